@@ -1,0 +1,1 @@
+"""Hold the statics of a cable robot against MuJoCo and against measurements."""

@@ -1,0 +1,368 @@
+"""Write the shipped robots' MJCF files, or check that they are what this script writes.
+
+    python models/make_models.py            writes models/<robot>/<robot>.xml
+    python models/make_models.py --check    exit status 1 and the names of those that differ
+
+Numbers are written by ``repr``, so that a file holds the very floats computed here; where each
+comes from is in models/README.md.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+VECTRAN = 3000.0  # k_c = E S [N], the cable that the shipped files carry
+
+Vector = tuple[float, float, float]
+
+# Paper, Table II: (A_i in the base frame, B_i in the platform frame) [m].
+# A4 is printed as (0.08, 0.04, 0.485), the same point as A1: a misprint, see docs/misprints.md.
+COGIRO: tuple[tuple[Vector, Vector], ...] = (
+    ((0.08, 0.04, 0.485), (0.04, -0.03, 0.018)),
+    ((0.04, 0.08, 0.485), (-0.0515, 0.022, -0.018)),
+    ((0.04, 0.42, 0.485), (-0.0515, -0.022, 0.018)),
+    ((0.08, 0.46, 0.485), (0.04, 0.03, -0.018)),
+    ((0.72, 0.46, 0.485), (-0.04, 0.03, 0.018)),
+    ((0.76, 0.42, 0.485), (0.0515, -0.022, -0.018)),
+    ((0.76, 0.08, 0.485), (0.0515, 0.022, 0.018)),
+    ((0.72, 0.04, 0.485), (-0.04, -0.03, -0.018)),
+)
+PARALLEL: tuple[tuple[Vector, Vector], ...] = (
+    ((0.04, 0.04, 0.486), (-0.0515, -0.022, 0.018)),
+    ((0.04, 0.04, 0.450), (-0.0515, -0.022, -0.018)),
+    ((0.04, 0.46, 0.486), (-0.0515, 0.022, 0.018)),
+    ((0.04, 0.46, 0.450), (-0.0515, 0.022, -0.018)),
+    ((0.76, 0.46, 0.486), (0.0515, 0.022, 0.018)),
+    ((0.76, 0.46, 0.450), (0.0515, 0.022, -0.018)),
+    ((0.76, 0.04, 0.486), (0.0515, -0.022, 0.018)),
+    ((0.76, 0.04, 0.450), (0.0515, -0.022, -0.018)),
+)
+# The planar robots' dimensions are ours, the paper gives none: see models/README.md.
+PLANAR_TWO_CABLE: tuple[tuple[Vector, Vector], ...] = (
+    ((0.0, 0.0, 1.0), (-0.1, 0.0, 0.0)),
+    ((1.0, 0.0, 1.0), (0.1, 0.0, 0.0)),
+)
+PLANAR_VERTICAL: tuple[tuple[Vector, Vector], ...] = (
+    ((0.04, 0.0, 0.486), (-0.0515, 0.0, 0.018)),
+    ((0.04, 0.0, 0.450), (-0.0515, 0.0, -0.018)),
+    ((0.76, 0.0, 0.486), (0.0515, 0.0, 0.018)),
+    ((0.76, 0.0, 0.450), (0.0515, 0.0, -0.018)),
+)
+PLANAR_HORIZONTAL: tuple[tuple[Vector, Vector], ...] = (
+    ((0.04, 0.0, 0.486), (-0.0515, 0.0, 0.018)),
+    ((0.143, 0.0, 0.486), (0.0515, 0.0, 0.018)),
+    ((0.657, 0.0, 0.486), (-0.0515, 0.0, 0.018)),
+    ((0.76, 0.0, 0.486), (0.0515, 0.0, 0.018)),
+)
+
+
+@dataclass(frozen=True)
+class Model:
+    """One robot to write.
+
+    Attributes:
+        name: of the folder, the file and the MJCF model.
+        title: one line for the file's comment.
+        cables: (exit point, anchor point) of each [m].
+        reference: position of the platform in the reference pose, unturned [m].
+        box: edges of the platform [m].
+        frame: edges of the frame [m]; planar robots have none in depth.
+        planar: moves in the x-z plane only.
+        mass: of the platform [kg].
+        bar: edge of the frame's square profile [m].
+    """
+
+    name: str
+    title: str
+    cables: tuple[tuple[Vector, Vector], ...]
+    reference: Vector = (0.4, 0.25, 0.15)
+    box: Vector = (0.102, 0.044, 0.036)
+    frame: Vector = (0.80, 0.50, 0.50)
+    planar: bool = False
+    mass: float = 0.4
+    bar: float = 0.02
+
+
+MODELS = (
+    Model("demobot_cogiro", "DemoBot, eight cables in the Cogiro configuration", COGIRO),
+    Model("demobot_parallel", "DemoBot, eight cables in the parallel configuration", PARALLEL),
+    Model(
+        "planar_two_cable",
+        "Bar on two cables, under-actuated, in the x-z plane",
+        PLANAR_TWO_CABLE,
+        reference=(0.5, 0.0, 0.5),
+        box=(0.2, 0.02, 0.02),
+        frame=(1.04, 0.0, 1.02),
+        planar=True,
+    ),
+    Model(
+        "planar_vertical",
+        "Four cables, vertical parallelograms, in the x-z plane",
+        PLANAR_VERTICAL,
+        reference=(0.4, 0.0, 0.15),
+        frame=(0.80, 0.0, 0.50),
+        planar=True,
+    ),
+    Model(
+        "planar_horizontal",
+        "Four cables, horizontal parallelograms, in the x-z plane",
+        PLANAR_HORIZONTAL,
+        reference=(0.4, 0.0, 0.15),
+        frame=(0.80, 0.0, 0.50),
+        planar=True,
+    ),
+)
+
+
+def exact_spring(k_c: float, length: float) -> tuple[float, float]:
+    """Stiffness [N/m] and rest length [m] whose product, rounded, is k_c [N] to the last digit.
+
+    The quotient k_c / length alone can miss by a rounding, so its neighbours are tried. The rest
+    length is two roundings (2e-16 m) short of the straight length, or what it takes: at exactly
+    that length MuJoCo's viewer draws the cable as a catenary whose points are not numbers.
+    """
+    for step in range(-2, -400, -1):
+        rest = _neighbour(length, step)
+        for nudge in (0, -1, 1):
+            stiffness = _neighbour(k_c / rest, nudge)
+            if stiffness * rest == k_c:
+                return stiffness, rest
+    raise ValueError(f"no two floats near {k_c / length!r} and {length!r} multiply to {k_c!r}")
+
+
+def _neighbour(x: float, steps: int) -> float:
+    for _ in range(abs(steps)):
+        x = math.nextafter(x, math.copysign(math.inf, steps))
+    return x
+
+
+def box_inertia(mass: float, edges: Vector) -> Vector:
+    """Principal moments of a homogeneous box about its centre [kg m^2]."""
+    a, b, c = edges
+    return (
+        mass / 12.0 * (b * b + c * c),
+        mass / 12.0 * (a * a + c * c),
+        mass / 12.0 * (a * a + b * b),
+    )
+
+
+def numbers(*values: float) -> str:
+    """Floats as MJCF wants them, by repr; minus zero would only puzzle a reader."""
+    return " ".join(repr(float(v) + 0.0) for v in values)
+
+
+def write_mjcf(model: Model) -> str:
+    """The whole MJCF file of a robot."""
+    lines = [
+        *_head(model),
+        "  <worldbody>",
+        *_surroundings(model),
+        *_frame(model),
+        *_exit_points(model),
+        *_platform(model),
+        "  </worldbody>",
+        *_tendons(model),
+        "</mujoco>",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _head(model: Model) -> Iterator[str]:
+    yield f'<mujoco model="{model.name}">'
+    yield f"  <!-- {model.title}. Written by models/make_models.py; numbers: models/README.md -->"
+    yield '  <compiler angle="radian" autolimits="true"/>'
+    yield '  <option gravity="0 0 -9.81" timestep="0.001" integrator="discrete"/>'
+    extent = 0.75 * math.hypot(*model.frame)
+    yield f'  <statistic center="{numbers(*_middle(model))}" extent="{numbers(round(extent, 3))}"/>'
+    yield from _LOOKS
+
+
+_LOOKS = """\
+  <visual>
+    <global offwidth="1920" offheight="1080" azimuth="112" elevation="-11"/>
+    <headlight ambient="0.45 0.45 0.45" diffuse="0.30 0.30 0.30" specular="0.1 0.1 0.1"/>
+    <map znear="0.01"/>
+    <quality shadowsize="4096" offsamples="8"/>
+  </visual>
+  <asset>
+    <texture name="sky" type="skybox" builtin="gradient" rgb1="0.93 0.95 0.97" rgb2="0.6 0.68 0.76"\
+ width="256" height="1536"/>
+    <texture name="floor" type="2d" builtin="checker" rgb1="0.86 0.87 0.88" rgb2="0.80 0.81 0.83"\
+ width="256" height="256"/>
+    <material name="floor" texture="floor" texrepeat="10 10" texuniform="true" reflectance="0.05"/>
+    <material name="aluminium" rgba="0.56 0.58 0.61 1" specular="0.6" shininess="0.4"/>
+    <material name="bracket" rgba="0.20 0.22 0.25 1" specular="0.2" shininess="0.2"/>
+    <material name="platform" rgba="0.13 0.35 0.62 1" specular="0.4" shininess="0.5"/>
+  </asset>
+  <default>
+    <!-- geoms are looks only: no contact, no mass -->
+    <geom contype="0" conaffinity="0" mass="0" group="1"/>
+    <default class="exit"><site size="0.005" rgba="0.85 0.16 0.14 1"/></default>
+    <default class="anchor"><site size="0.004" rgba="0.98 0.75 0.12 1"/></default>
+  </default>""".splitlines()
+
+
+def _middle(model: Model) -> Vector:
+    (x, y, z), inset = model.frame, _inset(model)
+    return (0.5 * x - inset, 0.5 * y, 0.5 * z - 0.03)
+
+
+def _inset(model: Model) -> float:
+    """How far left of the base frame's origin the frame's outer edge stands [m]."""
+    return 0.02 if model.name == "planar_two_cable" else 0.0
+
+
+def _surroundings(model: Model) -> Iterator[str]:
+    x, y, _ = _middle(model)
+    above = 2.0 * model.frame[2]
+    lamp = [round(v, 3) for v in (x - 0.3, y - 0.5, above + 0.8)]
+    yield f'    <light name="lamp" pos="{numbers(*lamp)}" dir="0.3 0.5 -1.8" cutoff="60"'
+    yield '     diffuse="0.60 0.60 0.60" specular="0.2 0.2 0.2"/>'
+    yield f'    <geom name="floor" type="plane" pos="{numbers(x, y, 0.0)}" size="2 2 0.1"'
+    yield '     material="floor"/>'
+    yield f'    <camera name="front" {_camera(model, azimuth=90.0, elevation=-8.0)}/>'
+    yield f'    <camera name="corner" {_camera(model, azimuth=112.0, elevation=-11.0)}/>'
+
+
+def _camera(model: Model, *, azimuth: float, elevation: float) -> str:
+    """Position and axes of a camera that looks at the middle of the robot; angles [deg]."""
+    az, el = math.radians(azimuth), math.radians(elevation)
+    ahead = (math.cos(el) * math.cos(az), math.cos(el) * math.sin(az), math.sin(el))
+    up = (-math.sin(el) * math.cos(az), -math.sin(el) * math.sin(az), math.cos(el))
+    distance = 1.35 * math.hypot(*model.frame)
+    place = [round(m - distance * a, 4) for m, a in zip(_middle(model), ahead, strict=True)]
+    axes = [round(v, 6) for v in (math.sin(az), -math.cos(az), 0.0, *up)]
+    return f'pos="{numbers(*place)}" xyaxes="{numbers(*axes)}"'
+
+
+def _frame(model: Model) -> Iterator[str]:
+    """The frame's bars, inside its outer edges; a planar robot's is a portal behind the plane."""
+    (x, y, z), half = model.frame, 0.5 * model.bar
+    left, right = half - _inset(model), x - half - _inset(model)
+    depths = (0.04,) if model.planar else (half, y - half)
+    for d in depths:
+        for side in (left, right):
+            yield _bar((side, d, 0.0), (side, d, z), half)
+        for height in (z - half,) if model.planar else (half, z - half):
+            yield _bar((left + half, d, height), (right - half, d, height), half)
+    if model.planar:
+        for side in (left, right):
+            yield _bar((side, 0.04 - 0.1, half), (side, 0.04 + 0.1, half), half)
+        return
+    for side in (left, right):
+        for height in (half, z - half):
+            yield _bar((side, model.bar, height), (side, y - model.bar, height), half)
+
+
+def _bar(start: Vector, end: Vector, half: float) -> str:
+    ends = [round(v, 6) for v in (*start, *end)]
+    return (
+        f'    <geom type="box" fromto="{numbers(*ends)}" size="{numbers(half)}" '
+        'material="aluminium"/>'
+    )
+
+
+def _exit_points(model: Model) -> Iterator[str]:
+    yield from _brackets(model)
+    for i, (exit_point, _) in enumerate(model.cables, start=1):
+        yield f'    <site name="A{i}" class="exit" pos="{numbers(*exit_point)}"/>'
+
+
+def _brackets(model: Model) -> Iterator[str]:
+    """What holds the exit points: a plate a corner and a pin a point, or a pin to the portal."""
+    x, y, z = model.frame
+    if not model.planar:
+        for px in (0.055, x - 0.055):
+            for py in (0.055, y - 0.055):
+                yield (
+                    f'    <geom type="box" pos="{numbers(px, py, z - 0.006)}" '
+                    'size="0.045 0.045 0.0015" material="bracket"/>'
+                )
+    for exit_point in dict.fromkeys(a for a, _ in model.cables):
+        ax, ay, az = exit_point
+        end = (ax, 0.04, az) if model.planar else (ax, ay, z - 0.006)
+        yield (
+            f'    <geom type="capsule" fromto="{numbers(ax, ay, az, *end)}" '
+            'size="0.0025" material="bracket"/>'
+        )
+
+
+def _platform(model: Model) -> Iterator[str]:
+    yield f'    <body name="platform" pos="{numbers(*model.reference)}">'
+    if model.planar:
+        yield '      <joint name="x" type="slide" axis="1 0 0"/>'
+        yield '      <joint name="z" type="slide" axis="0 0 1"/>'
+        yield '      <joint name="tilt" type="hinge" axis="0 1 0"/>'
+    else:
+        yield "      <freejoint/>"
+    inertia = numbers(*box_inertia(model.mass, model.box))
+    yield f'      <inertial pos="0 0 0" mass="{numbers(model.mass)}" diaginertia="{inertia}"/>'
+    halves = numbers(*(0.5 * edge for edge in model.box))
+    yield f'      <geom name="platform" type="box" size="{halves}" material="platform"/>'
+    yield from _anchor_pins(model)
+    for i, (_, anchor) in enumerate(model.cables, start=1):
+        yield f'      <site name="B{i}" class="anchor" pos="{numbers(*anchor)}"/>'
+    yield "    </body>"
+
+
+def _anchor_pins(model: Model) -> Iterator[str]:
+    """A pin to each anchor point that stands well clear of the platform's box."""
+    for _, anchor in model.cables:
+        inside = [
+            max(-0.5 * edge, min(0.5 * edge, b)) for b, edge in zip(anchor, model.box, strict=True)
+        ]
+        if math.dist(anchor, inside) > 0.002:
+            yield (
+                f'      <geom type="capsule" fromto="{numbers(*inside, *anchor)}" '
+                'size="0.002" material="bracket"/>'
+            )
+
+
+def _tendons(model: Model) -> Iterator[str]:
+    yield "  <tendon>"
+    for i, (a, b) in enumerate(model.cables, start=1):
+        on_base = [t + p for t, p in zip(model.reference, b, strict=True)]
+        stiffness, rest = exact_spring(VECTRAN, math.dist(a, on_base))
+        yield (
+            f'    <spatial name="cable{i}" width="0.0012" rgba="0.10 0.12 0.14 1" '
+            f'springlength="0 {rest!r}" stiffness="{stiffness!r}">'
+        )
+        yield f'      <site site="A{i}"/><site site="B{i}"/>'
+        yield "    </spatial>"
+    yield "  </tendon>"
+
+
+def main(arguments: list[str]) -> int:
+    """Write or check every model; the exit status."""
+    if arguments not in ([], ["--check"]):
+        print(f"expected no argument or --check, got: {' '.join(arguments)}", file=sys.stderr)
+        return 2
+    differing = 0
+    for model in MODELS:
+        path, text = HERE / model.name / f"{model.name}.xml", write_mjcf(model)
+        if path.is_file() and path.read_text(encoding="utf-8") == text:
+            continue
+        differing += 1
+        if arguments:
+            print(f"{path}: is not what make_models.py writes; run it without --check")
+        else:
+            _write(path, text)
+            print(f"{path}: written")
+    return 1 if arguments and differing else 0
+
+
+def _write(path: Path, text: str) -> None:
+    path.parent.mkdir(exist_ok=True)
+    part = path.with_suffix(".part")
+    part.write_text(text, encoding="utf-8", newline="\n")
+    os.replace(part, path)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
