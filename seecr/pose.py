@@ -1,0 +1,116 @@
+"""Poses and rotations as plain arrays; leading axes are batch.
+
+A pose is ``(..., 7)``: position x y z [m] in the base frame, then a unit quaternion, scalar
+first, that takes platform coordinates to base coordinates (``quat_wxyz`` of
+``R_world_platform``). A small change of a pose is ``(..., 6)``: translation [m] over rotation
+vector [rad], both in the base frame, rotations multiplied from the left:
+``R_new = exp(rotvec) R_old``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+# Below this angle the series of sin(x)/x are exact to double precision.
+_SMALL_ANGLE = 1e-4
+
+
+def quat_multiply(a: Array, b: Array) -> Array:
+    """Hamilton product a b of quaternions (..., 4), scalar first."""
+    a, b = np.asarray(a, float), np.asarray(b, float)
+    aw, av, bw, bv = a[..., :1], a[..., 1:], b[..., :1], b[..., 1:]
+    scalar = aw * bw - np.sum(av * bv, axis=-1, keepdims=True)
+    return np.concatenate([scalar, aw * bv + bw * av + np.cross(av, bv)], axis=-1)
+
+
+def quat_conjugate(quat_wxyz: Array) -> Array:
+    """Inverse rotation of unit quaternions (..., 4)."""
+    return np.asarray(quat_wxyz, float) * np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def quat_rotate(quat_wxyz: Array, vectors: Array) -> Array:
+    """Rotate vectors (..., 3) by unit quaternions (..., 4)."""
+    q, v = np.asarray(quat_wxyz, float), np.asarray(vectors, float)
+    twice = 2.0 * np.cross(q[..., 1:], v)
+    return v + q[..., :1] * twice + np.cross(q[..., 1:], twice)
+
+
+def quat_to_matrix(quat_wxyz: Array) -> Array:
+    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
+    q = np.asarray(quat_wxyz, float)
+    columns = [quat_rotate(q, axis) for axis in np.eye(3)]
+    return np.stack(columns, axis=-1)
+
+
+def matrix_to_quat(rotation: Array) -> Array:
+    """Unit quaternions (..., 4), scalar first and not negative, of rotation matrices."""
+    from scipy.spatial.transform import Rotation
+
+    matrix = np.asarray(rotation, float)
+    xyzw = Rotation.from_matrix(matrix.reshape(-1, 3, 3)).as_quat(canonical=True)
+    return np.roll(xyzw, 1, axis=-1).reshape((*matrix.shape[:-2], 4))
+
+
+def quat_from_rotvec(rotvec: Array) -> Array:
+    """Unit quaternions (..., 4) of rotation vectors (..., 3) [rad], exact also near zero."""
+    v = np.asarray(rotvec, float)
+    angle = np.linalg.norm(v, axis=-1, keepdims=True)
+    # np.sinc(x) = sin(pi x)/(pi x): sin(angle/2)/angle without a division by zero.
+    half = 0.5 * np.sinc(angle / (2.0 * np.pi))
+    return np.concatenate([np.cos(angle / 2.0), half * v], axis=-1)
+
+
+def rotvec_from_quat(quat_wxyz: Array) -> Array:
+    """Rotation vectors (..., 3) [rad], of length at most pi, of unit quaternions (..., 4)."""
+    q = np.asarray(quat_wxyz, float)
+    q = np.where(q[..., :1] < 0.0, -q, q)
+    sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
+    angle = 2.0 * np.arctan2(sine, q[..., :1])
+    safe = np.where(sine < _SMALL_ANGLE, 1.0, sine)
+    # Series of 2 asin(s)/s about zero; the next term is below 1e-17 here.
+    factor = np.where(sine < _SMALL_ANGLE, 2.0 + sine**2 / 3.0, angle / safe)
+    return factor * q[..., 1:]
+
+
+def quat_from_rxyz(angles_rad: Array) -> Array:
+    """Unit quaternions of angles (..., 3) [rad] with R = Rx(rx) Ry(ry) Rz(rz)."""
+    angles = np.asarray(angles_rad, float)
+    parts = []
+    for axis in range(3):
+        rotvec = np.zeros_like(angles)
+        rotvec[..., axis] = angles[..., axis]
+        parts.append(quat_from_rotvec(rotvec))
+    return quat_multiply(quat_multiply(parts[0], parts[1]), parts[2])
+
+
+def rxyz_from_quat(quat_wxyz: Array) -> Array:
+    """Angles (..., 3) [rad] with R = Rx(rx) Ry(ry) Rz(rz); ry within +-pi/2."""
+    R = quat_to_matrix(quat_wxyz)
+    ry = np.arcsin(np.clip(R[..., 0, 2], -1.0, 1.0))
+    rx = np.arctan2(-R[..., 1, 2], R[..., 2, 2])
+    rz = np.arctan2(-R[..., 0, 1], R[..., 0, 0])
+    return np.stack([rx, ry, rz], axis=-1)
+
+
+def pose_difference(pose_a: Array, pose_b: Array) -> Array:
+    """What takes pose b to pose a, (..., 6): t_a - t_b [m] over log(R_a R_b^T) [rad]."""
+    a, b = np.asarray(pose_a, float), np.asarray(pose_b, float)
+    turn = quat_multiply(a[..., 3:], quat_conjugate(b[..., 3:]))
+    return np.concatenate([a[..., :3] - b[..., :3], rotvec_from_quat(turn)], axis=-1)
+
+
+def pose_add(pose: Array, change: Array) -> Array:
+    """Apply a change (..., 6) to poses (..., 7); inverse of :func:`pose_difference`."""
+    pose, change = np.asarray(pose, float), np.asarray(change, float)
+    quat = quat_multiply(quat_from_rotvec(change[..., 3:]), pose[..., 3:])
+    quat = quat / np.linalg.norm(quat, axis=-1, keepdims=True)
+    return np.concatenate([pose[..., :3] + change[..., :3], quat], axis=-1)
+
+
+def transform_points(poses: Array, points: Array) -> Array:
+    """Base-frame coordinates (..., k, 3) of platform points (k, 3) at poses (..., 7)."""
+    poses = np.asarray(poses, float)
+    return poses[..., None, :3] + quat_rotate(poses[..., None, 3:], np.asarray(points, float))

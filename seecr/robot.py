@@ -1,0 +1,156 @@
+"""The robot as numbers: points, cables, load, and how the platform may move."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from seecr.errors import InputError, RobotError
+from seecr.pose import Array, transform_points
+
+IDENTITY_POSE = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """One slide or hinge joint of a platform that may not move freely.
+
+    Attributes:
+        kind: ``"slide"`` or ``"hinge"``.
+        name: as in the MJCF.
+        axis: (3,) unit vector in the base frame at the reference pose.
+        point: (3,) [m] a point of the axis, base frame at the reference pose.
+    """
+
+    kind: str
+    name: str
+    axis: Array
+    point: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A platform on elastic cables. Arrays are read-only; use ``dataclasses.replace``.
+
+    Attributes:
+        name: what people call it.
+        exit_points: A_i in the base frame, (m, 3) [m].
+        anchor_points: B_i in the platform frame, (m, 3) [m].
+        ea: k_c = E S of each cable, (m,) [N] (paper, eq 10).
+        rest_lengths: of the cables at the reference pose, (m,) [m].
+        mass: of the platform [kg].
+        centre_of_mass: in the platform frame, (3,) [m].
+        gravity: (3,) [m/s^2] in the base frame.
+        reference_pose: (7,) where the winches were zeroed.
+        joints: in the order of the chain; empty for a free platform.
+        cable_names: m names.
+        source: the file it was read from.
+    """
+
+    name: str
+    exit_points: Array
+    anchor_points: Array
+    ea: Array
+    rest_lengths: Array
+    mass: float
+    centre_of_mass: Array = field(default_factory=lambda: np.zeros(3))
+    gravity: Array = field(default_factory=lambda: np.array([0.0, 0.0, -9.81]))
+    reference_pose: Array = field(default_factory=lambda: IDENTITY_POSE.copy())
+    joints: tuple[Joint, ...] = ()
+    cable_names: tuple[str, ...] = ()
+    source: Path | None = None
+
+    def __post_init__(self) -> None:
+        m = np.shape(self.exit_points)[0]
+        shapes = {
+            "exit_points": (m, 3),
+            "anchor_points": (m, 3),
+            "ea": (m,),
+            "rest_lengths": (m,),
+            "centre_of_mass": (3,),
+            "gravity": (3,),
+            "reference_pose": (7,),
+        }
+        for name, shape in shapes.items():
+            value = np.array(getattr(self, name), dtype=float)
+            if value.shape != shape:
+                raise InputError(f"robot {self.name}: {name} must be {shape}, got {value.shape}")
+            if not np.all(np.isfinite(value)):
+                raise InputError(f"robot {self.name}: {name} holds a number that is not finite")
+            value.flags.writeable = False
+            object.__setattr__(self, name, value)
+        if not self.cable_names:
+            object.__setattr__(self, "cable_names", tuple(f"cable{i + 1}" for i in range(m)))
+        self._check_values()
+
+    def _check_values(self) -> None:
+        if self.n_cables == 0:
+            raise RobotError(f"robot {self.name}: expected at least one cable, got none")
+        for i, name in enumerate(self.cable_names):
+            if self.ea[i] <= 0:
+                raise RobotError(
+                    f"robot {self.name}: {name} has stiffness {self.ea[i]:g} N; "
+                    "expected stiffness x rest length above zero"
+                )
+            if self.rest_lengths[i] <= 0:
+                raise RobotError(
+                    f"robot {self.name}: {name} has rest length {self.rest_lengths[i]:g} m; "
+                    "expected a positive length"
+                )
+        if not self.mass >= 0:
+            raise RobotError(f"robot {self.name}: mass must not be negative, got {self.mass:g} kg")
+        short = self.nominal_lengths(self.reference_pose[None])[0] < 1e-9 * self.length
+        if np.any(short):
+            name = self.cable_names[int(np.argmax(short))]
+            raise RobotError(
+                f"robot {self.name}: {name} has its anchor point on its exit point at the "
+                "reference pose; expected them apart"
+            )
+
+    @property
+    def n_cables(self) -> int:
+        """Number of cables m."""
+        return len(self.exit_points)
+
+    @property
+    def n_dof(self) -> int:
+        """Degrees of freedom of the platform: 6 when free, else one a joint."""
+        return len(self.joints) or 6
+
+    @property
+    def weight(self) -> float:
+        """Weight of the platform [N]."""
+        return float(self.mass * np.linalg.norm(self.gravity))
+
+    @cached_property
+    def length(self) -> float:
+        """The robot's own length [m]: it weighs newton-metres against newtons.
+
+        Half the largest distance of two anchor points, so that a torque of (weight x length)
+        is what the cables can balance by moving the weight from one anchor to another; a
+        platform with one anchor point takes a hundredth of its longest cable instead.
+        """
+        b = self.anchor_points
+        reach = 0.5 * float(np.max(np.linalg.norm(b[:, None] - b[None], axis=-1)))
+        floor = 0.01 * float(
+            np.max(np.linalg.norm(self.exit_points - self.reference_pose[:3], axis=-1))
+        )
+        return max(reach, floor)
+
+    def nominal_lengths(self, poses: Array) -> Array:
+        """Straight lengths |A_i - (t + R B_i)| at poses (n, 7), as (n, m) [m] (eqs 1, 2)."""
+        anchors = transform_points(np.asarray(poses, float), self.anchor_points)
+        return np.linalg.norm(self.exit_points - anchors, axis=-1)
+
+    def commanded_lengths(self, poses: Array) -> Array:
+        """Rest lengths the winches pay out for commanded poses (n, 7), as (n, m) [m].
+
+        The rest lengths at the reference pose, moved by the difference of straight lengths.
+        Where the MJCF's rest lengths are the straight lengths at the reference pose, as in
+        the paper (step 3), these are the straight lengths at the commanded pose.
+        """
+        offset = self.rest_lengths - self.nominal_lengths(self.reference_pose[None])[0]
+        return self.nominal_lengths(poses) + offset

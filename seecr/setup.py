@@ -1,0 +1,197 @@
+"""What the statics uses at each pose, before it is solved: the thing that effects edit.
+
+A :class:`Setup` starts as the plain robot of the paper. Effects change its numbers; every
+field's null leaves the plain robot, bit for bit. Arrays have a leading axis of n rows where
+the number may differ from row to row; fields that belong to the robot are per cable or single.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from seecr.errors import InputError
+from seecr.pose import Array, quat_rotate, transform_points
+from seecr.robot import Robot
+
+
+@dataclass(frozen=True, eq=False)
+class Commands:
+    """What the robot was told, row by row, in time order within a run.
+
+    Attributes:
+        pose: (n, 7) commanded poses; for lengths, where the solver starts from.
+        lengths: (n, m) [m] commanded rest lengths, or None.
+        run: (n,) int, number of the continuous motion a row belongs to.
+        time: (n,) [s] or None.
+        temperature: (n,) [deg C] or None.
+    """
+
+    pose: Array
+    lengths: Array | None = None
+    run: Array | None = None
+    time: Array | None = None
+    temperature: Array | None = None
+
+    def __len__(self) -> int:
+        return len(self.pose)
+
+
+@dataclass(eq=False)
+class Setup:
+    """Numbers of a batch of rows; see the module's text.
+
+    Attributes:
+        robot: as described, without effects.
+        commands: what was commanded.
+        exit_points, anchor_points: (m, 3) [m] where they really are.
+        zero_pose: (7,) where the platform really was when the winches were zeroed.
+        pulley_radius: (m,) [m].
+        length_gain: (m,) relative error of the length a winch pays out.
+        extra_length: (n, m) [m] paid out beyond the command.
+        ea: (m,) [N].
+        quadratic, cubic: (m,) of the elastic law.
+        winch_side: (m,) [m] elastic cable behind the exit point.
+        compliance: (m,) [m/N] of the exit points.
+        cable_weight: (m,) [N/m].
+        friction: (m,) capstan exponent at the exit point.
+        hysteresis, hysteresis_strain: (m,) amplitude [N] and strain of Dahl's model.
+        creep, creep_time: (m,) part of the elastic strain that creeps, time constant [s].
+        laws: tension a user's effect adds, as functions of strain (n, m) giving (n, m) [N].
+        mass: [kg]; centre_of_mass: (3,) [m]; gravity: (3,) [m/s^2].
+        wrench: (n, 6) external force [N] at the platform origin and moment [N m], base frame.
+    """
+
+    robot: Robot
+    commands: Commands
+    exit_points: Array
+    anchor_points: Array
+    zero_pose: Array
+    pulley_radius: Array
+    length_gain: Array
+    extra_length: Array
+    ea: Array
+    quadratic: Array
+    cubic: Array
+    winch_side: Array
+    compliance: Array
+    cable_weight: Array
+    friction: Array
+    hysteresis: Array
+    hysteresis_strain: Array
+    creep: Array
+    creep_time: Array
+    mass: float
+    centre_of_mass: Array
+    gravity: Array
+    wrench: Array
+    laws: list[Callable[[Array], Array]] = field(default_factory=list)
+
+    @property
+    def commanded_change(self) -> Array:
+        """Length [m] the winches were told to pay out since they were zeroed, (n, m).
+
+        For commands in lengths, which are absolute, the lengths themselves.
+        """
+        if self.commands.lengths is not None:
+            return self.commands.lengths
+        robot = self.robot
+        reference = robot.nominal_lengths(robot.reference_pose[None])
+        return robot.nominal_lengths(self.commands.pose) - reference
+
+    def rest_lengths(self) -> Array:
+        """Rest lengths really paid out, (n, m) [m].
+
+        At the reference pose the winches were zeroed with the cables as they really ran there;
+        elsewhere the paid-out length has moved by the commanded change (contracts: reference
+        pose). Lengths commanded as such are absolute.
+        """
+        paid = self.commanded_change * (1.0 + self.length_gain) + self.extra_length
+        if self.commands.lengths is not None:
+            return paid
+        robot = self.robot
+        pretension = robot.rest_lengths - robot.nominal_lengths(robot.reference_pose[None])[0]
+        return self.geometric_lengths(self.zero_pose[None]) + pretension + paid
+
+    def geometric_lengths(self, poses: Array) -> Array:
+        """Lengths (k, m) [m] of straight cables over their pulleys at poses (k, 7)."""
+        anchors = transform_points(poses, self.anchor_points)
+        reach = anchors - self.exit_points
+        straight = np.linalg.norm(reach, axis=-1)
+        if not np.any(self.pulley_radius):
+            return straight
+        up = upwards(self.robot)
+        rise = reach @ up
+        across = np.linalg.norm(reach - rise[..., None] * up, axis=-1)
+        r = self.pulley_radius
+        free = np.sqrt(np.maximum((across - r) ** 2 + rise**2 - r**2, 0.0))
+        psi = np.arctan2(rise, across - r) + np.arctan2(free, r)
+        return np.where(r > 0.0, free + r * (np.pi - psi), straight)
+
+    @property
+    def has_history(self) -> bool:
+        """Whether a row depends on the rows before it."""
+        return bool(np.any(self.hysteresis) or np.any(self.friction) or np.any(self.creep))
+
+
+def upwards(robot: Robot) -> Array:
+    """Unit vector (3,) against the robot's gravity; base z where there is none.
+
+    It is the axis on which pulleys swivel. The frame carries the pulleys, so a tilt of
+    gravity against the frame does not turn it.
+    """
+    g = np.linalg.norm(robot.gravity)
+    return -robot.gravity / g if g > 0 else np.array([0.0, 0.0, 1.0])
+
+
+def plain_setup(robot: Robot, commands: Commands, wrench: Array | None = None) -> Setup:
+    """The setup of the paper's plain robot for commands of n rows.
+
+    Args:
+        robot: the robot.
+        commands: n rows.
+        wrench: (6,) or (n, 6) external wrench; none by default.
+    """
+    n, m = len(commands), robot.n_cables
+    if wrench is None:
+        wrench = np.zeros(6)
+    wrench = np.asarray(wrench, float)
+    if wrench.shape not in ((6,), (n, 6)):
+        raise InputError(f"wrench must be (6,) or ({n}, 6), got {wrench.shape}")
+
+    def zeros() -> Array:
+        return np.zeros(m)
+
+    return Setup(
+        robot=robot,
+        commands=commands,
+        exit_points=robot.exit_points.copy(),
+        anchor_points=robot.anchor_points.copy(),
+        zero_pose=robot.reference_pose.copy(),
+        pulley_radius=zeros(),
+        length_gain=zeros(),
+        extra_length=np.zeros((n, m)),
+        ea=robot.ea.copy(),
+        quadratic=zeros(),
+        cubic=zeros(),
+        winch_side=zeros(),
+        compliance=zeros(),
+        cable_weight=zeros(),
+        friction=zeros(),
+        hysteresis=zeros(),
+        hysteresis_strain=np.ones(m),
+        creep=zeros(),
+        creep_time=np.ones(m),
+        mass=robot.mass,
+        centre_of_mass=robot.centre_of_mass.copy(),
+        gravity=robot.gravity.copy(),
+        wrench=np.broadcast_to(wrench, (n, 6)).copy(),
+    )
+
+
+def platform_points(setup: Setup, poses: Array) -> Array:
+    """Anchor points in the base frame, (k, m, 3) [m], at poses (k, 7)."""
+    turned = quat_rotate(poses[:, None, 3:], setup.anchor_points)
+    return poses[:, None, :3] + turned

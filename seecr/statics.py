@@ -1,0 +1,241 @@
+"""From a setup to the tables of the compiled loop, and what that loop says at given poses."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from seecr import cable_law, kernel
+from seecr.joints import values_of_pose
+from seecr.pose import Array, quat_conjugate, quat_multiply
+from seecr.robot import Robot
+from seecr.setup import Setup, upwards
+
+# Fewer poses than this are not worth a second thread.
+_CHUNK = 48
+
+
+@dataclass(eq=False)
+class Tables:
+    """The problem of n poses as the compiled loop reads it."""
+
+    cables: Array  # (n, m, N_COLUMNS)
+    load: Array  # (n, N_LOAD)
+    poses: Array  # (n, 7) commanded
+    screws: Array  # (n, d, 7) joints at the commanded pose; (n, 0, 7) for a free platform
+    length: float
+    scale: Array  # (n,) [N] that residuals are measured against
+    reach: Array  # (n,) [m] deviations beyond this are a fall
+    n_dof: int
+
+    def __len__(self) -> int:
+        return len(self.poses)
+
+
+@dataclass(eq=False)
+class Evaluation:
+    """What the loop fills: one row a pose."""
+
+    outcome: Array
+    count: Array
+    residual: Array
+    gradient: Array  # (n, d) [N], torques over the robot's length
+    hessian: Array  # (n, d, d) [N/m] in scaled coordinates
+    states: Array  # (n, m, N_STATE)
+    slopes: Array  # (n, m, d)
+    deviation: Array  # (n, 7)
+    values: Array  # (n, d) joint values less the commanded ones, hinges times length
+    guess: Array  # (n, m, 3) catenaries
+    energy: Array
+
+    @classmethod
+    def empty(cls, n: int, m: int, d: int) -> Evaluation:
+        deviation = np.zeros((n, 7))
+        deviation[:, 3] = 1.0
+        return cls(
+            outcome=np.zeros(n, dtype=np.int64),
+            count=np.zeros(n, dtype=np.int64),
+            residual=np.zeros(n),
+            gradient=np.zeros((n, d)),
+            hessian=np.zeros((n, d, d)),
+            states=np.zeros((n, m, cable_law.N_STATE)),
+            slopes=np.zeros((n, m, d)),
+            deviation=deviation,
+            values=np.zeros((n, d)),
+            guess=np.zeros((n, m, 3)),
+            energy=np.zeros(n),
+        )
+
+
+@lru_cache(maxsize=8)
+def _screws_of(robot: Robot, poses_bytes: bytes, n: int) -> Array:
+    if not robot.joints:
+        return np.zeros((n, 0, 7))
+    poses = np.frombuffer(poses_bytes).reshape(n, 7)
+    return values_of_pose(robot, poses)[1]
+
+
+def assemble(setup: Setup) -> Tables:
+    """The tables of a setup. History columns are left at their null."""
+    robot, commands = setup.robot, setup.commands
+    poses = np.ascontiguousarray(commands.pose)
+    n, m = len(poses), robot.n_cables
+    rest = setup.rest_lengths()
+    cables = np.zeros((n, m, cable_law.N_COLUMNS))
+    cables[..., cable_law.EXIT : cable_law.EXIT + 3] = setup.exit_points
+    cables[..., cable_law.ANCHOR : cable_law.ANCHOR + 3] = setup.anchor_points
+    cables[..., cable_law.REST] = rest
+    cables[..., cable_law.GAP] = _gap(setup, rest)
+    for column, values in (
+        (cable_law.EA, setup.ea),
+        (cable_law.QUADRATIC, setup.quadratic),
+        (cable_law.CUBIC, setup.cubic),
+        (cable_law.RADIUS, setup.pulley_radius),
+        (cable_law.COMPLIANCE, setup.compliance),
+        (cable_law.WINCH_SIDE, setup.winch_side),
+        (cable_law.WEIGHT, setup.cable_weight),
+        (cable_law.HYSTERESIS, setup.hysteresis),
+        (cable_law.HYSTERESIS_STRAIN, setup.hysteresis_strain),
+        (cable_law.FRICTION, setup.friction),
+    ):
+        cables[..., column] = values
+    load = np.zeros((n, kernel.N_LOAD))
+    load[:, kernel.FORCE_OF_WEIGHT : kernel.FORCE_OF_WEIGHT + 3] = setup.mass * setup.gravity
+    load[:, kernel.CENTRE_OF_MASS : kernel.CENTRE_OF_MASS + 3] = setup.centre_of_mass
+    load[:, kernel.EXTERNAL_FORCE : kernel.EXTERNAL_FORCE + 6] = setup.wrench
+    load[:, kernel.UP : kernel.UP + 3] = _hanging(setup)
+    return Tables(
+        cables=cables,
+        load=load,
+        poses=poses,
+        screws=_screws_of(robot, poses.tobytes(), n),
+        length=robot.length,
+        scale=_load_scale(setup),
+        reach=3.0 * (rest.max(axis=1) + np.abs(cables[..., cable_law.GAP]).max(axis=1)),
+        n_dof=robot.n_dof,
+    )
+
+
+def _gap(setup: Setup, rest: Array) -> Array:
+    """Geometric length at the commanded pose less the rest length, exactly 0 where equal."""
+    return setup.geometric_lengths(setup.commands.pose) - rest
+
+
+def _hanging(setup: Setup) -> Array:
+    """Vertical of the planes in which cables hang: gravity's, or the pulleys' own."""
+    g = np.linalg.norm(setup.gravity)
+    if g == 0.0 or np.any(setup.pulley_radius):
+        return upwards(setup.robot)
+    return -setup.gravity / g
+
+
+def _load_scale(setup: Setup) -> Array:
+    """Load [N] of each pose: weight, external force and moment over the robot's length."""
+    weight = setup.mass * np.linalg.norm(setup.gravity)
+    force = np.linalg.norm(setup.wrench[:, :3], axis=1)
+    moment = np.linalg.norm(setup.wrench[:, 3:], axis=1) / setup.robot.length
+    scale = weight + force + moment
+    # nothing loads the platform: measure against what a strain of 1e-3 would pull
+    return np.where(scale > 0.0, scale, 1e-3 * float(np.max(setup.ea)))
+
+
+def _chunks(n: int, threads: int) -> list[slice]:
+    parts = max(1, min(threads, n // _CHUNK))
+    edges = np.linspace(0, n, parts + 1).astype(int)
+    return [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+
+
+@lru_cache(maxsize=1)
+def _pool() -> ThreadPoolExecutor:
+    import os
+
+    return ThreadPoolExecutor(max_workers=os.cpu_count() or 1)
+
+
+def default_threads() -> int:
+    """As many threads as there are processors."""
+    import os
+
+    return os.cpu_count() or 1
+
+
+def descend(
+    tables: Tables,
+    start: Array | None = None,
+    limit: int = 400,
+    threads: int | None = None,
+    start_values: Array | None = None,
+) -> Evaluation:
+    """Bring every pose to rest; ``start`` (n, 7) are deviations, none by default."""
+    n, m = tables.cables.shape[:2]
+    out = Evaluation.empty(n, m, tables.n_dof)
+    starts = out.deviation.copy() if start is None else np.ascontiguousarray(start)
+    first = np.zeros((n, tables.n_dof)) if start_values is None else start_values
+    out.energy = np.full(n, np.nan)
+
+    def run(part: slice) -> None:
+        kernel.solve_batch(
+            tables.cables[part], tables.load[part], tables.poses[part], tables.screws[part],
+            starts[part], first[part], tables.length, tables.scale[part], 0.5 * tables.length,
+            tables.reach[part], limit, out.outcome[part], out.count[part], out.residual[part],
+            out.gradient[part], out.hessian[part], out.states[part], out.slopes[part],
+            out.deviation[part], out.values[part], out.guess[part],
+        )  # fmt: skip
+
+    _run(run, n, threads)
+    return out
+
+
+def evaluate(tables: Tables, at: Evaluation, threads: int | None = 1) -> Evaluation:
+    """Wrench, stiffness and energy at the deviations of ``at``; nothing is solved."""
+    n, m = tables.cables.shape[:2]
+    out = Evaluation.empty(n, m, tables.n_dof)
+    out.deviation[:] = at.deviation
+    out.values[:] = at.values
+    out.guess[:] = at.guess
+
+    def run(part: slice) -> None:
+        kernel.evaluate_batch(
+            tables.cables[part], tables.load[part], tables.poses[part], tables.screws[part],
+            out.deviation[part], out.values[part], tables.length, out.gradient[part],
+            out.hessian[part], out.states[part], out.slopes[part], out.energy[part],
+            out.guess[part],
+        )  # fmt: skip
+
+    _run(run, n, threads)
+    out.outcome = np.where(np.isinf(out.energy), kernel.CABLE_LAW, kernel.CONVERGED)
+    out.residual = residual_size(out.gradient) / tables.scale
+    return out
+
+
+def _run(run, n: int, threads: int | None) -> None:  # type: ignore[no-untyped-def]
+    parts = _chunks(n, default_threads() if threads is None else threads)
+    if len(parts) == 1:
+        run(parts[0])
+    else:
+        list(_pool().map(run, parts))
+
+
+def residual_size(gradient: Array) -> Array:
+    """Largest of force and torque over length, (n,) [N], of gradients (n, d)."""
+    if gradient.shape[1] == 6:
+        halves = np.linalg.norm(gradient.reshape(-1, 2, 3), axis=2)
+        return halves.max(axis=1)
+    return np.linalg.norm(gradient, axis=1)
+
+
+def platform_poses(tables: Tables, deviation: Array) -> Array:
+    """Poses (n, 7) of deviations (n, 7) from the commanded ones."""
+    quat = quat_multiply(deviation[:, 3:], tables.poses[:, 3:])
+    quat = quat / np.linalg.norm(quat, axis=1, keepdims=True)
+    return np.concatenate([tables.poses[:, :3] + deviation[:, :3], quat], axis=1)
+
+
+def deviations(tables: Tables, poses: Array) -> Array:
+    """Deviations (n, 7) of poses (n, 7) from the commanded ones."""
+    quat = quat_multiply(poses[:, 3:], quat_conjugate(tables.poses[:, 3:]))
+    quat = np.where(quat[:, :1] < 0.0, -quat, quat)
+    return np.concatenate([poses[:, :3] - tables.poses[:, :3], quat], axis=1)
