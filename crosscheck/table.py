@@ -1,0 +1,242 @@
+"""A file of rows and named columns, CSV or Parquet, as text with the place of each cell.
+
+Nothing here knows what a column means; what is wrong with a file or a cell is said with its
+line and column.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.errors import CrosscheckError, InputFileError
+from seecr.pose import Array
+
+EXPECTED_FILE = "expected a CSV file in UTF-8 with a header row and one row a resting pose"
+
+_PARQUET_MAGIC = b"PAR1"
+_BEGINNINGS = (
+    (b"\x89PNG", "a PNG picture"),
+    (b"\xff\xd8\xff", "a JPEG picture"),
+    (b"PK\x03\x04", "a zip archive or an Excel workbook"),
+    (b"\xd0\xcf\x11\xe0", "an Excel workbook"),
+    (b"%PDF", "a PDF"),
+    (b"\x1f\x8b", "a gzip archive"),
+    (b"\x89HDF", "an HDF5 file"),
+    (b"RRF", "a Rerun recording"),
+    (b"MATLAB", "a MATLAB file"),
+    (b"\xff\xfe", "UTF-16 text"),
+    (b"\xfe\xff", "UTF-16 text"),
+)
+_TEXT_BEGINNINGS = {"{": "JSON", "[": "JSON or TOML", "<": "XML, such as a robot's MJCF"}
+_SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars"}
+_NO_NUMBER = {"nan", "inf", "infinity", "na", "n/a", "#n/a", "null", "none", "-", "--"}
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Named columns of text cells.
+
+    Attributes:
+        path: the file.
+        names: of the columns, stripped, as in the header.
+        line: (n,) where each row begins, counted from 1.
+        header_line: where the header is; None where the file has no lines.
+        cells: stripped text of one column, by its number from 0.
+    """
+
+    path: Path
+    names: tuple[str, ...]
+    line: NDArray[np.int64]
+    header_line: int | None
+    cells: Callable[[int], list[str]]
+
+    def error(
+        self, text: str, *, row: int | None = None, column: str | None = None
+    ) -> InputFileError:
+        """Error at a row (counted from 0) or, without one, in the header."""
+        in_lines = self.header_line is not None
+        line = self.header_line if row is None else int(self.line[row])
+        word = "line" if in_lines else "row"
+        return InputFileError.at(self.path, text, line=line, column=column, line_word=word)
+
+    def numbers(self, index: int, *, blank_is_nan: bool) -> Array:
+        """Numbers (n,) of one column, as written; NaN for an empty cell where that is allowed."""
+        cells = self.cells(index)
+        try:
+            values = np.array([float(cell) if cell else math.nan for cell in cells])
+        except ValueError:
+            raise self._first_fault(index, cells, blank_is_nan) from None
+        blank = np.array([not cell for cell in cells])
+        odd = np.any(np.isfinite(values) == blank) or "_" in "".join(cells)
+        if odd or (np.any(blank) and not blank_is_nan):
+            raise self._first_fault(index, cells, blank_is_nan)
+        return values
+
+    def _first_fault(self, index: int, cells: Sequence[str], blank_is_nan: bool) -> InputFileError:
+        for row, cell in enumerate(cells):
+            fault = _cell_fault(cell, blank_is_nan)
+            if fault:
+                return self.error(fault, row=row, column=self.names[index])
+        raise AssertionError("numbers() found a fault that no cell has")
+
+
+def show(text: str) -> str:
+    """A cell or header for an error message: quoted, one line, not too long."""
+    return repr(text if len(text) <= 40 else text[:37] + "...")
+
+
+def read_table(path: Path) -> Table:
+    """Read a CSV or Parquet file (told apart by content, not by name).
+
+    Raises:
+        InputFileError: missing, empty, of another kind, not UTF-8, or rows that do not fit the
+            header.
+    """
+    data = _read_bytes(path)
+    if data.startswith(_PARQUET_MAGIC):
+        return _read_parquet(path)
+    return _read_csv(path, data)
+
+
+def _read_bytes(path: Path) -> bytes:
+    if path.is_dir():
+        raise InputFileError.at(path, f"is a folder; {EXPECTED_FILE}")
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise InputFileError.at(path, f"no such file; {EXPECTED_FILE}") from None
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InputFileError.at(path, f"cannot be read: {reason}; {EXPECTED_FILE}") from None
+
+
+def _decode(path: Path, data: bytes) -> str:
+    for beginning, kind in _BEGINNINGS:
+        if data.startswith(beginning):
+            raise InputFileError.at(path, f"is {kind}; {EXPECTED_FILE}, or Parquet")
+    if b"\0" in data:
+        raise InputFileError.at(path, f"is a binary file; {EXPECTED_FILE}, or Parquet")
+    try:
+        return data.decode("utf-8").removeprefix("\ufeff")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        text = (
+            f"byte 0x{data[error.start]:02X} (number {error.start + 1} of the file) is not UTF-8; "
+            "expected text in UTF-8; save the file again in that encoding"
+        )
+        raise InputFileError.at(path, text, line=line) from None
+
+
+def _read_csv(path: Path, data: bytes) -> Table:
+    numbered = [
+        (number, line)
+        for number, line in enumerate(io.StringIO(_decode(path, data), newline=""), start=1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    if not numbered:
+        raise InputFileError.at(path, f"is empty; {EXPECTED_FILE}")
+    _check_first_line(path, *numbered[0])
+    (header_line, header), *body = _csv_rows(path, numbered)
+    if not body:
+        raise InputFileError.at(
+            path, "has a header but no rows; expected one row a resting pose", line=header_line
+        )
+    _check_cell_counts(path, header_line, len(header), body)
+    return Table(
+        path=path,
+        names=tuple(name.strip() for name in header),
+        line=np.array([line for line, _ in body]),
+        header_line=header_line,
+        cells=lambda index: [row[index].strip() for _, row in body],
+    )
+
+
+def _check_first_line(path: Path, number: int, line: str) -> None:
+    kind = _TEXT_BEGINNINGS.get(line.lstrip()[0])
+    if kind:
+        raise InputFileError.at(path, f"looks like {kind}; {EXPECTED_FILE}", line=number)
+    for mark, word in _SEPARATORS.items():
+        if line.count(mark) > line.count(","):
+            text = f"expected commas between cells, came {word}; write 1.5,2.5 for two cells"
+            raise InputFileError.at(path, text, line=number)
+
+
+def _csv_rows(path: Path, numbered: list[tuple[int, str]]) -> list[tuple[int, list[str]]]:
+    reader = csv.reader((line for _, line in numbered), strict=True, skipinitialspace=True)
+    rows, first = [], 0
+    try:
+        for row in reader:
+            rows.append((numbered[first][0], row))
+            first = reader.line_num
+    except csv.Error as error:
+        text = f"cannot be split into cells: {error}; look for a quotation mark without its partner"
+        raise InputFileError.at(path, text, line=numbered[first][0]) from None
+    return rows
+
+
+def _check_cell_counts(
+    path: Path, header_line: int, n_columns: int, body: list[tuple[int, list[str]]]
+) -> None:
+    for line, row in body:
+        if len(row) != n_columns:
+            cells = "1 cell" if len(row) == 1 else f"{len(row)} cells"
+            text = f"expected {n_columns} cells as in the header (line {header_line}), came {cells}"
+            if len(row) > n_columns:
+                text += "; a decimal comma splits a number in two: write 1.5, not 1,5"
+            raise InputFileError.at(path, text, line=line)
+
+
+def _read_parquet(path: Path) -> Table:
+    try:
+        import pyarrow
+        from pyarrow import parquet
+    except ImportError:
+        raise CrosscheckError(
+            f"{path}: is Parquet, which needs pyarrow; pip install pyarrow, or save it as CSV"
+        ) from None
+    try:
+        content = parquet.read_table(path)
+    except (pyarrow.ArrowException, OSError) as error:
+        raise InputFileError.at(path, f"cannot be read as Parquet: {error}") from None
+    if content.num_rows == 0:
+        raise InputFileError.at(path, "has columns but no rows; expected one row a resting pose")
+    return Table(
+        path=path,
+        names=tuple(name.strip() for name in content.column_names),
+        line=np.arange(1, content.num_rows + 1),
+        header_line=None,
+        cells=lambda index: [
+            "" if value is None else str(value).strip()
+            for value in content.column(index).to_pylist()
+        ],
+    )
+
+
+def _cell_fault(cell: str, blank_is_nan: bool) -> str | None:
+    """What is wrong with a cell that should hold a number; None if nothing is."""
+    expected = "expected a number, or an empty cell where the reading is missing"
+    if not blank_is_nan:
+        expected = "expected a number in every row"
+    if not cell:
+        return None if blank_is_nan else f"{expected}, came an empty cell; fill it or drop the row"
+    if cell.lower().lstrip("+-") in _NO_NUMBER or cell.lower() in _NO_NUMBER:
+        return f"{expected}, came {show(cell)}"
+    if re.fullmatch(r"[+-]?\d*,\d+(e[+-]?\d+)?", cell, re.IGNORECASE):
+        point = cell.replace(",", ".")
+        return f"{expected}, came a decimal comma in {show(cell)}; write {point}"
+    if re.fullmatch(r"[+-]?[\d.]+(e[+-]?\d+)?\s*[^\W\d_]+", cell, re.IGNORECASE):
+        return f"{expected}, came {show(cell)}; a unit belongs in the column's name, not in a cell"
+    try:
+        finite = "_" not in cell and math.isfinite(float(cell))
+    except ValueError:
+        finite = False
+    return None if finite else f"{expected}, came {show(cell)}"

@@ -1,0 +1,18 @@
+"""Fixtures that several test files share."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """The folder with trial data beside the repository, which not every checkout has."""
+    beside = Path(__file__).resolve().parents[2] / "shared"
+    folder = Path(os.environ.get("CROSSCHECK_SHARED", beside)) / "data"
+    if not folder.is_dir():
+        pytest.skip(f"no trial data: {folder} is absent (CROSSCHECK_SHARED names its parent)")
+    return folder
