@@ -199,7 +199,7 @@ def solve_setup(
     else:
         from seecr.seed_methods import solve_with_scipy
 
-        found = solve_with_scipy(setup, tables, method, first, max_iterations)
+        found = solve_with_scipy(setup, tables, method, first, max_iterations, values)
     return certify(setup.robot, tables, found)
 
 

@@ -56,7 +56,7 @@ def values_of_pose(robot: Robot, poses: Array) -> tuple[Array, Array]:
     for _ in range(50):
         reached, screws = pose_of_values(robot, values)
         miss = pose_difference(poses, reached)
-        columns = _columns(screws, reached[:, :3])
+        columns = motion_columns(screws, reached[:, :3])
         step = np.einsum("nkd,nd->nk", np.linalg.pinv(columns), miss)
         values = values + step
         if np.all(np.abs(step) < 1e-14 * (1.0 + np.abs(values))):
@@ -73,8 +73,8 @@ def values_of_pose(robot: Robot, poses: Array) -> tuple[Array, Array]:
     return values, screws
 
 
-def _columns(screws: Array, position: Array) -> Array:
-    """Change of the pose (n, 6, d) by the joint values."""
+def motion_columns(screws: Array, position: Array) -> Array:
+    """Change of poses at positions (n, 3) by their joint values, (n, 6, d); screws (n, d, 7)."""
     axis, point, hinge = screws[..., 1:4], screws[..., 4:7], screws[..., :1]
     linear = np.where(hinge == 1.0, np.cross(axis, position[:, None] - point), axis)
     return np.swapaxes(np.concatenate([linear, axis * hinge], axis=-1), 1, 2)

@@ -111,7 +111,7 @@ def place_joints(screws, values, length, origin, deviation, current):
         rotate_less(q, shift, step)
         for k in range(3):
             moved[k] += shift[k] + step[k]
-        _quat_product(q, own, q_next)
+        quat_product(q, own, q_next)
         for k in range(4):
             q[k] = q_next[k]
     for k in range(3):
@@ -121,7 +121,7 @@ def place_joints(screws, values, length, origin, deviation, current):
 
 
 @_jit
-def _quat_product(p, q, out):
+def quat_product(p, q, out):
     out[0] = p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3]
     out[1] = p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2]
     out[2] = p[0] * q[2] - p[1] * q[3] + p[2] * q[0] + p[3] * q[1]
@@ -521,7 +521,7 @@ def solve_one(
 @_jit
 def solve_in_stages(
     cables, load, pose, screws, start, start_values, length, scale, radius, reach, limit,
-    guess, gradient, hessian, states, slopes, deviation, values, softened,
+    guess, gradient, hessian, states, slopes, deviation, values, softened, staged,
 ):  # fmt: skip
     """Like solve_one, from soft to stiff: a stiff robot's energy is a narrow curved valley.
 
@@ -532,7 +532,7 @@ def solve_in_stages(
     for i in range(cables.shape[0]):
         top = max(top, cables[i, EA])
     factor, total = 1.0, 0
-    while top * factor > STIFF * scale:
+    while staged and top * factor > STIFF * scale:
         factor /= STAGE
     while factor < 0.99:
         softened[:] = cables
@@ -555,7 +555,7 @@ def solve_in_stages(
 @_jit
 def solve_batch(
     cables, load, poses, screws, starts, start_values, length, scale, radius, reach, limit,
-    outcome, count, residual, gradient, hessian, states, slopes, deviation, values, guess,
+    outcome, count, residual, gradient, hessian, states, slopes, deviation, values, guess, staged,
 ):  # fmt: skip
     """Independent poses, each from its own start; all outputs are filled."""
     softened = np.empty_like(cables[0])
@@ -563,7 +563,7 @@ def solve_batch(
         outcome[i], count[i], residual[i] = solve_in_stages(
             cables[i], load[i], poses[i], screws[i], starts[i], start_values[i], length, scale[i],
             radius, reach[i], limit, guess[i], gradient[i], hessian[i], states[i], slopes[i],
-            deviation[i], values[i], softened,
+            deviation[i], values[i], softened, staged,
         )  # fmt: skip
 
 

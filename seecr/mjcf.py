@@ -127,7 +127,9 @@ def _read_joints(model: mujoco.MjModel, body: int, path: Path) -> tuple[Joint, .
                 "one free joint, or slide and hinge joints"
             )
         if model.jnt_stiffness[j] != 0:
-            raise RobotError(f"{path}: joint {name} has a spring; expected cables to carry the load")
+            raise RobotError(
+                f"{path}: joint {name} has a spring; expected cables to carry the load"
+            )
         joints.append(
             Joint(
                 kind=kind,

@@ -33,15 +33,29 @@ def first_guess(setup: Setup) -> Array:
 
 
 def solve_with_scipy(
-    setup: Setup, tables: statics.Tables, method: str, start: Array | None, limit: int
+    setup: Setup,
+    tables: statics.Tables,
+    method: str,
+    start: Array | None,
+    limit: int,
+    start_values: Array | None = None,
 ) -> statics.Evaluation:
-    """Solve pose by pose; residuals are differenced numerically, as in the paper."""
+    """Solve pose by pose; residuals are differenced numerically, as in the paper.
+
+    Args:
+        setup: what is solved.
+        tables: assembled from it.
+        method: ``"fsolve"`` or ``"least_squares"``.
+        start: (n, 7) deviations to start from instead of the paper's first guess.
+        limit: most iterations, each of which differences the Jacobian once.
+        start_values: (n, d) the same for a platform on joints.
+    """
     n, m = tables.cables.shape[:2]
     found = statics.Evaluation.empty(n, m, tables.n_dof)
     fall = first_guess(setup)
     down = -upwards(setup.robot)
     for i in range(n):
-        one = _one(tables, i)
+        one = statics.take(tables, np.array([i]))
         point = statics.Evaluation.empty(1, m, tables.n_dof)
         base = np.array([0.0, 0, 0, 1, 0, 0, 0]) if start is None else start[i]
         counter = [0]
@@ -54,6 +68,8 @@ def solve_with_scipy(
         x0 = np.zeros(tables.n_dof)
         if start is None:
             x0 = _falling(tables, i, down * fall[i])
+        elif start_values is not None:
+            x0 = start_values[i].copy()
         ok, x = _search(method, residual, x0, limit)
         _place(one, point, base, x)
         found.deviation[i], found.values[i] = point.deviation[0], point.values[0]
@@ -67,20 +83,14 @@ def _search(method: str, residual, x0: Array, limit: int) -> tuple[bool, Array]:
         # MINPACK warns about slow progress; its flag says the same and is what we report
         warnings.simplefilter("ignore", RuntimeWarning)
         if method == "fsolve":
-            x, _info, flag, _text = optimize.fsolve(residual, x0, full_output=True, xtol=1e-13)
+            x, _info, flag, _text = optimize.fsolve(
+                residual, x0, full_output=True, xtol=1e-13, maxfev=limit * (len(x0) + 1)
+            )
             return flag == 1, x
         result = optimize.least_squares(
             residual, x0, xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=limit
         )
         return bool(result.success), result.x
-
-
-def _one(tables: statics.Tables, i: int) -> statics.Tables:
-    part = slice(i, i + 1)
-    return statics.Tables(
-        tables.cables[part], tables.load[part], tables.poses[part], tables.screws[part],
-        tables.length, tables.scale[part], tables.reach[part], tables.n_dof,
-    )  # fmt: skip
 
 
 def _falling(tables: statics.Tables, i: int, fall: Array) -> Array:

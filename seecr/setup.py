@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from seecr.errors import InputError
-from seecr.pose import Array, quat_rotate, transform_points
+from seecr.pose import Array, transform_points
 from seecr.robot import Robot
 
 
@@ -38,6 +38,29 @@ class Commands:
     def __len__(self) -> int:
         return len(self.pose)
 
+    def nominal_change(self, robot: Robot) -> Array:
+        """Straight lengths at the commanded poses less those at the reference, (n, m) [m]."""
+        if not self._kept or self._kept[0][0] is not robot:
+            reference = robot.nominal_lengths(robot.reference_pose[None])
+            change = robot.nominal_lengths(self.pose) - reference
+            self._kept[:] = [(robot, change)]
+        return self._kept[0][1]
+
+    # of the last robot asked for: every trial of a fit asks again
+    _kept: list[tuple[Robot, Array]] = field(default_factory=list, repr=False)
+
+
+def play(told: Array, run: Array | None, half_width: Array) -> Array:
+    """The play operator: an output that lags its input (n, m) by up to the half-width (m,).
+
+    It starts centred on the first row of each run.
+    """
+    out = told.copy()
+    for k in range(1, len(told)):
+        if run is None or run[k] == run[k - 1]:
+            out[k] = np.clip(out[k - 1], told[k] - half_width, told[k] + half_width)
+    return out
+
 
 @dataclass(eq=False)
 class Setup:
@@ -51,6 +74,8 @@ class Setup:
         pulley_radius: (m,) [m].
         length_gain: (m,) relative error of the length a winch pays out.
         extra_length: (n, m) [m] paid out beyond the command.
+        length_factor: (1 or n, m) by which the paid-out cable has grown.
+        backlash: (m,) [m] play between motor and drum.
         ea: (m,) [N].
         quadratic, cubic: (m,) of the elastic law.
         winch_side: (m,) [m] elastic cable behind the exit point.
@@ -72,6 +97,8 @@ class Setup:
     pulley_radius: Array
     length_gain: Array
     extra_length: Array
+    length_factor: Array
+    backlash: Array
     ea: Array
     quadratic: Array
     cubic: Array
@@ -97,9 +124,7 @@ class Setup:
         """
         if self.commands.lengths is not None:
             return self.commands.lengths
-        robot = self.robot
-        reference = robot.nominal_lengths(robot.reference_pose[None])
-        return robot.nominal_lengths(self.commands.pose) - reference
+        return self.commands.nominal_change(self.robot)
 
     def rest_lengths(self) -> Array:
         """Rest lengths really paid out, (n, m) [m].
@@ -108,12 +133,16 @@ class Setup:
         elsewhere the paid-out length has moved by the commanded change (contracts: reference
         pose). Lengths commanded as such are absolute.
         """
-        paid = self.commanded_change * (1.0 + self.length_gain) + self.extra_length
+        told = self.commanded_change
+        if np.any(self.backlash):
+            told = play(told, self.commands.run, 0.5 * self.backlash)
+        paid = told * (1.0 + self.length_gain) + self.extra_length
         if self.commands.lengths is not None:
-            return paid
+            return paid * self.length_factor
         robot = self.robot
         pretension = robot.rest_lengths - robot.nominal_lengths(robot.reference_pose[None])[0]
-        return self.geometric_lengths(self.zero_pose[None]) + pretension + paid
+        zero = self.geometric_lengths(self.zero_pose[None])
+        return (zero + pretension + paid) * self.length_factor
 
     def geometric_lengths(self, poses: Array) -> Array:
         """Lengths (k, m) [m] of straight cables over their pulleys at poses (k, 7)."""
@@ -133,7 +162,12 @@ class Setup:
     @property
     def has_history(self) -> bool:
         """Whether a row depends on the rows before it."""
-        return bool(np.any(self.hysteresis) or np.any(self.friction) or np.any(self.creep))
+        return bool(
+            np.any(self.hysteresis)
+            or np.any(self.friction)
+            or np.any(self.creep)
+            or np.any(self.backlash)
+        )
 
 
 def upwards(robot: Robot) -> Array:
@@ -173,6 +207,8 @@ def plain_setup(robot: Robot, commands: Commands, wrench: Array | None = None) -
         pulley_radius=zeros(),
         length_gain=zeros(),
         extra_length=np.zeros((n, m)),
+        length_factor=np.ones((1, m)),
+        backlash=zeros(),
         ea=robot.ea.copy(),
         quadratic=zeros(),
         cubic=zeros(),
@@ -189,9 +225,3 @@ def plain_setup(robot: Robot, commands: Commands, wrench: Array | None = None) -
         gravity=robot.gravity.copy(),
         wrench=np.broadcast_to(wrench, (n, 6)).copy(),
     )
-
-
-def platform_points(setup: Setup, poses: Array) -> Array:
-    """Anchor points in the base frame, (k, m, 3) [m], at poses (k, 7)."""
-    turned = quat_rotate(poses[:, None, 3:], setup.anchor_points)
-    return poses[:, None, :3] + turned

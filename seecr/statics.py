@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seecr import cable_law, kernel
 from seecr.joints import values_of_pose
@@ -39,8 +42,8 @@ class Tables:
 class Evaluation:
     """What the loop fills: one row a pose."""
 
-    outcome: Array
-    count: Array
+    outcome: NDArray[np.int64]
+    count: NDArray[np.int64]
     residual: Array
     gradient: Array  # (n, d) [N], torques over the robot's length
     hessian: Array  # (n, d, d) [N/m] in scaled coordinates
@@ -78,8 +81,13 @@ def _screws_of(robot: Robot, poses_bytes: bytes, n: int) -> Array:
     return values_of_pose(robot, poses)[1]
 
 
-def assemble(setup: Setup) -> Tables:
-    """The tables of a setup. History columns are left at their null."""
+def assemble(setup: Setup, strains: Array | None = None) -> Tables:
+    """The tables of a setup. History columns are left at their null.
+
+    Args:
+        setup: n rows.
+        strains: (n, m) about which users' laws are linearised; zero by default.
+    """
     robot, commands = setup.robot, setup.commands
     poses = np.ascontiguousarray(commands.pose)
     n, m = len(poses), robot.n_cables
@@ -102,6 +110,8 @@ def assemble(setup: Setup) -> Tables:
         (cable_law.FRICTION, setup.friction),
     ):
         cables[..., column] = values
+    if setup.laws:
+        _linearise(setup, np.zeros((n, m)) if strains is None else strains, cables)
     load = np.zeros((n, kernel.N_LOAD))
     load[:, kernel.FORCE_OF_WEIGHT : kernel.FORCE_OF_WEIGHT + 3] = setup.mass * setup.gravity
     load[:, kernel.CENTRE_OF_MASS : kernel.CENTRE_OF_MASS + 3] = setup.centre_of_mass
@@ -117,6 +127,15 @@ def assemble(setup: Setup) -> Tables:
         reach=3.0 * (rest.max(axis=1) + np.abs(cables[..., cable_law.GAP]).max(axis=1)),
         n_dof=robot.n_dof,
     )
+
+
+def _linearise(setup: Setup, strains: Array, cables: Array) -> None:
+    """Tangents of the users' laws at the given strains (Newton's method does the rest)."""
+    step = 1e-6 * (1e-3 + np.abs(strains))
+    for law in setup.laws:
+        slope = (law(strains + step) - law(strains - step)) / (2.0 * step)
+        cables[..., cable_law.EXTRA] += law(strains) - slope * strains
+        cables[..., cable_law.EXTRA_SLOPE] += slope
 
 
 def _gap(setup: Setup, rest: Array) -> Array:
@@ -145,7 +164,7 @@ def _load_scale(setup: Setup) -> Array:
 def _chunks(n: int, threads: int) -> list[slice]:
     parts = max(1, min(threads, n // _CHUNK))
     edges = np.linspace(0, n, parts + 1).astype(int)
-    return [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    return [slice(a, b) for a, b in pairwise(edges)]
 
 
 @lru_cache(maxsize=1)
@@ -168,8 +187,12 @@ def descend(
     limit: int = 400,
     threads: int | None = None,
     start_values: Array | None = None,
+    staged: bool = True,
 ) -> Evaluation:
-    """Bring every pose to rest; ``start`` (n, 7) are deviations, none by default."""
+    """Bring every pose to rest; ``start`` (n, 7) are deviations, none by default.
+
+    A start that is already close needs no stages of stiffness: ``staged=False``.
+    """
     n, m = tables.cables.shape[:2]
     out = Evaluation.empty(n, m, tables.n_dof)
     starts = out.deviation.copy() if start is None else np.ascontiguousarray(start)
@@ -182,7 +205,7 @@ def descend(
             starts[part], first[part], tables.length, tables.scale[part], 0.5 * tables.length,
             tables.reach[part], limit, out.outcome[part], out.count[part], out.residual[part],
             out.gradient[part], out.hessian[part], out.states[part], out.slopes[part],
-            out.deviation[part], out.values[part], out.guess[part],
+            out.deviation[part], out.values[part], out.guess[part], staged,
         )  # fmt: skip
 
     _run(run, n, threads)
@@ -211,8 +234,12 @@ def evaluate(tables: Tables, at: Evaluation, threads: int | None = 1) -> Evaluat
     return out
 
 
-def _run(run, n: int, threads: int | None) -> None:  # type: ignore[no-untyped-def]
-    parts = _chunks(n, default_threads() if threads is None else threads)
+def _run(run: Callable[[slice], None], n: int, threads: int | None) -> None:
+    run_parts(run, _chunks(n, default_threads() if threads is None else threads))
+
+
+def run_parts(run: Callable[[slice], None], parts: list[slice]) -> None:
+    """Run a job on every part of a batch, in threads: the compiled loop frees the lock."""
     if len(parts) == 1:
         run(parts[0])
     else:
@@ -225,6 +252,25 @@ def residual_size(gradient: Array) -> Array:
         halves = np.linalg.norm(gradient.reshape(-1, 2, 3), axis=2)
         return halves.max(axis=1)
     return np.linalg.norm(gradient, axis=1)
+
+
+def take(tables: Tables, rows: Array) -> Tables:
+    """Some rows of the tables."""
+    return Tables(
+        tables.cables[rows], tables.load[rows], tables.poses[rows], tables.screws[rows],
+        tables.length, tables.scale[rows], tables.reach[rows], tables.n_dof,
+    )  # fmt: skip
+
+
+def take_evaluation(whole: Evaluation, rows: Array) -> Evaluation:
+    """Some rows of an evaluation."""
+    return Evaluation(**{f.name: getattr(whole, f.name)[rows] for f in fields(Evaluation)})
+
+
+def put_evaluation(whole: Evaluation, rows: Array, part: Evaluation) -> None:
+    """Put rows into an evaluation."""
+    for f in fields(Evaluation):
+        getattr(whole, f.name)[rows] = getattr(part, f.name)
 
 
 def platform_poses(tables: Tables, deviation: Array) -> Array:

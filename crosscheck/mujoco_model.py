@@ -1,0 +1,130 @@
+"""A user's MJCF made ready for settling: compiled, checked, and stripped to springs and gravity.
+
+What would hide or shift the rest state that statics predicts is switched off: contacts, joint and
+tendon limits, dry friction (with it a platform rests anywhere in a band), and damping (which moves
+no rest state, only delays it).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from copy import copy
+from pathlib import Path
+from threading import Lock
+
+import mujoco
+import numpy as np
+
+from crosscheck.errors import InputFileError
+
+_DISABLE = (
+    mujoco.mjtDisableBit.mjDSBL_AUTORESET,  # else a diverging run restarts as if nothing happened
+    mujoco.mjtDisableBit.mjDSBL_CONSTRAINT,  # contacts, limits, dry friction
+    mujoco.mjtDisableBit.mjDSBL_CONTACT,  # without even looking for contacts
+    mujoco.mjtDisableBit.mjDSBL_DAMPER,
+    mujoco.mjtDisableBit.mjDSBL_SENSOR,
+)
+
+_quiet_lock = Lock()
+_quiet_depth = 0
+
+
+@contextmanager
+def quiet_mujoco() -> Iterator[None]:
+    """Keep MuJoCo from writing MUJOCO_LOG.TXT into the working folder; statuses tell instead."""
+    global _quiet_depth
+    with _quiet_lock:
+        _quiet_depth += 1
+        if _quiet_depth == 1 and mujoco.get_mju_user_warning() is None:
+            mujoco.set_mju_user_warning(_ignore)
+    try:
+        yield
+    finally:
+        with _quiet_lock:
+            _quiet_depth -= 1
+            if _quiet_depth == 0 and mujoco.get_mju_user_warning() is _ignore:
+                mujoco.set_mju_user_warning(None)
+
+
+def _ignore(message: str) -> None:
+    """Take a warning of MuJoCo's and do nothing with it."""
+
+
+def compile_model(source: str | Path | mujoco.MjModel) -> mujoco.MjModel:
+    """Compile a file, or copy a model, so that it is ours to change."""
+    if isinstance(source, mujoco.MjModel):
+        return copy(source)
+    path = Path(source)
+    if not path.is_file():
+        raise InputFileError(f"{path}: no such file; expected an MJCF model of the robot")
+    try:
+        return mujoco.MjModel.from_xml_path(str(path))
+    except ValueError as error:
+        reason = " ".join(str(error).split())
+        raise InputFileError(f"{path}: MuJoCo cannot read this as MJCF: {reason}") from None
+
+
+def platform_of(model: mujoco.MjModel, name: str) -> int:
+    """Number of the one moving body."""
+    moving = np.flatnonzero(model.body_jntnum > 0)
+    if len(moving) != 1:
+        raise InputFileError(
+            f"{name}: {len(moving)} moving bodies; expected one platform with a free "
+            "joint or with slide and hinge joints"
+        )
+    return int(moving[0])
+
+
+def check_cables(model: mujoco.MjModel, body: int, where: str) -> None:
+    """Hold the tendons to the contract: straight cables from the world to the platform."""
+    if model.ntendon == 0:
+        raise InputFileError(f"{where}: no cables; expected one <spatial> tendon a cable")
+    for i in range(model.ntendon):
+        name = model.tendon(i).name or f"cable{i + 1}"
+        first = model.tendon_adr[i]
+        kinds = model.wrap_type[first : first + model.tendon_num[i]]
+        if list(kinds) != 2 * [int(mujoco.mjtWrap.mjWRAP_SITE)]:
+            raise InputFileError(f"{where}: tendon {name}: expected exactly two sites")
+        sites = model.wrap_objid[first : first + 2]
+        if np.sum(model.site_bodyid[sites] == body) != 1:
+            raise InputFileError(
+                f"{where}: tendon {name}: expected one site on the platform and one on the world"
+            )
+        if np.any(model.tendon_stiffnesspoly[i] != 0.0):
+            raise InputFileError(
+                f"{where}: tendon {name}: expected one stiffness [N/m], got a polynomial"
+            )
+
+
+def switch_off(model: mujoco.MjModel) -> tuple[str, ...]:
+    """Leave springs, gravity and inertia; return sentences on what was there besides."""
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
+    model.opt.disableflags |= sum(int(flag) for flag in _DISABLE)
+    model.opt.tolerance = 1e-8  # relative, of the solve for the implicit step
+    model.opt.iterations = 100
+    model.opt.enableflags = int(mujoco.mjtEnableBit.mjENBL_ENERGY)
+    found = {
+        "joint limits": model.jnt_limited.any(),
+        "tendon limits": model.tendon_limited.any(),
+        "dry friction": model.dof_frictionloss.any() or model.tendon_frictionloss.any(),
+        "damping": model.dof_damping.any() or model.tendon_damping.any(),
+        "contacts": model.geom_contype.any() and model.geom_conaffinity.any(),
+    }
+    return tuple(f"{what} of the MJCF ignored" for what, there in found.items() if there)
+
+
+def change_mass_unit(model: mujoco.MjModel, mass_unit: float) -> None:
+    """Count mass in another unit [kg]: all that carries one, and what MuJoCo derives from it."""
+    for array in (
+        model.body_mass,
+        model.body_inertia,
+        model.dof_armature,
+        model.tendon_armature,
+        model.tendon_stiffness,
+        model.jnt_stiffness,
+    ):
+        array /= mass_unit
+    model.opt.density /= mass_unit
+    model.opt.viscosity /= mass_unit
+    mujoco.mj_setConst(model, mujoco.MjData(model))

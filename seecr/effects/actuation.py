@@ -1,0 +1,164 @@
+"""What length was really paid out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from seecr.effects.base import Effect, of_length, parameter
+from seecr.pose import Array, pose_add
+from seecr.setup import Setup
+
+
+@dataclass(frozen=True, eq=False)
+class CableLengthOffset(Effect):
+    """Each cable is longer than commanded by a constant: l0_i += offset_i.
+
+    A zero of the winch that was set wrong. Positive: more cable than commanded.
+    """
+
+    name: ClassVar[str] = "cable_length_offset"
+    place: ClassVar[str] = "actuation"
+    title: ClassVar[str] = "constant error of each cable's length"
+    advice: ClassVar[str] = (
+        "measure each cable at the reference pose with a tape: expect the offsets found"
+    )
+
+    offset: Array = parameter("m", of_length(2e-3), size="cable")
+
+    def edit_setup(self, setup: Setup) -> None:
+        setup.extra_length += self.offset
+
+
+@dataclass(frozen=True, eq=False)
+class InitialPoseError(Effect):
+    """The platform was misplaced when the winches were zeroed.
+
+    The zero of every cable is its length at the pose where the platform really was,
+    reference pose + (position, rotation): what the paper blames for its remaining
+    error (section IV). Displacement and rotation vector in the base frame.
+    """
+
+    name: ClassVar[str] = "initial_pose_error"
+    place: ClassVar[str] = "actuation"
+    title: ClassVar[str] = "platform misplaced when the winches were zeroed"
+    needs: ClassVar[tuple[str, ...]] = ("poses",)
+    advice: ClassVar[str] = (
+        "measure the platform with the tracker at the reference pose before releasing it"
+    )
+
+    position: Array = parameter("m", of_length(4e-3), size="vector")
+    rotation: Array = parameter("rad", 0.01, size="vector")
+
+    def edit_setup(self, setup: Setup) -> None:
+        change = np.concatenate([self.position, self.rotation])
+        if np.any(change):
+            setup.zero_pose = pose_add(setup.zero_pose, change)
+
+
+@dataclass(frozen=True, eq=False)
+class DrumGain(Effect):
+    """Winch i pays out (1 + gain_i) of what it is told to.
+
+    Of the commanded change since the zero; of the whole length where lengths are commanded
+    as such. Positive: the drum is larger than assumed.
+    """
+
+    name: ClassVar[str] = "drum_gain"
+    place: ClassVar[str] = "actuation"
+    title: ClassVar[str] = "drums larger or smaller than assumed"
+    advice: ClassVar[str] = "measure each drum with a caliper: expect its diameter off by the gain"
+
+    gain: Array = parameter("", 5e-3, size="cable", bounds=(-0.5, 1.0))
+
+    def edit_setup(self, setup: Setup) -> None:
+        setup.length_gain = setup.length_gain + self.gain
+
+
+@dataclass(frozen=True, eq=False)
+class DrumEccentricity(Effect):
+    """A drum that runs out of true adds a sine of its angle to the paid-out length.
+
+    l0_i += sine_i sin(a) + cosine_i (cos(a) - 1), a = (commanded change)/radius; zero at the
+    zero of the winch.
+    """
+
+    name: ClassVar[str] = "drum_eccentricity"
+    place: ClassVar[str] = "actuation"
+    title: ClassVar[str] = "drums that run out of true"
+    advice: ClassVar[str] = "hold a dial gauge to each drum and turn it: expect the run-out found"
+
+    sine: Array = parameter("m", of_length(1e-3), size="cable")
+    cosine: Array = parameter("m", of_length(1e-3), size="cable")
+    drum_radius: float = parameter(
+        "m", of_length(0.05), null=0.05, bounds=(1e-4, 1e3), shape=True
+    )
+
+    def edit_setup(self, setup: Setup) -> None:
+        if not (np.any(self.sine) or np.any(self.cosine)):
+            return
+        angle = setup.commanded_change / self.drum_radius
+        zero = 1.0 if setup.commands.lengths is None else 0.0
+        setup.extra_length += self.sine * np.sin(angle) + self.cosine * (np.cos(angle) - zero)
+
+    @classmethod
+    def shapes(cls, setup: Setup) -> list[dict[str, float]]:
+        change = setup.commanded_change
+        travel = float(np.max(np.ptp(change, axis=0)))
+        if not travel > 0:
+            return []
+        # one step of phase at the far end a start: from half a turn in all to 40 turns
+        turns = np.arange(0.5, 40.0, 0.16)
+        return [{"drum_radius": travel / (2 * np.pi * t)} for t in turns]
+
+
+@dataclass(frozen=True, eq=False)
+class Backlash(Effect):
+    """A winch turns ``gap`` of cable before the drum follows, whenever it reverses.
+
+    The paid-out length is the play operator of the commanded one, of half-width gap/2,
+    starting centred at the beginning of each run.
+    """
+
+    name: ClassVar[str] = "backlash"
+    place: ClassVar[str] = "actuation"
+    title: ClassVar[str] = "play between motor and drum"
+    advice: ClassVar[str] = "hold each drum and rock its motor: expect {gap:.2f} mm of cable play"
+
+    gap: float = parameter("m", of_length(2e-3), bounds=(0.0, 1e3))
+
+    def edit_setup(self, setup: Setup) -> None:
+        setup.backlash = setup.backlash + self.gap
+
+
+@dataclass(frozen=True, eq=False)
+class ThermalExpansion(Effect):
+    """Cables grow with temperature: l0 (1 + expansion (T - zero_temperature)).
+
+    ``zero_temperature`` is that at which the winches were zeroed.
+    """
+
+    name: ClassVar[str] = "thermal_expansion"
+    place: ClassVar[str] = "actuation"
+    title: ClassVar[str] = "cables that grow with temperature"
+    needs: ClassVar[tuple[str, ...]] = ("temperature",)
+    advice: ClassVar[str] = "repeat one pose at two temperatures and compare the platform's height"
+
+    expansion: float = parameter("1_per_K", 5e-5)
+    zero_temperature: float = parameter("C", 5.0, null=20.0, bounds=(-100.0, 200.0), shape=True)
+
+    def edit_setup(self, setup: Setup) -> None:
+        if self.expansion == 0.0 or setup.commands.temperature is None:
+            return
+        warmer = setup.commands.temperature - self.zero_temperature
+        setup.length_factor = setup.length_factor * (1.0 + self.expansion * warmer)[:, None]
+
+    @classmethod
+    def shapes(cls, setup: Setup) -> list[dict[str, float]]:
+        temperature = setup.commands.temperature
+        if temperature is None or np.ptp(temperature) == 0:
+            return []
+        starts = (float(temperature[0]), 20.0, float(np.mean(temperature)))
+        return [{"zero_temperature": t} for t in starts]

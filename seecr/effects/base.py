@@ -1,0 +1,203 @@
+"""What an effect is: a few numbers, and one verb that brings them into the model.
+
+An effect is a small frozen dataclass. Its fields are its parameters, made with
+:func:`parameter`; at their null values the effect is absent, exactly. It overrides one (or
+more) of three verbs:
+
+- ``edit_setup`` changes numbers the statics uses: lengths, points, masses ... (see
+  :class:`seecr.setup.Setup`, whose ``laws`` also take a cable's extra tension by its strain);
+- ``edit_readings`` changes what the sensors report of the solved pose.
+
+Sensitivities need no derivatives from it: the framework differences the edit, not the solve.
+An effect of your own goes through the entry point group ``seecr.effects`` (docs/effects.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar
+
+import numpy as np
+
+from seecr.errors import InputError
+from seecr.pose import Array
+from seecr.robot import Robot
+from seecr.setup import Setup
+
+Scale = float | Callable[[Robot], float]
+PLACES = ("actuation", "geometry", "cable", "structure", "load", "sensing")
+_AXES = ("x", "y", "z")
+# Components of a parameter: how many, and what each is called.
+_SIZES: dict[str, Callable[[int], list[str]]] = {
+    "one": lambda m: [""],
+    "cable": lambda m: [f"_{i + 1}" for i in range(m)],
+    "vector": lambda m: [f"_{a}" for a in _AXES],
+    "point": lambda m: [f"_{i + 1}_{a}" for i in range(m) for a in _AXES],
+}
+
+
+@dataclass(eq=False)
+class Readings:
+    """What the sensors report of n solved rows; effects edit it in place.
+
+    Attributes:
+        position: (n, 3) [m]; quat_wxyz: (n, 4); tensions: (n, m) [N].
+    """
+
+    position: Array
+    quat_wxyz: Array
+    tensions: Array
+
+
+def parameter(
+    unit: str,
+    scale: Scale,
+    *,
+    null: float = 0.0,
+    bounds: tuple[float, float] = (-np.inf, np.inf),
+    size: str = "one",
+    shape: bool = False,
+) -> Any:
+    """A field of an effect.
+
+    Args:
+        unit: as in the contract's suffixes, "" for none.
+        scale: plausible size, one standard deviation from tolerances or data sheets; a number
+            or a function of the robot.
+        null: value at which the effect is absent.
+        bounds: lowest and highest value.
+        size: "one" number, one a "cable", a "vector" of 3, or a "point" (3 a cable).
+        shape: the number only shapes the effect (a time constant, a period): it means nothing
+            while the others are null, and the effect says with ``shapes`` where to look.
+    """
+    if size not in _SIZES:
+        raise InputError(f"size must be one of {', '.join(_SIZES)}, got {size!r}")
+    metadata = {
+        "unit": unit,
+        "scale": scale,
+        "null": null,
+        "bounds": bounds,
+        "size": size,
+        "shape": shape,
+    }
+    return field(default=None if size != "one" else null, metadata=metadata)
+
+
+@dataclass(frozen=True, eq=False)
+class Effect:
+    """Base of all effects; see the module's text.
+
+    Class attributes:
+        name: as in model files and reports.
+        place: one of PLACES; says where to look.
+        title: what it is, in a few words.
+        needs: what the data must have: any of "time", "temperature", "poses" (commands in
+            poses), "tensions".
+        parent: an effect that this one only makes sense beside or contains, or "".
+        advice: how to measure it on its own; ``{name}`` is filled with a parameter in
+            millimetres or degrees where those are its units.
+    """
+
+    name: ClassVar[str] = ""
+    place: ClassVar[str] = ""
+    title: ClassVar[str] = ""
+    needs: ClassVar[tuple[str, ...]] = ()
+    parent: ClassVar[str] = ""
+    advice: ClassVar[str] = ""
+
+    def edit_setup(self, setup: Setup) -> None:
+        """Change numbers of the setup, in place."""
+
+    def edit_readings(self, readings: Readings, setup: Setup) -> None:
+        """Change what the sensors report, in place."""
+
+    @classmethod
+    def shapes(cls, setup: Setup) -> list[dict[str, float]]:
+        """Values of the shape parameters to start a search from."""
+        return [{}]
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """An effect's parameters for one robot, as one flat vector.
+
+    Attributes:
+        effect: the class.
+        names: (p,) keys such as ``radius_m`` or ``offset_3_m``.
+        units: (p,) null, lower, upper, scale: (p,) arrays. shape: (p,) bool.
+    """
+
+    effect: type[Effect]
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    null: Array
+    lower: Array
+    upper: Array
+    scale: Array
+    shape: np.ndarray
+    _parts: tuple[tuple[str, int, bool], ...]
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @property
+    def name(self) -> str:
+        """Name of the effect."""
+        return self.effect.name
+
+    def build(self, vector: Array) -> Effect:
+        """The effect with these parameters."""
+        values: dict[str, Any] = {}
+        first = 0
+        for name, count, single in self._parts:
+            part = np.asarray(vector[first : first + count], float)
+            values[name] = float(part[0]) if single else part.copy()
+            first += count
+        return self.effect(**values)
+
+    def start(self, shape: dict[str, float]) -> Array:
+        """Null values, with the shape parameters set."""
+        vector = self.null.copy()
+        first = 0
+        for name, count, _single in self._parts:
+            if name in shape:
+                vector[first : first + count] = shape[name]
+            first += count
+        return vector
+
+
+def layout_of(effect: type[Effect], robot: Robot) -> Layout:
+    """The flat parameters of an effect for a robot."""
+    names: list[str] = []
+    units: list[str] = []
+    columns: dict[str, list[float]] = {"null": [], "lower": [], "upper": [], "scale": []}
+    shape: list[bool] = []
+    parts = []
+    for item in fields(effect):
+        meta = item.metadata
+        suffix = f"_{meta['unit']}" if meta["unit"] else ""
+        endings = _SIZES[meta["size"]](robot.n_cables)
+        names += [f"{item.name}{ending}{suffix}" for ending in endings]
+        units += [meta["unit"]] * len(endings)
+        scale = meta["scale"](robot) if callable(meta["scale"]) else meta["scale"]
+        one_row = (meta["null"], *meta["bounds"], scale)
+        for key, value in zip(columns, one_row, strict=True):
+            columns[key] += [float(value)] * len(endings)
+        shape += [bool(meta["shape"])] * len(endings)
+        parts.append((item.name, len(endings), meta["size"] == "one"))
+    arrays = {key: np.array(column) for key, column in columns.items()}
+    return Layout(
+        effect, tuple(names), tuple(units), arrays["null"], arrays["lower"], arrays["upper"],
+        arrays["scale"], np.array(shape, dtype=bool), tuple(parts),
+    )  # fmt: skip
+
+
+def mean_length(robot: Robot) -> float:
+    """Mean straight cable length [m] at the reference pose: the scale of lengths."""
+    return float(np.mean(robot.nominal_lengths(robot.reference_pose[None])))
+
+
+def of_length(part: float) -> Callable[[Robot], float]:
+    """A plausible size that is a part of the mean cable length."""
+    return lambda robot: part * mean_length(robot)

@@ -1,0 +1,202 @@
+"""Tension from stretch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from seecr.effects.base import Effect, mean_length, of_length, parameter
+from seecr.pose import Array
+from seecr.robot import Robot
+from seecr.setup import Setup
+
+
+def usual_strain(robot: Robot) -> float:
+    """Strain of a cable that carries half the weight."""
+    return max(0.5 * robot.weight / float(np.mean(robot.ea)), 1e-9)
+
+
+@dataclass(frozen=True, eq=False)
+class Stiffness(Effect):
+    """All cables are stiffer than assumed by one factor: E S -> factor E S."""
+
+    name: ClassVar[str] = "stiffness"
+    place: ClassVar[str] = "cable"
+    title: ClassVar[str] = "stiffness of all cables"
+    advice: ClassVar[str] = "hang a known weight on a known length of cable: expect {factor:.3f} E S"
+
+    factor: float = parameter("", 0.3, null=1.0, bounds=(0.02, 50.0))
+
+    def edit_setup(self, setup: Setup) -> None:
+        setup.ea = setup.ea * self.factor
+
+
+@dataclass(frozen=True, eq=False)
+class CableStiffness(Effect):
+    """Each cable is stiffer than assumed by a factor of its own: E S_i -> factor_i E S_i."""
+
+    name: ClassVar[str] = "cable_stiffness"
+    place: ClassVar[str] = "cable"
+    title: ClassVar[str] = "stiffness of each cable"
+    parent: ClassVar[str] = "stiffness"
+    advice: ClassVar[str] = "hang a known weight on each cable: expect the factors found"
+
+    factor: Array = parameter("", 0.2, null=1.0, bounds=(0.02, 50.0), size="cable")
+
+    def edit_setup(self, setup: Setup) -> None:
+        setup.ea = setup.ea * self.factor
+
+
+@dataclass(frozen=True, eq=False)
+class NonlinearElasticity(Effect):
+    """Cables stiffen (or soften) as they stretch.
+
+    T = E S (eps + quadratic eps^2 + cubic eps^3), a polynomial in the strain (Kraus, Force
+    control of cable-driven parallel robots, 2016). Positive: stiffening.
+    """
+
+    name: ClassVar[str] = "nonlinear_elasticity"
+    place: ClassVar[str] = "cable"
+    title: ClassVar[str] = "cables that stiffen as they stretch"
+    advice: ClassVar[str] = "pull a cable to several loads: expect the curve found"
+
+    quadratic: float = parameter("", lambda r: 0.3 / usual_strain(r))
+    cubic: float = parameter("", lambda r: 0.3 / usual_strain(r) ** 2)
+
+    def edit_setup(self, setup: Setup) -> None:
+        setup.quadratic = setup.quadratic + self.quadratic
+        setup.cubic = setup.cubic + self.cubic
+
+
+@dataclass(frozen=True, eq=False)
+class WinchSideLength(Effect):
+    """Elastic cable between winch and exit point, under the same tension.
+
+    It adds a stretch T length/(E S), whatever the length in front of the exit point.
+    """
+
+    name: ClassVar[str] = "winch_side_length"
+    place: ClassVar[str] = "cable"
+    title: ClassVar[str] = "elastic cable behind the exit points"
+    advice: ClassVar[str] = (
+        "measure the cable between drum and exit point: expect {length:.0f} mm"
+    )
+
+    length: float = parameter("m", of_length(0.5), bounds=(0.0, 1e4))
+
+    def edit_setup(self, setup: Setup) -> None:
+        setup.winch_side = setup.winch_side + self.length
+
+
+@dataclass(frozen=True, eq=False)
+class CableWeight(Effect):
+    """Cables have weight and sag: elastic catenary (Irvine, Cable Structures, 1981, 1.2)."""
+
+    name: ClassVar[str] = "cable_weight"
+    place: ClassVar[str] = "cable"
+    title: ClassVar[str] = "cables with weight, which sag"
+    advice: ClassVar[str] = "weigh ten metres of cable: expect {weight_10m:.2f} N"
+
+    weight: float = parameter(
+        "N_per_m", lambda r: 0.02 * r.weight / mean_length(r), bounds=(0.0, 1e5)
+    )
+
+    def edit_setup(self, setup: Setup) -> None:
+        setup.cable_weight = setup.cable_weight + self.weight
+
+
+@dataclass(frozen=True, eq=False)
+class Hysteresis(Effect):
+    """Cables pull less when they relax than when they are stretched.
+
+    T = E S eps + z, z Dahl's friction of the amplitude given, turning over within the strain
+    given: dz/d eps = (amplitude - z sign(d eps))/strain (Dahl 1968; for cables Miermeister
+    et al. 2015). z = 0 at the start of each run.
+    """
+
+    name: ClassVar[str] = "hysteresis"
+    place: ClassVar[str] = "cable"
+    title: ClassVar[str] = "hysteresis of the cables"
+    advice: ClassVar[str] = (
+        "load and unload one cable: expect the curves to part by twice {amplitude:.3f} N"
+    )
+
+    amplitude: float = parameter("N", lambda r: 0.1 * r.weight / r.n_cables, bounds=(0.0, 1e6))
+    strain: float = parameter(
+        "", lambda r: 0.3 * usual_strain(r), null=1e-3, bounds=(1e-9, 1.0), shape=True
+    )
+
+    def edit_setup(self, setup: Setup) -> None:
+        setup.hysteresis = setup.hysteresis + self.amplitude
+        if self.amplitude:
+            setup.hysteresis_strain = np.full_like(setup.hysteresis_strain, self.strain)
+
+    @classmethod
+    def shapes(cls, setup: Setup) -> list[dict[str, float]]:
+        usual = usual_strain(setup.robot)
+        return [{"strain": part * usual} for part in (0.03, 0.1, 0.3, 1.0)]
+
+
+@dataclass(frozen=True, eq=False)
+class Creep(Effect):
+    """Cables go on stretching under load: Kelvin-Voigt.
+
+    The creep strain c follows time dc/dt = amount T/(E S) - c: under constant tension it ends
+    at ``amount`` times the elastic strain. It goes by the clock, through runs and pauses; the
+    tension is taken as linear in time between rows, and as that at the reference pose between
+    runs.
+    """
+
+    name: ClassVar[str] = "creep"
+    place: ClassVar[str] = "cable"
+    title: ClassVar[str] = "cables that creep under load"
+    needs: ClassVar[tuple[str, ...]] = ("time",)
+    advice: ClassVar[str] = "hold one pose under the tracker for an hour: expect it to sink"
+
+    amount: float = parameter("", 0.2, bounds=(0.0, 100.0))
+    time: float = parameter("s", 100.0, null=100.0, bounds=(1e-2, 1e9), shape=True)
+
+    def edit_setup(self, setup: Setup) -> None:
+        setup.creep = setup.creep + self.amount
+        if self.amount:
+            setup.creep_time = np.full_like(setup.creep_time, self.time)
+
+    @classmethod
+    def shapes(cls, setup: Setup) -> list[dict[str, float]]:
+        time = setup.commands.time
+        if time is None or np.ptp(time) == 0:
+            return []
+        whole = float(np.ptp(time))
+        return [{"time": part * whole} for part in (0.01, 0.05, 0.2, 0.7)]
+
+
+@dataclass(frozen=True, eq=False)
+class ExitFriction(Effect):
+    """The exit point rubs: the elastic cable behind it feels another tension.
+
+    Capstan (Euler-Eytelwein): the tensions behind and in front differ by at most the factor
+    exp(friction), friction = coefficient x wrap angle, against the motion of the cable. It
+    shows in the pose through the ``length`` of elastic cable behind the exit point.
+    """
+
+    name: ClassVar[str] = "exit_friction"
+    place: ClassVar[str] = "cable"
+    title: ClassVar[str] = "friction at the exit points"
+    parent: ClassVar[str] = "winch_side_length"
+    advice: ClassVar[str] = (
+        "pull a cable to and fro over its exit point with a spring balance: expect the pulls "
+        "to differ by exp(2 x {friction:.3f})"
+    )
+
+    friction: float = parameter("", 0.1, bounds=(0.0, 5.0))
+    length: float = parameter("m", of_length(0.5), bounds=(0.0, 1e4))
+
+    def edit_setup(self, setup: Setup) -> None:
+        setup.friction = setup.friction + self.friction
+        setup.winch_side = setup.winch_side + self.length
+
+    @classmethod
+    def shapes(cls, setup: Setup) -> list[dict[str, float]]:
+        return [{"length": part * mean_length(setup.robot)} for part in (0.3, 1.0)]

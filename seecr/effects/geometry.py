@@ -1,0 +1,61 @@
+"""Where the cable runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from seecr.effects.base import Effect, of_length, parameter
+from seecr.pose import Array
+from seecr.setup import Setup
+
+
+@dataclass(frozen=True, eq=False)
+class PulleyRadius(Effect):
+    """Cables leave over swivelling sheaves of this radius.
+
+    The cable enters at A_i vertically from below, runs over the top of a sheave whose centre
+    is at A_i + r e, e the horizontal direction to the anchor point, and leaves along the
+    tangent; length = r (pi - psi) + free part (Pott, Cable-Driven Parallel Robots, 2018,
+    section 7.2, with the wrap measured from the point of entry).
+    """
+
+    name: ClassVar[str] = "pulley_radius"
+    place: ClassVar[str] = "geometry"
+    title: ClassVar[str] = "pulleys with a radius"
+    advice: ClassVar[str] = "measure a sheave with a caliper: expect a radius of {radius:.1f} mm"
+
+    radius: float = parameter("m", of_length(0.02), bounds=(0.0, 1e3))
+
+    def edit_setup(self, setup: Setup) -> None:
+        setup.pulley_radius = setup.pulley_radius + self.radius
+
+
+@dataclass(frozen=True, eq=False)
+class ExitPointError(Effect):
+    """Exit points A_i are off by a vector each, in the base frame."""
+
+    name: ClassVar[str] = "exit_point_error"
+    place: ClassVar[str] = "geometry"
+    title: ClassVar[str] = "exit points off where the model has them"
+    advice: ClassVar[str] = "survey the exit points with the tracker: expect the errors found"
+
+    error: Array = parameter("m", of_length(2e-3), size="point")
+
+    def edit_setup(self, setup: Setup) -> None:
+        setup.exit_points = setup.exit_points + self.error.reshape(-1, 3)
+
+
+@dataclass(frozen=True, eq=False)
+class AnchorPointError(Effect):
+    """Anchor points B_i are off by a vector each, in the platform frame."""
+
+    name: ClassVar[str] = "anchor_point_error"
+    place: ClassVar[str] = "geometry"
+    title: ClassVar[str] = "anchor points off where the model has them"
+    advice: ClassVar[str] = "measure the platform's anchor points: expect the errors found"
+
+    error: Array = parameter("m", of_length(2e-3), size="point")
+
+    def edit_setup(self, setup: Setup) -> None:
+        setup.anchor_points = setup.anchor_points + self.error.reshape(-1, 3)

@@ -1,0 +1,90 @@
+"""What the cables carry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from seecr.effects.base import Effect, parameter
+from seecr.pose import Array, quat_from_rotvec, quat_rotate
+from seecr.robot import Robot
+from seecr.setup import Setup
+
+
+@dataclass(frozen=True, eq=False)
+class PlatformMass(Effect):
+    """The platform is heavier than assumed by ``added``."""
+
+    name: ClassVar[str] = "platform_mass"
+    place: ClassVar[str] = "load"
+    title: ClassVar[str] = "mass of the platform"
+    advice: ClassVar[str] = "weigh the platform: expect {added:+.3f} kg"
+
+    added: float = parameter("kg", lambda r: 0.1 * r.mass, bounds=(-1e6, 1e6))
+
+    def edit_setup(self, setup: Setup) -> None:
+        # a platform keeps a thousandth of its mass, whatever a search tries
+        setup.mass = max(setup.mass + self.added, 1e-3 * setup.robot.mass)
+
+
+@dataclass(frozen=True, eq=False)
+class CentreOfMass(Effect):
+    """The centre of mass is off by a vector, in the platform frame."""
+
+    name: ClassVar[str] = "centre_of_mass"
+    place: ClassVar[str] = "load"
+    title: ClassVar[str] = "centre of mass of the platform"
+    advice: ClassVar[str] = (
+        "balance the platform on an edge: expect its centre off by "
+        "({shift_x:.1f}, {shift_y:.1f}, {shift_z:.1f}) mm"
+    )
+
+    shift: Array = parameter("m", lambda r: 0.1 * r.length, size="vector")
+
+    def edit_setup(self, setup: Setup) -> None:
+        setup.centre_of_mass = setup.centre_of_mass + self.shift
+
+
+@dataclass(frozen=True, eq=False)
+class ExternalWrench(Effect):
+    """A constant force at the platform origin and a constant moment, both in the base frame.
+
+    A dangling hose or cable tray, or a spring.
+    """
+
+    name: ClassVar[str] = "external_wrench"
+    place: ClassVar[str] = "load"
+    title: ClassVar[str] = "a constant force and moment on the platform"
+    advice: ClassVar[str] = "look for a hose or cable that pulls on the platform, and take it off"
+
+    force: Array = parameter("N", lambda r: 0.03 * _load(r), size="vector")
+    moment: Array = parameter("Nm", lambda r: 0.03 * _load(r) * r.length, size="vector")
+
+    def edit_setup(self, setup: Setup) -> None:
+        setup.wrench = setup.wrench + np.concatenate([self.force, self.moment])
+
+
+def _load(robot: Robot) -> float:
+    return robot.weight if robot.weight > 0 else 1e-3 * float(np.mean(robot.ea))
+
+
+@dataclass(frozen=True, eq=False)
+class GravityTilt(Effect):
+    """The base frame is not level: gravity is turned about base x and y by two angles."""
+
+    name: ClassVar[str] = "gravity_tilt"
+    place: ClassVar[str] = "load"
+    title: ClassVar[str] = "a frame that is not level"
+    advice: ClassVar[str] = (
+        "put a level on the frame: expect {tilt_x:.2f} deg about x and {tilt_y:.2f} deg about y"
+    )
+
+    tilt_x: float = parameter("rad", 0.01, bounds=(-1.0, 1.0))
+    tilt_y: float = parameter("rad", 0.01, bounds=(-1.0, 1.0))
+
+    def edit_setup(self, setup: Setup) -> None:
+        if self.tilt_x or self.tilt_y:
+            turn = quat_from_rotvec(np.array([self.tilt_x, self.tilt_y, 0.0]))
+            setup.gravity = quat_rotate(turn, setup.gravity)

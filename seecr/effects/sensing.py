@@ -1,0 +1,90 @@
+"""What the tracker and the load cells report."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from seecr.effects.base import Effect, Readings, of_length, parameter
+from seecr.pose import Array, quat_from_rotvec, quat_multiply, quat_rotate
+from seecr.setup import Setup
+
+
+@dataclass(frozen=True, eq=False)
+class TrackerFrame(Effect):
+    """The tracker's base frame is not the robot's: reported = R p + t, and R times R_platform.
+
+    R turns about the base origin by the rotation vector, t is the shift.
+    """
+
+    name: ClassVar[str] = "tracker_frame"
+    place: ClassVar[str] = "sensing"
+    title: ClassVar[str] = "the tracker's frame against the robot's"
+    advice: ClassVar[str] = "register the tracker again on targets fixed to the frame"
+
+    shift: Array = parameter("m", of_length(5e-3), size="vector")
+    rotation: Array = parameter("rad", 5e-3, size="vector")
+
+    def edit_readings(self, readings: Readings, setup: Setup) -> None:
+        if np.any(self.rotation):
+            turn = quat_from_rotvec(self.rotation)
+            readings.position = quat_rotate(turn, readings.position)
+            readings.quat_wxyz = quat_multiply(turn, readings.quat_wxyz)
+        readings.position = readings.position + self.shift
+
+
+@dataclass(frozen=True, eq=False)
+class TrackerTarget(Effect):
+    """The tracked target is not at the platform origin.
+
+    Reported = p + R_platform shift, orientation R_platform R(rotation): both in the platform
+    frame.
+    """
+
+    name: ClassVar[str] = "tracker_target"
+    place: ClassVar[str] = "sensing"
+    title: ClassVar[str] = "the target's place on the platform"
+    advice: ClassVar[str] = "measure where the target sits on the platform"
+
+    shift: Array = parameter("m", of_length(5e-3), size="vector")
+    rotation: Array = parameter("rad", 5e-3, size="vector")
+
+    def edit_readings(self, readings: Readings, setup: Setup) -> None:
+        if np.any(self.shift):
+            readings.position = readings.position + quat_rotate(readings.quat_wxyz, self.shift)
+        if np.any(self.rotation):
+            turn = quat_from_rotvec(self.rotation)
+            readings.quat_wxyz = quat_multiply(readings.quat_wxyz, turn)
+
+
+@dataclass(frozen=True, eq=False)
+class TrackerScale(Effect):
+    """The tracker's metre is off: reported position = factor x position."""
+
+    name: ClassVar[str] = "tracker_scale"
+    place: ClassVar[str] = "sensing"
+    title: ClassVar[str] = "the tracker's scale"
+    advice: ClassVar[str] = "measure a scale bar with the tracker: expect {factor:.5f} of its length"
+
+    factor: float = parameter("", 3e-3, null=1.0, bounds=(0.5, 2.0))
+
+    def edit_readings(self, readings: Readings, setup: Setup) -> None:
+        readings.position = readings.position * self.factor
+
+
+@dataclass(frozen=True, eq=False)
+class TensionScale(Effect):
+    """The load cells are off by one factor: reported tension = factor x tension."""
+
+    name: ClassVar[str] = "tension_scale"
+    place: ClassVar[str] = "sensing"
+    title: ClassVar[str] = "the scale of the load cells"
+    needs: ClassVar[tuple[str, ...]] = ("tensions",)
+    advice: ClassVar[str] = "hang a known weight on a load cell: expect {factor:.3f} of it"
+
+    factor: float = parameter("", 0.1, null=1.0, bounds=(0.05, 20.0))
+
+    def edit_readings(self, readings: Readings, setup: Setup) -> None:
+        readings.tensions = readings.tensions * self.factor

@@ -1,0 +1,196 @@
+"""A robot, its commands and its effects: what would be read, row by row."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seecr import cable_law, kernel, statics
+from seecr.effects.base import Effect, Readings
+from seecr.equilibrium import Solution, certify
+from seecr.history import Path, path_of, walk
+from seecr.pose import Array
+from seecr.robot import Robot
+from seecr.setup import Commands, Setup, plain_setup
+
+# Rounds of linearising users' laws about the strains found with them.
+_LAW_ROUNDS = 30
+_LIMIT = 400
+
+
+@dataclass(eq=False)
+class Prediction:
+    """Solved rows and what the sensors would report of them.
+
+    Attributes:
+        setup: as the effects left it, of the rows asked for.
+        tables, found: of the rows asked for.
+        readings: what would be read.
+        has_history: whether rows depend on the rows before.
+        solved: (n,) bool, a stable equilibrium was found.
+    """
+
+    setup: Setup
+    tables: statics.Tables
+    found: statics.Evaluation
+    readings: Readings
+    has_history: bool
+    whole: statics.Evaluation | None = None
+
+    @property
+    def solved(self) -> NDArray[np.bool_]:
+        fine = (self.found.outcome == kernel.CONVERGED) & (
+            self.found.residual < kernel.TOLERANCE
+        )
+        return np.asarray(fine)
+
+    @property
+    def singular(self) -> NDArray[np.bool_]:
+        """(n,) rows at rest that are free to move along some direction."""
+        return np.asarray(self.found.outcome == kernel.SINGULAR)
+
+    @property
+    def poses(self) -> Array:
+        """(n, 7) where the platform rests."""
+        return statics.platform_poses(self.tables, self.found.deviation)
+
+    @property
+    def tensions(self) -> Array:
+        """(n, m) [N]."""
+        return self.found.states[..., cable_law.TENSION]
+
+    def solution(self) -> Solution:
+        """The rows as a certified :class:`seecr.Solution`."""
+        return certify(self.setup.robot, self.tables, self.found)
+
+
+@dataclass(eq=False)
+class Experiment:
+    """A robot and what it was told; predicts its readings under any effects.
+
+    Attributes:
+        robot: as described.
+        commands: n rows.
+    """
+
+    robot: Robot
+    commands: Commands
+    _path: list[Path] = field(default_factory=list, repr=False)
+
+    @property
+    def path(self) -> Path:
+        """The rows with their waypoints, for effects with history."""
+        if not self._path:
+            self._path.append(path_of(self.robot, self.commands))
+        return self._path[0]
+
+    def setup(self, effects: Sequence[Effect], commands: Commands | None = None) -> Setup:
+        """The setup as the effects leave it."""
+        setup = plain_setup(self.robot, self.commands if commands is None else commands)
+        for effect in effects:
+            effect.edit_setup(setup)
+        return setup
+
+    def predict(
+        self, effects: Sequence[Effect] = (), near: Prediction | None = None
+    ) -> Prediction:
+        """Solve all rows and read the sensors.
+
+        Args:
+            effects: in the order in which they act.
+            near: a prediction to start from, of effects a little different; the search starts
+                at the commanded poses without one.
+        """
+        setup = self.setup(effects)
+        if setup.has_history:
+            return self._predict_path(effects)
+        start = None if near is None or near.has_history else near.found
+        tables, found = self._solve(setup, start)
+        return Prediction(setup, tables, found, self._read(effects, setup, tables, found), False)
+
+    def _solve(
+        self, setup: Setup, start: statics.Evaluation | None
+    ) -> tuple[statics.Tables, statics.Evaluation]:
+        def run(tables: statics.Tables, start: statics.Evaluation | None) -> statics.Evaluation:
+            if start is None:
+                return statics.descend(tables, limit=_LIMIT)
+            found = statics.descend(
+                tables, start.deviation, _LIMIT, start_values=start.values, staged=False
+            )
+            return _mend(tables, found)
+
+        return _with_laws(setup, run, start)
+
+    def _predict_path(self, effects: Sequence[Effect]) -> Prediction:
+        path = self.path
+        setup = self.setup(effects, path.commands)
+        tables, whole = _with_laws(
+            setup, lambda tables, _start: walk(setup, tables, path, _LIMIT), None
+        )
+        rows = statics.take(tables, path.rows)
+        found = statics.take_evaluation(whole, path.rows)
+        # a waypoint that was not solved spoils the rows of its run from there on
+        failed = (whole.outcome != kernel.CONVERGED) & (whole.outcome != kernel.SINGULAR)
+        for k in path.source[failed]:
+            run = path.commands.run
+            assert run is not None
+            later = (np.arange(len(found.outcome)) >= k) & (
+                run[path.rows] == run[path.rows[k]]
+            )
+            found.outcome[later & (found.outcome == kernel.CONVERGED)] = kernel.STALLED
+        own = self.setup(effects)
+        return Prediction(own, rows, found, self._read(effects, own, rows, found), True, whole)
+
+    @staticmethod
+    def _read(
+        effects: Sequence[Effect],
+        setup: Setup,
+        tables: statics.Tables,
+        found: statics.Evaluation,
+    ) -> Readings:
+        pose = statics.platform_poses(tables, found.deviation)
+        return read(effects, setup, pose, found.states[..., cable_law.TENSION])
+
+
+def read(effects: Sequence[Effect], setup: Setup, poses: Array, tensions: Array) -> Readings:
+    """What the sensors report of poses (n, 7) and tensions (n, m)."""
+    readings = Readings(poses[:, :3].copy(), poses[:, 3:].copy(), tensions.copy())
+    for effect in effects:
+        effect.edit_readings(readings, setup)
+    return readings
+
+
+def _mend(tables: statics.Tables, found: statics.Evaluation) -> statics.Evaluation:
+    """Solve afresh what a warm start did not lead to."""
+    lost = np.flatnonzero(found.outcome != kernel.CONVERGED)
+    if len(lost):
+        again = statics.descend(statics.take(tables, lost), limit=_LIMIT)
+        statics.put_evaluation(found, lost, again)
+    return found
+
+
+def _with_laws(
+    setup: Setup,
+    run: Callable[[statics.Tables, statics.Evaluation | None], statics.Evaluation],
+    start: statics.Evaluation | None,
+) -> tuple[statics.Tables, statics.Evaluation]:
+    """Solve, and where users' laws are in play linearise them at the strains found, again."""
+    strains = None
+    if setup.laws and start is not None:
+        strains = start.states[..., cable_law.STRAIN]
+    tables = statics.assemble(setup, strains)
+    found = run(tables, start)
+    if not setup.laws:
+        return tables, found
+    for _ in range(_LAW_ROUNDS):
+        before = strains
+        strains = np.maximum(found.states[..., cable_law.STRAIN], 0.0)
+        tables = statics.assemble(setup, strains)
+        found = run(tables, found)
+        if before is not None and np.allclose(strains, before, rtol=1e-12, atol=1e-15):
+            return tables, found
+    found.outcome[found.outcome == kernel.CONVERGED] = kernel.STALLED
+    return tables, found

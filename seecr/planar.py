@@ -1,0 +1,199 @@
+"""Planar robots in closed form: a bar on two cables, and pairs of parallel cables.
+
+Everything here lies in the paper's vertical plane: x horizontal, y upwards, and a tilt theta
+that turns x towards y (Fig 2). In the shipped planar robots, which lie in the x-z plane, that
+is minus the value of the hinge about +y.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from seecr.errors import InputError
+from seecr.pose import Array
+
+# A root of the quartic this far off the unit circle is no angle (roots are polished later).
+_OFF_CIRCLE = 1e-5
+
+
+def bar_tilt(exit_points: ArrayLike, positions: ArrayLike, half_length: float = 0.0) -> Array:
+    """Tilt at which a bar on two inextensible cables hangs at rest (paper, section III-A).
+
+    The centre of mass is the bar's middle. For a half length of zero this is the paper's
+    closed form, eqs 5 and 6 without their misprints,
+
+        theta = 2 atan((B + sqrt(B^2 + A^2)) / -A) = atan(A / B),
+        A = Y1 X2 + Y2 X1,  B = 2 X1 X2,  X_i = a_ix - p_x,  Y_i = a_iy - p_y,
+
+    which the paper gives for any bar but which holds only as the half length goes to zero.
+    Else it is the root of :func:`bar_equation`, to rounding; of several roots the one at which
+    both cables pull and the bar rests stably, the most level of those.
+
+    Args:
+        exit_points: a_1, a_2, (2, 2) [m].
+        positions: of the bar's middle, (..., 2) [m].
+        half_length: from the middle to either anchor point, h [m]; cable 1 holds the end at -h.
+
+    Returns:
+        theta, (...) [rad]; nan where the two cables cannot hold the bar.
+    """
+    exits, places = _points(exit_points, 2), np.asarray(positions, float)
+    if places.shape[-1:] != (2,):
+        raise InputError(f"positions must be (..., 2), x y, got {places.shape}")
+    if not (np.isfinite(half_length) and half_length >= 0.0):
+        raise InputError(f"half_length must not be negative [m], got {half_length:g}")
+    to_exit = exits - places[..., None, :]
+    if half_length == 0.0:
+        return _point_tilt(to_exit)
+    flat = to_exit.reshape(-1, 2, 2)
+    tilts = [_most_level(_roots(one, half_length), one, half_length) for one in flat]
+    return np.array(tilts).reshape(places.shape[:-1])
+
+
+def solution_manifold(
+    exit_points: ArrayLike, x: ArrayLike, y: ArrayLike, half_length: float = 0.0
+) -> Array:
+    """Tilts at which the bar rests, over a grid of positions (paper, Fig 3).
+
+    Args:
+        exit_points: (2, 2) [m].
+        x: (k,) [m] and y: (r,) [m], the grid.
+        half_length: [m].
+
+    Returns:
+        (r, k) [rad]; nan where the two cables cannot hold the bar.
+    """
+    grid = np.stack(np.meshgrid(np.asarray(x, float), np.asarray(y, float)), axis=-1)
+    return bar_tilt(exit_points, grid, half_length)
+
+
+def bar_equation(
+    theta: ArrayLike, exit_points: ArrayLike, positions: ArrayLike, half_length: float = 0.0
+) -> Array:
+    """Zero where the lines of both cables and of the weight meet in one point, (...) [m^2].
+
+        -2 X1 X2 sin + h sin cos (X1 - X2) + cos (Y1 X2 + Y2 X1) + h cos^2 (Y2 - Y1)
+
+    with X_i = a_ix - p_x and Y_i = a_iy - p_y: the torque about the bar's middle of the two
+    forces that balance its weight, cleared of denominators. It replaces eqs 5 and 6 for a bar
+    of half length h.
+
+    Args:
+        theta: (...) [rad].
+        exit_points: (2, 2) [m].
+        positions: (..., 2) [m].
+        half_length: h [m].
+    """
+    to_exit = _points(exit_points, 2) - np.asarray(positions, float)[..., None, :]
+    return _equation(np.asarray(theta, float), to_exit, half_length)[0]
+
+
+def midline_point(exit_points: ArrayLike, anchor_points: ArrayLike) -> Array:
+    """Where the midlines of two pairs of parallel cables meet: the paper's V or H (Fig 9).
+
+    Cables 1 and 2 are one pair, 3 and 4 the other. Equal tensions in a parallel pair amount to
+    one force along its midline, so that the platform can rest with equal tensions on each side
+    only where the weight passes through this point.
+
+    Args:
+        exit_points: (4, 2) or (..., 4, 2) [m].
+        anchor_points: in the same frame, at the pose in question, (..., 4, 2) [m].
+
+    Returns:
+        (..., 2) [m]; infinite where the midlines are parallel.
+    """
+    exits, anchors = np.asarray(exit_points, float), np.asarray(anchor_points, float)
+    if exits.shape[-2:] != (4, 2) or anchors.shape[-2:] != (4, 2):
+        raise InputError(
+            "exit_points and anchor_points must be (..., 4, 2), got "
+            f"{exits.shape} and {anchors.shape}"
+        )
+    top, bottom = _middles(exits), _middles(anchors)
+    along = top - bottom
+    across = _cross(along[..., 0, :], along[..., 1, :])
+    between = bottom[..., 1, :] - bottom[..., 0, :]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        part = _cross(between, along[..., 1, :]) / across
+        point = bottom[..., 0, :] + part[..., None] * along[..., 0, :]
+    return np.where(across[..., None] == 0.0, np.inf, point)
+
+
+def _points(values: ArrayLike, count: int) -> Array:
+    points = np.asarray(values, float)
+    if points.shape != (count, 2) or not np.all(np.isfinite(points)):
+        raise InputError(f"exit_points must be ({count}, 2) finite numbers, got {points.shape}")
+    return points
+
+
+def _middles(points: Array) -> Array:
+    return 0.5 * (points[..., 0::2, :] + points[..., 1::2, :])
+
+
+def _cross(a: Array, b: Array) -> Array:
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
+def _point_tilt(to_exit: Array) -> Array:
+    """Eqs 5 and 6 as one arctangent, whose numerator and denominator do not cancel."""
+    (x1, y1), (x2, y2) = to_exit[..., 0, :].T, to_exit[..., 1, :].T
+    a, b = (y1 * x2 + y2 * x1).T, (2.0 * x1 * x2).T
+    # both pull: horizontally apart, and together upwards
+    lift = (y1 * x2 - y2 * x1).T * np.sign((x2 - x1).T)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where((b < 0.0) & (lift > 0.0), np.arctan(a / b), np.nan)
+
+
+def _equation(theta: Array, to_exit: Array, h: float) -> tuple[Array, Array]:
+    """Left side of :func:`bar_equation` and its derivative by theta."""
+    x1, y1 = to_exit[..., 0, 0], to_exit[..., 0, 1]
+    x2, y2 = to_exit[..., 1, 0], to_exit[..., 1, 1]
+    s, c = np.sin(theta), np.cos(theta)
+    a, b = -2.0 * x1 * x2, h * (x1 - x2)
+    d, e = y1 * x2 + y2 * x1, h * (y2 - y1)
+    value = a * s + b * s * c + d * c + e * c * c
+    slope = a * c + b * (c * c - s * s) - d * s - 2.0 * e * s * c
+    return value, slope
+
+
+def _roots(to_exit: Array, h: float) -> Array:
+    """All angles that solve the equation, from its quartic in exp(i theta), polished."""
+    (x1, y1), (x2, y2) = to_exit
+    single = complex(y1 * x2 + y2 * x1, 2.0 * x1 * x2) / 2.0
+    double = complex(h * (y2 - y1), -h * (x1 - x2)) / 4.0
+    constant = h * (y2 - y1) / 2.0
+    z = np.roots([double, single, constant, single.conjugate(), double.conjugate()])
+    theta = np.angle(z[np.abs(np.abs(z) - 1.0) < _OFF_CIRCLE])
+    for _ in range(4):
+        value, slope = _equation(theta, to_exit, h)
+        theta = theta - value / np.where(slope == 0.0, np.inf, slope)
+    return theta
+
+
+def _most_level(theta: Array, to_exit: Array, h: float) -> float:
+    held = theta[[_rests(t, to_exit, h) for t in theta]] if len(theta) else theta
+    return float(held[np.argmin(np.abs(held))]) if len(held) else float("nan")
+
+
+def _rests(theta: float, to_exit: Array, h: float) -> bool:
+    """Whether both cables pull, and the bar's one free motion raises its middle.
+
+    That motion leaves both cable lengths as they are; the second change of the energy along it
+    is tension times second change of length, summed over the cables.
+    """
+    arms = h * np.array([[-1.0], [1.0]]) * np.array([np.cos(theta), np.sin(theta)])
+    cables = to_exit - arms
+    lengths = np.linalg.norm(cables, axis=1)
+    if np.any(lengths == 0.0):
+        return False
+    u = cables / lengths[:, None]
+    # forces that cancel sideways and lift: tau_1 u_1x + tau_2 u_2x = 0
+    tension = np.array([u[1, 0], -u[0, 0]]) * np.sign(u[1, 0] - u[0, 0])
+    if np.any(tension < 0.0) or not tension @ u[:, 1] > 0.0:
+        return False
+    rows = np.column_stack([u, _cross(arms, u)])
+    x, y, turn = np.cross(rows[0], rows[1])
+    moves = np.array([x, y]) + turn * np.column_stack([-arms[:, 1], arms[:, 0]])
+    sideways = np.sum(moves**2, axis=1) - np.sum(moves * u, axis=1) ** 2
+    bending = sideways / lengths + turn**2 * np.sum(arms * u, axis=1)
+    return bool(tension @ bending > 0.0)
