@@ -30,8 +30,8 @@ COLUMNS = (
     "winch_side",  # length of elastic cable behind the exit point [m]
     "weight",  # per metre of cable [N/m]
     "creep", "creep_rate",  # creep strain = creep + creep_rate T
-    "hysteresis", "hysteresis_strain",  # Dahl: amplitude [N], strain over which it turns
-    "strain_before", "hysteresis_before",  # state the Dahl law starts from
+    "hysteresis", "hysteresis_stretch",  # Dahl: amplitude [N], stretch over which it turns [m]
+    "stretch_before", "hysteresis_before",  # state the Dahl law starts from
     "friction",  # exponent of the capstan at the exit point
     "winch_tension_stuck",  # tension behind the exit point if the cable does not slip [N]
     "extra", "extra_slope",  # a user's law, linearised: T += extra + extra_slope eps
@@ -40,7 +40,7 @@ N_COLUMNS = len(COLUMNS)
 
 (
     EXIT, _EY, _EZ, ANCHOR, _BY, _BZ, REST, GAP, EA, QUADRATIC, CUBIC, RADIUS, COMPLIANCE,
-    WINCH_SIDE, WEIGHT, CREEP, CREEP_RATE, HYSTERESIS, HYSTERESIS_STRAIN, STRAIN_BEFORE,
+    WINCH_SIDE, WEIGHT, CREEP, CREEP_RATE, HYSTERESIS, HYSTERESIS_STRETCH, STRETCH_BEFORE,
     HYSTERESIS_BEFORE, FRICTION, STUCK, EXTRA, EXTRA_SLOPE,
 ) = range(N_COLUMNS)  # fmt: skip
 
@@ -55,17 +55,17 @@ _jit = njit(cache=True, nogil=True, error_model="numpy")
 def dahl(row, strain):
     """Hysteretic tension [N] and its slope at a strain, from the state before.
 
-    Dahl's model in closed form for a monotone change of strain (Dahl 1968, with exponent 1):
-    z = s Z + (z0 - s Z) exp(-|d eps| / eps_c), s the sign of the change.
+    Dahl's model in closed form for a monotone change of stretch (Dahl 1968, with exponent 1):
+    z = s Z + (z0 - s Z) exp(-|d e| / e_c), s the sign of the change of the stretch e = l0 eps.
     """
     amplitude = row[HYSTERESIS]
     if amplitude == 0.0:
         return 0.0, 0.0
-    change = strain - row[STRAIN_BEFORE]
+    change = strain * row[REST] - row[STRETCH_BEFORE]
     limit = amplitude if change >= 0.0 else -amplitude
-    fade = math.exp(-abs(change) / row[HYSTERESIS_STRAIN])
+    fade = math.exp(-abs(change) / row[HYSTERESIS_STRETCH])
     z = limit + (row[HYSTERESIS_BEFORE] - limit) * fade
-    slope = abs(row[HYSTERESIS_BEFORE] - limit) * fade / row[HYSTERESIS_STRAIN]
+    slope = abs(row[HYSTERESIS_BEFORE] - limit) * fade * row[REST] / row[HYSTERESIS_STRETCH]
     return z, slope
 
 

@@ -235,13 +235,21 @@ def certify(robot: Robot, tables: statics.Tables, found: statics.Evaluation) -> 
             np.concatenate([found.deviation[:, :3], rotvec_from_quat(turn)], axis=1), lost
         ),
         tensions=_blank(check.states[..., cable_law.TENSION], lost),
-        slack=check.states[..., cable_law.SLACK] > 0.5,
+        slack=is_slack(tables, check),
         rest_lengths=tables.cables[..., cable_law.REST],
         iterations=found.count,
         residual=np.where(lost, np.inf, check.residual),
         energy=check.energy,
         status=status,
     )
+
+
+def is_slack(tables: statics.Tables, found: statics.Evaluation) -> NDArray[np.bool_]:
+    """Cables that do not pull, (n, m); a tension of mere rounding is none."""
+    rounding = kernel.IDLE * tables.scale[:, None]
+    loose = found.states[..., cable_law.SLACK] > 0.5
+    idle = found.states[..., cable_law.TENSION] < rounding
+    return np.asarray(loose | idle)
 
 
 def _blank(values: Array, rows: NDArray[np.bool_]) -> Array:

@@ -24,7 +24,7 @@ from seecr.cable_law import (
     REST,
     SLACK,
     STRAIN,
-    STRAIN_BEFORE,
+    STRETCH_BEFORE,
     STUCK,
     TENSION,
     WINCH_SIDE,
@@ -175,7 +175,7 @@ def _walk(
                 continue
             row[CREEP] += 0.5 * share * states[k - 1, i, TENSION]
             row[CREEP_RATE] = 0.5 * share
-            row[STRAIN_BEFORE] = max(states[k - 1, i, STRAIN], 0.0)
+            row[STRETCH_BEFORE] = max(states[k - 1, i, STRAIN], 0.0) * cables[k - 1, i, REST]
             row[HYSTERESIS_BEFORE] = states[k - 1, i, HYSTERESIS_NOW]
             if row[WINCH_SIDE] > 0.0:
                 paid = row[REST] - cables[k - 1, i, REST]
@@ -190,7 +190,7 @@ def _walk(
             crept[i] = row[CREEP] + row[CREEP_RATE] * states[k, i, TENSION]
             if fresh[k]:
                 row[HYSTERESIS], row[FRICTION] = amplitude[i], friction[i]
-                row[STRAIN_BEFORE] = max(states[k, i, STRAIN], 0.0)
+                row[STRETCH_BEFORE] = max(states[k, i, STRAIN], 0.0) * row[REST]
                 row[HYSTERESIS_BEFORE] = 0.0
                 row[STUCK] = states[k, i, WINCH_TENSION]
                 states[k, i, HYSTERESIS_NOW] = 0.0

@@ -21,7 +21,10 @@ from seecr.cable_law import (
     ANCHOR,
     EA,
     ENERGY,
+    GAP,
     N_STATE,
+    RADIUS,
+    REST,
     SLACK,
     TENSION,
     cable_pull,
@@ -38,6 +41,8 @@ CONVERGED, UNSTABLE, SINGULAR, STALLED, FALLING, CABLE_LAW, ITERATIONS = range(7
 
 # A stiffness below this part of the largest diagonal entry is none.
 SINGULAR_PART = 1e-11
+# A tension below this part of the load is rounding.
+IDLE = 1e-11
 # An equilibrium leaves at most this part of the load; the descent goes on to FINE while it
 # still gains digits.
 TOLERANCE = 1e-9
@@ -416,6 +421,33 @@ def _escape(hessian, top, radius, step):
 
 
 @_jit
+def _holds_without_idle(
+    cables, load, pose, deviation, current, length, guess, states, scale, gradient, hessian,
+    other_states, slopes, factor, work,
+):  # fmt: skip
+    """Whether the equilibrium is stable without the cables whose tension is mere rounding.
+
+    A cable that is exactly as long as its rest length resists on one side only.
+    """
+    idle = False
+    for i in range(cables.shape[0]):
+        if states[i, SLACK] == 0.0 and states[i, TENSION] < IDLE * scale:
+            idle = True
+    if not idle:
+        return True
+    rest = cables.copy()
+    for i in range(cables.shape[0]):
+        if states[i, SLACK] == 0.0 and states[i, TENSION] < IDLE * scale:
+            rest[i, GAP] = -rest[i, REST]
+            rest[i, RADIUS] = 0.0
+    evaluate(
+        rest, load, pose, deviation, current, length, guess.copy(), gradient, hessian,
+        other_states, slopes, work,
+    )  # fmt: skip
+    return cholesky(hessian, -SINGULAR_PART * largest_diagonal(hessian), factor)
+
+
+@_jit
 def solve_one(
     cables, load, pose, screws, start, start_values, length, scale, radius, reach, limit,
     guess, gradient, hessian, states, slopes, deviation, values, enough,
@@ -462,8 +494,14 @@ def solve_one(
         forced = False
         if size <= enough * scale or (idle >= 2 and size <= TOLERANCE * scale):
             top = largest_diagonal(hessian)
-            if cholesky(hessian, -SINGULAR_PART * top, factor):
+            firm = cholesky(hessian, -SINGULAR_PART * top, factor)
+            if firm and _holds_without_idle(
+                cables, load, pose, deviation, current, length, guess, states, scale,
+                trial_gradient, trial_hessian, trial_states, trial_slopes, factor, work,
+            ):  # fmt: skip
                 return CONVERGED, count, size / scale
+            if firm:
+                return SINGULAR, count, size / scale
             kind = _escape(hessian, top, radius, step)
             if kind == SINGULAR or escapes >= 4:
                 return kind, count, size / scale

@@ -33,6 +33,7 @@ def load_robot(path: str | Path) -> Robot:
     path = Path(path)
     model = _compile(path)
     body = _moving_body(model, path)
+    _refuse_other_forces(model, body, path)
     cables = [_read_cable(model, body, i, path) for i in range(model.ntendon)]
     if not cables:
         raise RobotError(
@@ -52,7 +53,7 @@ def load_robot(path: str | Path) -> Robot:
         rest_lengths=np.array(rest_lengths),
         mass=float(model.body_mass[body]),
         centre_of_mass=model.body_ipos[body].copy(),
-        gravity=model.opt.gravity.copy(),
+        gravity=_gravity(model),
         reference_pose=reference_pose,
         joints=joints,
         cable_names=tuple(names),
@@ -111,6 +112,29 @@ def _moving_body(model: mujoco.MjModel, path: Path) -> int:
     return body
 
 
+def _refuse_other_forces(model: mujoco.MjModel, body: int, path: Path) -> None:
+    """What would shift the platform at rest and is not read here: better no answer."""
+    if model.body_gravcomp[body] != 0:
+        raise RobotError(
+            f"{path}: body {_body_name(model, body)} has gravcomp "
+            f"{model.body_gravcomp[body]:g}; expected none, the cables carry the weight"
+        )
+    curved = np.flatnonzero(np.any(model.tendon_stiffnesspoly, axis=1))
+    if len(curved):
+        name = model.tendon(int(curved[0])).name or f"cable{curved[0] + 1}"
+        raise RobotError(
+            f"{path}: tendon {name} has a polynomial stiffness; expected one number [N/m]"
+        )
+
+
+def _gravity(model: mujoco.MjModel) -> Array:
+    import mujoco
+
+    if model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY):
+        return np.zeros(3)
+    return np.array(model.opt.gravity)
+
+
 def _read_joints(model: mujoco.MjModel, body: int, path: Path) -> tuple[Joint, ...]:
     first, count = model.body_jntadr[body], model.body_jntnum[body]
     kinds = {2: "slide", 3: "hinge"}
@@ -138,8 +162,6 @@ def _read_joints(model: mujoco.MjModel, body: int, path: Path) -> tuple[Joint, .
                 point=position + quat_rotate(quat, model.jnt_pos[j]),
             )
         )
-    if len(joints) > 6:
-        raise RobotError(f"{path}: {len(joints)} joints on one platform; expected at most 6")
     return tuple(joints)
 
 

@@ -102,7 +102,7 @@ class Robot:
                 )
         if not self.mass >= 0:
             raise RobotError(f"robot {self.name}: mass must not be negative, got {self.mass:g} kg")
-        short = self.nominal_lengths(self.reference_pose[None])[0] < 1e-9 * self.length
+        short = self.nominal_lengths(self.reference_pose[None])[0] <= 1e-9 * self.length
         if np.any(short):
             name = self.cable_names[int(np.argmax(short))]
             raise RobotError(
@@ -135,10 +135,11 @@ class Robot:
         """
         b = self.anchor_points
         reach = 0.5 * float(np.max(np.linalg.norm(b[:, None] - b[None], axis=-1)))
-        floor = 0.01 * float(
-            np.max(np.linalg.norm(self.exit_points - self.reference_pose[:3], axis=-1))
-        )
-        return max(reach, floor)
+        exits = self.exit_points - self.reference_pose[:3]
+        floor = 0.01 * float(np.max(np.linalg.norm(exits, axis=-1)))
+        # one exit point, and the platform's origin on it
+        longest = float(np.max(self.nominal_lengths(self.reference_pose[None])))
+        return max(reach, floor) or 0.01 * longest
 
     def nominal_lengths(self, poses: Array) -> Array:
         """Straight lengths |A_i - (t + R B_i)| at poses (n, 7), as (n, m) [m] (eqs 1, 2)."""

@@ -82,7 +82,7 @@ class Setup:
         compliance: (m,) [m/N] of the exit points.
         cable_weight: (m,) [N/m].
         friction: (m,) capstan exponent at the exit point.
-        hysteresis, hysteresis_strain: (m,) amplitude [N] and strain of Dahl's model.
+        hysteresis, hysteresis_stretch: (m,) amplitude [N] and stretch [m] of Dahl's model.
         creep, creep_time: (m,) part of the elastic strain that creeps, time constant [s].
         laws: tension a user's effect adds, as functions of strain (n, m) giving (n, m) [N].
         mass: [kg]; centre_of_mass: (3,) [m]; gravity: (3,) [m/s^2].
@@ -107,7 +107,7 @@ class Setup:
     cable_weight: Array
     friction: Array
     hysteresis: Array
-    hysteresis_strain: Array
+    hysteresis_stretch: Array
     creep: Array
     creep_time: Array
     mass: float
@@ -217,7 +217,7 @@ def plain_setup(robot: Robot, commands: Commands, wrench: Array | None = None) -
         cable_weight=zeros(),
         friction=zeros(),
         hysteresis=zeros(),
-        hysteresis_strain=np.ones(m),
+        hysteresis_stretch=np.ones(m),
         creep=zeros(),
         creep_time=np.ones(m),
         mass=robot.mass,

@@ -106,7 +106,7 @@ def assemble(setup: Setup, strains: Array | None = None) -> Tables:
         (cable_law.WINCH_SIDE, setup.winch_side),
         (cable_law.WEIGHT, setup.cable_weight),
         (cable_law.HYSTERESIS, setup.hysteresis),
-        (cable_law.HYSTERESIS_STRAIN, setup.hysteresis_strain),
+        (cable_law.HYSTERESIS_STRETCH, setup.hysteresis_stretch),
         (cable_law.FRICTION, setup.friction),
     ):
         cables[..., column] = values

@@ -18,6 +18,11 @@ def usual_strain(robot: Robot) -> float:
     return max(0.5 * robot.weight / float(np.mean(robot.ea)), 1e-9)
 
 
+def usual_stretch(robot: Robot) -> float:
+    """Stretch [m] of such a cable."""
+    return usual_strain(robot) * mean_length(robot)
+
+
 @dataclass(frozen=True, eq=False)
 class Stiffness(Effect):
     """All cables are stiffer than assumed by one factor: E S -> factor E S."""
@@ -111,9 +116,9 @@ class CableWeight(Effect):
 class Hysteresis(Effect):
     """Cables pull less when they relax than when they are stretched.
 
-    T = E S eps + z, z Dahl's friction of the amplitude given, turning over within the strain
-    given: dz/d eps = (amplitude - z sign(d eps))/strain (Dahl 1968; for cables Miermeister
-    et al. 2015). z = 0 at the start of each run.
+    T = E S eps + z, z Dahl's friction of the amplitude given, turning over within the stretch
+    e = l0 eps given: dz/de = (amplitude - z sign(de))/stretch (Dahl 1968; for cables
+    Miermeister et al. 2015). z = 0 at rest at the start of each run.
     """
 
     name: ClassVar[str] = "hysteresis"
@@ -124,19 +129,19 @@ class Hysteresis(Effect):
     )
 
     amplitude: float = parameter("N", lambda r: 0.1 * r.weight / r.n_cables, bounds=(0.0, 1e6))
-    strain: float = parameter(
-        "", lambda r: 0.3 * usual_strain(r), null=1e-3, bounds=(1e-9, 1.0), shape=True
+    stretch: float = parameter(
+        "m", lambda r: 0.3 * usual_stretch(r), null=1e-3, bounds=(1e-9, 10.0), shape=True
     )
 
     def edit_setup(self, setup: Setup) -> None:
         setup.hysteresis = setup.hysteresis + self.amplitude
         if self.amplitude:
-            setup.hysteresis_strain = np.full_like(setup.hysteresis_strain, self.strain)
+            setup.hysteresis_stretch = np.full_like(setup.hysteresis_stretch, self.stretch)
 
     @classmethod
     def shapes(cls, setup: Setup) -> list[dict[str, float]]:
-        usual = usual_strain(setup.robot)
-        return [{"strain": part * usual} for part in (0.03, 0.1, 0.3, 1.0)]
+        usual = usual_stretch(setup.robot)
+        return [{"stretch": part * usual} for part in (0.1, 0.3, 1.0)]
 
 
 @dataclass(frozen=True, eq=False)
