@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.mujoco_model import (
@@ -119,6 +120,11 @@ class Physics:
     def kinetic_energy(self) -> float:
         """Kinetic energy [J] as of the last step's beginning."""
         return float(self.data.energy[1]) * self.mass_unit
+
+    @property
+    def steers(self) -> bool:
+        """Whether something has to be done at every step: here, a wrench to be applied."""
+        return bool(self.wrench.any())
 
     def set_cables(self, rest_lengths: Array, ea: Array) -> None:
         """Make each cable a spring that only pulls, of stiffness EA/l0 (paper, step 8).
@@ -236,12 +242,11 @@ class Physics:
         mujoco.mj_integratePos(self.model, self.data.qpos, change, 1.0)
 
     @contextmanager
-    def frozen_slack(self) -> Iterator[None]:
-        """Let taut cables pull and push, slack ones vanish: smooth, for differences only."""
-        self.update()
+    def frozen_slack(self, taut: NDArray[np.bool_]) -> Iterator[None]:
+        """Let some cables (m,) pull and push, the others vanish: smooth, for Newton's method."""
         spring, stiffness = self.model.tendon_lengthspring, self.model.tendon_stiffness
         kept = stiffness.copy()
-        stiffness[self.tensions() == 0.0] = 0.0
+        stiffness[~taut] = 0.0
         spring[:, 0] = spring[:, 1]
         try:
             yield

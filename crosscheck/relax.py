@@ -168,10 +168,10 @@ def _run(
 
 
 def _advance(physics: Physics) -> Callable[[], None]:
-    """One MuJoCo step; with an external wrench it is applied at the pose of that very step."""
+    """One MuJoCo step; what acts at each, such as a wrench, acts at the pose of that very step."""
     model, data = physics.model, physics.data
     data.qfrc_applied[:] = 0.0
-    if not physics.wrench.any():
+    if not physics.steers:
         step = mujoco.mj_step
         return lambda: step(model, data)
 

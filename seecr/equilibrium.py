@@ -172,6 +172,8 @@ def solve(
     """
     if method not in METHODS:
         raise InputError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
+    if max_iterations < 1:
+        raise InputError(f"max_iterations must be at least 1, got {max_iterations}")
     if gravity is not None:
         robot = replace(robot, gravity=_array(gravity, (3,), "gravity"))
     commands = _commands(robot, poses, rest_lengths)
@@ -223,16 +225,18 @@ def certify(robot: Robot, tables: statics.Tables, found: statics.Evaluation) -> 
     status = np.array([_OF_OUTCOME.get(o, Status.GAVE_UP) for o in found.outcome], dtype=object)
     balanced = check.residual < kernel.TOLERANCE
     status[(status == Status.CONVERGED) & ~balanced] = Status.STALLED
-    turn = np.where(found.deviation[:, 3:4] < 0, -1.0, 1.0) * found.deviation[:, 3:]
-    lost = np.array([s in (Status.FALLING, Status.CABLE_LAW) for s in status])
+    # not found's own: a search in joint values alone leaves its deviations unplaced
+    moved = check.deviation
+    turn = np.where(moved[:, 3:4] < 0, -1.0, 1.0) * moved[:, 3:]
+    lost = np.array([s in (Status.FALLING, Status.CABLE_LAW) for s in status], dtype=bool)
     return Solution(
         robot=robot,
         tables=tables,
         evaluation=check,
         command=tables.poses,
-        pose=_blank(statics.platform_poses(tables, found.deviation), lost),
+        pose=_blank(statics.platform_poses(tables, moved), lost),
         deviation=_blank(
-            np.concatenate([found.deviation[:, :3], rotvec_from_quat(turn)], axis=1), lost
+            np.concatenate([moved[:, :3], rotvec_from_quat(turn)], axis=1), lost
         ),
         tensions=_blank(check.states[..., cable_law.TENSION], lost),
         slack=is_slack(tables, check),
@@ -271,7 +275,12 @@ def _commands(robot: Robot, poses: ArrayLike | None, lengths: ArrayLike | None) 
         )
     if np.any(table <= 0):
         raise InputError("rest_lengths must be positive [m]")
-    start = robot.reference_pose if poses is None else _poses(poses, "poses")
+    start = robot.reference_pose[None] if poses is None else _poses(poses, "poses")
+    if len(start) not in (1, len(table)):
+        raise InputError(
+            f"poses must be one or as many as the {len(table)} rows of rest_lengths, "
+            f"got {len(start)}"
+        )
     rows = np.broadcast_to(start, (len(table), 7)).copy()
     return Commands(rows, lengths=table)
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from seecr import cable_law, kernel, statics
 from seecr.effects.base import Effect, Readings
+from seecr.effects.checked import edit_readings, edit_setup
 from seecr.equilibrium import Solution, certify
 from seecr.history import Path, path_of, walk
 from seecr.pose import Array
@@ -38,7 +39,7 @@ class Prediction:
     found: statics.Evaluation
     readings: Readings
     has_history: bool
-    whole: statics.Evaluation | None = None
+    kept: dict[str, Array] = field(default_factory=dict, repr=False)
 
     @property
     def solved(self) -> NDArray[np.bool_]:
@@ -91,7 +92,7 @@ class Experiment:
         """The setup as the effects leave it."""
         setup = plain_setup(self.robot, self.commands if commands is None else commands)
         for effect in effects:
-            effect.edit_setup(setup)
+            edit_setup(effect, setup)
         return setup
 
     def predict(
@@ -142,7 +143,7 @@ class Experiment:
             )
             found.outcome[later & (found.outcome == kernel.CONVERGED)] = kernel.STALLED
         own = self.setup(effects)
-        return Prediction(own, rows, found, self._read(effects, own, rows, found), True, whole)
+        return Prediction(own, rows, found, self._read(effects, own, rows, found), True)
 
     @staticmethod
     def _read(
@@ -159,7 +160,7 @@ def read(effects: Sequence[Effect], setup: Setup, poses: Array, tensions: Array)
     """What the sensors report of poses (n, 7) and tensions (n, m)."""
     readings = Readings(poses[:, :3].copy(), poses[:, 3:].copy(), tensions.copy())
     for effect in effects:
-        effect.edit_readings(readings, setup)
+        edit_readings(effect, readings, setup)
     return readings
 
 

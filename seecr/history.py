@@ -8,9 +8,11 @@ everything; between runs the robot waits at its reference pose.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from seecr import kernel, statics
 from seecr.cable_law import (
@@ -30,6 +32,7 @@ from seecr.cable_law import (
     WINCH_SIDE,
     WINCH_TENSION,
 )
+from seecr.joints import pose_of_values, values_of_pose
 from seecr.pose import Array, pose_add, pose_difference
 from seecr.robot import Robot
 from seecr.setup import Commands, Setup
@@ -51,9 +54,9 @@ class Path:
     """
 
     commands: Commands
-    rows: Array
-    source: Array
-    fresh: Array
+    rows: NDArray[np.integer]
+    source: NDArray[np.integer]
+    fresh: NDArray[np.bool_]
     elapsed: Array
 
 
@@ -79,11 +82,11 @@ def path_of(robot: Robot, commands: Commands) -> Path:
             if home_length is not None:
                 lengths.append(home_length)
         before = robot.reference_pose if starts else commands.pose[k - 1]
-        change = pose_difference(commands.pose[k], before)
         steps = _APPROACH if starts else _BETWEEN
+        way = _straight(robot, before, commands.pose[k], steps)
         for s in range(1, steps + 1):
             part = s / steps
-            poses.append(commands.pose[k] if s == steps else pose_add(before, part * change))
+            poses.append(way[s - 1])
             source.append(k)
             fresh.append(False)
             elapsed.append(0.0 if starts else max(clock[k] - clock[k - 1], 0.0) / steps)
@@ -102,6 +105,18 @@ def path_of(robot: Robot, commands: Commands) -> Path:
     return Path(whole, np.array(rows), index, np.array(fresh), np.array(elapsed))
 
 
+def _straight(robot: Robot, before: Array, after: Array, steps: int) -> list[Array]:
+    """Poses (7,) in even steps from one pose to another, straight in what the platform may do."""
+    parts = np.arange(1, steps)[:, None] / steps
+    if robot.joints:
+        ends = values_of_pose(robot, np.stack([before, after]))[0]
+        way = pose_of_values(robot, ends[0] + parts * (ends[1] - ends[0]))[0]
+    else:
+        start = np.broadcast_to(before, (steps - 1, 7))
+        way = pose_add(start, parts * pose_difference(after, before))
+    return [*way, after]
+
+
 def walk(setup: Setup, tables: statics.Tables, path: Path, limit: int) -> statics.Evaluation:
     """Solve the waypoints in order, each from the one before, and carry the cables' state."""
     n, m = tables.cables.shape[:2]
@@ -111,7 +126,7 @@ def walk(setup: Setup, tables: statics.Tables, path: Path, limit: int) -> static
     starts = np.flatnonzero(path.fresh)
     # runs are independent, but for creep, which goes through all of them
     edges = [0, n] if with_clock else [*starts.tolist(), n]
-    parts = [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    parts = [slice(a, b) for a, b in pairwise(edges)]
 
     def run(part: slice) -> None:
         _walk(
@@ -128,7 +143,7 @@ def walk(setup: Setup, tables: statics.Tables, path: Path, limit: int) -> static
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _quat_to_next(q_old, q_command_old, q_command_new, out):
+def _quat_to_next(q_old, q_command_old, q_command_new, out):  # type: ignore[no-untyped-def]
     """Deviation from the new command of a platform that has not moved."""
     pose = np.empty(4)
     kernel.quat_product(q_old, q_command_old, pose)
@@ -142,7 +157,21 @@ def _quat_to_next(q_old, q_command_old, q_command_new, out):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _walk(
+def _shares(span):  # type: ignore[no-untyped-def]
+    """What a load linear in time leaves of itself after ``span`` time constants.
+
+    Of its value before and now: the convolution of a ramp with exp(-t); the rest, exp(-span),
+    is left of the creep there was.
+    """
+    if span < 1e-3:
+        before = span / 2 - span**2 / 3 + span**3 / 8
+        return before, span / 2 - span**2 / 6 + span**3 / 24
+    mean = -np.expm1(-span) / span
+    return mean - np.exp(-span), 1.0 - mean
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _walk(  # type: ignore[no-untyped-def]
     cables, load, poses, screws, length, scale, radius, reach, limit, fresh, elapsed, creep,
     creep_time, outcome, count, residual, gradient, hessian, states, slopes, deviation, values,
     guess,
@@ -165,16 +194,16 @@ def _walk(
         for i in range(m):
             row = cables[k, i]
             amplitude[i], friction[i] = row[HYSTERESIS], row[FRICTION]
-            fade = np.exp(-elapsed[k] / creep_time[i])
-            share = creep[i] / row[EA] * (1.0 - fade)
-            row[CREEP] = crept[i] * fade
+            before, now = _shares(elapsed[k] / creep_time[i])
+            share = creep[i] / row[EA]
+            row[CREEP] = crept[i] * (1.0 - before - now)
             if fresh[k]:
                 # waits at the reference pose, history cleared
-                row[CREEP_RATE] = share
+                row[CREEP_RATE] = share * (before + now)
                 row[HYSTERESIS], row[FRICTION] = 0.0, 0.0
                 continue
-            row[CREEP] += 0.5 * share * states[k - 1, i, TENSION]
-            row[CREEP_RATE] = 0.5 * share
+            row[CREEP] += share * before * states[k - 1, i, TENSION]
+            row[CREEP_RATE] = share * now
             row[STRETCH_BEFORE] = max(states[k - 1, i, STRAIN], 0.0) * cables[k - 1, i, REST]
             row[HYSTERESIS_BEFORE] = states[k - 1, i, HYSTERESIS_NOW]
             if row[WINCH_SIDE] > 0.0:

@@ -8,19 +8,21 @@ Rows with history are the exception: their walk is repeated with each parameter 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 
-from seecr import cable_law, statics
+from seecr import cable_law, kernel, statics
 from seecr.effects.base import Effect, Layout, Readings
 from seecr.experiment import Experiment, Prediction, read
+from seecr.joints import motion_columns
 from seecr.pose import Array, pose_add, quat_conjugate, quat_multiply, rotvec_from_quat
+from seecr.setup import Setup
 from seecr.statics import Tables
 
 # Differencing steps, in plausible sizes of a parameter.
-_CENTRAL, _ONE_SIDED, _WALK = 1e-4, 1e-5, 1e-3
+_CENTRAL, _ONE_SIDED, _WALK = 1e-4, 1e-5, 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +48,11 @@ def effects_of(terms: Sequence[Term]) -> list[Effect]:
 
 
 def sensitivities(
-    experiment: Experiment, terms: Sequence[Term], at: Prediction, columns: Sequence[int] = ()
+    experiment: Experiment,
+    terms: Sequence[Term],
+    at: Prediction,
+    columns: Sequence[int] = (),
+    frozen: bool = False,
 ) -> Array:
     """Derivative of the readings by the terms' parameters.
 
@@ -55,22 +61,19 @@ def sensitivities(
         terms: effects with values, in the order in which they act.
         at: the prediction with those values.
         columns: which parameters (counted through all terms); all by default.
+        frozen: take the history of each row as given, where the model has history: quick, and
+            good enough to see which effects could matter, but not to fit them.
 
     Returns:
         (n, 6 + m, p): position [m], rotation vector [rad], tensions [N], by each parameter.
     """
     wanted = list(columns) if len(columns) else list(range(sum(len(t.layout) for t in terms)))
-    if at.has_history:
+    if at.has_history and not frozen:
         return _by_walking(experiment, terms, at, wanted)
     out = np.zeros((*_shape(at), len(wanted)))
-    inverse = _inverse_stiffness(at)
-    sensing = _sensing(terms)
+    by_wrench = _ByWrench(experiment, at, _sensing(terms))
     for c, (which, k) in enumerate(_positions(terms, wanted)):
-        shifted = _shifted(terms, which, k)
-        if _walks(experiment, shifted):
-            out[..., c] = _difference(experiment, shifted, at)
-            continue
-        out[..., c] = _one(experiment, terms, shifted, at, inverse, sensing)
+        out[..., c] = by_wrench.column(_shifted(terms, which, k))
     return out
 
 
@@ -111,10 +114,14 @@ class _Shift:
 def _shifted(terms: Sequence[Term], which: int, k: int, part: float | None = None) -> _Shift:
     term = terms[which]
     layout, value = term.layout, float(term.vector[k])
-    step = (_CENTRAL if part is None else part) * float(layout.scale[k])
+    # a time constant, a radius: what counts is by which part of itself it changes; finely, since
+    # a drum of this radius may have turned many times, but above what a walk leaves unsolved
+    relative = bool(layout.shape[k]) and layout.lower[k] > 0.0
+    size = value * (0.1 if part is None else 1.0) if relative else float(layout.scale[k])
+    step = (_CENTRAL if part is None else part) * size
     up, down = value + step, value - step
     if down < layout.lower[k] or up > layout.upper[k]:
-        step = (_ONE_SIDED if part is None else part) * float(layout.scale[k])
+        step = (_ONE_SIDED if part is None else part) * size
         inside = down < layout.lower[k]
         up, down = (value + step, value) if inside else (value, value - step)
 
@@ -131,39 +138,93 @@ def _sensing(terms: Sequence[Term]) -> bool:
     return any(t.layout.effect.edit_readings is not Effect.edit_readings for t in terms)
 
 
-def _walks(experiment: Experiment, shift: _Shift) -> bool:
-    """Whether the shift brings history into a model that has none yet."""
-    if not shift.physical:
-        return False
-    return experiment.setup(effects_of(shift.plus)).has_history
+# Fields of a setup that reach the statics through the rest lengths alone.
+_LENGTH_FIELDS = {"extra_length", "length_gain", "length_factor", "zero_pose"}
+_OTHER_FIELDS = tuple(
+    item.name
+    for item in fields(Setup)
+    if item.name not in _LENGTH_FIELDS and item.name not in ("robot", "commands", "laws")
+)
+# Fields that make rows depend on the rows before, and the columns that hold what came of it.
+_HISTORY_FIELDS = (
+    "hysteresis", "hysteresis_stretch", "friction", "creep", "creep_time", "backlash",
+)  # fmt: skip
+_STATE_COLUMNS = (
+    cable_law.CREEP, cable_law.CREEP_RATE, cable_law.STRETCH_BEFORE, cable_law.HYSTERESIS_BEFORE,
+    cable_law.STUCK,
+)  # fmt: skip
 
 
-def _one(
-    experiment: Experiment,
-    terms: Sequence[Term],
-    shift: _Shift,
-    at: Prediction,
-    inverse: Array,
-    sensing: bool,
-) -> Array:
-    n, width = _shape(at)
-    move, tension = np.zeros((n, 6)), np.zeros((n, width - 6))
-    if shift.physical:
-        strains = at.found.states[..., cable_law.STRAIN]
-        plus = statics.assemble(experiment.setup(effects_of(shift.plus)), strains)
-        minus = statics.assemble(experiment.setup(effects_of(shift.minus)), strains)
-        move, tension = _response(at, plus, minus, shift.apart, inverse)
-    if not sensing:
+@dataclass(eq=False)
+class _ByWrench:
+    """Columns of the sensitivity at one prediction without history."""
+
+    experiment: Experiment
+    at: Prediction
+    sensing: bool
+
+    @property
+    def inverse(self) -> Array:
+        return _kept(self.at, "inverse", _inverse_stiffness)
+
+    @property
+    def by_length(self) -> Array:
+        return _kept(self.at, "by_length", length_sensitivities)
+
+    def column(self, shift: _Shift) -> Array:
+        """Derivative of the readings (n, 6 + m) by the shifted parameter."""
+        n, width = _shape(self.at)
+        change = np.zeros((n, width))
+        if shift.physical:
+            plus = self.experiment.setup(effects_of(shift.plus))
+            minus = self.experiment.setup(effects_of(shift.minus))
+            if _differ(plus, minus, _HISTORY_FIELDS):
+                return _difference(self.experiment, shift, self.at)
+            change = self._physical(plus, minus, shift.apart)
+        if not self.sensing:
+            return change
+        return self._read(shift, change)
+
+    def _physical(self, plus: Setup, minus: Setup, apart: float) -> Array:
+        if _differ_by_length_only(plus, minus):
+            longer = (plus.rest_lengths() - minus.rest_lengths()) / apart
+            return np.einsum("nkm,nm->nk", self.by_length, longer)
+        strains = self.at.found.states[..., cable_law.STRAIN]
+        ahead, behind = statics.assemble(plus, strains), statics.assemble(minus, strains)
+        if self.at.has_history:
+            for column in _STATE_COLUMNS:
+                ahead.cables[..., column] = self.at.tables.cables[..., column]
+                behind.cables[..., column] = self.at.tables.cables[..., column]
+        move, tension = _response(self.at, ahead, behind, apart, self.inverse)
         return np.concatenate([move, tension], axis=1)
-    half = 0.5 * shift.apart
-    poses, tensions = at.poses, at.tensions
-    ahead = read(
-        effects_of(shift.plus), at.setup, pose_add(poses, half * move), tensions + half * tension
-    )
-    behind = read(
-        effects_of(shift.minus), at.setup, pose_add(poses, -half * move), tensions - half * tension
-    )
-    return readings_difference(ahead, behind) / shift.apart
+
+    def _read(self, shift: _Shift, change: Array) -> Array:
+        at, half = self.at, 0.5 * shift.apart
+        move, tension = half * change[:, :6], half * change[:, 6:]
+        ahead = read(
+            effects_of(shift.plus), at.setup, pose_add(at.poses, move), at.tensions + tension
+        )
+        behind = read(
+            effects_of(shift.minus), at.setup, pose_add(at.poses, -move), at.tensions - tension
+        )
+        return readings_difference(ahead, behind) / shift.apart
+
+
+def _kept(at: Prediction, name: str, make: Callable[[Prediction], Array]) -> Array:
+    """What many effects ask of one prediction, computed once."""
+    if name not in at.kept:
+        at.kept[name] = make(at)
+    return at.kept[name]
+
+
+def _differ(a: Setup, b: Setup, names: Iterable[str]) -> bool:
+    return any(not np.array_equal(getattr(a, name), getattr(b, name)) for name in names)
+
+
+def _differ_by_length_only(a: Setup, b: Setup) -> bool:
+    if a.laws or b.laws:
+        return False
+    return not _differ(a, b, _OTHER_FIELDS)
 
 
 def _response(
@@ -183,24 +244,50 @@ def _as_motion(at: Prediction, step: Array) -> Array:
     tables = at.tables
     if tables.screws.shape[1] == 0:
         return step / np.repeat([1.0, tables.length], 3)
-    ahead = statics.evaluate(tables, _moved(at, 1e-6 * step)).deviation
-    behind = statics.evaluate(tables, _moved(at, -1e-6 * step)).deviation
-    turn = quat_multiply(ahead[:, 3:], quat_conjugate(behind[:, 3:]))
-    both = [ahead[:, :3] - behind[:, :3], rotvec_from_quat(turn)]
-    return np.concatenate(both, axis=1) / 2e-6
+    screws = _screws_at_rest(at)
+    values = np.where(screws[..., 0] == 1.0, step / tables.length, step)
+    return np.einsum("nkd,nd->nk", motion_columns(screws, at.poses[:, :3]), values)
 
 
-def _moved(at: Prediction, step: Array) -> statics.Evaluation:
-    n = len(step)
-    found = statics.take_evaluation(at.found, np.arange(n))
-    found.values = found.values + step
-    return found
+def _screws_at_rest(at: Prediction) -> Array:
+    """The joints (n, d, 7) as they stand where the platform rests."""
+    tables = at.tables
+    out, place = np.empty_like(tables.screws), np.empty(7)
+    for row in range(len(tables)):
+        kernel.place_joints(
+            tables.screws[row], at.found.values[row], tables.length, tables.poses[row, :3],
+            place, out[row],
+        )  # fmt: skip
+    return out
 
 
 def _inverse_stiffness(at: Prediction) -> Array:
     """Inverse of the stiffness of each row; of what is stiff, where a row is singular."""
     hessian = np.where(np.isfinite(at.found.hessian), at.found.hessian, 0.0)
-    return np.linalg.pinv(hessian, rcond=1e-12, hermitian=True)
+    moments = at.tables.load[:, kernel.EXTERNAL_MOMENT : kernel.EXTERNAL_MOMENT + 3]
+    if not np.any(moments):
+        return np.asarray(np.linalg.pinv(hessian, rcond=1e-12, hermitian=True), dtype=float)
+    return np.linalg.pinv(hessian + _turning(at, moments), rcond=1e-12)
+
+
+def _turning(at: Prediction, moments: Array) -> Array:
+    """What a constant moment (n, 3) [N m] adds to the stiffness (n, d, d), which it skews.
+
+    It has no potential, so the energy's second derivative lacks it. A free platform's is
+    symmetric about the moment of all else, which at rest is minus this one: -[M]x/2 is missing.
+    On joints, the axis a_j turns with each hinge i further out: -M . (a_i x a_j).
+    """
+    tables = at.tables
+    n, length2 = len(tables), tables.length**2
+    if tables.screws.shape[1] == 0:
+        out = np.zeros((n, 6, 6))
+        for k, unit in enumerate(np.eye(3)):
+            out[:, 3:, 3 + k] = -0.5 * np.cross(moments, unit) / length2
+        return out
+    screws = _screws_at_rest(at)
+    axes = screws[..., 1:4] * screws[..., :1]
+    turned = np.cross(axes[:, None, :], axes[:, :, None])  # [n, j, i] = a_i x a_j
+    return -np.tril(np.einsum("nk,njik->nji", moments, turned), -1) / length2
 
 
 def _lengthened(tables: Tables, cable: int, by: float) -> Tables:

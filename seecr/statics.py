@@ -254,7 +254,7 @@ def residual_size(gradient: Array) -> Array:
     return np.linalg.norm(gradient, axis=1)
 
 
-def take(tables: Tables, rows: Array) -> Tables:
+def take(tables: Tables, rows: NDArray[np.integer]) -> Tables:
     """Some rows of the tables."""
     return Tables(
         tables.cables[rows], tables.load[rows], tables.poses[rows], tables.screws[rows],
@@ -262,12 +262,12 @@ def take(tables: Tables, rows: Array) -> Tables:
     )  # fmt: skip
 
 
-def take_evaluation(whole: Evaluation, rows: Array) -> Evaluation:
+def take_evaluation(whole: Evaluation, rows: NDArray[np.integer]) -> Evaluation:
     """Some rows of an evaluation."""
     return Evaluation(**{f.name: getattr(whole, f.name)[rows] for f in fields(Evaluation)})
 
 
-def put_evaluation(whole: Evaluation, rows: Array, part: Evaluation) -> None:
+def put_evaluation(whole: Evaluation, rows: NDArray[np.integer], part: Evaluation) -> None:
     """Put rows into an evaluation."""
     for f in fields(Evaluation):
         getattr(whole, f.name)[rows] = getattr(part, f.name)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from functools import lru_cache
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 
 from seecr.effects.actuation import (
     Backlash,
@@ -25,6 +25,7 @@ from seecr.effects.cable import (
     Stiffness,
     WinchSideLength,
 )
+from seecr.effects.checked import check_class
 from seecr.effects.geometry import AnchorPointError, ExitPointError, PulleyRadius
 from seecr.effects.load import CentreOfMass, ExternalWrench, GravityTilt, PlatformMass
 from seecr.effects.sensing import TensionScale, TrackerFrame, TrackerScale, TrackerTarget
@@ -61,12 +62,23 @@ BUILT_IN: tuple[type[Effect], ...] = (
 )
 
 
+def _load(entry: EntryPoint) -> object:
+    """What an entry point names, or one line about why it cannot be had."""
+    try:
+        return entry.load()
+    except (ImportError, AttributeError, SyntaxError) as error:
+        raise InputError(
+            f"entry point {entry.name} ({entry.value}) cannot be loaded: {error}; correct the "
+            "package that declares it, or uninstall it"
+        ) from error
+
+
 @lru_cache(maxsize=1)
 def catalogue() -> dict[str, type[Effect]]:
     """All effects by name: the built-in ones, then those of entry points ``seecr.effects``."""
     found = {effect.name: effect for effect in BUILT_IN}
     for entry in entry_points(group="seecr.effects"):
-        effect = entry.load()
+        effect = _load(entry)
         if not (isinstance(effect, type) and issubclass(effect, Effect) and effect.name):
             raise InputError(
                 f"entry point {entry.name} ({entry.value}) is no effect; expected a subclass of "
@@ -77,6 +89,7 @@ def catalogue() -> dict[str, type[Effect]]:
                 f"entry point {entry.name} ({entry.value}) names its effect {effect.name}, which "
                 "exists already; expected a name of its own"
             )
+        check_class(effect, f"entry point {entry.name} ({entry.value})")
         found[effect.name] = effect
     return found
 

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from seecr.effects.base import Effect, of_length, parameter
+from seecr.effects.base import Effect, mean_length, of_length, parameter
 from seecr.pose import Array, pose_add
 from seecr.setup import Setup
 
@@ -38,7 +38,8 @@ class InitialPoseError(Effect):
 
     The zero of every cable is its length at the pose where the platform really was,
     reference pose + (position, rotation): what the paper blames for its remaining
-    error (section IV). Displacement and rotation vector in the base frame.
+    error (section IV). l0_i = L_i(true zero) + commanded change, L_i the geometric length.
+    Displacement and rotation vector in the base frame, true less assumed.
     """
 
     name: ClassVar[str] = "initial_pose_error"
@@ -60,7 +61,7 @@ class InitialPoseError(Effect):
 
 @dataclass(frozen=True, eq=False)
 class DrumGain(Effect):
-    """Winch i pays out (1 + gain_i) of what it is told to.
+    """Winch i pays out more or less than it is told to: change_i -> (1 + gain_i) change_i.
 
     Of the commanded change since the zero; of the whole length where lengths are commanded
     as such. Positive: the drum is larger than assumed.
@@ -93,7 +94,7 @@ class DrumEccentricity(Effect):
     sine: Array = parameter("m", of_length(1e-3), size="cable")
     cosine: Array = parameter("m", of_length(1e-3), size="cable")
     drum_radius: float = parameter(
-        "m", of_length(0.05), null=0.05, bounds=(1e-4, 1e3), shape=True
+        "m", of_length(0.05), null=0.05, bounds=(of_length(1e-3), of_length(0.12)), shape=True
     )
 
     def edit_setup(self, setup: Setup) -> None:
@@ -109,17 +110,20 @@ class DrumEccentricity(Effect):
         travel = float(np.max(np.ptp(change, axis=0)))
         if not travel > 0:
             return []
-        # one step of phase at the far end a start: from half a turn in all to 40 turns
-        turns = np.arange(0.5, 40.0, 0.16)
-        return [{"drum_radius": travel / (2 * np.pi * t)} for t in turns]
+        # from half a turn over the whole travel to 40; a start is right to a seventh of a turn
+        turns = np.arange(0.6, 40.0, 0.3)
+        largest = 0.12 * mean_length(setup.robot)
+        radii = travel / (2 * np.pi * turns)
+        return [{"drum_radius": float(r)} for r in radii[radii < largest]]
 
 
 @dataclass(frozen=True, eq=False)
 class Backlash(Effect):
     """A winch turns ``gap`` of cable before the drum follows, whenever it reverses.
 
-    The paid-out length is the play operator of the commanded one, of half-width gap/2,
-    starting centred at the beginning of each run.
+    The paid-out length p lags the commanded change c by at most half the gap:
+    p <- min(max(p, c - gap/2), c + gap/2), the play operator (Krasnosel'skii and Pokrovskii,
+    Systems with Hysteresis, 1989). It starts centred, p = c, at the beginning of each run.
     """
 
     name: ClassVar[str] = "backlash"
@@ -135,9 +139,10 @@ class Backlash(Effect):
 
 @dataclass(frozen=True, eq=False)
 class ThermalExpansion(Effect):
-    """Cables grow with temperature: l0 (1 + expansion (T - zero_temperature)).
+    """Cables grow with temperature: l0_i -> l0_i (1 + expansion (T - zero_temperature)).
 
-    ``zero_temperature`` is that at which the winches were zeroed.
+    ``zero_temperature`` is that at which the winches were zeroed. Positive: longer when warm;
+    aramids and other drawn fibres are negative.
     """
 
     name: ClassVar[str] = "thermal_expansion"

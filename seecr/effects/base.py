@@ -55,7 +55,7 @@ def parameter(
     scale: Scale,
     *,
     null: float = 0.0,
-    bounds: tuple[float, float] = (-np.inf, np.inf),
+    bounds: tuple[Scale, Scale] = (-np.inf, np.inf),
     size: str = "one",
     shape: bool = False,
 ) -> Any:
@@ -66,13 +66,12 @@ def parameter(
         scale: plausible size, one standard deviation from tolerances or data sheets; a number
             or a function of the robot.
         null: value at which the effect is absent.
-        bounds: lowest and highest value.
+        bounds: lowest and highest value, numbers or functions of the robot.
         size: "one" number, one a "cable", a "vector" of 3, or a "point" (3 a cable).
         shape: the number only shapes the effect (a time constant, a period): it means nothing
             while the others are null, and the effect says with ``shapes`` where to look.
     """
-    if size not in _SIZES:
-        raise InputError(f"size must be one of {', '.join(_SIZES)}, got {size!r}")
+    _check_parameter(unit, scale, null, bounds, size)
     metadata = {
         "unit": unit,
         "scale": scale,
@@ -82,6 +81,24 @@ def parameter(
         "shape": shape,
     }
     return field(default=None if size != "one" else null, metadata=metadata)
+
+
+def _check_parameter(
+    unit: str, scale: Scale, null: float, bounds: tuple[Scale, Scale], size: str
+) -> None:
+    if not isinstance(unit, str):
+        raise InputError(f'unit must be a text such as "m", or "" for none, got {unit!r}')
+    if size not in _SIZES:
+        raise InputError(f"size must be one of {', '.join(_SIZES)}, got {size!r}")
+    if not callable(scale) and not (np.isfinite(scale) and scale > 0):
+        raise InputError(
+            f"scale must be a positive number or a function of the robot, got {scale!r}"
+        )
+    if len(bounds) != 2:
+        raise InputError(f"bounds must be (lowest, highest), got {bounds!r}")
+    lower, upper = (b if not callable(b) else None for b in bounds)
+    if (lower is not None and not lower <= null) or (upper is not None and not null <= upper):
+        raise InputError(f"bounds must hold the null value {null!r}, got {bounds!r}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,13 +197,16 @@ def layout_of(effect: type[Effect], robot: Robot) -> Layout:
         endings = _SIZES[meta["size"]](robot.n_cables)
         names += [f"{item.name}{ending}{suffix}" for ending in endings]
         units += [meta["unit"]] * len(endings)
-        scale = meta["scale"](robot) if callable(meta["scale"]) else meta["scale"]
-        one_row = (meta["null"], *meta["bounds"], scale)
+        one_row = [meta["null"], *meta["bounds"], meta["scale"]]
+        one_row = [value(robot) if callable(value) else value for value in one_row]
         for key, value in zip(columns, one_row, strict=True):
             columns[key] += [float(value)] * len(endings)
         shape += [bool(meta["shape"])] * len(endings)
         parts.append((item.name, len(endings), meta["size"] == "one"))
     arrays = {key: np.array(column) for key, column in columns.items()}
+    # a shape starts where it may be: bounds go with the robot's size
+    inside = np.clip(arrays["null"], arrays["lower"], arrays["upper"])
+    arrays["null"] = np.where(shape, inside, arrays["null"])
     return Layout(
         effect, tuple(names), tuple(units), arrays["null"], arrays["lower"], arrays["upper"],
         arrays["scale"], np.array(shape, dtype=bool), tuple(parts),

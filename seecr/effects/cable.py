@@ -25,12 +25,17 @@ def usual_stretch(robot: Robot) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Stiffness(Effect):
-    """All cables are stiffer than assumed by one factor: E S -> factor E S."""
+    """All cables are stiffer than assumed by one factor: E S -> factor E S (paper, eq 10).
+
+    Above 1: stiffer.
+    """
 
     name: ClassVar[str] = "stiffness"
     place: ClassVar[str] = "cable"
     title: ClassVar[str] = "stiffness of all cables"
-    advice: ClassVar[str] = "hang a known weight on a known length of cable: expect {factor:.3f} E S"
+    advice: ClassVar[str] = (
+        "hang a known weight on a known length of cable: expect {factor:.3f} E S"
+    )
 
     factor: float = parameter("", 0.3, null=1.0, bounds=(0.02, 50.0))
 
@@ -40,7 +45,10 @@ class Stiffness(Effect):
 
 @dataclass(frozen=True, eq=False)
 class CableStiffness(Effect):
-    """Each cable is stiffer than assumed by a factor of its own: E S_i -> factor_i E S_i."""
+    """Each cable is stiffer than assumed by a factor of its own: E S_i -> factor_i E S_i.
+
+    Above 1: stiffer (paper, eq 10).
+    """
 
     name: ClassVar[str] = "cable_stiffness"
     place: ClassVar[str] = "cable"
@@ -79,7 +87,7 @@ class NonlinearElasticity(Effect):
 class WinchSideLength(Effect):
     """Elastic cable between winch and exit point, under the same tension.
 
-    It adds a stretch T length/(E S), whatever the length in front of the exit point.
+    It adds a stretch of T length/(E S) (Hooke), whatever the length in front of the exit point.
     """
 
     name: ClassVar[str] = "winch_side_length"
@@ -97,7 +105,12 @@ class WinchSideLength(Effect):
 
 @dataclass(frozen=True, eq=False)
 class CableWeight(Effect):
-    """Cables have weight and sag: elastic catenary (Irvine, Cable Structures, 1981, 1.2)."""
+    """Cables have a weight per metre and sag: an elastic catenary between A_i and B_i.
+
+    With H, V the pulls at the anchor point and w the weight a metre, the span is
+    x = H (asinh((V + w L)/H) - asinh(V/H))/w + H L/(E S) and likewise the rise (Irvine, Cable
+    Structures, 1981, section 1.2). The tension reported is that at the exit point.
+    """
 
     name: ClassVar[str] = "cable_weight"
     place: ClassVar[str] = "cable"

@@ -33,7 +33,10 @@ class PulleyRadius(Effect):
 
 @dataclass(frozen=True, eq=False)
 class ExitPointError(Effect):
-    """Exit points A_i are off by a vector each, in the base frame."""
+    """Exit points are off by a vector each, in the base frame: A_i -> A_i + error_i.
+
+    True less assumed.
+    """
 
     name: ClassVar[str] = "exit_point_error"
     place: ClassVar[str] = "geometry"
@@ -48,7 +51,10 @@ class ExitPointError(Effect):
 
 @dataclass(frozen=True, eq=False)
 class AnchorPointError(Effect):
-    """Anchor points B_i are off by a vector each, in the platform frame."""
+    """Anchor points are off by a vector each, in the platform frame: B_i -> B_i + error_i.
+
+    True less assumed.
+    """
 
     name: ClassVar[str] = "anchor_point_error"
     place: ClassVar[str] = "geometry"

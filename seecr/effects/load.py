@@ -15,7 +15,7 @@ from seecr.setup import Setup
 
 @dataclass(frozen=True, eq=False)
 class PlatformMass(Effect):
-    """The platform is heavier than assumed by ``added``."""
+    """The platform is heavier than assumed: m -> m + added. Positive: heavier."""
 
     name: ClassVar[str] = "platform_mass"
     place: ClassVar[str] = "load"
@@ -31,7 +31,10 @@ class PlatformMass(Effect):
 
 @dataclass(frozen=True, eq=False)
 class CentreOfMass(Effect):
-    """The centre of mass is off by a vector, in the platform frame."""
+    """The centre of mass is off by a vector, in the platform frame: c -> c + shift.
+
+    True less assumed.
+    """
 
     name: ClassVar[str] = "centre_of_mass"
     place: ClassVar[str] = "load"
@@ -49,9 +52,10 @@ class CentreOfMass(Effect):
 
 @dataclass(frozen=True, eq=False)
 class ExternalWrench(Effect):
-    """A constant force at the platform origin and a constant moment, both in the base frame.
+    """A constant force at the platform origin and a constant moment: w_e -> w_e + (f, m).
 
-    A dangling hose or cable tray, or a spring.
+    Both act on the platform and are given in the base frame (paper, eq 3). A dangling hose or
+    cable tray, or a spring.
     """
 
     name: ClassVar[str] = "external_wrench"
@@ -72,7 +76,10 @@ def _load(robot: Robot) -> float:
 
 @dataclass(frozen=True, eq=False)
 class GravityTilt(Effect):
-    """The base frame is not level: gravity is turned about base x and y by two angles."""
+    """The base frame is not level: g -> R((tilt_x, tilt_y, 0)) g, R of a rotation vector.
+
+    Positive turns gravity, seen in the base frame, about base x and y by the right hand.
+    """
 
     name: ClassVar[str] = "gravity_tilt"
     place: ClassVar[str] = "load"

@@ -61,12 +61,17 @@ class TrackerTarget(Effect):
 
 @dataclass(frozen=True, eq=False)
 class TrackerScale(Effect):
-    """The tracker's metre is off: reported position = factor x position."""
+    """The tracker's metre is off: reported position = factor x position.
+
+    Above 1: it reports too much.
+    """
 
     name: ClassVar[str] = "tracker_scale"
     place: ClassVar[str] = "sensing"
     title: ClassVar[str] = "the tracker's scale"
-    advice: ClassVar[str] = "measure a scale bar with the tracker: expect {factor:.5f} of its length"
+    advice: ClassVar[str] = (
+        "measure a scale bar with the tracker: expect {factor:.5f} of its length"
+    )
 
     factor: float = parameter("", 3e-3, null=1.0, bounds=(0.5, 2.0))
 
@@ -76,7 +81,10 @@ class TrackerScale(Effect):
 
 @dataclass(frozen=True, eq=False)
 class TensionScale(Effect):
-    """The load cells are off by one factor: reported tension = factor x tension."""
+    """The load cells are off by one factor: reported tension = factor x tension.
+
+    Above 1: they report too much.
+    """
 
     name: ClassVar[str] = "tension_scale"
     place: ClassVar[str] = "sensing"

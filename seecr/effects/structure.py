@@ -13,7 +13,9 @@ from seecr.setup import Setup
 
 @dataclass(frozen=True, eq=False)
 class FrameCompliance(Effect):
-    """Exit points yield towards the pull of their cable: A_i moves by compliance T_i along it.
+    """Exit points yield towards the pull of their cable: A_i -> A_i + compliance T_i u.
+
+    u points from A_i along the cable: the effective cable is longer by compliance T_i (Hooke).
 
     Isotropic: the frame moves the way it is pulled. From poses this cannot be told from
     elastic cable behind the exit point of length compliance x E S.

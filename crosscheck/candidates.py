@@ -1,0 +1,255 @@
+"""Which effects could be missing, where to start fitting each, and how it fits.
+
+Ranking candidates by their derivative at null is confidently wrong where cables go slack, so
+every candidate is fitted for itself; the derivative only chooses its starts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from crosscheck.evidence import Evidence, evidence, p_value, projected
+from crosscheck.fit import Fit, fit, flat
+from crosscheck.problem import Problem, State, derivatives, evaluate
+from seecr.effects import catalogue, layout_of
+from seecr.effects.base import Effect, Layout
+from seecr.errors import InputError
+from seecr.pose import Array
+from seecr.sensitivity import Term
+
+# A start is at most this many plausible sizes from null.
+_START_SIZES = 3.0
+# Most Gauss-Newton steps of a trial; what is chosen is fitted to the end.
+_TRIAL_ITERATIONS = 12
+# Effects that shift no reading by this part of its noise, for plausible sizes, are not seen.
+_UNSEEN = 0.02
+
+
+@dataclass(eq=False)
+class Candidate:
+    """An effect that might be missing, and what came of adding it.
+
+    Attributes:
+        layout: the effect for this robot.
+        fit: of the model with it added; None where it is no candidate.
+        evidence: of that fit.
+        drop: of chi2 against the model without it.
+        p: chance of that drop where the effect is absent.
+        why_not: a sentence where it is no candidate or was not chosen.
+    """
+
+    layout: Layout
+    fit: Fit | None = None
+    evidence: Evidence | None = None
+    drop: float = 0.0
+    p: float = 1.0
+    why_not: str = ""
+
+    @property
+    def name(self) -> str:
+        """Name of the effect."""
+        return self.layout.name
+
+
+def layouts_for(problem: Problem) -> list[Candidate]:
+    """All effects of the catalogue; those these data cannot show have a ``why_not``."""
+    out = []
+    for effect in catalogue().values():
+        layout = layout_of(effect, problem.robot)
+        out.append(Candidate(layout, why_not=_unfit(problem, layout)))
+    return out
+
+
+def _unfit(problem: Problem, layout: Layout) -> str:
+    data, effect = problem.data, layout.effect
+    rows = int(problem.use.sum())
+    if len(layout) > problem.n_readings or len(layout) > 6 * rows or rows < 2:
+        return f"no candidate: {len(layout)} parameters, but the data have {rows} rows"
+    if rows < len(layout):
+        return f"no candidate: {len(layout)} parameters, but the data have {rows} rows"
+    if "poses" in effect.needs and data.command_pose is None:
+        return "no candidate: needs commanded poses; these data command lengths"
+    if "time" in effect.needs and (data.t_s is None or np.ptp(data.t_s) == 0):
+        return "no candidate: needs the time of each row (t_s)"
+    if "temperature" in effect.needs:
+        if data.temperature_C is None:
+            return "no candidate: needs temperature_C"
+        if np.ptp(data.temperature_C) == 0:
+            return "no candidate: the temperature never changed"
+    if "tensions" in effect.needs and not data.has_tension:
+        return "no candidate: needs measured tensions"
+    return ""
+
+
+def ordered(terms: Sequence[Term]) -> tuple[Term, ...]:
+    """Terms in the order of the catalogue, in which effects act."""
+    order = {name: i for i, name in enumerate(catalogue())}
+    return tuple(sorted(terms, key=lambda t: order.get(t.name, len(order))))
+
+
+def try_candidate(
+    problem: Problem,
+    base: Fit,
+    layout: Layout,
+    factor: Array,
+    noise_scale: float = 1.0,
+    hopeless: float = np.inf,
+    prune: float = 1.0,
+) -> Candidate:
+    """Fit the base model with one effect added, from its most promising starts.
+
+    Args:
+        problem: the data.
+        base: the model without the effect.
+        layout: the effect.
+        factor: noise factors.
+        noise_scale: noise in units of the stated one.
+        hopeless: chi2 above which a trial is given up after a few steps.
+        prune: no fit where chance explains the linearised fall of chi2 with more than this.
+    """
+    out = Candidate(layout)
+    first = _starts(problem, base, layout, factor)
+    if not first.seen:
+        out.why_not = "these data do not show it: no reading moves by its plausible size"
+        return out
+    out.drop = first.gain / noise_scale**2
+    out.p = p_value(out.drop, first.directions, False) * first.shapes
+    if out.p > prune:
+        out.why_not = f"chance explains it (p {min(1.0, out.p):.2g})"
+        return out
+    best: Fit | None = None
+    for vector in first.vectors:
+        terms = ordered((*base.terms, Term(layout, vector)))
+        try:
+            found = fit(
+                problem, terms, factor, base.state,
+                iterations=_TRIAL_ITERATIONS, hopeless=hopeless,
+            )  # fmt: skip
+        except (InputError, np.linalg.LinAlgError):
+            continue
+        if found.valid and (best is None or found.chi2 < best.chi2):
+            best = found
+            hopeless = min(hopeless, 2.0 * best.chi2)
+    if best is None:
+        out.why_not = "no fit: rows could not be solved with it"
+        return out
+    out.fit, out.evidence = best, evidence(best, noise_scale)
+    out.drop = (base.chi2 - best.chi2) / noise_scale**2
+    columns = seen_directions(best, layout.name, base)
+    one_sided = bool(np.isfinite(layout.lower[0])) and layout.lower[0] == layout.null[0]
+    out.p = p_value(out.drop, columns, one_sided) * first.shapes
+    return out
+
+
+def seen_directions(found: Fit, name: str, base: Fit) -> int:
+    """How many directions of an effect's parameters the data see beside the other terms."""
+    own = own_columns(found.terms, name)
+    others = projected(found.jacobian[:, own], found.jacobian[:, ~own])
+    s = np.linalg.svd(others, compute_uv=False)
+    return max(1, int(np.sum(s > 0.1))) if len(s) else 1
+
+
+def own_columns(terms: Sequence[Term], name: str) -> np.ndarray:
+    """(p,) bool, the parameters of one effect."""
+    return np.concatenate([np.full(len(t.layout), t.name == name) for t in terms])
+
+
+@dataclass(frozen=True, eq=False)
+class _Starts:
+    """Where to start fitting an effect, and what its derivative at null promises.
+
+    Attributes:
+        vectors: starting values, the most promising first.
+        gain: linearised fall of chi2 of the best. directions: that the data see.
+        shapes: about how many shapes were tried for it.
+        seen: whether any reading moves by more than a trace of its noise.
+    """
+
+    vectors: list[Array]
+    gain: float
+    directions: int
+    shapes: float
+    seen: bool
+
+
+def _starts(problem: Problem, base: Fit, layout: Layout, factor: Array) -> _Starts:
+    shapes = layout.effect.shapes(base.state.prediction.setup)
+    scored: list[tuple[float, int, Array, dict[str, float]]] = []
+    seen = False
+    orthogonal = _basis(base.jacobian)
+    for shape in shapes:
+        null = layout.start(shape)
+        scale = layout.scale * ~layout.shape
+        white = amplitude_columns(problem, base, layout, null, factor) * scale
+        seen = seen or bool(np.max(np.abs(white), initial=0.0) > _UNSEEN)
+        left = white - orthogonal @ (orthogonal.T @ white)
+        z, gain, directions = _linear(left, base.state.white)
+        z = np.clip(z, -_START_SIZES, _START_SIZES)
+        vector = np.clip(null + z * scale, layout.lower, layout.upper)
+        scored.append((gain, directions, vector, shape))
+    if not scored:
+        return _Starts([], 0.0, 1, 1.0, False)
+    scored.sort(key=lambda item: -item[0])
+    vectors = [vector for _g, _d, vector, _s in scored[:2]]
+    if np.any((layout.lower == layout.null) & ~layout.shape):
+        # the derivative at a bound can point the wrong way: start inside as well
+        inside = layout.start(scored[0][3])
+        vectors = [vectors[0], np.where(layout.shape, inside, inside + 0.5 * layout.scale)]
+    elif len(shapes) == 1:
+        vectors = vectors[:1]
+    # neighbouring shapes are alike: about every third is one more chance of its own
+    return _Starts(vectors, scored[0][0], scored[0][1], max(1.0, len(shapes) / 3.0), seen)
+
+
+def amplitude_columns(
+    problem: Problem, base: Fit, layout: Layout, null: Array, factor: Array
+) -> Array:
+    """(N, p) whitened derivatives by the effect's own parameters at null; 0 for shapes."""
+    terms = ordered((*base.terms, Term(layout, null)))
+    own = own_columns(terms, layout.name)
+    wanted = np.flatnonzero(own)
+    amplitudes = wanted[~layout.shape]
+    out = np.zeros((len(base.state.white), len(layout)))
+    state = State(terms, base.state.prediction, base.state.raw, base.state.white, base.chi2)
+    if len(amplitudes):
+        out[:, ~layout.shape] = derivatives(
+            problem, state, factor, amplitudes.tolist(), frozen=True
+        )
+    return out
+
+
+def _basis(columns: Array) -> Array:
+    """Orthonormal basis of what columns span."""
+    if columns.shape[1] == 0:
+        return np.zeros((len(columns), 0))
+    u, s, _vt = np.linalg.svd(columns, full_matrices=False)
+    return np.asarray(u[:, s > 1e-9 * max(float(s[0]), 1e-300)])
+
+
+def _linear(x: Array, r: Array) -> tuple[Array, float, int]:
+    """Linear fit of r by columns x with a weak prior: values, fall of chi2, directions seen."""
+    normal = x.T @ x
+    z = np.linalg.solve(normal + 1e-2 * np.eye(x.shape[1]), x.T @ r)
+    left = r - x @ z
+    directions = int(np.sum(np.linalg.eigvalsh(normal) > 1e-2))
+    return z, float(r @ r - left @ left), max(1, directions)
+
+
+def null_fit(problem: Problem, terms: Sequence[Term], factor: Array, refit: bool) -> Fit:
+    """The model as it stands, as a fit: refitted, or at its stated values."""
+    if refit and terms:
+        return fit(problem, ordered(terms), factor)
+    state = evaluate(problem, ordered(terms), factor)
+    p = len(flat(terms, "null"))
+    jacobian = np.zeros((len(state.white), p))
+    return Fit(
+        state, jacobian, np.zeros((p, p)), np.zeros(p, dtype=bool), state.valid, "", 0
+    )
+
+
+def is_effect(name: str) -> type[Effect] | None:
+    """The effect of that name, or None."""
+    return catalogue().get(name)

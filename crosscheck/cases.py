@@ -1,0 +1,211 @@
+"""What the suite runs: a robot, a cable and the poses that both physics are given."""
+
+from __future__ import annotations
+
+import difflib
+import fnmatch
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from crosscheck.errors import CrosscheckError
+from seecr.pose import Array, pose_add, quat_from_rotvec
+from seecr.shipped import CABLES, model_path
+
+if TYPE_CHECKING:
+    from seecr.robot import Robot
+
+N_SWEEP = 24
+N_RANDOM = 200
+# The paper's trajectories (Fig 12): x from 0.17 to 0.63 m in the middle of the frame.
+_SWEEP_X = (0.17, 0.63)
+_SWEEP_Y = 0.25
+_SWEEP_Z = (0.1, 0.2)
+# Inside DemoBot's frame of 0.80 x 0.50 x 0.50 m, the platform clear of posts and exit points [m].
+_FRAME = ((0.10, 0.10, 0.05), (0.70, 0.40, 0.35))
+# Cogiro withstands moments: its random poses are turned, by up to this about a random axis.
+_COGIRO_TURN = np.deg2rad(12.0)
+# Planar robots: half the width of the sweep, and joint values about the reference pose.
+_PLANAR_HALF_WIDTH = 0.15
+# Of the way from the reference position to the exit points that a user's robot is sent.
+_USER_REACH = 0.6
+_USER_TURN = np.deg2rad(10.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """One robot on one cable, and the poses it is sent to.
+
+    Attributes:
+        name: as on the terminal, in files' names and for ``--case``.
+        model: MJCF file that SEECR reads.
+        mujoco_model: MJCF file that MuJoCo settles; the same one, unless the two are to differ.
+        cable: name of one of ``seecr.shipped.CABLES``; None leaves the MJCF's stiffness.
+        kind: ``"sweep"``, whose poses follow each other along a line, or ``"random"``.
+        poses: (n, 7) commanded.
+    """
+
+    name: str
+    model: Path
+    mujoco_model: Path
+    cable: str | None
+    kind: str
+    poses: Array
+
+    @property
+    def ea(self) -> float | None:
+        """k_c = E S [N] of every cable; None where the MJCF says it."""
+        return None if self.cable is None else CABLES[self.cable]
+
+    @property
+    def mujoco_ea(self) -> float | None:
+        """The same for MuJoCo's side; None where its own MJCF says it."""
+        return self.ea if self.mujoco_model == self.model else None
+
+
+def shipped_cases(seed: int = 0, n_random: int = N_RANDOM) -> list[Case]:
+    """Both DemoBots on both cables, along the paper's sweeps and at random; planar robots."""
+    cases = []
+    for robot, turn in (("cogiro", _COGIRO_TURN), ("parallel", 0.0)):
+        path = model_path(f"demobot_{robot}")
+        for cable in CABLES:
+            for z in _SWEEP_Z:
+                name = f"{robot}-{cable}-z{z:.2f}"
+                cases.append(Case(name, path, path, cable, "sweep", demobot_sweep(z)))
+            name = f"{robot}-{cable}-random"
+            poses = demobot_random(_generator(seed, name), n_random, turn)
+            cases.append(Case(name, path, path, cable, "random", poses))
+    return cases + [_planar_case(robot) for robot in ("two_cable", "vertical", "horizontal")]
+
+
+def user_cases(
+    robot: Robot,
+    model: Path,
+    mujoco_model: Path | None = None,
+    seed: int = 0,
+    n_random: int = N_RANDOM,
+) -> list[Case]:
+    """A sweep and random poses for any robot, scaled by its own size.
+
+    Args:
+        robot: read from ``model``.
+        model: its MJCF.
+        mujoco_model: another MJCF for MuJoCo's side; None takes the same.
+        seed: of the random poses.
+        n_random: how many.
+    """
+    name, other = model.stem, mujoco_model or model
+    random = robot_random(robot, _generator(seed, f"{name}-random"), n_random)
+    return [
+        Case(f"{name}-sweep", model, other, None, "sweep", robot_sweep(robot)),
+        Case(f"{name}-random", model, other, None, "random", random),
+    ]
+
+
+def select(cases: Sequence[Case], patterns: Sequence[str]) -> list[Case]:
+    """Cases that match any of the shell patterns; all without patterns.
+
+    Raises:
+        CrosscheckError: a pattern that matches none; names the nearest.
+    """
+    if not patterns:
+        return list(cases)
+    names = [case.name for case in cases]
+    for pattern in patterns:
+        if not fnmatch.filter(names, pattern):
+            near = difflib.get_close_matches(pattern, names, n=3, cutoff=0.4) or names
+            raise CrosscheckError(
+                f"--case {pattern}: no such case; the nearest are {', '.join(near)} "
+                "(patterns such as 'cogiro-*' work)"
+            )
+    return [c for c in cases if any(fnmatch.fnmatchcase(c.name, p) for p in patterns)]
+
+
+def demobot_sweep(z: float, n: int = N_SWEEP) -> Array:
+    """The paper's trajectory at height z [m], (n, 7): level, x from 0.17 to 0.63 m."""
+    poses = np.zeros((n, 7))
+    poses[:, 0] = np.linspace(*_SWEEP_X, n)
+    poses[:, 1], poses[:, 2], poses[:, 3] = _SWEEP_Y, z, 1.0
+    return poses
+
+
+def demobot_random(random: np.random.Generator, n: int, turn: float) -> Array:
+    """Poses (n, 7) in DemoBot's frame, turned by up to ``turn`` [rad]."""
+    poses = np.zeros((n, 7))
+    poses[:, :3] = random.uniform(*_FRAME, (n, 3))
+    poses[:, 3:] = quat_from_rotvec(_turns(random, n, turn))
+    return poses
+
+
+def robot_sweep(robot: Robot, n: int = N_SWEEP) -> Array:
+    """A level line (n, 7) through the reference pose, along the robot's widest direction."""
+    exits, middle = robot.exit_points, robot.reference_pose[:3]
+    spread = np.linalg.svd(_level(robot, exits - exits.mean(axis=0)), full_matrices=False)[2][0]
+    along = (exits - middle) @ spread
+    steps = np.linspace(_USER_REACH * min(along.min(), 0.0), _USER_REACH * max(along.max(), 0.0), n)
+    poses = np.tile(robot.reference_pose, (n, 1))
+    poses[:, :3] += steps[:, None] * spread
+    return _reachable(robot, poses)
+
+
+def robot_random(robot: Robot, random: np.random.Generator, n: int) -> Array:
+    """Poses (n, 7) between the reference position and the exit points, slightly turned.
+
+    A convex combination of exit points lies in their hull, flat or not, so does any point
+    between it and the reference position if that one does.
+    """
+    weights = random.dirichlet(np.full(robot.n_cables, 0.5), n)
+    towards = weights @ robot.exit_points - robot.reference_pose[:3]
+    change = np.zeros((n, 6))
+    change[:, :3] = random.uniform(0.0, _USER_REACH, (n, 1)) * towards
+    change[:, 3:] = _turns(random, n, _USER_TURN)
+    poses = pose_add(np.tile(robot.reference_pose, (n, 1)), change)
+    return _reachable(robot, poses)
+
+
+def _planar_case(robot: str) -> Case:
+    """A planar robot of the paper (Figs 2 to 9) along a short sweep about its reference."""
+    from seecr.mjcf import load_robot
+
+    path = model_path(f"planar_{robot}")
+    poses = np.tile(load_robot(path).reference_pose, (N_SWEEP, 1))
+    poses[:, 0] += np.linspace(-_PLANAR_HALF_WIDTH, _PLANAR_HALF_WIDTH, N_SWEEP)
+    return Case(f"planar-{robot}".replace("_", "-"), path, path, "vectran", "sweep", poses)
+
+
+def _generator(seed: int, name: str) -> np.random.Generator:
+    """Its own random numbers for each case, whichever others run."""
+    return np.random.default_rng([seed, *name.encode()])
+
+
+def _turns(random: np.random.Generator, n: int, largest: float) -> Array:
+    """Rotation vectors (n, 3) [rad] of random axes and angles up to the largest."""
+    axes = random.normal(size=(n, 3))
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    # adding zero makes -0.0, which nobody wants to read, 0.0
+    return np.asarray(axes * random.uniform(0.0, largest, (n, 1))) + 0.0
+
+
+def _level(robot: Robot, vectors: Array) -> Array:
+    """Vectors (k, 3) without their part along gravity."""
+    size = np.linalg.norm(robot.gravity)
+    if size == 0.0:
+        return vectors
+    down = robot.gravity / size
+    return np.asarray(vectors - (vectors @ down)[:, None] * down)
+
+
+def _reachable(robot: Robot, poses: Array) -> Array:
+    """The poses (n, 7), or what a jointed robot can do of them: one Gauss-Newton step's joints."""
+    if not robot.joints:
+        return poses
+    from seecr.joints import motion_columns, pose_of_values
+    from seecr.pose import pose_difference
+
+    start, screws = pose_of_values(robot, np.zeros((1, len(robot.joints))))
+    columns = motion_columns(screws, start[:, :3])[0]
+    values = pose_difference(poses, start) @ np.linalg.pinv(columns).T
+    return pose_of_values(robot, values)[0]

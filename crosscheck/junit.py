@@ -1,0 +1,63 @@
+"""The suite's results as ``junit.xml``, which continuous integration shows as tests."""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ET
+from typing import TYPE_CHECKING
+
+from crosscheck import figures
+from crosscheck.suite import EXIT_DIFFERS, EXIT_UNSOLVED
+
+if TYPE_CHECKING:
+    from crosscheck.results import Run
+    from crosscheck.suite import CaseResult
+
+# Characters that XML 1.0 cannot hold at all, escaped or not.
+_FORBIDDEN = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def junit_xml(run: Run) -> str:
+    """One test case a case of the suite; differences are failures, unsolved poses errors."""
+    statuses = [result.exit_status for result in run.results]
+    counts = {
+        "tests": str(len(statuses)),
+        "failures": str(statuses.count(EXIT_DIFFERS)),
+        "errors": str(statuses.count(EXIT_UNSOLVED)),
+        "time": f"{run.wall_s:.3f}",
+    }
+    root = ET.Element("testsuites", {"name": "crosscheck run", **counts})
+    suite = ET.SubElement(root, "testsuite", {"name": "crosscheck run", **counts})
+    for result in run.results:
+        _add_case(suite, result)
+    ET.indent(root)
+    return ET.tostring(root, encoding="utf-8", xml_declaration=True).decode() + "\n"
+
+
+def _add_case(suite: ET.Element, result: CaseResult) -> None:
+    case = ET.SubElement(
+        suite,
+        "testcase",
+        classname="crosscheck",
+        name=_clean(result.case.name),
+        time=f"{result.wall_s:.3f}",
+    )
+    tag = {EXIT_DIFFERS: "failure", EXIT_UNSOLVED: "error"}.get(result.exit_status)
+    if tag is not None:
+        lines = figures.failures(result)
+        message = f"{result.case.name}: {figures.remarks(result)}"
+        bad = ET.SubElement(case, tag, message=_clean(message), type=tag)
+        bad.text = _clean("\n".join(lines))
+    ET.SubElement(case, "system-out").text = _clean("\n".join(_report(result)))
+
+
+def _report(result: CaseResult) -> list[str]:
+    lines = [
+        f"{figures.NAMES[name]}: {worst.value:.3e}, allowed {worst.allowed:.3e}, pose {worst.pose}"
+        for name, worst in result.worst.items()
+    ]
+    return [*lines, *figures.findings(result), *figures.widened(result)]
+
+
+def _clean(text: str) -> str:
+    return _FORBIDDEN.sub("\ufffd", text)

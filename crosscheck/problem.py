@@ -1,0 +1,246 @@
+"""Measurements as a weighted least-squares problem: residuals, their noise, their rows.
+
+A residual is measured less predicted: position [m], orientation as the rotation vector from the
+predicted to the measured one [rad] (or the differences of those angles that were read), tension
+[N]. The noise of a row is that of its readings plus that of the commanded lengths, which reaches
+the readings through the robot's own sensitivity:
+
+    Sigma = diag(sigma^2) + (dy/dl0) sigma_length^2 (dy/dl0)^T
+
+Residuals are whitened by its Cholesky factor, so that noise alone has unit variance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.measurements import Measurements
+from crosscheck.sigma import Sigma
+from seecr.effects.base import Readings
+from seecr.experiment import Experiment, Prediction
+from seecr.pose import (
+    Array,
+    quat_conjugate,
+    quat_from_rotvec,
+    quat_multiply,
+    rotvec_from_quat,
+    rxyz_from_quat,
+)
+from seecr.robot import Robot
+from seecr.sensitivity import Term, effects_of, length_sensitivities, sensitivities
+from seecr.setup import Commands
+
+# Columns of a residual row: position, orientation, then tensions.
+POSITION, ORIENTATION, TENSION = slice(0, 3), slice(3, 6), slice(6, None)
+KINDS = ("position", "orientation", "tension")
+
+
+def commands_of(robot: Robot, data: Measurements) -> Commands:
+    """The commands of measurements, as the statics takes them."""
+    poses = data.command_pose
+    if poses is None:
+        poses = np.tile(robot.reference_pose, (data.n_rows, 1))
+    return Commands(
+        pose=np.asarray(poses, float),
+        lengths=data.command_lengths,
+        run=data.run_index,
+        time=data.t_s,
+        temperature=data.temperature_C,
+    )
+
+
+@dataclass(eq=False)
+class Problem:
+    """Readings of a robot, with their noise.
+
+    Attributes:
+        robot, data: what was measured.
+        sigma: noise of each kind of reading; every kind that was read has a number.
+        use: (n,) bool rows that count; others were left out, see ``left_out``.
+        left_out: sentences that name the rows left out and why.
+    """
+
+    robot: Robot
+    data: Measurements
+    sigma: Sigma
+    use: NDArray[np.bool_]
+    left_out: tuple[str, ...] = ()
+    experiment: Experiment = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        self.experiment = Experiment(self.robot, commands_of(self.robot, self.data))
+
+    def without(self, rows: NDArray[np.bool_], why: str) -> Problem:
+        """The same problem with some rows left out, sharing what is already computed."""
+        return self._like(use=self.use & ~rows, left_out=(*self.left_out, why))
+
+    def only(self, rows: NDArray[np.bool_]) -> Problem:
+        """The same problem on some of its rows."""
+        return self._like(use=self.use & rows)
+
+    def with_sigma(self, sigma: Sigma) -> Problem:
+        """The same problem with other noise."""
+        return self._like(sigma=sigma)
+
+    def _like(self, **changes: object) -> Problem:
+        other = replace(self, **changes)  # type: ignore[arg-type]
+        other.experiment = self.experiment
+        return other
+
+    @cached_property
+    def measured(self) -> NDArray[np.bool_]:
+        """(n, 6 + m) which readings there are."""
+        data = self.data
+        if data.quat_wxyz is not None:
+            turned = np.repeat(np.isfinite(data.quat_wxyz).all(axis=1)[:, None], 3, axis=1)
+        else:
+            turned = np.isfinite(data.angles_rad)
+        return np.concatenate(
+            [np.isfinite(data.position), turned, np.isfinite(data.tensions)], axis=1
+        )
+
+    @property
+    def counted(self) -> NDArray[np.bool_]:
+        """(n, 6 + m) readings that count."""
+        return self.measured & self.use[:, None]
+
+    @cached_property
+    def row_of(self) -> NDArray[np.int64]:
+        """Row of each counted residual, in the order of whitened vectors."""
+        return np.nonzero(self.counted)[0]
+
+    @cached_property
+    def column_of(self) -> NDArray[np.int64]:
+        """Column of each counted residual."""
+        return np.nonzero(self.counted)[1]
+
+    @property
+    def n_readings(self) -> int:
+        """Number of counted readings."""
+        return int(self.counted.sum())
+
+    @property
+    def uses_angles(self) -> bool:
+        """Whether the orientation was read as some angles only."""
+        return self.data.quat_wxyz is None
+
+    def residuals(self, readings: Readings) -> Array:
+        """Measured less predicted, (n, 6 + m), NaN where nothing was read."""
+        data = self.data
+        if data.quat_wxyz is not None:
+            turn = quat_multiply(data.quat_wxyz, quat_conjugate(readings.quat_wxyz))
+            turned = np.full((data.n_rows, 3), np.nan)
+            known = np.isfinite(turn).all(axis=1)
+            turned[known] = rotvec_from_quat(turn[known])
+        else:
+            turned = data.angles_rad - rxyz_from_quat(readings.quat_wxyz)
+            turned = (turned + np.pi) % (2 * np.pi) - np.pi
+        return np.concatenate(
+            [data.position - readings.position, turned, data.tensions - readings.tensions],
+            axis=1,
+        )
+
+    def as_read(self, change: Array, readings: Readings) -> Array:
+        """Derivatives (n, 6 + m, p) by rotation vector turned into those of what was read."""
+        if not self.uses_angles:
+            return change
+        change = change.copy()
+        change[:, ORIENTATION] = np.einsum(
+            "nij,njp->nip", angle_rates(readings.quat_wxyz), change[:, ORIENTATION]
+        )
+        return change
+
+    def noise(self, at: Prediction) -> Array:
+        """Cholesky factors of each row's noise, (n, 6 + m, 6 + m); 1 where nothing was read."""
+        n, width = self.measured.shape
+        sigma = np.concatenate(
+            [
+                np.full(3, self.sigma.position_m or 1.0),
+                np.full(3, self.sigma.orientation_rad or 1.0),
+                np.full(width - 6, self.sigma.tension_N or 1.0),
+            ]
+        )
+        covariance = np.zeros((n, width, width))
+        if self.sigma.length_m:
+            rate = self.as_read(length_sensitivities(at), at.readings)
+            covariance = np.einsum("nik,njk->nij", rate, rate) * self.sigma.length_m**2
+        covariance[:, np.arange(width), np.arange(width)] += sigma**2
+        blank = ~self.measured
+        covariance = np.where(blank[:, :, None] | blank[:, None, :], 0.0, covariance)
+        index = np.arange(width)
+        covariance[:, index, index] += np.where(blank, 1.0, 0.0)
+        return np.linalg.cholesky(covariance)
+
+    def whiten(self, factor: Array, values: Array) -> Array:
+        """Counted residuals (N,) or derivatives (N, p), in units of their noise."""
+        single = values.ndim == 2
+        table = values[..., None] if single else values
+        table = np.where(self.measured[..., None], table, 0.0)
+        white = np.linalg.solve(factor, table)[self.counted]
+        return white[:, 0] if single else white
+
+
+def angle_rates(quat_wxyz: Array) -> Array:
+    """d(rx, ry, rz)/d(rotation vector in the base frame), (n, 3, 3)."""
+    step = 1e-6
+    rates = np.zeros((len(quat_wxyz), 3, 3))
+    for k in range(3):
+        turn = np.zeros(3)
+        turn[k] = step
+        ahead = rxyz_from_quat(quat_multiply(quat_from_rotvec(turn), quat_wxyz))
+        behind = rxyz_from_quat(quat_multiply(quat_from_rotvec(-turn), quat_wxyz))
+        rates[..., k] = (ahead - behind) / (2 * step)
+    return rates
+
+
+@dataclass(eq=False)
+class State:
+    """A model at given values on a problem.
+
+    Attributes:
+        terms: the effects with their values.
+        prediction: of all rows.
+        raw: (n, 6 + m) residuals in their units, NaN where nothing was read.
+        white: (N,) counted residuals in units of their noise.
+        chi2: their sum of squares; inf where a counted row was not solved.
+    """
+
+    terms: tuple[Term, ...]
+    prediction: Prediction
+    raw: Array
+    white: Array
+    chi2: float
+
+    @property
+    def valid(self) -> bool:
+        """Whether every counted row was solved."""
+        return bool(np.isfinite(self.chi2))
+
+
+def evaluate(
+    problem: Problem, terms: Sequence[Term], factor: Array, near: Prediction | None = None
+) -> State:
+    """Predict with the terms and compare; ``factor`` is :meth:`Problem.noise`."""
+    prediction = problem.experiment.predict(effects_of(terms), near)
+    raw = problem.residuals(prediction.readings)
+    white = problem.whiten(factor, np.where(np.isfinite(raw), raw, 0.0))
+    valid = bool(np.all(prediction.solved[problem.use])) and bool(np.all(np.isfinite(white)))
+    chi2 = float(white @ white) if valid else np.inf
+    return State(tuple(terms), prediction, raw, white, chi2)
+
+
+def derivatives(
+    problem: Problem,
+    state: State,
+    factor: Array,
+    columns: Sequence[int] = (),
+    frozen: bool = False,
+) -> Array:
+    """Whitened derivative of the prediction by the terms' parameters, (N, p)."""
+    rates = sensitivities(problem.experiment, state.terms, state.prediction, columns, frozen)
+    return problem.whiten(factor, problem.as_read(rates, state.prediction.readings))

@@ -1,0 +1,7 @@
+"""Recordings for the Rerun viewer. Importing this imports Rerun, which takes a second or two."""
+
+from __future__ import annotations
+
+from crosscheck.recording.case import write_case_recording
+
+__all__ = ["write_case_recording"]

@@ -1,0 +1,165 @@
+"""The layout that a recording opens with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from crosscheck.recording import scene as scenes
+from crosscheck.recording import shapes
+from crosscheck.recording.stream import POSE
+from seecr.pose import Array
+from seecr.robot import Robot
+
+# Half the viewer's vertical field of view [rad], and the part of it that is filled.
+_HALF_VIEW, _FILL = np.deg2rad(27.5), 0.88
+_AIMING_ROUNDS = 8
+# Width over height of the left column in a window of 1920 by 1080 points.
+COLUMN_ASPECT = 0.82
+# One lane over the height of a column in a window of 1080 points.
+_LANE_HEIGHT = 0.0405
+# Poses a second when playing.
+_FPS = 4.0
+_GROUND = (24, 27, 33)
+
+
+def eye(robot: Robot, low: Array, high: Array, aspect: float) -> rrb.EyeControls3D:
+    """Where to look from: the wide side, from above and from one side, as near as all fits.
+
+    Args:
+        robot: tells which way is down.
+        low: (3,) corner of what is to be seen [m].
+        high: (3,) the opposite corner [m].
+        aspect: width over height of the view.
+    """
+    up, span = -shapes.down(robot), high - low
+    across = np.eye(3)[int(np.argmax(span - np.abs(up) * span))]
+    towards = np.cross(across, up)
+    towards = towards / max(float(np.linalg.norm(towards)), 1e-9)
+    flat = float(np.abs(towards) @ span) < 0.05 * float(np.linalg.norm(span))
+    aside, above = (0.12, 0.1) if flat else (0.42, 0.34)
+    gaze = towards + aside * across + above * up
+    gaze = gaze / np.linalg.norm(gaze)
+    target, distance = _aim(low, high, gaze, up, aspect)
+    return rrb.EyeControls3D(
+        kind=rrb.Eye3DKind.Orbital,
+        position=target + distance * gaze,
+        look_target=target,
+        eye_up=up,
+        speed=float(np.linalg.norm(span)),
+    )
+
+
+def _aim(low: Array, high: Array, gaze: Array, up: Array, aspect: float) -> tuple[Array, float]:
+    """Target (3,) and distance [m] from which a box, seen against ``gaze``, fills the view."""
+    right = np.cross(up, gaze)
+    right = right / np.linalg.norm(right)
+    above = np.cross(gaze, right)
+    corners = np.array([np.where(pick, high, low) for pick in np.ndindex(2, 2, 2)])
+    half = _FILL * np.tan(_HALF_VIEW) * np.array([[aspect], [1.0]])
+    target, distance = (low + high) / 2.0, 2.0 * float(np.linalg.norm(high - low))
+    for _ in range(_AIMING_ROUNDS):
+        flat = np.stack([right, above]) @ (corners - target).T
+        depth = distance - gaze @ (corners - target).T
+        seen = flat / depth
+        # near corners look larger: the middle of the picture is not the middle of the box
+        centre = (seen.max(axis=1) + seen.min(axis=1)) / 2.0 * distance
+        target = target + centre @ np.stack([right, above])
+        flat = np.stack([right, above]) @ (corners - target).T
+        distance = float(np.max(gaze @ (corners - target).T + np.abs(flat) / half))
+    return target, distance
+
+
+def scene_view(
+    robot: Robot, low: Array, high: Array, name: str, aspect: float
+) -> rrb.Spatial3DView:
+    """The 3D view of one robot, about so much wider than high."""
+    return rrb.Spatial3DView(
+        origin=scenes.ROOT,
+        name=name,
+        background=rrb.Background(color=_GROUND),
+        eye_controls=eye(robot, low, high, aspect),
+        line_grid=_floor(robot, low, high),
+        spatial_information=rrb.SpatialInformation(
+            target_frame=f"tf#/{scenes.ROOT}", show_axes=False
+        ),
+    )
+
+
+def _floor(robot: Robot, low: Array, high: Array) -> rrb.LineGrid3D:
+    up = -shapes.down(robot)
+    lowest = min(float(up @ low), float(up @ high))
+    spacing = 10.0 ** np.floor(np.log10(0.5 * float(np.linalg.norm(high - low))))
+    return rrb.LineGrid3D(
+        visible=True,
+        spacing=float(spacing),
+        plane=rr.components.Plane3D(normal=up, distance=lowest),
+        stroke_width=0.6,
+        color=(58, 64, 74, 255),
+    )
+
+
+def plot(
+    name: str, contents: Sequence[str], values: tuple[float, float] | None = None
+) -> rrb.TimeSeriesView:
+    """One plot with its legend inside; its range of values is the viewer's choice if None."""
+    axis = None if values is None else rrb.ScalarAxis(range=values)
+    return rrb.TimeSeriesView(
+        name=name,
+        contents=list(contents),
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
+        axis_y=axis,
+    )
+
+
+def text(name: str, entity: str) -> rrb.TextDocumentView:
+    """A panel of text."""
+    return rrb.TextDocumentView(name=name, origin=entity)
+
+
+def lanes(name: str, root: str) -> rrb.StateTimelineView:
+    """Lanes of states over time."""
+    return rrb.StateTimelineView(name=name, origin=root)
+
+
+def legend(entity: str) -> rrb.Spatial2DView:
+    """The strip with the meaning of the 3D view's colours."""
+    return rrb.Spatial2DView(
+        name="Colours",
+        origin=entity,
+        titlebar=False,
+        background=rrb.Background(color=_GROUND),
+        visual_bounds=rrb.VisualBounds2D(x_range=(0.0, 100.0), y_range=(1.5, 11.5)),
+    )
+
+
+def lanes_share(count: int) -> float:
+    """Height of lanes over the height of a column: all of up to ten cables, then a scroll bar."""
+    return min(_LANE_HEIGHT * (count + 1.2), 0.5)
+
+
+def blueprint(root: rrb.Container, *, playback_speed: float = 1.0) -> rrb.Blueprint:
+    """Views, with the timeline over poses first and nothing else in the way.
+
+    Args:
+        root: the views.
+        playback_speed: of timelines in seconds, over real time.
+    """
+    return rrb.Blueprint(
+        root,
+        rrb.BlueprintPanel(state="hidden"),
+        rrb.SelectionPanel(state="hidden"),
+        rrb.TimePanel(
+            state="collapsed",
+            timeline=POSE,
+            fps=_FPS / playback_speed,
+            playback_speed=playback_speed,
+            play_state="paused",
+            loop_mode="all",
+        ),
+        auto_layout=False,
+        auto_views=False,
+    )

@@ -1,0 +1,155 @@
+"""What a case's recording shows, taken from the case's result before anything is drawn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.agreement import Differences
+from crosscheck.motion import Motion, record_motion
+from crosscheck.recording import colours
+from crosscheck.recording.states import States
+from crosscheck.verdicts import Verdict
+from seecr.equilibrium import Status
+from seecr.pose import Array, pose_difference
+from seecr.robot import Robot
+
+if TYPE_CHECKING:
+    from crosscheck.suite import CaseResult
+
+_EQUILIBRIA = (Status.CONVERGED, Status.SINGULAR)
+_FRAMES = 240
+# How long the settling plays [s].
+_WATCH_S = 12.0
+
+
+@dataclass(frozen=True, eq=False)
+class Material:
+    """A case and what of it is to be seen.
+
+    Attributes:
+        result: the case's.
+        watched: the pose, counted from 0, whose settling is shown.
+        motion: that settling; None where MuJoCo did not come to rest at any pose.
+    """
+
+    result: CaseResult
+    watched: int
+    motion: Motion | None
+
+    @property
+    def name(self) -> str:
+        """Of the case."""
+        return self.result.case.name
+
+    @property
+    def robot(self) -> Robot:
+        """Of the case."""
+        return self.result.robot
+
+    @property
+    def command(self) -> Array:
+        """Commanded poses (n, 7)."""
+        return self.result.case.poses
+
+    @property
+    def count(self) -> int:
+        """Number of poses n."""
+        return len(self.command)
+
+    @property
+    def is_sweep(self) -> bool:
+        """Whether the poses follow each other along a line."""
+        return self.result.case.kind == "sweep"
+
+    @cached_property
+    def labels(self) -> list[str]:
+        """Names of the cables without what all have in common in front."""
+        names = self.robot.cable_names
+        common = 0
+        while len({name[: common + 1] for name in names}) == 1 and common < min(map(len, names)):
+            common += 1
+        short = [name[common:] for name in names]
+        return short if all(short) else list(names)
+
+    @cached_property
+    def seecr(self) -> States:
+        """SEECR's answers; a pose that it does not call an equilibrium is NaN."""
+        found = self.result.solution
+        known = np.array([status in _EQUILIBRIA for status in found.status])
+        pose = np.where(known[:, None], found.pose, np.nan)
+        return States(pose, found.tensions, found.rest_lengths, found.slack)
+
+    @cached_property
+    def mujoco(self) -> States:
+        """MuJoCo's, after the polish."""
+        found = self.result.settling
+        return States(found.pose, found.tensions, self.result.mujoco_rest_lengths, found.slack)
+
+    @cached_property
+    def settling(self) -> States:
+        """MuJoCo's platform on its way to rest."""
+        assert self.motion is not None
+        moving = self.motion
+        lengths = np.tile(self.mujoco.rest_lengths[self.watched], (len(moving.t_s), 1))
+        return States(moving.pose, moving.tensions, lengths, moving.tensions == 0.0)
+
+    @property
+    def slack_differs(self) -> NDArray[np.bool_]:
+        """Cables slack for one physics and taut for the other by more than is allowed, (n, m)."""
+        apart = self.gap.cable_tension_N
+        allowed = self.result.allowance.tension_N[:, None]
+        return np.asarray((self.seecr.slack != self.mujoco.slack) & (apart > allowed))
+
+    @property
+    def gap(self) -> Differences:
+        """MuJoCo against SEECR."""
+        return self.result.difference
+
+    @property
+    def playback_speed(self) -> float:
+        """Simulated seconds a second, so that the settling takes a while to watch."""
+        if self.motion is None:
+            return 1.0
+        speed = float(self.motion.t_s[-1]) / _WATCH_S
+        return colours.round_up(speed) if speed > 0.0 else 1.0
+
+    @property
+    def seen(self) -> Array:
+        """Every pose (k, 7) that the 3D view has to have room for."""
+        return np.concatenate([self.command, self.seecr.pose, self.mujoco.pose])
+
+    @cached_property
+    def top(self) -> float:
+        """Tension [N] at the end of the colour scale, a round number."""
+        tensions = np.concatenate([self.seecr.tensions, self.mujoco.tensions])
+        return colours.round_up(float(np.nanmax(tensions, initial=0.0)))
+
+
+def gather(result: CaseResult) -> Material:
+    """Choose the settling worth watching, and let MuJoCo repeat it."""
+    watched = _worth_watching(result)
+    if watched is None:
+        return Material(result, 0, None)
+    lengths = result.mujoco_rest_lengths[watched]
+    settler = result.side().settler
+    motion = record_motion(settler, result.case.poses[watched], lengths, max_frames=_FRAMES)
+    return Material(result, watched, motion)
+
+
+def _worth_watching(result: CaseResult) -> int | None:
+    """The pose at which MuJoCo moves the platform most, of those that differ if any do."""
+    settled = result.settling.settled
+    if not settled.any():
+        return None
+    for verdict in (Verdict.DIFFERS, Verdict.BRANCH):
+        if np.any(chosen := settled & (result.verdict == verdict)):
+            settled = chosen
+            break
+    change = pose_difference(result.settling.pose, result.case.poses)
+    change[:, 3:] *= result.robot.length
+    return int(np.argmax(np.where(settled, np.linalg.norm(change, axis=1), -1.0)))

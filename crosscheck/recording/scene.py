@@ -1,0 +1,111 @@
+"""The 3D view: frame, platforms and cables, at every pose and at every instant of a settling."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+
+from crosscheck.recording import colours, shapes
+from crosscheck.recording.colours import Rgba
+from crosscheck.recording.states import States
+from crosscheck.recording.stream import Recording
+from seecr.pose import Array, transform_points
+from seecr.robot import Robot
+
+ROOT = "scene"
+# Radii of lines over the robot's size.
+_FRAME, _TAUT, _LOOSE, _EDGE, _PATH = 0.0045, 0.0022, 0.0011, 0.0018, 0.0008
+
+
+class Scene:
+    """Draws one robot into a recording.
+
+    Attributes:
+        size: of what is to be seen [m]; all widths are parts of it.
+        top: tension [N] at the end of the colour scale.
+    """
+
+    def __init__(self, recording: Recording, robot: Robot, poses: Array, top: float) -> None:
+        self.recording, self.robot, self.top = recording, robot, top
+        self.low, self.high = shapes.extent(robot, poses)
+        self.size = float(np.linalg.norm(self.high - self.low))
+        self.box = shapes.platform_box(robot, self.size)
+
+    def surroundings(self, labels: list[str]) -> None:
+        """What does not move: the axes' convention, the frame, the exit points with labels."""
+        robot, record = self.robot, self.recording
+        record.always(ROOT, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+        record.always(
+            f"{ROOT}/frame",
+            rr.LineStrips3D(
+                shapes.frame_edges(self.low, self.high),
+                radii=_FRAME * self.size,
+                colors=colours.FRAME,
+            ),
+        )
+        record.always(
+            f"{ROOT}/exit_points",
+            rr.Points3D(
+                robot.exit_points,
+                radii=1.5 * _FRAME * self.size,
+                colors=colours.SILVER,
+                labels=labels,
+                show_labels=True,
+            ),
+        )
+
+    def path(self, name: str, poses: Array, colour: Rgba) -> None:
+        """The line along which the platform's origin goes."""
+        points = poses[np.isfinite(poses).all(axis=1), :3]
+        line = rr.LineStrips3D([points], radii=_PATH * self.size, colors=colour)
+        self.recording.always(f"{ROOT}/{name}/path", line)
+
+    def platform(
+        self, name: str, index: rr.TimeColumn, poses: Array, colour: Rgba, *, solid: bool = False
+    ) -> None:
+        """The platform as a box: solid, or only its edges so that others show through."""
+        seen = np.isfinite(poses).all(axis=1)
+        k, box = int(seen.sum()), self.box
+        fill = rr.components.FillMode.Solid if solid else rr.components.FillMode.MajorWireframe
+        columns = rr.Boxes3D.columns(
+            half_sizes=np.tile(box.half_size, (k, 1)),
+            centers=box.centres(poses[seen]),
+            quaternions=np.roll(poses[seen, 3:], -1, axis=1),  # Rerun's are scalar last
+        ).partition(seen.astype(int))
+        entity = f"{ROOT}/{name}/platform"
+        self.recording.rows(entity, index, columns)
+        style = rr.Boxes3D.from_fields(colors=[colour], radii=[_EDGE * self.size], fill_mode=fill)
+        self.recording.always(entity, style)
+
+    def anchors(self, name: str, index: rr.TimeColumn, poses: Array, colour: Rgba) -> None:
+        """Anchor points as dots, which also shows a platform that is a bar or a point."""
+        seen = np.isfinite(poses).all(axis=1)
+        points = transform_points(poses[seen], self.robot.anchor_points).reshape(-1, 3)
+        columns = rr.Points3D.columns(positions=points)
+        entity = f"{ROOT}/{name}/anchor_points"
+        self.recording.rows(entity, index, columns.partition(seen * self.robot.n_cables))
+        style = rr.Points3D.from_fields(radii=[1.6 * _TAUT * self.size], colors=[colour])
+        self.recording.always(entity, style)
+
+    def cables(self, name: str, index: rr.TimeColumn, states: States) -> None:
+        """Taut cables as thick lines coloured by tension, slack ones dashed, grey, sagging."""
+        known = states.known
+        poses = np.where(known[:, None], states.pose, self.robot.reference_pose)
+        self._taut(f"{ROOT}/{name}/cables/taut", index, states, poses)
+        slack = states.slack & known[:, None]
+        strips = shapes.slack_strips(self.robot, poses, slack, states.rest_lengths)
+        entity = f"{ROOT}/{name}/cables/slack"
+        columns = rr.LineStrips3D.columns(strips=strips)
+        counts = slack.sum(axis=1) * shapes.dashes_per_cable()
+        self.recording.rows(entity, index, columns.partition(counts))
+        style = rr.LineStrips3D.from_fields(radii=[_LOOSE * self.size], colors=[colours.SLACK])
+        self.recording.always(entity, style)
+
+    def _taut(self, entity: str, index: rr.TimeColumn, states: States, poses: Array) -> None:
+        pulls = ~states.slack & states.known[:, None]
+        columns = rr.LineStrips3D.columns(
+            strips=shapes.taut_strips(self.robot, poses, ~pulls),
+            colors=colours.scale_colours(states.tensions[pulls], self.top),
+        )
+        self.recording.rows(entity, index, columns.partition(pulls.sum(axis=1)))
+        self.recording.always(entity, rr.LineStrips3D.from_fields(radii=[_TAUT * self.size]))

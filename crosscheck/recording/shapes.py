@@ -1,0 +1,123 @@
+"""Where things are in the 3D view: cables that hang or pull, the platform's box, the frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seecr.pose import Array, quat_rotate, transform_points
+from seecr.robot import Robot
+
+# Slack cables are drawn as this many dashes of this many points.
+_DASHES, _DASH_POINTS = 12, 3
+# A cable paid out far too long is drawn sagging by no more than this part of its span.
+_DEEPEST = 0.35
+# Thickness of what has none, over the platform's largest side.
+_FLAT = 0.12
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """The platform as a box around its anchor points, platform frame.
+
+    Attributes:
+        half_size: (3,) [m].
+        centre: (3,) [m].
+    """
+
+    half_size: Array
+    centre: Array
+
+    def centres(self, poses: Array) -> Array:
+        """Centres (n, 3) [m] in the base frame at poses (n, 7)."""
+        return poses[:, :3] + quat_rotate(poses[:, 3:], self.centre)
+
+
+def platform_box(robot: Robot, size: float) -> Box:
+    """Box around the anchor points; a flat one is given some thickness.
+
+    Args:
+        robot: the robot.
+        size: of the whole robot [m], for platforms with one anchor point.
+    """
+    low, high = robot.anchor_points.min(axis=0), robot.anchor_points.max(axis=0)
+    half = (high - low) / 2.0
+    thinnest = max(_FLAT * float(half.max()), 0.006 * size)
+    return Box(np.maximum(half, thinnest), (low + high) / 2.0)
+
+
+def extent(robot: Robot, poses: Array) -> tuple[Array, Array]:
+    """Corners (3,), (3,) [m] of what is to be seen: exit points and the platform's poses."""
+    seen = poses[np.isfinite(poses).all(axis=-1)]
+    anchors = transform_points(seen, robot.anchor_points).reshape(-1, 3)
+    points = np.concatenate([robot.exit_points, anchors, seen[:, :3]])
+    return points.min(axis=0), points.max(axis=0)
+
+
+def frame_edges(low: Array, high: Array) -> list[Array]:
+    """Edges of the box between two corners, as strips (2, 3) [m]; a flat one has four."""
+    flat = (high - low) < 1e-3 * float(np.max(high - low))
+    edges = []
+    for axis in range(3):
+        others = [k for k in range(3) if k != axis]
+        for corner in np.ndindex(2, 2):
+            ends = np.array([low, low], dtype=float)
+            ends[1, axis] = high[axis]
+            for k, side in zip(others, corner, strict=True):
+                ends[:, k] = high[k] if side else low[k]
+            doubled = any(flat[k] and side for k, side in zip(others, corner, strict=True))
+            if not flat[axis] and not doubled:
+                edges.append(ends)
+    return edges
+
+
+def taut_strips(robot: Robot, poses: Array, slack: NDArray[np.bool_]) -> list[Array]:
+    """Straight lines (2, 3) [m] of the cables that pull, pose by pose."""
+    anchors = transform_points(poses, robot.anchor_points)
+    exits = np.broadcast_to(robot.exit_points, anchors.shape)
+    return list(np.stack([exits, anchors], axis=2)[~slack])
+
+
+def slack_strips(
+    robot: Robot, poses: Array, slack: NDArray[np.bool_], rest_lengths: Array
+) -> list[Array]:
+    """Dashes of the cables that hang loose, pose by pose; a fixed number a cable.
+
+    A loose cable has no weight in the statics, hence no shape of its own: drawn is the shallow
+    parabola of its length, whose sag s over a span d is l0 = d + 8 s^2 / (3 d).
+
+    Args:
+        robot: the robot.
+        poses: (n, 7).
+        slack: (n, m).
+        rest_lengths: (n, m) [m].
+    """
+    anchors = transform_points(poses, robot.anchor_points)
+    start = np.broadcast_to(robot.exit_points, anchors.shape)[slack]
+    end = anchors[slack]
+    span = np.linalg.norm(end - start, axis=-1)
+    loose = np.maximum(rest_lengths[slack] - span, 0.0)
+    sag = np.minimum(np.sqrt(3.0 * span * loose / 8.0), _DEEPEST * span)
+    part = _dash_grid()[None, :, :, None]
+    chord = start[:, None, None] + part * (end - start)[:, None, None]
+    drop = sag[:, None, None, None] * 4.0 * part * (1.0 - part) * down(robot)
+    return list((chord + drop).reshape(-1, _DASH_POINTS, 3))
+
+
+def dashes_per_cable() -> int:
+    """How many strips :func:`slack_strips` makes of one cable."""
+    return _DASHES
+
+
+def down(robot: Robot) -> Array:
+    """Unit vector (3,) of gravity; -z where there is none."""
+    size = float(np.linalg.norm(robot.gravity))
+    return robot.gravity / size if size > 0.0 else np.array([0.0, 0.0, -1.0])
+
+
+def _dash_grid() -> Array:
+    """Places along a cable, 0 to 1, of the dashes' points, (dashes, points)."""
+    begin = np.arange(_DASHES) / (_DASHES - 0.4)
+    return begin[:, None] + np.linspace(0.0, 0.6 / (_DASHES - 0.4), _DASH_POINTS)

@@ -1,0 +1,230 @@
+"""Settle a true robot row by row, and read its sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.relax import come_to_rest
+from crosscheck.settling import SettleStatus
+from crosscheck.truth.descent import descend
+from crosscheck.truth.lengths import Way, paid_out, way_of
+from crosscheck.truth.robot import TrueRobot, true_robot
+from crosscheck.truth.springs import Cable, Springs
+from crosscheck.truth.world import World
+from seecr.effects import Effect
+from seecr.pose import Array, pose_add, pose_difference
+from seecr.robot import Robot
+from seecr.setup import Commands
+
+SEGMENTS = (8, 16)
+"""Segments N of a cable with weight. A chain errs by some 1/N^2 of what the weight does, from two
+of them the error of that order is taken away (Richardson)."""
+
+# Of MuJoCo's dynamics, before the last digits are polished.
+_AT_REST, _MAX_STEPS = 1e-6, 40_000
+# Tangents of a law with memory until it agrees with MuJoCo: relative to the load.
+_AGREED, _TANGENTS = 1e-10, 60
+# Rounds until what lies on the sheaves and what hangs free agree, relative to a cable.
+_SHARE, _SHARES = 1e-10, 20
+
+Progress = Callable[[int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """What MuJoCo says of n rows.
+
+    Attributes:
+        pose: (n, 7) where the platform rests; tensions: (n, m) [N] where cables leave.
+        position: (n, 3) [m]; quat_wxyz: (n, 4); tension_readings: (n, m) [N], as read, no noise.
+        rest_lengths: (n, m) [m] really paid out.
+        at_rest: (n,) bool, a stable equilibrium was found.
+        residual: (n,) unbalanced force relative to the load.
+    """
+
+    pose: Array
+    tensions: Array
+    position: Array
+    quat_wxyz: Array
+    tension_readings: Array
+    rest_lengths: Array
+    at_rest: NDArray[np.bool_]
+    residual: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """Rests of rows: pose (n, 7), tensions (n, m) [N], at rest (n,), residual (n,)."""
+
+    pose: Array
+    tensions: Array
+    at_rest: NDArray[np.bool_]
+    residual: Array
+
+    @classmethod
+    def empty(cls, n: int, m: int) -> _Rows:
+        nan = np.full(n, np.nan)
+        return cls(np.full((n, 7), np.nan), np.full((n, m), np.nan), nan > 0, nan)
+
+
+def measure(
+    robot: Robot,
+    commands: Commands,
+    effects: Sequence[Effect] = (),
+    *,
+    segments: tuple[int, ...] = SEGMENTS,
+    progress: Progress | None = None,
+) -> Truth:
+    """Let MuJoCo bring a robot with effects to rest at each command, and read its sensors.
+
+    Args:
+        robot: as described.
+        commands: n rows.
+        effects: what it has besides, in the order in which they act.
+        segments: N of each cable, where cables have weight; of two, the poses are extrapolated.
+        progress: called with the number of rows done since the last call.
+    """
+    true = true_robot(robot, effects)
+    way = way_of(true, commands)
+    rest = paid_out(true, way, commands.temperature)
+    tell = progress or (lambda rows: None)
+    settle = _walk if true.has_history else _each
+    rows = settle(World(true, segments[-1] if true.cable_weight > 0 else 1), way, rest, tell)
+    if true.cable_weight > 0 and len(segments) > 1:
+        coarse = settle(World(true, segments[0]), way, rest, lambda rows: None)
+        rows = _extrapolated(coarse, rows, (segments[-1] / segments[0]) ** 2)
+    reading = (rows.pose[:, :3], rows.pose[:, 3:], rows.tensions)
+    for sensor in true.sensors:
+        reading = sensor(reading)
+    return Truth(
+        rows.pose, rows.tensions, *reading, rest[way.is_row], rows.at_rest, rows.residual
+    )
+
+
+def _extrapolated(coarse: _Rows, fine: _Rows, ratio: float) -> _Rows:
+    """Rows free of the leading error, which is ``ratio`` times as large in the coarse ones."""
+    part = 1.0 / (ratio - 1.0)
+    at_rest = fine.at_rest & coarse.at_rest
+    pose = fine.pose.copy()
+    change = part * pose_difference(fine.pose[at_rest], coarse.pose[at_rest])
+    pose[at_rest] = pose_add(fine.pose[at_rest], change)
+    tensions = fine.tensions + part * (fine.tensions - coarse.tensions)
+    return _Rows(pose, np.maximum(tensions, 0.0), at_rest, fine.residual)
+
+
+def _each(world: World, way: Way, rest: Array, tell: Progress) -> _Rows:
+    """Every row by itself, from its commanded pose."""
+    poses, lengths = way.pose[way.is_row], rest[way.is_row]
+    out = _Rows.empty(len(poses), world.n_cables)
+    bare = _without_weight(world)
+    for k, pose in enumerate(poses):
+        springs = Springs.plain(lengths[k], world.true)
+        go = _start(world, bare, pose, springs)
+        _note(world, out, k, *_settle(world, springs, go))
+        tell(1)
+    return out
+
+
+def _without_weight(world: World) -> World:
+    """The world itself, or one whose cables have no weight, where they do."""
+    if world.segments == 1:
+        return world
+    return World(replace(world.true, cable_weight=0.0))
+
+
+def _start(world: World, bare: World, pose: Array, springs: Springs) -> bool:
+    """Let the platform move to rest from a pose; cables with weight take theirs on there."""
+    bare.set_springs(springs)
+    bare.place(pose)
+    if not _moves_to_rest(bare):
+        return False
+    if bare is not world:
+        if world.true.pulley_radius:
+            world.free_share = bare.measure_free_share()
+        world.set_springs(springs)
+        world.place(bare.pose())
+    return True
+
+
+def _settle(world: World, springs: Springs, go: bool) -> tuple[bool, float]:
+    """Polish, or go downhill; with chains over sheaves until their free parts are right."""
+    if not go:
+        return False, np.nan
+    for _ in range(_SHARES):
+        world.set_springs(springs)
+        found = descend(world)
+        if world.segments == 1 or not world.true.pulley_radius or not found.at_rest:
+            break
+        share = world.measure_free_share()
+        change = float(np.max(np.abs(share - world.free_share)))
+        world.free_share = share
+        if change < _SHARE:
+            break
+    return found.at_rest, found.residual
+
+
+def _moves_to_rest(world: World) -> bool:
+    """MuJoCo's own dynamics, damped, from where the platform is placed."""
+    tolerance = max(_AT_REST, 10.0 * world.rounding())
+    return come_to_rest(world, tolerance, _MAX_STEPS).status is SettleStatus.SETTLED
+
+
+def _note(world: World, out: _Rows, k: int, at_rest: bool, residual: float) -> None:
+    out.at_rest[k], out.residual[k] = at_rest, residual
+    if at_rest:
+        out.tensions[k] = world.cable_tensions()
+        out.pose[k] = world.pose()
+
+
+def _walk(world: World, way: Way, rest: Array, tell: Progress) -> _Rows:
+    """All points of the way in order, each from where the last one rested."""
+    true = world.true
+    out = _Rows.empty(int(way.is_row.sum()), world.n_cables)
+    cables = [Cable(true, float(ea)) for ea in true.ea]
+    bare = _without_weight(world)
+    fine = True
+    for k, pose in enumerate(way.pose):
+        for cable, length in zip(cables, rest[k], strict=True):
+            cable.pays_out(float(length), float(way.elapsed[k]), bool(way.fresh[k]))
+        if way.fresh[k]:
+            fine = _start(world, bare, pose, Springs.plain(rest[k], true))
+        fine, residual = _agree(world, cables) if fine else (False, np.nan)
+        if way.is_row[k]:
+            _note(world, out, int(way.row[k]), fine, residual)
+            tell(1)
+    return out
+
+
+def _agree(world: World, cables: list[Cable]) -> tuple[bool, float]:
+    """Tangents of the cables' laws and MuJoCo's settling in turns until both hold."""
+    world.update()
+    before = None
+    for turn in range(_TANGENTS):
+        lengths = world.cable_lengths()
+        tangents = [c.tangent(float(at)) for c, at in zip(cables, lengths, strict=True)]
+        rest, stiffness = np.array(tangents).T
+        if turn > _TANGENTS // 3:
+            # a kink at which tangents flip: meet halfway
+            rest = 0.5 * (rest + springs.rest)
+            stiffness = 0.5 * (stiffness + springs.stiffness)
+        springs = Springs(rest, stiffness, np.zeros((len(rest), 2)))
+        at_rest, residual = _settle(world, springs, True)
+        if not at_rest:
+            return False, residual
+        tensions = world.cable_tensions()
+        if before is not None and np.max(np.abs(tensions - before)) < _AGREED * world.force_scale:
+            break
+        before = tensions
+    else:
+        return False, residual
+    for cable, at, tension in zip(cables, world.cable_lengths(), tensions, strict=True):
+        cable.tangent(float(at))
+        cable.rests(bool(tension == 0.0))
+    return True, residual
+
+
+__all__ = ["SEGMENTS", "Truth", "measure"]

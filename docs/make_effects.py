@@ -1,0 +1,70 @@
+"""Write the table of built-in effects into docs/effects.md, from the effects themselves.
+
+    python docs/make_effects.py
+
+A test runs :func:`with_table` and goes red where the table is out of date.
+"""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+
+from seecr.effects import BUILT_IN, PLACES, Effect
+
+BEGIN, END = "<!-- effects: begin -->", "<!-- effects: end -->"
+PAGE = Path(__file__).resolve().parent / "effects.md"
+_SIZES = {"one": "", "cable": ", one a cable", "vector": ", x y z", "point": ", x y z a cable"}
+
+
+def table() -> str:
+    """One Markdown table a place: name, parameters, and the effect's own docstring."""
+    lines = []
+    for place in PLACES:
+        lines += [f"### {place}", "", "| effect | parameters | what it is |", "|---|---|---|"]
+        for effect in BUILT_IN:
+            if effect.place == place:
+                lines.append(f"| `{effect.name}` | {_parameters(effect)} | {_words(effect)} |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def with_table(page: str) -> str:
+    """The page with a fresh table between its marks."""
+    before, rest = page.split(BEGIN)
+    after = rest.split(END)[1]
+    return f"{before}{BEGIN}\n\n{table()}\n{END}{after}"
+
+
+def _parameters(effect: type[Effect]) -> str:
+    parts = []
+    for item in fields(effect):
+        meta = item.metadata
+        unit = meta["unit"].replace("_per_", "/") or "no unit"
+        notes = [unit + _SIZES[meta["size"]]]
+        if meta["null"] != 0.0:
+            notes.append(f"{'start' if meta['shape'] else 'absent at'} {meta['null']:g}")
+        limits = [b for b in meta["bounds"] if not callable(b)]
+        if len(limits) == 2 and np.all(np.isfinite(limits)):
+            notes.append(f"{limits[0]:g} to {limits[1]:g}")
+        if meta["shape"]:
+            notes.append("shapes the others")
+        parts.append(f"`{item.name}` ({'; '.join(notes)})")
+    return "<br>".join(parts)
+
+
+def _words(effect: type[Effect]) -> str:
+    paragraphs = (inspect.getdoc(effect) or "").split("\n\n")
+    return "<br>".join(" ".join(p.split()) for p in paragraphs).replace("|", "\\|")
+
+
+if __name__ == "__main__":
+    fresh = with_table(PAGE.read_text(encoding="utf-8"))
+    part = PAGE.with_suffix(".md.part")
+    part.write_text(fresh, encoding="utf-8")
+    part.replace(PAGE)
+    sys.stdout.write(f"{PAGE.name}: {len(BUILT_IN)} effects\n")
