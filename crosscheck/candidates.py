@@ -28,6 +28,24 @@ _TRIAL_ITERATIONS = 12
 _UNSEEN = 0.02
 
 
+@dataclass(frozen=True, eq=False)
+class Starts:
+    """Where to start fitting an effect, and what its derivative at null promises.
+
+    Attributes:
+        vectors: starting values, the most promising first.
+        gain: linearised fall of chi2 of the best. directions: that the data see.
+        shapes: about how many shapes were tried for it.
+        seen: whether any reading moves by more than a trace of its noise.
+    """
+
+    vectors: list[Array]
+    gain: float
+    directions: int
+    shapes: float
+    seen: bool
+
+
 @dataclass(eq=False)
 class Candidate:
     """An effect that might be missing, and what came of adding it.
@@ -39,6 +57,7 @@ class Candidate:
         drop: of chi2 against the model without it.
         p: chance of that drop where the effect is absent.
         why_not: a sentence where it is no candidate or was not chosen.
+        starts: where to start fitting it.
     """
 
     layout: Layout
@@ -47,6 +66,7 @@ class Candidate:
     drop: float = 0.0
     p: float = 1.0
     why_not: str = ""
+    starts: Starts | None = None
 
     @property
     def name(self) -> str:
@@ -97,36 +117,54 @@ def try_candidate(
     factor: Array,
     noise_scale: float = 1.0,
     hopeless: float = np.inf,
-    prune: float = 1.0,
 ) -> Candidate:
-    """Fit the base model with one effect added, from its most promising starts.
+    """Fit the base model with one effect added, from its most promising starts."""
+    out = screen(problem, base, layout, factor, noise_scale)
+    return out if out.why_not else fit_candidate(problem, base, out, factor, noise_scale, hopeless)
+
+
+def screen(
+    problem: Problem, base: Fit, layout: Layout, factor: Array, noise_scale: float = 1.0
+) -> Candidate:
+    """What the effect's derivative promises beside the base model; nothing is fitted."""
+    out = Candidate(layout)
+    out.starts = _starts(problem, base, layout, factor)
+    if not out.starts.seen:
+        out.why_not = "these data do not show it: no reading moves by its plausible size"
+        return out
+    out.drop = out.starts.gain / noise_scale**2
+    out.p = p_value(out.drop, out.starts.directions, False) * out.starts.shapes
+    return out
+
+
+def fit_candidate(
+    problem: Problem,
+    base: Fit,
+    screened: Candidate,
+    factor: Array,
+    noise_scale: float = 1.0,
+    hopeless: float = np.inf,
+) -> Candidate:
+    """Fit the base model with a screened effect added.
 
     Args:
         problem: the data.
         base: the model without the effect.
-        layout: the effect.
+        screened: from :func:`screen`.
         factor: noise factors.
         noise_scale: noise in units of the stated one.
         hopeless: chi2 above which a trial is given up after a few steps.
-        prune: no fit where chance explains the linearised fall of chi2 with more than this.
     """
-    out = Candidate(layout)
-    first = _starts(problem, base, layout, factor)
-    if not first.seen:
-        out.why_not = "these data do not show it: no reading moves by its plausible size"
-        return out
-    out.drop = first.gain / noise_scale**2
-    out.p = p_value(out.drop, first.directions, False) * first.shapes
-    if out.p > prune:
-        out.why_not = f"chance explains it (p {min(1.0, out.p):.2g})"
-        return out
+    layout, first = screened.layout, screened.starts
+    assert first is not None
+    out = Candidate(layout, starts=first)
     best: Fit | None = None
     for vector in first.vectors:
         terms = ordered((*base.terms, Term(layout, vector)))
         try:
             found = fit(
                 problem, terms, factor, base.state,
-                iterations=_TRIAL_ITERATIONS, hopeless=hopeless,
+                iterations=_TRIAL_ITERATIONS, hopeless=hopeless, quick=True,
             )  # fmt: skip
         except (InputError, np.linalg.LinAlgError):
             continue
@@ -157,25 +195,7 @@ def own_columns(terms: Sequence[Term], name: str) -> np.ndarray:
     return np.concatenate([np.full(len(t.layout), t.name == name) for t in terms])
 
 
-@dataclass(frozen=True, eq=False)
-class _Starts:
-    """Where to start fitting an effect, and what its derivative at null promises.
-
-    Attributes:
-        vectors: starting values, the most promising first.
-        gain: linearised fall of chi2 of the best. directions: that the data see.
-        shapes: about how many shapes were tried for it.
-        seen: whether any reading moves by more than a trace of its noise.
-    """
-
-    vectors: list[Array]
-    gain: float
-    directions: int
-    shapes: float
-    seen: bool
-
-
-def _starts(problem: Problem, base: Fit, layout: Layout, factor: Array) -> _Starts:
+def _starts(problem: Problem, base: Fit, layout: Layout, factor: Array) -> Starts:
     shapes = layout.effect.shapes(base.state.prediction.setup)
     scored: list[tuple[float, int, Array, dict[str, float]]] = []
     seen = False
@@ -191,7 +211,7 @@ def _starts(problem: Problem, base: Fit, layout: Layout, factor: Array) -> _Star
         vector = np.clip(null + z * scale, layout.lower, layout.upper)
         scored.append((gain, directions, vector, shape))
     if not scored:
-        return _Starts([], 0.0, 1, 1.0, False)
+        return Starts([], 0.0, 1, 1.0, False)
     scored.sort(key=lambda item: -item[0])
     vectors = [vector for _g, _d, vector, _s in scored[:2]]
     if np.any((layout.lower == layout.null) & ~layout.shape):
@@ -201,7 +221,7 @@ def _starts(problem: Problem, base: Fit, layout: Layout, factor: Array) -> _Star
     elif len(shapes) == 1:
         vectors = vectors[:1]
     # neighbouring shapes are alike: about every third is one more chance of its own
-    return _Starts(vectors, scored[0][0], scored[0][1], max(1.0, len(shapes) / 3.0), seen)
+    return Starts(vectors, scored[0][0], scored[0][1], max(1.0, len(shapes) / 3.0), seen)
 
 
 def amplitude_columns(

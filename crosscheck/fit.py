@@ -102,6 +102,7 @@ def fit(
     free: NDArray[np.bool_] | None = None,
     iterations: int = _ITERATIONS,
     hopeless: float = np.inf,
+    quick: bool = False,
 ) -> Fit:
     """Fit the terms' parameters from their values.
 
@@ -112,6 +113,8 @@ def fit(
         start: a state near the start, to save solving.
         free: (p,) which parameters may move; all by default.
         iterations: most Gauss-Newton steps.
+        quick: take rows' history as given when deriving; near enough to compare models, not for
+            values.
         hopeless: stop after a few steps where chi2 is still above this.
     """
     near = None if start is None else start.prediction
@@ -122,18 +125,28 @@ def fit(
         return _invalid(state, p, "rows could not be solved at the start of the fit")
     scale, lower, upper = (flat(terms, k) for k in ("scale", "lower", "upper"))
     damping, count = 1e-3, 0
-    while count < iterations:
+    stale = 0
+    jacobian = np.zeros((0, p))
+    while count < iterations and p:
         count += 1
-        jacobian = derivatives(problem, state, factor) * scale
+        if stale == 0:
+            jacobian = derivatives(problem, state, factor, frozen=quick) * scale
         step_state, damping, gain = _step(
             problem, state, factor, jacobian, free, (scale, lower, upper), damping
         )
         if step_state is None:
-            break
+            if stale == 0:
+                break
+            stale = 0  # not the derivatives' last word: they are of an earlier step
+            continue
+        # derivatives cost much more than a trial: they serve twice where steps go well
+        stale = 1 if stale == 0 and step_state.chi2 < 0.3 * state.chi2 else 0
         state = step_state
         if gain < _GAIN or (count >= _FEW and state.chi2 > hopeless):
             break
-    jacobian = derivatives(problem, state, factor) * scale if p else np.zeros((len(state.white), 0))
+    jacobian = np.zeros((len(state.white), 0))
+    if p:
+        jacobian = derivatives(problem, state, factor, frozen=quick) * scale
     values = flat(state.terms, "vector")
     at_bound = (values <= lower) | (values >= upper)
     covariance = _covariance(jacobian, scale, free & ~at_bound)

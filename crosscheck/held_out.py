@@ -64,7 +64,7 @@ def hold_out(problem: Problem, best: Fit, factor: Array) -> HeldOut:
     values = np.zeros((len(blocks), len(flat(best.terms, "null"))))
     valid = best.valid
     for b, rows in enumerate(blocks):
-        fold = fit(problem.only(~rows), best.terms, factor, best.state, iterations=8)
+        fold = fit(problem.only(~rows), best.terms, factor, best.state, iterations=6, quick=True)
         valid = valid and fold.valid
         values[b] = flat(fold.terms, "vector")
         raw[rows] = fold.state.raw[rows]

@@ -153,17 +153,17 @@ def _runs_test(problem: Problem, table: Array) -> float:
 def rms_by_kind(problem: Problem, raw: Array) -> dict[str, float | None]:
     """Root mean square of the counted residuals: position [m], orientation [rad], tension [N].
 
-    Of the vector for positions and orientations (all measured components together), of single
-    readings for tensions; None where nothing was read.
+    Of single components, so that noise alone gives its sigma; None where nothing was read.
     """
     out: dict[str, float | None] = {}
-    parts = (("position_rms_m", POSITION), ("orientation_rms_rad", ORIENTATION))
-    for name, part in parts:
-        some = problem.counted[:, part]
-        square = np.where(some, raw[:, part] ** 2, 0.0).sum(axis=1)[some.any(axis=1)]
-        out[name] = float(np.sqrt(square.mean())) if len(square) else None
-    tension = raw[:, TENSION][problem.counted[:, TENSION]]
-    out["tension_rms_N"] = float(np.sqrt((tension**2).mean())) if len(tension) else None
+    kinds = (
+        ("position_rms_m", POSITION),
+        ("orientation_rms_rad", ORIENTATION),
+        ("tension_rms_N", TENSION),
+    )
+    for name, part in kinds:
+        values = raw[:, part][problem.counted[:, part]]
+        out[name] = float(np.sqrt((values**2).mean())) if len(values) else None
     return out
 
 

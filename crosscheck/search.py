@@ -1,9 +1,10 @@
-"""Stepwise search for missing effects: forward by evidence, with look-back, never by rms alone.
+"""The search for missing effects: by evidence, a few models abreast, judged on runs left out.
 
-Each step fits every candidate for itself, keeps those whose fall of chi2 cannot be chance given
-how many were tried, takes the one of most evidence, and asks for better predictions of runs left
-out. Then it looks back: an effect that the new one makes needless is dropped, one that another
-explains better with the rest is swapped.
+One effect is added at a time, to a few models abreast: where two effects are missing, the single
+effect that explains most is often a large group that blurs both, and the way to the truth leads
+through a smaller one that explains less. Every candidate is fitted for itself. The search ends
+with a model that leaves noise, or where the next effect takes away little of what is left; then
+it looks back, drops what is needless, and puts the rest in the order in which adding them pays.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from crosscheck.candidates import Candidate, layouts_for, ordered, try_candidate
+from crosscheck.candidates import Candidate, fit_candidate, layouts_for, ordered, screen
 from crosscheck.evidence import Evidence, evidence
 from crosscheck.fit import Fit, fit
 from crosscheck.held_out import HeldOut, hold_out, improves, unfitted
@@ -26,7 +27,14 @@ FALSE_ALARM = 0.01
 # Least gain in log evidence for one more effect (20:1), and the margin within which two models
 # explain equally well.
 LEAST_GAIN, EQUAL = 3.0, 3.0
-MOST_EFFECTS = 5
+MOST_EFFECTS = 4
+# An effect that takes away less than this part of what noise does not explain is no cause.
+LEAST_PART = 0.25
+# Models abreast, and candidates fitted beside each of them after the first round.
+_ABREAST, _FITTED = 4, 5
+# Beside a model that leaves noise, an effect is only fitted if chance explains what its
+# derivative promises with less than this; beside others it must be very likely chance.
+_PRUNE_NOISE, _PRUNE_OTHER = 0.02, 0.3
 
 Progress = Callable[[str, float], None]
 
@@ -74,9 +82,197 @@ class Search:
     @property
     def found(self) -> tuple[str, ...]:
         """Effects added, in the order of adding."""
-        names = [t.name for t in self.last.fit.terms if t.name not in self.base]
-        order = [s.added for s in self.steps]
-        return tuple(sorted(names, key=lambda n: order.index(n) if n in order else len(order)))
+        return tuple(step.added for step in self.steps[1:])
+
+
+@dataclass(eq=False)
+class _Node:
+    """A model of the search; ``candidates`` are filled when the search goes on from it."""
+
+    fit: Fit
+    evidence: Evidence
+    whiteness: Whiteness
+    candidates: list[Candidate] = field(default_factory=list)
+
+    @property
+    def names(self) -> frozenset[str]:
+        return frozenset(t.name for t in self.fit.terms)
+
+    @property
+    def excess(self) -> float:
+        return max(self.whiteness.chi2 - self.whiteness.dof, 1e-9)
+
+
+@dataclass(eq=False)
+class _Searcher:
+    problem: Problem
+    factor: Array
+    scale: float
+    base: Fit
+    progress: Progress
+
+    def run(self) -> Search:
+        root = self.node(self.base)
+        best, abreast = root, [root]
+        seen = {root.names: root}
+        for depth in range(MOST_EFFECTS):
+            children: list[_Node] = []
+            for k, node in enumerate(abreast):
+                self.try_all(node, depth, k, len(abreast))
+                children += self.children(node, seen)
+            better = [c for c in children if c.evidence.log > best.evidence.log + LEAST_GAIN]
+            if not better:
+                break
+            noise = [c for c in better if c.whiteness.is_noise]
+            top = max(noise or better, key=lambda c: c.evidence.log)
+            if not noise and top.excess > (1.0 - LEAST_PART) * best.excess:
+                break  # what is left has another cause than the next best guess
+            best = top
+            abreast = [top] if noise else _diverse(better)
+        return self.conclude(root, best, seen)
+
+    def node(self, found: Fit) -> _Node:
+        ev = evidence(found, self.scale)
+        white = whiteness(self.problem, found.state.white / self.scale, ev.parameters)
+        return _Node(found, ev, white)
+
+    def try_all(self, node: _Node, depth: int, which: int, of: int) -> None:
+        """Every effect that the node does not have: all fitted at first, then the best few."""
+        todo = [c for c in layouts_for(self.problem) if c.name not in node.names]
+        prune = _PRUNE_NOISE if node.whiteness.is_noise else _PRUNE_OTHER
+        open_ = []
+        for k, c in enumerate(todo):
+            part = (which + 0.5 * k / len(todo)) / of
+            self.progress(f"round {depth + 1}: looking at {c.name}", part)
+            if not c.why_not:
+                c = screen(self.problem, node.fit, c.layout, self.factor, self.scale)
+            if not c.why_not and c.p > prune:
+                c.why_not = f"chance explains it (p {min(1.0, c.p):.2g})"
+            (node.candidates if c.why_not else open_).append(c)
+        open_.sort(key=lambda c: -_promise(c))
+        most = len(open_) if depth == 0 else _FITTED
+        best = np.inf
+        for k, c in enumerate(open_):
+            if k >= most:
+                c.why_not = "promises less than others beside it"
+                node.candidates.append(c)
+                continue
+            self.progress(
+                f"round {depth + 1}: fitting {c.name}", (which + 0.5 + 0.5 * k / len(open_)) / of
+            )
+            hopeless = 4.0 * best + 0.02 * node.fit.chi2
+            tried = fit_candidate(self.problem, node.fit, c, self.factor, self.scale, hopeless)
+            if tried.fit is not None:
+                best = min(best, tried.fit.chi2)
+            node.candidates.append(tried)
+        self.judge(node)
+
+    def judge(self, node: _Node) -> None:
+        """Say of each candidate why it is not to be added, if it is not."""
+        count = sum(1 for c in node.candidates if c.fit is not None or c.drop > 0)
+        for c in node.candidates:
+            if c.fit is None or c.evidence is None or c.why_not:
+                continue
+            gain = c.evidence.log - node.evidence.log
+            if c.p * count > FALSE_ALARM:
+                c.why_not = f"chance explains it (p {min(1.0, c.p * count):.2g} over all tried)"
+            elif gain < LEAST_GAIN:
+                c.why_not = f"explains too little for its {len(c.layout)} parameters"
+
+    def children(self, node: _Node, seen: dict[frozenset[str], _Node]) -> list[_Node]:
+        """Models with one effect more that nobody has seen yet."""
+        out = []
+        for c in node.candidates:
+            if c.fit is None or c.why_not:
+                continue
+            child = self.node(c.fit)
+            other = seen.get(child.names)
+            if other is None or child.evidence.log > other.evidence.log:
+                seen[child.names] = child
+                out.append(child)
+        return out
+
+    def conclude(
+        self, root: _Node, best: _Node, seen: dict[frozenset[str], _Node]
+    ) -> Search:
+        """Fit to the end, look back, and put the effects in order."""
+        held = {t.name for t in self.base.terms}
+        last = self.settled(best)
+        last = self.without_needless(last, held)
+        steps = self.in_order(root, last, held, seen)
+        return Search(self.problem, self.factor, self.scale, steps, tuple(held))
+
+    def settled(self, node: _Node) -> _Node:
+        if not node.fit.terms or node.fit is self.base:
+            return node
+        full = fit(self.problem, node.fit.terms, self.factor, node.fit.state)
+        return self.node(full) if full.valid else node
+
+    def without_needless(self, node: _Node, held: set[str]) -> _Node:
+        """Drop effects whose absence costs no evidence."""
+        own = [t.name for t in node.fit.terms if t.name not in held]
+        if len(own) < 2:
+            return node
+        for name in own:
+            rest = [t for t in node.fit.terms if t.name != name]
+            shorter = fit(self.problem, rest, self.factor, node.fit.state)
+            if not shorter.valid:
+                continue
+            other = self.node(shorter)
+            if other.evidence.log > node.evidence.log - LEAST_GAIN:
+                return self.without_needless(other, held)
+        return node
+
+    def in_order(
+        self, root: _Node, last: _Node, held: set[str], seen: dict[frozenset[str], _Node]
+    ) -> list[Step]:
+        """Steps from the start to the last model, at each the effect that pays most."""
+        steps = [self.step("", root)]
+        todo = [t for t in last.fit.terms if t.name not in held]
+        terms = list(self.base.terms)
+        while todo:
+            options = []
+            for term in todo:
+                known = seen.get(frozenset(t.name for t in [*terms, term]))
+                if len(todo) == 1:
+                    options.append((term, last))
+                    continue
+                start = known.fit if known is not None else last.fit
+                values = {t.name: t for t in start.terms}
+                some = ordered([values.get(t.name, t) for t in [*terms, term]])
+                found = known.fit if known is not None else None
+                if found is None:
+                    found = fit(self.problem, some, self.factor, last.fit.state, iterations=8)
+                if found.valid:
+                    options.append((term, self.node(found)))
+            if not options:
+                break
+            term, node = min(options, key=lambda o: o[1].fit.chi2)
+            known = seen.get(node.names)
+            if known is not None:
+                node.candidates = known.candidates
+            step = self.step(term.name, node)
+            mean, error = improves(steps[-1].held_out, step.held_out)
+            if not step.held_out.valid or mean <= 0.0 or mean < 0.5 * error:
+                self.blame(root, term.name)
+                break
+            steps.append(step)
+            terms = list(node.fit.terms)
+            todo = [t for t in todo if t.name != term.name]
+        return steps
+
+    def blame(self, root: _Node, name: str) -> None:
+        for c in root.candidates:
+            if c.name == name and not c.why_not:
+                c.why_not = "does not predict runs left out any better"
+
+    def step(self, added: str, node: _Node) -> Step:
+        best = node.fit
+        if added and best.terms:
+            held = hold_out(self.problem, best, self.factor)
+        else:
+            held = unfitted(self.problem, best.terms, best)
+        return Step(added, best, node.evidence, node.whiteness, held, node.candidates)
 
 
 def search(
@@ -87,126 +283,21 @@ def search(
     progress: Progress = lambda _text, _part: None,
 ) -> Search:
     """Add effects to the base model until what is left is noise or nothing helps."""
-    names = tuple(t.name for t in base.terms)
-    steps = [_step("", problem, base, factor, noise_scale)]
-    out = Search(problem, factor, noise_scale, steps, names)
-    while len(out.found) < MOST_EFFECTS:
-        here = out.last
-        here.candidates = try_all(problem, here.fit, factor, noise_scale, progress, len(steps))
-        following = _choose(problem, here, factor, noise_scale)
-        if following is None:
-            break
-        following = _look_back(problem, following, names, here, factor, noise_scale)
-        steps.append(following)
-    return out
+    return _Searcher(problem, factor, noise_scale, base, progress).run()
 
 
-def _step(added: str, problem: Problem, best: Fit, factor: Array, scale: float) -> Step:
-    ev = evidence(best, scale)
-    held = hold_out(problem, best, factor) if best.terms else unfitted(problem, (), best)
-    white = whiteness(problem, best.state.white / scale, ev.parameters)
-    return Step(added, best, ev, white, held)
+def _promise(c: Candidate) -> float:
+    """Linearised gain in evidence, roughly: three for each direction."""
+    directions = c.starts.directions if c.starts is not None else 1
+    return 0.5 * c.drop - 3.0 * directions
 
 
-def try_all(
-    problem: Problem, base: Fit, factor: Array, scale: float, progress: Progress, round_: int
-) -> list[Candidate]:
-    """Every effect of the catalogue that the model does not have, fitted beside it."""
-    have = {t.name for t in base.terms}
-    todo = [c for c in layouts_for(problem) if c.name not in have]
-    # the cheap ones first: they tell how good a fit must be to be worth finishing
-    todo.sort(key=lambda c: (len(c.layout.effect.shapes(base.state.prediction.setup)), len(c.layout)))
-    best, out = np.inf, []
-    # beside a model that leaves noise, only what its derivative promises is worth a fit
-    left = whiteness(problem, base.state.white / scale, base.jacobian.shape[1])
-    prune = 0.02 if left.is_noise else 0.3
-    for k, candidate in enumerate(todo):
-        progress(f"round {round_}: {candidate.name}", k / len(todo))
-        if not candidate.why_not:
-            hopeless = 4.0 * best + 0.02 * base.chi2
-            candidate = try_candidate(
-                problem, base, candidate.layout, factor, scale, hopeless, prune
-            )
-            if candidate.fit is not None:
-                best = min(best, candidate.fit.chi2)
-        out.append(candidate)
-    return out
-
-
-def _choose(problem: Problem, here: Step, factor: Array, scale: float) -> Step | None:
-    """The best candidate that chance does not explain and that predicts runs left out."""
-    tried = [c for c in here.candidates if c.fit is not None and c.evidence is not None]
-    for c in tried:
-        assert c.evidence is not None
-        gain = c.evidence.log - here.evidence.log
-        if c.p * len(tried) > FALSE_ALARM:
-            c.why_not = f"chance explains it (p {min(1.0, c.p * len(tried)):.2g} over all tried)"
-        elif gain < LEAST_GAIN:
-            c.why_not = f"explains too little for its {len(c.layout)} parameters"
-    good = [c for c in tried if not c.why_not]
-    good.sort(key=lambda c: -(c.evidence.log if c.evidence else -np.inf))
-    for c in good[:4]:
-        assert c.fit is not None
-        best = fit(problem, c.fit.terms, factor, c.fit.state)
-        if not best.valid:
-            c.why_not = best.why
-            continue
-        step = _step(c.name, problem, best, factor, scale)
-        mean, error = improves(here.held_out, step.held_out)
-        if not step.held_out.valid or mean <= 0.0 or mean < 0.5 * error:
-            c.why_not = "does not predict runs left out any better"
-            continue
-        return step
-    return None
-
-
-def _look_back(
-    problem: Problem, step: Step, base: tuple[str, ...], before: Step, factor: Array, scale: float
-) -> Step:
-    """Drop what is needless now; swap what another effect explains better with the rest."""
-    step = _drop_needless(problem, step, base, factor, scale)
-    own = [t.name for t in step.fit.terms if t.name not in base and t.name != step.added]
-    for name in own:
-        rest = ordered([t for t in step.fit.terms if t.name != name])
-        without = fit(problem, rest, factor, step.fit.state)
-        if not without.valid:
-            continue
-        better: Candidate | None = None
-        rivals = sorted(
-            (c for c in before.candidates if c.evidence and c.name not in [t.name for t in rest]),
-            key=lambda c: -(c.evidence.log if c.evidence else -np.inf),
-        )
-        for rival in rivals[:6]:
-            if rival.name == name:
-                continue
-            trial = try_candidate(problem, without, rival.layout, factor, scale)
-            good = trial.evidence is not None and (
-                trial.evidence.log > step.evidence.log + LEAST_GAIN
-            )
-            if good and (better is None or _log(trial) > _log(better)):
-                better = trial
-        if better is not None and better.fit is not None:
-            best = fit(problem, better.fit.terms, factor, better.fit.state)
-            swapped = _step(step.added, problem, best, factor, scale)
-            if best.valid and swapped.evidence.log > step.evidence.log:
-                step = swapped
-    return _drop_needless(problem, step, base, factor, scale)
-
-
-def _log(candidate: Candidate) -> float:
-    return candidate.evidence.log if candidate.evidence is not None else -np.inf
-
-
-def _drop_needless(
-    problem: Problem, step: Step, base: tuple[str, ...], factor: Array, scale: float
-) -> Step:
-    for term in step.fit.terms:
-        if term.name in base or term.name == step.added:
-            continue
-        rest = [t for t in step.fit.terms if t.name != term.name]
-        shorter = fit(problem, rest, factor, step.fit.state)
-        if shorter.valid and evidence(shorter, scale).log > step.evidence.log - LEAST_GAIN:
-            return _drop_needless(
-                problem, _step(step.added, problem, shorter, factor, scale), base, factor, scale
-            )
-    return step
+def _diverse(nodes: list[_Node]) -> list[_Node]:
+    """A few models to go on from: the best, and the best of the small ones."""
+    ranked = sorted(nodes, key=lambda c: -c.evidence.log)
+    out = ranked[:1]
+    for most in (3, 8):
+        small = [c for c in ranked if c.fit.jacobian.shape[1] <= most and c not in out]
+        out += small[: 2 if most == 3 else 1]
+    out += [c for c in ranked if c not in out][: max(0, _ABREAST - len(out))]
+    return out[:_ABREAST]

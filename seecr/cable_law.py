@@ -48,6 +48,9 @@ N_COLUMNS = len(COLUMNS)
 TENSION, STRAIN, HYSTERESIS_NOW, WINCH_TENSION, ENERGY, SLACK = range(6)
 N_STATE = 6
 
+# A softening cable keeps this part of its stiffness.
+LEAST = 0.01
+
 _jit = njit(cache=True, nogil=True, error_model="numpy")
 
 
@@ -70,6 +73,32 @@ def dahl(row, strain):
 
 
 @_jit
+def _polynomial(ea, q, c, strain):
+    """Tension and slope of EA (eps + q eps^2 + c eps^3), kept from losing its stiffness.
+
+    Where the slope would fall below a hundredth of EA it stays there, so that the tension is the
+    integral of the slope: a softening cable still carries more when it is stretched further.
+    """
+    share = strain + q * strain**2 + c * strain**3
+    low, high = np.inf, np.inf
+    disc = q * q - 3.0 * c * (1.0 - LEAST)
+    if disc > 0.0:
+        # roots of 3 c e^2 + 2 q e + (1 - LEAST) = 0, in the form that does not cancel
+        half = -(q + math.copysign(math.sqrt(disc), q))
+        first, second = (1.0 - LEAST) / half, half / (3.0 * c) if c != 0.0 else np.inf
+        first = first if first > 0.0 else np.inf
+        second = second if second > 0.0 else np.inf
+        low, high = min(first, second), max(first, second)
+    if strain > low:
+        top = min(strain, high)
+        share += LEAST * (top - low)
+        share -= (top - low) + q * (top**2 - low**2) + c * (top**3 - low**3)
+    firm = strain <= low or strain >= high
+    slope = 1.0 + 2.0 * q * strain + 3.0 * c * strain**2 if firm else LEAST
+    return ea * share, ea * slope
+
+
+@_jit
 def tension_of_strain(row, strain):
     """Tension [N], its slope dT/d eps [N] and the hysteretic part of it, at strain >= 0."""
     ea = row[EA]
@@ -78,9 +107,7 @@ def tension_of_strain(row, strain):
     tension = ea * strain
     slope = ea
     if q != 0.0 or c != 0.0:
-        tension = ea * (strain + q * strain**2 + c * strain**3)
-        # A softening cable may not lose its stiffness: keep a hundredth of it.
-        slope = ea * max(1.0 + 2.0 * q * strain + 3.0 * c * strain**2, 0.01)
+        tension, slope = _polynomial(ea, q, c, strain)
     tension += z + row[EXTRA] + row[EXTRA_SLOPE] * strain
     slope += z_slope + row[EXTRA_SLOPE]
     return tension, slope, z
@@ -234,27 +261,60 @@ def _change_of_sine(v, top, h, w, length):
 
 
 @_jit
-def _other_stretch(row, tension):
-    """Lengthening [m] beside the catenary's own T/EA, at the tension of its upper end."""
-    length, rate = row[REST] * row[CREEP_RATE] * tension, row[REST] * row[CREEP_RATE]
-    length += row[COMPLIANCE] * tension
-    rate += row[COMPLIANCE]
-    behind, behind_slope = winch_tension(row, tension)
-    length += row[WINCH_SIDE] / row[EA] * behind
-    rate += row[WINCH_SIDE] / row[EA] * behind_slope
-    if is_linear(row):
-        return length, rate
+def strain_of_tension(row, tension):
+    """Strain at which the cable itself pulls with a tension: Newton kept inside a bracket.
+
+    Returns strain, slope dT/d eps [N] and the hysteretic part of the tension.
+    """
     strain = tension / row[EA]
+    if is_linear(row):
+        return strain, row[EA], 0.0
+    low, high, reach = strain, strain, abs(strain) + 1e-6
     for _ in range(60):
-        t, slope, _z = tension_of_strain(row, strain)
-        step = (tension - t) / slope
-        strain += step
-        if abs(step) <= 1e-15 * (abs(strain) + 1e-9):
+        if tension_of_strain(row, low)[0] <= tension:
             break
-    slope = tension_of_strain(row, strain)[1]
-    length += row[REST] * (strain - tension / row[EA])
-    rate += row[REST] * (1.0 / slope - 1.0 / row[EA])
-    return length, rate
+        low -= reach
+        reach *= 2.0
+    for _ in range(60):
+        if tension_of_strain(row, high)[0] >= tension:
+            break
+        high += reach
+        reach *= 2.0
+    for _ in range(100):
+        t, slope, _z = tension_of_strain(row, strain)
+        if t > tension:
+            high = strain
+        else:
+            low = strain
+        if abs(t - tension) <= 2e-16 * abs(tension):
+            break
+        following = strain - (t - tension) / slope
+        if not (low < following < high):
+            following = 0.5 * (low + high)
+        if following == strain:
+            break
+        strain = following
+    _t, slope, z = tension_of_strain(row, strain)
+    return strain, slope, z
+
+
+@_jit
+def _other_stretch(row, tension):
+    """Unstretched length [m] that all but the catenary's own T/EA would add, and its slope.
+
+    At the tension of the upper end. A cable that stretches by it as the straight one does
+    is one that is longer by stretch/(1 + T/EA) before the catenary stretches it again.
+    """
+    ea, rest = row[EA], row[REST]
+    behind, behind_slope = winch_tension(row, tension)
+    stretch = rest * (row[CREEP] + row[CREEP_RATE] * tension) + row[COMPLIANCE] * tension
+    stretch += row[WINCH_SIDE] / ea * behind
+    rate = rest * row[CREEP_RATE] + row[COMPLIANCE] + row[WINCH_SIDE] / ea * behind_slope
+    strain, slope, _z = strain_of_tension(row, tension)
+    stretch += rest * (strain - tension / ea)
+    rate += rest * (1.0 / slope - 1.0 / ea)
+    grown = 1.0 + tension / ea
+    return stretch / grown, (rate - stretch / (grown * ea)) / grown
 
 
 @_jit
@@ -276,7 +336,7 @@ def _catenary_equations(row, unknown, across, rise, error, jacobian):
     arc, squeeze = r * (math.pi - psi), 1.0 / (1.0 + t / ea)
     error[0] = x + r + r * cosine - across
     error[1] = z - r * sine - rise
-    error[2] = length - row[REST] * (1.0 + row[CREEP]) - other + arc * squeeze
+    error[2] = length - row[REST] - other + arc * squeeze
     by_t = -other_rate - arc * squeeze**2 / ea
     by_psi = -r * squeeze
     jacobian[0, 0], jacobian[0, 1] = xh - r * sine * psi_h, xv - r * sine * psi_v
@@ -311,7 +371,7 @@ def _first_guess(row, across, rise, unknown):
         unknown[1] = pull * rise / chord - 0.5 * w * length
     else:
         flat = max(abs(across), 1e-9 * length)
-        lam = math.sqrt(max(3.0 * ((length * length - rise * rise) / (flat * flat) - 1.0), 1e-6))
+        lam = math.sqrt(max(3.0 * ((length * length - rise * rise) / (flat * flat) - 1.0), 0.04))
         unknown[0] = 0.5 * w * flat / lam * (1.0 if across >= 0.0 else -1.0)
         unknown[1] = 0.5 * w * (rise / math.tanh(lam) - length)
     unknown[2] = length
@@ -557,8 +617,7 @@ def _catenary_pull(row, start, move, up, guess, work, force, stiffness, gradient
     state[TENSION], state[ENERGY] = tension, np.nan
     state[WINCH_TENSION] = winch_tension(row, tension)[0]
     stretch = geometric_length_plane(row, across, rise) - row[REST]
-    state[STRAIN] = tension / row[EA]
-    state[HYSTERESIS_NOW] = dahl(row, state[STRAIN])[0]
+    state[STRAIN], _slope, state[HYSTERESIS_NOW] = strain_of_tension(row, tension)
     state[SLACK] = 1.0 if stretch < 0.0 else 0.0
     return True
 

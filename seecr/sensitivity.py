@@ -267,7 +267,7 @@ def _inverse_stiffness(at: Prediction) -> Array:
     moments = at.tables.load[:, kernel.EXTERNAL_MOMENT : kernel.EXTERNAL_MOMENT + 3]
     if not np.any(moments):
         return np.asarray(np.linalg.pinv(hessian, rcond=1e-12, hermitian=True), dtype=float)
-    return np.linalg.pinv(hessian + _turning(at, moments), rcond=1e-12)
+    return np.asarray(np.linalg.pinv(hessian + _turning(at, moments), rcond=1e-12), dtype=float)
 
 
 def _turning(at: Prediction, moments: Array) -> Array:

@@ -187,12 +187,25 @@ def descend(
     limit: int = 400,
     threads: int | None = None,
     start_values: Array | None = None,
-    staged: bool = True,
+    staged: bool | None = None,
 ) -> Evaluation:
     """Bring every pose to rest; ``start`` (n, 7) are deviations, none by default.
 
-    A start that is already close needs no stages of stiffness: ``staged=False``.
+    Stiff robots that do not get there are made stiff in stages, from soft (``staged=True``
+    starts with that, ``False`` never does it). A soft robot can leave for another equilibrium,
+    so the stages are for those alone that need them.
     """
+    if staged is None:
+        out = descend(tables, start, limit, threads, start_values, staged=False)
+        unsettled = (out.outcome == kernel.ITERATIONS) | (out.outcome == kernel.STALLED)
+        stiff = tables.cables[..., cable_law.EA].max(axis=1) > kernel.STIFF * tables.scale
+        again = np.flatnonzero(unsettled & stiff)
+        if len(again):
+            first, values = (None if s is None else s[again] for s in (start, start_values))
+            better = descend(take(tables, again), first, limit, threads, values, staged=True)
+            better.count += out.count[again]
+            put_evaluation(out, again, better)
+        return out
     n, m = tables.cables.shape[:2]
     out = Evaluation.empty(n, m, tables.n_dof)
     starts = out.deviation.copy() if start is None else np.ascontiguousarray(start)

@@ -116,7 +116,7 @@ def brute_force_pulley(across: float, rise: float, r: float) -> tuple[float, flo
     leave = np.stack([r + r * np.cos(psi), r * np.sin(psi)])
     free = np.array([[across], [rise]]) - leave
     length = np.hypot(*free)
-    onward = np.stack([np.sin(psi), -np.cos(psi)])  # the way a point on the wheel runs, over the top
+    onward = np.stack([np.sin(psi), -np.cos(psi)])  # the way the cable runs, over the top
     off = np.where(np.sum(free * onward, axis=0) > 0, np.abs(free[0] * onward[1]
                    - free[1] * onward[0]) / length, np.inf)  # fmt: skip
     best = int(np.argmin(off))
@@ -179,7 +179,7 @@ def test_wrong_points_are_the_robot_with_these_points_zeroed_at_its_reference(na
     assert there.tensions == pytest.approx(own.tensions, abs=1e-8)
 
 
-# --- cable, structure and load: twins --------------------------------------------------------------
+# --- cable, structure and load: twins ------------------------------------------------------------
 
 
 @pytest.mark.parametrize("kind", ["demobot_cogiro", "demobot_parallel", "planar_vertical"])

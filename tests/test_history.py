@@ -158,7 +158,8 @@ def test_forward_and_back_part_and_each_run_starts_anew(
 ) -> None:
     robot = replace(robot_of(kind), ea=np.full(8, CABLES["fishing"]))
     x = np.concatenate([np.linspace(0.3, 0.5, 9), np.linspace(0.5, 0.3, 9)[1:]])
-    one = np.column_stack([x, np.full(17, 0.25), np.full(17, 0.15), np.tile([1.0, 0, 0, 0], (17, 1))])
+    one = np.tile([0.0, 0.25, 0.15, 1, 0, 0, 0], (17, 1))
+    one[:, 0] = x
     there = [effect(name, **values)]
     both = Commands(np.tile(one, (2, 1)), run=np.repeat([0, 1], 17))
     found = Experiment(robot, both).predict(there)
@@ -224,7 +225,9 @@ def test_endless_friction_shuts_the_cable_behind_the_exit_point_off() -> None:
 # --- creep ---------------------------------------------------------------------------------------
 
 
-def hold(times: np.ndarray, amount: float, constant: float, run: np.ndarray | None = None) -> np.ndarray:
+def hold(
+    times: np.ndarray, amount: float, constant: float, run: np.ndarray | None = None
+) -> np.ndarray:
     """Fall [m] below the command of 2 kg hung on one cable of 1 m and E S = 1000 N at times [s]."""
     robot = replace(
         lift(), exit_points=np.array([[0.0, 0, 1]]), anchor_points=np.zeros((1, 3)),

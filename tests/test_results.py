@@ -150,8 +150,10 @@ def test_terminal_table_shows_units_thresholds_and_failures(good, capsys):
     print_run(run_of(good, failed(good, "bad")), Path("here"))
     out = capsys.readouterr().out
     heads, units = out.splitlines()[:2]
-    assert heads.split()[:4] == ["case", "poses", "settled", "settled"]
-    assert units.split() == ["[m]", "[rad]", "[m]", "[rad]", "[N]", "[µs]", "[ms]"]
+    names = ["settled", "settled", "polished", "polished", "tension", "SEECR", "MuJoCo"]
+    assert heads.split() == names
+    under = ["case", "poses", "[m]", "[rad]", "[m]", "[rad]", "[N]", "[µs]", "[ms]"]
+    assert units.split() == [*under, "result", "remarks"]
     assert re.search(r"allowed +1e-06 +1e-05 +1e-08 +1e-07 +1e-06", out)
     assert "bad, pose 1, commanded" in out
     assert "DIFFER" in out
@@ -165,7 +167,7 @@ def test_a_narrow_terminal_gets_fewer_columns_and_whole_numbers(good, capsys):
     table = capsys.readouterr().out.splitlines()[:4]
     assert max(map(len, table)) <= 80
     assert "…" not in "".join(table)
-    assert table[1].split() == ["[m]", "[rad]", "[m]", "[rad]", "[N]"]
+    assert table[1].split() == ["case", "[m]", "[rad]", "[m]", "[rad]", "[N]", "result"]
     assert table[2].split()[0] == "parallel-vectran-random"
     assert table[2].split()[-1] == "agree"
 

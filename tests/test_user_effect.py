@@ -17,7 +17,9 @@ from seecr.sensitivity import Term, effects_of, sensitivities
 
 PAGE = (Path(__file__).resolve().parents[1] / "docs" / "effects.md").read_text(encoding="utf-8")
 PYTHON = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
-ENTRY_POINTS = re.search(r"```toml\n\[project\.entry-points\.\"(.*?)\"\]\n(.*?)```", PAGE, re.DOTALL)
+ENTRY_POINTS = re.search(
+    r"```toml\n\[project\.entry-points\.\"(.*?)\"\]\n(.*?)```", PAGE, re.DOTALL
+)
 
 
 @pytest.fixture

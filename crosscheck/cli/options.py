@@ -95,3 +95,24 @@ def progress_bar(text: str, total: int) -> Iterator[Callable[[int, str], None]]:
             bar.update(task, advance=steps, description=now or text)
 
         yield advance
+
+
+@contextmanager
+def progress_share(text: str) -> Iterator[Callable[[str, float], None]]:
+    """A progress bar for work that tells its share of a round done, on a terminal only.
+
+    Args:
+        text: what is going on.
+
+    Yields:
+        a function to call with what is going on now and the share of it (0 to 1) that is done.
+    """
+    done = [0]
+    with progress_bar(text, 100) as advance:
+
+        def tell(now: str, share: float) -> None:
+            percent = int(100 * share)
+            advance(percent - done[0], now)
+            done[0] = percent
+
+        yield tell

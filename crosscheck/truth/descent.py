@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crosscheck.truth.world import World
 from seecr.pose import Array, pose_difference
@@ -23,24 +24,35 @@ class Descent:
     """How it ended; the world is left there.
 
     Attributes:
-        at_rest: in a stable equilibrium.
+        balanced: MuJoCo's forces balance, and no way leads further down.
+        free: some motion changes no force: where it stops along it is arbitrary.
         residual: unbalanced force relative to the load.
         iterations: steps taken.
     """
 
-    at_rest: bool
+    balanced: bool
+    free: bool
     residual: float
     iterations: int
 
+    @property
+    def at_rest(self) -> bool:
+        """In a stable equilibrium."""
+        return self.balanced and not self.free
 
-def stiffness(world: World) -> Array:
-    """Stiffness (d, d) [N/m], rotations as metres, by differences of MuJoCo's forces."""
+
+def stiffness(world: World, taut: NDArray[np.bool_]) -> Array:
+    """Stiffness (d, d) [N/m], rotations as metres, by differences of MuJoCo's forces.
+
+    Args:
+        world: in the state asked about.
+        taut: (m N,) tendons that pull; the others are left out.
+    """
     step = _DIFFERENCE * world.length
     data, n = world.data, world.n_dof
     start = data.qpos.copy()
     matrix = np.zeros((n, n))
-    world.update()
-    with world.frozen_slack(world.tensions() > 0.0):
+    with world.frozen_slack(taut):
         for dofs, rows, columns in world.coupling:
             change = np.zeros(n)
             change[dofs] = step / world.metre[dofs]
@@ -58,31 +70,47 @@ def stiffness(world: World) -> Array:
     return 0.5 * (matrix + matrix.T)
 
 
-def descend(world: World) -> Descent:
-    """Go downhill from the world's present state until MuJoCo's forces balance."""
+def descend(world: World, judge: bool = True) -> Descent:
+    """Go downhill from the world's present state until MuJoCo's forces balance.
+
+    Args:
+        world: left where it ends.
+        judge: look whether it is stable there, and go on if it is not.
+    """
     total = 0
     for nudge in range(1 + _NUDGES):
         size, iterations = _minimise(world, total)
         total += iterations
         fine = size <= max(_TOLERANCE, 10.0 * world.rounding())
-        if not fine:
-            return Descent(False, size, total)
-        softest = _unstable_direction(world)
-        if softest is None:
-            return Descent(True, size, total)
+        if not (fine and judge):
+            return Descent(fine, False, size, total)
+        value, softest, neutral = _softest(world)
+        if value >= -neutral:
+            return Descent(True, value <= neutral, size, total)
         if nudge < _NUDGES:
             world.move(_NUDGE * world.length * softest / world.metre)
-    return Descent(False, size, total)
+    return Descent(False, False, size, total)
 
 
-def _unstable_direction(world: World) -> Array | None:
-    matrix = stiffness(world)
+def _softest(world: World) -> tuple[float, Array, float]:
+    """Smallest eigenvalue of the stiffness [N/m], its vector (d,), and what counts as zero.
+
+    A cable whose tension is rounding hinders on one side at most: without it, the platform may
+    be free to move to the other. Where it would be unstable, such cables prop it up.
+    """
+    world.update()
+    tensions = world.tensions()
+    firm = tensions > 1e-9 * world.force_scale
     neutral = 10.0 * world.rounding() * world.force_scale / (_DIFFERENCE * world.length)
-    neutral += 1e-9 * float(np.max(np.abs(matrix)))
-    if _damped_step(world, matrix, np.zeros(len(matrix)), neutral) is not None:
-        return None
-    values, vectors = np.linalg.eigh(matrix)
-    return np.asarray(vectors[:, 0]) if values[0] < -neutral else None
+    for taut in (firm, tensions > 0.0):
+        matrix = stiffness(world, taut)
+        zero = neutral + 1e-9 * float(np.max(np.abs(matrix)))
+        if _damped_step(world, matrix, np.zeros(len(matrix)), -zero) is not None:
+            return np.inf, np.zeros(len(matrix)), zero
+        values, vectors = np.linalg.eigh(matrix)
+        if values[0] >= -zero or np.array_equal(firm, tensions > 0.0):
+            break
+    return float(values[0]), np.asarray(vectors[:, 0]), zero
 
 
 def _minimise(world: World, done: int) -> tuple[float, int]:
@@ -93,7 +121,8 @@ def _minimise(world: World, done: int) -> tuple[float, int]:
     for iteration in range(_MAX_ITERATIONS - done):
         if size <= goal:
             return size, iteration
-        matrix = stiffness(world)
+        world.update()
+        matrix = stiffness(world, world.tensions() > 0.0)
         while True:
             step = _damped_step(world, matrix, force, damping)
             better = None if step is None else _try(world, step, size)
@@ -110,7 +139,7 @@ def _minimise(world: World, done: int) -> tuple[float, int]:
 def _damped_step(world: World, matrix: Array, force: Array, damping: float) -> Array | None:
     """Solve (matrix + damping) step = force cable by cable; None if not positive definite."""
     d, own = world.places.n_platform, world.cable_dofs
-    k, h = own.shape
+    h = own.shape[1]
     try:
         blocks = matrix[own[:, :, None], own[:, None, :]] + damping * np.eye(h)
         np.linalg.cholesky(blocks)

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from crosscheck.relax import come_to_rest
 from crosscheck.settling import SettleStatus
-from crosscheck.truth.descent import descend
+from crosscheck.truth.descent import Descent, descend
 from crosscheck.truth.lengths import Way, paid_out, way_of
-from crosscheck.truth.robot import TrueRobot, true_robot
+from crosscheck.truth.robot import true_robot
 from crosscheck.truth.springs import Cable, Springs
 from crosscheck.truth.world import World
 from seecr.effects import Effect
@@ -32,6 +32,7 @@ _AGREED, _TANGENTS = 1e-10, 60
 _SHARE, _SHARES = 1e-10, 20
 
 Progress = Callable[[int], None]
+_NOWHERE = Descent(False, False, np.nan, 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +44,7 @@ class Truth:
         position: (n, 3) [m]; quat_wxyz: (n, 4); tension_readings: (n, m) [N], as read, no noise.
         rest_lengths: (n, m) [m] really paid out.
         at_rest: (n,) bool, a stable equilibrium was found.
+        free: (n,) bool, balanced, but free to move along some direction: a pose, no rest.
         residual: (n,) unbalanced force relative to the load.
     """
 
@@ -53,22 +55,24 @@ class Truth:
     tension_readings: Array
     rest_lengths: Array
     at_rest: NDArray[np.bool_]
+    free: NDArray[np.bool_]
     residual: Array
 
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """Rests of rows: pose (n, 7), tensions (n, m) [N], at rest (n,), residual (n,)."""
+    """Rests of rows: pose (n, 7), tensions (n, m) [N], how each ended (n,), residual (n,)."""
 
     pose: Array
     tensions: Array
     at_rest: NDArray[np.bool_]
+    free: NDArray[np.bool_]
     residual: Array
 
     @classmethod
     def empty(cls, n: int, m: int) -> _Rows:
-        nan = np.full(n, np.nan)
-        return cls(np.full((n, 7), np.nan), np.full((n, m), np.nan), nan > 0, nan)
+        no, nan = np.zeros(n, dtype=bool), np.full(n, np.nan)
+        return cls(np.full((n, 7), np.nan), np.full((n, m), np.nan), no, no.copy(), nan)
 
 
 def measure(
@@ -101,19 +105,21 @@ def measure(
     for sensor in true.sensors:
         reading = sensor(reading)
     return Truth(
-        rows.pose, rows.tensions, *reading, rest[way.is_row], rows.at_rest, rows.residual
+        rows.pose, rows.tensions, *reading, rest[way.is_row], rows.at_rest, rows.free,
+        rows.residual,
     )
 
 
 def _extrapolated(coarse: _Rows, fine: _Rows, ratio: float) -> _Rows:
     """Rows free of the leading error, which is ``ratio`` times as large in the coarse ones."""
     part = 1.0 / (ratio - 1.0)
-    at_rest = fine.at_rest & coarse.at_rest
-    pose = fine.pose.copy()
-    change = part * pose_difference(fine.pose[at_rest], coarse.pose[at_rest])
-    pose[at_rest] = pose_add(fine.pose[at_rest], change)
-    tensions = fine.tensions + part * (fine.tensions - coarse.tensions)
-    return _Rows(pose, np.maximum(tensions, 0.0), at_rest, fine.residual)
+    both = np.isfinite(fine.pose[:, 0]) & np.isfinite(coarse.pose[:, 0])
+    pose = np.full_like(fine.pose, np.nan)
+    change = part * pose_difference(fine.pose[both], coarse.pose[both])
+    pose[both] = pose_add(fine.pose[both], change)
+    tensions = np.maximum(fine.tensions + part * (fine.tensions - coarse.tensions), 0.0)
+    at_rest, free = fine.at_rest & coarse.at_rest, fine.free | coarse.free
+    return _Rows(pose, tensions, at_rest, free, fine.residual)
 
 
 def _each(world: World, way: Way, rest: Array, tell: Progress) -> _Rows:
@@ -124,7 +130,7 @@ def _each(world: World, way: Way, rest: Array, tell: Progress) -> _Rows:
     for k, pose in enumerate(poses):
         springs = Springs.plain(lengths[k], world.true)
         go = _start(world, bare, pose, springs)
-        _note(world, out, k, *_settle(world, springs, go))
+        _note(world, out, k, _settle(world, springs) if go else _NOWHERE)
         tell(1)
     return out
 
@@ -150,21 +156,20 @@ def _start(world: World, bare: World, pose: Array, springs: Springs) -> bool:
     return True
 
 
-def _settle(world: World, springs: Springs, go: bool) -> tuple[bool, float]:
+def _settle(world: World, springs: Springs, judge: bool = True) -> Descent:
     """Polish, or go downhill; with chains over sheaves until their free parts are right."""
-    if not go:
-        return False, np.nan
+    found = _NOWHERE
     for _ in range(_SHARES):
         world.set_springs(springs)
-        found = descend(world)
-        if world.segments == 1 or not world.true.pulley_radius or not found.at_rest:
+        found = descend(world, judge)
+        if world.segments == 1 or not world.true.pulley_radius or not found.balanced:
             break
         share = world.measure_free_share()
         change = float(np.max(np.abs(share - world.free_share)))
         world.free_share = share
         if change < _SHARE:
             break
-    return found.at_rest, found.residual
+    return found if world.wraps else _NOWHERE
 
 
 def _moves_to_rest(world: World) -> bool:
@@ -173,9 +178,9 @@ def _moves_to_rest(world: World) -> bool:
     return come_to_rest(world, tolerance, _MAX_STEPS).status is SettleStatus.SETTLED
 
 
-def _note(world: World, out: _Rows, k: int, at_rest: bool, residual: float) -> None:
-    out.at_rest[k], out.residual[k] = at_rest, residual
-    if at_rest:
+def _note(world: World, out: _Rows, k: int, found: Descent) -> None:
+    out.at_rest[k], out.free[k], out.residual[k] = found.at_rest, found.free, found.residual
+    if found.balanced:
         out.tensions[k] = world.cable_tensions()
         out.pose[k] = world.pose()
 
@@ -186,45 +191,51 @@ def _walk(world: World, way: Way, rest: Array, tell: Progress) -> _Rows:
     out = _Rows.empty(int(way.is_row.sum()), world.n_cables)
     cables = [Cable(true, float(ea)) for ea in true.ea]
     bare = _without_weight(world)
-    fine = True
+    found = _NOWHERE
     for k, pose in enumerate(way.pose):
         for cable, length in zip(cables, rest[k], strict=True):
             cable.pays_out(float(length), float(way.elapsed[k]), bool(way.fresh[k]))
+        go = found.balanced
         if way.fresh[k]:
-            fine = _start(world, bare, pose, Springs.plain(rest[k], true))
-        fine, residual = _agree(world, cables) if fine else (False, np.nan)
+            go = _start(world, bare, pose, Springs.plain(rest[k], true))
+        found = _agree(world, cables) if go else _NOWHERE
         if way.is_row[k]:
-            _note(world, out, int(way.row[k]), fine, residual)
+            _note(world, out, int(way.row[k]), found)
             tell(1)
     return out
 
 
-def _agree(world: World, cables: list[Cable]) -> tuple[bool, float]:
+def _agree(world: World, cables: list[Cable]) -> Descent:
     """Tangents of the cables' laws and MuJoCo's settling in turns until both hold."""
     world.update()
-    before = None
+    springs, before = None, None
     for turn in range(_TANGENTS):
-        lengths = world.cable_lengths()
-        tangents = [c.tangent(float(at)) for c, at in zip(cables, lengths, strict=True)]
-        rest, stiffness = np.array(tangents).T
-        if turn > _TANGENTS // 3:
+        tangent = _tangents(world, cables)
+        if springs is not None and turn > _TANGENTS // 3:
             # a kink at which tangents flip: meet halfway
-            rest = 0.5 * (rest + springs.rest)
-            stiffness = 0.5 * (stiffness + springs.stiffness)
-        springs = Springs(rest, stiffness, np.zeros((len(rest), 2)))
-        at_rest, residual = _settle(world, springs, True)
-        if not at_rest:
-            return False, residual
+            tangent = tangent.halfway(springs)
+        springs = tangent
+        if not _settle(world, springs, judge=False).balanced:
+            return _NOWHERE
         tensions = world.cable_tensions()
         if before is not None and np.max(np.abs(tensions - before)) < _AGREED * world.force_scale:
             break
         before = tensions
     else:
-        return False, residual
-    for cable, at, tension in zip(cables, world.cable_lengths(), tensions, strict=True):
-        cable.tangent(float(at))
+        return _NOWHERE
+    found = descend(world)
+    _tangents(world, cables)
+    for cable, tension in zip(cables, world.cable_tensions(), strict=True):
         cable.rests(bool(tension == 0.0))
-    return True, residual
+    return found
+
+
+def _tangents(world: World, cables: list[Cable]) -> Springs:
+    """Springs that touch the cables' laws at their present lengths."""
+    lengths = world.cable_lengths()
+    pairs = [cable.tangent(float(at)) for cable, at in zip(cables, lengths, strict=True)]
+    rest, stiffness = np.array(pairs).T
+    return Springs(rest, stiffness, np.zeros((len(rest), 2)))
 
 
 __all__ = ["SEGMENTS", "Truth", "measure"]

@@ -38,6 +38,13 @@ class Springs:
         return cls(lengths.copy(), k, poly)
 
 
+    def halfway(self, other: Springs) -> Springs:
+        """Springs between these and others."""
+        rest = 0.5 * (self.rest + other.rest)
+        stiffness = 0.5 * (self.stiffness + other.stiffness)
+        return Springs(rest, stiffness, 0.5 * (self.poly + other.poly))
+
+
 @dataclass(eq=False)
 class Cable:
     """One cable with a memory.

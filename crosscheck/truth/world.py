@@ -230,6 +230,15 @@ class World(Physics):
             points.append(self.data.wrap_xpos.reshape(-1, 3)[last - 1])
         return np.array(points)
 
+    @property
+    def wraps(self) -> bool:
+        """Whether every cable lies on its sheave, as of the last update."""
+        if not self.true.pulley_radius:
+            return True
+        tops = self.places.tendons[:, 0]
+        # site, two points on the sheave, site
+        return bool(np.all(self.data.ten_wrapnum[tops] == 4))
+
     def cable_lengths(self) -> Array:
         """Lengths (m,) [m] from the exit points on, as of the last update."""
         return np.asarray(

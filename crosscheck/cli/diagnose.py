@@ -1,0 +1,63 @@
+"""``crosscheck diagnose``: which effects are missing."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from crosscheck.cli.options import FILE, json_option, out_option, progress_share
+
+if TYPE_CHECKING:
+    from seecr.sensitivity import Term
+
+
+@click.command(
+    epilog="Example: crosscheck diagnose robot.xml measured.csv --out diagnosis",
+)
+@click.argument("robot", type=FILE, metavar="ROBOT.xml")
+@click.argument("data", type=FILE, metavar="DATA.csv")
+@click.option("--model", type=FILE, metavar="M.toml", help="Effects the model has already.")
+@click.option("--no-recording", is_flag=True, help="Write no .rrd.")
+@out_option("crosscheck-diagnosis")
+@json_option
+def command(
+    robot: Path, data: Path, model: Path | None, no_recording: bool, out: Path, as_json: bool
+) -> int:
+    """Find which effects a model misses, in the order in which adding them pays.
+
+    ROBOT.xml is the robot's MJCF, DATA.csv its measurements, with sigma in a TOML beside it.
+    Writes diagnosis.json, diagnosis.html and diagnosis.rrd.
+    """
+    from crosscheck.diagnose import diagnose
+    from crosscheck.measurements import load_measurements
+    from crosscheck.output import staged
+    from crosscheck.report import write_report
+    from seecr.mjcf import load_robot
+
+    machine = load_robot(robot)
+    measured = load_measurements(data, machine)
+    terms: tuple[Term, ...] = ()
+    if model is not None:
+        from crosscheck.model import load_model
+
+        terms = load_model(model, machine).terms
+    with staged(out) as folder:
+        with progress_share("diagnosing") as progress:
+            found = diagnose(machine, measured, terms, progress)
+        text = json.dumps(found.as_json(), indent=1)
+        (folder / "diagnosis.json").write_text(text + "\n", encoding="utf-8")
+        write_report(found, folder / "diagnosis.html")
+        if not no_recording and found.search is not None:
+            from crosscheck.recording import write_diagnosis_recording
+
+            write_diagnosis_recording(found, folder / "diagnosis.rrd")
+    if as_json:
+        click.echo(text)
+    else:
+        from crosscheck.diagnosis_text import print_diagnosis
+
+        print_diagnosis(found, out)
+    return 3 if found.unsolved else 0

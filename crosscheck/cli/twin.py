@@ -1,0 +1,148 @@
+"""``crosscheck twin``: measurements with something hidden in them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from crosscheck.cli.options import FILE, json_option, out_option, progress_bar
+
+if TYPE_CHECKING:
+    from crosscheck.twin import Twin
+
+
+@click.command(
+    short_help="Make measurements with a hidden effect.",
+    epilog="""\b
+Examples:
+  crosscheck twin my_robot.xml --hide 7 --out case7
+  crosscheck diagnose case7/robot.xml case7/measured.csv
+  crosscheck twin --open case7
+""",
+)
+@click.argument("robot", type=FILE, metavar="ROBOT.xml", required=False)
+@click.option(
+    "--hide",
+    "seed",
+    type=click.IntRange(min=0),
+    metavar="SEED",
+    help="Draws what is hidden, how large it is, and the noise. The same seed, the same case.",
+)
+@click.option(
+    "--effects",
+    "count",
+    type=click.IntRange(min=0),
+    metavar="K",
+    help="How many effects to hide.  [default: none, one or two, as the seed has it]",
+)
+@click.option(
+    "--effect",
+    "names",
+    multiple=True,
+    metavar="NAME",
+    help="Hide this effect, only its size being drawn; may be repeated.",
+)
+@click.option("--tensions", is_flag=True, help="Record tensions too.")
+@click.option(
+    "--open",
+    "opened",
+    type=FILE,
+    metavar="FILE",
+    help="Show what a case hides: its answer.sealed, or its folder.",
+)
+@out_option("twin")
+@json_option
+def command(
+    robot: Path | None,
+    seed: int | None,
+    count: int | None,
+    names: tuple[str, ...],
+    tensions: bool,
+    opened: Path | None,
+    out: Path,
+    as_json: bool,
+) -> int:
+    """Measure a robot with MuJoCo as the truth, with effects that are not disclosed.
+
+    The platform is commanded along sweeps to and fro, at two heights and across, and around a
+    tilted loop, 144 rows in all, scaled to the robot. MuJoCo brings it to rest at each; a tracker
+    with noise reads its pose.
+
+    \b
+    Writes into --out:
+      robot.xml        the robot as described, without what is hidden
+      measured.csv     commands and readings
+      measured.toml    the noise of the readings
+      answer.sealed    what was hidden; no other command opens it
+    """
+    if opened is not None:
+        return _open(opened, as_json)
+    if robot is None or seed is None:
+        raise click.UsageError("expected ROBOT.xml and --hide SEED, or --open FILE")
+    if names and count is not None:
+        raise click.UsageError("--effect says how many there are: leave out --effects")
+    from crosscheck.twin import make_twin
+
+    # whatever is hidden, the bar shows the same: rows of one kind, done or not
+    with progress_bar("measuring", 1) as advance:
+        twin = make_twin(
+            robot,
+            seed,
+            effects=names or None,
+            n_effects=count,
+            out=out,
+            tensions=tensions,
+            progress=lambda rows, now: advance(0, "measuring"),
+        )
+        advance(1, "measured")
+    _tell(twin, seed, out, as_json)
+    return 0
+
+
+def _tell(twin: Twin, seed: int, out: Path, as_json: bool) -> None:
+    result = _summary(twin, seed, out)
+    if as_json:
+        click.echo(json.dumps(result, indent=2))
+        return
+    sigma = result["sigma"]
+    click.echo(
+        f"{result['rows']} rows of {result['robot']} in {result['runs']} runs; noise "
+        f"{1e3 * sigma['position_m']:.3g} mm, {57.29577951 * sigma['orientation_rad']:.2g} deg"
+    )
+    click.echo(f"written to {out}: {', '.join(result['files'])}")
+    click.echo(f"next: crosscheck diagnose {out / 'robot.xml'} {out / 'measured.csv'}")
+    click.echo(f"what was hidden: crosscheck twin --open {out}")
+
+
+def _summary(twin: Twin, seed: int, out: Path) -> dict[str, Any]:
+    from crosscheck.sealed import NAME
+
+    return {
+        "robot": twin.robot.name,
+        "seed": seed,
+        "rows": twin.measured.n_rows,
+        "runs": len(twin.measured.runs),
+        "sigma": twin.answer["sigma"],
+        "folder": str(out),
+        "files": ["robot.xml", "measured.csv", "measured.toml", NAME],
+    }
+
+
+def _open(path: Path, as_json: bool) -> int:
+    from crosscheck.sealed import unseal
+
+    answer = unseal(path)
+    if as_json:
+        click.echo(json.dumps(answer, indent=2))
+        return 0
+    if answer["hidden"] == ["null"]:
+        click.echo("nothing was hidden")
+    for name in answer["values"]:
+        moves = answer["moves_over_noise"][name]
+        click.echo(f"{name}: moves readings by up to {moves['max']:.3g} times their noise")
+        for parameter, value in answer["values"][name].items():
+            click.echo(f"  {parameter} = {value:.6g}")
+    return 0

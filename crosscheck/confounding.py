@@ -1,0 +1,118 @@
+"""What these data cannot tell apart, from the subspaces that effects span, and from refits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from crosscheck.candidates import Candidate, ordered, own_columns, try_candidate
+from crosscheck.evidence import evidence, projected
+from crosscheck.fit import Fit, fit, sizes
+from crosscheck.problem import Problem
+from crosscheck.search import EQUAL, Search
+from seecr.effects import layout_of
+from seecr.effects.base import Effect
+from seecr.pose import Array
+
+# An effect that can imitate less than this part of another's signal is not refitted for it.
+_LIKELY = 0.9
+# A rival that leaves this much more chi2 has been told apart, whatever its evidence.
+_TOLD_APART = 9.0
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """An effect that explains the data as well as the one listed.
+
+    Attributes:
+        name: of the rival. fit: the model with it instead. loss: evidence lost with it.
+    """
+
+    name: str
+    fit: Fit
+    loss: float
+
+
+def rivals_of(found: Search, name: str) -> list[Rival]:
+    """Effects that could stand in for ``name`` in the final model, the best first."""
+    problem, factor, scale = found.problem, found.factor, found.noise_scale
+    final = found.last
+    rest = ordered([t for t in final.fit.terms if t.name != name])
+    without = fit(problem, rest, factor, final.fit.state) if rest else found.steps[0].fit
+    if not without.valid:
+        return []
+    out = []
+    for candidate in _likely(found, name, without):
+        trial = candidate
+        if trial.fit is None or len(found.found) > 1:
+            trial = try_candidate(problem, without, candidate.layout, factor, scale)
+        if trial.fit is None or not trial.fit.valid:
+            continue
+        best = fit(problem, trial.fit.terms, factor, trial.fit.state)
+        if not best.valid:
+            continue
+        loss = final.evidence.log - evidence(best, scale).log
+        worse = (best.chi2 - final.fit.chi2) / scale**2
+        if loss < EQUAL and worse < _TOLD_APART:
+            out.append(Rival(candidate.name, best, loss))
+    return sorted(out, key=lambda r: r.loss)
+
+
+def _likely(found: Search, name: str, without: Fit) -> list[Candidate]:
+    """Candidates whose derivatives can imitate what the effect does in the final model."""
+    final = found.last
+    have = {t.name for t in final.fit.terms}
+    own = own_columns(final.fit.terms, name)
+    signal = final.fit.jacobian[:, own] @ sizes(final.fit.terms)[own]
+    signal = projected(signal[:, None], final.fit.jacobian[:, ~own])[:, 0]
+    # candidates as they were tried where the effect was chosen
+    pool: list[Candidate] = []
+    for step in found.steps:
+        if name in [c.name for c in step.candidates]:
+            pool = step.candidates
+            break
+    out = []
+    single = len(found.found) == 1
+    for c in pool:
+        if c.name in have or c.name == name or c.fit is None:
+            continue
+        if single:
+            # tried beside the same model already: its own fit says more than a derivative
+            if (c.fit.chi2 - final.fit.chi2) / found.noise_scale**2 < 4.0 * _TOLD_APART:
+                out.append(c)
+            continue
+        columns = c.fit.jacobian[:, own_columns(c.fit.terms, c.name)]
+        columns = projected(columns, without.jacobian)
+        if contained(signal, columns) > _LIKELY:
+            out.append(c)
+    return out
+
+
+def contained(signal: Array, columns: Array) -> float:
+    """Part of a signal's power that columns can imitate."""
+    power = float(signal @ signal)
+    if power == 0.0 or columns.shape[1] == 0:
+        return 0.0
+    u, s, _vt = np.linalg.svd(columns, full_matrices=False)
+    u = u[:, s > 1e-9 * max(float(s[0]), 1e-300)]
+    imitated = u.T @ signal
+    return float(imitated @ imitated) / power
+
+
+def containment(a: Array, b: Array) -> float:
+    """Part of what effect a does, over its plausible sizes, that b can imitate: 1 - lam_g|h/lam_g.
+
+    Args:
+        a, b: (N, p) whitened derivatives by plausible sizes.
+    """
+    power = float(np.sum(a**2))
+    if power == 0.0:
+        return 0.0
+    left = projected(a, b)
+    return 1.0 - float(np.sum(left**2)) / power
+
+
+def title_of(problem: Problem, effect: type[Effect]) -> str:
+    """What an effect is, in words."""
+    return layout_of(effect, problem.robot).effect.title

@@ -1,0 +1,409 @@
+"""Which effects are missing: prepare the data, search, and say no more than they warrant."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from crosscheck.candidates import null_fit
+from crosscheck.confounding import Rival, rivals_of
+from crosscheck.diagnosis import Diagnosis, Finding, Rms
+from crosscheck.fit import Fit, flat
+from crosscheck.held_out import blocks_of
+from crosscheck.measurements import Measurements
+from crosscheck.noise import Whiteness, estimate_sigma, rms_by_kind, whiteness
+from crosscheck.problem import Problem, State
+from crosscheck.search import MOST_EFFECTS, Progress, Search, Step, search
+from crosscheck.separation import measured_directly, proposals
+from seecr.effects.base import Layout
+from seecr.pose import Array
+from seecr.robot import Robot
+from seecr.sensitivity import Term
+
+# More rows than this part without an answer, and the data are not fit for a verdict.
+_LOST = 0.05
+# Rows that stick out by this many robust deviations, alone, are outliers.
+_OUTLIER = 8.0
+_MOST_OUTLIERS = 0.05
+# Where structure is left over, an effect is sure only if it has few parameters and took away
+# most of what was unexplained.
+_SURE_PARAMETERS, _SURE_SHARE = 3, 0.5
+# Noise up to this many times the stated one is noise that was stated too small.
+_UNDERSTATED = 3.0
+
+
+def diagnose(
+    robot: Robot,
+    data: Measurements,
+    terms: Sequence[Term] = (),
+    progress: Progress = lambda _text, _part: None,
+) -> Diagnosis:
+    """Find the effects that a model misses.
+
+    Args:
+        robot: as described.
+        data: its measurements.
+        terms: effects the model has already.
+        progress: called with what is being done and the part of it that is done.
+    """
+    problem, notes, why = prepare(robot, data, terms)
+    factor = problem.noise(problem.experiment.predict(_effects(terms)))
+    base = null_fit(problem, terms, factor, refit=False)
+    if why or not base.valid:
+        return no_verdict(problem, base, notes, why or base.why)
+    if terms:
+        # the values of a model come from other fits: they may settle on these data first
+        settled = null_fit(problem, terms, factor, refit=True)
+        if settled.valid and settled.chi2 < base.chi2 - 30.0:
+            notes.append("the model's values were refitted to these data before the search")
+            base = settled
+        else:
+            base = _with_derivatives(problem, base, factor)
+    found = search(problem, base, factor, 1.0, progress)
+    found, more = _without_outliers(problem, found, base, factor, progress)
+    notes += more
+    found, more = _with_larger_noise(found, progress)
+    notes += more
+    return conclude(found, notes)
+
+
+def prepare(
+    robot: Robot, data: Measurements, terms: Sequence[Term]
+) -> tuple[Problem, list[str], str]:
+    """The problem without rows that have no answer; notes; why there can be no verdict."""
+    problem = Problem(robot, data, data.sigma, np.ones(data.n_rows, dtype=bool))
+    notes = list(data.notes)
+    if not problem.measured.any():
+        return problem, notes, "the data hold no readings"
+    plain = problem.experiment.predict(_effects(terms))
+    n = data.n_rows
+    for rows, words in (
+        (plain.singular, "the platform is free to move there"),
+        (~plain.solved & ~plain.singular, "no equilibrium was found there"),
+    ):
+        if rows.any():
+            lines = ", ".join(str(k) for k in data.line[rows][:8])
+            more = f" and {int(rows.sum()) - 8} more" if rows.sum() > 8 else ""
+            problem = problem.without(rows, f"lines {lines}{more} left out: {words}")
+    notes += problem.left_out
+    lost = n - int(problem.use.sum())
+    why = ""
+    if lost > max(_LOST * n, 1) and lost > 1:
+        why = f"{lost} of {n} rows have no equilibrium to compare with; see the notes"
+    raw = problem.residuals(plain.readings)
+    problem, more_notes = estimate_sigma(problem, raw)
+    notes += more_notes
+    if not why and problem.n_readings < 6:
+        why = f"only {problem.n_readings} readings are left"
+    if not why and _constant_commands(problem):
+        why = "all commands are the same: nothing tells effects apart"
+    _blocks, note = blocks_of(problem)
+    return problem, [*notes, note] if note else notes, why
+
+
+def _constant_commands(problem: Problem) -> bool:
+    commands = problem.experiment.commands
+    table = commands.pose if commands.lengths is None else commands.lengths
+    return len(table) > 1 and bool(np.all(np.ptp(table[problem.use], axis=0) == 0))
+
+
+def _effects(terms: Sequence[Term]) -> list[Any]:
+    return [t.effect() for t in terms]
+
+
+def _with_derivatives(problem: Problem, base: Fit, factor: Array) -> Fit:
+    from dataclasses import replace
+
+    from crosscheck.problem import derivatives
+
+    jacobian = derivatives(problem, base.state, factor) * flat(base.terms, "scale")
+    return replace(base, jacobian=jacobian)
+
+
+def no_verdict(problem: Problem, base: Fit, notes: list[str], why: str) -> Diagnosis:
+    """Nothing can be said, and why."""
+    empty: Rms = rms_by_kind(problem, base.state.raw)
+    nothing: Rms = dict.fromkeys(empty)
+    return Diagnosis(
+        "no_verdict", f"No verdict: {why}.", (), empty, nothing, nothing, noise_floor(problem),
+        (), (), tuple(notes), unsolved="equilibrium" in why or "solved" in why,
+    )  # fmt: skip
+
+
+def noise_floor(problem: Problem) -> Rms:
+    """The rms errors that readings of the stated noise would give a perfect model."""
+    n, width = problem.measured.shape
+    sigma = problem.sigma
+    raw = np.full((n, width), np.nan)
+    raw[:, 0:3] = sigma.position_m or 0.0
+    raw[:, 3:6] = sigma.orientation_rad or 0.0
+    raw[:, 6:] = sigma.tension_N or 0.0
+    return rms_by_kind(problem, raw)
+
+
+def _without_outliers(
+    problem: Problem, found: Search, base: Fit, factor: Array, progress: Progress
+) -> tuple[Search, list[str]]:
+    """Search again without rows that stick out alone, if there are a few; name them."""
+    rows = outlying_rows(problem, found.last.fit.state)
+    if not rows.any():
+        return found, []
+    lines = ", ".join(str(k) for k in problem.data.line[rows])
+    word = "line" if rows.sum() == 1 else "lines"
+    cleaned = problem.without(rows, f"{word} {lines} left out: outliers, far from all the others")
+    again = null_fit(cleaned, base.terms, factor, refit=False)
+    if base.terms:
+        again = _with_derivatives(cleaned, again, factor)
+    better = search(cleaned, again, factor, found.noise_scale, progress)
+    note = f"{word} {lines} left out: outliers, far from all the others"
+    if better.found != found.found:
+        with_all = ", ".join(found.found) or "nothing"
+        note += f" (with them the search finds {with_all})"
+    return better, [note]
+
+
+def outlying_rows(problem: Problem, state: State) -> np.ndarray:
+    """(n,) rows whose whitened residual is far beyond all others, in few places."""
+    power = np.zeros(problem.data.n_rows)
+    count = np.zeros(problem.data.n_rows)
+    np.add.at(power, problem.row_of, state.white**2)
+    np.add.at(count, problem.row_of, 1.0)
+    size = np.sqrt(power / np.maximum(count, 1.0))
+    used = problem.use & (count > 0)
+    middle = float(np.median(size[used]))
+    spread = 1.4826 * float(np.median(np.abs(size[used] - middle)))
+    limit = middle + _OUTLIER * max(spread, 0.2 * middle, 1e-12)
+    rows = used & (size > max(limit, 4.0))
+    if rows.sum() > max(_MOST_OUTLIERS * used.sum(), 1):
+        return np.zeros_like(rows)
+    # a neighbour that sticks out as well makes it structure, not an outlier
+    for k in np.flatnonzero(rows):
+        near = [j for j in (k - 1, k + 1) if 0 <= j < len(rows) and used[j]]
+        if any(size[j] > middle + 0.5 * (size[k] - middle) for j in near):
+            rows[k] = False
+    return np.asarray(rows)
+
+
+def _with_larger_noise(found: Search, progress: Progress) -> tuple[Search, list[str]]:
+    """Where what is left is white but too large, the noise was stated too small."""
+    last = found.last.whiteness
+    if last.is_noise or last.structured or last.scale > _UNDERSTATED or found.noise_scale != 1.0:
+        return found, []
+    scale = last.scale
+    again = search(found.problem, found.steps[0].fit, found.factor, scale, progress)
+    return again, [
+        f"what is left is white but {scale:.2f} times the stated noise: taken as the noise"
+    ]
+
+
+def conclude(found: Search, notes: list[str]) -> Diagnosis:
+    """The verdict of a search."""
+    problem, last = found.problem, found.last
+    names = found.found
+    clean = last.whiteness.is_noise
+    findings = [_finding(found, name) for name in names]
+    if not clean:
+        findings = [f for f in findings if _is_sure(found, f)]
+    if clean:
+        verdict = "effects_found" if findings else "no_effect_missing"
+    else:
+        verdict = "unknown_effect"
+    where = _where(found) if verdict == "unknown_effect" else ()
+    shown = found.last if clean else _step_of(found, findings)
+    return Diagnosis(
+        verdict=verdict,
+        sentence=_sentence(verdict, findings, found),
+        missing=tuple(findings),
+        before=rms_by_kind(problem, found.steps[0].fit.state.raw),
+        after=rms_by_kind(problem, shown.fit.state.raw),
+        held_out=shown.held_out.rms,
+        floor=noise_floor(problem),
+        candidates=tuple(_candidates(found, [f.effect for f in findings])),
+        measure_next=tuple(_measure_next(found, findings, verdict, where)),
+        notes=tuple(dict.fromkeys(notes)),
+        search=found,
+        whiteness=last.whiteness,
+        where=where,
+    )
+
+
+def _step_of(found: Search, findings: list[Finding]) -> Step:
+    """The last step that holds only effects that are sure."""
+    sure = {f.effect for f in findings} | set(found.base)
+    shown = found.steps[0]
+    for step in found.steps:
+        if {t.name for t in step.fit.terms} <= sure:
+            shown = step
+    return shown
+
+
+def _is_sure(found: Search, finding: Finding) -> bool:
+    few = len(finding.layout) <= _SURE_PARAMETERS
+    return few and finding.share > _SURE_SHARE and not bool(np.any(finding.at_bound))
+
+
+def _finding(found: Search, name: str) -> Finding:
+    problem, last = found.problem, found.last
+    best = last.fit
+    term = next(t for t in best.terms if t.name == name)
+    first = 0
+    for t in best.terms:
+        if t.name == name:
+            break
+        first += len(t.layout)
+    part = slice(first, first + len(term.layout))
+    stderr = best.stderr[part] * max(1.0, last.whiteness.scale)
+    index = next((k for k, s in enumerate(found.steps) if s.added == name), len(found.steps) - 1)
+    step, before = found.steps[index], found.steps[max(index - 1, 0)]
+    return Finding(
+        effect=name,
+        title=term.layout.effect.title,
+        layout=term.layout,
+        values=term.vector,
+        stderr=stderr,
+        at_bound=best.at_bound[part],
+        rivals=tuple(rivals_of(found, name)),
+        check=check_of(term),
+        rms=rms_by_kind(problem, step.fit.state.raw),
+        held_out_rms=step.held_out.rms,
+        share=_share(before, step),
+    )
+
+
+def _share(before: Step, step: Step) -> float:
+    """Part of the unexplained chi2 of runs left out that a step took away."""
+    unexplained = float(before.held_out.chi2.sum() - before.held_out.readings.sum())
+    fall = float(before.held_out.chi2.sum() - step.held_out.chi2.sum())
+    return float(np.clip(fall / unexplained, 0.0, 1.0)) if unexplained > 0 else 0.0
+
+
+def check_of(term: Term) -> str:
+    """The effect's independent check, with what to expect in mm and degrees."""
+    values = {}
+    for name, unit, value in zip(term.layout.names, term.layout.units, term.vector, strict=True):
+        short = name.removesuffix(f"_{unit}") if unit else name
+        factor = {"m": 1e3, "rad": 180.0 / np.pi, "m_per_N": 1e3}.get(unit, 1.0)
+        values[short] = factor * float(value)
+        if short == "weight":
+            values["weight_10m"] = 10.0 * float(value)
+    try:
+        return term.layout.effect.advice.format(**values)
+    except (KeyError, IndexError, ValueError):
+        return term.layout.effect.advice
+
+
+def _sentence(verdict: str, findings: list[Finding], found: Search) -> str:
+    tried = len([c for c in found.steps[0].candidates if c.fit is not None or c.drop])
+    runs = "runs it was not fitted to"
+    if verdict == "no_effect_missing":
+        return (
+            f"Model and data agree: what is left is noise, and none of {tried} effects tried "
+            "explains any of it."
+        )
+    if not findings:
+        return (
+            f"Structure remains that none of {tried} effects tried explains: an effect that is "
+            "not in the catalogue."
+        )
+    parts = []
+    for f in findings:
+        alike = f" (or {', '.join(r.name for r in f.rivals)}, alike on these data)"
+        parts.append(
+            f"adding {f.effect}{alike if f.rivals else ''} removes {100 * f.share:.0f} % of the "
+            f"unexplained error on {runs}"
+        )
+    end = (
+        "; what is left is noise"
+        if verdict == "effects_found"
+        else "; structure remains that no known effect explains"
+    )
+    text = "; then ".join(parts) + end
+    return text[0].upper() + text[1:] + f". {tried} effects were tried."
+
+
+def _candidates(found: Search, listed: list[str]) -> list[dict[str, Any]]:
+    """Every effect that was tried and is not listed, the nearest miss first."""
+    out = []
+    start = found.steps[0]
+    for c in start.candidates:
+        if c.name in listed:
+            continue
+        score = c.evidence.log - start.evidence.log if c.evidence is not None else 0.0
+        why = c.why_not
+        if not why:
+            better = ", ".join(found.found)
+            later = _later_reason(found, c.name)
+            why = later or (f"explained better by {better}" if better else "not needed")
+        out.append({"effect": c.name, "score": float(score), "why_not": why})
+    return sorted(out, key=lambda row: -row["score"])
+
+
+def _later_reason(found: Search, name: str) -> str:
+    if name in found.found:
+        return "explains a part, but structure remains: not sure"
+    for step in reversed(found.steps[1:]):
+        for c in step.candidates:
+            if c.name == name and c.why_not:
+                return f"beside {', '.join(t.name for t in step.fit.terms)}: {c.why_not}"
+    return ""
+
+
+def _where(found: Search) -> tuple[dict[str, Any], ...]:
+    try:
+        from crosscheck.associations import associations
+    except ImportError:
+        return ()
+    last = found.last.fit.state
+    return tuple(associations(found.problem, last.white, last.prediction)[:5])
+
+
+def _measure_next(
+    found: Search, findings: list[Finding], verdict: str, where: tuple[dict[str, Any], ...]
+) -> list[str]:
+    out = []
+    for finding in findings:
+        for rival in finding.rivals:
+            out += _to_separate(found, finding, rival)
+        if finding.effect and not finding.rivals:
+            out.append(f"to confirm {finding.effect}: {finding.check}")
+    if verdict == "unknown_effect":
+        out.append(_to_find(found, where))
+    if verdict == "no_effect_missing":
+        out.append("nothing is missing; to see smaller effects, see crosscheck plan")
+    return list(dict.fromkeys(out))
+
+
+def _to_separate(found: Search, finding: Finding, rival: Rival) -> list[str]:
+    robot = found.problem.robot
+    names = f"{finding.effect} and {rival.name}"
+    direct = list(
+        dict.fromkeys(measured_directly(n, robot) for n in (finding.effect, rival.name))
+    )
+    ways = [
+        f"{p.words} (signal that separates them: now {p.now:.2g}, then {p.then:.2g}, needs 15)"
+        for p in proposals(found.problem, found.last.fit, finding.effect, rival)
+        if p.separates
+    ]
+    if ways:
+        return [f"to tell {names} apart: {direct[-1]}, or {ways[0]}"] + [
+            f"to tell {names} apart: {way}" for way in ways[1:2]
+        ]
+    return [
+        f"to tell {names} apart: {' or '.join(direct)}; no further pose, payload or tension that "
+        "was tried here separates them"
+    ]
+
+
+def _to_find(found: Search, where: tuple[dict[str, Any], ...]) -> str:
+    if where:
+        first = where[0]
+        return (
+            f"the unexplained error goes with {first.get('against', first.get('name'))}: repeat "
+            "poses that differ in nothing else, forward and back, and look at it there"
+        )
+    return "repeat the same poses forward and back, and after an hour, to see what the error follows"
+
+
+__all__ = ["MOST_EFFECTS", "diagnose", "prepare"]

@@ -1,0 +1,139 @@
+"""Which robot a model was made for, written so that a person sees what differs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import tomlkit
+
+from crosscheck.errors import InputFileError
+
+if TYPE_CHECKING:
+    from seecr.robot import Robot
+
+# Points that moved by less than this part of the longest cable are where they were.
+_SAME = 1e-6
+_POINTS = ("exit_points_m", "anchor_points_m", "reference_pose")
+_NOTED = ("mass_kg", "ea_N", "rest_lengths_m", "centre_of_mass_m")
+# Digits kept: more than anybody measures, few enough to read.
+_DIGITS = 9
+
+
+def fingerprint(robot: Robot) -> tomlkit.items.Table:
+    """The table ``[robot]`` of a model."""
+    table = tomlkit.table()
+    table["name"] = robot.name
+    table["cables"] = list(robot.cable_names)
+    numbers = {
+        "exit_points_m": robot.exit_points,
+        "anchor_points_m": robot.anchor_points,
+        "reference_pose": robot.reference_pose,
+        "mass_kg": robot.mass,
+        "ea_N": robot.ea,
+        "rest_lengths_m": robot.rest_lengths,
+        "centre_of_mass_m": robot.centre_of_mass,
+    }
+    for key, value in numbers.items():
+        table[key] = _toml(np.round(np.asarray(value, float), _DIGITS).tolist())
+    return table
+
+
+def _toml(value: Any) -> Any:
+    """Points one a line, other numbers as they are."""
+    if not (isinstance(value, list) and isinstance(value[0], list)):
+        return value
+    rows = tomlkit.array()
+    rows.extend(value)
+    return rows.multiline(True)
+
+
+def check_robot(path: Path, table: Any, robot: Robot) -> tuple[str, ...]:
+    """Whether a model is this robot's.
+
+    Args:
+        path: the model's file.
+        table: its ``[robot]``; None where a person left it out, which is their business.
+        robot: the one it is to be used for.
+
+    Returns:
+        notes about mass, stiffness and the like that have changed since.
+
+    Raises:
+        InputFileError: another number of cables, or points elsewhere.
+    """
+    if table is None:
+        return (f"{path} does not say which robot it was made for",)
+    if not isinstance(table, Mapping):
+        raise InputFileError.at(path, f"robot: expected a table [robot], came {table!r}")
+    _check_cables(path, table, robot)
+    own = fingerprint(robot)
+    tolerance = _SAME * float(np.max(robot.nominal_lengths(robot.reference_pose[None])))
+    for key in _POINTS:
+        apart = _apart(path, table, key, own)
+        if np.any(apart > tolerance):
+            raise _elsewhere(path, table, key, apart, robot)
+    notes = []
+    for key in _NOTED:
+        apart = _apart(path, table, key, own)
+        size = float(np.max(np.abs(np.asarray(own[key], float)))) + tolerance
+        if np.any(apart > 1e-6 * size):
+            notes.append(
+                f"{path} was made when {key} of robot {robot.name} was {_short(table[key])}; now "
+                f"it is {_short(own[key])}: its effects may count twice (see crosscheck add --refit)"
+            )
+    return tuple(notes)
+
+
+def _check_cables(path: Path, table: Mapping[str, Any], robot: Robot) -> None:
+    cables = table.get("cables")
+    if not isinstance(cables, list):
+        return
+    if len(cables) != robot.n_cables:
+        raise InputFileError.at(
+            path,
+            f"made for another robot: {table.get('name', 'one')} with {len(cables)} cables; "
+            f"{robot.name} has {robot.n_cables}",
+        )
+
+
+def _apart(path: Path, table: Mapping[str, Any], key: str, own: Mapping[str, Any]) -> Any:
+    """How far each row of numbers is from the robot's, (k,); 0 where the file has none."""
+    here = np.atleast_1d(np.asarray(own[key], float))
+    if key not in table:
+        return np.zeros(len(here))
+    try:
+        there = np.atleast_1d(np.asarray(table[key], float))
+    except (TypeError, ValueError):
+        there = np.zeros(0)
+    if there.shape != here.shape or not np.all(np.isfinite(there)):
+        raise InputFileError.at(
+            path, f"[robot] {key}: expected numbers of shape {here.shape}; leave it out otherwise"
+        )
+    apart = np.abs(there - here)
+    return apart.max(axis=1) if apart.ndim == 2 else apart
+
+
+def _elsewhere(
+    path: Path, table: Mapping[str, Any], key: str, apart: Any, robot: Robot
+) -> InputFileError:
+    name = table.get("name", "one")
+    k = int(np.argmax(apart))
+    if key == "reference_pose":
+        what = f"its reference pose is {_short(table[key])}"
+    else:
+        word = key.removesuffix("s_m").replace("_", " ")
+        what = f"the {word} of {robot.cable_names[k]} is {1e3 * float(apart[k]):.3g} mm away"
+    return InputFileError.at(
+        path,
+        f"made for another robot: {name}, not {robot.name}: {what}; give the robot it was made "
+        "for, or make a new model",
+    )
+
+
+def _short(value: Any) -> str:
+    numbers = np.atleast_1d(np.asarray(value, float)).ravel()
+    text = " ".join(f"{v:.6g}" for v in numbers[:7])
+    return f"({text}{' ...' if len(numbers) > 7 else ''})" if len(numbers) > 1 else text
