@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from crosscheck.cable_space import cable_errors, cable_lengths
+from crosscheck.cable_space import cable_errors, cable_lengths, independent_part
 from crosscheck.noise import as_table
 from crosscheck.problem import Problem
 from crosscheck.travel import AXES, Travel, travel
@@ -119,7 +119,7 @@ def _in_cables(
     errors, noise = cable_errors(problem, raw, prediction)
     if not np.isfinite(errors).any() or not np.all(noise > 0):
         return []
-    n, m = errors.shape
+    n = len(errors)
     lengths = cable_lengths(problem, prediction)
     first = np.concatenate([[True], problem.data.run_index[1:] != problem.data.run_index[:-1]])
     home = problem.robot.nominal_lengths(problem.robot.reference_pose[None])
@@ -133,8 +133,7 @@ def _in_cables(
         _Quantity("the cable's tension", prediction.tensions.ravel(), "N"),
         _Quantity("whether the cable was paid out or reeled in", motion.ravel()),
     )
-    # m cables share the 6 numbers of a pose: the errors are not m independent ones
-    part = min(1.0, 6.0 / m)
+    part = independent_part(problem, prediction)
     table = (errors / noise).reshape(-1, 1)
     return [
         _row(q, "cable lengths", table, errors.reshape(-1, 1), ["cable length"], ["m"], part)

@@ -39,6 +39,27 @@ def cable_lengths(problem: Problem, prediction: Prediction) -> Array:
     return problem.robot.nominal_lengths(prediction.poses)
 
 
+def independent_part(problem: Problem, prediction: Prediction) -> float:
+    """Part of the m errors of cable length that is independent noise: they share one pose.
+
+    By m^2/tr(C^2) of their correlations C, which is m where they are independent and the number
+    of groups where they agree in groups.
+    """
+    unit, arm = _cables(problem, prediction)
+    sigma = problem.sigma
+    columns = np.concatenate(
+        [
+            (sigma.position_m or 0.0) * unit,
+            (sigma.orientation_rad or 0.0) * np.cross(arm, unit),
+        ],
+        axis=-1,
+    )
+    columns /= np.maximum(np.linalg.norm(columns, axis=-1, keepdims=True), 1e-300)
+    m = columns.shape[1]
+    together = np.einsum("nik,njk->nij", columns, columns)
+    return float(np.mean(m / np.sum(together**2, axis=(1, 2))))
+
+
 def _cables(problem: Problem, prediction: Prediction) -> tuple[Array, Array]:
     """Unit vectors to the exit points and arms R b_i, (n, m, 3)."""
     robot, pose = problem.robot, prediction.poses

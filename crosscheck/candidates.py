@@ -13,7 +13,7 @@ import numpy as np
 
 from crosscheck.evidence import Evidence, evidence, p_value, projected
 from crosscheck.fit import Fit, fit, flat
-from crosscheck.problem import Problem, State, derivatives, evaluate
+from crosscheck.problem import Problem, derivatives, evaluate
 from seecr.effects import catalogue, layout_of
 from seecr.effects.base import Effect, Layout
 from seecr.errors import InputError
@@ -233,7 +233,7 @@ def amplitude_columns(
     wanted = np.flatnonzero(own)
     amplitudes = wanted[~layout.shape]
     out = np.zeros((len(base.state.white), len(layout)))
-    state = State(terms, base.state.prediction, base.state.raw, base.state.white, base.chi2)
+    state = base.state.of(terms)
     if len(amplitudes):
         out[:, ~layout.shape] = derivatives(
             problem, state, factor, amplitudes.tolist(), frozen=True

@@ -132,14 +132,11 @@ def no_verdict(problem: Problem, base: Fit, notes: list[str], why: str) -> Diagn
     )  # fmt: skip
 
 
-def noise_floor(problem: Problem) -> Rms:
-    """The rms errors that readings of the stated noise would give a perfect model."""
-    n, width = problem.measured.shape
-    sigma = problem.sigma
-    raw = np.full((n, width), np.nan)
-    raw[:, 0:3] = sigma.position_m or 0.0
-    raw[:, 3:6] = sigma.orientation_rad or 0.0
-    raw[:, 6:] = sigma.tension_N or 0.0
+def noise_floor(problem: Problem, state: State | None = None) -> Rms:
+    """The rms errors that noise alone would give a perfect model, that of lengths included."""
+    raw = np.broadcast_to(problem.reading_sigma, problem.measured.shape).copy()
+    if state is not None:
+        raw = np.sqrt(np.einsum("nij,nij->ni", state.factor, state.factor))
     return rms_by_kind(problem, raw)
 
 
@@ -219,7 +216,7 @@ def conclude(found: Search, notes: list[str]) -> Diagnosis:
         before=rms_by_kind(problem, found.steps[0].fit.state.raw),
         after=rms_by_kind(problem, shown.fit.state.raw),
         held_out=shown.held_out.rms,
-        floor=noise_floor(problem),
+        floor=noise_floor(problem, last.fit.state),
         candidates=tuple(_candidates(found, [f.effect for f in findings])),
         measure_next=tuple(_measure_next(found, findings, verdict, where)),
         notes=tuple(dict.fromkeys(notes)),

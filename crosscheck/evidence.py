@@ -44,7 +44,7 @@ def evidence(fit: Fit, noise_scale: float = 1.0) -> Evidence:
     white = fit.state.white / noise_scale
     p = fit.jacobian.shape[1]
     if p == 0:
-        return Evidence(-0.5 * float(white @ white), fit.chi2, 0)
+        return Evidence(-0.5 * (float(white @ white) + fit.state.log_det), fit.chi2, 0)
     # a parameter stopped by its bound is not at the optimum the formula is about
     free = ~fit.at_bound
     x = fit.jacobian[:, free] / noise_scale
@@ -58,7 +58,7 @@ def evidence(fit: Fit, noise_scale: float = 1.0) -> Evidence:
         logs.append(
             -0.5 * (total - float(c2 @ gain)) - 0.5 * float(np.sum(np.log1p((lam * s) ** 2)))
         )
-    log = float(special.logsumexp(logs) - np.log(len(_LAMBDAS)))
+    log = float(special.logsumexp(logs) - np.log(len(_LAMBDAS))) - 0.5 * fit.state.log_det
     return Evidence(log, fit.chi2, int(np.sum(s > 1e-2)))
 
 

@@ -117,8 +117,7 @@ def fit(
             values.
         hopeless: stop after a few steps where chi2 is still above this.
     """
-    near = None if start is None else start.prediction
-    state = evaluate(problem, terms, factor, near)
+    state = evaluate(problem, terms, factor, start)
     p = len(flat(terms, "null"))
     free = np.ones(p, dtype=bool) if free is None else free
     if not state.valid:
@@ -161,7 +160,7 @@ def _invalid(state: State, p: int, why: str) -> Fit:
 
 def _objective(state: State) -> float:
     z = sizes(state.terms) / PRIOR_SIZES
-    return state.chi2 + float(z @ z)
+    return state.chi2 + state.log_det + float(z @ z)
 
 
 def _step(
@@ -194,14 +193,14 @@ def _step(
         step *= min(1.0, 5.0 / max(float(np.max(np.abs(step))), 1e-300))
         trial_values = np.clip(values + step * scale, lower, upper)
         trial = evaluate(
-            problem, with_values(state.terms, trial_values), factor, state.prediction
+            problem, with_values(state.terms, trial_values), factor, state
         )
         after = _objective(trial) if trial.valid else np.inf
         if after < before:
             gain = before - after
             return trial, max(0.2 * damping, 1e-9), gain
         expected = -(gradient @ step + 0.5 * step @ normal @ step)
-        if trial.valid and 2.0 * expected < _GAIN:
+        if trial.valid and 2.0 * expected < _GAIN:  # nothing left to gain
             return None, damping, 0.0
         damping = max(10.0 * damping, 1e-6)
     return None, damping, 0.0

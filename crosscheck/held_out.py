@@ -68,8 +68,7 @@ def hold_out(problem: Problem, best: Fit, factor: Array) -> HeldOut:
         valid = valid and fold.valid
         values[b] = flat(fold.terms, "vector")
         raw[rows] = fold.state.raw[rows]
-        left = problem.only(rows)
-        white = left.whiten(factor, np.where(np.isfinite(fold.state.raw), fold.state.raw, 0.0))
+        white = fold.state.table[rows[:, None] & problem.counted]
         solved = bool(np.all(fold.state.prediction.solved[rows]))
         valid = valid and solved
         chi2[b], readings[b] = float(white @ white), len(white)

@@ -10,7 +10,7 @@ import numpy as np
 from crosscheck.errors import CrosscheckError
 from crosscheck.truth.robot import TRUE_EFFECTS
 from seecr.effects import Effect, Layout, effect_named, layout_of
-from seecr.pose import Array
+from seecr.pose import Array, transform_points
 from seecr.robot import Robot
 
 # How often a seed hides none, one and two.
@@ -19,6 +19,8 @@ _SHARES = (0.2, 0.6, 0.2)
 _ONE, _SEVERAL = (1.0, 2.0), (0.5, 2.0)
 # A cable that loses stiffness as it stretches breaks in the end: these only stiffen.
 _UPWARDS = ("nonlinear_elasticity",)
+# Sheaves need anchor points this far aside of exit points, in cable lengths.
+_ASIDE = 0.15
 
 Generator = np.random.Generator
 
@@ -77,7 +79,7 @@ def choose(
         CrosscheckError: an effect that MuJoCo has no truth for, or more than there are.
     """
     if names is None:
-        names = _drawn(random, count, tensions)
+        names = _drawn(robot, random, count, tensions)
     for name in names:
         effect_named(name)  # says which are known, nearest first
         if name not in TRUE_EFFECTS:
@@ -87,13 +89,25 @@ def choose(
     return [_with_numbers(layout_of(effect_named(name), robot), robot, random) for name in names]
 
 
-def _drawn(random: Generator, count: int | None, tensions: bool) -> list[str]:
-    known = [name for name in TRUE_EFFECTS if tensions or name != "tension_scale"]
+def _drawn(robot: Robot, random: Generator, count: int | None, tensions: bool) -> list[str]:
+    without = set() if tensions else {"tension_scale"}
+    without |= set() if _room_for_sheaves(robot) else {"pulley_radius"}
+    known = [name for name in TRUE_EFFECTS if name not in without]
     if count is None:
         count = int(random.choice(len(_SHARES), p=_SHARES))
     if count > len(known):
         raise CrosscheckError(f"{count} effects: expected at most {len(known)}")
     return [known[i] for i in random.choice(len(known), size=count, replace=False)]
+
+
+def _room_for_sheaves(robot: Robot) -> bool:
+    """Whether all anchor points are well aside of their exit points, seen from above."""
+    size = float(np.linalg.norm(robot.gravity))
+    up = -robot.gravity / size if size > 0 else np.array([0.0, 0.0, 1.0])
+    anchors = transform_points(robot.reference_pose[None], robot.anchor_points)[0]
+    reach = anchors - robot.exit_points
+    across = np.linalg.norm(reach - np.outer(reach @ up, up), axis=1)
+    return bool(np.all(across > _ASIDE * np.linalg.norm(reach, axis=1)))
 
 
 def _with_numbers(layout: Layout, robot: Robot, random: Generator) -> Hidden:

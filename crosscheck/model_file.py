@@ -15,9 +15,11 @@ import numpy as np
 import tomlkit
 
 from crosscheck.errors import CrosscheckError
+from crosscheck.fingerprint import fingerprint
 from crosscheck.model import UNSEEN, Model
 from seecr.effects.base import Layout
 from seecr.pose import Array
+from seecr.robot import Robot
 from seecr.sensitivity import Term
 
 Rms = Mapping[str, float | None]
@@ -88,6 +90,7 @@ def with_fit(
             _fill(table, by_name[name])
             _describe(table, provenance, errors)
             document["effect"].append(table)  # type: ignore[union-attr]
+            table.trivia.indent = "\n"
             continue
         _fill(table, by_name[name])
         if name == added:
@@ -110,9 +113,13 @@ def _fill(table: Any, fitted: Fitted) -> None:
             for word, value in cell.items():
                 parameters[key][word] = value
         else:
-            inline = tomlkit.inline_table()
-            inline.update(cell)
-            parameters[key] = inline
+            parameters[key] = _inline(cell)
+
+
+def _inline(cell: Mapping[str, Any]) -> Any:
+    """A table on one line, with the spaces that people write."""
+    parts = [f"{word} = {tomlkit.item(value).as_string()}" for word, value in cell.items()]
+    return tomlkit.parse(f"x = {{ {', '.join(parts)} }}")["x"]
 
 
 def _cell(layout: Layout, i: int, fitted: Fitted) -> dict[str, Any]:
@@ -140,6 +147,14 @@ def _plain(values: Mapping[str, Any]) -> Any:
     table = tomlkit.table()
     table.update(values)
     return table
+
+
+def renewed(model: Model, robot: Robot) -> Model:
+    """The model with the robot's numbers as they are now: all values have just been fitted."""
+    document = copy.deepcopy(model.document)
+    if document.get("robot") is None or model.notes:
+        document["robot"] = fingerprint(robot)
+    return replace(model, document=document, notes=())
 
 
 def save_model(path: str | Path, model: Model) -> None:

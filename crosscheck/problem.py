@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from crosscheck.measurements import Measurements
 from crosscheck.sigma import Sigma
-from seecr.effects.base import Readings
+from seecr.effects.base import Effect, Readings
 from seecr.experiment import Experiment, Prediction
 from seecr.pose import (
     Array,
@@ -35,6 +35,8 @@ from seecr.robot import Robot
 from seecr.sensitivity import Term, effects_of, length_sensitivities, sensitivities
 from seecr.setup import Commands
 
+# Rounds of finding the likeliest errors of commanded lengths.
+_LENGTH_ROUNDS = 25
 # Columns of a residual row: position, orientation, then tensions.
 POSITION, ORIENTATION, TENSION = slice(0, 3), slice(3, 6), slice(6, None)
 KINDS = ("position", "orientation", "tension")
@@ -155,16 +157,21 @@ class Problem:
         )
         return change
 
-    def noise(self, at: Prediction) -> Array:
-        """Cholesky factors of each row's noise, (n, 6 + m, 6 + m); 1 where nothing was read."""
-        n, width = self.measured.shape
-        sigma = np.concatenate(
+    @property
+    def reading_sigma(self) -> Array:
+        """(6 + m,) noise of each reading."""
+        return np.concatenate(
             [
                 np.full(3, self.sigma.position_m or 1.0),
                 np.full(3, self.sigma.orientation_rad or 1.0),
-                np.full(width - 6, self.sigma.tension_N or 1.0),
+                np.full(self.data.n_cables, self.sigma.tension_N or 1.0),
             ]
         )
+
+    def noise(self, at: Prediction) -> Array:
+        """Cholesky factors of each row's noise, (n, 6 + m, 6 + m); 1 where nothing was read."""
+        n, width = self.measured.shape
+        sigma = self.reading_sigma
         covariance = np.zeros((n, width, width))
         if self.sigma.length_m:
             rate = self.as_read(length_sensitivities(at), at.readings)
@@ -204,34 +211,157 @@ class State:
 
     Attributes:
         terms: the effects with their values.
-        prediction: of all rows.
-        raw: (n, 6 + m) residuals in their units, NaN where nothing was read.
-        white: (N,) counted residuals in units of their noise.
-        chi2: their sum of squares; inf where a counted row was not solved.
+        prediction: of all rows; where commanded lengths are noisy, with their likeliest errors.
+        raw: (n, 6 + m) residuals of the commanded lengths in their units, NaN where not read.
+        table: (n, 6 + m) the same in units of their noise.
+        white: (N,) those that count.
+        factor: (n, 6 + m, 6 + m) Cholesky factors of the noise.
+        chi2: sum of squares of ``white``; inf where a counted row was not solved.
+        log_det: log determinant of the counted rows' noise, less that of the readings alone.
+        experiment: with the likeliest length errors.
     """
 
     terms: tuple[Term, ...]
     prediction: Prediction
     raw: Array
+    table: Array
     white: Array
+    factor: Array
     chi2: float
+    log_det: float
+    experiment: Experiment
 
     @property
     def valid(self) -> bool:
         """Whether every counted row was solved."""
         return bool(np.isfinite(self.chi2))
 
+    def of(self, terms: Sequence[Term]) -> State:
+        """The same state seen as that of other terms (some more, at null)."""
+        return replace(self, terms=tuple(terms))
+
 
 def evaluate(
-    problem: Problem, terms: Sequence[Term], factor: Array, near: Prediction | None = None
+    problem: Problem, terms: Sequence[Term], factor: Array, near: State | None = None
 ) -> State:
-    """Predict with the terms and compare; ``factor`` is :meth:`Problem.noise`."""
-    prediction = problem.experiment.predict(effects_of(terms), near)
-    raw = problem.residuals(prediction.readings)
-    white = problem.whiten(factor, np.where(np.isfinite(raw), raw, 0.0))
+    """Predict with the terms and compare.
+
+    Where commanded lengths are noisy, the errors they most likely had are found row by row
+    (Gauss-Newton on errors in variables), and the noise is propagated there: cables that go
+    slack at the commanded lengths may well have been taut at the true ones.
+
+    Args:
+        problem: readings and noise.
+        terms: effects with values.
+        factor: :meth:`Problem.noise`; used as it is where commanded lengths are exact.
+        near: a state to start from.
+    """
+    effects = effects_of(terms)
+    experiment = problem.experiment if near is None else near.experiment
+    start = None if near is None else near.prediction
+    if not problem.sigma.length_m:
+        prediction = experiment.predict(effects, start)
+        raw = problem.residuals(prediction.readings)
+        return _compared(problem, terms, prediction, raw, factor, experiment)
+    return _with_length_errors(problem, terms, experiment.length_errors, start)
+
+
+def _with_length_errors(
+    problem: Problem, terms: Sequence[Term], errors: Array | None, start: Prediction | None
+) -> State:
+    """The likeliest errors of the commanded lengths, row by row, and the noise about them."""
+    effects, spread = effects_of(terms), problem.sigma.length_m or 1.0
+    if errors is None:
+        errors = np.zeros((problem.data.n_rows, problem.data.n_cables))
+    here = _At(problem, effects, errors, spread, start)
+    share = np.ones(len(errors))  # of the full step, a row
+    for _ in range(_LENGTH_ROUNDS):
+        step = here.better_errors() - here.errors
+        size = np.max(np.abs(step), axis=1, initial=0.0)
+        moving = problem.use & (share * size > 1e-3 * spread)
+        if not moving.any():
+            break
+        trial = _At(
+            problem, effects, here.errors + (share * moving)[:, None] * step, spread,
+            here.prediction,
+        )  # fmt: skip
+        better = moving & (trial.cost <= here.cost)
+        share = np.where(better, np.minimum(2.0 * share, 1.0), np.where(moving, 0.3 * share, share))
+        if better.all() or (better == moving).all():
+            here = trial
+        elif better.any():
+            mixed = np.where(better[:, None], trial.errors, here.errors)
+            here = _At(problem, effects, mixed, spread, here.prediction)
+    return _compared(
+        problem, terms, here.prediction, here.linear_raw(), here.factor, here.experiment
+    )
+
+
+class _At:
+    """A prediction with given errors of the lengths, and what the readings say of them."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        effects: Sequence[Effect],
+        errors: Array,
+        spread: float,
+        start: Prediction | None,
+    ) -> None:
+        self.problem, self.errors, self.spread = problem, errors, spread
+        self.experiment = problem.experiment.with_length_errors(errors)
+        self.prediction = self.experiment.predict(effects, start)
+        self.raw = problem.residuals(self.prediction.readings)
+        filled = np.where(problem.measured & np.isfinite(self.raw), self.raw, 0.0)
+        cost = ((filled / problem.reading_sigma) ** 2).sum(axis=1)
+        cost = cost + ((errors / spread) ** 2).sum(axis=1)
+        self.cost = np.where(self.prediction.solved, cost, np.inf)
+
+    @cached_property
+    def rate(self) -> Array:
+        return self.problem.as_read(
+            length_sensitivities(self.prediction), self.prediction.readings
+        )
+
+    @cached_property
+    def factor(self) -> Array:
+        return self.problem.noise(self.prediction)
+
+    def linear_raw(self) -> Array:
+        """Residuals as they would be at the commanded lengths, to first order."""
+        return self.raw + np.einsum("nkm,nm->nk", self.rate, self.errors)
+
+    def better_errors(self) -> Array:
+        weighed = _precision_times(self.problem, self.factor, self.linear_raw())
+        return self.spread**2 * np.einsum("nkm,nk->nm", self.rate, weighed)
+
+
+def _precision_times(problem: Problem, factor: Array, raw: Array) -> Array:
+    """Sigma^-1 raw, (n, 6 + m), 0 where nothing was read."""
+    filled = np.where(problem.measured, raw, 0.0)[..., None]
+    half = np.linalg.solve(factor, filled)
+    return np.linalg.solve(np.swapaxes(factor, 1, 2), half)[..., 0]
+
+
+def _compared(
+    problem: Problem,
+    terms: Sequence[Term],
+    prediction: Prediction,
+    raw: Array,
+    factor: Array,
+    experiment: Experiment,
+) -> State:
+    filled = np.where(problem.measured & np.isfinite(raw), raw, 0.0)
+    table = np.linalg.solve(factor, filled[..., None])[..., 0]
+    white = table[problem.counted]
     valid = bool(np.all(prediction.solved[problem.use])) and bool(np.all(np.isfinite(white)))
     chi2 = float(white @ white) if valid else np.inf
-    return State(tuple(terms), prediction, raw, white, chi2)
+    diagonal = np.log(np.diagonal(factor, axis1=1, axis2=2)) - np.log(problem.reading_sigma)
+    log_det = 2.0 * float(diagonal[problem.counted].sum()) if problem.sigma.length_m else 0.0
+    return State(
+        tuple(terms), prediction, raw, np.where(problem.measured, table, np.nan), white, factor,
+        chi2, log_det, experiment,
+    )  # fmt: skip
 
 
 def derivatives(
@@ -242,5 +372,5 @@ def derivatives(
     frozen: bool = False,
 ) -> Array:
     """Whitened derivative of the prediction by the terms' parameters, (N, p)."""
-    rates = sensitivities(problem.experiment, state.terms, state.prediction, columns, frozen)
-    return problem.whiten(factor, problem.as_read(rates, state.prediction.readings))
+    rates = sensitivities(state.experiment, state.terms, state.prediction, columns, frozen)
+    return problem.whiten(state.factor, problem.as_read(rates, state.prediction.readings))

@@ -21,7 +21,7 @@ from crosscheck.problem import Problem, State, derivatives, evaluate
 from seecr.effects.base import Layout, layout_of
 from seecr.pose import Array, quat_from_rotvec, quat_multiply
 from seecr.robot import Robot
-from seecr.sensitivity import Term
+from seecr.sensitivity import Term, effects_of
 
 # Squared signal, in units of the noise, that tells two effects apart (diagnosis: about 15).
 NEEDED = 15.0
@@ -52,21 +52,15 @@ class Proposal:
 def proposals(problem: Problem, final: Fit, name: str, rival: Rival) -> list[Proposal]:
     """Measurements that would tell an effect from its rival, the most telling first."""
     layout = next(t.layout for t in rival.fit.terms if t.name == rival.name)
-    here = _split(problem, final, name, layout, problem.noise(final.state.prediction))
+    here = _split(problem, final, name, layout)
     now = _signal(*here)
     out = []
     for words, other in _options(problem, final):
-        try:
-            state = evaluate(other, final.terms, np.broadcast_to(
-                np.eye(other.measured.shape[1]), (other.data.n_rows, *[other.measured.shape[1]] * 2)
-            ))
-        except ValueError:
+        plain = other.experiment.predict(effects_of(final.terms))
+        state = evaluate(other, final.terms, other.noise(plain))
+        if not state.valid:
             continue
-        if not np.all(state.prediction.solved):
-            continue
-        there = _split(
-            other, replace_state(final, state), name, layout, other.noise(state.prediction)
-        )
+        there = _split(other, replace_state(final, state), name, layout)
         joined = tuple(np.concatenate([a, b]) for a, b in zip(here, there, strict=True))
         out.append(Proposal(words, now, _signal(*joined)))
     return sorted(out, key=lambda p: -p.then)
@@ -78,14 +72,14 @@ def replace_state(final: Fit, state: State) -> Fit:
 
 
 def _split(
-    problem: Problem, final: Fit, name: str, rival: Layout, factor: Array
+    problem: Problem, final: Fit, name: str, rival: Layout
 ) -> tuple[Array, Array]:
     """Signal of the effect (N,) and columns of all that could imitate it (N, q)."""
     term = Term(rival, rival.start(_first_shape(rival, final)))
     terms = ordered([t for t in final.terms if t.name != rival.name] + [term])
-    state = State(terms, final.state.prediction, final.state.raw, final.state.white, 0.0)
+    state = final.state.of(terms)
     scale = flat(terms, "scale")
-    columns = derivatives(problem, state, factor, frozen=True) * scale
+    columns = derivatives(problem, state, state.factor, frozen=True) * scale
     own = own_columns(terms, name)
     values = sizes([t for t in final.terms if t.name == name])
     return columns[:, own] @ values, columns[:, ~own]

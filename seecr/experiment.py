@@ -75,10 +75,13 @@ class Experiment:
     Attributes:
         robot: as described.
         commands: n rows.
+        length_errors: (n, m) [m] by which each row's rest lengths differ from what was commanded:
+            noise of the winches, not an effect.
     """
 
     robot: Robot
     commands: Commands
+    length_errors: Array | None = None
     _path: list[Path] = field(default_factory=list, repr=False)
 
     @property
@@ -88,9 +91,16 @@ class Experiment:
             self._path.append(path_of(self.robot, self.commands))
         return self._path[0]
 
+    def with_length_errors(self, errors: Array | None) -> Experiment:
+        """The same experiment with other errors of the paid-out lengths."""
+        return Experiment(self.robot, self.commands, errors, self._path)
+
     def setup(self, effects: Sequence[Effect], commands: Commands | None = None) -> Setup:
         """The setup as the effects leave it."""
         setup = plain_setup(self.robot, self.commands if commands is None else commands)
+        if self.length_errors is not None:
+            rows = slice(None) if commands is None else self.path.source
+            setup.extra_length += self.length_errors[rows]
         for effect in effects:
             edit_setup(effect, setup)
         return setup

@@ -128,8 +128,10 @@ def _minimise(world: World, done: int) -> tuple[float, int]:
             better = None if step is None else _try(world, step, size)
             if better is not None:
                 break
-            damping = max(10.0 * damping, 1e-8 * float(np.max(np.abs(np.diag(matrix)))))
-            if not np.isfinite(damping) or damping > 1e6 * float(np.max(np.abs(matrix))):
+            # with all cables slack there is no stiffness to compare with, only the load
+            stiff = float(np.max(np.abs(matrix))) + world.force_scale / world.length
+            damping = max(10.0 * damping, 1e-8 * stiff)
+            if not damping < 1e6 * stiff:
                 return size, iteration
         force, size = better, float(np.linalg.norm(better)) / world.force_scale
         damping = 0.1 * damping if damping > 1e-12 * float(np.max(matrix)) else 0.0

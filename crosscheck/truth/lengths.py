@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from crosscheck.errors import CrosscheckError
 from crosscheck.truth.robot import TrueRobot
 from crosscheck.truth.world import World
 from seecr.pose import Array, pose_add, pose_difference, transform_points
@@ -120,5 +121,10 @@ def _zero(true: TrueRobot) -> Array:
         # misplaced by hand, off its joints too: put there as a free body
         world = World(replace(bare, robot=replace(robot, joints=())))
     world.place(true.zero_pose)
+    if not world.wraps:
+        raise CrosscheckError(
+            f"robot {robot.name}: pulley_radius {true.pulley_radius:g} m leaves a cable no way over "
+            "its sheave at the reference pose; expected anchor points aside of exit points"
+        )
     pretension = robot.rest_lengths - _straight(true, robot.reference_pose[None])[0]
     return world.cable_lengths() + pretension

@@ -133,7 +133,7 @@ def _give_mass(body: mujoco.MjsBody, mass: float, length: float) -> None:
 
 def _add_exit(spec: mujoco.MjSpec, true: TrueRobot, i: int) -> None:
     world, a, up = spec.worldbody, true.exit_points[i], true.up
-    mass = _SMALL_MASS * true.mass
+    mass, tail = _SMALL_MASS * true.mass, tail_of(true)
     carrier = world
     origin = a
     if _yields(true):
@@ -156,10 +156,12 @@ def _add_exit(spec: mujoco.MjSpec, true: TrueRobot, i: int) -> None:
             contype=0,
             conaffinity=0,
         )
-        # straight above the centre: MuJoCo wraps towards the side site where the straight line
-        # passes on the other side of the centre, which below the wheel it always does
-        wheel.add_site(name=f"o{i}", pos=[r, 0.0, 2.0 * r])
-    tail = tail_of(true)
+        # MuJoCo wraps over the top as long as this site lies, seen from the centre, between the
+        # normals to the tangent from the winch and to the straight line to the anchor point:
+        # just inside the first of them, to leave all the room to the second
+        lean = 0.9 * np.arctan2(r, tail)
+        side = [r + 2.0 * r * np.sin(lean), 0.0, 2.0 * r * np.cos(lean)]
+        wheel.add_site(name=f"o{i}", pos=side)
     if _slides(true):
         winch = carrier.add_body(name=f"p{i}", pos=origin - tail * up)
         _give_mass(winch, mass, true.robot.length)

@@ -1,0 +1,244 @@
+"""Fit an effect to measurements, together with those a model has, and say what it is worth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from crosscheck.candidates import layouts_for, null_fit, ordered, seen_directions, try_candidate
+from crosscheck.diagnose import outlying_rows, prepare
+from crosscheck.diagnosis import Rms
+from crosscheck.errors import CrosscheckError
+from crosscheck.evidence import p_value
+from crosscheck.fit import Fit, fit, sizes
+from crosscheck.held_out import HeldOut, hold_out, improves, unfitted
+from crosscheck.measurements import Measurements
+from crosscheck.model_file import Fitted
+from crosscheck.noise import Whiteness, rms_by_kind, whiteness
+from crosscheck.problem import Problem, evaluate
+from crosscheck.search import FALSE_ALARM, Progress
+from seecr.effects import effect_named, layout_of
+from seecr.effects.base import Layout
+from seecr.pose import Array
+from seecr.robot import Robot
+from seecr.sensitivity import Term, effects_of
+
+# A value this many plausible sizes from null deserves a second look.
+_IMPLAUSIBLE = 5.0
+# Parameters whose errors go together like this are hardly determined apart.
+_CORRELATED = 0.95
+_MOST_NAMED = 4
+
+
+class UnsolvedError(CrosscheckError):
+    """Rows that have no equilibrium, so that nothing can be fitted."""
+
+    exit_status = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Addition:
+    """An effect fitted to data, with the rest of the model.
+
+    Attributes:
+        name: of the effect.
+        fitted: all effects of the new model with their errors.
+        before: rms errors of the model as it stood. after: of the new one.
+        held_out_before, held_out: the same on runs left out of the fit.
+        fall: mean fall of chi2 on a block left out, and its standard error.
+        p: chance of the fall of chi2 on all data where the effect is absent.
+        pays: whether the effect improves what was left out, and not by chance.
+        whiteness: of what is left.
+        warnings: about the values. notes: about the data.
+    """
+
+    name: str
+    fitted: tuple[Fitted, ...]
+    before: Rms
+    after: Rms
+    held_out_before: Rms
+    held_out: Rms
+    fall: tuple[float, float]
+    p: float
+    pays: bool
+    whiteness: Whiteness
+    warnings: tuple[str, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def own(self) -> Fitted:
+        """The effect itself."""
+        return next(f for f in self.fitted if f.term.name == self.name)
+
+
+def add_effect(
+    robot: Robot,
+    data: Measurements,
+    terms: Sequence[Term],
+    name: str,
+    progress: Progress = lambda _text, _part: None,
+) -> Addition:
+    """Fit an effect to data, jointly with those the model has.
+
+    Args:
+        robot: as described.
+        data: measurements.
+        terms: effects of the model; where the named one is among them it is fitted again.
+        name: of the effect.
+        progress: called with what is being done and the part of it that is done.
+
+    Raises:
+        InputError: no effect of that name.
+        CrosscheckError: the data cannot carry it.
+    """
+    layout = layout_of(effect_named(name), robot)
+    problem, notes, why = prepare(robot, data, terms)
+    if why:
+        kind = UnsolvedError if not problem.n_readings or "equilibrium" in why else CrosscheckError
+        raise kind(f"{data.path}: {why}; {name} was not fitted")
+    _refuse(problem, layout)
+    progress(f"fitting {name}", 0.0)
+    plain = problem.experiment.predict(effects_of(ordered(terms)))
+    factor = problem.noise(plain)
+    best = _fitted(problem, terms, layout, factor)
+    progress("looking for outliers", 0.4)
+    outliers = outlying_rows(problem, best.state)
+    if outliers.any():
+        lines = ", ".join(str(k) for k in data.line[outliers])
+        words = f"line{'s' * (outliers.sum() > 1)} {lines} left out: outliers, far off the others"
+        notes.append(words)
+        problem = problem.without(outliers, words)
+        best = _fitted(problem, terms, layout, factor)
+    progress("predicting runs left out", 0.6)
+    return _weigh(problem, terms, layout, factor, best, notes)
+
+
+def _refuse(problem: Problem, layout: Layout) -> None:
+    why = next(c.why_not for c in layouts_for(problem) if c.name == layout.name)
+    if why:
+        raise CrosscheckError(
+            f"{problem.data.path} cannot carry {layout.name}: {why.removeprefix('no candidate: ')}"
+        )
+
+
+def _rest(terms: Sequence[Term], layout: Layout) -> tuple[Term, ...]:
+    return ordered([t for t in terms if t.name != layout.name])
+
+
+def _base(problem: Problem, terms: Sequence[Term], layout: Layout, factor: Array) -> Fit:
+    """The model without the effect, at its own best."""
+    rest = _rest(terms, layout)
+    base = null_fit(problem, rest, factor, refit=bool(rest))
+    if not base.valid:
+        raise UnsolvedError(f"{problem.data.path}: the model without {layout.name}: {base.why}")
+    return base
+
+
+def _fitted(problem: Problem, terms: Sequence[Term], layout: Layout, factor: Array) -> Fit:
+    """The best joint fit, from where the effect stands and from its most promising starts."""
+    trials = []
+    if layout.name in [t.name for t in terms]:
+        trials.append(fit(problem, ordered(terms), factor))
+    tried = try_candidate(problem, _base(problem, terms, layout, factor), layout, factor)
+    if tried.fit is not None:
+        trials.append(fit(problem, tried.fit.terms, factor, tried.fit.state))
+    good = [t for t in trials if t.valid]
+    if not good:
+        why = tried.why_not or trials[0].why
+        kind = UnsolvedError if "solved" in why else CrosscheckError
+        raise kind(f"{problem.data.path} cannot carry {layout.name}: {why}")
+    return min(good, key=lambda f: f.chi2)
+
+
+def _weigh(
+    problem: Problem,
+    terms: Sequence[Term],
+    layout: Layout,
+    factor: Array,
+    best: Fit,
+    notes: list[str],
+) -> Addition:
+    base = _base(problem, terms, layout, factor)
+    rest = _rest(terms, layout)
+    without = hold_out(problem, base, factor) if rest else unfitted(problem, (), base)
+    held = hold_out(problem, best, factor)
+    white = whiteness(problem, best.state.white, int(np.sum(np.isfinite(best.stderr))))
+    stood = evaluate(problem, ordered(terms), factor)
+    fall = improves(without, held)
+    drop = (base.chi2 - best.chi2) / max(1.0, white.scale) ** 2
+    p = p_value(drop, seen_directions(best, layout.name, base), False)
+    # stated noise that is too small makes standard errors too small
+    fitted = _split(best, max(1.0, white.scale))
+    return Addition(
+        name=layout.name,
+        fitted=fitted,
+        before=rms_by_kind(problem, stood.raw),
+        after=rms_by_kind(problem, best.state.raw),
+        held_out_before=without.rms,
+        held_out=held.rms,
+        fall=fall,
+        p=p,
+        pays=_pays(held, fall, p),
+        whiteness=white,
+        warnings=tuple(_warnings(best, fitted, layout.name)),
+        notes=tuple(dict.fromkeys(notes)),
+    )
+
+
+def _pays(held: HeldOut, fall: tuple[float, float], p: float) -> bool:
+    """The same as a search asks of an effect, for the one that was named."""
+    mean, error = fall
+    return bool(held.valid and mean > 0.0 and mean >= 0.5 * error and p < FALSE_ALARM)
+
+
+def _split(best: Fit, scale: float) -> tuple[Fitted, ...]:
+    out, first = [], 0
+    for term in best.terms:
+        part = slice(first, first + len(term.layout))
+        out.append(Fitted(term, best.stderr[part] * scale, best.at_bound[part]))
+        first += len(term.layout)
+    return tuple(out)
+
+
+def _warnings(best: Fit, fitted: Sequence[Fitted], name: str) -> list[str]:
+    out = []
+    for f in fitted:
+        names = np.array(f.term.layout.names)
+        unseen, stopped = ~np.isfinite(f.stderr), np.asarray(f.at_bound, bool)
+        if stopped.any():
+            out.append(f"{f.term.name}: {_some(names[stopped])} ended on a bound")
+        if (unseen & ~stopped).any():
+            out.append(f"{f.term.name}: {_some(names[unseen & ~stopped])} not seen by these data")
+        size = np.abs(sizes([f.term]))
+        large = (size > _IMPLAUSIBLE) & ~f.term.layout.shape
+        if large.any():
+            out.append(
+                f"{f.term.name}: {_some(names[large])} is up to {size[large].max():.3g} times a "
+                "plausible size: check it on the robot"
+            )
+    return out + _together(best, name)
+
+
+def _together(best: Fit, name: str) -> list[str]:
+    """Parameters of the effect that are hardly determined apart from those of another."""
+    owner = [t.name for t in best.terms for _ in t.layout.names]
+    labels = [f"{t.name}.{key}" for t in best.terms for key in t.layout.names]
+    table = np.abs(best.correlation)
+    pairs = [
+        (float(table[i, j]), i, j)
+        for i in range(len(owner))
+        for j in range(len(owner))
+        if owner[i] == name and owner[j] != name and table[i, j] > _CORRELATED
+    ]
+    return [
+        f"{labels[i]} and {labels[j]} are hardly determined apart (correlation {c:.3f})"
+        for c, i, j in sorted(pairs, reverse=True)[:_MOST_NAMED]
+    ]
+
+
+def _some(names: Any) -> str:
+    rest = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
+    return ", ".join(names[:_MOST_NAMED]) + rest

@@ -1,0 +1,125 @@
+"""``crosscheck add``: fit an effect and put it into a model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from crosscheck.cli.options import FILE, json_option, progress_share
+
+if TYPE_CHECKING:
+    from crosscheck.add import Addition
+    from crosscheck.model import Model
+    from seecr.robot import Robot
+
+
+@click.command(
+    short_help="Fit an effect and add it to a model.",
+    epilog="""\b
+Examples:
+  crosscheck add pulley_radius robot.xml measured.csv --model model.toml
+  crosscheck compare robot.xml measured.csv --model model.toml
+  crosscheck add pulley_radius robot.xml second_day.csv --model model.toml --refit
+""",
+)
+@click.argument("effect", metavar="EFFECT")
+@click.argument("robot", type=FILE, metavar="ROBOT.xml")
+@click.argument("data", type=FILE, metavar="DATA.csv")
+@click.option(
+    "--model", type=FILE, required=True, metavar="M.toml", help="The model; made if need be."
+)
+@click.option("--refit", is_flag=True, help="Fit again an effect that the model has.")
+@click.option("--force", is_flag=True, help="Add it even if it does not predict any better.")
+@click.option("--out", type=FILE, metavar="DIR", help="Folder for add.json.  [default: none]")
+@json_option
+def command(
+    effect: str,
+    robot: Path,
+    data: Path,
+    model: Path,
+    refit: bool,
+    force: bool,
+    out: Path | None,
+    as_json: bool,
+) -> int:
+    """Fit EFFECT to DATA.csv, together with the effects the model has, and add it to the model.
+
+    All effects of the model are fitted again, since what one explained may be the other's. The
+    model keeps values, standard errors, where they come from, and the errors before and after.
+
+    An effect that does not predict runs left out of the fit any better is not added: more
+    parameters always fit better. --force adds it all the same.
+
+    \b
+    Exit status: 0 added, 1 not added since it does not pay, 2 bad input, 3 rows without an
+    equilibrium.
+    """
+    from crosscheck.add import add_effect
+    from crosscheck.measurements import load_measurements
+    from crosscheck.model import load_model, new_model
+    from seecr.effects import effect_named
+    from seecr.mjcf import load_robot
+
+    effect_named(effect)
+    machine = load_robot(robot)
+    old = load_model(model, machine) if model.exists() else new_model(machine)
+    _check_names(old, effect, refit, model)
+    measured = load_measurements(data, machine)
+    with progress_share(f"adding {effect}") as progress:
+        found = add_effect(machine, measured, old.terms, effect, progress)
+    written = found.pays or force
+    if written:
+        _write(found, old, machine, data, model)
+    _tell(found, old, model, written, out, as_json)
+    return 0 if written else 1
+
+
+def _check_names(old: Model, effect: str, refit: bool, path: Path) -> None:
+    from crosscheck.errors import CrosscheckError
+
+    if effect in old.names and not refit:
+        raise CrosscheckError(f"{path} has {effect} already; --refit fits it again")
+    if refit and effect not in old.names:
+        has = ", ".join(old.names) or "none"
+        raise CrosscheckError(
+            f"{path} has no {effect} to fit again (it has {has}); leave out --refit to add it"
+        )
+
+
+def _write(found: Addition, old: Model, robot: Robot, data: Path, path: Path) -> None:
+    from datetime import date
+
+    from crosscheck.model_file import Provenance, renewed, save_model, with_fit
+    from seecr import __version__
+
+    source = Provenance(
+        data=data.name,
+        date=date.today().isoformat(),
+        version=f"seecr {__version__}",
+        by=f"crosscheck add {found.name}",
+    )
+    errors = {"before": found.before, "after": found.after, "held_out": found.held_out}
+    save_model(path, renewed(with_fit(old, found.fitted, found.name, source, errors), robot))
+
+
+def _tell(
+    found: Addition, old: Model, model: Path, written: bool, out: Path | None, as_json: bool
+) -> None:
+    from crosscheck.addition_text import as_json as document_of
+    from crosscheck.addition_text import print_addition
+    from crosscheck.document import json_text
+
+    text = json_text({**document_of(found, model, written), "model_notes": list(old.notes)})
+    if out is not None:
+        from crosscheck.output import staged
+
+        with staged(out) as folder:
+            (folder / "add.json").write_text(text + "\n", encoding="utf-8")
+    if as_json:
+        click.echo(text)
+        return
+    for note in old.notes:
+        click.echo(f"note: {note}")
+    print_addition(found, model, written)

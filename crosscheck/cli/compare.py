@@ -1,0 +1,110 @@
+"""``crosscheck compare``: a model against measurements."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from crosscheck.cli.options import FILE, json_option, out_option
+
+if TYPE_CHECKING:
+    from crosscheck.compare import Comparison
+
+
+@click.command(
+    short_help="Hold a model against measurements.",
+    epilog="""\b
+Examples:
+  crosscheck compare robot.xml measured.csv
+  crosscheck compare robot.xml measured.csv --model model.toml --max-position 0.5mm
+  crosscheck compare robot.xml measured.csv --limits limits.toml --json
+""",
+)
+@click.argument("robot", type=FILE, metavar="ROBOT.xml")
+@click.argument("data", type=FILE, metavar="DATA.csv")
+@click.option("--model", type=FILE, metavar="M.toml", help="The model; plain SEECR without.")
+@click.option("--max-position", metavar="0.5mm", help="Limit on the rms position error.")
+@click.option("--max-orientation", metavar="0.2deg", help="Limit on the rms orientation error.")
+@click.option("--max-tension", metavar="1N", help="Limit on the rms tension error.")
+@click.option("--max-position-worst", metavar="2mm", help="Limit on the worst row's error.")
+@click.option("--max-orientation-worst", metavar="1deg", help="Limit on the worst row's error.")
+@click.option("--max-tension-worst", metavar="5N", help="Limit on the worst row's error.")
+@click.option(
+    "--limits",
+    "limits_file",
+    type=FILE,
+    metavar="FILE.toml",
+    help='Limits from a file: max_position = "0.5mm" and so on; options go first.',
+)
+@click.option("--no-recording", is_flag=True, help="Write no .rrd.")
+@out_option("crosscheck-comparison")
+@json_option
+def command(
+    robot: Path,
+    data: Path,
+    model: Path | None,
+    limits_file: Path | None,
+    no_recording: bool,
+    out: Path,
+    as_json: bool,
+    **options: str | None,
+) -> int:
+    """Show where a model is off, by how much, and whether what is left is noise.
+
+    ROBOT.xml is the robot's MJCF, DATA.csv its measurements, with sigma in a TOML beside it.
+    Nothing is fitted: with the model's values as they are. Writes comparison.json and
+    comparison.rrd.
+
+    \b
+    Limits make it a gate for continuous integration. Position and orientation errors are
+    lengths of the error vector, rms over all rows (or of the worst row).
+    Exit status: 0 all well, 1 a limit exceeded, 2 bad input, 3 rows without an equilibrium.
+    """
+    from crosscheck.compare import as_json as document_of
+    from crosscheck.compare import compare
+    from crosscheck.document import json_text
+    from crosscheck.limits import Limits, check, load_limits, with_options
+    from crosscheck.measurements import load_measurements
+    from crosscheck.model import load_model
+    from crosscheck.output import staged
+    from seecr.mjcf import load_robot
+
+    limits = with_options(load_limits(limits_file) if limits_file else Limits(), options)
+    machine = load_robot(robot)
+    measured = load_measurements(data, machine)
+    own = load_model(model, machine) if model is not None else None
+    with staged(out) as folder:
+        found = compare(machine, measured, own.terms if own else ())
+        exceeded = check(limits, found)
+        status = 1 if exceeded else (0 if found.converged else 3)
+        document = {
+            "exit_status": status,
+            "limits": {k: v for k, v in vars(limits).items() if v is not None},
+            "exceeded": [vars(item) for item in exceeded],
+            **document_of(found),
+            "model_notes": list(own.notes) if own else [],
+        }
+        text = json_text(document)
+        (folder / "comparison.json").write_text(text + "\n", encoding="utf-8")
+        if not no_recording:
+            _record(found, folder / "comparison.rrd")
+    if as_json:
+        click.echo(text)
+        return status
+    from crosscheck.comparison_text import print_comparison
+
+    for note in own.notes if own else ():
+        click.echo(f"note: {note}")
+    print_comparison(found, exceeded, limits != Limits(), out)
+    return status
+
+
+def _record(found: Comparison, path: Path) -> None:
+    if importlib.util.find_spec("crosscheck.recording.comparison") is None:
+        return
+    from crosscheck.recording import write_comparison_recording
+
+    write_comparison_recording(found, path)

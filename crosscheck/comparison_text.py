@@ -1,0 +1,147 @@
+"""A comparison on the terminal, in millimetres and degrees."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from crosscheck.associations import SIGNIFICANT
+from crosscheck.compare import Comparison
+from crosscheck.diagnosis import Rms
+from crosscheck.diagnosis_text import say
+from crosscheck.limits import Exceeded
+
+_SHOWN = {"m": (1e3, "mm"), "rad": (180.0 / np.pi, "deg"), "N": (1.0, "N")}
+_KINDS = (
+    ("position_rms_m", 1e3, "position\n[mm]"),
+    ("orientation_rms_rad", 180.0 / np.pi, "orientation\n[deg]"),
+    ("tension_rms_N", 1.0, "tension\n[N]"),
+)
+_MOST, _MOST_WORST, _MOST_UNSOLVED = 12, 5, 5
+_WIDE = 160
+
+
+def print_comparison(
+    found: Comparison,
+    exceeded: Sequence[Exceeded],
+    limited: bool,
+    out: Path,
+    console: Console | None = None,
+) -> None:
+    """Print the tables, the verdict, what exceeds its limit, and where the files are."""
+    console = console or Console(highlight=False)
+    if not console.is_terminal:
+        console.width = max(console.width, _WIDE)
+    for note in found.notes:
+        say(console, f"note: {note}", "dim")
+    if found.coordinates:
+        console.print(_coordinates(found))
+        console.print(_errors(found))
+        _print_associations(console, found)
+        _print_worst(console, found)
+    for row in found.unsolved[:_MOST_UNSOLVED]:
+        say(console, f"line {row['line']}, run {row['run']}: {row['why']}", "bold yellow")
+    if len(found.unsolved) > _MOST_UNSOLVED:
+        say(console, f"{len(found.unsolved) - _MOST_UNSOLVED} more rows without an equilibrium")
+    say(console, found.sentence, "green" if found.is_noise else "bold yellow")
+    for item in exceeded:
+        say(console, item.words, "bold red")
+    if limited and not exceeded:
+        say(console, "All limits hold.", "green")
+    say(console, f"Results in {out}/", "dim")
+
+
+def _coordinates(found: Comparison) -> Table:
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    table.add_column("measured less predicted")
+    for head in ("bias", "rms", "max", "unit", "at line", "rows"):
+        table.add_column(head, justify="right")
+    for row in found.coordinates:
+        factor, unit = _SHOWN[row["unit"]]
+        numbers = [f"{factor * row[key]:.4g}" for key in ("bias", "rms", "max")]
+        table.add_row(row["name"], *numbers, unit, str(row["line"]), str(row["rows"]))
+    return table
+
+
+def _errors(found: Comparison) -> Table:
+    """rms errors overall and of each run, direction and region."""
+    kinds = [k for k in _KINDS if found.rms.get(k[0]) is not None]
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    table.add_column("rms error")
+    for _key, _factor, head in kinds:
+        table.add_column(head, justify="right")
+    table.add_column("rows", justify="right")
+    _add(table, kinds, "all rows", found.rms, int(found.problem.use.sum()), "bold")
+    _add(table, kinds, "noise alone", found.floor, "", "dim")
+    for title, groups in (
+        ("run", found.runs),
+        ("travel", found.directions),
+        ("region", found.regions),
+    ):
+        if len(groups) > 1:
+            for row in _biggest(groups):
+                _add(table, kinds, f"{title} {row['name']}", row, row["rows"])
+            if len(groups) > _MOST:
+                table.add_row(f"{len(groups) - _MOST} more, with smaller errors", style="dim")
+    return table
+
+
+def _biggest(groups: Sequence[dict[str, Any]]) -> Iterable[dict[str, Any]]:
+    if len(groups) <= _MOST:
+        return groups
+    return sorted(groups, key=lambda g: -(g["position_rms_m"] or g["orientation_rms_rad"] or 0.0))[
+        :_MOST
+    ]
+
+
+def _add(
+    table: Table, kinds: Sequence[Any], name: str, rms: Rms, rows: int | str, style: str = ""
+) -> None:
+    cells = []
+    for key, factor, _head in kinds:
+        value = rms.get(key)
+        cells.append("-" if value is None else f"{factor * value:.4g}")
+    table.add_row(name, *cells, str(rows), style=style)
+
+
+def _print_associations(console: Console, found: Comparison) -> None:
+    strong = [a for a in found.associations if a["p"] < SIGNIFICANT]
+    if not strong:
+        say(console, "The errors go with nothing that was tried: place, time, tension, travel ...")
+        return
+    for row in strong[:4]:
+        factor, unit = _SHOWN[row["unit"]]
+        steps = [b for b in row["bins"] if b["mean"] is not None]
+        means = ", ".join(f"{factor * b['mean']:.3g} at {b['label']}" for b in steps[:6])
+        against = row["against"]
+        if against.startswith("nothing"):
+            means = f"{factor * steps[0]['mean']:.3g}"
+            against = "nothing, being the same everywhere"
+        say(
+            console,
+            f"The errors go with {against} ({100 * row['share']:.0f} % of their variance): "
+            f"{row['strongest']} [{unit}] {means}",
+        )
+
+
+def _print_worst(console: Console, found: Comparison) -> None:
+    for row in found.worst[:_MOST_WORST]:
+        x, y, z = row["command"][:3]
+        k = row["row"]
+        parts = []
+        for kind, (factor, unit) in zip(
+            ("position", "orientation", "tension"), _SHOWN.values(), strict=True
+        ):
+            size = found.errors_of(kind)[k]
+            if np.isfinite(size):
+                parts.append(f"{factor * size:.4g} {unit}")
+        say(
+            console,
+            f"worst: line {row['line']}, run {row['run']}, commanded ({x:.4g} {y:.4g} {z:.4g}) m: "
+            f"{', '.join(parts)} ({row['times_noise']:.3g} times the noise)",
+        )
