@@ -11,8 +11,7 @@ from crosscheck.evidence import evidence, projected
 from crosscheck.fit import Fit, fit, sizes
 from crosscheck.problem import Problem
 from crosscheck.search import EQUAL, Search
-from seecr.effects import layout_of
-from seecr.effects.base import Effect
+from seecr.effects import catalogue
 from seecr.pose import Array
 
 # An effect that can imitate less than this part of another's signal is not refitted for it.
@@ -56,6 +55,10 @@ def rivals_of(found: Search, name: str) -> list[Rival]:
         worse = (best.chi2 - final.fit.chi2) / scale**2
         if loss < EQUAL and worse < _TOLD_APART:
             out.append(Rival(candidate.name, best, loss))
+    # one that contains another (friction on a cable behind the exit point, with no friction)
+    # says nothing that the other does not
+    names = {name, *(r.name for r in out)}
+    out = [r for r in out if catalogue()[r.name].parent not in names]
     return sorted(out, key=lambda r: r.loss)
 
 
@@ -111,8 +114,3 @@ def containment(a: Array, b: Array) -> float:
         return 0.0
     left = projected(a, b)
     return 1.0 - float(np.sum(left**2)) / power
-
-
-def title_of(problem: Problem, effect: type[Effect]) -> str:
-    """What an effect is, in words."""
-    return layout_of(effect, problem.robot).effect.title

@@ -25,7 +25,7 @@ from seecr.sensitivity import Term
 # More rows than this part without an answer, and the data are not fit for a verdict.
 _LOST = 0.05
 # Rows that stick out by this many robust deviations, alone, are outliers.
-_OUTLIER = 8.0
+_OUTLIER = 6.0
 _MOST_OUTLIERS = 0.05
 # Where structure is left over, an effect is sure only if it has few parameters and took away
 # most of what was unexplained.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 import math
-import re
 import tomllib
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -14,14 +13,8 @@ import numpy as np
 
 from crosscheck.compare import Comparison
 from crosscheck.errors import CrosscheckError, InputFileError
+from crosscheck.quantity import EXAMPLE, parse_quantity
 
-# Units of each kind, in SI.
-_UNITS = {
-    "position": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6},
-    "orientation": {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0, "°": math.pi / 180.0},
-    "tension": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
-}
-_EXAMPLE = {"position": "0.5mm", "orientation": "0.2deg", "tension": "1N"}
 _SHOWN = {"position": (1e3, "mm"), "orientation": (180.0 / math.pi, "deg"), "tension": (1.0, "N")}
 _SUM = {
     "position": "position_rms_m",
@@ -35,8 +28,10 @@ class Limits:
     """Largest errors allowed, in SI; None where there is no limit.
 
     Attributes:
-        max_position, max_orientation, max_tension: rms over all rows compared.
-        max_position_worst, max_orientation_worst, max_tension_worst: of the worst row.
+        max_position, max_orientation, max_tension: rms over all rows compared and the components
+            read in them, as reported everywhere.
+        max_position_worst, max_orientation_worst, max_tension_worst: length of the error vector
+            (largest tension error) of the worst row.
     """
 
     max_position: float | None = None
@@ -70,32 +65,12 @@ def kind_of(name: str) -> str:
 
 
 def parse_limit(name: str, text: str) -> float:
-    """A number with its unit, in SI.
-
-    Args:
-        name: one of NAMES.
-        text: such as ``0.5mm``.
+    """A limit, one of NAMES, with its unit, in SI.
 
     Raises:
         CrosscheckError: no number above zero with a unit of that kind.
     """
-    kind = kind_of(name)
-    units = _UNITS[kind]
-    words = f"expected a number with its unit ({', '.join(units)}) such as {_EXAMPLE[kind]}"
-    match = re.fullmatch(r"\s*([-+0-9.eE]*[0-9.])\s*([^\d\s.]*)\s*", text)
-    try:
-        value = float(match.group(1)) if match else math.nan
-    except ValueError:
-        value = math.nan
-    if match is None or math.isnan(value):
-        raise CrosscheckError(f"{option(name)}: {words}, came {text!r}")
-    unit = match.group(2)
-    if unit not in units:
-        came = f"unit {unit!r}" if unit else "no unit"
-        raise CrosscheckError(f"{option(name)}: {words}, came {came} in {text!r}")
-    if not (value > 0 and math.isfinite(value)):
-        raise CrosscheckError(f"{option(name)}: expected a limit above zero, came {text!r}")
-    return value * units[unit]
+    return parse_quantity(option(name), kind_of(name), text)
 
 
 def option(name: str) -> str:
@@ -129,8 +104,9 @@ def load_limits(path: str | Path) -> Limits:
                 path, f"{key} is no limit; known, nearest first: {', '.join(near)}"
             )
         if not isinstance(value, str):
-            example = _EXAMPLE[kind_of(name)]
-            raise InputFileError.at(path, f'{key}: expected a text such as "{example}", came {value!r}')
+            example = EXAMPLE[kind_of(name)]
+            text = f'{key}: expected a text such as "{example}", came {value!r}'
+            raise InputFileError.at(path, text)
         try:
             values[name] = parse_limit(name, value)
         except CrosscheckError as error:

@@ -111,7 +111,7 @@ class _Case:
     temperature: Array
 
     def commands(self) -> Commands:
-        run = np.unique(self.way.run, return_inverse=True)[1]
+        run: Any = np.unique(self.way.run, return_inverse=True)[1]
         return Commands(
             pose=self.way.pose, run=run, time=self.way.t_s, temperature=self.temperature
         )
@@ -236,7 +236,7 @@ def _read(
     noise = random.standard_normal((n, 6))
     turn = quat_from_rotvec(sigma.orientation_rad * noise[:, 3:])
     quat = quat_multiply(turn, truth.quat_wxyz)
-    pull = None
+    pull: Any = None
     if sigma.tension_N is not None:
         pull = truth.tension_readings + sigma.tension_N * random.standard_normal(
             truth.tension_readings.shape

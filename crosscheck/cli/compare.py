@@ -59,8 +59,8 @@ def command(
     comparison.rrd.
 
     \b
-    Limits make it a gate for continuous integration. Position and orientation errors are
-    lengths of the error vector, rms over all rows (or of the worst row).
+    Limits make it a gate for continuous integration: on the rms over all rows and components,
+    as in the tables, or on the worst row (the length of its error vector).
     Exit status: 0 all well, 1 a limit exceeded, 2 bad input, 3 rows without an equilibrium.
     """
     from crosscheck.compare import as_json as document_of

@@ -13,8 +13,8 @@ from crosscheck.truth.world import World
 from seecr.pose import Array, pose_add, pose_difference, transform_points
 from seecr.setup import Commands
 
-# Points looked at on the way to the first row of a run, and from row to row.
-_APPROACH, _BETWEEN = 12, 4
+WAYPOINTS = (12, 4)
+"""Points looked at on the way to the first row of a run, and from row to row."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,9 @@ class Way:
     elapsed: Array
 
 
-def way_of(true: TrueRobot, commands: Commands) -> Way:
+def way_of(
+    true: TrueRobot, commands: Commands, waypoints: tuple[int, int] = WAYPOINTS
+) -> Way:
     """Every run from the reference pose straight to its first row, then from row to row."""
     robot, n = true.robot, len(commands)
     run = np.zeros(n, dtype=int) if commands.run is None else commands.run
@@ -54,19 +56,15 @@ def way_of(true: TrueRobot, commands: Commands) -> Way:
         if starts:
             points.append((robot.reference_pose, paid, k, False, True, passed))
             passed = 0.0
-        steps = _APPROACH if starts else _BETWEEN
+        steps = waypoints[0] if starts else waypoints[1]
         change = pose_difference(commands.pose[k], before)
         for s in range(1, steps + 1):
             part = s / steps
             pose = pose_add(before, part * change) if s < steps else commands.pose[k]
             length = paid + part * (told - paid)
             points.append((pose, length, k, s == steps, False, passed / steps))
-    pose, length, row, is_row, fresh, elapsed = zip(*points, strict=True)
-    lengths = None if commands.lengths is None else np.array(length)
-    return Way(
-        np.array(pose), lengths, np.array(row), np.array(is_row), np.array(fresh),
-        np.array(elapsed),
-    )  # fmt: skip
+    poses, lengths, *others = (np.array(part) for part in zip(*points, strict=True))
+    return Way(poses, None if commands.lengths is None else lengths, *others)
 
 
 def paid_out(true: TrueRobot, way: Way, temperature: Array | None) -> Array:
@@ -123,8 +121,8 @@ def _zero(true: TrueRobot) -> Array:
     world.place(true.zero_pose)
     if not world.wraps:
         raise CrosscheckError(
-            f"robot {robot.name}: pulley_radius {true.pulley_radius:g} m leaves a cable no way over "
-            "its sheave at the reference pose; expected anchor points aside of exit points"
+            f"robot {robot.name}: pulley_radius {true.pulley_radius:g} m leaves a cable no way "
+            "over its sheave at the reference pose; expected anchor points aside of exit points"
         )
     pretension = robot.rest_lengths - _straight(true, robot.reference_pose[None])[0]
     return world.cable_lengths() + pretension

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from crosscheck.relax import come_to_rest
 from crosscheck.settling import SettleStatus
 from crosscheck.truth.descent import Descent, descend
-from crosscheck.truth.lengths import Way, paid_out, way_of
+from crosscheck.truth.lengths import WAYPOINTS, Way, paid_out, way_of
 from crosscheck.truth.robot import true_robot
 from crosscheck.truth.springs import Cable, Springs
 from crosscheck.truth.world import World
@@ -81,6 +81,7 @@ def measure(
     effects: Sequence[Effect] = (),
     *,
     segments: tuple[int, ...] = SEGMENTS,
+    waypoints: tuple[int, int] = WAYPOINTS,
     progress: Progress | None = None,
 ) -> Truth:
     """Let MuJoCo bring a robot with effects to rest at each command, and read its sensors.
@@ -90,10 +91,12 @@ def measure(
         commands: n rows.
         effects: what it has besides, in the order in which they act.
         segments: N of each cable, where cables have weight; of two, the poses are extrapolated.
+        waypoints: on the way to the first row of a run and from row to row, where what happened
+            on the way counts.
         progress: called with the number of rows done since the last call.
     """
     true = true_robot(robot, effects)
-    way = way_of(true, commands)
+    way = way_of(true, commands, waypoints)
     rest = paid_out(true, way, commands.temperature)
     tell = progress or (lambda rows: None)
     settle = _walk if true.has_history else _each

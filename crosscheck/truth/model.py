@@ -18,13 +18,16 @@ Each part is there only where an effect asks for it:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from crosscheck.truth.robot import TrueRobot
 from seecr.pose import Array, quat_conjugate, quat_rotate
+
+Index = NDArray[np.int64]
 
 # Mass of the bodies that carry exit points and winches, over that of the platform; it moves no
 # equilibrium (their springs start from where it has sunk them to).
@@ -39,26 +42,28 @@ class Places:
     """Where things are in the compiled model, per cable.
 
     Attributes:
+        platform: its body; n_platform: its coordinates, the first ones.
         exit_dofs: (m, 3) or (m, 0); slider_dofs: (m, 1) or (m, 0).
         node_dofs: (m, N - 1, 3).
         tendons: (m, N), the first the one at the exit point.
         exits, anchors: (m,) sites.
         node_bodies: (m, N - 1); end_bodies: (m,) point masses on the platform, or (m, 0).
+        top_next: (m,) sites that the cables first go to from their exit points.
         tail: [m] of tendon behind the exit point when the winch's spring is at rest.
     """
 
     platform: int
     n_platform: int
-    exit_dofs: Array
-    slider_dofs: Array
-    node_dofs: Array
-    tendons: Array
-    exits: Array
-    anchors: Array
-    node_bodies: Array
-    end_bodies: Array
+    exit_dofs: Index
+    slider_dofs: Index
+    node_dofs: Index
+    tendons: Index
+    exits: Index
+    anchors: Index
+    node_bodies: Index
+    end_bodies: Index
+    top_next: Index
     tail: float
-    top_next: Array = field(default_factory=lambda: np.zeros(0, dtype=int))
 
 
 def build(true: TrueRobot, segments: int = 1) -> tuple[mujoco.MjModel, Places]:
@@ -132,46 +137,54 @@ def _give_mass(body: mujoco.MjsBody, mass: float, length: float) -> None:
 
 
 def _add_exit(spec: mujoco.MjSpec, true: TrueRobot, i: int) -> None:
-    world, a, up = spec.worldbody, true.exit_points[i], true.up
-    mass, tail = _SMALL_MASS * true.mass, tail_of(true)
-    carrier = world
-    origin = a
+    """What is at and behind an exit point: its site, a sheave, a winch, each where needed."""
+    carrier, origin = spec.worldbody, true.exit_points[i]
     if _yields(true):
-        carrier = world.add_body(name=f"x{i}", pos=a)
-        _give_mass(carrier, mass, true.robot.length)
+        carrier = spec.worldbody.add_body(name=f"x{i}", pos=origin)
+        origin = np.zeros(3)
+        _give_mass(carrier, _SMALL_MASS * true.mass, true.robot.length)
         for axis in np.eye(3):
             joint = carrier.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
             joint.stiffness = [1.0 / true.compliance, 0.0, 0.0]
-        origin = np.zeros(3)
     carrier.add_site(name=f"a{i}", pos=origin)
-    if true.pulley_radius:
-        r = true.pulley_radius
-        wheel = world.add_body(name=f"s{i}", pos=a, mocap=True)
-        wheel.add_geom(
-            name=f"w{i}",
-            type=mujoco.mjtGeom.mjGEOM_CYLINDER,
-            size=[r, 0.2 * r, 0.0],
-            pos=[r, 0.0, 0.0],
-            quat=_ACROSS,
-            contype=0,
-            conaffinity=0,
-        )
-        # MuJoCo wraps over the top as long as this site lies, seen from the centre, between the
-        # normals to the tangent from the winch and to the straight line to the anchor point:
-        # just inside the first of them, to leave all the room to the second
-        lean = 0.9 * np.arctan2(r, tail)
-        side = [r + 2.0 * r * np.sin(lean), 0.0, 2.0 * r * np.cos(lean)]
-        wheel.add_site(name=f"o{i}", pos=side)
+    winch = origin - tail_of(true) * true.up
     if _slides(true):
-        winch = carrier.add_body(name=f"p{i}", pos=origin - tail * up)
-        _give_mass(winch, mass, true.robot.length)
-        joint = winch.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=up)
-        series = true.winch_side / true.ea[i] if true.friction == 0 else 0.0
-        series += true.compliance if true.pulley_radius else 0.0
-        joint.stiffness = [1.0 / series, 0.0, 0.0]
-        winch.add_site(name=f"p{i}")
+        _add_winch(carrier, true, i, winch)
     elif true.pulley_radius:
-        world.add_site(name=f"p{i}", pos=a - tail * up)
+        carrier.add_site(name=f"p{i}", pos=winch)
+    if true.pulley_radius:
+        _add_sheave(spec, true, i)
+
+
+def _add_winch(carrier: mujoco.MjsBody, true: TrueRobot, i: int, place: Array) -> None:
+    """A winch that the cable pulls up against a spring: all that stretches behind the exit."""
+    winch = carrier.add_body(name=f"p{i}", pos=place)
+    _give_mass(winch, _SMALL_MASS * true.mass, true.robot.length)
+    series = true.winch_side / true.ea[i] if true.friction == 0 else 0.0
+    series += true.compliance if true.pulley_radius else 0.0
+    joint = winch.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=true.up)
+    joint.stiffness = [1.0 / series, 0.0, 0.0]
+    winch.add_site(name=f"p{i}")
+
+
+def _add_sheave(spec: mujoco.MjSpec, true: TrueRobot, i: int) -> None:
+    r = true.pulley_radius
+    wheel = spec.worldbody.add_body(name=f"s{i}", pos=true.exit_points[i], mocap=True)
+    wheel.add_geom(
+        name=f"w{i}",
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        size=[r, 0.2 * r, 0.0],
+        pos=[r, 0.0, 0.0],
+        quat=_ACROSS,
+        contype=0,
+        conaffinity=0,
+    )
+    # MuJoCo wraps over the top as long as this site lies, seen from the centre, between the
+    # normals to the tangent from the winch and to the straight line to the anchor point: just
+    # inside the first of them, to leave all the room to the second
+    lean = 0.9 * np.arctan2(r, tail_of(true))
+    side = [r + 2.0 * r * np.sin(lean), 0.0, 2.0 * r * np.cos(lean)]
+    wheel.add_site(name=f"o{i}", pos=side)
 
 
 def _add_chain(spec: mujoco.MjSpec, true: TrueRobot, i: int, segments: int) -> None:
@@ -238,6 +251,6 @@ def _places(model: mujoco.MjModel, true: TrueRobot, segments: int) -> Places:
         anchors=np.array([number(site, f"b{i}") for i in range(m)]),
         node_bodies=np.array([[number(body, n) for n in row] for row in nodes], dtype=int),
         end_bodies=np.array(ends, dtype=int),
-        tail=tail_of(true),
         top_next=np.array([number(site, ([*row, f"b{i}"])[0]) for i, row in enumerate(nodes)]),
+        tail=tail_of(true),
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -12,13 +13,15 @@ from numpy.typing import NDArray
 from crosscheck.mujoco_model import change_mass_unit, switch_off
 from crosscheck.physics import Physics
 from crosscheck.truth.chain import hang
-from crosscheck.truth.model import Places, build
+from crosscheck.truth.model import Index, Places, build
 from crosscheck.truth.robot import TrueRobot
 from crosscheck.truth.springs import Springs
-from seecr.pose import Array, quat_multiply
+from seecr.pose import Array, pose_difference, quat_multiply
 
 # As in crosscheck.physics: MuJoCo's mass unit is chosen so that the platform has this mass.
 _MASS_IN_MUJOCO = 1e6
+
+Group = tuple[Index, Index, Index]
 
 
 class World(Physics):
@@ -134,10 +137,19 @@ class World(Physics):
             self.update()
 
     def _joints_towards(self, pose: Array) -> None:
-        from seecr.joints import values_of_pose
-
+        """Gauss-Newton on the platform's joints until it is as near as they let it."""
         n = self.places.n_platform
-        self.data.qpos[:n] = values_of_pose(self.true.robot, pose[None])[0][0]
+        weigh = np.array([1.0, 1.0, 1.0] + 3 * [self.length])
+        jacobian = np.zeros((6, self.n_dof))
+        for _ in range(50):
+            mujoco.mj_kinematics(self.model, self.data)
+            mujoco.mj_comPos(self.model, self.data)
+            gap = weigh * pose_difference(pose, self.pose())
+            mujoco.mj_jacBody(self.model, self.data, jacobian[:3], jacobian[3:], self.body)
+            step = np.linalg.lstsq(weigh[:, None] * jacobian[:, :n], gap, rcond=None)[0]
+            self.data.qpos[:n] += step
+            if np.linalg.norm(step * self.metre[:n]) < 1e-15 * self.length:
+                break
 
     def _string(self) -> None:
         """Point masses where a chain hangs between its ends."""
@@ -156,7 +168,7 @@ class World(Physics):
             start += (1.0 - self.free_share)[:, None] * (ends - start)
         return start
 
-    def _address(self, dofs: NDArray[np.int64]) -> NDArray[np.int64]:
+    def _address(self, dofs: Index) -> Index:
         """Where in qpos: a free platform has one number more there."""
         return dofs + (1 if self.is_free else 0)
 
@@ -253,8 +265,8 @@ class World(Physics):
         arc = top - np.linalg.norm(ends - self._leaves(), axis=1)
         return np.asarray(1.0 - arc / self.cable_lengths())
 
-    def _which_rotate(self) -> NDArray[np.bool_]:
-        rotate = np.zeros(self.n_dof, dtype=bool)
+    def _which_rotate(self) -> Array:
+        rotate: Any = np.zeros(self.n_dof, dtype=bool)
         if self.is_free:
             rotate[3:6] = True
         else:
@@ -263,16 +275,14 @@ class World(Physics):
         return rotate
 
 
-def _coupling(
-    places: Places, n_dof: int, segments: int
-) -> list[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]]:
+def _coupling(places: Places, n_dof: int, segments: int) -> list[Group]:
     """Groups of coordinates that may be shifted together to difference the forces.
 
     Each group: the coordinates, and the (rows, columns) of the stiffness that one shift of all
     of them gives. Cables meet only on the platform and segments only at their ends, so however
     long the chains are, a few groups do.
     """
-    groups = []
+    groups: list[Group] = []
     for k in range(places.n_platform):
         rows = np.arange(n_dof)
         groups.append((np.array([k]), rows, np.full(n_dof, k)))
@@ -281,11 +291,12 @@ def _coupling(
     for colour in range(4):
         mine = [0] if colour == 0 else list(range(colour, segments, 3))
         for axis in range(max((blocks[b].shape[1] for b in mine), default=0)):
-            columns, rows = [], []
+            columns: list[Index] = []
+            near_rows: list[Index] = []
             for b in mine:
                 near = np.concatenate(blocks[max(b - 1, 0) : b + 2], axis=1)
                 columns.append(np.repeat(blocks[b][:, axis], near.shape[1]))
-                rows.append(near.ravel())
+                near_rows.append(near.ravel())
             flat = np.concatenate(columns)
-            groups.append((np.unique(flat), np.concatenate(rows), flat))
+            groups.append((np.unique(flat), np.concatenate(near_rows), flat))
     return groups

@@ -1,0 +1,168 @@
+"""The wall: residuals cable by cable against what they may follow, and what the effects predict.
+
+What kind of effect it is shows at a glance: an offset is a constant, a gain a slope with length,
+a drum a sine, creep a curve in time, friction and backlash a step with the direction of motion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from crosscheck.associations import channels
+from crosscheck.cable_space import cable_errors, cable_lengths
+from crosscheck.problem import TENSION, Problem
+from crosscheck.report.drawing import AFTER, BEFORE, INK, MANY, NOISE, blank, grid, styled, svg
+from crosscheck.stages import KINDS, Stage
+from crosscheck.travel import travel
+from seecr.experiment import Prediction
+from seecr.pose import Array
+
+# More rows of panels than this are too many to look at: the worst are shown.
+_MOST_ROWS = 12
+_ROW_HEIGHT = 0.78
+
+
+@dataclass(frozen=True, eq=False)
+class Wall:
+    """Residuals as rows of panels.
+
+    Attributes:
+        title: what is shown. names: (k,) of the rows of panels.
+        measured: (n, k) residuals of the model as it stood. predicted: (n, k) what the effects
+            added account for. noise: (k,) one standard deviation.
+        unit: of these. abscissae: name and values, (n,) or (n, k).
+    """
+
+    title: str
+    names: list[str]
+    measured: Array
+    predicted: Array
+    noise: Array
+    unit: str
+    abscissae: list[tuple[str, Array]]
+
+
+def walls_of(problem: Problem, before: Stage, after: Stage) -> list[Wall]:
+    """Cable lengths where the whole pose was read, else its readings; tensions where read."""
+    raw = before.state.raw
+    change = raw - after.state.raw
+    prediction = after.state.prediction
+    out = []
+    errors, noise = cable_errors(problem, raw, before.state.prediction)
+    predicted, _ = cable_errors(problem, change, before.state.prediction)
+    names = list(problem.robot.cable_names)
+    if np.isfinite(errors).any():
+        out.append(
+            Wall("Errors of cable length", names, 1e3 * errors, 1e3 * predicted,
+                 1e3 * np.mean(noise, axis=0), "mm", _of_cables(problem, prediction))
+        )  # fmt: skip
+    elif problem.counted[:, :6].any():
+        out.append(_of_readings(problem, raw, change, prediction))
+    if problem.counted[:, TENSION].any():
+        shown = np.where(problem.counted[:, TENSION], raw[:, TENSION], np.nan)
+        part = np.where(np.isfinite(shown), change[:, TENSION], np.nan)
+        level = np.full(len(names), problem.sigma.tension_N or 0.0)
+        out.append(
+            Wall("Errors of tension", names, shown, part, level, "N",
+                 _of_cables(problem, prediction))
+        )  # fmt: skip
+    return out
+
+
+def _of_cables(problem: Problem, prediction: Prediction) -> list[tuple[str, Array]]:
+    out = [("length of the cable [m]", cable_lengths(problem, prediction))]
+    out.append(("its tension [N]", prediction.tensions))
+    out.append(("reeled in ← last move [mm] → paid out", 1e3 * paid_out(problem, prediction)))
+    return out + _time(problem)
+
+
+def _of_readings(problem: Problem, raw: Array, change: Array, prediction: Prediction) -> Wall:
+    """Where the pose was read in part: its readings against place and time."""
+    kept = [c for c in range(6) if problem.counted[:, c].any()]
+    names, _units = channels(problem)
+    factor = np.array([KINDS[0].factor] * 3 + [KINDS[1].factor] * 3)
+    sigma = np.array([problem.sigma.position_m or 0.0] * 3)
+    sigma = np.concatenate([sigma, [problem.sigma.orientation_rad or 0.0] * 3])
+    units = [KINDS[0 if c < 3 else 1].unit for c in kept]
+    shown = np.where(problem.counted[:, kept], raw[:, kept], np.nan) * factor[kept]
+    part = np.where(np.isfinite(shown), change[:, kept] * factor[kept], np.nan)
+    place = travel(problem, prediction).pose[:, :3]
+    wide = np.ptp(place[problem.use], axis=0) > 1e-6 * problem.robot.length
+    abscissae = [(f"{'xyz'[k]} [m]", place[:, k]) for k in range(3) if wide[k]]
+    rows = [names[c] for c in kept]
+    if len(set(units)) > 1:
+        rows = [f"{name} [{unit}]" for name, unit in zip(rows, units, strict=True)]
+    unit = units[0] if len(set(units)) == 1 else ""
+    level = sigma[kept] * factor[kept]
+    return Wall("Errors of what was read", rows, shown, part, level, unit,
+                (abscissae + _time(problem))[:4])  # fmt: skip
+
+
+def _time(problem: Problem) -> list[tuple[str, Array]]:
+    t_s = problem.data.t_s
+    if t_s is None or np.ptp(t_s) == 0.0:
+        return [("row", np.arange(problem.data.n_rows, dtype=float) + 1.0)]
+    return [("time [s]", t_s - t_s.min())]
+
+
+def paid_out(problem: Problem, prediction: Prediction) -> Array:
+    """Commanded change of each cable's length (n, m) [m] since the row before in its run."""
+    run = problem.data.run_index
+    first = np.concatenate([[True], run[1:] != run[:-1]])
+    lengths = problem.experiment.commands.lengths
+    if lengths is None:
+        robot = problem.robot
+        lengths = robot.nominal_lengths(travel(problem, prediction).pose)
+        home = robot.nominal_lengths(robot.reference_pose[None])
+    else:
+        home = np.full((1, lengths.shape[1]), np.nan)
+    before = np.concatenate([home, lengths[:-1]])
+    return np.asarray(lengths - np.where(first[:, None], home, before))
+
+
+def draw_wall(wall: Wall, salt: str) -> str:
+    """One row of panels a cable (or reading), one column an abscissa."""
+    rows = _worth_showing(wall)
+    with styled(salt):
+        figure = blank(_ROW_HEIGHT * len(rows) + 0.62)
+        panels = figure.subplots(
+            len(rows), len(wall.abscissae), sharex="col", sharey=bool(wall.unit), squeeze=False
+        )
+        for place, k in enumerate(rows):
+            for axes, (_name, values) in zip(panels[place], wall.abscissae, strict=True):
+                _panel(axes, values if values.ndim == 1 else values[:, k], wall, k)
+            panels[place, 0].set_ylabel(
+                wall.names[k], rotation=0, ha="right", va="center", labelpad=6
+            )
+        for axes, (name, _values) in zip(panels[-1], wall.abscissae, strict=True):
+            axes.set_xlabel(name)
+        unit = f" [{wall.unit}]" if wall.unit else ""
+        panels[0, 0].set_title(f"{wall.title}{unit}", loc="left", fontsize=8.5)
+        return svg(figure, f"{wall.title} against what they may follow")
+
+
+def _worth_showing(wall: Wall) -> list[int]:
+    count = wall.measured.shape[1]
+    with np.errstate(invalid="ignore"):
+        size = np.nanmean(np.where(np.isfinite(wall.measured), wall.measured**2, 0.0), axis=0)
+    worst = np.argsort(-size)[:_MOST_ROWS]
+    return sorted(int(k) for k in worst) if count > _MOST_ROWS else list(range(count))
+
+
+def _panel(axes: Axes, x: Array, wall: Wall, k: int) -> None:
+    y, model = wall.measured[:, k], wall.predicted[:, k]
+    many = bool(np.isfinite(y).sum() > MANY)
+    style: dict[str, Any] = {"linewidths": 0, "rasterized": many}
+    level = float(wall.noise[k])
+    axes.axhspan(-2 * level, 2 * level, color=NOISE, linewidth=0, zorder=0)
+    axes.axhline(0.0, color=INK, linewidth=0.5, zorder=1)
+    axes.scatter(x, y, s=3 if many else 9, color=BEFORE, alpha=0.55, zorder=2, **style)
+    if np.any(model[np.isfinite(model)] != 0.0):
+        axes.scatter(x, model, s=1.5 if many else 3.5, color=AFTER, zorder=3, **style)
+    grid(axes, "x")
+    axes.margins(x=0.04)
+    axes.locator_params(axis="y", nbins=3)

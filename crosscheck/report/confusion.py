@@ -1,0 +1,155 @@
+"""The confusion map: what part of one effect's signal another could imitate on these data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from crosscheck.candidates import amplitude_columns, own_columns
+from crosscheck.confounding import containment
+from crosscheck.diagnosis import Diagnosis
+from crosscheck.evidence import projected
+from crosscheck.fit import Fit
+from crosscheck.report.drawing import INK, WIDTH, blank, styled, svg
+from crosscheck.search import Search
+from seecr.effects.base import Layout
+from seecr.pose import Array
+
+# Effects in the map where some are listed, and where none are.
+_FEW, _MANY = 12, 30
+# From here on two effects look alike.
+ALIKE = 0.9
+
+
+@dataclass(frozen=True, eq=False)
+class Confusion:
+    """What could imitate what.
+
+    Attributes:
+        names: of the effects. listed: of those, how many the diagnosis lists (they come first).
+        part: (k, k) part of the row's signal that the column could imitate.
+    """
+
+    names: tuple[str, ...]
+    listed: int
+    part: Array
+
+    @property
+    def twins(self) -> list[tuple[str, str]]:
+        """Pairs that imitate each other."""
+        k = len(self.names)
+        return [
+            (self.names[i], self.names[j])
+            for i in range(k)
+            for j in range(i + 1, k)
+            if min(self.part[i, j], self.part[j, i]) > ALIKE
+        ]
+
+
+def confusion_of(found: Diagnosis) -> Confusion | None:
+    """Of the effects found, their rivals and the best of the others, at the final model."""
+    if found.search is None:
+        return None
+    columns = {}
+    names = _names(found)
+    for name in names:
+        own = _columns(found.search, name)
+        if own is not None and float(np.sum(own**2)) > 0.0:
+            columns[name] = own
+    kept = tuple(columns)
+    if len(kept) < 2:
+        return None
+    part = np.array([[containment(columns[a], columns[b]) for b in kept] for a in kept])
+    listed = sum(1 for f in found.missing if f.effect in columns)
+    return Confusion(kept, listed, np.clip(part, 0.0, 1.0))
+
+
+def _names(found: Diagnosis) -> list[str]:
+    """Listed effects first, then what cannot be told from them, then the best of the others."""
+    names = [f.effect for f in found.missing]
+    names += [rival.name for f in found.missing for rival in f.rivals]
+    names += [
+        str(row["effect"])
+        for row in found.candidates
+        if not str(row["why_not"]).startswith(("no candidate", "these data do not show it"))
+    ]
+    return list(dict.fromkeys(names))[: _FEW if found.missing else _MANY]
+
+
+def _columns(found: Search, name: str) -> Array | None:
+    """(N, p) what an effect does beside the base model, by plausible sizes."""
+    final = found.last.fit
+    base = _base_columns(final, found.base)
+    if name in [t.name for t in final.terms]:
+        own = final.jacobian[:, own_columns(final.terms, name)]
+    else:
+        layout = _layout(found, name)
+        if layout is None:
+            return None
+        shapes = layout.effect.shapes(final.state.prediction.setup)
+        null = layout.start(shapes[0] if shapes else {})
+        own = amplitude_columns(found.problem, final, layout, null, found.factor) * layout.scale
+    return projected(own, base)
+
+
+def _base_columns(final: Fit, held: tuple[str, ...]) -> Array:
+    """Columns of the effects that the model had before the diagnosis."""
+    keep = np.zeros(final.jacobian.shape[1], dtype=bool)
+    for name in held:
+        keep |= own_columns(final.terms, name)
+    return final.jacobian[:, keep]
+
+
+def _layout(found: Search, name: str) -> Layout | None:
+    for candidate in found.steps[0].candidates:
+        if candidate.name == name:
+            return candidate.layout
+    return None
+
+
+def draw_confusion(confusion: Confusion) -> str:
+    """A matrix: row imitated by column; pairs that imitate each other are framed."""
+    names, part = confusion.names, confusion.part
+    k = len(names)
+    side = min(0.5, 7.2 / k)
+    with styled("confusion"):
+        figure = blank(side * k + 1.75, min(WIDTH, side * k + 3.4))
+        axes = figure.subplots()
+        axes.imshow(part, cmap="Blues", vmin=0.0, vmax=1.25, aspect="equal")
+        for i in range(k):
+            for j in range(k):
+                if i != j and part[i, j] >= 0.005:
+                    axes.text(
+                        j, i, _words(part[i, j], k), ha="center", va="center",
+                        fontsize=7.5 if k <= _FEW else 5.5,
+                        color="white" if part[i, j] > 0.75 else INK,
+                    )  # fmt: skip
+        for a, b in confusion.twins:
+            for i, j in ((names.index(a), names.index(b)), (names.index(b), names.index(a))):
+                frame = _frame(j, i)
+                axes.add_patch(frame)
+        axes.set_xticks(range(k), names, rotation=40, ha="right", rotation_mode="anchor")
+        axes.set_yticks(range(k), names)
+        for label in axes.get_yticklabels()[: confusion.listed]:
+            label.set_fontweight("bold")
+        for label in axes.get_xticklabels()[: confusion.listed]:
+            label.set_fontweight("bold")
+        axes.set_xlabel("could be imitated by")
+        axes.tick_params(length=0)
+        for spine in axes.spines.values():
+            spine.set_visible(False)
+        return svg(figure, "What part of each effect another could imitate")
+
+
+def _words(part: float, count: int) -> str:
+    if count > _FEW and part < 0.5:
+        return ""
+    text = f"{100 * np.floor(100 * part) / 100:.0f}"
+    return text if part < 0.9995 else "100"
+
+
+def _frame(x: float, y: float):  # type: ignore[no-untyped-def]
+    from matplotlib.patches import Rectangle
+
+    return Rectangle((x - 0.46, y - 0.46), 0.92, 0.92, fill=False, edgecolor="#D55E00", lw=1.8)

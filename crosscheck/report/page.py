@@ -1,0 +1,162 @@
+"""``diagnosis.html``: verdict, figures and tables put into one page that needs nothing else."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from crosscheck.diagnosis import Diagnosis
+from crosscheck.errors import CrosscheckError
+from crosscheck.problem import Problem
+from crosscheck.report.cables import draw_wall, walls_of
+from crosscheck.report.confusion import confusion_of, draw_confusion
+from crosscheck.report.numbers import short
+from crosscheck.report.tables import candidate_rows, checks, errors_of, finding_context
+from crosscheck.report.waterfall import waterfall
+from crosscheck.report.where import failure_map, scale_words
+from crosscheck.stages import KINDS, kinds_read, shown_stages, stages_of
+from seecr import __version__
+
+_VERDICTS = {
+    "effects_found": ("Effects found", "what is left after them is noise"),
+    "no_effect_missing": ("No effect missing", "model and data agree"),
+    "unknown_effect": ("Unknown effect", "structure remains that no known effect explains"),
+    "no_verdict": ("No verdict", "the data or the solves are not fit for one"),
+}
+
+
+def write_report(found: Diagnosis, path: str | Path) -> None:
+    """Write a diagnosis as one self-contained page.
+
+    Args:
+        found: the diagnosis.
+        path: the ``.html`` file; a temporary one takes its place when complete.
+
+    Raises:
+        CrosscheckError: the file cannot be written.
+    """
+    path = Path(path)
+    text = render(found)
+    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        partial.write_text(text, encoding="utf-8")
+        partial.replace(path)
+    except OSError as error:
+        raise CrosscheckError(f"{path}: cannot write the report: {error.strerror}") from None
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def render(found: Diagnosis) -> str:
+    """The page's text."""
+    environment = Environment(
+        loader=PackageLoader("crosscheck.report", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template("report.html.jinja").render(**_context(found))
+
+
+def _context(found: Diagnosis) -> dict[str, Any]:
+    name, meaning = _VERDICTS[found.verdict]
+    return {
+        "version": __version__,
+        "verdict": found.verdict,
+        "verdict_name": name,
+        "verdict_meaning": meaning,
+        "sentence": found.sentence,
+        "before": errors_of(found.before),
+        "floor": errors_of(found.floor),
+        "notes": list(found.notes),
+        "measure_next": list(found.measure_next),
+        "findings": [finding_context(found, finding) for finding in found.missing],
+        "candidates": candidate_rows(found),
+        "checks": checks(found),
+        "where": [_association(row) for row in found.where],
+        **_of_search(found),
+    }
+
+
+def _of_search(found: Diagnosis) -> dict[str, Any]:
+    """Facts and figures; empty where there was no search."""
+    if found.search is None:
+        return {"facts": [], "title": "", "figures": {}, "walls": [], "twins": [],
+                "arrow": "", "added": []}  # fmt: skip
+    problem = found.search.problem
+    before, after = shown_stages(found)
+    # what the wall overlays is the last model, sure or not: it shows what was tried
+    last = stages_of(found)[-1]
+    confusion = confusion_of(found)
+    figures = {
+        "waterfall": waterfall(found),
+        "map": failure_map(problem, before, after),
+        "confusion": draw_confusion(confusion) if confusion is not None else "",
+    }
+    walls = [draw_wall(w, f"wall{k}") for k, w in enumerate(walls_of(problem, before, last))]
+    return {
+        "title": f"{problem.robot.name} · {problem.data.path.name}",
+        "facts": facts(problem),
+        "figures": {key: Markup(text) for key, text in figures.items()},  # ours, escaped there
+        "walls": [Markup(text) for text in walls],
+        "twins": confusion.twins if confusion is not None else [],
+        "arrow": scale_words(problem, before),
+        "added": [t.name for t in last.state.terms if t.name not in found.search.base],
+    }
+
+
+def facts(problem: Problem) -> list[tuple[str, str]]:
+    """What was measured, in a few words."""
+    data, sigma = problem.data, problem.sigma
+    values = {"position": sigma.position_m, "orientation": sigma.orientation_rad,
+              "tension": sigma.tension_N}  # fmt: skip
+    noise = [
+        f"{kind.name} {short(value * kind.factor, 2)} {kind.unit}"
+        for kind in kinds_read(problem)
+        if (value := values[kind.name]) is not None
+    ]
+    if sigma.length_m:
+        noise.append(f"commanded lengths {short(1e3 * sigma.length_m, 2)} mm")
+    rows = f"{int(problem.use.sum())}"
+    if not problem.use.all():
+        rows += f" of {data.n_rows}"
+    return [
+        ("robot", f"{problem.robot.name}, {problem.robot.n_cables} cables"),
+        ("data", data.path.name),
+        ("rows", rows),
+        ("runs", str(len(data.runs))),
+        ("readings", str(problem.n_readings)),
+        ("noise", ", ".join(noise)),
+    ]
+
+
+def _association(row: dict[str, Any]) -> dict[str, Any]:
+    """One thing that the unexplained part goes with, its bins in units for people."""
+    factor, unit = next(
+        ((k.factor, k.unit) for k in KINDS if {"m": "mm", "rad": "deg"}.get(row["unit"]) == k.unit),
+        (1.0, str(row["unit"])),
+    )
+    means = [bin_["mean"] for bin_ in row["bins"]]
+    top = max((abs(m) for m in means if m is not None), default=0.0)
+    return {
+        "against": row["against"],
+        "of": row["of"],
+        "strongest": row["strongest"],
+        "share": f"{100 * row['share']:.0f} %",
+        "p": "< 1e−12" if row["p"] < 1e-12 else short(row["p"], 2),
+        "unit": unit,
+        "bins": [
+            {
+                "label": bin_["label"],
+                "rows": bin_["rows"],
+                "mean": short(None if bin_["mean"] is None else factor * bin_["mean"]),
+                "part": 0.0 if not top or bin_["mean"] is None else 50.0 * bin_["mean"] / top,
+            }
+            for bin_ in row["bins"]
+        ],
+    }

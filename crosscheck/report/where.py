@@ -1,0 +1,172 @@
+"""The map of where the model fails, before and after, with the same scale."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+
+from crosscheck.problem import POSITION, Problem
+from crosscheck.report.drawing import GREY, INK, MANY, blank, grid, styled, svg
+from crosscheck.report.numbers import short
+from crosscheck.stages import KINDS, Kind, Stage, kinds_read, sizes_of
+from seecr.pose import Array
+
+# The largest arrow over the widest side of the region, and what share of arrows may be larger.
+_ARROW, _LARGEST = 0.13, 98.0
+# A side that is shorter than this part of the longest is flat.
+_FLAT = 0.02
+_MOST_HEIGHT = 3.4
+
+
+def failure_map(problem: Problem, before: Stage, after: Stage) -> str:
+    """Arrows of the position error and dots of the orientation error at each measured pose."""
+    place = before.state.prediction.poses[:, :3]
+    views = views_of(place[problem.use])
+    stages = [before] if after is before else [before, after]
+    with styled("where"):
+        heights = [_height(place[problem.use], view, len(stages)) for view in views]
+        figure = blank(sum(heights) + 0.62 * len(views) + 0.35)
+        panels = figure.subplots(
+            len(views), len(stages), squeeze=False, gridspec_kw={"height_ratios": heights}
+        )
+        _draw(figure, panels, problem, stages, place, views)
+        return svg(figure, "Where the model fails, before and after")
+
+
+def views_of(place: Array) -> list[tuple[int, int]]:
+    """Pairs of axes to look along: from above and from the side, or the plane of a flat robot."""
+    span = np.ptp(place, axis=0)
+    wide = span > _FLAT * max(float(span.max()), 1e-12)
+    if wide.all():
+        return [(0, 1), (0, 2)]
+    kept = [int(k) for k in np.flatnonzero(wide)]
+    while len(kept) < 2:
+        kept.append(next(k for k in (0, 2, 1) if k not in kept))
+    first, second = sorted(kept[:2])
+    return [(first, second)]
+
+
+def _height(place: Array, view: tuple[int, int], columns: int) -> float:
+    """Of a panel [in] whose two axes have the same scale."""
+    span = np.ptp(place, axis=0)
+    wide, high = (max(float(span[k]), 0.15 * float(span.max())) for k in view)
+    return float(np.clip(8.6 / columns * (high + 0.3 * wide) / (1.3 * wide), 1.1, _MOST_HEIGHT))
+
+
+def _draw(
+    figure: Figure,
+    panels: Any,
+    problem: Problem,
+    stages: list[Stage],
+    place: Array,
+    views: list[tuple[int, int]],
+) -> None:
+    magnify = magnification(problem, stages[0], place)
+    kind = _coloured(problem)
+    top = _top(problem, stages[0], kind) if kind else 1.0
+    dots = None
+    for column, stage in enumerate(stages):
+        for axes, view in zip(panels[:, column], views, strict=True):
+            dots = _dots(axes, problem, stage, place, view, kind, top) or dots
+            if magnify:
+                _arrows(axes, problem, stage, place, view, magnify)
+            _frame(axes, place[problem.use], view)
+        panels[0, column].set_title(_title(stage, column, magnify), loc="left", color=INK)
+    if dots is not None and kind is not None:
+        bar = figure.colorbar(dots, ax=panels.ravel().tolist(), shrink=0.7, pad=0.01, aspect=28)
+        bar.set_label(f"{kind.name} error [{kind.unit}]")
+        bar.outline.set_visible(False)  # type: ignore[operator]
+
+
+def _title(stage: Stage, column: int, magnify: float) -> str:
+    when = "before: " if column == 0 else "after: "
+    names = [stage.label] if column == 0 else ["+ " + t.name for t in stage.state.terms]
+    scale = f"   (arrows drawn {magnify:g} times too long)" if magnify and column == 0 else ""
+    return when + " ".join(names) + scale
+
+
+def magnification(problem: Problem, stage: Stage, place: Array) -> float:
+    """How many times too long arrows are drawn, a round number; 0 where there are none."""
+    size = sizes_of(problem, stage.state, KINDS[0])
+    size = size[np.isfinite(size)]
+    span = float(np.max(np.ptp(place[problem.use], axis=0)))
+    if len(size) == 0 or not np.any(size > 0):
+        return 0.0
+    factor = _ARROW * max(span, 1e-9) / float(np.percentile(size, _LARGEST))
+    power = 10.0 ** np.floor(np.log10(factor))
+    steps = [s for s in (1.0, 2.0, 5.0) if s * power <= factor]
+    return float(max(steps) * power)
+
+
+def _coloured(problem: Problem) -> Kind | None:
+    """What the dots show: the orientation, or else the tensions."""
+    read = [kind for kind in kinds_read(problem) if kind.name != "position"]
+    return read[0] if read else None
+
+
+def _top(problem: Problem, stage: Stage, kind: Kind) -> float:
+    size = sizes_of(problem, stage.state, kind) * kind.factor
+    return max(float(np.nanpercentile(size, _LARGEST)), 1e-12)
+
+
+def _dots(
+    axes: Axes,
+    problem: Problem,
+    stage: Stage,
+    place: Array,
+    view: tuple[int, int],
+    kind: Kind | None,
+    top: float,
+) -> Any:
+    rows = problem.use
+    many = bool(rows.sum() > MANY)
+    x, y = place[rows][:, view[0]], place[rows][:, view[1]]
+    style: dict[str, Any] = {"linewidths": 0, "zorder": 3, "rasterized": many}
+    if kind is None:
+        axes.scatter(x, y, s=5, color=GREY, **style)
+        return None
+    size = (sizes_of(problem, stage.state, kind) * kind.factor)[rows]
+    worst_last = np.argsort(np.nan_to_num(size))
+    return axes.scatter(
+        x[worst_last], y[worst_last], s=9 if many else 16, c=size[worst_last], cmap="viridis_r",
+        norm=Normalize(0.0, top), **style,
+    )  # fmt: skip
+
+
+def _arrows(
+    axes: Axes, problem: Problem, stage: Stage, place: Array, view: tuple[int, int], magnify: float
+) -> None:
+    error = np.where(problem.counted[:, POSITION], stage.state.raw[:, POSITION], 0.0)
+    rows = problem.use
+    axes.quiver(
+        place[rows, view[0]], place[rows, view[1]], error[rows, view[0]], error[rows, view[1]],
+        angles="xy", scale_units="xy", scale=1.0 / magnify, width=0.0028, headwidth=3.6,
+        headlength=4.2, headaxislength=3.8, minlength=0.0, color=INK, zorder=4,
+        rasterized=bool(rows.sum() > MANY),
+    )  # fmt: skip
+
+
+def _frame(axes: Axes, place: Array, view: tuple[int, int]) -> None:
+    names = "xyz"
+    span = float(np.max(np.ptp(place, axis=0)))
+    margin = 0.15 * span
+    for k, set_limits in zip(view, (axes.set_xlim, axes.set_ylim), strict=True):
+        low, high = float(place[:, k].min()), float(place[:, k].max())
+        set_limits(low - margin, high + margin)
+    axes.set_aspect("equal", adjustable="box", anchor="NW")
+    axes.set_xlabel(f"{names[view[0]]} [m]")
+    axes.set_ylabel(f"{names[view[1]]} [m]")
+    grid(axes)
+
+
+def scale_words(problem: Problem, stage: Stage) -> str:
+    """What an arrow means, for the caption."""
+    place = stage.state.prediction.poses[:, :3]
+    magnify = magnification(problem, stage, place)
+    if not magnify:
+        return ""
+    return f"An error of 1 mm is an arrow of {short(magnify)} mm."

@@ -1,0 +1,114 @@
+"""The models on the way of a diagnosis, as its page and its recording show them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from crosscheck.diagnosis import Diagnosis
+from crosscheck.held_out import blocks_of
+from crosscheck.noise import rms_by_kind
+from crosscheck.problem import ORIENTATION, POSITION, TENSION, Problem, State
+from crosscheck.search import Step
+from seecr.pose import Array
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of reading as people read it.
+
+    Attributes:
+        name: in words. key: of the rms errors. columns: of the residuals.
+        factor: from SI to ``unit``.
+    """
+
+    name: str
+    key: str
+    columns: slice
+    factor: float
+    unit: str
+
+
+KINDS = (
+    Kind("position", "position_rms_m", POSITION, 1e3, "mm"),
+    Kind("orientation", "orientation_rms_rad", ORIENTATION, 180.0 / np.pi, "deg"),
+    Kind("tension", "tension_rms_N", TENSION, 1.0, "N"),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """One model on the way.
+
+    Attributes:
+        label: what was added, in words.
+        added: the effect added last, "" for the model as it stood.
+        sure: whether the diagnosis lists it.
+        step: of the search.
+    """
+
+    label: str
+    added: str
+    sure: bool
+    step: Step
+
+    @property
+    def state(self) -> State:
+        """The model fitted to all rows."""
+        return self.step.fit.state
+
+
+def stages_of(found: Diagnosis) -> list[Stage]:
+    """From the model as it stood to the last one; none where there was no search."""
+    if found.search is None:
+        return []
+    listed = {finding.effect: finding for finding in found.missing}
+    out = []
+    for step in found.search.steps:
+        if step.added:
+            label = f"+ {step.added}"
+        else:
+            label = "the model as it stands" if found.search.base else "plain SEECR"
+        out.append(Stage(label, step.added, not step.added or step.added in listed, step))
+    return out
+
+
+def shown_stages(found: Diagnosis) -> tuple[Stage, Stage]:
+    """The model as it stood, and the last one that holds only effects that are listed."""
+    stages = stages_of(found)
+    last = stages[0]
+    for stage in stages[1:]:
+        if not stage.sure:
+            break
+        last = stage
+    return stages[0], last
+
+
+def kinds_read(problem: Problem) -> list[Kind]:
+    """Kinds of reading that the data hold."""
+    return [kind for kind in KINDS if problem.counted[:, kind.columns].any()]
+
+
+def by_block(problem: Problem, stage: Stage, kind: Kind) -> Array:
+    """The rms error of each run (or block of time) left out, in SI; NaN where nothing was read."""
+    blocks, _note = blocks_of(problem)
+    out = []
+    for rows in blocks:
+        value = rms_by_kind(problem.only(rows), stage.step.held_out.raw)[kind.key]
+        out.append(np.nan if value is None else value)
+    return np.array(out)
+
+
+def sizes_of(problem: Problem, state: State, kind: Kind) -> Array:
+    """(n,) size of each row's error: length of the vector, or the largest tension; SI.
+
+    NaN where nothing of the kind was read or the row does not count.
+    """
+    some = problem.counted[:, kind.columns]
+    raw = np.where(some, state.raw[:, kind.columns], 0.0)
+    if kind.name == "tension":
+        size = np.max(np.abs(raw), axis=1, initial=0.0)
+    else:
+        size = np.linalg.norm(raw, axis=1)
+    return np.where(some.any(axis=1), size, np.nan)
