@@ -108,7 +108,8 @@ def add_effect(
     outliers = outlying_rows(problem, best.state)
     if outliers.any():
         lines = ", ".join(str(k) for k in data.line[outliers])
-        words = f"line{'s' * (outliers.sum() > 1)} {lines} left out: outliers, far off the others"
+        word = "line" if outliers.sum() == 1 else "lines"
+        words = f"{word} {lines} left out: outliers, far off the others"
         notes.append(words)
         problem = problem.without(outliers, words)
         best = _fitted(problem, terms, layout, factor)

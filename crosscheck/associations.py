@@ -28,8 +28,10 @@ from seecr.pose import Array, rotvec_from_quat
 SIGNIFICANT = 0.01
 """An association of a smaller p, over all that were tried, counts."""
 
+EVERYWHERE = "nothing: it is the same everywhere"
+"""The quantity of what does not change from row to row."""
+
 _BINS, _IN_A_BIN = 6, 4
-_EVERYWHERE = "nothing: it is the same everywhere"
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +89,7 @@ def channels(problem: Problem) -> tuple[list[str], list[str]]:
 
 def _of_rows(problem: Problem, prediction: Prediction, way: Travel) -> Iterator[_Quantity]:
     n, data = problem.data.n_rows, problem.data
-    yield _Quantity(_EVERYWHERE, np.zeros(n))
+    yield _Quantity(EVERYWHERE, np.zeros(n))
     turn = rotvec_from_quat(way.pose[:, 3:])
     place = np.concatenate([way.pose[:, :3], turn], axis=1)
     for k, axis in enumerate(AXES):
@@ -151,8 +153,8 @@ def _row(
     part: float,
 ) -> dict[str, Any] | None:
     """One association, or None where the quantity never changes."""
-    index, labels = _binned(quantity, np.isfinite(table).any(axis=1))
-    constant = quantity.name == _EVERYWHERE
+    index, labels = _binned(quantity, np.asarray(np.isfinite(table).any(axis=1)))
+    constant = quantity.name == EVERYWHERE
     if len(labels) < (1 if constant else 2):
         return None
     between, within, counts = _squares(table, index, len(labels), constant)

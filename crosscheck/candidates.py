@@ -252,7 +252,7 @@ def _basis(columns: Array) -> Array:
 def _linear(x: Array, r: Array) -> tuple[Array, float, int]:
     """Linear fit of r by columns x with a weak prior: values, fall of chi2, directions seen."""
     normal = x.T @ x
-    z = np.linalg.solve(normal + 1e-2 * np.eye(x.shape[1]), x.T @ r)
+    z: Array = np.asarray(np.linalg.solve(normal + 1e-2 * np.eye(x.shape[1]), x.T @ r), float)
     left = r - x @ z
     directions = int(np.sum(np.linalg.eigvalsh(normal) > 1e-2))
     return z, float(r @ r - left @ left), max(1, directions)

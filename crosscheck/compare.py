@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.associations import SIGNIFICANT, associations, channels
+from crosscheck.associations import EVERYWHERE, SIGNIFICANT, associations, channels
 from crosscheck.candidates import ordered
 from crosscheck.diagnose import noise_floor, outlying_rows, prepare
 from crosscheck.diagnosis import Rms
@@ -140,7 +140,8 @@ def _outliers(problem: Problem, state: State) -> list[str]:
     if not rows.any():
         return []
     lines = ", ".join(str(k) for k in problem.data.line[rows])
-    return [f"line{'s' * (rows.sum() > 1)} {lines}: far off all the others, outliers? (counted)"]
+    word = "line" if rows.sum() == 1 else "lines"
+    return [f"{word} {lines}: far off all the others, outliers? (counted)"]
 
 
 def _coordinates(problem: Problem, state: State) -> list[dict[str, Any]]:
@@ -206,7 +207,7 @@ def _unsolved(problem: Problem, state: State) -> list[dict[str, Any]]:
     if len(rows) == 0:
         return []
     status = prediction.solution().status
-    slack = (prediction.found.states[..., cable_law.SLACK] > 0).all(axis=1)
+    slack = np.asarray((prediction.found.states[..., cable_law.SLACK] > 0).all(axis=1))
     return [
         {
             "row": int(k),
@@ -236,7 +237,7 @@ def _sentence(found: Comparison) -> str:
     if strong:
         share = 100 * strong[0]["share"]
         goes = f"; {share:.0f} % of their variance goes with {strong[0]['against']}"
-        if strong[0]["against"].startswith("nothing"):
+        if strong[0]["against"] == EVERYWHERE:
             goes = f"; {share:.0f} % of their square is the same everywhere"
     return f"The model misses something: {size}, and neighbouring rows agree in them{goes}."
 

@@ -10,11 +10,11 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from crosscheck.associations import SIGNIFICANT
+from crosscheck.associations import EVERYWHERE, SIGNIFICANT
 from crosscheck.compare import Comparison
 from crosscheck.diagnosis import Rms
 from crosscheck.diagnosis_text import say
-from crosscheck.limits import Exceeded
+from crosscheck.limits import Exceeded, place
 
 _SHOWN = {"m": (1e3, "mm"), "rad": (180.0 / np.pi, "deg"), "N": (1.0, "N")}
 _KINDS = (
@@ -118,20 +118,16 @@ def _print_associations(console: Console, found: Comparison) -> None:
         factor, unit = _SHOWN[row["unit"]]
         steps = [b for b in row["bins"] if b["mean"] is not None]
         means = ", ".join(f"{factor * b['mean']:.3g} at {b['label']}" for b in steps[:6])
-        against = row["against"]
-        if against.startswith("nothing"):
+        share = f"{100 * row['share']:.0f} %"
+        text = f"The errors go with {row['against']} ({share} of their variance)"
+        if row["against"] == EVERYWHERE:
+            text = f"The errors are the same everywhere ({share} of their square)"
             means = f"{factor * steps[0]['mean']:.3g}"
-            against = "nothing, being the same everywhere"
-        say(
-            console,
-            f"The errors go with {against} ({100 * row['share']:.0f} % of their variance): "
-            f"{row['strongest']} [{unit}] {means}",
-        )
+        say(console, f"{text}: {row['strongest']} [{unit}] {means}")
 
 
 def _print_worst(console: Console, found: Comparison) -> None:
     for row in found.worst[:_MOST_WORST]:
-        x, y, z = row["command"][:3]
         k = row["row"]
         parts = []
         for kind, (factor, unit) in zip(
@@ -142,6 +138,6 @@ def _print_worst(console: Console, found: Comparison) -> None:
                 parts.append(f"{factor * size:.4g} {unit}")
         say(
             console,
-            f"worst: line {row['line']}, run {row['run']}, commanded ({x:.4g} {y:.4g} {z:.4g}) m: "
-            f"{', '.join(parts)} ({row['times_noise']:.3g} times the noise)",
+            f"worst: line {row['line']}, run {row['run']}, {place(found, k)}: {', '.join(parts)} "
+            f"({row['times_noise']:.3g} times the noise)",
         )

@@ -9,7 +9,6 @@ import numpy as np
 from crosscheck.candidates import Candidate, ordered, own_columns, try_candidate
 from crosscheck.evidence import evidence, projected
 from crosscheck.fit import Fit, fit, sizes
-from crosscheck.problem import Problem
 from crosscheck.search import EQUAL, Search
 from seecr.effects import catalogue
 from seecr.pose import Array
@@ -51,9 +50,11 @@ def rivals_of(found: Search, name: str) -> list[Rival]:
         best = fit(problem, trial.fit.terms, factor, trial.fit.state)
         if not best.valid:
             continue
-        loss = final.evidence.log - evidence(best, scale).log
-        worse = (best.chi2 - final.fit.chi2) / scale**2
-        if loss < EQUAL and worse < _TOLD_APART:
+        # where structure is left over, differences count against that, not against the noise
+        left = max(1.0, final.whiteness.scale**2)
+        loss = (final.evidence.log - evidence(best, scale).log) / left
+        worse = (best.chi2 - final.fit.chi2) / scale**2 / left
+        if abs(loss) < EQUAL and worse < _TOLD_APART:
             out.append(Rival(candidate.name, best, loss))
     # one that contains another (friction on a cable behind the exit point, with no friction)
     # says nothing that the other does not
@@ -82,7 +83,8 @@ def _likely(found: Search, name: str, without: Fit) -> list[Candidate]:
             continue
         if single:
             # tried beside the same model already: its own fit says more than a derivative
-            if (c.fit.chi2 - final.fit.chi2) / found.noise_scale**2 < 4.0 * _TOLD_APART:
+            margin = 4.0 * _TOLD_APART * max(1.0, final.whiteness.scale**2)
+            if (c.fit.chi2 - final.fit.chi2) / found.noise_scale**2 < margin:
                 out.append(c)
             continue
         columns = c.fit.jacobian[:, own_columns(c.fit.terms, c.name)]

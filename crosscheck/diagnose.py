@@ -13,11 +13,10 @@ from crosscheck.diagnosis import Diagnosis, Finding, Rms
 from crosscheck.fit import Fit, flat
 from crosscheck.held_out import blocks_of
 from crosscheck.measurements import Measurements
-from crosscheck.noise import Whiteness, estimate_sigma, rms_by_kind, whiteness
+from crosscheck.noise import estimate_sigma, rms_by_kind
 from crosscheck.problem import Problem, State
-from crosscheck.search import MOST_EFFECTS, Progress, Search, Step, search
+from crosscheck.search import Progress, Search, Step, search, smallest_sure
 from crosscheck.separation import measured_directly, proposals
-from seecr.effects.base import Layout
 from seecr.pose import Array
 from seecr.robot import Robot
 from seecr.sensitivity import Term
@@ -29,7 +28,7 @@ _OUTLIER = 6.0
 _MOST_OUTLIERS = 0.05
 # Where structure is left over, an effect is sure only if it has few parameters and took away
 # most of what was unexplained.
-_SURE_PARAMETERS, _SURE_SHARE = 3, 0.5
+_SURE_PARAMETERS, _SURE_SHARE, _SURE_ALONE = 3, 0.5, 2.0 / 3.0
 # Noise up to this many times the stated one is noise that was stated too small.
 _UNDERSTATED = 3.0
 
@@ -202,7 +201,12 @@ def conclude(found: Search, notes: list[str]) -> Diagnosis:
     clean = last.whiteness.is_noise
     findings = [_finding(found, name) for name in names]
     if not clean:
-        findings = [f for f in findings if _is_sure(found, f)]
+        findings = [f for f in findings if _is_sure(f)]
+        smaller = None if findings else smallest_sure(found, _SURE_PARAMETERS, _SURE_ALONE)
+        if smaller is not None:
+            alone = _finding(smaller, smaller.found[0])
+            findings = [alone] if alone.share > _SURE_ALONE else []
+            found = smaller if findings else found
     if clean:
         verdict = "effects_found" if findings else "no_effect_missing"
     else:
@@ -236,7 +240,7 @@ def _step_of(found: Search, findings: list[Finding]) -> Step:
     return shown
 
 
-def _is_sure(found: Search, finding: Finding) -> bool:
+def _is_sure(finding: Finding) -> bool:
     few = len(finding.layout) <= _SURE_PARAMETERS
     return few and finding.share > _SURE_SHARE and not bool(np.any(finding.at_bound))
 
@@ -400,7 +404,5 @@ def _to_find(found: Search, where: tuple[dict[str, Any], ...]) -> str:
             f"the unexplained error goes with {first.get('against', first.get('name'))}: repeat "
             "poses that differ in nothing else, forward and back, and look at it there"
         )
-    return "repeat the same poses forward and back, and after an hour, to see what the error follows"
+    return "repeat the same poses forward, back and an hour later, to see what the error follows"
 
-
-__all__ = ["MOST_EFFECTS", "diagnose", "prepare"]

@@ -121,6 +121,6 @@ def number(value: float | None) -> float | None:
 
 def _plain(table: dict[str, Any]) -> dict[str, Any]:
     return {
-        key: number(value) if isinstance(value, float | np.floating) else value
+        key: number(float(value)) if isinstance(value, float | np.floating) else value
         for key, value in table.items()
     }

@@ -95,18 +95,16 @@ def _backwards(data: Measurements) -> Measurements:
 def _after(problem: Problem, later: Measurements, kinds: Sequence[str]) -> Planned:
     """Rows that come after the planned ones: what creeps goes by the clock through all."""
     first = problem.data.rows(problem.use)
-    both = replace(
-        first,
+    both = Measurements(
+        path=first.path,
+        n_cables=first.n_cables,
         run=np.concatenate([first.run, later.run]),
         line=np.concatenate([first.line, later.line]),
-        **{
-            name: _stack(getattr(first, name), getattr(later, name))
-            for name in (
-                "t_s", "command_pose", "command_lengths", "position", "quat_wxyz", "angles_rad",
-                "tensions", "temperature_C",
-            )
-        },
-    )  # fmt: skip
+        t_s=_stack(first.t_s, later.t_s),
+        command_pose=_stack(first.command_pose, later.command_pose),
+        command_lengths=_stack(first.command_lengths, later.command_lengths),
+        temperature_C=_stack(first.temperature_C, later.temperature_C),
+    )
     whole = planned(problem.robot, both, problem.sigma, kinds)
     added = np.arange(both.n_rows) >= first.n_rows
     rest = whole.problem.only(added)

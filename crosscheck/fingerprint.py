@@ -82,7 +82,8 @@ def check_robot(path: Path, table: Any, robot: Robot) -> tuple[str, ...]:
         if np.any(apart > 1e-6 * size):
             notes.append(
                 f"{path} was made when {key} of robot {robot.name} was {_short(table[key])}; now "
-                f"it is {_short(own[key])}: its effects may count twice (see crosscheck add --refit)"
+                f"it is {_short(own[key])}: its effects may count twice; fit them again "
+                "(crosscheck add --refit)"
             )
     return tuple(notes)
 

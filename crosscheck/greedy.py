@@ -80,7 +80,9 @@ def _scores(grams: Array, part: Mapping[str, slice], pairs: Sequence[Pair]) -> A
         if other:
             h = part[other]
             if other not in inverse:
-                inverse[other] = np.linalg.pinv(grams[:, h, h], rcond=_RANK, hermitian=True)
+                inverse[other] = np.asarray(
+                    np.linalg.pinv(grams[:, h, h], rcond=_RANK, hermitian=True), dtype=float
+                )
             cross = grams[:, g, h]
             imitated = np.einsum("kgh,khi,kgi->k", cross, inverse[other], cross, optimize=True)
             signal = signal - imitated

@@ -168,6 +168,7 @@ def _words(found: Comparison, name: str, limit: float, value: float) -> str:
 
 
 def place(found: Comparison, row: int) -> str:
-    """The commanded position of a row for people."""
+    """The commanded position of a row for people; of lengths, where the model rests."""
     x, y, z = found.way.pose[row, :3]
-    return f"commanded ({x:.4g} {y:.4g} {z:.4g}) m"
+    word = "commanded" if found.problem.data.command_lengths is None else "predicted"
+    return f"{word} ({x:.4g} {y:.4g} {z:.4g}) m"

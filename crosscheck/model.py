@@ -101,7 +101,8 @@ def load_model(path: str | Path, robot: Robot) -> Model:
     where = _Where(path, text)
     _check_tables(where, document)
     notes = check_robot(path, document.get("robot"), robot)
-    terms, errors = [], []
+    terms: list[Term] = []
+    errors: list[Array] = []
     for k, table in enumerate(_effect_tables(where, document)):
         term, stderr = _term(where, k, table, robot)
         if term.name in [t.name for t in terms]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -42,9 +41,8 @@ class Visible:
     Attributes:
         signal: what it does to the readings.
         needed: squared signal that a test finds.
-        sizes: (p,) smallest visible parameters, in plausible sizes times scale; inf where the
-            poses do not see it at all. The same for all its parameters, in plausible sizes.
-        factor: that size in plausible ones.
+        factor: smallest size that shows, of all its parameters alike, in plausible sizes; inf
+            where the poses do not see it at all.
         identifiable: the same beside the best imitator that is no exact twin.
         imitator: its name, "" where there is none.
         confused: (name, what it cannot imitate) of effects it cannot be told from at its
@@ -71,14 +69,11 @@ class Visible:
         return self.factor <= 1.0
 
     def sizes(self, factor: float) -> dict[str, float]:
-        """Parameters at a multiple of their plausible sizes, shapes left out."""
+        """Parameters at a multiple of their plausible sizes, without those that only shape it."""
         layout = self.signal.layout
         own = np.any(self.signal.columns != 0.0, axis=0)
-        return {
-            key: factor * float(layout.scale[i])
-            for i, key in enumerate(layout.names)
-            if own[i] or not layout.shape[i]
-        }
+        own = own if own.any() else ~layout.shape
+        return {k: factor * float(layout.scale[i]) for i, k in enumerate(layout.names) if own[i]}
 
 
 @dataclass(frozen=True, eq=False)

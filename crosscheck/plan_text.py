@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -27,7 +26,7 @@ def size_words(found: Visible, factor: float) -> str:
     parts = []
     for field in fields(layout.effect):
         unit = field.metadata["unit"]
-        keys = [key for key in sizes if _belongs(key, field.name, unit, layout.names)]
+        keys = [key for key in sizes if _belongs(key, field.name, unit)]
         if not keys or field.metadata["shape"]:
             continue
         null = float(field.metadata["null"])
@@ -37,7 +36,7 @@ def size_words(found: Visible, factor: float) -> str:
     return ", ".join(parts)
 
 
-def _belongs(key: str, name: str, unit: str, _names: Sequence[str]) -> bool:
+def _belongs(key: str, name: str, unit: str) -> bool:
     stem = key.removesuffix(f"_{unit}") if unit else key
     return stem == name or (stem.startswith(f"{name}_") and len(stem) > len(name) + 1)
 
@@ -89,8 +88,8 @@ def sentence(plan: Plan) -> str:
     alone = [v for v in seen if not v.confused and not v.twins]
     return (
         f"Of {len(plan.effects)} effects, {len(seen)} would show at a plausible size and "
-        f"{len(alone)} of these could be named; {POWER:.0%} of such are found, with {LEVEL:.0%} "
-        "false alarms over all."
+        f"{len(alone)} of these could be named; {100 * POWER:.0f} % of such are found, "
+        f"with {100 * LEVEL:.0f} % false alarms over all."
     )
 
 

@@ -99,9 +99,10 @@ class Problem:
         """(n, 6 + m) which readings there are."""
         data = self.data
         if data.quat_wxyz is not None:
-            turned = np.repeat(np.isfinite(data.quat_wxyz).all(axis=1)[:, None], 3, axis=1)
+            whole = np.asarray(np.isfinite(data.quat_wxyz).all(axis=1))
+            turned = np.repeat(whole[:, None], 3, axis=1)
         else:
-            turned = np.isfinite(data.angles_rad)
+            turned = np.asarray(np.isfinite(data.angles_rad))
         return np.concatenate(
             [np.isfinite(data.position), turned, np.isfinite(data.tensions)], axis=1
         )
@@ -181,14 +182,14 @@ class Problem:
         covariance = np.where(blank[:, :, None] | blank[:, None, :], 0.0, covariance)
         index = np.arange(width)
         covariance[:, index, index] += np.where(blank, 1.0, 0.0)
-        return np.linalg.cholesky(covariance)
+        return np.asarray(np.linalg.cholesky(covariance), float)
 
     def whiten(self, factor: Array, values: Array) -> Array:
         """Counted residuals (N,) or derivatives (N, p), in units of their noise."""
         single = values.ndim == 2
         table = values[..., None] if single else values
         table = np.where(self.measured[..., None], table, 0.0)
-        white = np.linalg.solve(factor, table)[self.counted]
+        white: Array = np.asarray(np.linalg.solve(factor, table), float)[self.counted]
         return white[:, 0] if single else white
 
 
@@ -352,7 +353,7 @@ def _compared(
     experiment: Experiment,
 ) -> State:
     filled = np.where(problem.measured & np.isfinite(raw), raw, 0.0)
-    table = np.linalg.solve(factor, filled[..., None])[..., 0]
+    table: Array = np.asarray(np.linalg.solve(factor, filled[..., None]), float)[..., 0]
     white = table[problem.counted]
     valid = bool(np.all(prediction.solved[problem.use])) and bool(np.all(np.isfinite(white)))
     chi2 = float(white @ white) if valid else np.inf

@@ -140,7 +140,7 @@ class _Searcher:
         """Every effect that the node does not have: all fitted at first, then the best few."""
         todo = [c for c in layouts_for(self.problem) if c.name not in node.names]
         prune = _PRUNE_NOISE if node.whiteness.is_noise else _PRUNE_OTHER
-        open_ = []
+        open_: list[Candidate] = []
         for k, c in enumerate(todo):
             part = (which + 0.5 * k / len(todo)) / of
             self.progress(f"round {depth + 1}: looking at {c.name}", part)
@@ -284,6 +284,33 @@ def search(
 ) -> Search:
     """Add effects to the base model until what is left is noise or nothing helps."""
     return _Searcher(problem, factor, noise_scale, base, progress).run()
+
+
+def smallest_sure(found: Search, parameters: int, share: float) -> Search | None:
+    """The way with the one small effect that explains most by itself, if it is most of all.
+
+    For data that keep some structure whatever is added: large groups imitate anything, but an
+    effect of a few parameters that takes away nearly all is there.
+    """
+    start = found.steps[0]
+    small = [
+        c
+        for c in start.candidates
+        if c.fit is not None and c.evidence is not None and len(c.layout) <= parameters
+    ]
+    if not small:
+        return None
+    best = max(small, key=lambda c: c.evidence.log if c.evidence else -np.inf)
+    assert best.fit is not None
+    if best.fit.chi2 > (1.0 - share) * start.fit.chi2:
+        return None
+    full = fit(found.problem, best.fit.terms, found.factor, best.fit.state)
+    if not full.valid:
+        return None
+    ev = evidence(full, found.noise_scale)
+    white = whiteness(found.problem, full.state.white / found.noise_scale, ev.parameters)
+    step = Step(best.name, full, ev, white, hold_out(found.problem, full, found.factor))
+    return Search(found.problem, found.factor, found.noise_scale, [start, step], found.base)
 
 
 def _promise(c: Candidate) -> float:

@@ -185,15 +185,21 @@ def _with_poses(problem: Problem) -> Problem:
         n_cables=data.n_cables,
         run=np.array([f"new{k}" for k in range(len(pick))]),
         command_pose=poses,
-        t_s=None if data.t_s is None else float(data.t_s[-1]) + 60.0 * np.arange(1, len(pick) + 1),
-        position=np.zeros((len(pick), 3)) if data.has_position else None,
+        t_s=_later(data, len(pick)),
+        position=np.full((len(pick), 3), 0.0 if data.has_position else np.nan),
         quat_wxyz=np.tile([1.0, 0, 0, 0], (len(pick), 1)) if data.has_orientation else None,
-        tensions=np.zeros((len(pick), data.n_cables)) if data.has_tension else None,
+        tensions=np.full((len(pick), data.n_cables), 0.0 if data.has_tension else np.nan),
         temperature_C=None
         if data.temperature_C is None
         else np.full(len(pick), float(np.mean(data.temperature_C))),
     )
     return _like(problem, new)
+
+
+def _later(data: Measurements, count: int) -> Array | None:
+    if data.t_s is None:
+        return None
+    return np.asarray(float(data.t_s[-1]) + 60.0 * np.arange(1, count + 1), float)
 
 
 def measured_directly(effect_name: str, robot: Robot) -> str:

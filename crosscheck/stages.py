@@ -13,6 +13,11 @@ from crosscheck.problem import ORIENTATION, POSITION, TENSION, Problem, State
 from crosscheck.search import Step
 from seecr.pose import Array
 
+# The longest arrow over the widest side of the region, and the percentile that is as long.
+_ARROW, _LARGEST = 0.13, 98.0
+# A side that is shorter than this part of the longest is flat.
+_FLAT = 0.02
+
 
 @dataclass(frozen=True)
 class Kind:
@@ -112,3 +117,47 @@ def sizes_of(problem: Problem, state: State, kind: Kind) -> Array:
     else:
         size = np.linalg.norm(raw, axis=1)
     return np.where(some.any(axis=1), size, np.nan)
+
+
+def magnification(problem: Problem, state: State) -> float:
+    """How many times too long arrows of the position error are drawn; 0 where there are none.
+
+    A round number with which all but the largest are within a part of the measured region.
+    """
+    place = state.prediction.poses[:, :3]
+    size = sizes_of(problem, state, KINDS[0])
+    size = size[np.isfinite(size)]
+    if len(size) == 0 or not np.any(size > 0):
+        return 0.0
+    span = float(np.max(np.ptp(place[problem.use], axis=0)))
+    longest = max(float(np.percentile(size, _LARGEST)), 1e-12)
+    factor = _ARROW * max(span, 1e-9) / longest
+    power = 10.0 ** np.floor(np.log10(factor))
+    return float(max(s for s in (1.0, 2.0, 5.0) if s * power <= factor) * power)
+
+
+def floor_of(found: Diagnosis, kind: Kind) -> float:
+    """The rms error that noise alone would give, in SI; that of the commanded lengths with it."""
+    assert found.search is not None
+    problem, last = found.search.problem, found.search.last.fit.state
+    floor = found.floor.get(kind.key) or 0.0
+    if problem.sigma.length_m:
+        noise = np.sqrt(np.sum(last.factor**2, axis=-1))
+        floor = rms_by_kind(problem, noise)[kind.key] or 0.0
+    return floor * found.search.noise_scale
+
+
+def views_of(place: Array) -> list[tuple[int, int]]:
+    """Pairs of axes to look along: from above and from the side, or the plane of a flat robot.
+
+    Args:
+        place: (n, 3) [m] of what is to be seen.
+    """
+    span = np.ptp(place, axis=0)
+    wide = span > _FLAT * max(float(span.max()), 1e-12)
+    if wide.all():
+        return [(0, 1), (0, 2)]
+    kept = [int(k) for k in np.flatnonzero(wide)]
+    kept += [k for k in (0, 2, 1) if k not in kept]
+    first, second = sorted(kept[:2])
+    return [(first, second)]

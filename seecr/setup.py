@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seecr.errors import InputError
 from seecr.pose import Array, transform_points
@@ -31,7 +32,7 @@ class Commands:
 
     pose: Array
     lengths: Array | None = None
-    run: Array | None = None
+    run: NDArray[np.int64] | None = None
     time: Array | None = None
     temperature: Array | None = None
 
@@ -50,7 +51,7 @@ class Commands:
     _kept: list[tuple[Robot, Array]] = field(default_factory=list, repr=False)
 
 
-def play(told: Array, run: Array | None, half_width: Array) -> Array:
+def play(told: Array, run: NDArray[np.int64] | None, half_width: Array) -> Array:
     """The play operator: an output that lags its input (n, m) by up to the half-width (m,).
 
     It starts centred on the first row of each run.

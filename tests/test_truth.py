@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
@@ -150,17 +151,17 @@ def test_a_platform_that_is_free_to_move_is_not_at_rest():
     assert taut == 2 and truth.free[0] and not truth.at_rest[0]
 
 
-def test_hysteresis_depends_on_the_points_looked_at_only_to_second_order():
-    robot = robot_named()
-    x = np.concatenate([np.linspace(-0.2, 0.2, 5), np.linspace(0.2, -0.2, 5)])
-    commands = commands_of(robot, x)
-    effects = [effect("hysteresis", amplitude=0.05, stretch=3e-4)]
-    fine, finer = (
-        measure(robot, commands, effects, waypoints=points) for points in ((12, 4), (24, 8))
-    )
-    plain = measure(robot, commands)
-    assert np.max(distance(fine.pose, plain.pose)) > 2e-5
-    assert np.max(distance(fine.pose, finer.pose)) < 0.2 * np.max(distance(fine.pose, plain.pose))
+def test_hysteresis_leaves_a_loop_and_forgets_it_between_runs():
+    robot = dataclasses.replace(robot_named(), ea=np.full(8, 300.0))
+    forth = np.linspace(-0.2, 0.2, 5)
+    x = np.concatenate([forth, forth[::-1], forth])
+    run = np.repeat([0, 0, 1], 5)
+    commands = Commands(pose=commands_of(robot, x).pose, run=run)
+    truth = measure(robot, commands, [effect("hysteresis", amplitude=0.05, stretch=3e-4)])
+    there, back, again = truth.pose.reshape(3, 5, 7)
+    apart = distance(there[1:-1], back[::-1][1:-1])
+    assert np.all(apart > 5e-5)
+    np.testing.assert_allclose(again, there, atol=1e-9)
 
 
 def test_creep_under_a_held_pose_goes_as_kelvin_and_voigt_say():

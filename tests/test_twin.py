@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import filecmp
 import json
+import xml.etree.ElementTree as ElementTree
 
 import numpy as np
 import pytest
@@ -167,10 +169,17 @@ def test_what_is_hidden_explains_the_readings(robot, name):
     assert is_noise(residuals(twin))
 
 
-@pytest.mark.parametrize("name", ["backlash", "hysteresis", "exit_friction"])
-def test_what_happens_on_the_way_explains_the_readings(name):
+@pytest.mark.parametrize(
+    ("robot", "name"),
+    [
+        ("demobot_cogiro", "backlash"),
+        ("demobot_parallel", "hysteresis"),
+        ("demobot_cogiro", "exit_friction"),
+    ],
+)
+def test_what_happens_on_the_way_explains_the_readings(robot, name):
     """Here the rows must lie as near as they usually do: both look at points between them."""
-    twin = make_twin(COGIRO, 21, effects=(name,), points=12)
+    twin = make_twin(model_path(robot), 21, effects=(name,), points=12)
     assert is_noise(residuals(twin))
 
 
@@ -179,14 +188,9 @@ def test_two_hidden_effects_act_together():
     twin = make_twin(COGIRO, 2, effects=names, points=POINTS)
     assert is_noise(residuals(twin))
     assert set(twin.answer["moves_over_noise"]) == set(names)
-    alone = Hidden(twin.hidden[0].layout, twin.hidden[0].layout.null)
-    assert not is_noise(residuals(replace_hidden(twin, (alone, twin.hidden[1]))))
-
-
-def replace_hidden(twin, hidden):
-    import dataclasses
-
-    return dataclasses.replace(twin, hidden=hidden)
+    absent = Hidden(twin.hidden[0].layout, twin.hidden[0].layout.null)
+    without = dataclasses.replace(twin, hidden=(absent, twin.hidden[1]))
+    assert not is_noise(residuals(without))
 
 
 def test_a_robot_of_another_size_has_noise_of_another_size(tmp_path):
@@ -199,9 +203,7 @@ def test_a_robot_of_another_size_has_noise_of_another_size(tmp_path):
 
 def _scaled(text, factor):
     """The MJCF with its lengths (and springs) as many times as large."""
-    import xml.etree.ElementTree as tree
-
-    root = tree.fromstring(text)
+    root = ElementTree.fromstring(text)
     for node in root.iter():
         for key in ("pos", "springlength", "size", "fromto"):
             if key in node.attrib and not (key == "size" and node.tag == "statistic"):
@@ -209,7 +211,7 @@ def _scaled(text, factor):
                 node.attrib[key] = " ".join(map(repr, numbers))
         if "stiffness" in node.attrib:
             node.attrib["stiffness"] = repr(float(node.attrib["stiffness"]) / factor)
-    return tree.tostring(root, encoding="unicode")
+    return ElementTree.tostring(root, encoding="unicode")
 
 
 def test_the_command_writes_a_case_and_does_not_tell(tmp_path):

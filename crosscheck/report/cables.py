@@ -7,7 +7,6 @@ a drum a sine, creep a curve in time, friction and backlash a step with the dire
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,7 +14,18 @@ from matplotlib.axes import Axes
 from crosscheck.associations import channels
 from crosscheck.cable_space import cable_errors, cable_lengths
 from crosscheck.problem import TENSION, Problem
-from crosscheck.report.drawing import AFTER, BEFORE, INK, MANY, NOISE, blank, grid, styled, svg
+from crosscheck.report.drawing import (
+    AFTER,
+    INK,
+    MANY,
+    NOISE,
+    TINT,
+    blank,
+    dots,
+    grid,
+    styled,
+    svg,
+)
 from crosscheck.stages import KINDS, Stage
 from crosscheck.travel import travel
 from seecr.experiment import Prediction
@@ -110,28 +120,32 @@ def _time(problem: Problem) -> list[tuple[str, Array]]:
 
 
 def paid_out(problem: Problem, prediction: Prediction) -> Array:
-    """Commanded change of each cable's length (n, m) [m] since the row before in its run."""
+    """Commanded change of each cable's length (n, m) [m] since the row before in its run.
+
+    NaN for the first row of a run: its long way from the reference pose would hide the others.
+    """
     run = problem.data.run_index
     first = np.concatenate([[True], run[1:] != run[:-1]])
     lengths = problem.experiment.commands.lengths
     if lengths is None:
-        robot = problem.robot
-        lengths = robot.nominal_lengths(travel(problem, prediction).pose)
-        home = robot.nominal_lengths(robot.reference_pose[None])
-    else:
-        home = np.full((1, lengths.shape[1]), np.nan)
-    before = np.concatenate([home, lengths[:-1]])
-    return np.asarray(lengths - np.where(first[:, None], home, before))
+        lengths = problem.robot.nominal_lengths(travel(problem, prediction).pose)
+    before = np.concatenate([lengths[:1], lengths[:-1]])
+    return np.asarray(np.where(first[:, None], np.nan, lengths - before))
 
 
 def draw_wall(wall: Wall, salt: str) -> str:
     """One row of panels a cable (or reading), one column an abscissa."""
     rows = _worth_showing(wall)
     with styled(salt):
-        figure = blank(_ROW_HEIGHT * len(rows) + 0.62)
+        height = _ROW_HEIGHT * len(rows) + 0.75
+        figure = blank(height, constrained=False)
         panels = figure.subplots(
-            len(rows), len(wall.abscissae), sharex="col", sharey=bool(wall.unit), squeeze=False
-        )
+            len(rows), len(wall.abscissae), sharex="col", sharey=bool(wall.unit), squeeze=False,
+            gridspec_kw={
+                "left": 0.105, "right": 0.995, "bottom": 0.5 / height, "top": 1.0 - 0.25 / height,
+                "wspace": 0.07 if wall.unit else 0.16, "hspace": 0.16,
+            },
+        )  # fmt: skip
         for place, k in enumerate(rows):
             for axes, (_name, values) in zip(panels[place], wall.abscissae, strict=True):
                 _panel(axes, values if values.ndim == 1 else values[:, k], wall, k)
@@ -155,14 +169,13 @@ def _worth_showing(wall: Wall) -> list[int]:
 
 def _panel(axes: Axes, x: Array, wall: Wall, k: int) -> None:
     y, model = wall.measured[:, k], wall.predicted[:, k]
-    many = bool(np.isfinite(y).sum() > MANY)
-    style: dict[str, Any] = {"linewidths": 0, "rasterized": many}
     level = float(wall.noise[k])
     axes.axhspan(-2 * level, 2 * level, color=NOISE, linewidth=0, zorder=0)
     axes.axhline(0.0, color=INK, linewidth=0.5, zorder=1)
-    axes.scatter(x, y, s=3 if many else 9, color=BEFORE, alpha=0.55, zorder=2, **style)
+    many = bool(np.isfinite(y).sum() > MANY)
+    dots(axes, x, y, 2.4 if many else 4.4, TINT, 2)
     if np.any(model[np.isfinite(model)] != 0.0):
-        axes.scatter(x, model, s=1.5 if many else 3.5, color=AFTER, zorder=3, **style)
+        dots(axes, x, model, 1.0 if many else 2.0, AFTER, 3)
     grid(axes, "x")
     axes.margins(x=0.04)
     axes.locator_params(axis="y", nbins=3)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from crosscheck.candidates import amplitude_columns, own_columns
-from crosscheck.confounding import containment
 from crosscheck.diagnosis import Diagnosis
 from crosscheck.evidence import projected
 from crosscheck.fit import Fit
@@ -60,9 +59,21 @@ def confusion_of(found: Diagnosis) -> Confusion | None:
     kept = tuple(columns)
     if len(kept) < 2:
         return None
-    part = np.array([[containment(columns[a], columns[b]) for b in kept] for a in kept])
+    bases = {name: _basis(own) for name, own in columns.items()}
+    part = np.array([[_contained(columns[a], bases[b]) for b in kept] for a in kept])
     listed = sum(1 for f in found.missing if f.effect in columns)
     return Confusion(kept, listed, np.clip(part, 0.0, 1.0))
+
+
+def _basis(columns: Array) -> Array:
+    """Orthonormal basis of what an effect's columns span."""
+    u, s, _vt = np.linalg.svd(columns, full_matrices=False)
+    return np.asarray(u[:, s > 1e-9 * max(float(s[0]), 1e-300)])
+
+
+def _contained(columns: Array, basis: Array) -> float:
+    """Part of an effect's signal in a space: :func:`crosscheck.confounding.containment`."""
+    return float(np.sum((basis.T @ columns) ** 2) / np.sum(columns**2))
 
 
 def _names(found: Diagnosis) -> list[str]:

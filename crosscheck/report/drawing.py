@@ -9,12 +9,18 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import matplotlib
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from seecr.pose import Array
 
 # Okabe and Ito (2008): pairs that stay apart for every common kind of colour blindness.
-BEFORE, AFTER, UNSURE = "#D55E00", "#0072B2", "#8a94a0"
+BEFORE, TINT, AFTER, UNSURE = "#D55E00", "#F3B48A", "#0072B2", "#8a94a0"
 INK, GREY, FAINT, NOISE = "#1d2329", "#6b747d", "#e7eaed", "#d9dee3"
 WIDTH = 10.4
 """Width of a figure [in]; the page scales it to its own."""
@@ -57,9 +63,14 @@ def styled(salt: str) -> Iterator[None]:
         yield
 
 
-def blank(height: float, width: float = WIDTH) -> Figure:
-    """An empty figure that fills the page's width, so high [in]."""
-    figure = Figure(figsize=(width, height), layout="constrained")
+def blank(height: float, width: float = WIDTH, *, constrained: bool = True) -> Figure:
+    """An empty figure that fills the page's width, so high [in].
+
+    Args:
+        height, width: [in].
+        constrained: let Matplotlib find room for all labels, which takes its time.
+    """
+    figure = Figure(figsize=(width, height), layout="constrained" if constrained else None)
     FigureCanvasSVG(figure)
     return figure
 
@@ -88,5 +99,40 @@ def svg(figure: Figure, words: str) -> str:
     text = re.sub(r"<!--.*?-->\n?", "", text, flags=re.DOTALL)
     head = f'<svg role="img" aria-label="{html.escape(words, quote=True)}"'
     text = re.sub(r'<svg width="[^"]*" height="[^"]*"', lambda _m: head, text, count=1)
-    # a hundredth of a point is finer than any screen
-    return re.sub(r"(\d+\.\d\d)\d+", r"\1", text).strip()
+    return re.sub(r'\s(?:d|x|y)="[^"]*"', _rounded, text).strip()
+
+
+def _rounded(found: re.Match[str]) -> str:
+    """Coordinates to a hundredth of a point, which is finer than any screen."""
+    short = re.sub(r"(\d+\.\d\d)\d+", r"\1", found.group())
+    return re.sub(r"\s*\n", "", short)
+
+
+def dots(axes: Axes, x: Array, y: Array, size: float, colour: str, order: float) -> None:
+    """Round dots of one colour, so many points wide, as one path: a tenth of the text.
+
+    Many are drawn as an image.
+    """
+    seen = np.isfinite(x) & np.isfinite(y)
+    points = np.stack([x[seen], y[seen]], axis=1)
+    if len(points) == 0:
+        return
+    # a line from a point to itself with round ends is a dot
+    codes = np.tile(np.array([Path.MOVETO, Path.LINETO], dtype=np.uint8), len(points))
+    path = Path(np.repeat(points, 2, axis=0), codes)
+    path.should_simplify = False  # it would take dots for needless points of a line
+    patch = PathPatch(
+        path, fill=False, edgecolor=colour, linewidth=size, capstyle="round", zorder=order
+    )
+    patch.set_rasterized(len(points) > MANY)
+    axes.add_patch(patch)
+    axes.update_datalim(points)
+    axes.autoscale_view()
+
+
+def plain_log(axes: Axes) -> None:
+    """A logarithmic axis of x whose labels are plain numbers."""
+    axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())

@@ -11,10 +11,10 @@ from markupsafe import Markup
 
 from crosscheck.diagnosis import Diagnosis
 from crosscheck.errors import CrosscheckError
+from crosscheck.numbers import short
 from crosscheck.problem import Problem
 from crosscheck.report.cables import draw_wall, walls_of
 from crosscheck.report.confusion import confusion_of, draw_confusion
-from crosscheck.report.numbers import short
 from crosscheck.report.tables import candidate_rows, checks, errors_of, finding_context
 from crosscheck.report.waterfall import waterfall
 from crosscheck.report.where import failure_map, scale_words

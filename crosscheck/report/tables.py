@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +13,7 @@ from crosscheck.diagnosis import Diagnosis, Finding, Rms
 from crosscheck.evidence import p_value
 from crosscheck.fit import sizes
 from crosscheck.noise import POOR_FIT, STRUCTURED
-from crosscheck.report.numbers import chance, in_unit, parameter_name, percent, short, with_error
+from crosscheck.numbers import chance, in_unit, parameter_name, percent, short, with_error
 from crosscheck.search import FALSE_ALARM, Step
 from crosscheck.stages import KINDS
 
@@ -87,9 +88,7 @@ def _tried(step: Step) -> int:
 
 def _better_runs(steps: list[Step]) -> tuple[int, int]:
     """Runs left out whose error falls with every effect that was added, and all."""
-    falls = [
-        a.held_out.chi2 - b.held_out.chi2 for a, b in zip(steps[:-1], steps[1:], strict=True)
-    ]
+    falls = [a.held_out.chi2 - b.held_out.chi2 for a, b in itertools.pairwise(steps)]
     least = np.min(falls, axis=0)
     return int(np.sum(least > 0)), len(least)
 

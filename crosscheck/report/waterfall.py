@@ -6,6 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from crosscheck.diagnosis import Diagnosis
+from crosscheck.noise import rms_by_kind
+from crosscheck.numbers import short
 from crosscheck.report.drawing import (
     AFTER,
     BEFORE,
@@ -15,11 +17,11 @@ from crosscheck.report.drawing import (
     UNSURE,
     blank,
     grid,
+    plain_log,
     styled,
     svg,
 )
-from crosscheck.report.numbers import short
-from crosscheck.stages import Kind, Stage, by_block, kinds_read, stages_of
+from crosscheck.stages import Kind, Stage, by_block, floor_of, kinds_read, stages_of
 
 # Errors this many times the noise need a logarithmic axis for both to be seen.
 _FAR = 12.0
@@ -57,11 +59,11 @@ def _panel(axes: Axes, found: Diagnosis, stages: list[Stage], kind: Kind) -> Non
     problem = found.search.problem
     values = [(stage.step.held_out.rms[kind.key] or 0.0) * kind.factor for stage in stages]
     blocks = [by_block(problem, stage, kind) * kind.factor for stage in stages]
-    floor = (found.floor.get(kind.key) or 0.0) * kind.factor * found.search.noise_scale
+    floor = floor_of(found, kind) * kind.factor
     top = max(*values, *(float(np.nanmax(b, initial=0.0)) for b in blocks), floor)
     logarithmic = floor > 0.0 and top > _FAR * floor
     if logarithmic:
-        axes.set_xscale("log")
+        plain_log(axes)
         left, right = 0.5 * min(floor, *values), top * (top / floor) ** 0.32
     else:
         left, right = 0.0, 1.45 * top
@@ -100,8 +102,6 @@ def _is_noise(found: Diagnosis) -> bool:
 
 
 def _in_sample(found: Diagnosis, stage: Stage, kind: Kind) -> float | None:
-    from crosscheck.noise import rms_by_kind
-
     assert found.search is not None
     value = rms_by_kind(found.search.problem, stage.state.raw)[kind.key]
     return None if value is None else value * kind.factor

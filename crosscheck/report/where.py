@@ -5,21 +5,21 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
-from matplotlib.colors import Normalize
+from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 
 from crosscheck.problem import POSITION, Problem
 from crosscheck.report.drawing import GREY, INK, MANY, blank, grid, styled, svg
-from crosscheck.report.numbers import short
-from crosscheck.stages import KINDS, Kind, Stage, kinds_read, sizes_of
+from crosscheck.stages import Kind, Stage, kinds_read, magnification, sizes_of, views_of
 from seecr.pose import Array
 
-# The largest arrow over the widest side of the region, and what share of arrows may be larger.
-_ARROW, _LARGEST = 0.13, 98.0
-# A side that is shorter than this part of the longest is flat.
-_FLAT = 0.02
+# Colours end at this percentile of the errors.
+_LARGEST = 98.0
 _MOST_HEIGHT = 3.4
+# Viridis without its bright end, which would not be seen on white.
+_COLOURS = ListedColormap(colormaps["viridis_r"](np.linspace(0.12, 1.0, 128)))
 
 
 def failure_map(problem: Problem, before: Stage, after: Stage) -> str:
@@ -37,19 +37,6 @@ def failure_map(problem: Problem, before: Stage, after: Stage) -> str:
         return svg(figure, "Where the model fails, before and after")
 
 
-def views_of(place: Array) -> list[tuple[int, int]]:
-    """Pairs of axes to look along: from above and from the side, or the plane of a flat robot."""
-    span = np.ptp(place, axis=0)
-    wide = span > _FLAT * max(float(span.max()), 1e-12)
-    if wide.all():
-        return [(0, 1), (0, 2)]
-    kept = [int(k) for k in np.flatnonzero(wide)]
-    while len(kept) < 2:
-        kept.append(next(k for k in (0, 2, 1) if k not in kept))
-    first, second = sorted(kept[:2])
-    return [(first, second)]
-
-
 def _height(place: Array, view: tuple[int, int], columns: int) -> float:
     """Of a panel [in] whose two axes have the same scale."""
     span = np.ptp(place, axis=0)
@@ -65,7 +52,7 @@ def _draw(
     place: Array,
     views: list[tuple[int, int]],
 ) -> None:
-    magnify = magnification(problem, stages[0], place)
+    magnify = magnification(problem, stages[0].state)
     kind = _coloured(problem)
     top = _top(problem, stages[0], kind) if kind else 1.0
     dots = None
@@ -87,19 +74,6 @@ def _title(stage: Stage, column: int, magnify: float) -> str:
     names = [stage.label] if column == 0 else ["+ " + t.name for t in stage.state.terms]
     scale = f"   (arrows drawn {magnify:g} times too long)" if magnify and column == 0 else ""
     return when + " ".join(names) + scale
-
-
-def magnification(problem: Problem, stage: Stage, place: Array) -> float:
-    """How many times too long arrows are drawn, a round number; 0 where there are none."""
-    size = sizes_of(problem, stage.state, KINDS[0])
-    size = size[np.isfinite(size)]
-    span = float(np.max(np.ptp(place[problem.use], axis=0)))
-    if len(size) == 0 or not np.any(size > 0):
-        return 0.0
-    factor = _ARROW * max(span, 1e-9) / float(np.percentile(size, _LARGEST))
-    power = 10.0 ** np.floor(np.log10(factor))
-    steps = [s for s in (1.0, 2.0, 5.0) if s * power <= factor]
-    return float(max(steps) * power)
 
 
 def _coloured(problem: Problem) -> Kind | None:
@@ -132,7 +106,7 @@ def _dots(
     size = (sizes_of(problem, stage.state, kind) * kind.factor)[rows]
     worst_last = np.argsort(np.nan_to_num(size))
     return axes.scatter(
-        x[worst_last], y[worst_last], s=9 if many else 16, c=size[worst_last], cmap="viridis_r",
+        x[worst_last], y[worst_last], s=9 if many else 16, c=size[worst_last], cmap=_COLOURS,
         norm=Normalize(0.0, top), **style,
     )  # fmt: skip
 
@@ -165,8 +139,5 @@ def _frame(axes: Axes, place: Array, view: tuple[int, int]) -> None:
 
 def scale_words(problem: Problem, stage: Stage) -> str:
     """What an arrow means, for the caption."""
-    place = stage.state.prediction.poses[:, :3]
-    magnify = magnification(problem, stage, place)
-    if not magnify:
-        return ""
-    return f"An error of 1 mm is an arrow of {short(magnify)} mm."
+    magnify = magnification(problem, stage.state)
+    return f"An error of 1 mm is an arrow of {magnify:g} mm." if magnify else ""

@@ -70,16 +70,17 @@ def stiffness(world: World, taut: NDArray[np.bool_]) -> Array:
     return 0.5 * (matrix + matrix.T)
 
 
-def descend(world: World, judge: bool = True) -> Descent:
+def descend(world: World, judge: bool = True, limit: int = _MAX_ITERATIONS) -> Descent:
     """Go downhill from the world's present state until MuJoCo's forces balance.
 
     Args:
         world: left where it ends.
         judge: look whether it is stable there, and go on if it is not.
+        limit: steps to take at most.
     """
     total = 0
     for nudge in range(1 + _NUDGES):
-        size, iterations = _minimise(world, total)
+        size, iterations = _minimise(world, limit - total)
         total += iterations
         fine = size <= max(_TOLERANCE, 10.0 * world.rounding())
         if not (fine and judge):
@@ -113,12 +114,12 @@ def _softest(world: World) -> tuple[float, Array, float]:
     return float(values[0]), np.asarray(vectors[:, 0]), zero
 
 
-def _minimise(world: World, done: int) -> tuple[float, int]:
+def _minimise(world: World, limit: int) -> tuple[float, int]:
     force = world.residual() / world.metre
     size = float(np.linalg.norm(force)) / world.force_scale
     goal = max(0.01 * _TOLERANCE, world.rounding())
     damping = 0.0
-    for iteration in range(_MAX_ITERATIONS - done):
+    for iteration in range(limit):
         if size <= goal:
             return size, iteration
         world.update()
@@ -135,7 +136,7 @@ def _minimise(world: World, done: int) -> tuple[float, int]:
                 return size, iteration
         force, size = better, float(np.linalg.norm(better)) / world.force_scale
         damping = 0.1 * damping if damping > 1e-12 * float(np.max(matrix)) else 0.0
-    return size, _MAX_ITERATIONS
+    return size, limit
 
 
 def _damped_step(world: World, matrix: Array, force: Array, damping: float) -> Array | None:

@@ -27,7 +27,9 @@ of them the error of that order is taken away (Richardson)."""
 # Of MuJoCo's dynamics, before the last digits are polished.
 _AT_REST, _MAX_STEPS = 1e-6, 40_000
 # Tangents of a law with memory until it agrees with MuJoCo: relative to the load.
-_AGREED, _TANGENTS = 1e-10, 60
+_AGREED, _TANGENTS = 1e-9, 60
+# Steps downhill.
+_LIMIT = 300
 # Rounds until what lies on the sheaves and what hangs free agree, relative to a cable.
 _SHARE, _SHARES = 1e-10, 20
 
@@ -159,12 +161,14 @@ def _start(world: World, bare: World, pose: Array, springs: Springs) -> bool:
     return True
 
 
-def _settle(world: World, springs: Springs, judge: bool = True) -> Descent:
+def _settle(
+    world: World, springs: Springs, judge: bool = True, limit: int = _LIMIT
+) -> Descent:
     """Polish, or go downhill; with chains over sheaves until their free parts are right."""
     found = _NOWHERE
     for _ in range(_SHARES):
         world.set_springs(springs)
-        found = descend(world, judge)
+        found = descend(world, judge, limit)
         if world.segments == 1 or not world.true.pulley_radius or not found.balanced:
             break
         share = world.measure_free_share()
@@ -218,15 +222,19 @@ def _agree(world: World, cables: list[Cable]) -> Descent:
             # a kink at which tangents flip: meet halfway
             tangent = tangent.halfway(springs)
         springs = tangent
-        if not _settle(world, springs, judge=False).balanced:
+        # one step for each tangent is Newton's method on both; all of them where that fails
+        quick = turn < _TANGENTS // 6
+        fine = _settle(world, springs, judge=False, limit=1 if quick else _LIMIT).balanced
+        if not (fine or quick):
             return _NOWHERE
         tensions = world.cable_tensions()
-        if before is not None and np.max(np.abs(tensions - before)) < _AGREED * world.force_scale:
+        moved = np.inf if before is None else float(np.max(np.abs(tensions - before)))
+        if fine and moved < _AGREED * world.force_scale:
             break
         before = tensions
     else:
         return _NOWHERE
-    found = descend(world)
+    found = _settle(world, springs)
     _tangents(world, cables)
     for cable, tension in zip(cables, world.cable_tensions(), strict=True):
         cable.rests(bool(tension == 0.0))

@@ -118,20 +118,33 @@ class Cable:
         return at - tension / stiffness, stiffness
 
     def _strain_at(self, length: float) -> float:
-        """Strain at which the cable has this length, or at which it just goes taut."""
-        low, high = 0.0, 1e-3
-        while self.length(high)[0] < length or self.length(high)[2] == 0.0:
-            high *= 2.0
+        """Strain at which the cable has this length, or at which it just goes taut.
+
+        Newton's method inside a bracket; to where a cable goes taut the bracket alone leads.
+        """
+        low, high = 0.0, max(2.0 * self.strain, 1e-6)
+        while not self._reaches(length, high):
+            low, high = high, 2.0 * high
+        strain = min(max(self.strain, low), high)
         for _ in range(_BISECTIONS):
-            middle = 0.5 * (low + high)
-            if middle in (low, high):
-                break
-            at, _, tension, _ = self.length(middle)
-            if at < length or tension == 0.0:
-                low = middle
+            at, rate, tension, _ = self.length(strain)
+            if tension > 0.0 and abs(at - length) <= 2e-16 * length:
+                return strain
+            if tension > 0.0 and at >= length:
+                high = strain
             else:
-                high = middle
+                low = strain
+            following = strain - (at - length) / rate
+            if not (tension > 0.0 and low < following < high):
+                following = 0.5 * (low + high)
+            if following in (low, high):
+                break
+            strain = following
         return high
+
+    def _reaches(self, length: float, strain: float) -> bool:
+        at, _, tension, _ = self.length(strain)
+        return tension > 0.0 and at >= length
 
     def rests(self, slack: bool) -> None:
         """Remember the state the cable has come to rest in."""

@@ -1,0 +1,64 @@
+"""``crosscheck plan`` from outside."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from made_data import case, refused, run
+
+
+@pytest.fixture(scope="module")
+def poses(tmp_path_factory):
+    """Commands without readings."""
+    folder = tmp_path_factory.mktemp("poses")
+    xml, data = case(folder, points=6)
+    lines = data.read_text().splitlines()
+    keep = [i for i, name in enumerate(lines[0].split(",")) if not name.startswith("meas")]
+    planned = folder / "poses.csv"
+    planned.write_text(
+        "\n".join(",".join(line.split(",")[i] for i in keep) for line in lines) + "\n"
+    )
+    return xml, planned
+
+
+def test_a_plan_says_what_shows_what_is_alike_and_what_to_add(poses, tmp_path):
+    result = run("plan", *poses, "--out", tmp_path)
+    assert result.exit_code == 0 and result.stderr == ""
+    out = result.stdout
+    assert "noise of positions is not stated" in out
+    assert "pulley_radius" in out and "frame_compliance (exactly)" in out
+    assert "add: record the cable tensions" in out and "needs" in out
+    assert "of these could be named" in out
+    document = json.loads((tmp_path / "plan.json").read_text())
+    stiffness = next(e for e in document["effects"] if e["effect"] == "stiffness")
+    assert stiffness["visible"] is True and stiffness["smallest_identifiable"] is None
+    assert {"effect": "platform_mass", "exact": True, "signal": 0.0} in stiffness[
+        "cannot_be_told_from"
+    ]
+    assert stiffness["smallest_visible"]["factor"] < 0.3
+    table = document["confusion"]["containment"]
+    assert len(table) == len(document["confusion"]["effects"])
+    added = next(s for s in document["add"] if s["kind"] == "poses")
+    assert all(len(p) == 7 for p in added["poses"])
+
+
+def test_json_and_stated_noise(poses, tmp_path):
+    options = ("--position-sigma", "0.1mm", "--orientation-sigma", "1mrad")
+    result = run("plan", *poses, *options, "--tension-sigma", "0.05N", "--json", "--out", tmp_path)
+    document = json.loads(result.stdout)
+    assert document == json.loads((tmp_path / "plan.json").read_text())
+    assert document["sigma"]["position_m"] == pytest.approx(1e-4)
+    assert document["sigma"]["tension_N"] == pytest.approx(0.05)
+    assert document["notes"] == []
+    assert "tension_scale" in [e["effect"] for e in document["effects"]]
+    assert "tensions" not in [s["kind"] for s in document["add"]]
+
+
+def test_noise_without_a_right_unit_is_refused(poses, tmp_path):
+    out = tmp_path / "out"
+    text = refused("plan", *poses, "--position-sigma", "0.1", "--out", out)
+    assert "--position-sigma: expected a number with its unit" in text
+    assert "came unit 'mm'" in refused("plan", *poses, "--tension-sigma", "1mm", "--out", out)
+    assert "none.csv" in refused("plan", poses[0], tmp_path / "none.csv", "--out", out)
+    assert not out.exists()
