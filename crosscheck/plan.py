@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crosscheck.confounding import containment
 from crosscheck.extensions import Extension, extensions, more_poses
 from crosscheck.greedy import chosen_poses
 from crosscheck.measurements import Measurements
@@ -196,7 +195,7 @@ def _visible(name: str, own: Mapping[str, Signal]) -> Visible:
     g = own[name]
     need = needed(g.directions, len(own))
     power = g.power
-    left = {other: left_over(g.columns, s.columns) for other, s in own.items() if other != name}
+    left = {other: left_over(g, s) for other, s in own.items() if other != name}
     twins = tuple(o for o, value in left.items() if power > 0 and value <= EXACT * power)
     rest = {o: value for o, value in left.items() if o not in twins}
     imitator = min(rest, key=lambda o: rest[o]) if rest else ""
@@ -220,7 +219,8 @@ def _confusion(own: Mapping[str, Signal]) -> tuple[tuple[str, ...], Array]:
     for i, a in enumerate(names):
         for j, b in enumerate(names):
             if i != j:
-                table[i, j] = containment(own[a].columns, own[b].columns)
+                power = own[a].power
+                table[i, j] = 1.0 - left_over(own[a], own[b]) / power if power > 0 else 0.0
     return names, table
 
 
@@ -276,8 +276,8 @@ def _suggestion(
     both = joined(own, there)
     gains = []
     for name, other, now, need in open_pairs:
-        g = both[name].columns
-        then = left_over(g, both[other].columns) if other else both[name].power
+        g = both[name]
+        then = left_over(g, both[other]) if other else g.power
         if then > _GAINS * now and then > 0.1 * need:
             gains.append(Gain(name, other, now, then, need))
     gains.sort(key=lambda gain: (gain.then < gain.needed, -gain.then / gain.needed))

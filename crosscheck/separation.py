@@ -102,14 +102,14 @@ def _options(problem: Problem, final: Fit) -> list[tuple[str, Problem]]:
         options.append(("record the cable tensions", lambda: _with_tensions(problem, final)))
     if not data.has_position or not data.has_orientation:
         options.append(("record the whole pose of the platform", lambda: _with_pose(problem)))
-    if data.command_pose is not None:
-        load = _PAYLOAD * problem.robot.mass
-        options.append(
-            (
-                f"repeat the poses with a known payload of {load:.2g} kg at the centre of mass",
-                lambda: _with_payload(problem),
-            )
+    load = _PAYLOAD * problem.robot.mass
+    options.append(
+        (
+            f"repeat the poses with a known payload of {load:.2g} kg at the centre of mass",
+            lambda: _with_payload(problem),
         )
+    )
+    if data.command_pose is not None:
         options.append(
             (
                 f"add {_MORE_POSES} poses tilted by 10 deg, high and low at the corners of the "

@@ -10,13 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from scipy import optimize, stats
 
 from crosscheck.candidates import amplitude_columns, layouts_for
-from crosscheck.evidence import projected
 from crosscheck.planned import Planned
 from seecr.effects.base import Layout
 from seecr.pose import Array
@@ -26,6 +25,8 @@ LEVEL, POWER = 0.05, 0.8
 
 # A direction this much weaker than the strongest is no direction.
 _RANK = 1e-5
+# ... as the rounding of differences leaves behind.
+_BASIS = 1e-9
 # What an exact twin leaves, of the signal.
 EXACT = 1e-6
 
@@ -43,6 +44,17 @@ class Signal:
     shape: dict[str, float]
     columns: Array
 
+    @cached_property
+    def _decomposed(self) -> tuple[Array, Array]:
+        u, s, _vt = np.linalg.svd(self.columns, full_matrices=False)
+        return u, s
+
+    @cached_property
+    def basis(self) -> Array:
+        """Orthonormal basis (N, d) of all that the effect can do to the readings."""
+        u, s = self._decomposed
+        return np.asarray(u[:, s > _BASIS * s[0]] if len(s) and s[0] > 0 else u[:, :0])
+
     @property
     def power(self) -> float:
         """Squared signal to be expected of plausible sizes."""
@@ -51,7 +63,7 @@ class Signal:
     @property
     def directions(self) -> int:
         """How many directions of its parameters show."""
-        s = np.linalg.svd(self.columns, compute_uv=False)
+        s = self._decomposed[1]
         return max(1, int(np.sum(s > _RANK * s[0]))) if len(s) and s[0] > 0 else 1
 
 
@@ -103,9 +115,9 @@ def _columns(plan: Planned, layout: Layout, shape: dict[str, float]) -> Array:
     return np.asarray(np.where(given, 0.0, columns * layout.scale))
 
 
-def left_over(g: Array, h: Array) -> float:
-    """lam_gh: squared signal of columns g that columns h cannot imitate."""
-    return float(np.sum(projected(g, h) ** 2))
+def left_over(g: Signal, h: Signal) -> float:
+    """lam_gh: squared signal of g that h cannot imitate."""
+    return float(np.sum((g.columns - h.basis @ (h.basis.T @ g.columns)) ** 2))
 
 
 def joined(a: Mapping[str, Signal], b: Mapping[str, Signal]) -> dict[str, Signal]:

@@ -18,7 +18,7 @@ from crosscheck.plan_text import as_json, size_words
 from crosscheck.planned import near_slack
 from crosscheck.problem import Problem
 from crosscheck.sigma import Sigma
-from crosscheck.visibility import left_over, needed, signals, signals_like
+from crosscheck.visibility import joined, left_over, needed, signals, signals_like
 from seecr.mjcf import load_robot
 from seecr.pose import rotvec_from_quat
 from seecr.shipped import model_path
@@ -164,11 +164,9 @@ def test_chosen_poses_beat_the_first_ones(plan):
 
     def signal(chosen):
         some = np.isin(row_of, chosen)
-        columns = [
-            np.concatenate([own[n].columns, there[n].columns[some]])
-            for n in ("centre_of_mass", "external_wrench")
-        ]
-        return left_over(*columns)
+        few = {n: replace(s, columns=s.columns[some]) for n, s in there.items()}
+        both = joined(own, few)
+        return left_over(both["centre_of_mass"], both["external_wrench"])
 
     assert signal(rows) > 1.5 * signal(np.unique(row_of)[:4])
 

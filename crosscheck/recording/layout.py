@@ -23,7 +23,7 @@ COLUMN_ASPECT = 0.82
 _LANE_HEIGHT = 0.0405
 # Poses a second when playing.
 _FPS = 4.0
-_GROUND = (24, 27, 33)
+GROUND = (24, 27, 33)
 
 
 def eye(robot: Robot, low: Array, high: Array, aspect: float) -> rrb.EyeControls3D:
@@ -80,7 +80,7 @@ def scene_view(
     return rrb.Spatial3DView(
         origin=scenes.ROOT,
         name=name,
-        background=rrb.Background(color=_GROUND),
+        background=rrb.Background(color=GROUND),
         eye_controls=eye(robot, low, high, aspect),
         line_grid=_floor(robot, low, high),
         spatial_information=rrb.SpatialInformation(
@@ -131,7 +131,7 @@ def legend(entity: str) -> rrb.Spatial2DView:
         name="Colours",
         origin=entity,
         titlebar=False,
-        background=rrb.Background(color=_GROUND),
+        background=rrb.Background(color=GROUND),
         visual_bounds=rrb.VisualBounds2D(x_range=(0.0, 100.0), y_range=(1.5, 11.5)),
     )
 
@@ -141,12 +141,20 @@ def lanes_share(count: int) -> float:
     return min(_LANE_HEIGHT * (count + 1.2), 0.5)
 
 
-def blueprint(root: rrb.Container, *, playback_speed: float = 1.0) -> rrb.Blueprint:
+def blueprint(
+    root: rrb.Container,
+    *,
+    playback_speed: float = 1.0,
+    timeline: str = POSE,
+    frames_per_second: float = _FPS,
+) -> rrb.Blueprint:
     """Views, with the timeline over poses first and nothing else in the way.
 
     Args:
         root: the views.
         playback_speed: of timelines in seconds, over real time.
+        timeline: that it opens with.
+        frames_per_second: when playing a timeline that counts.
     """
     return rrb.Blueprint(
         root,
@@ -154,8 +162,8 @@ def blueprint(root: rrb.Container, *, playback_speed: float = 1.0) -> rrb.Bluepr
         rrb.SelectionPanel(state="hidden"),
         rrb.TimePanel(
             state="collapsed",
-            timeline=POSE,
-            fps=_FPS / playback_speed,
+            timeline=timeline,
+            fps=frames_per_second / playback_speed,
             playback_speed=playback_speed,
             play_state="paused",
             loop_mode="all",

@@ -1,0 +1,127 @@
+"""Bars of the errors, model by model, against the noise; the one under the cursor is lit."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from crosscheck.diagnosis import Diagnosis
+from crosscheck.numbers import short
+from crosscheck.recording import colours, layout
+from crosscheck.recording.colours import Rgba
+from crosscheck.recording.stream import Recording
+from crosscheck.stages import Kind, Stage, floor_of, kinds_read
+
+ROOT = "bars"
+# The drawing is 100 wide; y points down, a row a model.
+_LEFT, _RIGHT, _ROW, _HEAD = 27.0, 80.0, 4.2, 5.0
+_DIM = 0.5
+
+
+def write_bars(
+    recording: Recording, index: rr.TimeColumn, found: Diagnosis, stages: list[Stage]
+) -> None:
+    """A block a kind of reading: bars from half the noise to the error on runs left out."""
+    assert found.search is not None
+    for block, kind in enumerate(kinds_read(found.search.problem)):
+        _block(recording, index, found, stages, kind, block * _block_height(len(stages)))
+
+
+def view(found: Diagnosis, stages: list[Stage]) -> rrb.Spatial2DView:
+    """The bars' view."""
+    assert found.search is not None
+    height = len(kinds_read(found.search.problem)) * _block_height(len(stages))
+    return rrb.Spatial2DView(
+        name="rms error on runs left out, logarithmic; the line is the noise",
+        origin=ROOT,
+        background=rrb.Background(color=layout.GROUND),
+        visual_bounds=rrb.VisualBounds2D(x_range=(0.0, 100.0), y_range=(-1.0, height)),
+    )
+
+
+def _block_height(rows: int) -> float:
+    return _HEAD + rows * _ROW + 1.5
+
+
+def _block(
+    recording: Recording,
+    index: rr.TimeColumn,
+    found: Diagnosis,
+    stages: list[Stage],
+    kind: Kind,
+    top: float,
+) -> None:
+    values = np.array([kind.factor * (s.step.held_out.rms[kind.key] or 0.0) for s in stages])
+    floor = kind.factor * floor_of(found, kind)
+    ends = _places(values, values, floor)
+    rows = top + _HEAD + _ROW * (np.arange(len(stages)) + 0.5)
+    lit = [_lit(stage) for stage in stages]
+    root = f"{ROOT}/{kind.name}"
+    boxes = _boxes(ends, rows)
+    dim = [_dimmed(colour) for colour in lit]
+    solid = rr.components.FillMode.Solid
+    recording.always(f"{root}/all", _bars(boxes, dim))
+    columns = rr.Boxes2D.columns(
+        centers=boxes[:, :2], half_sizes=boxes[:, 2:], colors=np.array(lit, dtype=np.uint8)
+    )
+    recording.rows(f"{root}/now", index, columns)
+    del solid
+    place = float(_places(np.array([floor]), values, floor)[0])
+    line = [[place, rows[0] - 0.6 * _ROW], [place, rows[-1] + 0.6 * _ROW]]
+    recording.always(
+        f"{root}/noise",
+        rr.LineStrips2D([line], radii=0.18, colors=colours.SILVER),
+    )
+    names = [s.label for s in stages]
+    _words(recording, f"{root}/names", [(0.5 * _LEFT, y) for y in rows], names)
+    numbers = [f"{short(v)} {kind.unit}" for v in values]
+    _words(recording, f"{root}/numbers", [(x + 8.0, y) for x, y in zip(ends, rows, strict=True)],
+           numbers)  # fmt: skip
+    title = f"{kind.name} [{kind.unit}], noise {short(floor)}"
+    _words(recording, f"{root}/title", [(0.5 * (_LEFT + _RIGHT), top + 0.55 * _HEAD)], [title])
+
+
+def _bars(boxes: np.ndarray, shades: list[Rgba]) -> rr.LineStrips2D:
+    """Bars as thick lines: the viewer draws 2D boxes as outlines only."""
+    return rr.LineStrips2D(_strips(boxes), radii=0.3 * _ROW, colors=shades)
+
+
+def _strips(boxes: np.ndarray) -> list[np.ndarray]:
+    return [np.array([[x - w, y], [x + w, y]]) for x, y, w, _h in boxes]
+
+
+def _places(values: np.ndarray, every: np.ndarray, floor: float) -> np.ndarray:
+    """Where bars end: logarithmic from half the noise, linear where there is no noise."""
+    if floor <= 0.0:
+        return _LEFT + (_RIGHT - _LEFT) * values / max(float(every.max()), 1e-300)
+    low = np.log(0.5 * min(floor, float(every[every > 0].min(initial=floor))))
+    high = np.log(max(float(every.max()), 2.0 * floor))
+    part = (np.log(np.maximum(values, 1e-300)) - low) / (high - low)
+    return _LEFT + (_RIGHT - _LEFT) * np.clip(part, 0.01, 1.0)
+
+
+def _boxes(ends: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """(k, 4) centre and half sizes."""
+    half = 0.5 * (ends - _LEFT)
+    return np.stack([_LEFT + half, rows, half, np.full(len(rows), 0.34 * _ROW)], axis=1)
+
+
+def _lit(stage: Stage) -> Rgba:
+    if not stage.added:
+        return colours.VERMILION
+    return colours.SKY if stage.sure else colours.SILVER
+
+
+def _dimmed(colour: Rgba) -> Rgba:
+    red, green, blue = (int(_DIM * c) for c in colour[:3])
+    return red, green, blue, 255
+
+
+def _words(
+    recording: Recording, entity: str, places: list[tuple[float, float]], words: list[str]
+) -> None:
+    points = rr.Points2D(
+        places, radii=0.01, colors=colours.COMMAND, labels=words, show_labels=True
+    )
+    recording.always(entity, points)

@@ -1,0 +1,209 @@
+"""How errors of a model are drawn: arrows in the 3D view, maps, and boxes of the platform."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from crosscheck.problem import ORIENTATION, POSITION, Problem, State
+from crosscheck.recording import colours, layout
+from crosscheck.recording.states import States
+from crosscheck.recording.stream import Recording
+from crosscheck.stages import KINDS, Kind, kinds_read, magnification, sizes_of, views_of
+from seecr import cable_law
+from seecr.pose import Array, quat_from_rxyz, rxyz_from_quat
+
+MEASURED: colours.Rgba = colours.MUJOCO
+# Top of a colour scale: this percentile of the errors.
+_LARGEST = 98.0
+# Radii of arrows over the robot's size, of dots in points of the screen.
+_ARROW, _DOT, _RING = 0.0016, 5.0, 9.0
+_MARGIN = 0.14
+
+
+@dataclass(frozen=True, eq=False)
+class Misfit:
+    """What is measured, and the scales that all models on the way are drawn with.
+
+    Attributes:
+        problem: the data.
+        first: the model whose errors set the scales, and whose predictions are the places.
+    """
+
+    problem: Problem
+    first: State
+
+    @property
+    def kinds(self) -> list[Kind]:
+        """Kinds of reading that there are."""
+        return kinds_read(self.problem)
+
+    @property
+    def rows(self) -> Array:
+        """Numbers of the rows that count."""
+        return np.flatnonzero(self.problem.use)
+
+    @property
+    def place(self) -> Array:
+        """(n, 3) [m] where the rows are drawn."""
+        return self.first.prediction.readings.position
+
+    @property
+    def magnify(self) -> float:
+        """How many times too long arrows are drawn; 0 where no position was read."""
+        return magnification(self.problem, self.first)
+
+    def top(self, kind: Kind) -> float:
+        """End of the colour scale of a kind, in its unit for people."""
+        sizes = sizes_of(self.problem, self.first, kind)
+        return colours.round_up(float(np.nanpercentile(sizes, _LARGEST)) * kind.factor)
+
+    def shades(self, state: State, kind: Kind) -> colours.Colours:
+        """(k, 4) colours of the rows that count."""
+        sizes = np.nan_to_num(sizes_of(self.problem, state, kind)[self.rows])
+        return colours.scale_colours(sizes * kind.factor, self.top(kind))
+
+    @property
+    def measured(self) -> Array:
+        """(n, 7) measured poses, filled up with the first model's where only a part was read."""
+        data, readings = self.problem.data, self.first.prediction.readings
+        position = np.where(np.isfinite(data.position), data.position, readings.position)
+        if data.quat_wxyz is not None:
+            known = np.isfinite(data.quat_wxyz)
+            quat = np.where(known, data.quat_wxyz, readings.quat_wxyz)
+        else:
+            angles = rxyz_from_quat(readings.quat_wxyz)
+            known = np.isfinite(data.angles_rad)
+            quat = quat_from_rxyz(np.where(known, data.angles_rad, angles))
+        return np.concatenate([position, quat], axis=1)
+
+
+def read_poses(state: State) -> Array:
+    """(n, 7) poses that the model says would be read."""
+    readings = state.prediction.readings
+    return np.concatenate([readings.position, readings.quat_wxyz], axis=1)
+
+
+def states_of(state: State) -> States:
+    """The model's platform and cables at every row; NaN where it has no equilibrium."""
+    prediction = state.prediction
+    pose = np.where(prediction.solved[:, None], prediction.poses, np.nan)
+    slack = prediction.found.states[..., cable_law.SLACK] > 0
+    return States(pose, prediction.tensions, prediction.setup.rest_lengths(), slack)
+
+
+def worst_row(misfit: Misfit) -> int:
+    """The row that is furthest off, in units of the noise."""
+    table = np.zeros(misfit.problem.measured.shape)
+    table[misfit.problem.row_of, misfit.problem.column_of] = misfit.first.white
+    return int(np.argmax((table**2).sum(axis=1)))
+
+
+def arrows(
+    recording: Recording, index: rr.TimeColumn, misfit: Misfit, states: list[State], size: float
+) -> None:
+    """At each time the errors of one model: arrows of position, or dots where none was read."""
+    rows, place = misfit.rows, misfit.place
+    count = [len(rows)] * len(states)
+    kind = misfit.kinds[0]
+    shade = np.concatenate([misfit.shades(state, kind) for state in states])
+    origins = np.tile(place[rows], (len(states), 1))
+    if misfit.magnify:
+        vectors = np.concatenate([_vectors(misfit, state)[rows] for state in states])
+        columns = rr.Arrows3D.columns(origins=origins, vectors=vectors, colors=shade)
+        recording.rows("scene/errors", index, columns.partition(count))
+        style = rr.Arrows3D.from_fields(radii=[_ARROW * size])
+    else:
+        columns = rr.Points3D.columns(positions=origins, colors=shade)
+        recording.rows("scene/errors", index, columns.partition(count))
+        style = rr.Points3D.from_fields(radii=[4.0 * _ARROW * size])
+    recording.always("scene/errors", style)
+
+
+def _vectors(misfit: Misfit, state: State) -> Array:
+    """(n, 3) arrows [m] from what the model says to what was measured, drawn too long."""
+    counted = misfit.problem.counted[:, POSITION]
+    return misfit.magnify * np.where(counted, state.raw[:, POSITION], 0.0)
+
+
+def maps(recording: Recording, index: rr.TimeColumn, misfit: Misfit, states: list[State]) -> None:
+    """A map a kind of reading, its dots coloured by the error."""
+    rows = misfit.rows
+    points = np.tile(_flat(misfit, misfit.place)[rows], (len(states), 1))
+    count = [len(rows)] * len(states)
+    for kind in misfit.kinds:
+        entity = f"map/{kind.name}/errors"
+        shade = np.concatenate([misfit.shades(state, kind) for state in states])
+        columns = rr.Points2D.columns(positions=points, colors=shade)
+        recording.rows(entity, index, columns.partition(count))
+        radius = rr.components.Radius.ui_points(_DOT)
+        recording.always(entity, rr.Points2D.from_fields(radii=[radius]))
+        if kind.name == "position" and misfit.magnify:
+            vectors = [_flat(misfit, _vectors(misfit, state))[rows] for state in states]
+            thin = rr.Arrows2D.columns(vectors=np.concatenate(vectors), origins=points)
+            recording.rows(f"map/{kind.name}/arrows", index, thin.partition(count))
+            style = rr.Arrows2D.from_fields(
+                radii=[rr.components.Radius.ui_points(0.8)], colors=[colours.SILVER]
+            )
+            recording.always(f"map/{kind.name}/arrows", style)
+
+
+def cursor(recording: Recording, index: rr.TimeColumn, misfit: Misfit) -> None:
+    """A ring around the dot of the row under the cursor, on every map."""
+    points = _flat(misfit, misfit.place)
+    radius = rr.components.Radius.ui_points(_RING)
+    for kind in misfit.kinds:
+        entity = f"map/{kind.name}/here"
+        recording.rows(entity, index, rr.Points2D.columns(positions=points))
+        white = rr.Points2D.from_fields(radii=[radius], colors=[(255, 255, 255, 120)])
+        recording.always(entity, white)
+
+
+def _flat(misfit: Misfit, vectors: Array) -> Array:
+    """(n, 2) in the map's plane, the second axis up."""
+    first, second = views_of(misfit.place[misfit.rows])[0]
+    return np.stack([vectors[:, first], -vectors[:, second]], axis=1)
+
+
+def map_views(misfit: Misfit) -> list[rrb.Spatial2DView]:
+    """The maps' views."""
+    points = _flat(misfit, misfit.place)[misfit.rows]
+    low, high = points.min(axis=0), points.max(axis=0)
+    margin = _MARGIN * float(np.max(high - low))
+    plane = "".join("xyz"[k] for k in views_of(misfit.place[misfit.rows])[0])
+    return [
+        rrb.Spatial2DView(
+            name=f"{kind.name.capitalize()} error over {plane}: yellow is {misfit.top(kind):g} "
+            f"{kind.unit} or more",
+            origin=f"map/{kind.name}",
+            background=rrb.Background(color=layout.GROUND),
+            visual_bounds=rrb.VisualBounds2D(
+                x_range=(low[0] - margin, high[0] + margin),
+                y_range=(low[1] - margin, high[1] + margin),
+            ),
+        )
+        for kind in misfit.kinds
+    ]
+
+
+def rotation_read(problem: Problem) -> bool:
+    """Whether anything of the orientation was read."""
+    return bool(problem.counted[:, ORIENTATION].any())
+
+
+def words_of(misfit: Misfit) -> str:
+    """What arrows and colours mean, in a sentence or two."""
+    kind = misfit.kinds[0]
+    scale = f"from dark (none) to yellow ({misfit.top(kind):g} {kind.unit} or more)"
+    if not misfit.magnify:
+        return f"Dots are measured poses, coloured by their {kind.name} error {scale}."
+    return (
+        f"An arrow at each measured pose points from what the model says to what was measured; "
+        f"it is drawn **{misfit.magnify:g} times** too long and coloured {scale}."
+    )
+
+
+__all__ = ["KINDS", "Misfit", "arrows", "cursor", "map_views", "maps", "read_poses", "states_of"]
