@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crosscheck.evidence import Evidence, evidence, p_value, projected
+from crosscheck.evidence import Evidence, evidence, p_value
 from crosscheck.fit import Fit, fit, flat
 from crosscheck.problem import Problem, derivatives, evaluate
+from crosscheck.subspace import projected
 from seecr.effects import catalogue, layout_of
 from seecr.effects.base import Effect, Layout
 from seecr.errors import InputError
@@ -186,8 +187,8 @@ def seen_directions(found: Fit, name: str, base: Fit) -> int:
     """How many directions of an effect's parameters the data see beside the other terms."""
     own = own_columns(found.terms, name)
     others = projected(found.jacobian[:, own], found.jacobian[:, ~own])
-    s = np.linalg.svd(others, compute_uv=False)
-    return max(1, int(np.sum(s > 0.1))) if len(s) else 1
+    power = np.linalg.eigvalsh(others.T @ others)
+    return max(1, int(np.sum(power > 1e-2)))
 
 
 def own_columns(terms: Sequence[Term], name: str) -> np.ndarray:
@@ -199,7 +200,7 @@ def _starts(problem: Problem, base: Fit, layout: Layout, factor: Array) -> Start
     shapes = layout.effect.shapes(base.state.prediction.setup)
     scored: list[tuple[float, int, Array, dict[str, float]]] = []
     seen = False
-    orthogonal = _basis(base.jacobian)
+    orthogonal = base.span
     for shape in shapes:
         null = layout.start(shape)
         scale = layout.scale * ~layout.shape
@@ -239,14 +240,6 @@ def amplitude_columns(
             problem, state, factor, amplitudes.tolist(), frozen=True
         )
     return out
-
-
-def _basis(columns: Array) -> Array:
-    """Orthonormal basis of what columns span."""
-    if columns.shape[1] == 0:
-        return np.zeros((len(columns), 0))
-    u, s, _vt = np.linalg.svd(columns, full_matrices=False)
-    return np.asarray(u[:, s > 1e-9 * max(float(s[0]), 1e-300)])
 
 
 def _linear(x: Array, r: Array) -> tuple[Array, float, int]:

@@ -7,7 +7,7 @@ import fnmatch
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import numpy as np
 
@@ -17,6 +17,17 @@ from seecr.shipped import CABLES, model_path
 
 if TYPE_CHECKING:
     from seecr.robot import Robot
+
+
+class Named(Protocol):
+    """What ``--case`` can select."""
+
+    @property
+    def name(self) -> str:
+        """As on the terminal."""
+
+
+N = TypeVar("N", bound=Named)
 
 N_SWEEP = 24
 N_RANDOM = 200
@@ -105,7 +116,7 @@ def user_cases(
     ]
 
 
-def select(cases: Sequence[Case], patterns: Sequence[str]) -> list[Case]:
+def select(cases: Sequence[N], patterns: Sequence[str]) -> list[N]:
     """Cases that match any of the shell patterns; all without patterns.
 
     Raises:

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from crosscheck.candidates import Candidate, ordered, own_columns, try_candidate
-from crosscheck.evidence import evidence, projected
+from crosscheck.evidence import evidence
 from crosscheck.fit import Fit, fit, sizes
 from crosscheck.search import EQUAL, Search
+from crosscheck.subspace import basis, projected
 from seecr.effects import catalogue
 from seecr.pose import Array
 
@@ -99,9 +100,7 @@ def contained(signal: Array, columns: Array) -> float:
     power = float(signal @ signal)
     if power == 0.0 or columns.shape[1] == 0:
         return 0.0
-    u, s, _vt = np.linalg.svd(columns, full_matrices=False)
-    u = u[:, s > 1e-9 * max(float(s[0]), 1e-300)]
-    imitated = u.T @ signal
+    imitated = basis(columns).T @ signal
     return float(imitated @ imitated) / power
 
 

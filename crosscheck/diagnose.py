@@ -207,10 +207,9 @@ def conclude(found: Search, notes: list[str]) -> Diagnosis:
             alone = _finding(smaller, smaller.found[0])
             findings = [alone] if alone.share > _SURE_ALONE else []
             found = smaller if findings else found
+    verdict = "unknown_effect"
     if clean:
         verdict = "effects_found" if findings else "no_effect_missing"
-    else:
-        verdict = "unknown_effect"
     where = _where(found) if verdict == "unknown_effect" else ()
     shown = found.last if clean else _step_of(found, findings)
     return Diagnosis(

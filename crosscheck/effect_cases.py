@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -96,16 +97,22 @@ def effect_cases(robots: Sequence[str | Path] = ROBOTS, seed: int = 0) -> list[E
         robots: names of shipped models, or MJCF files.
         seed: of the sizes.
     """
-    cases = []
-    for robot in robots:
-        path = robot if isinstance(robot, Path) else model_path(robot)
-        loaded = load_robot(path)
-        commands = _commands(loaded)
-        for k, name in enumerate(TRUE_EFFECTS):
-            random = np.random.default_rng([seed, k])
-            hidden = choose(loaded, random, [name])[0]
-            cases.append(EffectCase(f"{path.stem}-{name}", loaded, _slow(hidden), commands))
-    return cases
+    return [effect_case(robot, name, seed) for robot in robots for name in TRUE_EFFECTS]
+
+
+def effect_case(robot: str | Path, effect: str, seed: int = 0) -> EffectCase:
+    """One effect on a robot, the same as among all of them.
+
+    Args:
+        robot: name of a shipped model, or an MJCF file.
+        effect: one of ``TRUE_EFFECTS``.
+        seed: of its size.
+    """
+    path = robot if isinstance(robot, Path) else model_path(robot)
+    loaded, commands = _robot_and_commands(path)
+    random = np.random.default_rng([seed, TRUE_EFFECTS.index(effect)])
+    hidden = choose(loaded, random, [effect])[0]
+    return EffectCase(f"{path.stem}-{effect}", loaded, _slow(hidden), commands)
 
 
 def run_effect_case(case: EffectCase) -> EffectAgreement:
@@ -113,9 +120,7 @@ def run_effect_case(case: EffectCase) -> EffectAgreement:
     experiment = Experiment(case.robot, case.commands)
     effects = [case.hidden.effect()]
     ours, plain = experiment.predict(effects), experiment.predict()
-    truth = measure(
-        case.robot, case.commands, effects, segments=_SEGMENTS, waypoints=_WAYPOINTS
-    )
+    truth = measure(case.robot, case.commands, effects, segments=_SEGMENTS, waypoints=_WAYPOINTS)
     ours_pose = np.concatenate([ours.readings.position, ours.readings.quat_wxyz], axis=1)
     theirs = np.concatenate([truth.position, truth.quat_wxyz], axis=1)
     change = pose_difference(theirs, ours_pose)
@@ -137,6 +142,12 @@ def _slow(hidden: Hidden) -> Hidden:
         if (hidden.name, name) == ("creep", "time_s"):
             vector[k] = _CREEP_TIME_S
     return Hidden(hidden.layout, vector)
+
+
+@cache
+def _robot_and_commands(path: Path) -> tuple[Robot, Commands]:
+    robot = load_robot(path)
+    return robot, _commands(robot)
 
 
 def _commands(robot: Robot) -> Commands:

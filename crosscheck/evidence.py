@@ -19,7 +19,6 @@ import numpy as np
 from scipy import special, stats
 
 from crosscheck.fit import Fit, sizes
-from seecr.pose import Array
 
 _LAMBDAS = (0.1, 0.3, 1.0, 3.0, 10.0)
 
@@ -48,9 +47,10 @@ def evidence(fit: Fit, noise_scale: float = 1.0) -> Evidence:
     # a parameter stopped by its bound is not at the optimum the formula is about
     free = ~fit.at_bound
     x = fit.jacobian[:, free] / noise_scale
-    u, s, _vt = np.linalg.svd(x, full_matrices=False)
     y = white + x @ sizes(fit.terms)[free]
-    c2 = (u.T @ y) ** 2
+    power, v = np.linalg.eigh(x.T @ x)
+    s = np.sqrt(np.maximum(power, 0.0))
+    c2 = (v.T @ (x.T @ y)) ** 2 / np.maximum(power, 1e-300)
     total = float(y @ y)
     logs = []
     for lam in _LAMBDAS:
@@ -71,12 +71,3 @@ def p_value(drop: float, parameters: int, one_sided: bool) -> float:
         return 1.0
     p = float(stats.chi2.sf(drop, max(parameters, 1)))
     return 0.5 * p if one_sided and parameters == 1 else p
-
-
-def projected(jacobian: Array, base: Array) -> Array:
-    """What is left of the columns of ``jacobian`` beside those of ``base``."""
-    if base.shape[1] == 0:
-        return jacobian
-    u, s, _vt = np.linalg.svd(base, full_matrices=False)
-    u = u[:, s > 1e-9 * max(float(s[0]), 1e-300)] if len(s) else u
-    return jacobian - u @ (u.T @ jacobian)

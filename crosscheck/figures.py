@@ -89,19 +89,26 @@ def threshold_cells(run: Run) -> list[str]:
 
 
 def verdict_line(run: Run) -> str:
-    """How it ended, and the difference nearest to, or furthest over, what is allowed."""
+    """How it ended, and the difference nearest to, or furthest over, what is allowed.
+
+    Of effects only those that fail are named here; where nothing else was run, it is theirs.
+    """
+    from crosscheck import effect_figures
     from crosscheck.suite import worst_of
 
+    if not run.results:
+        return effect_figures.line(run.effects)
     total = sum(len(result) for result in run.results)
     aside = sum(run.count(verdict) for verdict in FINDINGS)
     poses = f"{count(total, 'pose')} of {count(len(run.results), 'case')}"
     if aside:
         poses = f"{total - aside} of {poses} ({count(aside, 'finding')})"
     bad = [result.case.name for result in run.results if result.exit_status]
+    bad += [result.task.name for result in run.effects if result.exit_status]
     start = {
         0: f"SEECR and MuJoCo agree at {poses}",
-        1: f"SEECR and MuJoCo differ in {_list(bad)}",
-        3: f"not every solve converged: see {_list(bad)}",
+        1: f"SEECR and MuJoCo differ in {name_list(bad)}",
+        3: f"not every solve converged: see {name_list(bad)}",
     }[run.exit_status]
     return f"{start}; {worst_sentence(worst_of(run.results))}."
 
@@ -168,6 +175,7 @@ def count(number: int, noun: str) -> str:
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
-def _list(names: Sequence[str], most: int = 4) -> str:
+def name_list(names: Sequence[str], most: int = 4) -> str:
+    """The first few names, and how many more."""
     rest = f" and {len(names) - most} more" if len(names) > most else ""
     return ", ".join(names[:most]) + rest

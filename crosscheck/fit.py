@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.problem import Problem, State, derivatives, evaluate
+from crosscheck.subspace import basis
 from seecr.pose import Array
 from seecr.sensitivity import Term
 
@@ -57,6 +59,11 @@ class Fit:
     def chi2(self) -> float:
         """Sum of squared whitened residuals."""
         return self.state.chi2
+
+    @cached_property
+    def span(self) -> Array:
+        """Orthonormal basis (N, k) of what the parameters can imitate."""
+        return basis(self.jacobian)
 
     @property
     def stderr(self) -> Array:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ET
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from crosscheck import figures
+from crosscheck import effect_figures, figures
+from crosscheck.effect_suite import GROUP
 from crosscheck.suite import EXIT_DIFFERS, EXIT_UNSOLVED
 
 if TYPE_CHECKING:
+    from crosscheck.effect_suite import EffectResult
     from crosscheck.results import Run
     from crosscheck.suite import CaseResult
 
@@ -18,20 +21,50 @@ _FORBIDDEN = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
 
 
 def junit_xml(run: Run) -> str:
-    """One test case a case of the suite; differences are failures, unsolved poses errors."""
-    statuses = [result.exit_status for result in run.results]
-    counts = {
+    """One test case a case of the suite; differences are failures, unsolved poses errors.
+
+    Poses and effects are a suite each, where there are any.
+    """
+    both: list[CaseResult | EffectResult] = [*run.results, *run.effects]
+    root = ET.Element("testsuites", {"name": "crosscheck run", **_counts(both, run.wall_s)})
+    if run.results:
+        counts = _counts(run.results, run.wall_s)
+        suite = ET.SubElement(root, "testsuite", {"name": "crosscheck run", **counts})
+        for result in run.results:
+            _add_case(suite, result)
+    if run.effects:
+        counts = _counts(run.effects, sum(effect.wall_s for effect in run.effects))
+        suite = ET.SubElement(root, "testsuite", {"name": GROUP, **counts})
+        for effect in run.effects:
+            _add_effect(suite, effect)
+    ET.indent(root)
+    return ET.tostring(root, encoding="utf-8", xml_declaration=True).decode() + "\n"
+
+
+def _counts(results: Sequence[CaseResult | EffectResult], seconds: float) -> dict[str, str]:
+    statuses = [result.exit_status for result in results]
+    return {
         "tests": str(len(statuses)),
         "failures": str(statuses.count(EXIT_DIFFERS)),
         "errors": str(statuses.count(EXIT_UNSOLVED)),
-        "time": f"{run.wall_s:.3f}",
+        "time": f"{seconds:.3f}",
     }
-    root = ET.Element("testsuites", {"name": "crosscheck run", **counts})
-    suite = ET.SubElement(root, "testsuite", {"name": "crosscheck run", **counts})
-    for result in run.results:
-        _add_case(suite, result)
-    ET.indent(root)
-    return ET.tostring(root, encoding="utf-8", xml_declaration=True).decode() + "\n"
+
+
+def _add_effect(suite: ET.Element, result: EffectResult) -> None:
+    case = ET.SubElement(
+        suite,
+        "testcase",
+        classname=f"crosscheck.{GROUP}",
+        name=_clean(result.task.name),
+        time=f"{result.wall_s:.3f}",
+    )
+    text = _clean(effect_figures.text(result))
+    tag = {EXIT_DIFFERS: "failure", EXIT_UNSOLVED: "error"}.get(result.exit_status)
+    if tag is not None:
+        message = f"{_clean(result.task.name)}: {text}"
+        ET.SubElement(case, tag, message=message, type=tag).text = message
+    ET.SubElement(case, "system-out").text = text
 
 
 def _add_case(suite: ET.Element, result: CaseResult) -> None:

@@ -9,13 +9,16 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from enum import Enum
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from crosscheck.suite import EXIT_AGREES, EXIT_DIFFERS, CaseResult, Worst, exit_status, worst_of
 from crosscheck.thresholds import Thresholds
 from crosscheck.verdicts import Verdict
+
+if TYPE_CHECKING:
+    from crosscheck.effect_suite import EffectResult
 
 FORMAT = 1
 """Of ``results.json``; raised when a key changes its meaning or goes."""
@@ -34,6 +37,7 @@ class Run:
         seed: of the random poses.
         jobs: cases at a time.
         wall_s: [s] it took.
+        effects: results of its effects.
     """
 
     results: Sequence[CaseResult]
@@ -41,11 +45,12 @@ class Run:
     seed: int
     jobs: int
     wall_s: float
+    effects: Sequence[EffectResult] = ()
 
     @property
     def exit_status(self) -> int:
         """0 all agree, 1 a threshold exceeded, 3 a solve did not converge."""
-        return exit_status(self.results)
+        return exit_status([*self.results, *self.effects])
 
     @property
     def verdict(self) -> str:
@@ -91,6 +96,7 @@ def _head(run: Run) -> dict[str, Any]:
         "jobs": run.jobs,
         "wall_s": run.wall_s,
         "packages": package_versions(),
+        "effects": [_effect(result) for result in run.effects],
     }
 
 
@@ -100,6 +106,22 @@ def _counts(counted: Run | CaseResult) -> dict[str, int]:
 
 def _worst(worst: Worst) -> dict[str, Any]:
     return {**asdict(worst), "ratio": worst.ratio}
+
+
+def _effect(result: EffectResult) -> dict[str, Any]:
+    return {
+        "name": result.task.name,
+        "robot": result.task.robot,
+        "effect": result.task.effect,
+        "agrees": result.agrees,
+        "exit_status": result.exit_status,
+        "position_m": result.position_m,
+        "orientation_rad": result.orientation_rad,
+        "tension_N": result.tension_N,
+        "moved_m": result.moved_m,
+        "poses": {"total": result.rows, "unsolved": result.unsolved},
+        "wall_s": result.wall_s,
+    }
 
 
 def _case(result: CaseResult) -> dict[str, Any]:

@@ -14,10 +14,10 @@ import numpy as np
 
 from crosscheck.candidates import ordered, own_columns
 from crosscheck.confounding import Rival
-from crosscheck.evidence import projected
 from crosscheck.fit import Fit, flat, sizes
 from crosscheck.measurements import Measurements
 from crosscheck.problem import Problem, State, derivatives, evaluate
+from crosscheck.subspace import projected
 from seecr.effects.base import Layout, layout_of
 from seecr.pose import Array, quat_from_rotvec, quat_multiply
 from seecr.robot import Robot

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import signal
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
-from multiprocessing import get_context
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,7 +14,8 @@ from numpy.typing import NDArray
 
 from crosscheck.agreement import QUANTITIES, Allowance, Differences, allowances, compare, ratios
 from crosscheck.cases import Case
-from crosscheck.errors import CrosscheckError, InputFileError
+from crosscheck.errors import InputFileError
+from crosscheck.pool import Pool
 from crosscheck.side import MujocoSide
 from crosscheck.thresholds import Thresholds
 from crosscheck.verdicts import UNSOLVED, Answers, Finding, Verdict, judge
@@ -28,6 +26,7 @@ from seecr.pose import Array
 from seecr.robot import Robot
 
 if TYPE_CHECKING:
+    from crosscheck.effect_suite import EffectResult
     from crosscheck.settling import SettlingBatch
 
 # SEECR takes microseconds: the best of this many runs is what it needs, the rest is the machine.
@@ -185,11 +184,9 @@ def run_suite(
     jobs: int = 1,
     folder: Path | None = None,
     progress: Callable[[CaseResult], None] | None = None,
+    pool: Pool | None = None,
 ) -> list[CaseResult]:
     """Run cases, several at a time.
-
-    In processes, not threads: a settling is thousands of calls of a few microseconds, between
-    which Python lets one thread run at a time; two threads took longer than one.
 
     Args:
         cases: what to run.
@@ -197,35 +194,21 @@ def run_suite(
         jobs: how many at a time.
         folder: where to write recordings; None writes none.
         progress: called with each result as it comes.
+        pool: processes to run in, instead of ``jobs`` of its own.
 
     Returns:
         the results in the order of the cases.
     """
-    tell = progress or (lambda result: None)
-    jobs = min(jobs, len(cases))
-    if jobs <= 1:
-        results = []
-        for case in cases:
-            results.append(run_case(case, thresholds, folder))
-            tell(results[-1])
-        return results
-    warm_up(cases[0])
-    pool = ProcessPoolExecutor(jobs, get_context("spawn"), initializer=_leave_interrupts)
-    try:
-        # The longest first, so that none is left over at the end.
-        order = sorted(range(len(cases)), key=lambda i: -len(cases[i].poses))
-        futures = {pool.submit(run_case, cases[i], thresholds, folder): i for i in order}
-        found: dict[int, CaseResult] = {}
-        for future in as_completed(futures):
-            found[futures[future]] = future.result()
-            tell(found[futures[future]])
-    except BrokenProcessPool:
-        raise CrosscheckError(
-            f"one of {jobs} processes was killed, perhaps for lack of memory; try --jobs 1"
-        ) from None
-    finally:
-        pool.shutdown(cancel_futures=True)
-    return [found[i] for i in range(len(cases))]
+    if not cases:
+        return []
+    if pool is None:
+        with Pool(min(jobs, len(cases))) as own:
+            return run_suite(cases, thresholds, folder=folder, progress=progress, pool=own)
+    if pool.jobs > 1:
+        warm_up(cases[0])
+    one = partial(run_case, thresholds=thresholds, folder=folder)
+    order = sorted(range(len(cases)), key=lambda i: -len(cases[i].poses))
+    return pool.run(one, cases, order, progress or (lambda result: None))
 
 
 def warm_up(case: Case) -> None:
@@ -233,12 +216,7 @@ def warm_up(case: Case) -> None:
     seecr_solve(load_robot(case.model), case.poses[:1])
 
 
-def _leave_interrupts() -> None:
-    """Let the process that asked handle Ctrl-C, and tell the others to stop."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-def exit_status(results: Sequence[CaseResult]) -> int:
+def exit_status(results: Sequence[CaseResult | EffectResult]) -> int:
     """0 all agree (findings allowed), 1 a threshold exceeded, 3 a solve did not converge."""
     statuses = {result.exit_status for result in results}
     return next((s for s in (EXIT_DIFFERS, EXIT_UNSOLVED) if s in statuses), EXIT_AGREES)

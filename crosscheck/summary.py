@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from crosscheck import figures
+from crosscheck import effect_figures, figures
 
 if TYPE_CHECKING:
     from crosscheck.results import Run
@@ -13,15 +13,25 @@ if TYPE_CHECKING:
 
 
 def summary_md(run: Run, worst_pose: str) -> str:
-    """The verdict, a table of the cases, then failures, findings and widened thresholds.
+    """The verdict, a table of the cases, then failures, findings, widened thresholds, effects.
 
     Args:
         run: what to tell about.
         worst_pose: sentence about the file with the worst pose.
     """
+    parts = ["# SEECR against MuJoCo", figures.verdict_line(run)]
+    if run.results:
+        parts += _cases(run, worst_pose)
+    if run.effects:
+        parts += _effects(run)
+    parts.append(
+        f"{run.wall_s:.1f} s with {run.jobs} at a time; random numbers of seed {run.seed}."
+    )
+    return "\n\n".join(parts) + "\n"
+
+
+def _cases(run: Run, worst_pose: str) -> list[str]:
     parts = [
-        "# SEECR against MuJoCo",
-        figures.verdict_line(run),
         _table(run),
         "Largest differences between SEECR and MuJoCo over each case's poses; `settled` is MuJoCo "
         "brought to rest by its own dynamics, `polished` and the tensions after Newton's method on "
@@ -30,8 +40,21 @@ def summary_md(run: Run, worst_pose: str) -> str:
     parts += _section(run, "Failures", figures.failures)
     parts += _section(run, "Findings", figures.findings)
     parts += _section(run, "Widened thresholds", figures.widened)
-    parts.append(f"{run.wall_s:.1f} s with {run.jobs} at a time; random poses of seed {run.seed}.")
-    return "\n\n".join(parts) + "\n"
+    return parts
+
+
+def _effects(run: Run) -> list[str]:
+    """How they ended, those that failed, and a folded table of all."""
+    heads = effect_figures.TABLE_HEADS
+    rule = ["---", "---", *["---:"] * (len(heads) - 3), "---"]
+    table = "\n".join(_row(row) for row in [heads, rule, *map(effect_figures.cells, run.effects)])
+    failed = [f"- {line}" for line in effect_figures.failures(run.effects)]
+    return [
+        "## Effects",
+        effect_figures.line(run.effects),
+        *(["\n".join(failed)] if failed else []),
+        f"<details><summary>All {len(run.effects)}</summary>\n\n{table}\n\n</details>",
+    ]
 
 
 def _table(run: Run) -> str:

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from crosscheck import figures
+from crosscheck import effect_figures, figures
 from crosscheck.verdicts import FINDINGS, Verdict
 
 if TYPE_CHECKING:
@@ -39,7 +39,8 @@ def print_run(run: Run, out: Path, console: Console | None = None) -> None:
     console = console or Console(highlight=False)
     if not console.is_terminal:
         console.width = max(console.width, _WIDE)
-    console.print(_table(run, console.width))
+    if run.results:
+        console.print(_table(run, console.width))
     for result in run.results:
         _print_notes(console, result)
     for verdict in FINDINGS:
@@ -47,6 +48,9 @@ def print_run(run: Run, out: Path, console: Console | None = None) -> None:
             _print(
                 console, f"Finding at {figures.count(run.count(verdict), 'pose')}: {verdict.value}."
             )
+    _print_lines(console, effect_figures.failures(run.effects), "effects")
+    if run.effects and run.results:
+        _print(console, effect_figures.line(run.effects))
     _print(console, figures.verdict_line(run), _STYLE[run.exit_status])
     _print(console, f"{run.wall_s:.1f} s; results in {out}/")
 
@@ -78,7 +82,13 @@ def _print_notes(console: Console, result: CaseResult) -> None:
     branches = [f for f in result.findings if f.verdict is Verdict.BRANCH]
     lines += [f"pose {f.pose}: {f.text}" for f in branches]
     lines += figures.widened(result)
+    name = result.case.name
+    _print_lines(console, [f"{name}, {line}" for line in lines], name)
+
+
+def _print_lines(console: Console, lines: list[str], name: str) -> None:
+    """The first few lines about a case or the effects, and how many more there are."""
     for line in lines[:_MOST]:
-        _print(console, f"{result.case.name}, {line}")
+        _print(console, line)
     if len(lines) > _MOST:
-        _print(console, f"{result.case.name}: {len(lines) - _MOST} more in summary.md")
+        _print(console, f"{name}: {len(lines) - _MOST} more in summary.md")

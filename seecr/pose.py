@@ -23,7 +23,7 @@ def quat_multiply(a: Array, b: Array) -> Array:
     a, b = np.asarray(a, float), np.asarray(b, float)
     aw, av, bw, bv = a[..., :1], a[..., 1:], b[..., :1], b[..., 1:]
     scalar = aw * bw - np.sum(av * bv, axis=-1, keepdims=True)
-    return np.concatenate([scalar, aw * bv + bw * av + np.cross(av, bv)], axis=-1)
+    return np.concatenate([scalar, aw * bv + bw * av + cross(av, bv)], axis=-1)
 
 
 def quat_conjugate(quat_wxyz: Array) -> Array:
@@ -31,18 +31,30 @@ def quat_conjugate(quat_wxyz: Array) -> Array:
     return np.asarray(quat_wxyz, float) * np.array([1.0, -1.0, -1.0, -1.0])
 
 
+def cross(a: Array, b: Array) -> Array:
+    """Cross product of vectors (..., 3); NumPy's own takes five times as long on small arrays."""
+    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
+
+
 def quat_rotate(quat_wxyz: Array, vectors: Array) -> Array:
     """Rotate vectors (..., 3) by unit quaternions (..., 4)."""
     q, v = np.asarray(quat_wxyz, float), np.asarray(vectors, float)
-    twice = 2.0 * np.cross(q[..., 1:], v)
-    return v + q[..., :1] * twice + np.cross(q[..., 1:], twice)
+    twice = 2.0 * cross(q[..., 1:], v)
+    return v + q[..., :1] * twice + cross(q[..., 1:], twice)
 
 
 def quat_to_matrix(quat_wxyz: Array) -> Array:
     """Rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
     q = np.asarray(quat_wxyz, float)
-    columns = [quat_rotate(q, axis) for axis in np.eye(3)]
-    return np.stack(columns, axis=-1)
+    w, x, y, z = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
+    rows = [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def matrix_to_quat(rotation: Array) -> Array:
@@ -113,4 +125,5 @@ def pose_add(pose: Array, change: Array) -> Array:
 def transform_points(poses: Array, points: Array) -> Array:
     """Base-frame coordinates (..., k, 3) of platform points (k, 3) at poses (..., 7)."""
     poses = np.asarray(poses, float)
-    return poses[..., None, :3] + quat_rotate(poses[..., None, 3:], np.asarray(points, float))
+    turned = np.asarray(points, float) @ np.swapaxes(quat_to_matrix(poses[..., 3:]), -1, -2)
+    return poses[..., None, :3] + turned

@@ -12,7 +12,7 @@ from made_data import case, refused, run
 def poses(tmp_path_factory):
     """Commands without readings."""
     folder = tmp_path_factory.mktemp("poses")
-    xml, data = case(folder, points=6)
+    xml, data = case(folder, points=4)
     lines = data.read_text().splitlines()
     keep = [i for i, name in enumerate(lines[0].split(",")) if not name.startswith("meas")]
     planned = folder / "poses.csv"

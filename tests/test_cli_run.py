@@ -7,14 +7,16 @@ import subprocess
 import sys
 import time
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import click
 import pytest
 from click.testing import CliRunner, Result
 
-from crosscheck import cli, suite
+from crosscheck import cli, effect_cases, suite
 from crosscheck.cli import COMMANDS, main
+from crosscheck.truth import TRUE_EFFECTS
 from seecr.shipped import model_path
 
 SMALL = ("--case", "planar-two-cable", "--no-recordings", "--jobs", "1")
@@ -110,6 +112,84 @@ def test_a_solve_that_does_not_converge_ends_3(tmp_path, monkeypatch):
     result = run(*SMALL, "--out", tmp_path)
     assert result.exit_code == 3
     assert "not every solve converged: see planar-two-cable" in result.stdout
+
+
+EFFECT = "effect-demobot_parallel-platform_mass"
+
+
+def test_an_effect_is_a_case_like_any_other(tmp_path):
+    result = run(*SMALL, "--case", EFFECT, "--out", tmp_path)
+    assert result.exit_code == 0
+    assert "1 effect on 1 robot: all agree with MuJoCo; worst " in result.stdout
+    assert "SEECR and MuJoCo agree at 24 poses of 1 case" in result.stdout
+    document = json.loads((tmp_path / "results.json").read_text())
+    (effect,) = document["effects"]
+    assert (effect["name"], effect["robot"]) == (EFFECT, "demobot_parallel")
+    assert (effect["effect"], effect["agrees"]) == ("platform_mass", True)
+    # the agreement means something: the effect moves the platform by far more
+    assert effect["position_m"] < 1e-8 < 1e-6 < effect["moved_m"]
+    assert effect["orientation_rad"] < 1e-7 and effect["tension_N"] < 1e-6
+    suites = ET.parse(tmp_path / "junit.xml").getroot().findall("testsuite")
+    assert [suite.get("name") for suite in suites] == ["crosscheck run", "effects"]
+    assert [case.get("name") for case in suites[1]] == [EFFECT]
+    assert suites[1].get("failures") == "0"
+    assert "| platform_mass | demobot_parallel |" in (tmp_path / "summary.md").read_text()
+
+
+def test_effects_alone_run_in_several_processes(tmp_path):
+    result = run("--case", "effect-*-platform_mass", "--jobs", "2", "--out", tmp_path)
+    assert result.exit_code == 0
+    assert result.stdout.startswith("1 effect on 2 robots: all agree with MuJoCo; worst ")
+    document = json.loads((tmp_path / "results.json").read_text())
+    assert [effect["robot"] for effect in document["effects"]] == [
+        "demobot_cogiro",
+        "demobot_parallel",
+    ]
+    assert document["cases"] == []
+    assert not (tmp_path / "worst_pose.xml").exists()
+
+
+def test_an_effect_that_differs_ends_1_and_is_named(tmp_path, monkeypatch):
+    honest = effect_cases.measure
+
+    def heavier(robot, commands, effects, **options):
+        (effect,) = effects
+        return honest(robot, commands, [replace(effect, factor=1.01 * effect.factor)], **options)
+
+    monkeypatch.setattr(effect_cases, "measure", heavier)
+    result = run(*SMALL, "--case", EFFECT, "--out", tmp_path)
+    assert result.exit_code == 1
+    assert f"1 of 1 case not as MuJoCo: {EFFECT}; worst" in result.stdout
+    assert f"SEECR and MuJoCo differ in {EFFECT}; " in result.stdout
+    assert json.loads((tmp_path / "results.json").read_text())["verdict"] == "differ"
+    poses, effects = ET.parse(tmp_path / "junit.xml").getroot().findall("testsuite")
+    assert (poses.get("failures"), effects.get("failures")) == ("0", "1")
+    assert EFFECT in effects.find("testcase/failure").get("message")
+    assert f"- {EFFECT}: position " in (tmp_path / "summary.md").read_text()
+
+
+def test_an_effect_without_rest_ends_3(tmp_path, monkeypatch):
+    honest = effect_cases.measure
+
+    def restless(*arguments, **options):
+        truth = honest(*arguments, **options)
+        at_rest = truth.at_rest.copy()
+        at_rest[2] = False
+        return replace(truth, at_rest=at_rest)
+
+    monkeypatch.setattr(effect_cases, "measure", restless)
+    result = run("--case", EFFECT, "--jobs", "1", "--out", tmp_path)
+    assert result.exit_code == 3
+    assert "no rest at 1 of 16 poses" in result.stdout
+
+
+def test_effects_are_a_group_of_the_shipped_robots(tmp_path):
+    lines = run("--list", "--case", "effects").stdout.splitlines()
+    assert len(lines) == 2 * len(TRUE_EFFECTS)
+    assert all(line.startswith("effect-demobot_") for line in lines)
+    assert EFFECT in run("--list").stdout
+    assert "effect-" not in run("--list", "--robot", PLANAR).stdout
+    assert "--case effects: no such case" in refused("--robot", PLANAR, "--case", "effects")
 
 
 def test_list_names_cases_and_runs_nothing(tmp_path, monkeypatch):

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import importlib.util
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from crosscheck.cli.options import FILE, json_option, out_option
-
-if TYPE_CHECKING:
-    from crosscheck.compare import Comparison
 
 
 @click.command(
@@ -90,7 +85,10 @@ def command(
         text = json_text(document)
         (folder / "comparison.json").write_text(text + "\n", encoding="utf-8")
         if not no_recording:
-            _record(found, folder / "comparison.rrd")
+            # takes a second or two to import
+            from crosscheck.recording import write_comparison_recording
+
+            write_comparison_recording(found, folder / "comparison.rrd")
     if as_json:
         click.echo(text)
         return status
@@ -100,11 +98,3 @@ def command(
         click.echo(f"note: {note}")
     print_comparison(found, exceeded, limits != Limits(), out)
     return status
-
-
-def _record(found: Comparison, path: Path) -> None:
-    if importlib.util.find_spec("crosscheck.recording.comparison") is None:
-        return
-    from crosscheck.recording import write_comparison_recording
-
-    write_comparison_recording(found, path)

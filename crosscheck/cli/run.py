@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,7 +21,9 @@ from crosscheck.cli.options import (
 
 if TYPE_CHECKING:
     from crosscheck.cases import Case
+    from crosscheck.effect_suite import EffectResult, EffectTask
     from crosscheck.results import Run
+    from crosscheck.suite import CaseResult
     from crosscheck.thresholds import Thresholds
 
 
@@ -84,7 +87,8 @@ def command(
 
     The shipped cases: DemoBot in the Cogiro and the parallel configuration, on Vectran and on
     fishing line, along the paper's sweeps (x 0.17 to 0.63 m at z 0.1 and 0.2 m) and at 200 random
-    poses each; and three planar robots.
+    poses each; and three planar robots. After them the group 'effects': every effect that MuJoCo
+    can express, on both DemoBots (--case effects runs only these).
 
     A pose where the platform is free to move, or has two stable equilibria that both physics
     confirm, is a finding: it is listed, and fails nothing.
@@ -102,32 +106,45 @@ def command(
     Exit status: 0 all agree, 1 a threshold exceeded, 2 bad input, 3 a solve did not converge
     (and nothing exceeded a threshold).
     """
-    from crosscheck.cases import select
+    from crosscheck.cases import select, user_cases
     from crosscheck.thresholds import load_thresholds
 
     if mujoco_robot is not None and robot is None:
         raise click.UsageError("--mujoco-robot needs --robot: the MJCF that SEECR reads")
     thresholds = load_thresholds(thresholds_file)
-    cases = select(_cases(robot, mujoco_robot, seed), patterns)
-    if list_only:
-        for case in cases:
-            click.echo(f"{case.name:28s} {len(case.poses):4d} poses  {case.model}")
-        return 0
-    return _run(cases, thresholds, seed, jobs or processors(), not no_recordings, out, as_json)
-
-
-def _cases(robot: Path | None, mujoco_robot: Path | None, seed: int) -> list[Case]:
-    from crosscheck.cases import shipped_cases, user_cases
-
     if robot is None:
-        return shipped_cases(seed)
-    from seecr.mjcf import load_robot
+        chosen = _shipped(seed, patterns)
+    else:
+        from seecr.mjcf import load_robot
 
-    return user_cases(load_robot(robot), robot, mujoco_robot, seed)
+        robots = load_robot(robot), robot, mujoco_robot
+        chosen = list(select(user_cases(*robots, seed), patterns))
+    if list_only:
+        _list(chosen)
+        return 0
+    return _run(chosen, thresholds, seed, jobs or processors(), not no_recordings, out, as_json)
+
+
+def _shipped(seed: int, patterns: Sequence[str]) -> list[Case | EffectTask]:
+    """The selected pose cases and effects; the group's name stands for all its effects."""
+    from crosscheck.cases import select, shipped_cases
+    from crosscheck.effect_suite import GROUP, PREFIX, effect_tasks
+
+    every: list[Case | EffectTask] = [*shipped_cases(seed), *effect_tasks(seed)]
+    return select(every, [f"{PREFIX}*" if name == GROUP else name for name in patterns])
+
+
+def _list(chosen: list[Case | EffectTask]) -> None:
+    from crosscheck.cases import Case
+
+    width = max(len(case.name) for case in chosen)
+    for case in chosen:
+        what = f"{len(case.poses):4d} poses" if isinstance(case, Case) else "    effect"
+        click.echo(f"{case.name:{width}s} {what}  {case.model}")
 
 
 def _run(
-    cases: list[Case],
+    chosen: list[Case | EffectTask],
     thresholds: Thresholds,
     seed: int,
     jobs: int,
@@ -139,19 +156,10 @@ def _run(
 
     began = time.perf_counter()
     with staged(out) as folder:
-        total = sum(len(case.poses) for case in cases)
-        with progress_bar("compiling", total) as advance:
-            from crosscheck.results import Run
-            from crosscheck.suite import run_suite
+        results, effects = _results(chosen, thresholds, jobs, folder if recordings else None)
+        from crosscheck.results import Run
 
-            results = run_suite(
-                cases,
-                thresholds,
-                jobs=jobs,
-                folder=folder if recordings else None,
-                progress=lambda result: advance(len(result), result.case.name),
-            )
-        run = Run(results, thresholds, seed, jobs, time.perf_counter() - began)
+        run = Run(results, thresholds, seed, jobs, time.perf_counter() - began, effects)
         _write(run, folder)
     if as_json:
         from crosscheck.results import results_json
@@ -164,6 +172,34 @@ def _run(
     return run.exit_status
 
 
+def _results(
+    chosen: list[Case | EffectTask], thresholds: Thresholds, jobs: int, folder: Path | None
+) -> tuple[list[CaseResult], list[EffectResult]]:
+    """The poses' cases, then the effects, in the same processes and under one bar."""
+    from crosscheck.cases import Case
+
+    cases = [case for case in chosen if isinstance(case, Case)]
+    tasks = [case for case in chosen if not isinstance(case, Case)]
+    total = sum(len(case.poses) for case in cases) + sum(task.n_poses for task in tasks)
+    with progress_bar("compiling", total) as advance:
+        from crosscheck.effect_suite import run_effects
+        from crosscheck.pool import Pool
+        from crosscheck.suite import run_suite
+
+        with Pool(min(jobs, len(chosen))) as pool:
+            results = run_suite(
+                cases,
+                thresholds,
+                folder=folder,
+                progress=lambda result: advance(len(result), result.case.name),
+                pool=pool,
+            )
+            effects = run_effects(
+                tasks, pool, lambda result: advance(result.rows, result.task.name)
+            )
+    return results, effects
+
+
 def _write(run: Run, folder: Path) -> None:
     from crosscheck.junit import junit_xml
     from crosscheck.results import results_json
@@ -171,7 +207,7 @@ def _write(run: Run, folder: Path) -> None:
     from crosscheck.thresholds import thresholds_toml
     from crosscheck.worst import write_worst_pose
 
-    sentence = write_worst_pose(run.results, folder)
+    sentence = write_worst_pose(run.results, folder) if run.results else ""
     texts = {
         "results.json": results_json(run),
         "junit.xml": junit_xml(run),

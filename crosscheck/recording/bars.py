@@ -16,7 +16,7 @@ from crosscheck.stages import Kind, Stage, floor_of, kinds_read
 ROOT = "bars"
 # The drawing is 100 wide; y points down, a row a model.
 _LEFT, _RIGHT, _ROW, _HEAD = 27.0, 80.0, 4.2, 5.0
-_DIM = 0.5
+_DIM, _LABEL = 0.45, 2.2
 
 
 def write_bars(
@@ -56,22 +56,22 @@ def _block(
     floor = kind.factor * floor_of(found, kind)
     ends = _places(values, values, floor)
     rows = top + _HEAD + _ROW * (np.arange(len(stages)) + 0.5)
-    lit = [_lit(stage) for stage in stages]
+    lit = np.array([_lit(stage) for stage in stages], dtype=np.uint8)
     root = f"{ROOT}/{kind.name}"
-    boxes = _boxes(ends, rows)
-    dim = [_dimmed(colour) for colour in lit]
-    solid = rr.components.FillMode.Solid
-    recording.always(f"{root}/all", _bars(boxes, dim))
-    columns = rr.Boxes2D.columns(
-        centers=boxes[:, :2], half_sizes=boxes[:, 2:], colors=np.array(lit, dtype=np.uint8)
-    )
-    recording.rows(f"{root}/now", index, columns)
-    del solid
+    strips = [np.array([[_LEFT, y], [x, y]]) for x, y in zip(ends, rows, strict=True)]
+    thick = 0.3 * _ROW
+    # the viewer draws 2D boxes as outlines only: bars are thick lines
+    dim = (_DIM * lit).astype(np.uint8)
+    dim[:, 3] = 255
+    recording.always(f"{root}/all", rr.LineStrips2D(strips, radii=thick, colors=dim, draw_order=20.0))
+    columns = rr.LineStrips2D.columns(strips=strips, colors=lit)
+    recording.rows(f"{root}/now", index, columns.partition([1] * len(stages)))
+    recording.always(f"{root}/now", rr.LineStrips2D.from_fields(radii=[thick], draw_order=40.0))
     place = float(_places(np.array([floor]), values, floor)[0])
     line = [[place, rows[0] - 0.6 * _ROW], [place, rows[-1] + 0.6 * _ROW]]
     recording.always(
         f"{root}/noise",
-        rr.LineStrips2D([line], radii=0.18, colors=colours.SILVER),
+        rr.LineStrips2D([line], radii=0.18, colors=colours.COMMAND, draw_order=50.0),
     )
     names = [s.label for s in stages]
     _words(recording, f"{root}/names", [(0.5 * _LEFT, y) for y in rows], names)
@@ -80,15 +80,6 @@ def _block(
            numbers)  # fmt: skip
     title = f"{kind.name} [{kind.unit}], noise {short(floor)}"
     _words(recording, f"{root}/title", [(0.5 * (_LEFT + _RIGHT), top + 0.55 * _HEAD)], [title])
-
-
-def _bars(boxes: np.ndarray, shades: list[Rgba]) -> rr.LineStrips2D:
-    """Bars as thick lines: the viewer draws 2D boxes as outlines only."""
-    return rr.LineStrips2D(_strips(boxes), radii=0.3 * _ROW, colors=shades)
-
-
-def _strips(boxes: np.ndarray) -> list[np.ndarray]:
-    return [np.array([[x - w, y], [x + w, y]]) for x, y, w, _h in boxes]
 
 
 def _places(values: np.ndarray, every: np.ndarray, floor: float) -> np.ndarray:
@@ -101,27 +92,16 @@ def _places(values: np.ndarray, every: np.ndarray, floor: float) -> np.ndarray:
     return _LEFT + (_RIGHT - _LEFT) * np.clip(part, 0.01, 1.0)
 
 
-def _boxes(ends: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """(k, 4) centre and half sizes."""
-    half = 0.5 * (ends - _LEFT)
-    return np.stack([_LEFT + half, rows, half, np.full(len(rows), 0.34 * _ROW)], axis=1)
-
-
 def _lit(stage: Stage) -> Rgba:
     if not stage.added:
         return colours.VERMILION
     return colours.SKY if stage.sure else colours.SILVER
 
 
-def _dimmed(colour: Rgba) -> Rgba:
-    red, green, blue = (int(_DIM * c) for c in colour[:3])
-    return red, green, blue, 255
-
-
 def _words(
     recording: Recording, entity: str, places: list[tuple[float, float]], words: list[str]
 ) -> None:
-    points = rr.Points2D(
-        places, radii=0.01, colors=colours.COMMAND, labels=words, show_labels=True
-    )
+    # the viewer hangs labels under their points
+    places = [(x, y - _LABEL) for x, y in places]
+    points = rr.Points2D(places, radii=0.01, colors=colours.COMMAND, labels=words, show_labels=True)
     recording.always(entity, points)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from crosscheck.agreement import Differences
 from crosscheck.motion import Motion, record_motion
-from crosscheck.recording import colours
+from crosscheck.recording import colours, words
 from crosscheck.recording.states import States
 from crosscheck.verdicts import Verdict
 from seecr.equilibrium import Status
@@ -69,12 +69,7 @@ class Material:
     @cached_property
     def labels(self) -> list[str]:
         """Names of the cables without what all have in common in front."""
-        names = self.robot.cable_names
-        common = 0
-        while len({name[: common + 1] for name in names}) == 1 and common < min(map(len, names)):
-            common += 1
-        short = [name[common:] for name in names]
-        return short if all(short) else list(names)
+        return words.short_names(self.robot.cable_names)
 
     @cached_property
     def seecr(self) -> States:

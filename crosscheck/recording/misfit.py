@@ -8,11 +8,11 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from crosscheck.problem import ORIENTATION, POSITION, Problem, State
+from crosscheck.problem import POSITION, Problem, State
 from crosscheck.recording import colours, layout
 from crosscheck.recording.states import States
 from crosscheck.recording.stream import Recording
-from crosscheck.stages import KINDS, Kind, kinds_read, magnification, sizes_of, views_of
+from crosscheck.stages import Kind, kinds_read, magnification, sizes_of, views_of
 from seecr import cable_law
 from seecr.pose import Array, quat_from_rxyz, rxyz_from_quat
 
@@ -93,6 +93,17 @@ def states_of(state: State) -> States:
     pose = np.where(prediction.solved[:, None], prediction.poses, np.nan)
     slack = prediction.found.states[..., cable_law.SLACK] > 0
     return States(pose, prediction.tensions, prediction.setup.rest_lengths(), slack)
+
+
+def stacked(rows: list[tuple[State, int]]) -> States:
+    """One row of each of several models, one below the other."""
+    parts = [(states_of(state), k) for state, k in rows]
+    return States(
+        np.stack([s.pose[k] for s, k in parts]),
+        np.stack([s.tensions[k] for s, k in parts]),
+        np.stack([s.rest_lengths[k] for s, k in parts]),
+        np.stack([s.slack[k] for s, k in parts]),
+    )
 
 
 def worst_row(misfit: Misfit) -> int:
@@ -189,11 +200,6 @@ def map_views(misfit: Misfit) -> list[rrb.Spatial2DView]:
     ]
 
 
-def rotation_read(problem: Problem) -> bool:
-    """Whether anything of the orientation was read."""
-    return bool(problem.counted[:, ORIENTATION].any())
-
-
 def words_of(misfit: Misfit) -> str:
     """What arrows and colours mean, in a sentence or two."""
     kind = misfit.kinds[0]
@@ -204,6 +210,3 @@ def words_of(misfit: Misfit) -> str:
         f"An arrow at each measured pose points from what the model says to what was measured; "
         f"it is drawn **{misfit.magnify:g} times** too long and coloured {scale}."
     )
-
-
-__all__ = ["KINDS", "Misfit", "arrows", "cursor", "map_views", "maps", "read_poses", "states_of"]

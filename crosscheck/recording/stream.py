@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from crosscheck.errors import CrosscheckError
 from seecr.pose import Array
 
-POSE, SETTLING = "pose", "settling_time"
+POSE, SETTLING, MODEL_STEP = "pose", "settling_time", "model_step"
 
 
 class Recording:

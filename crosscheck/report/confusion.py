@@ -8,7 +8,7 @@ import numpy as np
 
 from crosscheck.candidates import amplitude_columns, own_columns
 from crosscheck.diagnosis import Diagnosis
-from crosscheck.evidence import projected
+from crosscheck.subspace import projected
 from crosscheck.fit import Fit
 from crosscheck.report.drawing import INK, WIDTH, blank, styled, svg
 from crosscheck.search import Search

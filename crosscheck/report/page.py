@@ -17,7 +17,7 @@ from crosscheck.report.cables import draw_wall, walls_of
 from crosscheck.report.confusion import confusion_of, draw_confusion
 from crosscheck.report.tables import candidate_rows, checks, errors_of, finding_context
 from crosscheck.report.waterfall import waterfall
-from crosscheck.report.where import failure_map, scale_words
+from crosscheck.report.where import failure_map, caption
 from crosscheck.stages import KINDS, kinds_read, shown_stages, stages_of
 from seecr import __version__
 
@@ -87,7 +87,7 @@ def _of_search(found: Diagnosis) -> dict[str, Any]:
     """Facts and figures; empty where there was no search."""
     if found.search is None:
         return {"facts": [], "title": "", "figures": {}, "walls": [], "twins": [],
-                "arrow": "", "added": []}  # fmt: skip
+                "caption": "", "added": [], "together": False, "unsure": False}  # fmt: skip
     problem = found.search.problem
     before, after = shown_stages(found)
     # what the wall overlays is the last model, sure or not: it shows what was tried
@@ -105,7 +105,9 @@ def _of_search(found: Diagnosis) -> dict[str, Any]:
         "figures": {key: Markup(text) for key, text in figures.items()},  # ours, escaped there
         "walls": [Markup(text) for text in walls],
         "twins": confusion.twins if confusion is not None else [],
-        "arrow": scale_words(problem, before),
+        "caption": caption(problem, before),
+        "together": bool(problem.sigma.length_m),
+        "unsure": not all(stage.sure for stage in stages_of(found)),
         "added": [t.name for t in last.state.terms if t.name not in found.search.base],
     }
 
@@ -152,7 +154,7 @@ def _association(row: dict[str, Any]) -> dict[str, Any]:
         "unit": unit,
         "bins": [
             {
-                "label": bin_["label"],
+                "label": bin_["label"] if len(means) > 1 else "all",
                 "rows": bin_["rows"],
                 "mean": short(None if bin_["mean"] is None else factor * bin_["mean"]),
                 "part": 0.0 if not top or bin_["mean"] is None else 50.0 * bin_["mean"] / top,

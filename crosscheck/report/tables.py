@@ -15,7 +15,7 @@ from crosscheck.fit import sizes
 from crosscheck.noise import POOR_FIT, STRUCTURED
 from crosscheck.numbers import chance, in_unit, parameter_name, percent, short, with_error
 from crosscheck.search import FALSE_ALARM, Step
-from crosscheck.stages import KINDS
+from crosscheck.stages import KINDS, stages_of
 
 # Correlations above this are named; parameters beyond this many plausible sizes are doubtful.
 _CORRELATED, _PLAUSIBLE = 0.9, 5.0
@@ -57,8 +57,8 @@ def checks(found: Diagnosis) -> list[Check]:
 
 def _of_effects(found: Diagnosis) -> list[Check]:
     assert found.search is not None
-    steps = found.search.steps
-    tried = _tried(steps[0])
+    tried = _tried(found.search.steps[0])
+    steps = [stage.step for stage in itertools.takewhile(lambda s: s.sure, stages_of(found))]
     if len(steps) == 1:
         smallest = min((c.p for c in steps[0].candidates if c.drop > 0), default=1.0)
         return [
@@ -70,7 +70,7 @@ def _of_effects(found: Diagnosis) -> list[Check]:
     better, blocks = _better_runs(steps)
     worst = max(_largest_sizes(step) for step in steps[1:])
     p = max(_chance(steps[k - 1], steps[k]) for k in range(1, len(steps)))
-    bound = bool(np.any(found.search.last.fit.at_bound))
+    bound = bool(np.any(steps[-1].fit.at_bound))
     return [
         Check("effects tried", None, str(tried)),
         Check("chance", p < FALSE_ALARM, f"explains what was added with p {chance(p)}, over all "

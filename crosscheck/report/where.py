@@ -27,13 +27,17 @@ def failure_map(problem: Problem, before: Stage, after: Stage) -> str:
     place = before.state.prediction.poses[:, :3]
     views = views_of(place[problem.use])
     stages = [before] if after is before else [before, after]
+    # a model alone has its views side by side, two have them one below the other
+    across = len(views) if len(stages) == 1 else len(stages)
     with styled("where"):
-        heights = [_height(place[problem.use], view, len(stages)) for view in views]
-        figure = blank(sum(heights) + 0.62 * len(views) + 0.35)
+        heights = [_height(place[problem.use], view, across) for view in views]
+        rows = [max(heights)] if len(stages) == 1 else heights
+        figure = blank(sum(rows) + 0.62 * len(rows) + 0.35)
         panels = figure.subplots(
-            len(views), len(stages), squeeze=False, gridspec_kw={"height_ratios": heights}
+            len(rows), across, squeeze=False, gridspec_kw={"height_ratios": rows}
         )
-        _draw(figure, panels, problem, stages, place, views)
+        columns = panels.T if len(stages) == 1 else panels
+        _draw(figure, columns, problem, stages, place, views)
         return svg(figure, "Where the model fails, before and after")
 
 
@@ -62,15 +66,17 @@ def _draw(
             if magnify:
                 _arrows(axes, problem, stage, place, view, magnify)
             _frame(axes, place[problem.use], view)
-        panels[0, column].set_title(_title(stage, column, magnify), loc="left", color=INK)
+        title = _title(stages, column, magnify)
+        panels[0, column].set_title(title, loc="left", color=INK)
     if dots is not None and kind is not None:
         bar = figure.colorbar(dots, ax=panels.ravel().tolist(), shrink=0.7, pad=0.01, aspect=28)
         bar.set_label(f"{kind.name} error [{kind.unit}]")
         bar.outline.set_visible(False)  # type: ignore[operator]
 
 
-def _title(stage: Stage, column: int, magnify: float) -> str:
-    when = "before: " if column == 0 else "after: "
+def _title(stages: list[Stage], column: int, magnify: float) -> str:
+    stage = stages[column]
+    when = "" if len(stages) == 1 else ("before: ", "after: ")[column]
     names = [stage.label] if column == 0 else ["+ " + t.name for t in stage.state.terms]
     scale = f"   (arrows drawn {magnify:g} times too long)" if magnify and column == 0 else ""
     return when + " ".join(names) + scale
@@ -118,7 +124,7 @@ def _arrows(
     rows = problem.use
     axes.quiver(
         place[rows, view[0]], place[rows, view[1]], error[rows, view[0]], error[rows, view[1]],
-        angles="xy", scale_units="xy", scale=1.0 / magnify, width=0.0028, headwidth=3.6,
+        angles="xy", scale_units="xy", scale=1.0 / magnify, units="inches", width=0.017, headwidth=3.6,
         headlength=4.2, headaxislength=3.8, minlength=0.0, color=INK, zorder=4,
         rasterized=bool(rows.sum() > MANY),
     )  # fmt: skip
@@ -137,7 +143,15 @@ def _frame(axes: Axes, place: Array, view: tuple[int, int]) -> None:
     grid(axes)
 
 
-def scale_words(problem: Problem, stage: Stage) -> str:
-    """What an arrow means, for the caption."""
-    magnify = magnification(problem, stage.state)
-    return f"An error of 1 mm is an arrow of {magnify:g} mm." if magnify else ""
+def caption(problem: Problem, stage: Stage) -> str:
+    """What arrows and dots mean."""
+    magnify, kind = magnification(problem, stage.state), _coloured(problem)
+    parts = []
+    if magnify:
+        parts.append(
+            "Arrows: measured less predicted position at each pose; an error of 1 mm is an arrow "
+            f"of {magnify:g} mm."
+        )
+    if kind is not None:
+        parts.append(f"Dots: the {kind.name} error.")
+    return " ".join(parts)

@@ -1,0 +1,162 @@
+"""The recording of a comparison: the model against what was measured, pose by pose."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from crosscheck.associations import channels
+from crosscheck.numbers import short
+from crosscheck.recording import colours, layout, misfit, plots, shapes, words
+from crosscheck.recording.diagnosis_words import plain
+from crosscheck.recording.misfit import MEASURED, Misfit
+from crosscheck.recording.scene import Scene
+from crosscheck.recording.stream import Recording, pose_index, recording_file
+from crosscheck.stages import KINDS, Kind
+
+if TYPE_CHECKING:
+    from crosscheck.compare import Comparison
+
+_MARKDOWN = rr.MediaType.MARKDOWN
+_MOST_LISTED, _MOST_WORST = 5, 6
+
+
+def write_comparison_recording(found: Comparison, path: str | Path) -> None:
+    """Write what a person wants to see of a comparison.
+
+    Args:
+        found: the comparison; one in which nothing could be compared is text alone.
+        path: the ``.rrd`` file; a temporary one takes its place when complete.
+
+    Raises:
+        CrosscheckError: the file cannot be written.
+    """
+    problem = found.problem
+    name = f"comparison of {problem.robot.name}, {problem.data.path.name}"
+    if found.whiteness is None:
+        root = rrb.Vertical(layout.text("Verdict", "text/verdict"))
+        with recording_file(path, name, layout.blueprint(root)) as recording:
+            _verdict(recording, found, None)
+        return
+    shown = Misfit(problem, found.state)
+    seen = np.concatenate([shown.measured[shown.rows], misfit.read_poses(shown.first)[shown.rows]])
+    with recording_file(path, name, _blueprint(found, shown, name, seen)) as recording:
+        top = colours.round_up(float(np.nanmax(found.state.prediction.tensions, initial=0.0)))
+        scene = Scene(recording, problem.robot, seen, top)
+        scene.surroundings(words.short_names(problem.robot.cable_names))
+        _over_poses(recording, scene, found, shown)
+        _verdict(recording, found, shown)
+
+
+def _blueprint(found: Comparison, shown: Misfit, name: str, seen: np.ndarray) -> rrb.Blueprint:
+    robot = found.problem.robot
+    low, high = shapes.extent(robot, seen)
+    plotted = [
+        layout.plot(f"{kind.name.capitalize()} error [{kind.unit}]", [f"plot/{kind.name}/**"])
+        for kind in shown.kinds
+    ]
+    root = rrb.Horizontal(
+        layout.scene_view(robot, low, high, name, 0.95),
+        rrb.Vertical(*misfit.map_views(shown), *plotted),
+        rrb.Vertical(
+            layout.text("Verdict", "text/verdict"),
+            layout.text("Now", "text/now"),
+            row_shares=[2.4, 2.0],
+        ),
+        column_shares=[4.6, 3.8, 2.8],
+    )
+    return layout.blueprint(root)
+
+
+def _over_poses(recording: Recording, scene: Scene, found: Comparison, shown: Misfit) -> None:
+    """The measured poses one by one; all errors are to be seen at each."""
+    n = found.problem.data.n_rows
+    index, begin = pose_index(n), pose_index(1)
+    misfit.arrows(recording, begin, shown, [found.state], scene.size)
+    misfit.maps(recording, begin, shown, [found.state])
+    misfit.cursor(recording, index, shown)
+    measured = np.where(found.problem.use[:, None], shown.measured, np.nan)
+    scene.platform("measured", index, measured, MEASURED)
+    predicted = misfit.read_poses(found.state)
+    states = misfit.states_of(found.state)
+    predicted = np.where(states.known[:, None], predicted, np.nan)
+    scene.platform("model", index, predicted, colours.SEECR, solid=True)
+    scene.cables("model", index, states)
+    for kind in shown.kinds:
+        _plots(recording, index, found, kind)
+    texts = [_pose(found, k) for k in range(n)]
+    kinds = [str(_MARKDOWN)] * n
+    recording.rows("text/now", index, rr.TextDocument.columns(text=texts, media_type=kinds))
+
+
+def _plots(recording: Recording, index: rr.TimeColumn, found: Comparison, kind: Kind) -> None:
+    """The errors of one kind, reading by reading, over the poses."""
+    names, _units = channels(found.problem)
+    counted = found.problem.counted[:, kind.columns]
+    raw = np.where(counted, found.state.raw[:, kind.columns], np.nan) * kind.factor
+    shades = colours.cable_colours(raw.shape[1])
+    for k, (name, shade) in enumerate(zip(names[kind.columns], shades, strict=True)):
+        if not counted[:, k].any():
+            continue
+        entity = f"plot/{kind.name}/reading_{k + 1}"
+        recording.scalars(entity, index, raw[:, k])
+        colour = (int(shade[0]), int(shade[1]), int(shade[2]), 255)
+        plots.as_line(recording, entity, name, colour, 1.5)
+
+
+def _verdict(recording: Recording, found: Comparison, shown: Misfit | None) -> None:
+    parts = [f"# {'Noise' if found.is_noise else 'Not noise'}\n{plain(found.sentence)}\n"]
+    if found.terms:
+        parts.append("Model: SEECR + " + ", ".join(plain(t.name) for t in found.terms) + ".\n")
+    if shown is not None:
+        parts.append(_errors(found, shown))
+        parts.append(
+            f"\n**Scene.** {misfit.words_of(shown)} Blue box and cables: the model; orange "
+            "edges: what was measured.\n"
+        )
+        parts.append(_worst(found))
+    if found.notes:
+        lines = [f"- {plain(note)}" for note in found.notes[:_MOST_LISTED]]
+        parts.append("\n".join(["## Notes", *lines]))
+    document = rr.TextDocument("\n".join(parts), media_type=_MARKDOWN)
+    recording.always("text/verdict", document)
+
+
+def _errors(found: Comparison, shown: Misfit) -> str:
+    rows = []
+    for kind in shown.kinds:
+        values = (found.rms.get(kind.key), found.floor.get(kind.key))
+        cells = [short(None if v is None else kind.factor * v) for v in values]
+        rows.append((f"{kind.name} [{kind.unit}]", *cells))
+    return words.table(rows, ("rms error", "model", "noise"))
+
+
+def _worst(found: Comparison) -> str:
+    rows = [
+        (str(row["row"] + 1), str(row["line"]), plain(row["run"]), short(row["times_noise"]))
+        for row in found.worst[:_MOST_WORST]
+    ]
+    return "## Worst poses\n" + words.table(rows, ("pose", "line", "run", "times the noise"))
+
+
+def _pose(found: Comparison, k: int) -> str:
+    data = found.problem.data
+    head = f"## Pose {k + 1} of {data.n_rows}\nline {int(data.line[k])}, run {plain(data.run[k])}\n"
+    missing = [row["why"] for row in found.unsolved if row["row"] == k]
+    if missing:
+        return head + f"\nNo equilibrium to compare with: {plain(missing[0])}."
+    if not found.problem.use[k]:
+        return head + "\nLeft out, see the notes."
+    names, units = channels(found.problem)
+    factors = {"m": KINDS[0], "rad": KINDS[1], "N": KINDS[2]}
+    rows = [
+        (name, short(factors[unit].factor * float(found.state.raw[k, c])), factors[unit].unit)
+        for c, (name, unit) in enumerate(zip(names, units, strict=True))
+        if found.problem.counted[k, c]
+    ]
+    rows.append(("moving", str(found.way.direction[k]), ""))
+    return head + "\n" + words.table(rows, ("measured less predicted", "", ""))

@@ -1,0 +1,160 @@
+"""The recording of a diagnosis: its timeline steps from the model as it stood through the effects.
+
+On the timeline ``model_step`` every pose's error is seen under one model after the other. On
+``pose`` the platform goes through the measured poses, as it was measured, as the first model says
+and as the last one does.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from crosscheck.diagnosis import Diagnosis
+from crosscheck.recording import bars, colours, layout, misfit, plots, shapes, words
+from crosscheck.recording.diagnosis_words import model_words, pose_words, verdict_words
+from crosscheck.recording.misfit import MEASURED, Misfit
+from crosscheck.recording.scene import Scene
+from crosscheck.recording.stream import MODEL_STEP, Recording, pose_index, recording_file
+from crosscheck.stages import Kind, Stage, sizes_of, stages_of
+from seecr.pose import Array
+
+_MARKDOWN = rr.MediaType.MARKDOWN
+_STEPS_A_SECOND = 1.0
+_BETWEEN = (colours.YELLOW, colours.PINK, colours.GREEN, colours.SILVER)
+
+
+def write_diagnosis_recording(found: Diagnosis, path: str | Path) -> None:
+    """Write what a person wants to see of a diagnosis.
+
+    Args:
+        found: the diagnosis; one without a search (no verdict) is text alone.
+        path: the ``.rrd`` file; a temporary one takes its place when complete.
+
+    Raises:
+        CrosscheckError: the file cannot be written.
+    """
+    stages = stages_of(found)
+    if not stages:
+        _write_words(found, path)
+        return
+    assert found.search is not None
+    shown = Misfit(found.search.problem, stages[0].state)
+    with recording_file(path, _name(found), _blueprint(found, stages, shown)) as recording:
+        scene = Scene(recording, shown.problem.robot, _seen(shown), _top_tension(stages))
+        scene.surroundings(words.short_names(shown.problem.robot.cable_names))
+        _over_steps(recording, scene, found, stages, shown)
+        _over_poses(recording, scene, stages, shown)
+        document = rr.TextDocument(verdict_words(found, shown), media_type=_MARKDOWN)
+        recording.always("text/verdict", document)
+
+
+def _name(found: Diagnosis) -> str:
+    assert found.search is not None
+    problem = found.search.problem
+    return f"diagnosis of {problem.robot.name}, {problem.data.path.name}"
+
+
+def _write_words(found: Diagnosis, path: str | Path) -> None:
+    root = rrb.Vertical(layout.text("Verdict", "text/verdict"))
+    with recording_file(path, "diagnosis", layout.blueprint(root)) as recording:
+        document = rr.TextDocument(verdict_words(found, None), media_type=_MARKDOWN)
+        recording.always("text/verdict", document)
+
+
+def _seen(shown: Misfit) -> Array:
+    return np.concatenate([shown.measured[shown.rows], misfit.read_poses(shown.first)[shown.rows]])
+
+
+def _top_tension(stages: list[Stage]) -> float:
+    tensions = [stage.state.prediction.tensions for stage in (stages[0], stages[-1])]
+    return colours.round_up(float(np.nanmax(tensions, initial=0.0)))
+
+
+def _blueprint(found: Diagnosis, stages: list[Stage], shown: Misfit) -> rrb.Blueprint:
+    low, high = shapes.extent(shown.problem.robot, _seen(shown))
+    robot = shown.problem.robot
+    middle = [*misfit.map_views(shown), bars.view(found, stages)]
+    plotted = [
+        layout.plot(f"{kind.name.capitalize()} error [{kind.unit}]", [f"plot/{kind.name}/**"])
+        for kind in shown.kinds
+    ]
+    root = rrb.Horizontal(
+        rrb.Vertical(
+            layout.scene_view(robot, low, high, _name(found), 1.22),
+            rrb.Tabs(*plotted),
+            row_shares=[3.0, 1.3],
+        ),
+        rrb.Vertical(*middle, row_shares=[*[2.0] * len(shown.kinds), 1.7]),
+        rrb.Vertical(
+            layout.text("Verdict", "text/verdict"),
+            layout.text("Now", "text/now"),
+            row_shares=[1.6, 2.0],
+        ),
+        column_shares=[5.0, 3.6, 2.8],
+    )
+    return layout.blueprint(root, timeline=MODEL_STEP, frames_per_second=_STEPS_A_SECOND)
+
+
+def _over_steps(
+    recording: Recording, scene: Scene, found: Diagnosis, stages: list[Stage], shown: Misfit
+) -> None:
+    """Everything that changes from model to model."""
+    index = rr.TimeColumn(MODEL_STEP, sequence=range(len(stages)))
+    states = [stage.state for stage in stages]
+    misfit.arrows(recording, index, shown, states, scene.size)
+    misfit.maps(recording, index, shown, states)
+    bars.write_bars(recording, index, found, stages)
+    worst = misfit.worst_row(shown)
+    count = len(stages)
+    measured = np.tile(shown.measured[worst], (count, 1))
+    scene.platform("measured", index, measured, MEASURED)
+    predicted = np.stack([misfit.read_poses(state)[worst] for state in states])
+    scene.platform("model", index, predicted, colours.SEECR, solid=True)
+    scene.cables("model", index, misfit.stacked([(state, worst) for state in states]))
+    texts = [model_words(found, stages, k, shown, worst) for k in range(count)]
+    _texts(recording, index, texts)
+
+
+def _over_poses(recording: Recording, scene: Scene, stages: list[Stage], shown: Misfit) -> None:
+    """The measured poses one by one, under the first and the last model."""
+    n = shown.problem.data.n_rows
+    index = pose_index(n)
+    last = stages[-1].state
+    measured = np.where(shown.problem.use[:, None], shown.measured, np.nan)
+    scene.platform("measured", index, measured, MEASURED)
+    scene.platform("model", index, misfit.read_poses(last), colours.SEECR, solid=True)
+    scene.cables("model", index, misfit.states_of(last))
+    if len(stages) > 1:
+        scene.platform("first", index, misfit.read_poses(shown.first), colours.VERMILION)
+    misfit.maps(recording, pose_index(1), shown, [shown.first])
+    misfit.cursor(recording, index, shown)
+    for kind in shown.kinds:
+        _plots(recording, index, stages, shown, kind)
+    _texts(recording, index, [pose_words(stages, shown, k) for k in range(n)])
+
+
+def _plots(
+    recording: Recording, index: rr.TimeColumn, stages: list[Stage], shown: Misfit, kind: Kind
+) -> None:
+    """The error of each pose under each model; over the steps, that of all runs left out."""
+    for k, stage in enumerate(stages):
+        entity = f"plot/{kind.name}/model_{k}"
+        sizes = sizes_of(shown.problem, stage.state, kind) * kind.factor
+        recording.scalars(entity, index, sizes)
+        shade = colours.VERMILION if k == 0 else _BETWEEN[(k - 1) % len(_BETWEEN)]
+        shade = colours.SKY if 0 < k == len(stages) - 1 else shade
+        plots.as_line(recording, entity, stage.label, shade, 1.5)
+    entity = f"plot/{kind.name}/left_out"
+    steps = rr.TimeColumn(MODEL_STEP, sequence=range(len(stages)))
+    rms = [kind.factor * (stage.step.held_out.rms[kind.key] or 0.0) for stage in stages]
+    recording.scalars(entity, steps, rms)
+    plots.as_line(recording, entity, "rms on runs left out", colours.SILVER, 2.0)
+
+
+def _texts(recording: Recording, index: rr.TimeColumn, texts: list[str]) -> None:
+    kinds = [str(_MARKDOWN)] * len(texts)
+    recording.rows("text/now", index, rr.TextDocument.columns(text=texts, media_type=kinds))

@@ -1,0 +1,126 @@
+"""Texts of a diagnosis's recording, in Markdown: the verdict, each model, each pose."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from crosscheck.diagnosis import Diagnosis, Finding
+from crosscheck.noise import rms_by_kind
+from crosscheck.numbers import in_unit, parameter_name, percent, short, with_error
+from crosscheck.recording import misfit, words
+from crosscheck.recording.misfit import Misfit
+from crosscheck.stages import Stage, floor_of, sizes_of
+
+_MOST_PARAMETERS, _MOST_CANDIDATES, _MOST_LISTED = 9, 6, 6
+
+_NAMES = {
+    "effects_found": "Effects found",
+    "no_effect_missing": "No effect missing",
+    "unknown_effect": "Unknown effect",
+    "no_verdict": "No verdict",
+}
+_PLAY = """
+**Scene.** {arrows} Blue box and cables: the model at the worst pose; orange edges: what was \
+measured there.
+
+**Play.** `model_step` goes from the model as it stood through the effects added. `pose` (choose \
+it at the bottom left) goes through the measured poses: orange edges measured, blue the last \
+model, red edges the first.
+"""
+
+
+def verdict_words(found: Diagnosis, shown: Misfit | None) -> str:
+    """The verdict, what to measure next, what was assumed, and how to read the views."""
+    parts = [f"# {_NAMES[found.verdict]}\n{plain(found.sentence)}\n"]
+    if shown is not None:
+        parts.append(_PLAY.format(arrows=misfit.words_of(shown)))
+    parts += _listed("What to measure next", list(found.measure_next))
+    parts += _listed("Notes", list(found.notes))
+    return "\n".join(parts)
+
+
+def plain(text: str) -> str:
+    """A user's text, that no character of it means anything to Markdown."""
+    return "".join(f"\\{c}" if c in "\\`*_[]<>#|" else c for c in text)
+
+
+def _listed(title: str, lines: list[str]) -> list[str]:
+    if not lines:
+        return []
+    shown = [f"- {plain(line)}" for line in lines[:_MOST_LISTED]]
+    if len(lines) > _MOST_LISTED:
+        shown.append(f"- and {len(lines) - _MOST_LISTED} more in diagnosis.json")
+    return ["\n".join([f"## {title}", *shown, ""])]
+
+
+def model_words(found: Diagnosis, stages: list[Stage], k: int, shown: Misfit, worst: int) -> str:
+    """One model: its errors, and what its last effect is."""
+    stage = stages[k]
+    head = f"## Step {k} of {len(stages) - 1}: {plain(stage.label)}\n"
+    parts = [head, _errors(found, stage, shown)]
+    finding = next((f for f in found.missing if f.effect == stage.added), None)
+    if finding is not None:
+        parts.append(_finding(finding))
+    elif stage.added:
+        parts.append("Explains a part, but structure remains: not sure.\n")
+    elif found.candidates and len(stages) == 1:
+        parts.append(_candidates(found))
+    line = int(shown.problem.data.line[worst])
+    parts.append(f"\nThe box is the worst pose, line {line} of the data.")
+    return "\n".join(parts)
+
+
+def _errors(found: Diagnosis, stage: Stage, shown: Misfit) -> str:
+    fitted = rms_by_kind(shown.problem, stage.state.raw)
+    rows = []
+    for kind in shown.kinds:
+        values = (stage.step.held_out.rms[kind.key], fitted[kind.key], floor_of(found, kind))
+        cells = [short(None if v is None else kind.factor * v) for v in values]
+        rows.append((f"{kind.name} [{kind.unit}]", *cells))
+    return words.table(rows, ("rms error", "runs left out", "fitted to", "noise"))
+
+
+def _finding(finding: Finding) -> str:
+    rows = []
+    layout = finding.layout
+    for name, unit, value, error in zip(
+        layout.names, layout.units, finding.values, finding.stderr, strict=True
+    ):
+        factor, word = in_unit(unit)
+        shown, spread = with_error(factor * float(value), factor * float(error))
+        spread = f"± {spread}" if np.isfinite(error) else spread
+        rows.append((plain(parameter_name(name, unit)), f"{shown} {spread} {word}".strip()))
+    lines = [
+        f"\nRemoves **{percent(finding.share)}** of the unexplained error on runs it was not "
+        f"fitted to: {plain(finding.title)}.\n",
+        words.table(rows[:_MOST_PARAMETERS], ("parameter", "value")),
+    ]
+    if len(rows) > _MOST_PARAMETERS:
+        lines.append(f"\nand {len(rows) - _MOST_PARAMETERS} more in diagnosis.json")
+    if finding.rivals:
+        names = ", ".join(plain(rival.name) for rival in finding.rivals)
+        lines.append(f"\nCannot be told from: {names}.")
+    lines.append(f"\n**Check:** {plain(finding.check)}.")
+    return "\n".join(lines)
+
+
+def _candidates(found: Diagnosis) -> str:
+    rows = [
+        (plain(str(row["effect"])), plain(str(row["why_not"])))
+        for row in found.candidates[:_MOST_CANDIDATES]
+    ]
+    return "\n" + words.table(rows, ("tried", "why not"))
+
+
+def pose_words(stages: list[Stage], shown: Misfit, k: int) -> str:
+    """The numbers of one row under the first and the last model."""
+    data = shown.problem.data
+    head = f"## Pose {k + 1} of {data.n_rows}\nline {int(data.line[k])}, run {plain(data.run[k])}\n"
+    if not shown.problem.use[k]:
+        return head + "\nLeft out, see the notes."
+    ends = stages if len(stages) < 2 else [stages[0], stages[-1]]
+    rows = []
+    for kind in shown.kinds:
+        values = [kind.factor * float(sizes_of(shown.problem, s.state, kind)[k]) for s in ends]
+        rows.append((f"{kind.name} error [{kind.unit}]", *(short(v) for v in values)))
+    return head + "\n" + words.table(rows, ("", *(plain(s.label) for s in ends)))
