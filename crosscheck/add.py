@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from crosscheck.candidates import layouts_for, null_fit, ordered, seen_directions, try_candidate
-from crosscheck.diagnose import outlying_rows, prepare
 from crosscheck.diagnosis import Rms
 from crosscheck.errors import CrosscheckError
 from crosscheck.evidence import p_value
@@ -18,6 +17,7 @@ from crosscheck.held_out import HeldOut, hold_out, improves, unfitted
 from crosscheck.measurements import Measurements
 from crosscheck.model_file import Fitted
 from crosscheck.noise import Whiteness, rms_by_kind, whiteness
+from crosscheck.prepare import outlying_rows, prepare
 from crosscheck.problem import Problem, evaluate
 from crosscheck.search import FALSE_ALARM, Progress
 from seecr.effects import effect_named, layout_of

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from crosscheck.associations import EVERYWHERE, SIGNIFICANT, associations, channels
 from crosscheck.candidates import ordered
-from crosscheck.diagnose import noise_floor, outlying_rows, prepare
 from crosscheck.diagnosis import Rms
+from crosscheck.held_out import blocks_of
 from crosscheck.measurements import Measurements
 from crosscheck.noise import Whiteness, as_table, rms_by_kind, whiteness
+from crosscheck.prepare import noise_floor, outlying_rows, prepare
 from crosscheck.problem import ORIENTATION, POSITION, TENSION, Problem, State, evaluate
 from crosscheck.regions import regions_of
 from crosscheck.travel import Travel, travel
@@ -108,8 +109,8 @@ def compare(robot: Robot, data: Measurements, terms: Sequence[Term] = ()) -> Com
         terms: the model's effects with their values.
     """
     problem, notes, why = prepare(robot, data, terms)
-    if why:
-        notes.append(why)
+    # nothing is fitted here, so nobody asks how cross-validation would cut the data
+    notes = [note for note in [*notes, why] if note and note != blocks_of(problem)[1]]
     plain = problem.experiment.predict(effects_of(ordered(terms)))
     factor = problem.noise(plain)
     state = evaluate(problem, ordered(terms), factor)

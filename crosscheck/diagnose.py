@@ -11,21 +11,16 @@ from crosscheck.candidates import null_fit
 from crosscheck.confounding import Rival, rivals_of
 from crosscheck.diagnosis import Diagnosis, Finding, Rms
 from crosscheck.fit import Fit, flat
-from crosscheck.held_out import blocks_of
 from crosscheck.measurements import Measurements
-from crosscheck.noise import estimate_sigma, rms_by_kind
-from crosscheck.problem import Problem, State
+from crosscheck.noise import rms_by_kind
+from crosscheck.prepare import noise_floor, outlying_rows, prepare
+from crosscheck.problem import Problem
 from crosscheck.search import Progress, Search, Step, search, smallest_sure
 from crosscheck.separation import measured_directly, proposals
 from seecr.pose import Array
 from seecr.robot import Robot
-from seecr.sensitivity import Term
+from seecr.sensitivity import Term, effects_of
 
-# More rows than this part without an answer, and the data are not fit for a verdict.
-_LOST = 0.05
-# Rows that stick out by this many robust deviations, alone, are outliers.
-_OUTLIER = 6.0
-_MOST_OUTLIERS = 0.05
 # Where structure is left over, an effect is sure only if it has few parameters and took away
 # most of what was unexplained.
 _SURE_PARAMETERS, _SURE_SHARE, _SURE_ALONE = 3, 0.5, 2.0 / 3.0
@@ -48,7 +43,7 @@ def diagnose(
         progress: called with what is being done and the part of it that is done.
     """
     problem, notes, why = prepare(robot, data, terms)
-    factor = problem.noise(problem.experiment.predict(_effects(terms)))
+    factor = problem.noise(problem.experiment.predict(effects_of(terms)))
     base = null_fit(problem, terms, factor, refit=False)
     if why or not base.valid:
         return no_verdict(problem, base, notes, why or base.why)
@@ -66,50 +61,6 @@ def diagnose(
     found, more = _with_larger_noise(found, progress)
     notes += more
     return conclude(found, notes)
-
-
-def prepare(
-    robot: Robot, data: Measurements, terms: Sequence[Term]
-) -> tuple[Problem, list[str], str]:
-    """The problem without rows that have no answer; notes; why there can be no verdict."""
-    problem = Problem(robot, data, data.sigma, np.ones(data.n_rows, dtype=bool))
-    notes = list(data.notes)
-    if not problem.measured.any():
-        return problem, notes, "the data hold no readings"
-    plain = problem.experiment.predict(_effects(terms))
-    n = data.n_rows
-    for rows, words in (
-        (plain.singular, "the platform is free to move there"),
-        (~plain.solved & ~plain.singular, "no equilibrium was found there"),
-    ):
-        if rows.any():
-            lines = ", ".join(str(k) for k in data.line[rows][:8])
-            more = f" and {int(rows.sum()) - 8} more" if rows.sum() > 8 else ""
-            problem = problem.without(rows, f"lines {lines}{more} left out: {words}")
-    notes += problem.left_out
-    lost = n - int(problem.use.sum())
-    why = ""
-    if lost > max(_LOST * n, 1) and lost > 1:
-        why = f"{lost} of {n} rows have no equilibrium to compare with; see the notes"
-    raw = problem.residuals(plain.readings)
-    problem, more_notes = estimate_sigma(problem, raw)
-    notes += more_notes
-    if not why and problem.n_readings < 6:
-        why = f"only {problem.n_readings} readings are left"
-    if not why and _constant_commands(problem):
-        why = "all commands are the same: nothing tells effects apart"
-    _blocks, note = blocks_of(problem)
-    return problem, [*notes, note] if note else notes, why
-
-
-def _constant_commands(problem: Problem) -> bool:
-    commands = problem.experiment.commands
-    table = commands.pose if commands.lengths is None else commands.lengths
-    return len(table) > 1 and bool(np.all(np.ptp(table[problem.use], axis=0) == 0))
-
-
-def _effects(terms: Sequence[Term]) -> list[Any]:
-    return [t.effect() for t in terms]
 
 
 def _with_derivatives(problem: Problem, base: Fit, factor: Array) -> Fit:
@@ -131,14 +82,6 @@ def no_verdict(problem: Problem, base: Fit, notes: list[str], why: str) -> Diagn
     )  # fmt: skip
 
 
-def noise_floor(problem: Problem, state: State | None = None) -> Rms:
-    """The rms errors that noise alone would give a perfect model, that of lengths included."""
-    raw = np.broadcast_to(problem.reading_sigma, problem.measured.shape).copy()
-    if state is not None:
-        raw = np.sqrt(np.einsum("nij,nij->ni", state.factor, state.factor))
-    return rms_by_kind(problem, raw)
-
-
 def _without_outliers(
     problem: Problem, found: Search, base: Fit, factor: Array, progress: Progress
 ) -> tuple[Search, list[str]]:
@@ -158,28 +101,6 @@ def _without_outliers(
         with_all = ", ".join(found.found) or "nothing"
         note += f" (with them the search finds {with_all})"
     return better, [note]
-
-
-def outlying_rows(problem: Problem, state: State) -> np.ndarray:
-    """(n,) rows whose whitened residual is far beyond all others, in few places."""
-    power = np.zeros(problem.data.n_rows)
-    count = np.zeros(problem.data.n_rows)
-    np.add.at(power, problem.row_of, state.white**2)
-    np.add.at(count, problem.row_of, 1.0)
-    size = np.sqrt(power / np.maximum(count, 1.0))
-    used = problem.use & (count > 0)
-    middle = float(np.median(size[used]))
-    spread = 1.4826 * float(np.median(np.abs(size[used] - middle)))
-    limit = middle + _OUTLIER * max(spread, 0.2 * middle, 1e-12)
-    rows = used & (size > max(limit, 4.0))
-    if rows.sum() > max(_MOST_OUTLIERS * used.sum(), 1):
-        return np.zeros_like(rows)
-    # a neighbour that sticks out as well makes it structure, not an outlier
-    for k in np.flatnonzero(rows):
-        near = [j for j in (k - 1, k + 1) if 0 <= j < len(rows) and used[j]]
-        if any(size[j] > middle + 0.5 * (size[k] - middle) for j in near):
-            rows[k] = False
-    return np.asarray(rows)
 
 
 def _with_larger_noise(found: Search, progress: Progress) -> tuple[Search, list[str]]:
@@ -311,7 +232,7 @@ def _sentence(verdict: str, findings: list[Finding], found: Search) -> str:
     for f in findings:
         alike = f" (or {', '.join(r.name for r in f.rivals)}, alike on these data)"
         parts.append(
-            f"adding {f.effect}{alike if f.rivals else ''} removes {100 * f.share:.0f} % of the "
+            f"adding {f.effect}{alike if f.rivals else ''} removes {percent(f.share)} of the "
             f"unexplained error on {runs}"
         )
     end = (
@@ -321,6 +242,11 @@ def _sentence(verdict: str, findings: list[Finding], found: Search) -> str:
     )
     text = "; then ".join(parts) + end
     return text[0].upper() + text[1:] + f". {tried} effects were tried."
+
+
+def percent(share: float) -> str:
+    """A share for people; what is not all is not called all."""
+    return f"{min(100.0 * share, 99.9):.3g} %"
 
 
 def _candidates(found: Search, listed: list[str]) -> list[dict[str, Any]]:
@@ -378,9 +304,7 @@ def _measure_next(
 def _to_separate(found: Search, finding: Finding, rival: Rival) -> list[str]:
     robot = found.problem.robot
     names = f"{finding.effect} and {rival.name}"
-    direct = list(
-        dict.fromkeys(measured_directly(n, robot) for n in (finding.effect, rival.name))
-    )
+    direct = list(dict.fromkeys(measured_directly(n, robot) for n in (finding.effect, rival.name)))
     ways = [
         f"{p.words} (signal that separates them: now {p.now:.2g}, then {p.then:.2g}, needs 15)"
         for p in proposals(found.problem, found.last.fit, finding.effect, rival)
@@ -404,4 +328,3 @@ def _to_find(found: Search, where: tuple[dict[str, Any], ...]) -> str:
             "poses that differ in nothing else, forward and back, and look at it there"
         )
     return "repeat the same poses forward, back and an hour later, to see what the error follows"
-

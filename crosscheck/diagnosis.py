@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 
 from crosscheck.confounding import Rival
-from crosscheck.noise import Whiteness
+from crosscheck.noise import Rms, Whiteness
 from crosscheck.search import Search
 from seecr.effects.base import Layout
 from seecr.pose import Array
 
 VERDICTS = ("no_effect_missing", "effects_found", "unknown_effect", "no_verdict")
-Rms = dict[str, float | None]
 
 
 @dataclass(frozen=True, eq=False)

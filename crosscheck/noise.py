@@ -10,6 +10,8 @@ from scipy import spatial, stats
 from crosscheck.problem import ORIENTATION, POSITION, TENSION, Problem
 from seecr.pose import Array, rotvec_from_quat
 
+Rms = dict[str, float | None]
+
 # Residuals are structured where neighbours agree by more than this many standard errors.
 STRUCTURED = 4.0
 # A goodness of fit below this is not noise of the stated size.

@@ -154,7 +154,7 @@ def test_an_effect_that_differs_ends_1_and_is_named(tmp_path, monkeypatch):
 
     def heavier(robot, commands, effects, **options):
         (effect,) = effects
-        return honest(robot, commands, [replace(effect, factor=1.01 * effect.factor)], **options)
+        return honest(robot, commands, [replace(effect, added=1.01 * effect.added)], **options)
 
     monkeypatch.setattr(effect_cases, "measure", heavier)
     result = run(*SMALL, "--case", EFFECT, "--out", tmp_path)

@@ -150,7 +150,9 @@ BAD = {
     "wrong unit": ('unit = "m"', 'unit = "mm"', r"radius_m: expected unit 'm', came 'mm'"),
     "bad error": ("stderr = 0.0001", "stderr = -1", r"stderr must be a number from 0 or"),
     "odd word": ("at_bound", "atbound", r"unknown atbound; expected value, stderr, unit"),
-    "misspelt table": ("[[effect]]", "[[effects]]\n[[effect]]", r"unknown effects; expected effect"),
+    "misspelt table": (
+        "[[effect]]", "[[effects]]\n[[effect]]", r"line \d+: unknown effects; expected effect",
+    ),
     "newer": ("format = 1", "format = 2", r"format 2 is not known to this version"),
 }  # fmt: skip
 

@@ -9,7 +9,7 @@ import pytest
 from made_data import SIGMA, measured, soft_cogiro, term
 from scipy import stats
 
-from crosscheck.candidates import layouts_for, null_fit, try_candidate
+from crosscheck.candidates import null_fit, try_candidate
 from crosscheck.document import json_text
 from crosscheck.extensions import more_poses
 from crosscheck.greedy import chosen_poses

@@ -63,7 +63,9 @@ def _block(
     # the viewer draws 2D boxes as outlines only: bars are thick lines
     dim = (_DIM * lit).astype(np.uint8)
     dim[:, 3] = 255
-    recording.always(f"{root}/all", rr.LineStrips2D(strips, radii=thick, colors=dim, draw_order=20.0))
+    recording.always(
+        f"{root}/all", rr.LineStrips2D(strips, radii=thick, colors=dim, draw_order=20.0)
+    )
     columns = rr.LineStrips2D.columns(strips=strips, colors=lit)
     recording.rows(f"{root}/now", index, columns.partition([1] * len(stages)))
     recording.always(f"{root}/now", rr.LineStrips2D.from_fields(radii=[thick], draw_order=40.0))

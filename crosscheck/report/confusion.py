@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from matplotlib.patches import Rectangle
 
 from crosscheck.candidates import amplitude_columns, own_columns
 from crosscheck.diagnosis import Diagnosis
-from crosscheck.subspace import projected
 from crosscheck.fit import Fit
-from crosscheck.report.drawing import INK, WIDTH, blank, styled, svg
+from crosscheck.report.drawing import BEFORE, INK, WIDTH, blank, styled, svg
 from crosscheck.search import Search
+from crosscheck.subspace import basis, projected
 from seecr.effects.base import Layout
 from seecr.pose import Array
 
@@ -59,16 +60,10 @@ def confusion_of(found: Diagnosis) -> Confusion | None:
     kept = tuple(columns)
     if len(kept) < 2:
         return None
-    bases = {name: _basis(own) for name, own in columns.items()}
+    bases = {name: basis(own) for name, own in columns.items()}
     part = np.array([[_contained(columns[a], bases[b]) for b in kept] for a in kept])
     listed = sum(1 for f in found.missing if f.effect in columns)
     return Confusion(kept, listed, np.clip(part, 0.0, 1.0))
-
-
-def _basis(columns: Array) -> Array:
-    """Orthonormal basis of what an effect's columns span."""
-    u, s, _vt = np.linalg.svd(columns, full_matrices=False)
-    return np.asarray(u[:, s > 1e-9 * max(float(s[0]), 1e-300)])
 
 
 def _contained(columns: Array, basis: Array) -> float:
@@ -138,8 +133,10 @@ def draw_confusion(confusion: Confusion) -> str:
                     )  # fmt: skip
         for a, b in confusion.twins:
             for i, j in ((names.index(a), names.index(b)), (names.index(b), names.index(a))):
-                frame = _frame(j, i)
-                axes.add_patch(frame)
+                corner = (j - 0.46, i - 0.46)
+                axes.add_patch(
+                    Rectangle(corner, 0.92, 0.92, fill=False, edgecolor=BEFORE, linewidth=1.8)
+                )
         axes.set_xticks(range(k), names, rotation=40, ha="right", rotation_mode="anchor")
         axes.set_yticks(range(k), names)
         for label in axes.get_yticklabels()[: confusion.listed]:
@@ -158,9 +155,3 @@ def _words(part: float, count: int) -> str:
         return ""
     text = f"{100 * np.floor(100 * part) / 100:.0f}"
     return text if part < 0.9995 else "100"
-
-
-def _frame(x: float, y: float):  # type: ignore[no-untyped-def]
-    from matplotlib.patches import Rectangle
-
-    return Rectangle((x - 0.46, y - 0.46), 0.92, 0.92, fill=False, edgecolor="#D55E00", lw=1.8)

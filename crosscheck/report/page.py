@@ -17,7 +17,7 @@ from crosscheck.report.cables import draw_wall, walls_of
 from crosscheck.report.confusion import confusion_of, draw_confusion
 from crosscheck.report.tables import candidate_rows, checks, errors_of, finding_context
 from crosscheck.report.waterfall import waterfall
-from crosscheck.report.where import failure_map, caption
+from crosscheck.report.where import caption, failure_map
 from crosscheck.stages import KINDS, kinds_read, shown_stages, stages_of
 from seecr import __version__
 

@@ -124,8 +124,8 @@ def _arrows(
     rows = problem.use
     axes.quiver(
         place[rows, view[0]], place[rows, view[1]], error[rows, view[0]], error[rows, view[1]],
-        angles="xy", scale_units="xy", scale=1.0 / magnify, units="inches", width=0.017, headwidth=3.6,
-        headlength=4.2, headaxislength=3.8, minlength=0.0, color=INK, zorder=4,
+        angles="xy", scale_units="xy", scale=1.0 / magnify, units="inches", width=0.017,
+        headwidth=3.6, headlength=4.2, headaxislength=3.8, minlength=0.0, color=INK, zorder=4,
         rasterized=bool(rows.sum() > MANY),
     )  # fmt: skip
 
