@@ -108,7 +108,9 @@ def worst_mismatch(
         for k in range(len(layout)):
             relative = bool(layout.shape[k]) and layout.lower[k] > 0
             size = float(term.vector[k] if relative else layout.scale[k])
-            full = full_difference(experiment, terms, which, k, 1e-5 * size if relative else
+            # of another size than the differences found rest on; below, rounding of the solved
+            # rows (1e-13 of the load) shows in steps of readings that barely change
+            full = full_difference(experiment, terms, which, k, 5e-5 * size if relative else
                                    1e-4 * size)  # fmt: skip
             for part, unit in kinds:
                 largest = max(np.abs(full[:, part]).max() * size, 1e-6 * unit)

@@ -59,12 +59,13 @@ def plain_fsolve(robot: Robot, pose: np.ndarray, start: np.ndarray | None = None
     return Plain(found, flag == 1, info["nfev"])
 
 
-def exact_residual(answer: Solution, i: int) -> float:
+def exact_residual(answer: Solution, i: int, extra: np.ndarray | float = 0.0) -> float:
     """Unbalanced load at answer i, relative to the weight, torques over the robot's length.
 
     From command, deviation and rest lengths alone, in extended precision, so that neither
     rounding nor the solver's own bookkeeping hides anything. A platform on joints has only
-    their work balanced: what they carry themselves is projected out.
+    their work balanced: what they carry themselves is projected out. ``extra`` is an external
+    moment (3,) [N m].
     """
     wide = np.longdouble
     robot, pose, deviation = answer.robot, answer.command[i], answer.deviation[i]
@@ -83,6 +84,7 @@ def exact_residual(answer: Solution, i: int) -> float:
     pulls = tension[:, None] * cables / lengths[:, None]
     weight = (robot.mass * robot.gravity).astype(wide)
     moment = _cross(arms, pulls).sum(axis=0) + _cross(turn @ robot.centre_of_mass, weight)
+    moment = moment + extra
     force = pulls.sum(axis=0) + weight
     if robot.joints:
         return _on_joints(robot, pose, deviation, force.astype(float), moment.astype(float))
