@@ -14,7 +14,7 @@ _SHOWN = {
     "C": (1.0, "°C"),
     "Nm": (1.0, "N m"),
 }
-# A small factor without a unit reads better so.
+# Larger numbers are written with an exponent.
 _MOST_DIGITS = 6
 
 
@@ -48,13 +48,6 @@ def with_error(value: float, error: float) -> tuple[str, str]:
         return short(value, 6), short(error, 2)
     decimals = max(decimals, 0)
     return f"{value:.{decimals}f}".replace("-", "−"), f"{error:.{decimals}f}"
-
-
-def percent(part: float) -> str:
-    """A part as a percentage, never rounded up to all of it."""
-    if 0.995 <= part < 1.0:
-        return f"{np.floor(1e4 * part) / 100:.4g} %"
-    return f"{100 * part:.0f} %"
 
 
 def chance(p: float) -> str:

@@ -37,6 +37,9 @@ from seecr.setup import Commands
 
 # Rounds of finding the likeliest errors of commanded lengths.
 _LENGTH_ROUNDS = 25
+# A row is far off beyond this mean square of its whitened residuals; only where few rows are
+# (this part of all), it may be that they rest in another equilibrium.
+_FAR_OFF, _FEW_ROWS = 25.0, 0.25
 # Columns of a residual row: position, orientation, then tensions.
 POSITION, ORIENTATION, TENSION = slice(0, 3), slice(3, 6), slice(6, None)
 KINDS = ("position", "orientation", "tension")
@@ -263,8 +266,42 @@ def evaluate(
     if not problem.sigma.length_m:
         prediction = experiment.predict(effects, start)
         raw = problem.residuals(prediction.readings)
-        return _compared(problem, terms, prediction, raw, factor, experiment)
+        state = _compared(problem, terms, prediction, raw, factor, experiment)
+        return _on_measured_branch(problem, state)
     return _with_length_errors(problem, terms, experiment.length_errors, start)
+
+
+def _on_measured_branch(problem: Problem, state: State) -> State:
+    """Where a few rows are far off, take the equilibrium nearest to the measured pose.
+
+    A platform with slack cables can have several stable equilibria. Which one the robot came to
+    rest in is what the reading says; the model has only to have it.
+    """
+    data, at = problem.data, state.prediction
+    if data.quat_wxyz is None or at.has_history or at.setup.laws or problem.robot.joints:
+        return state
+    size = np.nanmean(np.where(problem.measured, state.table, np.nan) ** 2, axis=1)
+    whole = np.isfinite(data.position).all(axis=1) & np.isfinite(data.quat_wxyz).all(axis=1)
+    rows = np.flatnonzero(problem.use & whole & ((size > _FAR_OFF) | ~at.solved))
+    if len(rows) == 0 or len(rows) > _FEW_ROWS * problem.use.sum():
+        return state
+    poses = np.concatenate([data.position, data.quat_wxyz], axis=1)[rows]
+    effects = effects_of(state.terms)
+    other = state.experiment.from_other_starts(effects, at, rows, poses)
+    there = _compared(
+        problem, state.terms, other, problem.residuals(other.readings), state.factor,
+        state.experiment,
+    )  # fmt: skip
+    better = np.nansum(there.table**2, axis=1) < 0.5 * np.nansum(state.table**2, axis=1)
+    better = (better | ~at.solved) & other.solved
+    keep = rows[better[rows]]
+    if len(keep) == 0:
+        return state
+    mixed = state.experiment.from_other_starts(effects, at, keep, other.poses[keep])
+    return _compared(
+        problem, state.terms, mixed, problem.residuals(mixed.readings), state.factor,
+        state.experiment,
+    )  # fmt: skip
 
 
 def _with_length_errors(

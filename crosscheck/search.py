@@ -124,7 +124,8 @@ class _Searcher:
             if not better:
                 break
             noise = [c for c in better if c.whiteness.is_noise]
-            top = max(noise or better, key=lambda c: c.evidence.log)
+            # of models alike in evidence (friction that is null, say) the smaller one
+            top = max(noise or better, key=lambda c: c.evidence.log - 0.1 * len(c.fit.at_bound))
             if not noise and top.excess > (1.0 - LEAST_PART) * best.excess:
                 break  # what is left has another cause than the next best guess
             best = top

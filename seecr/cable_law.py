@@ -232,9 +232,10 @@ def catenary_span(h, v, w, length, ea):
     t_low, t_top = math.sqrt(h * h + v * v), math.sqrt(h * h + top * top)
     rise = length * (v + top) / (t_top + t_low)  # (t_top - t_low)/w
     # asinh(top/h) - asinh(v/h) as a logarithm, each form where its terms do not cancel
-    if v >= 0.0:
+    # the first two hold for either sign of their end, and cancel only where it is steep
+    if v >= -h:
         grow = math.log1p(w * (length + rise) / (v + t_low)) / w
-    elif top <= 0.0:
+    elif top <= h:
         grow = math.log1p(w * (length - rise) / (t_top - top)) / w
     else:
         grow = math.log((top + t_top) * (t_low - v) / (h * h)) / w
@@ -414,7 +415,7 @@ def solve_catenary(row, across, rise, unknown, error, jacobian, work):
     step = work[1]
     _catenary_equations(row, unknown, across, rise, error, jacobian)
     size = _size(error, scale)
-    for iteration in range(200):
+    for _ in range(200):
         if size < 1e-15:
             return True
         _solve3(jacobian, error, step)

@@ -27,6 +27,7 @@ class Status(Enum):
     SINGULAR = "balanced, but free to move along at least one direction without resistance"
     STALLED = "not at rest: steps no longer reduce the forces, though they do not balance"
     FALLING = "no equilibrium found: the platform fell beyond the reach of its cables"
+    SPINNING = "no equilibrium found: the external moment turned the platform round and round"
     CABLE_LAW = "no answer: a cable's own equations have no solution at this pose"
     ITERATIONS = "not at rest: the limit of iterations was reached before the forces balanced"
     GAVE_UP = "not at rest: SciPy's solver gave up before the forces balanced"
@@ -40,6 +41,7 @@ _OF_OUTCOME = {
     kernel.FALLING: Status.FALLING,
     kernel.CABLE_LAW: Status.CABLE_LAW,
     kernel.ITERATIONS: Status.ITERATIONS,
+    kernel.SPINNING: Status.SPINNING,
 }
 
 
@@ -92,16 +94,23 @@ class Solution:
         """Minus the derivative of the wrench by the pose, (n, d, d).
 
         For a free platform [N/m, N/rad; N m/m, N m/rad], by translation and rotation vector
-        in the base frame; else by the joints.
+        in the base frame; else by the joints. An external moment, which has no potential,
+        takes its symmetry.
         """
         unit = self._units()
-        return self.evaluation.hessian * unit[:, None] * unit[None, :]
+        return statics.stiffness(self.tables, self.evaluation) * unit[:, None] * unit[None, :]
 
     @cached_property
     def _spectrum(self) -> tuple[Array, Array]:
-        finite = np.where(np.isfinite(self.evaluation.hessian), self.evaluation.hessian, 0.0)
-        values, vectors = np.linalg.eigh(finite)
-        values[~np.isfinite(self.evaluation.hessian).all(axis=(1, 2))] = np.nan
+        hessian = self.evaluation.hessian.copy()
+        rows = np.flatnonzero(self.status == Status.SINGULAR)
+        if len(rows):
+            # a cable that is just as long as its rest length resists on one side only
+            there = statics.take_evaluation(self.evaluation, rows)
+            hessian[rows] = statics.without_idle(statics.take(self.tables, rows), there).hessian
+        finite = np.isfinite(hessian)
+        values, vectors = np.linalg.eigh(np.where(finite, hessian, 0.0))
+        values[~finite.all(axis=(1, 2))] = np.nan
         return values, vectors
 
     @property
@@ -228,7 +237,7 @@ def certify(robot: Robot, tables: statics.Tables, found: statics.Evaluation) -> 
     # not found's own: a search in joint values alone leaves its deviations unplaced
     moved = check.deviation
     turn = np.where(moved[:, 3:4] < 0, -1.0, 1.0) * moved[:, 3:]
-    lost = np.array([s in (Status.FALLING, Status.CABLE_LAW) for s in status], dtype=bool)
+    lost = np.isin(found.outcome, (kernel.FALLING, kernel.CABLE_LAW, kernel.SPINNING))
     return Solution(
         robot=robot,
         tables=tables,

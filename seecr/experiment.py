@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from seecr import cable_law, kernel, statics
 from seecr.effects.base import Effect, Readings
 from seecr.effects.checked import edit_readings, edit_setup
-from seecr.equilibrium import Solution, certify
+from seecr.equilibrium import Solution, certify, start_of
 from seecr.history import Path, path_of, walk
 from seecr.pose import Array
 from seecr.robot import Robot
@@ -122,6 +122,21 @@ class Experiment:
         tables, found = self._solve(setup, start)
         return Prediction(setup, tables, found, self._read(effects, setup, tables, found), False)
 
+    def from_other_starts(
+        self, effects: Sequence[Effect], at: Prediction, rows: Array, poses: Array
+    ) -> Prediction:
+        """The same prediction with some rows solved again from given poses (k, 7).
+
+        Where a robot has several stable equilibria, the start decides which one is found.
+        """
+        tables = statics.take(at.tables, rows)
+        start, values = start_of(self.robot, tables, poses)
+        again = statics.descend(tables, start, _LIMIT, start_values=values, staged=False)
+        found = statics.take_evaluation(at.found, np.arange(len(at.found.outcome)))
+        statics.put_evaluation(found, rows, again)
+        readings = self._read(effects, at.setup, at.tables, found)
+        return Prediction(at.setup, at.tables, found, readings, at.has_history)
+
     def _solve(
         self, setup: Setup, start: statics.Evaluation | None
     ) -> tuple[statics.Tables, statics.Evaluation]:
@@ -129,8 +144,9 @@ class Experiment:
             if start is None:
                 return statics.descend(tables, limit=_LIMIT)
             found = statics.descend(
-                tables, start.deviation, _LIMIT, start_values=start.values, staged=False
-            )
+                tables, start.deviation, _LIMIT, start_values=start.values, staged=False,
+                guess=start.guess,
+            )  # fmt: skip
             return _mend(tables, found)
 
         return _with_laws(setup, run, start)

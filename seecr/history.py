@@ -143,20 +143,6 @@ def walk(setup: Setup, tables: statics.Tables, path: Path, limit: int) -> static
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _quat_to_next(q_old, q_command_old, q_command_new, out):  # type: ignore[no-untyped-def]
-    """Deviation from the new command of a platform that has not moved."""
-    pose = np.empty(4)
-    kernel.quat_product(q_old, q_command_old, pose)
-    back = q_command_new.copy()
-    for k in range(1, 4):
-        back[k] = -back[k]
-    kernel.quat_product(pose, back, out)
-    if out[0] < 0.0:
-        for k in range(4):
-            out[k] = -out[k]
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
 def _shares(span):  # type: ignore[no-untyped-def]
     """What a load linear in time leaves of itself after ``span`` time constants.
 
@@ -181,16 +167,16 @@ def _walk(  # type: ignore[no-untyped-def]
     start, first = np.zeros(7), np.zeros(gradient.shape[1])
     crept, amplitude = np.zeros(m), np.empty(m)
     friction = np.empty(m)
+    space = kernel.make_space(m, gradient.shape[1], screws.shape[1])
     for k in range(n):
-        start[:] = 0.0
-        start[3] = 1.0
-        first[:] = 0.0
-        if not fresh[k] and screws.shape[1] == 0:
-            for c in range(3):
-                start[c] = poses[k - 1, c] + deviation[k - 1, c] - poses[k, c]
-            _quat_to_next(
-                deviation[k - 1, 3:], poses[k - 1, 3:], poses[k, 3:], start[3:]
-            )
+        if fresh[k]:
+            start[:] = 0.0
+            start[3] = 1.0
+            first[:] = 0.0
+        else:
+            # as far from its command as it was before
+            start[:] = deviation[k - 1]
+            first[:] = values[k - 1]
         for i in range(m):
             row = cables[k, i]
             amplitude[i], friction[i] = row[HYSTERESIS], row[FRICTION]
@@ -212,7 +198,7 @@ def _walk(  # type: ignore[no-untyped-def]
         outcome[k], count[k], residual[k] = kernel.solve_in_stages(
             cables[k], load[k], poses[k], screws[k], start, first, length, scale[k], radius,
             reach[k], limit, guess[k], gradient[k], hessian[k], states[k], slopes[k],
-            deviation[k], values[k], softened, fresh[k],
+            deviation[k], values[k], softened, fresh[k], space,
         )  # fmt: skip
         for i in range(m):
             row = cables[k, i]

@@ -141,6 +141,11 @@ class Robot:
         longest = float(np.max(self.nominal_lengths(self.reference_pose[None])))
         return max(reach, floor) or 0.01 * longest
 
+    @cached_property
+    def reference_lengths(self) -> Array:
+        """Straight lengths |A_i - (t + R B_i)| at the reference pose, (m,) [m]."""
+        return self.nominal_lengths(self.reference_pose[None])[0]
+
     def nominal_lengths(self, poses: Array) -> Array:
         """Straight lengths |A_i - (t + R B_i)| at poses (n, 7), as (n, m) [m] (eqs 1, 2)."""
         anchors = transform_points(np.asarray(poses, float), self.anchor_points)
@@ -153,5 +158,5 @@ class Robot:
         Where the MJCF's rest lengths are the straight lengths at the reference pose, as in
         the paper (step 3), these are the straight lengths at the commanded pose.
         """
-        offset = self.rest_lengths - self.nominal_lengths(self.reference_pose[None])[0]
+        offset = self.rest_lengths - self.reference_lengths
         return self.nominal_lengths(poses) + offset

@@ -13,7 +13,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from seecr import cable_law, kernel, statics
+from seecr import cable_law, statics
 from seecr.effects.base import Effect, Layout, Readings
 from seecr.experiment import Experiment, Prediction, read
 from seecr.joints import motion_columns
@@ -244,50 +244,17 @@ def _as_motion(at: Prediction, step: Array) -> Array:
     tables = at.tables
     if tables.screws.shape[1] == 0:
         return step / np.repeat([1.0, tables.length], 3)
-    screws = _screws_at_rest(at)
+    screws = statics.joints_at_rest(at.tables, at.found)
     values = np.where(screws[..., 0] == 1.0, step / tables.length, step)
     return np.einsum("nkd,nd->nk", motion_columns(screws, at.poses[:, :3]), values)
 
 
-def _screws_at_rest(at: Prediction) -> Array:
-    """The joints (n, d, 7) as they stand where the platform rests."""
-    tables = at.tables
-    out, place = np.empty_like(tables.screws), np.empty(7)
-    for row in range(len(tables)):
-        kernel.place_joints(
-            tables.screws[row], at.found.values[row], tables.length, tables.poses[row, :3],
-            place, out[row],
-        )  # fmt: skip
-    return out
-
-
 def _inverse_stiffness(at: Prediction) -> Array:
     """Inverse of the stiffness of each row; of what is stiff, where a row is singular."""
-    hessian = np.where(np.isfinite(at.found.hessian), at.found.hessian, 0.0)
-    moments = at.tables.load[:, kernel.EXTERNAL_MOMENT : kernel.EXTERNAL_MOMENT + 3]
-    if not np.any(moments):
-        return np.asarray(np.linalg.pinv(hessian, rcond=1e-12, hermitian=True), dtype=float)
-    return np.asarray(np.linalg.pinv(hessian + _turning(at, moments), rcond=1e-12), dtype=float)
-
-
-def _turning(at: Prediction, moments: Array) -> Array:
-    """What a constant moment (n, 3) [N m] adds to the stiffness (n, d, d), which it skews.
-
-    It has no potential, so the energy's second derivative lacks it. A free platform's is
-    symmetric about the moment of all else, which at rest is minus this one: -[M]x/2 is missing.
-    On joints, the axis a_j turns with each hinge i further out: -M . (a_i x a_j).
-    """
-    tables = at.tables
-    n, length2 = len(tables), tables.length**2
-    if tables.screws.shape[1] == 0:
-        out = np.zeros((n, 6, 6))
-        for k, unit in enumerate(np.eye(3)):
-            out[:, 3:, 3 + k] = -0.5 * np.cross(moments, unit) / length2
-        return out
-    screws = _screws_at_rest(at)
-    axes = screws[..., 1:4] * screws[..., :1]
-    turned = np.cross(axes[:, None, :], axes[:, :, None])  # [n, j, i] = a_i x a_j
-    return -np.tril(np.einsum("nk,njik->nji", moments, turned), -1) / length2
+    stiffness = statics.stiffness(at.tables, at.found)
+    finite = np.where(np.isfinite(stiffness), stiffness, 0.0)
+    symmetric = stiffness is at.found.hessian  # else a moment skews it
+    return np.asarray(np.linalg.pinv(finite, rcond=1e-12, hermitian=symmetric), dtype=float)
 
 
 def _lengthened(tables: Tables, cable: int, by: float) -> Tables:

@@ -42,8 +42,7 @@ class Commands:
     def nominal_change(self, robot: Robot) -> Array:
         """Straight lengths at the commanded poses less those at the reference, (n, m) [m]."""
         if not self._kept or self._kept[0][0] is not robot:
-            reference = robot.nominal_lengths(robot.reference_pose[None])
-            change = robot.nominal_lengths(self.pose) - reference
+            change = robot.nominal_lengths(self.pose) - robot.reference_lengths
             self._kept[:] = [(robot, change)]
         return self._kept[0][1]
 
@@ -56,10 +55,11 @@ def play(told: Array, run: NDArray[np.int64] | None, half_width: Array) -> Array
 
     It starts centred on the first row of each run.
     """
-    out = told.copy()
+    out, low, high = told.copy(), told - half_width, told + half_width
     for k in range(1, len(told)):
         if run is None or run[k] == run[k - 1]:
-            out[k] = np.clip(out[k - 1], told[k] - half_width, told[k] + half_width)
+            np.maximum(out[k - 1], low[k], out=out[k])
+            np.minimum(out[k], high[k], out=out[k])
     return out
 
 
@@ -141,7 +141,7 @@ class Setup:
         if self.commands.lengths is not None:
             return paid * self.length_factor
         robot = self.robot
-        pretension = robot.rest_lengths - robot.nominal_lengths(robot.reference_pose[None])[0]
+        pretension = robot.rest_lengths - robot.reference_lengths
         zero = self.geometric_lengths(self.zero_pose[None])
         return (zero + pretension + paid) * self.length_factor
 

@@ -18,7 +18,7 @@ from seecr.robot import Robot
 from seecr.setup import Setup, upwards
 
 # Fewer poses than this are not worth a second thread.
-_CHUNK = 48
+_CHUNK = 128
 
 
 @dataclass(eq=False)
@@ -92,24 +92,11 @@ def assemble(setup: Setup, strains: Array | None = None) -> Tables:
     poses = np.ascontiguousarray(commands.pose)
     n, m = len(poses), robot.n_cables
     rest = setup.rest_lengths()
-    cables = np.zeros((n, m, cable_law.N_COLUMNS))
-    cables[..., cable_law.EXIT : cable_law.EXIT + 3] = setup.exit_points
-    cables[..., cable_law.ANCHOR : cable_law.ANCHOR + 3] = setup.anchor_points
+    gap = setup.geometric_lengths(poses) - rest
+    cables = np.empty((n, m, cable_law.N_COLUMNS))
+    cables[:] = _same_in_all_rows(setup)
     cables[..., cable_law.REST] = rest
-    cables[..., cable_law.GAP] = _gap(setup, rest)
-    for column, values in (
-        (cable_law.EA, setup.ea),
-        (cable_law.QUADRATIC, setup.quadratic),
-        (cable_law.CUBIC, setup.cubic),
-        (cable_law.RADIUS, setup.pulley_radius),
-        (cable_law.COMPLIANCE, setup.compliance),
-        (cable_law.WINCH_SIDE, setup.winch_side),
-        (cable_law.WEIGHT, setup.cable_weight),
-        (cable_law.HYSTERESIS, setup.hysteresis),
-        (cable_law.HYSTERESIS_STRETCH, setup.hysteresis_stretch),
-        (cable_law.FRICTION, setup.friction),
-    ):
-        cables[..., column] = values
+    cables[..., cable_law.GAP] = gap
     if setup.laws:
         _linearise(setup, np.zeros((n, m)) if strains is None else strains, cables)
     load = np.zeros((n, kernel.N_LOAD))
@@ -124,9 +111,30 @@ def assemble(setup: Setup, strains: Array | None = None) -> Tables:
         screws=_screws_of(robot, poses.tobytes(), n),
         length=robot.length,
         scale=_load_scale(setup),
-        reach=3.0 * (rest.max(axis=1) + np.abs(cables[..., cable_law.GAP]).max(axis=1)),
+        reach=3.0 * (rest.max(axis=1) + np.abs(gap).max(axis=1)),
         n_dof=robot.n_dof,
     )
+
+
+def _same_in_all_rows(setup: Setup) -> Array:
+    """The cables' columns that no row changes, (m, N_COLUMNS)."""
+    cables = np.zeros((setup.robot.n_cables, cable_law.N_COLUMNS))
+    cables[:, cable_law.EXIT : cable_law.EXIT + 3] = setup.exit_points
+    cables[:, cable_law.ANCHOR : cable_law.ANCHOR + 3] = setup.anchor_points
+    for column, values in (
+        (cable_law.EA, setup.ea),
+        (cable_law.QUADRATIC, setup.quadratic),
+        (cable_law.CUBIC, setup.cubic),
+        (cable_law.RADIUS, setup.pulley_radius),
+        (cable_law.COMPLIANCE, setup.compliance),
+        (cable_law.WINCH_SIDE, setup.winch_side),
+        (cable_law.WEIGHT, setup.cable_weight),
+        (cable_law.HYSTERESIS, setup.hysteresis),
+        (cable_law.HYSTERESIS_STRETCH, setup.hysteresis_stretch),
+        (cable_law.FRICTION, setup.friction),
+    ):
+        cables[:, column] = values
+    return cables
 
 
 def _linearise(setup: Setup, strains: Array, cables: Array) -> None:
@@ -136,11 +144,6 @@ def _linearise(setup: Setup, strains: Array, cables: Array) -> None:
         slope = (law(strains + step) - law(strains - step)) / (2.0 * step)
         cables[..., cable_law.EXTRA] += law(strains) - slope * strains
         cables[..., cable_law.EXTRA_SLOPE] += slope
-
-
-def _gap(setup: Setup, rest: Array) -> Array:
-    """Geometric length at the commanded pose less the rest length, exactly 0 where equal."""
-    return setup.geometric_lengths(setup.commands.pose) - rest
 
 
 def _hanging(setup: Setup) -> Array:
@@ -188,15 +191,18 @@ def descend(
     threads: int | None = None,
     start_values: Array | None = None,
     staged: bool | None = None,
+    guess: Array | None = None,
 ) -> Evaluation:
     """Bring every pose to rest; ``start`` (n, 7) are deviations, none by default.
+
+    ``guess`` (n, m, 3) are the catenaries of the start, where there are any.
 
     Stiff robots that do not get there are made stiff in stages, from soft (``staged=True``
     starts with that, ``False`` never does it). A soft robot can leave for another equilibrium,
     so the stages are for those alone that need them.
     """
     if staged is None:
-        out = descend(tables, start, limit, threads, start_values, staged=False)
+        out = descend(tables, start, limit, threads, start_values, False, guess)
         unsettled = (out.outcome == kernel.ITERATIONS) | (out.outcome == kernel.STALLED)
         stiff = tables.cables[..., cable_law.EA].max(axis=1) > kernel.STIFF * tables.scale
         again = np.flatnonzero(unsettled & stiff)
@@ -210,6 +216,8 @@ def descend(
     out = Evaluation.empty(n, m, tables.n_dof)
     starts = out.deviation.copy() if start is None else np.ascontiguousarray(start)
     first = np.zeros((n, tables.n_dof)) if start_values is None else start_values
+    if guess is not None:
+        out.guess[:] = guess
     out.energy = np.full(n, np.nan)
 
     def run(part: slice) -> None:
@@ -253,10 +261,49 @@ def _run(run: Callable[[slice], None], n: int, threads: int | None) -> None:
 
 def run_parts(run: Callable[[slice], None], parts: list[slice]) -> None:
     """Run a job on every part of a batch, in threads: the compiled loop frees the lock."""
-    if len(parts) == 1:
-        run(parts[0])
-    else:
-        list(_pool().map(run, parts))
+    others = [_pool().submit(run, part) for part in parts[1:]]
+    run(parts[0])
+    for other in others:
+        other.result()
+
+
+def without_idle(tables: Tables, at: Evaluation) -> Evaluation:
+    """Evaluate again, without the taut cables whose tension is mere rounding."""
+    tension = at.states[..., cable_law.TENSION]
+    idle = (at.states[..., cable_law.SLACK] == 0.0) & (
+        tension < kernel.IDLE * tables.scale[:, None]
+    )
+    rest = take(tables, np.arange(len(tables)))
+    rest.cables[idle, cable_law.GAP] = -rest.cables[idle, cable_law.REST]
+    rest.cables[idle, cable_law.RADIUS] = 0.0
+    return evaluate(rest, at)
+
+
+def joints_at_rest(tables: Tables, at: Evaluation) -> Array:
+    """The joints (n, d, 7) as they stand at the joint values of ``at``."""
+    out, place = np.empty_like(tables.screws), np.empty(7)
+    if tables.screws.shape[1] == 0:
+        return out
+    for i in range(len(tables)):
+        kernel.place_joints(
+            tables.screws[i], at.values[i], tables.length, tables.poses[i], place, out[i]
+        )
+    return out
+
+
+def stiffness(tables: Tables, at: Evaluation) -> Array:
+    """Minus the derivative of the wrench, (n, d, d) [N/m] in scaled coordinates.
+
+    A constant moment, which has no potential, skews it; ``at.hessian`` is its symmetric part.
+    """
+    first = kernel.EXTERNAL_MOMENT
+    rows = np.flatnonzero(np.any(tables.load[:, first : first + 3], axis=1))
+    if len(rows) == 0:
+        return at.hessian
+    joints, out = joints_at_rest(tables, at), at.hessian.copy()
+    for i in rows:
+        kernel.add_skew(tables.load[i], joints[i], tables.length, out[i])
+    return out
 
 
 def residual_size(gradient: Array) -> Array:

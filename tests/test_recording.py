@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import os
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from rerun.chunk import RrdReader
-from rerun.experimental import ViewerClient
+from recordings import Readback, headless_viewer
 
 from crosscheck.cases import Case, demobot_sweep, user_cases
 from crosscheck.errors import CrosscheckError
@@ -48,47 +45,6 @@ def written(result: CaseResult, tmp_path_factory: pytest.TempPathFactory) -> Pat
     path = tmp_path_factory.mktemp("recording") / "case.rrd"
     write_case_recording(result, path)
     return path
-
-
-class Readback:
-    """Everything in a recording, by entity and timeline."""
-
-    def __init__(self, path: Path) -> None:
-        self.reader = RrdReader(path)
-        self.chunks = [
-            (chunk.entity_path, tuple(chunk.timeline_names), chunk.to_record_batch())
-            for chunk in self.reader.stream()
-        ]
-
-    @property
-    def timelines(self) -> set[str]:
-        return {name for _, names, _ in self.chunks for name in names}
-
-    def entities(self, timeline: str) -> set[str]:
-        return {entity for entity, names, _ in self.chunks if timeline in names}
-
-    def column(self, entity: str, component: str, timeline: str | None = "pose") -> list[Any]:
-        wanted = (timeline,) if timeline else ()
-        rows: list[Any] = []
-        for path, names, batch in self.chunks:
-            if path == entity and names == wanted and component in batch.schema.names:
-                rows += batch.column(batch.schema.names.index(component)).to_pylist()
-        assert rows, f"{entity} has no {component} over {timeline}"
-        return rows
-
-    def scalars(self, entity: str, timeline: str = "pose") -> np.ndarray:
-        return np.array(self.column(entity, "Scalars:scalars", timeline), dtype=float)[:, 0]
-
-    def seconds(self, entity: str) -> np.ndarray:
-        """Times of an entity's rows on the timeline of the settling [s]."""
-        for path, names, batch in self.chunks:
-            if path == entity and names == ("settling_time",):
-                column = batch.column(batch.schema.names.index("settling_time"))
-                return column.cast("int64").to_numpy() / 1e9
-        raise AssertionError(f"{entity} has no rows over settling_time")
-
-    def static(self, entity: str, component: str) -> Any:
-        return self.column(entity, component, None)[0]
 
 
 @pytest.fixture(scope="module")
@@ -422,17 +378,7 @@ def test_the_top_of_the_scale_is_round(value: float, top: float) -> None:
 
 @pytest.fixture(scope="module")
 def viewer() -> Iterator[Any]:
-    """A headless viewer, where the machine can draw at all."""
-    program = Path(sys.executable).with_name("rerun")
-    if not program.is_file():
-        pytest.skip(f"no Rerun viewer beside {sys.executable}")
-    try:
-        client = ViewerClient.spawn(
-            headless=True, port=20000 + os.getpid() % 20000, executable_path=str(program)
-        )
-    except Exception as error:
-        pytest.skip(f"no headless viewer here (mesa-vulkan-drivers?): {error}")
-    with client:
+    with headless_viewer() as client:
         yield client
 
 

@@ -129,7 +129,7 @@ def _over_poses(recording: Recording, scene: Scene, stages: list[Stage], shown: 
     scene.platform("model", index, misfit.read_poses(last), colours.SEECR, solid=True)
     scene.cables("model", index, misfit.states_of(last))
     if len(stages) > 1:
-        scene.platform("first", index, misfit.read_poses(shown.first), colours.VERMILION)
+        scene.platform("first", index, misfit.read_poses(shown.first), colours.PINK)
     misfit.maps(recording, pose_index(1), shown, [shown.first])
     misfit.cursor(recording, index, shown)
     for kind in shown.kinds:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from crosscheck.diagnose import percent
 from crosscheck.diagnosis import Diagnosis, Finding
 from crosscheck.noise import rms_by_kind
-from crosscheck.numbers import in_unit, parameter_name, percent, short, with_error
+from crosscheck.numbers import in_unit, parameter_name, short, with_error
 from crosscheck.recording import misfit, words
 from crosscheck.recording.misfit import Misfit
 from crosscheck.stages import Stage, floor_of, sizes_of
@@ -25,7 +26,7 @@ measured there.
 
 **Play.** `model_step` goes from the model as it stood through the effects added. `pose` (choose \
 it at the bottom left) goes through the measured poses: orange edges measured, blue the last \
-model, red edges the first.
+model, pink edges the first.
 """
 
 

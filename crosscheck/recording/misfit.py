@@ -18,9 +18,9 @@ from seecr.pose import Array, quat_from_rxyz, rxyz_from_quat
 
 MEASURED: colours.Rgba = colours.MUJOCO
 # Top of a colour scale: this percentile of the errors.
-_LARGEST = 98.0
+_LARGEST = 95.0
 # Radii of arrows over the robot's size, of dots in points of the screen.
-_ARROW, _DOT, _RING = 0.0016, 5.0, 9.0
+_ARROW, _DOT, _RING = 0.0021, 5.0, 9.0
 _MARGIN = 0.14
 
 

@@ -28,6 +28,11 @@ _VERDICTS = {
     "no_verdict": ("No verdict", "the data or the solves are not fit for one"),
 }
 
+_NO_SEARCH: dict[str, Any] = {
+    "title": "", "facts": [], "figures": dict.fromkeys(("waterfall", "map", "confusion"), ""),
+    "walls": [], "twins": [], "caption": "", "added": [], "together": False, "unsure": False,
+}  # fmt: skip
+
 
 def write_report(found: Diagnosis, path: str | Path) -> None:
     """Write a diagnosis as one self-contained page.
@@ -86,8 +91,7 @@ def _context(found: Diagnosis) -> dict[str, Any]:
 def _of_search(found: Diagnosis) -> dict[str, Any]:
     """Facts and figures; empty where there was no search."""
     if found.search is None:
-        return {"facts": [], "title": "", "figures": {}, "walls": [], "twins": [],
-                "caption": "", "added": [], "together": False, "unsure": False}  # fmt: skip
+        return _NO_SEARCH
     problem = found.search.problem
     before, after = shown_stages(found)
     # what the wall overlays is the last model, sure or not: it shows what was tried

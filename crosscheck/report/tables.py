@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from crosscheck.candidates import Candidate, own_columns
+from crosscheck.diagnose import percent
 from crosscheck.diagnosis import Diagnosis, Finding, Rms
 from crosscheck.evidence import p_value
 from crosscheck.fit import sizes
 from crosscheck.noise import POOR_FIT, STRUCTURED
-from crosscheck.numbers import chance, in_unit, parameter_name, percent, short, with_error
+from crosscheck.numbers import chance, in_unit, parameter_name, short, with_error
 from crosscheck.search import FALSE_ALARM, Step
 from crosscheck.stages import KINDS, stages_of
 
