@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crosscheck.equation_error import start_from_forces
 from crosscheck.evidence import Evidence, evidence, p_value
 from crosscheck.fit import Fit, fit, flat
 from crosscheck.problem import Problem, derivatives, evaluate
@@ -161,11 +160,7 @@ def fit_candidate(
     assert first is not None
     out = Candidate(layout, starts=first)
     best: Fit | None = None
-    vectors = list(first.vectors)
-    balanced = start_from_forces(problem, base.terms, layout)
-    if balanced is not None:
-        vectors.insert(0, balanced)
-    for vector in vectors:
+    for vector in first.vectors:
         terms = ordered((*base.terms, Term(layout, vector)))
         try:
             found = fit(

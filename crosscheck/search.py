@@ -16,7 +16,7 @@ import numpy as np
 
 from crosscheck.candidates import Candidate, fit_candidate, layouts_for, ordered, screen
 from crosscheck.evidence import Evidence, evidence
-from crosscheck.fit import Fit, fit
+from crosscheck.fit import Fit, fit, flat, with_values
 from crosscheck.held_out import HeldOut, hold_out, improves, unfitted
 from crosscheck.noise import Whiteness, whiteness
 from crosscheck.problem import Problem
@@ -30,6 +30,8 @@ LEAST_GAIN, EQUAL = 3.0, 3.0
 MOST_EFFECTS = 4
 # An effect that takes away less than this part of what noise does not explain is no cause.
 LEAST_PART = 0.25
+# The best few models are fitted again, so often, from values so many plausible sizes away.
+_SHAKEN, _SHAKES, _SHAKE = 2, 4, 0.2
 # Models abreast, and candidates fitted beside each of them after the first round.
 _ABREAST, _FITTED = 4, 5
 # Beside a model that leaves noise, an effect is only fitted if chance explains what its
@@ -123,13 +125,15 @@ class _Searcher:
             better = [c for c in children if c.evidence.log > best.evidence.log + LEAST_GAIN]
             if not better:
                 break
+            if depth == 0 and not any(c.whiteness.is_noise for c in better):
+                better = self.shaken(better, seen)
             noise = [c for c in better if c.whiteness.is_noise]
             # of models alike in evidence (friction that is null, say) the smaller one
             top = max(noise or better, key=lambda c: c.evidence.log - 0.1 * len(c.fit.at_bound))
             if not noise and top.excess > (1.0 - LEAST_PART) * best.excess:
                 break  # what is left has another cause than the next best guess
             best = top
-            abreast = [top] if noise else _diverse(better)
+            abreast = [top] if noise else _diverse(better)[: _ABREAST if depth == 0 else 1]
         return self.conclude(root, best, seen)
 
     def node(self, found: Fit) -> _Node:
@@ -191,6 +195,30 @@ class _Searcher:
             if other is None or child.evidence.log > other.evidence.log:
                 seen[child.names] = child
                 out.append(child)
+        return out
+
+    def shaken(self, nodes: list[_Node], seen: dict[frozenset[str], _Node]) -> list[_Node]:
+        """The best few fitted again from values nearby: slack cables make local minima."""
+        ranked = sorted(nodes, key=lambda c: -c.evidence.log)
+        rng = np.random.default_rng(0)
+        out = ranked[_SHAKEN:]
+        for node in ranked[:_SHAKEN]:
+            best = node.fit
+            scale, lower, upper = (flat(best.terms, k) for k in ("scale", "lower", "upper"))
+            for k in range(_SHAKES):
+                shake = _SHAKE * scale * rng.normal(size=len(scale))
+                values = np.clip(flat(best.terms, "vector") + shake, lower, upper)
+                self.progress("fitting again from values nearby", k / _SHAKES)
+                again = fit(
+                    self.problem, with_values(best.terms, values), self.factor, best.state,
+                    iterations=12, quick=True,
+                )  # fmt: skip
+                if again.valid and again.chi2 < best.chi2:
+                    best = again
+            better = node if best is node.fit else self.node(best)
+            better.candidates = node.candidates
+            seen[better.names] = better
+            out.append(better)
         return out
 
     def conclude(

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from recordings import Readback, headless_viewer
+from rerun.chunk import RrdReader
 
 from crosscheck.cases import Case, demobot_sweep, user_cases
 from crosscheck.errors import CrosscheckError

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
+from numpy.typing import NDArray
 
 from crosscheck.problem import POSITION, Problem, State
 from crosscheck.recording import colours, layout
@@ -20,7 +21,7 @@ MEASURED: colours.Rgba = colours.MUJOCO
 # Top of a colour scale: this percentile of the errors.
 _LARGEST = 95.0
 # Radii of arrows over the robot's size, of dots in points of the screen.
-_ARROW, _DOT, _RING = 0.0021, 5.0, 9.0
+_ARROW, _DOT, _RING, _THIN = 0.0021, 5.0, 9.0, 0.8
 _MARGIN = 0.14
 
 
@@ -42,7 +43,7 @@ class Misfit:
         return kinds_read(self.problem)
 
     @property
-    def rows(self) -> Array:
+    def rows(self) -> NDArray[np.int64]:
         """Numbers of the rows that count."""
         return np.flatnonzero(self.problem.use)
 
@@ -126,12 +127,12 @@ def arrows(
         vectors = np.concatenate([_vectors(misfit, state)[rows] for state in states])
         columns = rr.Arrows3D.columns(origins=origins, vectors=vectors, colors=shade)
         recording.rows("scene/errors", index, columns.partition(count))
-        style = rr.Arrows3D.from_fields(radii=[_ARROW * size])
+        recording.always("scene/errors", rr.Arrows3D.from_fields(radii=[_ARROW * size]))
     else:
         columns = rr.Points3D.columns(positions=origins, colors=shade)
         recording.rows("scene/errors", index, columns.partition(count))
-        style = rr.Points3D.from_fields(radii=[4.0 * _ARROW * size])
-    recording.always("scene/errors", style)
+        dots = rr.Points3D.from_fields(radii=[4.0 * _ARROW * size])
+        recording.always("scene/errors", dots)
 
 
 def _vectors(misfit: Misfit, state: State) -> Array:
@@ -150,27 +151,30 @@ def maps(recording: Recording, index: rr.TimeColumn, misfit: Misfit, states: lis
         shade = np.concatenate([misfit.shades(state, kind) for state in states])
         columns = rr.Points2D.columns(positions=points, colors=shade)
         recording.rows(entity, index, columns.partition(count))
-        radius = rr.components.Radius.ui_points(_DOT)
+        radius = _on_screen(_DOT)
         recording.always(entity, rr.Points2D.from_fields(radii=[radius]))
         if kind.name == "position" and misfit.magnify:
             vectors = [_flat(misfit, _vectors(misfit, state))[rows] for state in states]
             thin = rr.Arrows2D.columns(vectors=np.concatenate(vectors), origins=points)
             recording.rows(f"map/{kind.name}/arrows", index, thin.partition(count))
-            style = rr.Arrows2D.from_fields(
-                radii=[rr.components.Radius.ui_points(0.8)], colors=[colours.SILVER]
-            )
+            style = rr.Arrows2D.from_fields(radii=[_on_screen(_THIN)], colors=[colours.SILVER])
             recording.always(f"map/{kind.name}/arrows", style)
 
 
 def cursor(recording: Recording, index: rr.TimeColumn, misfit: Misfit) -> None:
     """A ring around the dot of the row under the cursor, on every map."""
     points = _flat(misfit, misfit.place)
-    radius = rr.components.Radius.ui_points(_RING)
+    radius = _on_screen(_RING)
     for kind in misfit.kinds:
         entity = f"map/{kind.name}/here"
         recording.rows(entity, index, rr.Points2D.columns(positions=points))
         white = rr.Points2D.from_fields(radii=[radius], colors=[(255, 255, 255, 120)])
         recording.always(entity, white)
+
+
+def _on_screen(points: float) -> float:
+    """A radius in points of the screen, whatever the zoom: Rerun counts those below zero."""
+    return -points
 
 
 def _flat(misfit: Misfit, vectors: Array) -> Array:

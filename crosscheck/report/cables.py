@@ -171,11 +171,13 @@ def _panel(axes: Axes, x: Array, wall: Wall, k: int) -> None:
     y, model = wall.measured[:, k], wall.predicted[:, k]
     level = float(wall.noise[k])
     axes.axhspan(-2 * level, 2 * level, color=NOISE, linewidth=0, zorder=0)
-    axes.axhline(0.0, color=INK, linewidth=0.5, zorder=1)
     many = bool(np.isfinite(y).sum() > MANY)
-    dots(axes, x, y, 2.4 if many else 4.4, TINT, 2)
+    dots(axes, x, y, 2.4 if many else 4.4, TINT, 0.6)
     if np.any(model[np.isfinite(model)] != 0.0):
-        dots(axes, x, model, 1.0 if many else 2.0, AFTER, 3)
+        dots(axes, x, model, 1.0 if many else 2.0, AFTER, 0.7)
+    axes.axhline(0.0, color=INK, linewidth=0.5, zorder=1)
+    if many:
+        axes.set_rasterization_zorder(0.8)  # both kinds of dots as one image a panel
     grid(axes, "x")
     axes.margins(x=0.04)
     axes.locator_params(axis="y", nbins=3)

@@ -7,6 +7,7 @@ import io
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -28,7 +29,7 @@ WIDTH = 10.4
 MANY = 400
 """More marks than this are drawn as an image: the page is to stay small."""
 
-_STYLE = {
+_STYLE: dict[str, Any] = {
     "svg.fonttype": "none",
     "text.parse_math": False,  # names of cables and runs are a user's
     "font.size": 8.5,
@@ -50,7 +51,7 @@ _STYLE = {
     "ytick.major.width": 0.6,
     "text.color": INK,
     "figure.dpi": 72,
-    "savefig.dpi": 170,
+    "savefig.dpi": 150,
     "legend.frameon": False,
     "hatch.linewidth": 0.7,
 }
@@ -59,7 +60,8 @@ _STYLE = {
 @contextmanager
 def styled(salt: str) -> Iterator[None]:
     """The style of all figures; ``salt`` keeps the names inside one apart from the others'."""
-    with matplotlib.rc_context({**_STYLE, "svg.hashsalt": salt}):
+    style: Any = {**_STYLE, "svg.hashsalt": salt}
+    with matplotlib.rc_context(style):
         yield
 
 
@@ -109,10 +111,7 @@ def _rounded(found: re.Match[str]) -> str:
 
 
 def dots(axes: Axes, x: Array, y: Array, size: float, colour: str, order: float) -> None:
-    """Round dots of one colour, so many points wide, as one path: a tenth of the text.
-
-    Many are drawn as an image.
-    """
+    """Round dots of one colour, so many points wide, as one path: a tenth of the text."""
     seen = np.isfinite(x) & np.isfinite(y)
     points = np.stack([x[seen], y[seen]], axis=1)
     if len(points) == 0:
@@ -124,7 +123,6 @@ def dots(axes: Axes, x: Array, y: Array, size: float, colour: str, order: float)
     patch = PathPatch(
         path, fill=False, edgecolor=colour, linewidth=size, capstyle="round", zorder=order
     )
-    patch.set_rasterized(len(points) > MANY)
     axes.add_patch(patch)
     axes.update_datalim(points)
     axes.autoscale_view()

@@ -134,9 +134,9 @@ def _frame(axes: Axes, place: Array, view: tuple[int, int]) -> None:
     names = "xyz"
     span = float(np.max(np.ptp(place, axis=0)))
     margin = 0.15 * span
-    for k, set_limits in zip(view, (axes.set_xlim, axes.set_ylim), strict=True):
-        low, high = float(place[:, k].min()), float(place[:, k].max())
-        set_limits(low - margin, high + margin)
+    low, high = place.min(axis=0) - margin, place.max(axis=0) + margin
+    axes.set_xlim(float(low[view[0]]), float(high[view[0]]))
+    axes.set_ylim(float(low[view[1]]), float(high[view[1]]))
     axes.set_aspect("equal", adjustable="box", anchor="NW")
     axes.set_xlabel(f"{names[view[0]]} [m]")
     axes.set_ylabel(f"{names[view[1]]} [m]")
