@@ -43,9 +43,7 @@ class Prediction:
 
     @property
     def solved(self) -> NDArray[np.bool_]:
-        fine = (self.found.outcome == kernel.CONVERGED) & (
-            self.found.residual < kernel.TOLERANCE
-        )
+        fine = (self.found.outcome == kernel.CONVERGED) & (self.found.residual < kernel.TOLERANCE)
         return np.asarray(fine)
 
     @property
@@ -105,9 +103,7 @@ class Experiment:
             edit_setup(effect, setup)
         return setup
 
-    def predict(
-        self, effects: Sequence[Effect] = (), near: Prediction | None = None
-    ) -> Prediction:
+    def predict(self, effects: Sequence[Effect] = (), near: Prediction | None = None) -> Prediction:
         """Solve all rows and read the sensors.
 
         Args:
@@ -123,7 +119,7 @@ class Experiment:
         return Prediction(setup, tables, found, self._read(effects, setup, tables, found), False)
 
     def from_other_starts(
-        self, effects: Sequence[Effect], at: Prediction, rows: Array, poses: Array
+        self, effects: Sequence[Effect], at: Prediction, rows: NDArray[np.intp], poses: Array
     ) -> Prediction:
         """The same prediction with some rows solved again from given poses (k, 7).
 
@@ -164,9 +160,7 @@ class Experiment:
         for k in path.source[failed]:
             run = path.commands.run
             assert run is not None
-            later = (np.arange(len(found.outcome)) >= k) & (
-                run[path.rows] == run[path.rows[k]]
-            )
+            later = (np.arange(len(found.outcome)) >= k) & (run[path.rows] == run[path.rows[k]])
             found.outcome[later & (found.outcome == kernel.CONVERGED)] = kernel.STALLED
         own = self.setup(effects)
         return Prediction(own, rows, found, self._read(effects, own, rows, found), True)
