@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import html
+import io
 import re
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
@@ -13,6 +15,7 @@ from typing import Any
 import made_diagnoses as made
 import numpy as np
 import pytest
+from PIL import Image
 
 from crosscheck.confounding import containment
 from crosscheck.diagnosis import Diagnosis
@@ -316,7 +319,23 @@ def test_many_rows_stay_small() -> None:
         "many", [f"cable{k}" for k in range(m)], values, 0.5 * values, np.ones(m), "mm",
         [(f"abscissa {k}", rng.uniform(size=(n, m))) for k in range(4)],
     )  # fmt: skip
-    assert len(draw_wall(wall, "many")) < 1_500_000
+    text = draw_wall(wall, "many")
+    assert len(text) < 1_500_000
+    images = re.findall(r'"data:image/png;base64,([^"]*)"', text)
+    assert len(images) == 32
+    for image in images:
+        drawn = np.asarray(Image.open(io.BytesIO(base64.b64decode(image))).convert("RGBA"))
+        assert np.mean(drawn[..., 3] > 128) > 0.02, "dots that nobody sees"
+
+
+def test_few_dots_are_drawn_as_what_they_are() -> None:
+    values = np.linspace(-1.0, 1.0, 7)[:, None]
+    wall = Wall("few", ["a"], values, 0.5 * values, np.ones(1), "mm", [("t", np.arange(7) * 1.0)])
+    text = draw_wall(wall, "few")
+    dots = re.findall(r'd="((?:M [\d.]+ [\d.]+ ?L [\d.]+ [\d.]+ ?){7})"', text)
+    assert len(dots) == 2
+    assert "stroke-linecap: round" in text
+    assert "image/png" not in text
 
 
 def test_a_wall_of_many_cables_shows_the_worst() -> None:

@@ -51,7 +51,7 @@ _STYLE: dict[str, Any] = {
     "ytick.major.width": 0.6,
     "text.color": INK,
     "figure.dpi": 72,
-    "savefig.dpi": 150,
+    "savefig.dpi": 130,
     "legend.frameon": False,
     "hatch.linewidth": 0.7,
 }
@@ -111,19 +111,25 @@ def _rounded(found: re.Match[str]) -> str:
 
 
 def dots(axes: Axes, x: Array, y: Array, size: float, colour: str, order: float) -> None:
-    """Round dots of one colour, so many points wide, as one path: a tenth of the text."""
+    """Round dots of one colour, so many points wide."""
     seen = np.isfinite(x) & np.isfinite(y)
     points = np.stack([x[seen], y[seen]], axis=1)
     if len(points) == 0:
         return
-    # a line from a point to itself with round ends is a dot
+    if len(points) > MANY:
+        axes.plot(
+            *points.T, linestyle="none", marker="o", markersize=size, markeredgewidth=0,
+            color=colour, zorder=order,
+        )  # fmt: skip
+        return
+    # in SVG a line from a point to itself with round ends is a dot, in a tenth of the text
     codes = np.tile(np.array([Path.MOVETO, Path.LINETO], dtype=np.uint8), len(points))
     path = Path(np.repeat(points, 2, axis=0), codes)
     path.should_simplify = False  # it would take dots for needless points of a line
     patch = PathPatch(
         path, fill=False, edgecolor=colour, linewidth=size, capstyle="round", zorder=order
     )
-    axes.add_patch(patch)
+    axes.add_artist(patch)  # add_patch would look for the bends of each dot
     axes.update_datalim(points)
     axes.autoscale_view()
 

@@ -18,6 +18,8 @@ from seecr.pose import Array
 # Colours end at this percentile of the errors.
 _LARGEST = 98.0
 _MOST_HEIGHT = 3.4
+# More arrows than this hide each other.
+_MOST_ARROWS = 250
 # Viridis without its bright end, which would not be seen on white.
 _COLOURS = ListedColormap(colormaps["viridis_r"](np.linspace(0.12, 1.0, 128)))
 
@@ -121,13 +123,17 @@ def _arrows(
     axes: Axes, problem: Problem, stage: Stage, place: Array, view: tuple[int, int], magnify: float
 ) -> None:
     error = np.where(problem.counted[:, POSITION], stage.state.raw[:, POSITION], 0.0)
-    rows = problem.use
+    rows = np.flatnonzero(problem.use)[:: thinned(problem)]
     axes.quiver(
         place[rows, view[0]], place[rows, view[1]], error[rows, view[0]], error[rows, view[1]],
         angles="xy", scale_units="xy", scale=1.0 / magnify, units="inches", width=0.017,
         headwidth=3.6, headlength=4.2, headaxislength=3.8, minlength=0.0, color=INK, zorder=4,
-        rasterized=bool(rows.sum() > MANY),
     )  # fmt: skip
+
+
+def thinned(problem: Problem) -> int:
+    """Arrows are drawn for one row in so many."""
+    return int(np.ceil(problem.use.sum() / _MOST_ARROWS))
 
 
 def _frame(axes: Axes, place: Array, view: tuple[int, int]) -> None:
@@ -149,9 +155,13 @@ def caption(problem: Problem, stage: Stage) -> str:
     parts = []
     if magnify:
         parts.append(
-            "Arrows: measured less predicted position at each pose; an error of 1 mm is an arrow "
-            f"of {magnify:g} mm."
+            f"Arrows: measured less predicted position at {_which(thinned(problem))}; an error of "
+            f"1 mm is an arrow of {magnify:g} mm."
         )
     if kind is not None:
         parts.append(f"Dots: the {kind.name} error.")
     return " ".join(parts)
+
+
+def _which(every: int) -> str:
+    return "each pose" if every == 1 else f"one pose in {every}"

@@ -1,0 +1,48 @@
+"""Twins with MuJoCo as the truth: the hidden effect is named, and only that.
+
+A sample that fits into a test run; ``scripts/score_twins.py`` goes through all effects and seeds.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from crosscheck.diagnose import diagnose
+from crosscheck.measurements import load_measurements
+from crosscheck.sealed import unseal
+from crosscheck.twin import make_twin
+from seecr.mjcf import load_robot
+from seecr.shipped import model_path
+
+CASES = [
+    ("demobot_parallel", 1, ("cable_length_offset",)),  # several equilibria, slack cables
+    ("demobot_cogiro", 2, ("pulley_radius",)),
+    ("demobot_parallel", 3, ("backlash",)),
+    ("demobot_cogiro", 4, ("exit_point_error",)),
+    ("demobot_parallel", 5, ("frame_compliance",)),
+    ("demobot_parallel", 6, ("centre_of_mass", "gravity_tilt")),
+    ("demobot_cogiro", 7, ()),
+    ("demobot_parallel", 8, ()),
+]
+
+
+@pytest.mark.parametrize(("robot", "seed", "hidden"), CASES)
+def test_twin(robot: str, seed: int, hidden: tuple[str, ...], tmp_path: Path) -> None:
+    make_twin(model_path(robot), seed, effects=hidden, out=tmp_path / "case")
+    machine = load_robot(tmp_path / "case" / "robot.xml")
+    found = diagnose(machine, load_measurements(tmp_path / "case" / "measured.csv", machine))
+    assert found.verdict == ("effects_found" if hidden else "no_effect_missing")
+    named = [{f.effect, *(r.name for r in f.rivals)} for f in found.missing]
+    assert len(named) == len(hidden)
+    values = unseal(tmp_path / "case").get("values", {})
+    for effect in hidden:
+        assert any(effect in names for names in named)
+    for finding in found.missing:
+        truth = values.get(finding.effect, {})
+        for name, value, error in zip(
+            finding.layout.names, finding.values, finding.stderr, strict=True
+        ):
+            if name in truth:
+                assert abs(value - truth[name]) < 4.0 * error, name
