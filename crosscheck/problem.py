@@ -36,7 +36,7 @@ from seecr.sensitivity import Term, effects_of, length_sensitivities, sensitivit
 from seecr.setup import Commands
 
 # Rounds of finding the likeliest errors of commanded lengths.
-_LENGTH_ROUNDS = 25
+_LENGTH_ROUNDS = 8
 # A row is far off beyond this mean square of its whitened residuals; only where few rows are
 # (this part of all), it may be that they rest in another equilibrium.
 _FAR_OFF, _FEW_ROWS = 25.0, 0.25
@@ -316,7 +316,7 @@ def _with_length_errors(
     for _ in range(_LENGTH_ROUNDS):
         step = here.better_errors() - here.errors
         size = np.max(np.abs(step), axis=1, initial=0.0)
-        moving = problem.use & (share * size > 1e-3 * spread)
+        moving = problem.use & (share * size > 1e-2 * spread)
         if not moving.any():
             break
         trial = _At(
