@@ -136,6 +136,13 @@ def magnification(problem: Problem, state: State) -> float:
     return float(max(s for s in (1.0, 2.0, 5.0) if s * power <= factor) * power)
 
 
+def drawn(magnify: float) -> str:
+    """How long arrows are drawn, in words."""
+    if magnify == 1.0:
+        return "to scale"
+    return f"{magnify:g} times {'too long' if magnify > 1.0 else 'as long as they are'}"
+
+
 def floor_of(found: Diagnosis, kind: Kind) -> float:
     """The rms error that noise alone would give, in SI; that of the commanded lengths with it."""
     assert found.search is not None

@@ -87,7 +87,7 @@ def test_arrows_are_the_errors_so_many_times_too_long(
     sizes = [np.linalg.norm(vectors[k], axis=1).mean() for k in (0, 1)]
     assert sizes[1] < 0.1 * sizes[0]
     text = back.static("/text/verdict", "TextDocument:text")[0]
-    assert f"{shown.magnify:g} times" in text
+    assert f"drawn **{shown.magnify:g} times too long**" in text
 
 
 def test_maps_dim_as_the_error_falls(back: Readback, shown: Misfit) -> None:

@@ -28,7 +28,15 @@ from crosscheck.report.confusion import confusion_of
 from crosscheck.report.page import render
 from crosscheck.report.tables import candidate_rows, checks, finding_context
 from crosscheck.report.waterfall import waterfall
-from crosscheck.stages import KINDS, by_block, magnification, shown_stages, stages_of, views_of
+from crosscheck.stages import (
+    KINDS,
+    by_block,
+    drawn,
+    magnification,
+    shown_stages,
+    stages_of,
+    views_of,
+)
 
 ALL = ("pulleys", "nothing", "unknown", "none", "position_only", "tensions_only", "one_angle")
 EVIL = '<script>alert("1")</script>&$x$'
@@ -83,6 +91,7 @@ def test_the_page_needs_nothing_else(name: str) -> None:
     assert "<script" not in text
     assert "<link" not in text
     assert "@import" not in text
+    assert text.count("<style") == 1  # one inside a figure would be the whole page's
     links = re.findall(r'(?:href|src)="([^"]*)"', text)
     assert all(link.startswith(("#", "data:")) for link in links), links
     assert all(u.startswith("#") for u in re.findall(r"url\(([^)]*)\)", text))
@@ -291,6 +300,14 @@ def test_arrows_fit_the_region() -> None:
     span = np.ptp(before.state.prediction.poses[:, :3], axis=0).max()
     assert 0.04 * span < longest <= 0.13 * span
     assert str(factor).rstrip("0").rstrip(".")[0] in "125"
+
+
+@pytest.mark.parametrize(
+    ("magnify", "words"),
+    [(1.0, "to scale"), (50.0, "50 times too long"), (0.5, "0.5 times as long as they are")],
+)
+def test_arrows_say_how_long_they_are(magnify: float, words: str) -> None:
+    assert drawn(magnify) == words
 
 
 @pytest.mark.parametrize(

@@ -60,7 +60,7 @@ def _blueprint(found: Comparison, shown: Misfit, name: str, seen: np.ndarray) ->
         for kind in shown.kinds
     ]
     root = rrb.Horizontal(
-        layout.scene_view(robot, low, high, name, 0.95),
+        layout.scene_view(robot, low, high, name, 0.76),
         rrb.Vertical(*misfit.map_views(shown), *plotted),
         rrb.Vertical(
             layout.text("Verdict", "text/verdict"),

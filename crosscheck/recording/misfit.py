@@ -13,7 +13,7 @@ from crosscheck.problem import POSITION, Problem, State
 from crosscheck.recording import colours, layout
 from crosscheck.recording.states import States
 from crosscheck.recording.stream import Recording
-from crosscheck.stages import Kind, kinds_read, magnification, sizes_of, views_of
+from crosscheck.stages import Kind, drawn, kinds_read, magnification, sizes_of, views_of
 from seecr import cable_law
 from seecr.pose import Array, quat_from_rxyz, rxyz_from_quat
 
@@ -211,6 +211,6 @@ def words_of(misfit: Misfit) -> str:
     if not misfit.magnify:
         return f"Dots are measured poses, coloured by their {kind.name} error {scale}."
     return (
-        f"An arrow at each measured pose points from what the model says to what was measured; "
-        f"it is drawn **{misfit.magnify:g} times** too long and coloured {scale}."
+        f"Arrows at the measured poses point from what the model says to what was measured; they "
+        f"are drawn **{drawn(misfit.magnify)}** and coloured {scale}."
     )

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from crosscheck.problem import POSITION, Problem
 from crosscheck.report.drawing import GREY, INK, MANY, blank, grid, styled, svg
-from crosscheck.stages import Kind, Stage, kinds_read, magnification, sizes_of, views_of
+from crosscheck.stages import Kind, Stage, drawn, kinds_read, magnification, sizes_of, views_of
 from seecr.pose import Array
 
 # Colours end at this percentile of the errors.
@@ -80,7 +80,7 @@ def _title(stages: list[Stage], column: int, magnify: float) -> str:
     stage = stages[column]
     when = "" if len(stages) == 1 else ("before: ", "after: ")[column]
     names = [stage.label] if column == 0 else ["+ " + t.name for t in stage.state.terms]
-    scale = f"   (arrows drawn {magnify:g} times too long)" if magnify and column == 0 else ""
+    scale = f"   (arrows drawn {drawn(magnify)})" if magnify and column == 0 else ""
     return when + " ".join(names) + scale
 
 
