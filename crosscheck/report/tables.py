@@ -229,4 +229,6 @@ def _largest_parameter(candidate: Candidate) -> str:
     factor, unit = in_unit(layout.units[k])
     name = parameter_name(layout.names[k], layout.units[k])
     doubt = f" ({short(abs(float(size[k])), 2)} plausible sizes)" if abs(size[k]) > 3 else ""
-    return f"{name} = {short(factor * float(term.vector[k]))} {unit}".strip() + doubt
+    # a factor near one is told from one by its later digits
+    digits = 5 if layout.null[k] else 3
+    return f"{name} = {short(factor * float(term.vector[k]), digits)} {unit}".strip() + doubt
