@@ -16,7 +16,7 @@ from crosscheck.fit import Fit, fit, flat
 from crosscheck.problem import Problem, derivatives, evaluate
 from crosscheck.subspace import projected
 from seecr.effects import catalogue, layout_of
-from seecr.effects.base import Effect, Layout
+from seecr.effects.base import Layout
 from seecr.errors import InputError
 from seecr.pose import Array
 from seecr.sensitivity import Term
@@ -261,8 +261,3 @@ def null_fit(problem: Problem, terms: Sequence[Term], factor: Array, refit: bool
     return Fit(
         state, jacobian, np.zeros((p, p)), np.zeros(p, dtype=bool), state.valid, "", 0
     )
-
-
-def is_effect(name: str) -> type[Effect] | None:
-    """The effect of that name, or None."""
-    return catalogue().get(name)
