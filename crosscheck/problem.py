@@ -192,8 +192,15 @@ class Problem:
         single = values.ndim == 2
         table = values[..., None] if single else values
         table = np.where(self.measured[..., None], table, 0.0)
-        white: Array = np.asarray(np.linalg.solve(factor, table), float)[self.counted]
+        white: Array = in_units_of(factor, table, bool(self.sigma.length_m))[self.counted]
         return white[:, 0] if single else white
+
+
+def in_units_of(factor: Array, table: Array, correlated: bool) -> Array:
+    """Residuals or derivatives (n, k, p) in units of their noise, by its Cholesky factors."""
+    if correlated:
+        return np.asarray(np.linalg.solve(factor, table), float)
+    return table / np.diagonal(factor, axis1=1, axis2=2)[..., None]
 
 
 def angle_rates(quat_wxyz: Array) -> Array:
@@ -390,7 +397,7 @@ def _compared(
     experiment: Experiment,
 ) -> State:
     filled = np.where(problem.measured & np.isfinite(raw), raw, 0.0)
-    table: Array = np.asarray(np.linalg.solve(factor, filled[..., None]), float)[..., 0]
+    table = in_units_of(factor, filled[..., None], bool(problem.sigma.length_m))[..., 0]
     white = table[problem.counted]
     valid = bool(np.all(prediction.solved[problem.use])) and bool(np.all(np.isfinite(white)))
     chi2 = float(white @ white) if valid else np.inf

@@ -475,6 +475,24 @@ def geometric_length(row, anchor, up):
 
 
 @_jit
+def lengths_at(poses, anchors, exits, radii, up, out):
+    """Straight lengths over the pulleys (n, m) [m] of cables at poses (n, 7)."""
+    row, anchor = np.zeros(N_COLUMNS), np.empty(3)
+    for i in range(exits.shape[0]):
+        row[EXIT], row[EXIT + 1], row[EXIT + 2] = exits[i, 0], exits[i, 1], exits[i, 2]
+        row[RADIUS] = radii[i]
+        a, b, c = anchors[i, 0], anchors[i, 1], anchors[i, 2]
+        for n in range(poses.shape[0]):
+            w, x, y, z = poses[n, 3], poses[n, 4], poses[n, 5], poses[n, 6]
+            # b + 2 q x (q x b + w b)
+            tx, ty, tz = y * c - z * b + w * a, z * a - x * c + w * b, x * b - y * a + w * c
+            anchor[0] = poses[n, 0] + a + 2.0 * (y * tz - z * ty)
+            anchor[1] = poses[n, 1] + b + 2.0 * (z * tx - x * tz)
+            anchor[2] = poses[n, 2] + c + 2.0 * (x * ty - y * tx)
+            out[n, i] = geometric_length(row, anchor, up)
+
+
+@_jit
 def cable_pull(row, start, move, up, guess, work, force, stiffness, gradient, state):
     """Force of a cable on its anchor point, its stiffness, and the gradient of its tension.
 

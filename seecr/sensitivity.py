@@ -8,13 +8,16 @@ Rows with history are the exception: their walk is repeated with each parameter 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Container, Iterable, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from seecr import cable_law, statics
+from seecr import cable_law, response, statics
 from seecr.effects.base import Effect, Layout, Readings
+from seecr.effects.checked import is_built_in
 from seecr.experiment import Experiment, Prediction, read
 from seecr.joints import motion_columns
 from seecr.pose import Array, pose_add, quat_conjugate, quat_multiply, rotvec_from_quat
@@ -72,23 +75,45 @@ def sensitivities(
         return _by_walking(experiment, terms, at, wanted)
     out = np.zeros((*_shape(at), len(wanted)))
     by_wrench = _ByWrench(experiment, at, _sensing(terms))
-    for c, (which, k) in enumerate(_positions(terms, wanted)):
+    todo = {position: c for c, position in enumerate(_positions(terms, wanted))}
+    for which, group in _blocks(terms, todo):
+        block = by_wrench.block(_shifted(terms, which, group))
+        if block is not None:
+            out[..., [todo.pop((which, k)) for k in group.tolist()]] = block
+    for (which, k), c in todo.items():
         out[..., c] = by_wrench.column(_shifted(terms, which, k))
     return out
 
 
+def _blocks(
+    terms: Sequence[Term], todo: Container[tuple[int, int]]
+) -> list[tuple[int, NDArray[np.intp]]]:
+    """What every cable has one of: shifted together, told apart by what each cable does.
+
+    Of our own effects alone: nobody has tested that others' leave the other cables be.
+    """
+    return [
+        (which, group)
+        for which, term in enumerate(terms)
+        if is_built_in(term.layout.effect)
+        for group in term.layout.cable_by_cable
+        if all((which, k) in todo for k in group.tolist())
+    ]
+
+
 def length_sensitivities(at: Prediction) -> Array:
     """Derivative of pose and tensions by each cable's rest length, (n, 6 + m, m)."""
-    n, width = _shape(at)
-    m = width - 6
-    out = np.zeros((n, width, m))
-    inverse = _inverse_stiffness(at)
     step = 1e-6 * at.tables.length
-    for i in range(m):
-        plus, minus = (_lengthened(at.tables, i, sign * step) for sign in (1.0, -1.0))
-        move, tension = _response(at, plus, minus, 2 * step, inverse)
-        out[:, :6, i], out[:, 6:, i] = move, tension
-    return out
+    return _response_by_cable(
+        at, _lengthened(at.tables, step), _lengthened(at.tables, -step), 2.0 * step
+    )
+
+
+def _lengthened(tables: Tables, by: float) -> Tables:
+    cables = tables.cables.copy()
+    cables[..., cable_law.REST] += by
+    cables[..., cable_law.GAP] -= by
+    return replace(tables, cables=cables)
 
 
 def _shape(at: Prediction) -> tuple[int, int]:
@@ -103,35 +128,48 @@ def _positions(terms: Sequence[Term], wanted: list[int]) -> list[tuple[int, int]
 
 @dataclass(frozen=True, eq=False)
 class _Shift:
-    """Terms with one parameter shifted up and down, ``apart`` from each other."""
+    """Terms with a parameter shifted up and down, or several of one effect together.
+
+    ``apart`` is by how much plus and minus differ, a number or one for each of several.
+    """
 
     plus: list[Term]
     minus: list[Term]
-    apart: float
-    physical: bool  # whether the shifted effect edits the setup
+    apart: Any
+    layout: Layout
+
+    @property
+    def physical(self) -> bool:
+        """Whether the shifted effect edits the setup."""
+        return self.layout.effect.edit_setup is not Effect.edit_setup
+
+    @property
+    def sensing(self) -> bool:
+        """Whether the shifted effect edits the readings."""
+        return self.layout.effect.edit_readings is not Effect.edit_readings
 
 
-def _shifted(terms: Sequence[Term], which: int, k: int, part: float | None = None) -> _Shift:
+def _shifted(terms: Sequence[Term], which: int, k: Any, part: float | None = None) -> _Shift:
+    """Shift parameter ``k`` (or those of an index array, together) of one of the terms."""
     term = terms[which]
-    layout, value = term.layout, float(term.vector[k])
+    layout, value = term.layout, term.vector[k]
+    lower, upper = layout.lower[k], layout.upper[k]
     # a time constant, a radius: what counts is by which part of itself it changes; finely, since
     # a drum of this radius may have turned many times, but above what a walk leaves unsolved
-    relative = bool(layout.shape[k]) and layout.lower[k] > 0.0
-    size = value * (0.1 if part is None else 1.0) if relative else float(layout.scale[k])
+    relative = layout.shape[k] & (lower > 0.0)
+    size = np.where(relative, value * (0.1 if part is None else 1.0), layout.scale[k])
     step = (_CENTRAL if part is None else part) * size
-    up, down = value + step, value - step
-    if down < layout.lower[k] or up > layout.upper[k]:
-        step = (_ONE_SIDED if part is None else part) * size
-        inside = down < layout.lower[k]
-        up, down = (value + step, value) if inside else (value, value - step)
+    low, high = value - step < lower, value + step > upper
+    small = (_ONE_SIDED if part is None else part) * size
+    up = np.where(low, value + small, np.where(high, value, value + step))
+    down = np.where(low, value, np.where(high, value - small, value - step))
 
-    def with_value(number: float) -> list[Term]:
+    def with_value(numbers: Array) -> list[Term]:
         vector = term.vector.copy()
-        vector[k] = number
+        vector[k] = numbers
         return [Term(layout, vector) if i == which else t for i, t in enumerate(terms)]
 
-    physical = layout.effect.edit_setup is not Effect.edit_setup
-    return _Shift(with_value(up), with_value(down), up - down, physical)
+    return _Shift(with_value(up), with_value(down), up - down, layout)
 
 
 def _sensing(terms: Sequence[Term]) -> bool:
@@ -183,23 +221,44 @@ class _ByWrench:
             change = self._physical(plus, minus, shift.apart)
         if not self.sensing:
             return change
-        return self._read(shift, change)
+        return self._read(shift, change, shift.apart)
+
+    def block(self, shift: _Shift) -> Array | None:
+        """Derivatives (n, 6 + m, m) by what each cable has of its own, shifted together."""
+        if shift.sensing:
+            return None
+        plus = self.experiment.setup(effects_of(shift.plus))
+        minus = self.experiment.setup(effects_of(shift.minus))
+        if _differ(plus, minus, _HISTORY_FIELDS):
+            return None
+        if _differ_by_length_only(plus, minus):
+            longer = (plus.rest_lengths() - minus.rest_lengths()) / shift.apart
+            change = self.by_length * longer[:, None, :]
+        else:
+            ahead, behind = self._tables(plus, minus)
+            change = _response_by_cable(self.at, ahead, behind, shift.apart)
+        if not self.sensing:
+            return change
+        columns = [self._read(shift, change[..., i], by) for i, by in enumerate(shift.apart)]
+        return np.stack(columns, axis=-1)
 
     def _physical(self, plus: Setup, minus: Setup, apart: float) -> Array:
         if _differ_by_length_only(plus, minus):
             longer = (plus.rest_lengths() - minus.rest_lengths()) / apart
-            return np.einsum("nkm,nm->nk", self.by_length, longer)
+            return (self.by_length @ longer[..., None])[..., 0]
+        return _response(self.at, *self._tables(plus, minus), apart, self.inverse)
+
+    def _tables(self, plus: Setup, minus: Setup) -> tuple[Tables, Tables]:
         strains = self.at.found.states[..., cable_law.STRAIN]
         ahead, behind = statics.assemble(plus, strains), statics.assemble(minus, strains)
         if self.at.has_history:
             for column in _STATE_COLUMNS:
                 ahead.cables[..., column] = self.at.tables.cables[..., column]
                 behind.cables[..., column] = self.at.tables.cables[..., column]
-        move, tension = _response(self.at, ahead, behind, apart, self.inverse)
-        return np.concatenate([move, tension], axis=1)
+        return ahead, behind
 
-    def _read(self, shift: _Shift, change: Array) -> Array:
-        at, half = self.at, 0.5 * shift.apart
+    def _read(self, shift: _Shift, change: Array, apart: float) -> Array:
+        at, half = self.at, 0.5 * apart
         move, tension = half * change[:, :6], half * change[:, 6:]
         ahead = read(
             effects_of(shift.plus), at.setup, pose_add(at.poses, move), at.tensions + tension
@@ -207,7 +266,7 @@ class _ByWrench:
         behind = read(
             effects_of(shift.minus), at.setup, pose_add(at.poses, -move), at.tensions - tension
         )
-        return readings_difference(ahead, behind) / shift.apart
+        return readings_difference(ahead, behind) / apart
 
 
 def _kept(at: Prediction, name: str, make: Callable[[Prediction], Array]) -> Array:
@@ -218,7 +277,11 @@ def _kept(at: Prediction, name: str, make: Callable[[Prediction], Array]) -> Arr
 
 
 def _differ(a: Setup, b: Setup, names: Iterable[str]) -> bool:
-    return any(not np.array_equal(getattr(a, name), getattr(b, name)) for name in names)
+    for name in names:
+        mine, other = getattr(a, name), getattr(b, name)
+        if np.shape(mine) != np.shape(other) or np.any(mine != other):
+            return True
+    return False
 
 
 def _differ_by_length_only(a: Setup, b: Setup) -> bool:
@@ -227,26 +290,36 @@ def _differ_by_length_only(a: Setup, b: Setup) -> bool:
     return not _differ(a, b, _OTHER_FIELDS)
 
 
-def _response(
-    at: Prediction, plus: Tables, minus: Tables, apart: float, inverse: Array
-) -> tuple[Array, Array]:
-    """Change of pose (n, 6) and tensions (n, m) between two tables, per unit of ``apart``."""
-    ahead, behind = statics.evaluate(plus, at.found), statics.evaluate(minus, at.found)
-    force = (ahead.gradient - behind.gradient) / apart
-    step = -np.einsum("nij,nj->ni", inverse, force)
-    tension = ahead.states[..., cable_law.TENSION] - behind.states[..., cable_law.TENSION]
-    tension = tension / apart + np.einsum("nmd,nd->nm", at.found.slopes, step)
-    return _as_motion(at, step), tension
+def _response(at: Prediction, plus: Tables, minus: Tables, apart: float, inverse: Array) -> Array:
+    """Change of pose and tensions (n, 6 + m) between two tables, per unit of ``apart``."""
+    force, tension = response.difference(plus, minus, at.found)
+    step = -inverse @ (force / apart)[..., None]
+    move = (_motion_of(at) @ step)[..., 0]
+    return np.concatenate([move, tension / apart + (at.found.slopes @ step)[..., 0]], axis=1)
 
 
-def _as_motion(at: Prediction, step: Array) -> Array:
-    """Steps (n, d) in the loop's coordinates as displacement and rotation vector (n, 6)."""
+def _response_by_cable(at: Prediction, plus: Tables, minus: Tables, apart: Any) -> Array:
+    """The same (n, 6 + m, m) where each cable was changed, by the change of each."""
+    force, own = response.by_cable(plus, minus, at.found)
+    step = -_kept(at, "inverse", _inverse_stiffness) @ (force / apart)
+    out = np.concatenate([_motion_of(at) @ step, at.found.slopes @ step], axis=1)
+    cable = np.arange(own.shape[1])
+    out[:, 6 + cable, cable] += own / apart
+    return out
+
+
+def _motion_of(at: Prediction) -> Array:
+    """Displacement and rotation vector (n, 6, d) by steps in the loop's coordinates."""
+    return _kept(at, "motion", _motion_columns)
+
+
+def _motion_columns(at: Prediction) -> Array:
     tables = at.tables
     if tables.screws.shape[1] == 0:
-        return step / np.repeat([1.0, tables.length], 3)
+        return np.diag(1.0 / np.repeat([1.0, tables.length], 3))[None]
     screws = statics.joints_at_rest(at.tables, at.found)
-    values = np.where(screws[..., 0] == 1.0, step / tables.length, step)
-    return np.einsum("nkd,nd->nk", motion_columns(screws, at.poses[:, :3]), values)
+    per = np.where(screws[..., 0] == 1.0, 1.0 / tables.length, 1.0)
+    return motion_columns(screws, at.poses[:, :3]) * per[:, None, :]
 
 
 def _inverse_stiffness(at: Prediction) -> Array:
@@ -255,13 +328,6 @@ def _inverse_stiffness(at: Prediction) -> Array:
     finite = np.where(np.isfinite(stiffness), stiffness, 0.0)
     symmetric = stiffness is at.found.hessian  # else a moment skews it
     return np.asarray(np.linalg.pinv(finite, rcond=1e-12, hermitian=symmetric), dtype=float)
-
-
-def _lengthened(tables: Tables, cable: int, by: float) -> Tables:
-    longer = statics.take(tables, np.arange(len(tables)))
-    longer.cables[:, cable, cable_law.REST] += by
-    longer.cables[:, cable, cable_law.GAP] -= by
-    return longer
 
 
 def _by_walking(

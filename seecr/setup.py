@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.errors import InputError
-from seecr.pose import Array, transform_points
+from seecr.pose import Array
 from seecr.robot import Robot
 
 
@@ -147,18 +147,14 @@ class Setup:
 
     def geometric_lengths(self, poses: Array) -> Array:
         """Lengths (k, m) [m] of straight cables over their pulleys at poses (k, 7)."""
-        anchors = transform_points(poses, self.anchor_points)
-        reach = anchors - self.exit_points
-        straight = np.linalg.norm(reach, axis=-1)
-        if not np.any(self.pulley_radius):
-            return straight
-        up = upwards(self.robot)
-        rise = reach @ up
-        across = np.linalg.norm(reach - rise[..., None] * up, axis=-1)
-        r = self.pulley_radius
-        free = np.sqrt(np.maximum((across - r) ** 2 + rise**2 - r**2, 0.0))
-        psi = np.arctan2(rise, across - r) + np.arctan2(free, r)
-        return np.where(r > 0.0, free + r * (np.pi - psi), straight)
+        from seecr.cable_law import lengths_at  # compiled: takes a while to import
+
+        out = np.empty((len(poses), self.robot.n_cables))
+        lengths_at(
+            np.ascontiguousarray(poses, dtype=float), self.anchor_points, self.exit_points,
+            self.pulley_radius, upwards(self.robot), out,
+        )  # fmt: skip
+        return out
 
     @property
     def has_history(self) -> bool:

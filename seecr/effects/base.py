@@ -19,6 +19,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seecr.errors import InputError
 from seecr.pose import Array
@@ -67,7 +68,8 @@ def parameter(
             or a function of the robot.
         null: value at which the effect is absent.
         bounds: lowest and highest value, numbers or functions of the robot.
-        size: "one" number, one a "cable", a "vector" of 3, or a "point" (3 a cable).
+        size: "one" number, one a "cable", a "vector" of 3, or a "point" (3 a cable); what a
+            cable has of its own acts on that cable alone.
         shape: the number only shapes the effect (a time constant, a period): it means nothing
             while the others are null, and the effect says with ``shapes`` where to look.
     """
@@ -153,7 +155,7 @@ class Layout:
     upper: Array
     scale: Array
     shape: np.ndarray
-    _parts: tuple[tuple[str, int, bool], ...]
+    _parts: tuple[tuple[str, int, str], ...]
 
     def __len__(self) -> int:
         return len(self.names)
@@ -163,13 +165,23 @@ class Layout:
         """Name of the effect."""
         return self.effect.name
 
+    @property
+    def cable_by_cable(self) -> list[NDArray[np.intp]]:
+        """Parameters that every cable has one of, in their order: one (m,) index array each."""
+        out, first = [], 0
+        for _name, count, size in self._parts:
+            apart = {"cable": 1, "point": len(_AXES)}.get(size, 0)
+            out += [np.arange(first + k, first + count, apart) for k in range(apart)]
+            first += count
+        return out
+
     def build(self, vector: Array) -> Effect:
         """The effect with these parameters."""
         values: dict[str, Any] = {}
         first = 0
-        for name, count, single in self._parts:
+        for name, count, size in self._parts:
             part = np.asarray(vector[first : first + count], float)
-            values[name] = float(part[0]) if single else part.copy()
+            values[name] = float(part[0]) if size == "one" else part.copy()
             first += count
         return self.effect(**values)
 
@@ -177,7 +189,7 @@ class Layout:
         """Null values, with the shape parameters set."""
         vector = self.null.copy()
         first = 0
-        for name, count, _single in self._parts:
+        for name, count, _size in self._parts:
             if name in shape:
                 vector[first : first + count] = shape[name]
             first += count
@@ -202,7 +214,7 @@ def layout_of(effect: type[Effect], robot: Robot) -> Layout:
         for key, value in zip(columns, one_row, strict=True):
             columns[key] += [float(value)] * len(endings)
         shape += [bool(meta["shape"])] * len(endings)
-        parts.append((item.name, len(endings), meta["size"] == "one"))
+        parts.append((item.name, len(endings), meta["size"]))
     arrays = {key: np.array(column) for key, column in columns.items()}
     # a shape starts where it may be: bounds go with the robot's size
     inside = np.clip(arrays["null"], arrays["lower"], arrays["upper"])

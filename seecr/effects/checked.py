@@ -58,7 +58,7 @@ def check_class(effect: type[Effect], where: str) -> None:
 def edit_setup(effect: Effect, setup: Setup) -> None:
     """Let an effect edit a setup; complain in its name about what it leaves there."""
     first = len(setup.laws)
-    if _is_ours(effect):
+    if is_built_in(type(effect)):
         effect.edit_setup(setup)
         return
     shapes = {name: np.shape(getattr(setup, name)) for name in _NUMBERS_OF_A_SETUP}
@@ -76,7 +76,7 @@ def edit_setup(effect: Effect, setup: Setup) -> None:
 
 def edit_readings(effect: Effect, readings: Readings, setup: Setup) -> None:
     """Let an effect edit readings; complain in its name about what it leaves there."""
-    if _is_ours(effect):
+    if is_built_in(type(effect)):
         effect.edit_readings(readings, setup)
         return
     names = [item.name for item in fields(Readings)]
@@ -116,6 +116,6 @@ def _finite(value: object, what: str) -> Array:
     return array
 
 
-def _is_ours(effect: Effect) -> bool:
-    """Whether the effect is built in: those are tested, and fits call them often."""
-    return type(effect).__module__.startswith("seecr.effects.")
+def is_built_in(effect: type[Effect]) -> bool:
+    """Whether the effect is our own: those are tested, and fits call them often."""
+    return effect.__module__.startswith("seecr.effects.")
