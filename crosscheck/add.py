@@ -18,8 +18,9 @@ from crosscheck.measurements import Measurements
 from crosscheck.model_file import Fitted
 from crosscheck.noise import Whiteness, rms_by_kind, whiteness
 from crosscheck.prepare import outlying_rows, prepare
-from crosscheck.problem import Problem, evaluate
+from crosscheck.problem import Problem
 from crosscheck.search import FALSE_ALARM, Progress
+from crosscheck.state import evaluate
 from seecr.effects import effect_named, layout_of
 from seecr.effects.base import Layout
 from seecr.pose import Array

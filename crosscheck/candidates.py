@@ -13,7 +13,8 @@ import numpy as np
 
 from crosscheck.evidence import Evidence, evidence, p_value
 from crosscheck.fit import Fit, fit, flat
-from crosscheck.problem import Problem, derivatives, evaluate
+from crosscheck.problem import Problem
+from crosscheck.state import derivatives, evaluate
 from crosscheck.subspace import projected
 from seecr.effects import catalogue, layout_of
 from seecr.effects.base import Layout
@@ -175,12 +176,18 @@ def fit_candidate(
     if best is None:
         out.why_not = "no fit: rows could not be solved with it"
         return out
-    out.fit, out.evidence = best, evidence(best, noise_scale)
-    out.drop = (base.chi2 - best.chi2) / noise_scale**2
-    columns = seen_directions(best, layout.name, base)
+    return judged(best, base, screened, noise_scale)
+
+
+def judged(found: Fit, base: Fit, screened: Candidate, noise_scale: float) -> Candidate:
+    """A candidate with its fit: how much better than without it, and by what chance."""
+    layout, first = screened.layout, screened.starts
+    assert first is not None
+    columns = seen_directions(found, layout.name, base)
     one_sided = bool(np.isfinite(layout.lower[0])) and layout.lower[0] == layout.null[0]
-    out.p = p_value(out.drop, columns, one_sided) * first.shapes
-    return out
+    drop = (base.chi2 - found.chi2) / noise_scale**2
+    p = p_value(drop, columns, one_sided) * first.shapes
+    return Candidate(layout, found, evidence(found, noise_scale), drop, p, starts=first)
 
 
 def seen_directions(found: Fit, name: str, base: Fit) -> int:

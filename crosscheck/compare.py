@@ -20,8 +20,9 @@ from crosscheck.held_out import blocks_of
 from crosscheck.measurements import Measurements
 from crosscheck.noise import Whiteness, as_table, rms_by_kind, whiteness
 from crosscheck.prepare import noise_floor, outlying_rows, prepare
-from crosscheck.problem import ORIENTATION, POSITION, TENSION, Problem, State, evaluate
+from crosscheck.problem import ORIENTATION, POSITION, TENSION, Problem
 from crosscheck.regions import regions_of
+from crosscheck.state import State, evaluate
 from crosscheck.travel import Travel, travel
 from seecr import cable_law
 from seecr.pose import Array

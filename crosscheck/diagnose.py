@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from crosscheck.candidates import null_fit
 from crosscheck.confounding import Rival, rivals_of
@@ -28,6 +29,9 @@ _SURE_PARAMETERS, _SURE_SHARE, _SURE_ALONE = 3, 0.5, 2.0 / 3.0
 _UNDERSTATED = 3.0
 
 
+# BLAS on several threads takes longer for matrices as narrow as these, and takes the processors
+# from the compiled loop.
+@threadpool_limits.wrap(limits=1, user_api="blas")
 def diagnose(
     robot: Robot,
     data: Measurements,
@@ -66,7 +70,7 @@ def diagnose(
 def _with_derivatives(problem: Problem, base: Fit, factor: Array) -> Fit:
     from dataclasses import replace
 
-    from crosscheck.problem import derivatives
+    from crosscheck.state import derivatives
 
     jacobian = derivatives(problem, base.state, factor) * flat(base.terms, "scale")
     return replace(base, jacobian=jacobian)
@@ -109,7 +113,7 @@ def _with_larger_noise(found: Search, progress: Progress) -> tuple[Search, list[
     if last.is_noise or last.structured or last.scale > _UNDERSTATED or found.noise_scale != 1.0:
         return found, []
     scale = last.scale
-    again = search(found.problem, found.steps[0].fit, found.factor, scale, progress)
+    again = search(found.problem, found.steps[0].fit, found.factor, scale, progress, found)
     return again, [
         f"what is left is white but {scale:.2f} times the stated noise: taken as the noise"
     ]

@@ -14,7 +14,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.problem import Problem, State, derivatives, evaluate
+from crosscheck.problem import Problem
+from crosscheck.state import State, derivatives, evaluate
 from crosscheck.subspace import basis
 from seecr.pose import Array
 from seecr.sensitivity import Term
@@ -25,7 +26,10 @@ PRIOR_SIZES = 10.0
 UNSEEN_SIZES = 100.0
 _ITERATIONS = 40
 _GAIN = 1e-3
-_FEW = 4
+# A trial is given up after a few steps, or fewer where it is that much further off.
+_FEW, _FEW_FAR, _FAR = 4, 2, 10.0
+# Steps that derivatives serve at most beyond their own.
+_STALE = 2
 
 
 @dataclass(eq=False)
@@ -145,10 +149,15 @@ def fit(
                 break
             stale = 0  # not the derivatives' last word: they are of an earlier step
             continue
-        # derivatives cost much more than a trial: they serve twice where steps go well
-        stale = 1 if stale == 0 and step_state.chi2 < 0.3 * state.chi2 else 0
+        # derivatives cost much more than a trial: they serve again where steps go well
+        if stale < _STALE and step_state.chi2 < 0.3 * state.chi2:
+            stale += 1
+            jacobian = _corrected(jacobian, state, step_state)
+        else:
+            stale = 0
         state = step_state
-        if gain < _GAIN or (count >= _FEW and state.chi2 > hopeless):
+        lost = state.chi2 > (hopeless if count >= _FEW else _FAR * hopeless)
+        if gain < _GAIN or (count >= _FEW_FAR and lost):
             break
     jacobian = np.zeros((len(state.white), 0))
     if p:
@@ -163,6 +172,16 @@ def _invalid(state: State, p: int, why: str) -> Fit:
     empty = np.zeros((len(state.white), p))
     unknown = np.full((p, p), np.inf)
     return Fit(state, empty, unknown, np.zeros(p, dtype=bool), False, why, 0)
+
+
+def _corrected(jacobian: Array, before: State, after: State) -> Array:
+    """Broyden's update: the derivatives made to agree with what the last step did."""
+    step = sizes(after.terms) - sizes(before.terms)
+    change = before.white - after.white  # of the prediction
+    length = float(step @ step)
+    if length == 0.0:
+        return jacobian
+    return jacobian + np.outer(change - jacobian @ step, step) / length
 
 
 def _objective(state: State) -> float:

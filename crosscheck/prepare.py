@@ -9,7 +9,8 @@ import numpy as np
 from crosscheck.held_out import blocks_of
 from crosscheck.measurements import Measurements
 from crosscheck.noise import Rms, estimate_sigma, rms_by_kind
-from crosscheck.problem import Problem, State
+from crosscheck.problem import Problem
+from crosscheck.state import State
 from seecr.robot import Robot
 from seecr.sensitivity import Term, effects_of
 

@@ -14,7 +14,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from crosscheck.candidates import Candidate, fit_candidate, layouts_for, ordered, screen
+from crosscheck.candidates import (
+    Candidate,
+    fit_candidate,
+    judged,
+    layouts_for,
+    ordered,
+    screen,
+)
 from crosscheck.evidence import Evidence, evidence
 from crosscheck.fit import Fit, fit, flat, with_values
 from crosscheck.held_out import HeldOut, hold_out, improves, unfitted
@@ -68,6 +75,7 @@ class Search:
         noise_scale: noise in units of the stated one, used by all tests.
         steps: from the model as it stood to the last one.
         base: names of the effects the model had.
+        known: fits of candidates, for a search of the same data again.
     """
 
     problem: Problem
@@ -75,6 +83,7 @@ class Search:
     noise_scale: float
     steps: list[Step]
     base: tuple[str, ...]
+    known: dict[tuple[frozenset[str], str], tuple[float, Fit]] = field(default_factory=dict)
 
     @property
     def last(self) -> Step:
@@ -112,6 +121,8 @@ class _Searcher:
     scale: float
     base: Fit
     progress: Progress
+    # fits of candidates by (effects beside it, its name), with the chi2 of those effects alone
+    known: dict[tuple[frozenset[str], str], tuple[float, Fit]]
 
     def run(self) -> Search:
         root = self.node(self.base)
@@ -166,11 +177,22 @@ class _Searcher:
                 f"round {depth + 1}: fitting {c.name}", (which + 0.5 + 0.5 * k / len(open_)) / of
             )
             hopeless = 4.0 * best + 0.02 * node.fit.chi2
-            tried = fit_candidate(self.problem, node.fit, c, self.factor, self.scale, hopeless)
+            tried = self.tried(node, c, hopeless)
             if tried.fit is not None:
                 best = min(best, tried.fit.chi2)
             node.candidates.append(tried)
         self.judge(node)
+
+    def tried(self, node: _Node, screened: Candidate, hopeless: float) -> Candidate:
+        """A candidate fitted; with what an earlier search found, where that fitted it."""
+        key = (node.names, screened.name)
+        known = self.known.get(key)
+        if known is not None and known[0] == node.fit.chi2:
+            return judged(known[1], node.fit, screened, self.scale)
+        out = fit_candidate(self.problem, node.fit, screened, self.factor, self.scale, hopeless)
+        if out.fit is not None:
+            self.known[key] = (node.fit.chi2, out.fit)
+        return out
 
     def judge(self, node: _Node) -> None:
         """Say of each candidate why it is not to be added, if it is not."""
@@ -229,7 +251,7 @@ class _Searcher:
         last = self.settled(best)
         last = self.without_needless(last, held)
         steps = self.in_order(root, last, held, seen)
-        return Search(self.problem, self.factor, self.scale, steps, tuple(held))
+        return Search(self.problem, self.factor, self.scale, steps, tuple(held), self.known)
 
     def settled(self, node: _Node) -> _Node:
         if not node.fit.terms or node.fit is self.base:
@@ -310,9 +332,14 @@ def search(
     factor: Array,
     noise_scale: float = 1.0,
     progress: Progress = lambda _text, _part: None,
+    before: Search | None = None,
 ) -> Search:
-    """Add effects to the base model until what is left is noise or nothing helps."""
-    return _Searcher(problem, factor, noise_scale, base, progress).run()
+    """Add effects to the base model until what is left is noise or nothing helps.
+
+    ``before`` is a search of the same data with another noise scale: its fits still hold.
+    """
+    known = {} if before is None else before.known
+    return _Searcher(problem, factor, noise_scale, base, progress, known).run()
 
 
 def smallest_sure(found: Search, parameters: int, share: float) -> Search | None:

@@ -16,7 +16,8 @@ from crosscheck.candidates import ordered, own_columns
 from crosscheck.confounding import Rival
 from crosscheck.fit import Fit, flat, sizes
 from crosscheck.measurements import Measurements
-from crosscheck.problem import Problem, State, derivatives, evaluate
+from crosscheck.problem import Problem
+from crosscheck.state import State, derivatives, evaluate
 from crosscheck.subspace import projected
 from seecr.effects.base import Layout, layout_of
 from seecr.pose import Array, quat_from_rotvec, quat_multiply

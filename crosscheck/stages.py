@@ -9,8 +9,9 @@ import numpy as np
 from crosscheck.diagnosis import Diagnosis
 from crosscheck.held_out import blocks_of
 from crosscheck.noise import rms_by_kind
-from crosscheck.problem import ORIENTATION, POSITION, TENSION, Problem, State
+from crosscheck.problem import ORIENTATION, POSITION, TENSION, Problem
 from crosscheck.search import Step
+from crosscheck.state import State
 from seecr.pose import Array
 
 # The longest arrow over the widest side of the region, and the percentile that is as long.

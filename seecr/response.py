@@ -13,7 +13,7 @@ from seecr import cable_law
 from seecr.cable_law import TENSION
 from seecr.forces import N_LOAD, N_READY, N_WORK, UP, evaluate, place_joints, prepare
 from seecr.pose import Array
-from seecr.statics import Evaluation, Tables
+from seecr.statics import Evaluation, Tables, in_parts
 
 _jit = njit(cache=True, nogil=True, error_model="numpy")
 
@@ -27,10 +27,15 @@ def difference(plus: Tables, minus: Tables, at: Evaluation) -> tuple[Array, Arra
     """
     n, m = plus.cables.shape[:2]
     gradient, tension = np.zeros((n, plus.n_dof)), np.zeros((n, m))
-    _difference(
-        plus.cables, minus.cables, plus.load, minus.load, plus.poses, plus.screws, at.deviation,
-        at.values, plus.length, at.guess, gradient, tension,
-    )  # fmt: skip
+
+    def run(part: slice) -> None:
+        _difference(
+            plus.cables[part], minus.cables[part], plus.load[part], minus.load[part],
+            plus.poses[part], plus.screws[part], at.deviation[part], at.values[part],
+            plus.length, at.guess[part], gradient[part], tension[part],
+        )  # fmt: skip
+
+    in_parts(run, n)
     return _solved(gradient, tension, gradient)
 
 
@@ -42,10 +47,15 @@ def by_cable(plus: Tables, minus: Tables, at: Evaluation) -> tuple[Array, Array]
     """
     n, m = plus.cables.shape[:2]
     gradient, tension = np.zeros((n, m, plus.n_dof)), np.zeros((n, m))
-    _by_cable(
-        plus.cables, minus.cables, plus.load, plus.poses, plus.screws, at.deviation, at.values,
-        plus.length, at.guess, gradient, tension,
-    )  # fmt: skip
+
+    def run(part: slice) -> None:
+        _by_cable(
+            plus.cables[part], minus.cables[part], plus.load[part], plus.poses[part],
+            plus.screws[part], at.deviation[part], at.values[part], plus.length, at.guess[part],
+            gradient[part], tension[part],
+        )  # fmt: skip
+
+    in_parts(run, n)
     return _solved(np.swapaxes(gradient, 1, 2), tension, gradient.reshape(n, -1))
 
 

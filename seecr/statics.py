@@ -229,7 +229,7 @@ def descend(
             out.deviation[part], out.values[part], out.guess[part], staged,
         )  # fmt: skip
 
-    _run(run, n, threads)
+    in_parts(run, n, threads)
     return out
 
 
@@ -249,13 +249,14 @@ def evaluate(tables: Tables, at: Evaluation, threads: int | None = 1) -> Evaluat
             out.guess[part],
         )  # fmt: skip
 
-    _run(run, n, threads)
+    in_parts(run, n, threads)
     out.outcome = np.where(np.isinf(out.energy), kernel.CABLE_LAW, kernel.CONVERGED)
     out.residual = residual_size(out.gradient) / tables.scale
     return out
 
 
-def _run(run: Callable[[slice], None], n: int, threads: int | None) -> None:
+def in_parts(run: Callable[[slice], None], n: int, threads: int | None = None) -> None:
+    """Run a job on n rows, in as many parts as there are threads and rows enough for them."""
     run_parts(run, _chunks(n, default_threads() if threads is None else threads))
 
 

@@ -9,11 +9,12 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from crosscheck.problem import POSITION, Problem, State
+from crosscheck.problem import POSITION, Problem
 from crosscheck.recording import colours, layout
 from crosscheck.recording.states import States
 from crosscheck.recording.stream import Recording
 from crosscheck.stages import Kind, drawn, kinds_read, magnification, sizes_of, views_of
+from crosscheck.state import State
 from seecr import cable_law
 from seecr.pose import Array, quat_from_rxyz, rxyz_from_quat
 
