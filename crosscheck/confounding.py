@@ -65,34 +65,36 @@ def rivals_of(found: Search, name: str) -> list[Rival]:
 
 
 def _likely(found: Search, name: str, without: Fit) -> list[Candidate]:
-    """Candidates whose derivatives can imitate what the effect does in the final model."""
+    """Candidates that fitted nearly as well as the effect, or can imitate what it does."""
     final = found.last
     have = {t.name for t in final.fit.terms}
     own = own_columns(final.fit.terms, name)
     signal = final.fit.jacobian[:, own] @ sizes(final.fit.terms)[own]
     signal = projected(signal[:, None], final.fit.jacobian[:, ~own])[:, 0]
-    # candidates as they were tried where the effect was chosen
-    pool: list[Candidate] = []
-    for step in found.steps:
-        if name in [c.name for c in step.candidates]:
-            pool = step.candidates
-            break
+    pool, best = _tried_beside(found, name)
+    # structure that was left over then counts as noise
+    margin = 4.0 * _TOLD_APART * max(found.noise_scale**2, best / max(final.whiteness.dof, 1))
     out = []
-    single = len(found.found) == 1
     for c in pool:
-        if c.name in have or c.name == name or c.fit is None:
+        if c.name in have or c.fit is None:
             continue
-        if single:
-            # tried beside the same model already: its own fit says more than a derivative
-            margin = 4.0 * _TOLD_APART * max(1.0, final.whiteness.scale**2)
-            if (c.fit.chi2 - final.fit.chi2) / found.noise_scale**2 < margin:
-                out.append(c)
-            continue
-        columns = c.fit.jacobian[:, own_columns(c.fit.terms, c.name)]
-        columns = projected(columns, without.jacobian)
-        if contained(signal, columns) > _LIKELY:
+        if c.fit.chi2 < best + margin:
             out.append(c)
+        elif len(found.found) > 1:
+            # fitted beside another model, its own fit does not say all
+            columns = c.fit.jacobian[:, own_columns(c.fit.terms, c.name)]
+            if contained(signal, projected(columns, without.jacobian)) > _LIKELY:
+                out.append(c)
     return out
+
+
+def _tried_beside(found: Search, name: str) -> tuple[list[Candidate], float]:
+    """Candidates of the step that chose the effect, beside all that came before; its chi2."""
+    for step in reversed(found.steps):
+        for c in step.candidates:
+            if c.name == name:
+                return step.candidates, c.fit.chi2 if c.fit is not None else found.last.fit.chi2
+    return [], found.last.fit.chi2
 
 
 def contained(signal: Array, columns: Array) -> float:

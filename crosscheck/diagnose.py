@@ -16,15 +16,15 @@ from crosscheck.measurements import Measurements
 from crosscheck.noise import rms_by_kind
 from crosscheck.prepare import noise_floor, outlying_rows, prepare
 from crosscheck.problem import Problem
-from crosscheck.search import Progress, Search, Step, search, smallest_sure
+from crosscheck.search import Progress, Search, Step, search, share_of, smallest_sure
 from crosscheck.separation import measured_directly, proposals
 from seecr.pose import Array
 from seecr.robot import Robot
 from seecr.sensitivity import Term, effects_of
 
 # Where structure is left over, an effect is sure only if it has few parameters and took away
-# most of what was unexplained.
-_SURE_PARAMETERS, _SURE_SHARE, _SURE_ALONE = 3, 0.5, 2.0 / 3.0
+# most of what was unexplained; by itself, two thirds of all and then a third of the rest.
+_SURE_PARAMETERS, _SURE_SHARE, _SURE_ALONE = 3, 0.5, (2.0 / 3.0, 1.0 / 3.0)
 # Noise up to this many times the stated one is noise that was stated too small.
 _UNDERSTATED = 3.0
 
@@ -129,9 +129,8 @@ def conclude(found: Search, notes: list[str]) -> Diagnosis:
         findings = [f for f in findings if _is_sure(f)]
         smaller = None if findings else smallest_sure(found, _SURE_PARAMETERS, _SURE_ALONE)
         if smaller is not None:
-            alone = _finding(smaller, smaller.found[0])
-            findings = [alone] if alone.share > _SURE_ALONE else []
-            found = smaller if findings else found
+            found = smaller
+            findings = [_finding(found, name) for name in found.found]
     verdict = "unknown_effect"
     if clean:
         verdict = "effects_found" if findings else "no_effect_missing"
@@ -193,15 +192,8 @@ def _finding(found: Search, name: str) -> Finding:
         check=check_of(term),
         rms=rms_by_kind(problem, step.fit.state.raw),
         held_out_rms=step.held_out.rms,
-        share=_share(before, step),
+        share=share_of(before, step),
     )
-
-
-def _share(before: Step, step: Step) -> float:
-    """Part of the unexplained chi2 of runs left out that a step took away."""
-    unexplained = float(before.held_out.chi2.sum() - before.held_out.readings.sum())
-    fall = float(before.held_out.chi2.sum() - step.held_out.chi2.sum())
-    return float(np.clip(fall / unexplained, 0.0, 1.0)) if unexplained > 0 else 0.0
 
 
 def check_of(term: Term) -> str:

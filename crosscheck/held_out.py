@@ -16,6 +16,8 @@ from seecr.sensitivity import Term
 
 # One run alone is cut into this many blocks of time.
 _BLOCKS = 5
+# Standard errors by which blocks left out must be predicted better to be sure.
+_SURE_ERRORS = 2.0
 
 
 @dataclass(eq=False)
@@ -80,6 +82,18 @@ def improves(without: HeldOut, with_effect: HeldOut) -> tuple[float, float]:
     delta = without.chi2 - with_effect.chi2
     error = float(np.std(delta, ddof=1) / np.sqrt(len(delta))) if len(delta) > 1 else np.inf
     return float(delta.mean()), error
+
+
+def surely_improves(without: HeldOut, with_effect: HeldOut) -> bool:
+    """Whether blocks left out are predicted better beyond doubt.
+
+    By two standard errors of the mean fall, or every one of at least five blocks: one block that
+    falls much more than the others makes the mean uncertain, not the sign.
+    """
+    mean, error = improves(without, with_effect)
+    delta = without.chi2 - with_effect.chi2
+    every = len(delta) >= _BLOCKS and bool(np.all(delta > 0.0))
+    return with_effect.valid and (mean > _SURE_ERRORS * error or every)
 
 
 def unfitted(problem: Problem, terms: Sequence[Term], base: Fit) -> HeldOut:

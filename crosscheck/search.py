@@ -10,7 +10,7 @@ it looks back, drops what is needless, and puts the rest in the order in which a
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -21,10 +21,11 @@ from crosscheck.candidates import (
     layouts_for,
     ordered,
     screen,
+    try_candidate,
 )
 from crosscheck.evidence import Evidence, evidence
 from crosscheck.fit import Fit, fit, flat, with_values
-from crosscheck.held_out import HeldOut, hold_out, improves, unfitted
+from crosscheck.held_out import HeldOut, hold_out, improves, surely_improves, unfitted
 from crosscheck.noise import Whiteness, whiteness
 from crosscheck.problem import Problem
 from seecr.pose import Array
@@ -342,31 +343,70 @@ def search(
     return _Searcher(problem, factor, noise_scale, base, progress, known).run()
 
 
-def smallest_sure(found: Search, parameters: int, share: float) -> Search | None:
-    """The way with the one small effect that explains most by itself, if it is most of all.
+def smallest_sure(found: Search, parameters: int, shares: tuple[float, float]) -> Search | None:
+    """The way by small effects alone, each of which explains much by itself.
 
     For data that keep some structure whatever is added: large groups imitate anything, but an
-    effect of a few parameters that takes away nearly all is there.
+    effect of a few parameters that takes away nearly all is there; and so may be the next one,
+    if it takes away a good part of what the first leaves.
+
+    Args:
+        found: a search that did not end with noise.
+        parameters: most that an effect may have.
+        shares: least part of what runs left out leave unexplained that the first effect and
+            each after it must take away.
     """
-    start = found.steps[0]
+    way = Search(
+        found.problem, found.factor, found.noise_scale, found.steps[:1], found.base, found.known
+    )
+    while len(way.found) < MOST_EFFECTS:
+        step = _small_step(way, parameters, shares[1] if way.found else shares[0])
+        if step is None:
+            break
+        way = replace(way, steps=[*way.steps, step])
+    return way if way.found else None
+
+
+def _small_step(way: Search, parameters: int, share: float) -> Step | None:
+    problem, last = way.problem, way.last
+    if way.found:
+        last.candidates = _small_candidates(way, parameters)
     small = [
         c
-        for c in start.candidates
+        for c in last.candidates
         if c.fit is not None and c.evidence is not None and len(c.layout) <= parameters
-    ]
+        and not np.any(c.fit.at_bound)
+    ]  # fmt: skip
     if not small:
         return None
     best = max(small, key=lambda c: c.evidence.log if c.evidence else -np.inf)
     assert best.fit is not None
-    if best.fit.chi2 > (1.0 - share) * start.fit.chi2:
-        return None
-    full = fit(found.problem, best.fit.terms, found.factor, best.fit.state)
+    full = fit(problem, best.fit.terms, way.factor, best.fit.state)
     if not full.valid:
         return None
-    ev = evidence(full, found.noise_scale)
-    white = whiteness(found.problem, full.state.white / found.noise_scale, ev.parameters)
-    step = Step(best.name, full, ev, white, hold_out(found.problem, full, found.factor))
-    return Search(found.problem, found.factor, found.noise_scale, [start, step], found.base)
+    ev = evidence(full, way.noise_scale)
+    white = whiteness(problem, full.state.white / way.noise_scale, ev.parameters)
+    step = Step(best.name, full, ev, white, hold_out(problem, full, way.factor))
+    sure = surely_improves(last.held_out, step.held_out) and not np.any(full.at_bound)
+    return step if sure and share_of(last, step) > share else None
+
+
+def _small_candidates(way: Search, parameters: int) -> list[Candidate]:
+    """The small effects that the last model does not have, fitted beside it."""
+    held = {t.name for t in way.last.fit.terms}
+    out = []
+    for c in layouts_for(way.problem):
+        if c.name in held or c.why_not or len(c.layout) > parameters:
+            continue
+        out.append(try_candidate(way.problem, way.last.fit, c.layout, way.factor, way.noise_scale))
+    return out
+
+
+def share_of(before: Step, step: Step) -> float:
+    """Part of the unexplained chi2 of runs left out that a step took away."""
+    unexplained = float(before.held_out.chi2.sum() - before.held_out.readings.sum())
+    fall = float(before.held_out.chi2.sum() - step.held_out.chi2.sum())
+    return float(np.clip(fall / unexplained, 0.0, 1.0)) if unexplained > 0 else 0.0
 
 
 def _promise(c: Candidate) -> float:
