@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from itertools import takewhile
 from typing import Any
 
 import numpy as np
@@ -13,11 +15,19 @@ from crosscheck.confounding import Rival, rivals_of
 from crosscheck.diagnosis import Diagnosis, Finding, Rms
 from crosscheck.fit import Fit, flat
 from crosscheck.measurements import Measurements
-from crosscheck.noise import rms_by_kind
+from crosscheck.noise import rms_by_kind, whiteness
 from crosscheck.prepare import noise_floor, outlying_rows, prepare
 from crosscheck.problem import Problem
-from crosscheck.search import Progress, Search, Step, search, share_of, smallest_sure
+from crosscheck.search import (
+    Progress,
+    Search,
+    is_plausible,
+    search,
+    share_of,
+    smallest_sure,
+)
 from crosscheck.separation import measured_directly, proposals
+from crosscheck.state import derivatives
 from seecr.pose import Array
 from seecr.robot import Robot
 from seecr.sensitivity import Term, effects_of
@@ -68,10 +78,6 @@ def diagnose(
 
 
 def _with_derivatives(problem: Problem, base: Fit, factor: Array) -> Fit:
-    from dataclasses import replace
-
-    from crosscheck.state import derivatives
-
     jacobian = derivatives(problem, base.state, factor) * flat(base.terms, "scale")
     return replace(base, jacobian=jacobian)
 
@@ -96,6 +102,11 @@ def _without_outliers(
     lines = ", ".join(str(k) for k in problem.data.line[rows])
     word = "line" if rows.sum() == 1 else "lines"
     cleaned = problem.without(rows, f"{word} {lines} left out: outliers, far from all the others")
+    state = found.last.fit.state
+    kept = ~rows[problem.row_of]
+    if whiteness(cleaned, state.white[kept], found.last.evidence.parameters).structured:
+        # nor are the others noise: rows that stick out are part of what is not explained
+        return found, []
     again = null_fit(cleaned, base.terms, factor, refit=False)
     if base.terms:
         again = _with_derivatives(cleaned, again, factor)
@@ -121,21 +132,17 @@ def _with_larger_noise(found: Search, progress: Progress) -> tuple[Search, list[
 
 def conclude(found: Search, notes: list[str]) -> Diagnosis:
     """The verdict of a search."""
-    problem, last = found.problem, found.last
-    names = found.found
-    clean = last.whiteness.is_noise
-    findings = [_finding(found, name) for name in names]
-    if not clean:
-        findings = [f for f in findings if _is_sure(f)]
-        smaller = None if findings else smallest_sure(found, _SURE_PARAMETERS, _SURE_ALONE)
-        if smaller is not None:
-            found = smaller
-            findings = [_finding(found, name) for name in found.found]
+    problem, clean = found.problem, found.last.whiteness.is_noise
+    if clean:
+        findings, sure = [_finding(found, name) for name in found.found], found
+    else:
+        findings, sure = _sure(found)
+        found = sure if findings else found
     verdict = "unknown_effect"
     if clean:
         verdict = "effects_found" if findings else "no_effect_missing"
-    where = _where(found) if verdict == "unknown_effect" else ()
-    shown = found.last if clean else _step_of(found, findings)
+    where = _where(sure) if verdict == "unknown_effect" else ()
+    shown = sure.last
     return Diagnosis(
         verdict=verdict,
         sentence=_sentence(verdict, findings, found),
@@ -143,29 +150,32 @@ def conclude(found: Search, notes: list[str]) -> Diagnosis:
         before=rms_by_kind(problem, found.steps[0].fit.state.raw),
         after=rms_by_kind(problem, shown.fit.state.raw),
         held_out=shown.held_out.rms,
-        floor=noise_floor(problem, last.fit.state),
+        floor=noise_floor(problem, found.last.fit.state),
         candidates=tuple(_candidates(found, [f.effect for f in findings])),
         measure_next=tuple(_measure_next(found, findings, verdict, where)),
         notes=tuple(dict.fromkeys(notes)),
         search=found,
-        whiteness=last.whiteness,
+        whiteness=found.last.whiteness,
         where=where,
     )
 
 
-def _step_of(found: Search, findings: list[Finding]) -> Step:
-    """The last step that holds only effects that are sure."""
-    sure = {f.effect for f in findings} | set(found.base)
-    shown = found.steps[0]
-    for step in found.steps:
-        if {t.name for t in step.fit.terms} <= sure:
-            shown = step
-    return shown
+def _sure(found: Search) -> tuple[list[Finding], Search]:
+    """What is sure where structure is left over, and the way that far."""
+    # what was found beside an effect that is not sure is not sure either
+    first = list(takewhile(_is_sure, (_finding(found, name) for name in found.found)))
+    way: Search | None = replace(found, steps=found.steps[: 1 + len(first)])
+    if not first:
+        way = smallest_sure(found, _SURE_PARAMETERS, _SURE_ALONE)
+    if way is None:
+        return [], replace(found, steps=found.steps[:1])
+    return [_finding(way, name) for name in way.found], way
 
 
 def _is_sure(finding: Finding) -> bool:
     few = len(finding.layout) <= _SURE_PARAMETERS
-    return few and finding.share > _SURE_SHARE and not bool(np.any(finding.at_bound))
+    stopped = bool(np.any(finding.at_bound))
+    return few and finding.share > _SURE_SHARE and not stopped and is_plausible(finding.term)
 
 
 def _finding(found: Search, name: str) -> Finding:

@@ -12,6 +12,7 @@ from crosscheck.noise import Rms, Whiteness
 from crosscheck.search import Search
 from seecr.effects.base import Layout
 from seecr.pose import Array
+from seecr.sensitivity import Term
 
 VERDICTS = ("no_effect_missing", "effects_found", "unknown_effect", "no_verdict")
 
@@ -42,6 +43,11 @@ class Finding:
     rms: Rms
     held_out_rms: Rms
     share: float
+
+    @property
+    def term(self) -> Term:
+        """The effect with its values."""
+        return Term(self.layout, self.values)
 
 
 @dataclass(frozen=True, eq=False)

@@ -228,7 +228,7 @@ def _step(
         expected = -(gradient @ step + 0.5 * step @ normal @ step)
         if trial.valid and 2.0 * expected < _GAIN:  # nothing left to gain
             return None, damping, 0.0
-        damping = max(10.0 * damping, 1e-6)
+        damping = max(10.0 * damping, 1e-4)
     return None, damping, 0.0
 
 

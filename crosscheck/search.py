@@ -24,11 +24,13 @@ from crosscheck.candidates import (
     try_candidate,
 )
 from crosscheck.evidence import Evidence, evidence
-from crosscheck.fit import Fit, fit, flat, with_values
+from crosscheck.fit import Fit, fit, flat, sizes, with_values
 from crosscheck.held_out import HeldOut, hold_out, improves, surely_improves, unfitted
 from crosscheck.noise import Whiteness, whiteness
 from crosscheck.problem import Problem
+from seecr.effects import catalogue
 from seecr.pose import Array
+from seecr.sensitivity import Term
 
 # Family-wise chance of a false alarm, over all candidates of a step.
 FALSE_ALARM = 0.01
@@ -36,12 +38,15 @@ FALSE_ALARM = 0.01
 # explain equally well.
 LEAST_GAIN, EQUAL = 3.0, 3.0
 MOST_EFFECTS = 4
+# Where structure is left over, an effect of more plausible sizes than this is not believed.
+PLAUSIBLE = 20.0
 # An effect that takes away less than this part of what noise does not explain is no cause.
 LEAST_PART = 0.25
 # The best few models are fitted again, so often, from values so many plausible sizes away.
 _SHAKEN, _SHAKES, _SHAKE = 2, 4, 0.2
-# Models abreast, and candidates fitted beside each of them after the first round.
-_ABREAST, _FITTED = 4, 5
+# Models abreast, at least so many though none is small, and candidates fitted beside each of
+# them after the first round.
+_ABREAST, _LARGE, _FITTED = 4, 2, 5
 # Beside a model that leaves noise, an effect is only fitted if chance explains what its
 # derivative promises with less than this; beside others it must be very likely chance.
 _PRUNE_NOISE, _PRUNE_OTHER = 0.02, 0.3
@@ -140,12 +145,11 @@ class _Searcher:
             if depth == 0 and not any(c.whiteness.is_noise for c in better):
                 better = self.shaken(better, seen)
             noise = [c for c in better if c.whiteness.is_noise]
-            # of models alike in evidence (friction that is null, say) the smaller one
-            top = max(noise or better, key=lambda c: c.evidence.log - 0.1 * len(c.fit.at_bound))
+            top = max(noise or better, key=_standing)
             if not noise and top.excess > (1.0 - LEAST_PART) * best.excess:
                 break  # what is left has another cause than the next best guess
             best = top
-            abreast = [top] if noise else _diverse(better)[: _ABREAST if depth == 0 else 1]
+            abreast = [top] if noise else _diverse(better, root)[: _ABREAST if depth == 0 else 1]
         return self.conclude(root, best, seen)
 
     def node(self, found: Fit) -> _Node:
@@ -375,7 +379,7 @@ def _small_step(way: Search, parameters: int, share: float) -> Step | None:
         c
         for c in last.candidates
         if c.fit is not None and c.evidence is not None and len(c.layout) <= parameters
-        and not np.any(c.fit.at_bound)
+        and not np.any(c.fit.at_bound) and is_plausible(_term(c.fit, c.name))
     ]  # fmt: skip
     if not small:
         return None
@@ -389,6 +393,16 @@ def _small_step(way: Search, parameters: int, share: float) -> Step | None:
     step = Step(best.name, full, ev, white, hold_out(problem, full, way.factor))
     sure = surely_improves(last.held_out, step.held_out) and not np.any(full.at_bound)
     return step if sure and share_of(last, step) > share else None
+
+
+def _term(of: Fit, name: str) -> Term:
+    return next(t for t in of.terms if t.name == name)
+
+
+def is_plausible(term: Term) -> bool:
+    """Whether an effect is of a size that happens; what shapes it has no such size."""
+    amplitudes = ~term.layout.shape
+    return bool(np.all(np.abs(sizes([term]))[amplitudes] < PLAUSIBLE))
 
 
 def _small_candidates(way: Search, parameters: int) -> list[Candidate]:
@@ -415,12 +429,24 @@ def _promise(c: Candidate) -> float:
     return 0.5 * c.drop - 3.0 * directions
 
 
-def _diverse(nodes: list[_Node]) -> list[_Node]:
-    """A few models to go on from: the best, and the best of the small ones."""
+def _standing(node: _Node) -> tuple[float, int]:
+    """Evidence; of models alike in it (friction that is null, say) the smaller one counts.
+
+    Of exact equals (exit and anchor points of a platform that cannot turn) that which comes
+    first in the catalogue, and not the one that rounding prefers.
+    """
+    place = {name: i for i, name in enumerate(catalogue())}
+    log = node.evidence.log - 0.1 * len(node.fit.at_bound)
+    return round(log, 1), -sum(place.get(name, len(place)) for name in node.names)
+
+
+def _diverse(nodes: list[_Node], root: _Node) -> list[_Node]:
+    """A few models to go on from: the best, and the best of the small ones that explain much."""
     ranked = sorted(nodes, key=lambda c: -c.evidence.log)
+    enough = (1.0 - LEAST_PART) * root.excess
     out = ranked[:1]
-    for most in (3, 8):
-        small = [c for c in ranked if c.fit.jacobian.shape[1] <= most and c not in out]
-        out += small[: 2 if most == 3 else 1]
-    out += [c for c in ranked if c not in out][: max(0, _ABREAST - len(out))]
-    return out[:_ABREAST]
+    for most, count in ((3, 2), (8, 1)):
+        small = [c for c in ranked if c.fit.jacobian.shape[1] <= most and c.excess < enough]
+        out += [c for c in small if c not in out][:count]
+    others = [c for c in ranked if c not in out and c.excess < enough]
+    return out + others[: max(0, _LARGE - len(out))]

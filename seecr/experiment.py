@@ -101,6 +101,10 @@ class Experiment:
             setup.extra_length += self.length_errors[rows]
         for effect in effects:
             edit_setup(effect, setup)
+        if np.any(setup.backlash):
+            # what the winches did on the way to the rows counts too
+            path = self.path
+            setup.commands = path.given_turning if commands is None else path.turning
         return setup
 
     def predict(self, effects: Sequence[Effect] = (), near: Prediction | None = None) -> Prediction:

@@ -28,6 +28,8 @@ class Commands:
         run: (n,) int, number of the continuous motion a row belongs to.
         time: (n,) [s] or None.
         temperature: (n,) [deg C] or None.
+        passed: (k, n, m) [m] commanded changes of length (or lengths) that the way to each row
+            passes, in order: where it starts and where cables turn round; None where nobody asks.
     """
 
     pose: Array
@@ -35,6 +37,7 @@ class Commands:
     run: NDArray[np.int64] | None = None
     time: Array | None = None
     temperature: Array | None = None
+    passed: Array | None = None
 
     def __len__(self) -> int:
         return len(self.pose)
@@ -50,17 +53,41 @@ class Commands:
     _kept: list[tuple[Robot, Array]] = field(default_factory=list, repr=False)
 
 
-def play(told: Array, run: NDArray[np.int64] | None, half_width: Array) -> Array:
+def run_starts(run: NDArray[np.integer] | None, n: int) -> NDArray[np.bool_]:
+    """Which of n rows are the first of their run, (n,)."""
+    fresh = np.zeros(n, dtype=bool)
+    fresh[:1] = True
+    if run is not None:
+        fresh[1:] = run[1:] != run[:-1]
+    return fresh
+
+
+def play(
+    told: Array, run: NDArray[np.int64] | None, half_width: Array, passed: Array | None = None
+) -> Array:
     """The play operator: an output that lags its input (n, m) by up to the half-width (m,).
 
-    It starts centred on the first row of each run.
+    It starts centred where each run starts: on its first row, or on ``passed[0]`` there. Between
+    rows the input goes through ``passed`` (k, n, m), if given, and one way in between.
     """
-    out, low, high = told.copy(), told - half_width, told + half_width
-    for k in range(1, len(told)):
-        if run is None or run[k] == run[k - 1]:
-            np.maximum(out[k - 1], low[k], out=out[k])
-            np.minimum(out[k], high[k], out=out[k])
-    return out
+    way = told[None] if passed is None else np.concatenate([passed, told[None]])
+    low, high = way[0] - half_width, way[0] + half_width
+    fresh = run_starts(run, len(told))
+    low[fresh] = high[fresh] = way[0, fresh]
+    # an input moves the output to the nearest point of a band about it, and so do many inputs
+    # in turn, with one band for all: that of each row first, then of 2, 4, 8, ... rows
+    for at in way[1:]:
+        low, high = _band_of_both(low, high, at - half_width, at + half_width)
+    rows = 1
+    while np.any(low < high):
+        low[rows:], high[rows:] = _band_of_both(low[:-rows], high[:-rows], low[rows:], high[rows:])
+        rows *= 2
+    return low
+
+
+def _band_of_both(low: Array, high: Array, least: Array, most: Array) -> tuple[Array, Array]:
+    """The band that limits to ``low`` and ``high`` and then to ``least`` and ``most``."""
+    return np.clip(low, least, most), np.clip(high, least, most)
 
 
 @dataclass(eq=False)
@@ -136,7 +163,7 @@ class Setup:
         """
         told = self.commanded_change
         if np.any(self.backlash):
-            told = play(told, self.commands.run, 0.5 * self.backlash)
+            told = play(told, self.commands.run, 0.5 * self.backlash, self.commands.passed)
         paid = told * (1.0 + self.length_gain) + self.extra_length
         if self.commands.lengths is not None:
             return paid * self.length_factor

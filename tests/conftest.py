@@ -10,7 +10,7 @@ import pytest
 
 # numba keeps what it compiled, and notices an edit of a function's own file alone: not of the
 # files whose functions it calls
-COMPILED = ("cable_law", "forces", "kernel", "history")
+COMPILED = ("cable_law", "forces", "kernel", "history", "response")
 
 
 def pytest_sessionstart() -> None:

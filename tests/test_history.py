@@ -11,8 +11,8 @@ from effect_cases import experiment_of, robot_of
 from seecr.effects import Effect, effect_named
 from seecr.experiment import Experiment, Prediction
 from seecr.history import path_of
-from seecr.joints import values_of_pose
-from seecr.pose import pose_difference
+from seecr.joints import pose_of_values, values_of_pose
+from seecr.pose import pose_add, pose_difference
 from seecr.robot import Joint, Robot
 from seecr.setup import Commands, play
 from seecr.shipped import CABLES
@@ -98,6 +98,116 @@ def test_the_play_operator_lags_by_half_its_width_and_starts_centred() -> None:
     found = play(told, run, np.array([0.5]))[:, 0]
     assert found.tolist() == [0.0, 0.5, 1.5, 2.5, 2.5, 2.5, 1.5, 0.5, 0.5, 5.0]
     assert np.array_equal(play(told, run, np.zeros(1)), told)
+
+
+def test_the_play_operator_is_the_one_that_goes_row_by_row() -> None:
+    rng = np.random.default_rng(0)
+    told, run = np.cumsum(rng.normal(size=(300, 3)), axis=0), np.repeat([4, 2, 7], 100)
+    half = np.array([0.0, 0.7, 20.0])
+    expected = told.copy()
+    for k in range(1, 300):
+        if run[k] == run[k - 1]:
+            near = np.maximum(expected[k - 1], told[k] - half)
+            expected[k] = np.minimum(near, told[k] + half)
+    assert np.array_equal(play(told, run, half), expected)
+    # every other row as what is passed between the others
+    passed = np.stack([np.roll(told[1::2], 1, axis=0), told[::2]])
+    passed[0, ::50] = told[::100]
+    assert np.array_equal(play(told[1::2], run[1::2], half, passed), expected[1::2])
+
+
+def paid_out(robot: Robot, commands: Commands, gap: float) -> np.ndarray:
+    """Rest lengths (n, m) [m] of the rows, the same with waypoints as without."""
+    experiment = Experiment(robot, commands)
+    loose = [effect("backlash", gap=gap)]
+    rows = experiment.setup(loose).rest_lengths()
+    walked = experiment.setup(loose, experiment.path.commands).rest_lengths()
+    assert rows == pytest.approx(walked[experiment.path.rows], abs=1e-12)
+    return rows
+
+
+@pytest.mark.parametrize("start", [[0.0], []])
+def test_a_cable_that_turns_round_between_two_rows_takes_up_its_play_there(
+    start: list[float],
+) -> None:
+    """Past an exit point 1 m above the way: 1.25 m, 1 m at x = 0.75 m, and longer again."""
+    robot = Robot(
+        "rail", np.array([[0.75, 0.0, 1.0]]), np.zeros((1, 3)), np.array([1000.0]),
+        np.array([1.25]), 2.0, joints=(Joint("slide", "x", np.array([1.0, 0, 0]), np.zeros(3)),),
+    )  # fmt: skip
+    x = np.array([*start, 1.0, 1.5])
+    poses = np.zeros((len(x), 7))
+    poses[:, 0], poses[:, 3] = x, 1.0
+    # shortest, it is half a gap behind: 1.02 m; at x = 1 m, where it should have
+    # sqrt(17)/4 = 1.031 m, it still is; at x = 1.5 m it is behind the other way
+    found = paid_out(robot, Commands(poses), 0.04)[len(start) :, 0]
+    assert found == pytest.approx([1.02, 1.25 - 0.02], abs=1e-14)
+
+
+@pytest.mark.parametrize("joints", [(Joint("hinge", "c", np.array([0.0, 0, 1]), np.zeros(3)),), ()])
+def test_a_cable_on_a_crank_turns_round_at_both_dead_centres(joints: tuple[Joint, ...]) -> None:
+    """2 m from the axis of a crank of 1 m: 1 m of cable at 0 rad, 3 m at pi."""
+    crank = np.array([[np.cos(1.0), np.sin(1.0), 0.0]])
+    robot = Robot(
+        "crank", np.array([[2.0, 0.0, 0.0]]), crank, np.array([1000.0]),
+        np.sqrt([5 - 4 * np.cos(1.0)]), 2.0, joints=joints,
+    )  # fmt: skip
+    # a free platform takes the shorter way round: one row more
+    angles = np.array([-1.5, 3.5] if joints else [-1.5, 1.3, 3.5])
+    half = 0.5 * (angles - 1.0)
+    poses = np.zeros((len(angles), 7))
+    poses[:, 3], poses[:, 6] = np.cos(half), np.sin(half)
+    found = paid_out(robot, Commands(poses), 1.0)[:, 0]
+    told = np.sqrt(5 - 4 * np.cos(angles))
+    assert found[0] == pytest.approx(told[0] - 0.5, abs=1e-13)
+    assert found[-1] == pytest.approx(3.0 - 0.5, abs=1e-13) and told[-1] < 2.96
+
+
+def finer(robot: Robot, commands: Commands, by: int) -> tuple[Commands, np.ndarray]:
+    """More rows on the same straight ways, and where the first ones are among them."""
+    n, run = len(commands), commands.run
+    assert run is not None
+    whole: list[np.ndarray] = []
+    for k in range(n):
+        starts = k == 0 or run[k] != run[k - 1]
+        before = robot.reference_pose if starts else commands.pose[k - 1]
+        ends = np.stack([before, commands.pose[k]])
+        parts = np.arange(1, by)[:, None] / by
+        if robot.joints:
+            values = values_of_pose(robot, ends)[0]
+            way = pose_of_values(robot, values[0] + parts * (values[1] - values[0]))[0]
+        else:
+            way = pose_add(np.tile(before, (by - 1, 1)), parts * pose_difference(ends[1], ends[0]))
+        whole += [*way, commands.pose[k]]
+    rows = by * np.arange(1, n + 1) - 1
+    return Commands(np.array(whole), run=np.repeat(run, by)), rows
+
+
+@pytest.mark.parametrize("gap", [2e-4, 2e-3, 2e-2])
+@pytest.mark.parametrize("kind, seed", [
+    ("demobot_parallel", 0), ("demobot_cogiro", 0), ("jointed", 1), ("jointed", 2),
+])  # fmt: skip
+def test_more_rows_on_the_same_way_leave_backlash_as_it_is(
+    kind: str, seed: int, gap: float
+) -> None:
+    experiment = experiment_of(kind, seed=seed, rows=10)
+    robot, commands = experiment.robot, experiment.commands
+    fine, rows = finer(robot, commands, 9)
+    coarse = paid_out(robot, commands, gap)
+    assert coarse == pytest.approx(paid_out(robot, fine, gap)[rows], abs=1e-12)
+    told = experiment.setup([]).rest_lengths()
+    assert np.abs(coarse - told).max() > 0.49 * gap  # it is there
+
+
+def test_backlash_moves_no_platform_elsewhere_for_more_rows_on_its_way() -> None:
+    experiment = experiment_of("demobot_parallel", rows=10)
+    loose = [effect("backlash", gap=1e-3)]
+    fine, rows = finer(experiment.robot, experiment.commands, 7)
+    coarse = experiment.predict(loose)
+    refined = Experiment(experiment.robot, fine).predict(loose)
+    assert np.all(coarse.solved) and np.all(refined.solved)
+    expected = refined.readings.position[rows]
+    assert coarse.readings.position == pytest.approx(expected, abs=1e-10)
 
 
 def test_backlash_parts_the_way_up_from_the_way_down_by_its_gap() -> None:

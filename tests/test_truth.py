@@ -10,6 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from effect_cases import experiment_of
 
 import crosscheck.truth
 from crosscheck.effect_cases import ROBOTS, effect_cases, run_effect_case
@@ -19,6 +20,7 @@ from crosscheck.settling import SettleStatus
 from crosscheck.truth import TRUE_EFFECTS, measure, true_robot
 from crosscheck.truth.chain import hang
 from crosscheck.truth.descent import descend
+from crosscheck.truth.lengths import paid_out, way_of
 from crosscheck.truth.springs import Springs
 from crosscheck.truth.world import World
 from seecr.effects import BUILT_IN, Effect, effect_named, parameter
@@ -162,6 +164,33 @@ def test_hysteresis_leaves_a_loop_and_forgets_it_between_runs():
     apart = distance(there[1:-1], back[::-1][1:-1])
     assert np.all(apart > 5e-5)
     np.testing.assert_allclose(again, there, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind, seed", [
+    ("demobot_cogiro", 0), ("jointed", 1), ("jointed", 2), ("lengths", 0),
+])  # fmt: skip
+def test_winches_that_turn_round_between_points_take_up_their_play_there(kind, seed):
+    experiment = experiment_of(kind, seed=seed, rows=8)
+    robot, commands = experiment.robot, experiment.commands
+    backlash = [effect("backlash", gap=2e-3)]
+    true = true_robot(robot, backlash)
+    found = []
+    for waypoints in ((6, 2), (7, 3)):
+        way = way_of(true, commands, waypoints)
+        found.append(paid_out(true, way, None)[way.is_row])
+    # what 64 parts of a way leave: two ways of looking for the same extrema
+    np.testing.assert_allclose(found[0], found[1], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(
+        found[0], experiment.setup(backlash).rest_lengths(), rtol=0, atol=1e-9
+    )
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_robot_on_joints_is_led_straight_along_them(seed):
+    experiment = experiment_of("jointed", seed=seed, rows=4)
+    robot, commands = experiment.robot, experiment.commands
+    way = way_of(true_robot(robot, []), commands, (6, 2))
+    np.testing.assert_allclose(way.pose, experiment.path.commands.pose, atol=1e-12)
 
 
 def test_creep_under_a_held_pose_goes_as_kelvin_and_voigt_say():
