@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from crosscheck.advice import check_of, measure_next
 from crosscheck.candidates import null_fit
-from crosscheck.confounding import Rival, rivals_of
+from crosscheck.confounding import rivals_of
 from crosscheck.diagnosis import Diagnosis, Finding, Rms
 from crosscheck.fit import Fit, flat
 from crosscheck.measurements import Measurements
@@ -26,7 +27,6 @@ from crosscheck.search import (
     share_of,
     smallest_sure,
 )
-from crosscheck.separation import measured_directly, proposals
 from crosscheck.state import derivatives
 from seecr.pose import Array
 from seecr.robot import Robot
@@ -150,9 +150,9 @@ def conclude(found: Search, notes: list[str]) -> Diagnosis:
         before=rms_by_kind(problem, found.steps[0].fit.state.raw),
         after=rms_by_kind(problem, shown.fit.state.raw),
         held_out=shown.held_out.rms,
-        floor=noise_floor(problem, found.last.fit.state),
+        floor=noise_floor(problem, found.last.fit.state, found.noise_scale),
         candidates=tuple(_candidates(found, [f.effect for f in findings])),
-        measure_next=tuple(_measure_next(found, findings, verdict, where)),
+        measure_next=tuple(measure_next(found, findings, verdict, where)),
         notes=tuple(dict.fromkeys(notes)),
         search=found,
         whiteness=found.last.whiteness,
@@ -199,26 +199,11 @@ def _finding(found: Search, name: str) -> Finding:
         stderr=stderr,
         at_bound=best.at_bound[part],
         rivals=tuple(rivals_of(found, name)),
-        check=check_of(term),
+        check=check_of(term, problem.robot),
         rms=rms_by_kind(problem, step.fit.state.raw),
         held_out_rms=step.held_out.rms,
         share=share_of(before, step),
     )
-
-
-def check_of(term: Term) -> str:
-    """The effect's independent check, with what to expect in mm and degrees."""
-    values = {}
-    for name, unit, value in zip(term.layout.names, term.layout.units, term.vector, strict=True):
-        short = name.removesuffix(f"_{unit}") if unit else name
-        factor = {"m": 1e3, "rad": 180.0 / np.pi, "m_per_N": 1e3}.get(unit, 1.0)
-        values[short] = factor * float(value)
-        if short == "weight":
-            values["weight_10m"] = 10.0 * float(value)
-    try:
-        return term.layout.effect.advice.format(**values)
-    except (KeyError, IndexError, ValueError):
-        return term.layout.effect.advice
 
 
 def _sentence(verdict: str, findings: list[Finding], found: Search) -> str:
@@ -289,48 +274,3 @@ def _where(found: Search) -> tuple[dict[str, Any], ...]:
         return ()
     last = found.last.fit.state
     return tuple(associations(found.problem, last.white, last.prediction)[:5])
-
-
-def _measure_next(
-    found: Search, findings: list[Finding], verdict: str, where: tuple[dict[str, Any], ...]
-) -> list[str]:
-    out = []
-    for finding in findings:
-        for rival in finding.rivals:
-            out += _to_separate(found, finding, rival)
-        if finding.effect and not finding.rivals:
-            out.append(f"to confirm {finding.effect}: {finding.check}")
-    if verdict == "unknown_effect":
-        out.append(_to_find(found, where))
-    if verdict == "no_effect_missing":
-        out.append("nothing is missing; to see smaller effects, see crosscheck plan")
-    return list(dict.fromkeys(out))
-
-
-def _to_separate(found: Search, finding: Finding, rival: Rival) -> list[str]:
-    robot = found.problem.robot
-    names = f"{finding.effect} and {rival.name}"
-    direct = list(dict.fromkeys(measured_directly(n, robot) for n in (finding.effect, rival.name)))
-    ways = [
-        f"{p.words} (signal that separates them: now {p.now:.2g}, then {p.then:.2g}, needs 15)"
-        for p in proposals(found.problem, found.last.fit, finding.effect, rival)
-        if p.separates
-    ]
-    if ways:
-        return [f"to tell {names} apart: {direct[-1]}, or {ways[0]}"] + [
-            f"to tell {names} apart: {way}" for way in ways[1:2]
-        ]
-    return [
-        f"to tell {names} apart: {' or '.join(direct)}; no further pose, payload or tension that "
-        "was tried here separates them"
-    ]
-
-
-def _to_find(found: Search, where: tuple[dict[str, Any], ...]) -> str:
-    if where:
-        first = where[0]
-        return (
-            f"the unexplained error goes with {first.get('against', first.get('name'))}: repeat "
-            "poses that differ in nothing else, forward and back, and look at it there"
-        )
-    return "repeat the same poses forward, back and an hour later, to see what the error follows"

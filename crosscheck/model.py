@@ -31,6 +31,7 @@ from tomlkit.exceptions import TOMLKitError
 
 from crosscheck.errors import InputFileError
 from crosscheck.fingerprint import check_robot, fingerprint
+from crosscheck.text_file import read_text
 from seecr.effects import effect_named, layout_of
 from seecr.effects.base import Layout
 from seecr.errors import InputError
@@ -96,7 +97,7 @@ def load_model(path: str | Path, robot: Robot) -> Model:
             that is unknown, missing, given twice, no number or out of bounds.
     """
     path = Path(path)
-    text = _read(path)
+    text = read_text(path, "expected a model as crosscheck add writes it")
     document = _parse(path, text)
     where = _Where(path, text)
     _check_tables(where, document)
@@ -139,20 +140,6 @@ class _Where:
 
 def _is_key(bare: str, key: str) -> bool:
     return bare.split("=")[0].strip("\"'").split(".")[-1].strip("\"'") == key and "=" in bare
-
-
-def _read(path: Path) -> str:
-    expected = "expected a model as crosscheck add writes it"
-    try:
-        return path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise InputFileError.at(path, f"no such file; {expected}") from None
-    except UnicodeDecodeError as error:
-        text = f"is not UTF-8 (byte number {error.start + 1}); {expected}"
-        raise InputFileError.at(path, text) from None
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise InputFileError.at(path, f"cannot be read: {reason}; {expected}") from None
 
 
 def _parse(path: Path, text: str) -> TOMLDocument:

@@ -62,12 +62,15 @@ def _constant_commands(problem: Problem) -> bool:
     return len(table) > 1 and bool(np.all(np.ptp(table, axis=0) == 0))
 
 
-def noise_floor(problem: Problem, state: State | None = None) -> Rms:
-    """The rms errors that noise alone would give a perfect model, that of lengths included."""
+def noise_floor(problem: Problem, state: State | None = None, scale: float = 1.0) -> Rms:
+    """The rms errors that noise alone would give a perfect model, that of lengths included.
+
+    ``scale`` is the noise in units of the stated one.
+    """
     raw = np.broadcast_to(problem.reading_sigma, problem.measured.shape).copy()
     if state is not None:
         raw = np.sqrt(np.einsum("nij,nij->ni", state.factor, state.factor))
-    return rms_by_kind(problem, raw)
+    return rms_by_kind(problem, scale * raw)
 
 
 def outlying_rows(problem: Problem, state: State) -> np.ndarray:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 from crosscheck.errors import InputFileError
+from crosscheck.text_file import read_text
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ def load_sigma(path: str | Path) -> Sigma:
             finite number.
     """
     path = Path(path)
-    text = _read(path)
+    text = read_text(path, "expected a TOML file with a table [sigma]")
     try:
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -61,20 +62,6 @@ def sigma_toml(sigma: Sigma) -> str:
         if value is not None:
             lines.append(f"{key} = {float(value)!r}")
     return "\n".join(lines) + "\n"
-
-
-def _read(path: Path) -> str:
-    expected = "expected a TOML file with a table [sigma]"
-    try:
-        return path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise InputFileError.at(path, f"no such file; {expected}") from None
-    except UnicodeDecodeError as error:
-        text = f"is not UTF-8 (byte number {error.start + 1}); {expected}"
-        raise InputFileError.at(path, text) from None
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise InputFileError.at(path, f"cannot be read: {reason}; {expected}") from None
 
 
 def _check_tables(path: Path, text: str, content: dict[str, object]) -> None:

@@ -146,13 +146,7 @@ def drawn(magnify: float) -> str:
 
 def floor_of(found: Diagnosis, kind: Kind) -> float:
     """The rms error that noise alone would give, in SI; that of the commanded lengths with it."""
-    assert found.search is not None
-    problem, last = found.search.problem, found.search.last.fit.state
-    floor = found.floor.get(kind.key) or 0.0
-    if problem.sigma.length_m:
-        noise = np.sqrt(np.sum(last.factor**2, axis=-1))
-        floor = rms_by_kind(problem, noise)[kind.key] or 0.0
-    return floor * found.search.noise_scale
+    return found.floor.get(kind.key) or 0.0
 
 
 def views_of(place: Array) -> list[tuple[int, int]]:

@@ -23,7 +23,8 @@ class CableLengthOffset(Effect):
     place: ClassVar[str] = "actuation"
     title: ClassVar[str] = "constant error of each cable's length"
     advice: ClassVar[str] = (
-        "measure each cable at the reference pose with a tape: expect the offsets found"
+        "measure each cable at the reference pose with a tape: expect the offsets found, the "
+        "largest {largest:+.1f} mm ({which})"
     )
 
     offset: Array = parameter("m", of_length(2e-3), size="cable")
@@ -70,7 +71,10 @@ class DrumGain(Effect):
     name: ClassVar[str] = "drum_gain"
     place: ClassVar[str] = "actuation"
     title: ClassVar[str] = "drums larger or smaller than assumed"
-    advice: ClassVar[str] = "measure each drum with a caliper: expect its diameter off by the gain"
+    advice: ClassVar[str] = (
+        "measure each drum with a caliper: expect its diameter off by its gain, the largest "
+        "{largest:+.4f} ({which})"
+    )
 
     gain: Array = parameter("", 5e-3, size="cable", bounds=(-0.5, 1.0))
 
@@ -89,7 +93,10 @@ class DrumEccentricity(Effect):
     name: ClassVar[str] = "drum_eccentricity"
     place: ClassVar[str] = "actuation"
     title: ClassVar[str] = "drums that run out of true"
-    advice: ClassVar[str] = "hold a dial gauge to each drum and turn it: expect the run-out found"
+    advice: ClassVar[str] = (
+        "hold a dial gauge to each drum and turn it: expect the run-out found, the largest "
+        "{largest:+.2f} mm ({which})"
+    )
 
     sine: Array = parameter("m", of_length(1e-3), size="cable")
     cosine: Array = parameter("m", of_length(1e-3), size="cable")

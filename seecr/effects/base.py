@@ -115,7 +115,8 @@ class Effect:
             poses), "tensions".
         parent: an effect that this one only makes sense beside or contains, or "".
         advice: how to measure it on its own; ``{name}`` is filled with a parameter in
-            millimetres or degrees where those are its units.
+            millimetres or degrees where those are its units, ``{largest}`` and ``{which}`` with
+            the parameter that is the most plausible sizes from null, ``{ea}`` with E S [N].
     """
 
     name: ClassVar[str] = ""

@@ -34,7 +34,8 @@ class Stiffness(Effect):
     place: ClassVar[str] = "cable"
     title: ClassVar[str] = "stiffness of all cables"
     advice: ClassVar[str] = (
-        "hang a known weight on a known length of cable: expect {factor:.3f} E S"
+        "hang a known weight on a known length of cable: expect E S = {ea:.4g} N, {factor:.3f} "
+        "times what is stated"
     )
 
     factor: float = parameter("", 0.3, null=1.0, bounds=(0.02, 50.0))
@@ -54,7 +55,10 @@ class CableStiffness(Effect):
     place: ClassVar[str] = "cable"
     title: ClassVar[str] = "stiffness of each cable"
     parent: ClassVar[str] = "stiffness"
-    advice: ClassVar[str] = "hang a known weight on each cable: expect the factors found"
+    advice: ClassVar[str] = (
+        "hang a known weight on each cable: expect the factors found, {largest:.3f} ({which}) "
+        "the furthest off"
+    )
 
     factor: Array = parameter("", 0.2, null=1.0, bounds=(0.02, 50.0), size="cable")
 

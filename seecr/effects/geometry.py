@@ -41,7 +41,10 @@ class ExitPointError(Effect):
     name: ClassVar[str] = "exit_point_error"
     place: ClassVar[str] = "geometry"
     title: ClassVar[str] = "exit points off where the model has them"
-    advice: ClassVar[str] = "survey the exit points with the tracker: expect the errors found"
+    advice: ClassVar[str] = (
+        "survey the exit points with the tracker: expect the errors found, the largest "
+        "{largest:+.1f} mm ({which})"
+    )
 
     error: Array = parameter("m", of_length(2e-3), size="point")
 
@@ -59,7 +62,10 @@ class AnchorPointError(Effect):
     name: ClassVar[str] = "anchor_point_error"
     place: ClassVar[str] = "geometry"
     title: ClassVar[str] = "anchor points off where the model has them"
-    advice: ClassVar[str] = "measure the platform's anchor points: expect the errors found"
+    advice: ClassVar[str] = (
+        "measure the platform's anchor points: expect the errors found, the largest "
+        "{largest:+.1f} mm ({which})"
+    )
 
     error: Array = parameter("m", of_length(2e-3), size="point")
 
