@@ -172,8 +172,8 @@ def _weigh(
     fall = improves(without, held)
     drop = (base.chi2 - best.chi2) / max(1.0, white.scale) ** 2
     p = p_value(drop, seen_directions(best, layout.name, base), False)
-    # stated noise that is too small makes standard errors too small
-    fitted = _split(best, max(1.0, white.scale))
+    # stated noise that is too small, or noise that goes together, makes standard errors too small
+    fitted = _split(best, white.inflation)
     return Addition(
         name=layout.name,
         fitted=fitted,

@@ -5,20 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.console import Console
 from rich.table import Table
 
 from crosscheck.add import Addition
-from crosscheck.diagnosis import Rms, number
-from crosscheck.diagnosis_text import say, shown
+from crosscheck.diagnosis import number
+from crosscheck.lines import console_for, print_parameters, rms_table, say
 from crosscheck.search import FALSE_ALARM
 
-_KINDS = (
-    ("position_rms_m", 1e3, "position\n[mm]"),
-    ("orientation_rms_rad", 180.0 / np.pi, "orientation\n[deg]"),
-    ("tension_rms_N", 1.0, "tension\n[N]"),
-)
 _MOST = 12
 
 
@@ -26,9 +20,7 @@ def print_addition(
     found: Addition, model: Path, written: bool, console: Console | None = None
 ) -> None:
     """Print values, errors before and after, warnings, and what was written."""
-    console = console or Console(highlight=False)
-    if not console.is_terminal:
-        console.width = max(console.width, 160)
+    console = console_for(console)
     for note in found.notes:
         say(console, f"note: {note}", "dim")
     for fitted in found.fitted:
@@ -64,18 +56,9 @@ def _left(found: Addition) -> str:
 def _print_values(console: Console, fitted: Any) -> None:
     layout = fitted.term.layout
     say(console, f"{layout.name}: {layout.effect.title}", "bold")
-    rows = list(
-        zip(
-            layout.names, layout.units, fitted.term.vector, fitted.stderr, fitted.at_bound,
-            strict=True,
-        )
-    )  # fmt: skip
-    for name, unit, value, error, bound in rows[:_MOST]:
-        spread = f"+- {shown(error, unit)}" if np.isfinite(error) else "not seen by these data"
-        stop = " (at its bound)" if bound else ""
-        say(console, f"  {name.removesuffix('_' + unit)} = {shown(value, unit)} {spread}{stop}")
-    if len(rows) > _MOST:
-        say(console, f"  and {len(rows) - _MOST} more in the model")
+    print_parameters(
+        console, layout, fitted.term.vector, fitted.stderr, fitted.at_bound, _MOST, "the model"
+    )
 
 
 def _table(found: Addition) -> Table:
@@ -85,19 +68,7 @@ def _table(found: Addition) -> Table:
         ("before, on runs left out", found.held_out_before, "dim"),
         (f"with {found.name}, on runs left out", found.held_out, ""),
     )
-    kinds = [k for k in _KINDS if any(r.get(k[0]) is not None for _n, r, _s in rows)]
-    table = Table(box=None, header_style="bold", pad_edge=False)
-    table.add_column("rms error")
-    for _key, _factor, head in kinds:
-        table.add_column(head, justify="right")
-    for name, rms, style in rows:
-        table.add_row(name, *_cells(rms, kinds), style=style)
-    return table
-
-
-def _cells(rms: Rms, kinds: Any) -> list[str]:
-    values = [(rms.get(key), factor) for key, factor, _head in kinds]
-    return ["-" if value is None else f"{factor * value:.4g}" for value, factor in values]
+    return rms_table("rms error", rows)
 
 
 def as_json(found: Addition, model: Path, written: bool) -> dict[str, Any]:

@@ -9,21 +9,16 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from crosscheck.associations import EVERYWHERE, SIGNIFICANT
 from crosscheck.compare import Comparison
 from crosscheck.diagnosis import Rms
-from crosscheck.diagnosis_text import say
 from crosscheck.limits import Exceeded, place
+from crosscheck.lines import KINDS, Kind, console_for, say, table_of
 
 _SHOWN = {"m": (1e3, "mm"), "rad": (180.0 / np.pi, "deg"), "N": (1.0, "N")}
-_KINDS = (
-    ("position_rms_m", 1e3, "position\n[mm]"),
-    ("orientation_rms_rad", 180.0 / np.pi, "orientation\n[deg]"),
-    ("tension_rms_N", 1.0, "tension\n[N]"),
-)
 _MOST, _MOST_WORST, _MOST_UNSOLVED = 12, 5, 5
-_WIDE = 160
 
 
 def print_comparison(
@@ -34,9 +29,7 @@ def print_comparison(
     console: Console | None = None,
 ) -> None:
     """Print the tables, the verdict, what exceeds its limit, and where the files are."""
-    console = console or Console(highlight=False)
-    if not console.is_terminal:
-        console.width = max(console.width, _WIDE)
+    console = console_for(console)
     for note in found.notes:
         say(console, f"note: {note}", "dim")
     if found.coordinates:
@@ -57,10 +50,9 @@ def print_comparison(
 
 
 def _coordinates(found: Comparison) -> Table:
-    table = Table(box=None, header_style="bold", pad_edge=False)
-    table.add_column("measured less predicted")
-    for head in ("bias", "rms", "max", "unit", "at line", "rows"):
-        table.add_column(head, justify="right")
+    table = table_of(
+        ["measured less predicted", "bias", "rms", "max", "unit", "at line", "rows"]
+    )
     for row in found.coordinates:
         factor, unit = _SHOWN[row["unit"]]
         numbers = [f"{factor * row[key]:.4g}" for key in ("bias", "rms", "max")]
@@ -70,12 +62,8 @@ def _coordinates(found: Comparison) -> Table:
 
 def _errors(found: Comparison) -> Table:
     """rms errors overall and of each run, direction and region."""
-    kinds = [k for k in _KINDS if found.rms.get(k[0]) is not None]
-    table = Table(box=None, header_style="bold", pad_edge=False)
-    table.add_column("rms error")
-    for _key, _factor, head in kinds:
-        table.add_column(head, justify="right")
-    table.add_column("rows", justify="right")
+    kinds = [k for k in KINDS if found.rms.get(k.key) is not None]
+    table = table_of(["rms error", *(k.head for k in kinds), "rows"])
     _add(table, kinds, "all rows", found.rms, int(found.problem.use.sum()), "bold")
     _add(table, kinds, "noise alone", found.floor, "", "dim")
     for title, groups in (
@@ -100,13 +88,9 @@ def _biggest(groups: Sequence[dict[str, Any]]) -> Iterable[dict[str, Any]]:
 
 
 def _add(
-    table: Table, kinds: Sequence[Any], name: str, rms: Rms, rows: int | str, style: str = ""
+    table: Table, kinds: Sequence[Kind], name: str, rms: Rms, rows: int | str, style: str = ""
 ) -> None:
-    cells = []
-    for key, factor, _head in kinds:
-        value = rms.get(key)
-        cells.append("-" if value is None else f"{factor * value:.4g}")
-    table.add_row(name, *cells, str(rows), style=style)
+    table.add_row(Text(name), *(k.cell(rms) for k in kinds), str(rows), style=style)
 
 
 def _print_associations(console: Console, found: Comparison) -> None:

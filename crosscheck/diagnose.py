@@ -11,7 +11,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from crosscheck.advice import check_of, measure_next
-from crosscheck.candidates import null_fit
+from crosscheck.candidates import Candidate, null_fit
 from crosscheck.confounding import rivals_of
 from crosscheck.diagnosis import Diagnosis, Finding, Rms
 from crosscheck.fit import Fit, flat
@@ -188,7 +188,7 @@ def _finding(found: Search, name: str) -> Finding:
             break
         first += len(t.layout)
     part = slice(first, first + len(term.layout))
-    stderr = best.stderr[part] * max(1.0, last.whiteness.scale)
+    stderr = best.stderr[part] * last.whiteness.inflation
     index = next((k for k, s in enumerate(found.steps) if s.added == name), len(found.steps) - 1)
     step, before = found.steps[index], found.steps[max(index - 1, 0)]
     return Finding(
@@ -250,11 +250,19 @@ def _candidates(found: Search, listed: list[str]) -> list[dict[str, Any]]:
         score = c.evidence.log - start.evidence.log if c.evidence is not None else 0.0
         why = c.why_not
         if not why:
-            better = ", ".join(found.found)
-            later = _later_reason(found, c.name)
-            why = later or (f"explained better by {better}" if better else "not needed")
+            why = _later_reason(found, c.name) or _beaten_reason(found, c)
         out.append({"effect": c.name, "score": float(score), "why_not": why})
     return sorted(out, key=lambda row: -row["score"])
+
+
+def _beaten_reason(found: Search, c: Candidate) -> str:
+    """Why a candidate that explains something by itself is not listed."""
+    if found.last.whiteness.is_noise:
+        better = ", ".join(found.found)
+        return f"explained better by {better}" if better else "not needed"
+    if len(c.layout) > _SURE_PARAMETERS:
+        return f"not sure: {len(c.layout)} parameters imitate much of what no effect explains"
+    return "explains a part, but structure remains: not sure"
 
 
 def _later_reason(found: Search, name: str) -> str:

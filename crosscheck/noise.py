@@ -16,6 +16,8 @@ Rms = dict[str, float | None]
 STRUCTURED = 4.0
 # A goodness of fit below this is not noise of the stated size.
 POOR_FIT = 1e-3
+# Residuals are not taken to go together more than this.
+_MOST_ALIKE = 0.98
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,19 @@ class Whiteness:
     def structured(self) -> bool:
         """Whether neighbours agree more than noise would."""
         return max(self.lag_errors, self.neighbour_errors) > STRUCTURED
+
+    @property
+    def inflation(self) -> float:
+        """By how much standard errors of fitted values grow over those of the stated noise.
+
+        By the size of what is left; and where that has structure, residuals that go together
+        count for fewer: n (1 - rho)/(1 + rho) of n with correlation rho from one to the next.
+        """
+        grown = max(1.0, self.scale)
+        if not self.structured:
+            return grown
+        rho = min(max(self.lag, self.neighbour, 0.0), _MOST_ALIKE)
+        return float(grown * np.sqrt((1.0 + rho) / (1.0 - rho)))
 
     @property
     def is_noise(self) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from crosscheck.diagnosis_text import say, shown
+from crosscheck.lines import console_for, say, shown
 from crosscheck.plan import LEVEL, POWER, Gain, Plan, Suggestion, Visible
 from seecr.pose import rotvec_from_quat
 
@@ -43,9 +43,7 @@ def _belongs(key: str, name: str, unit: str) -> bool:
 
 def print_plan(plan: Plan, out: Path, console: Console | None = None) -> None:
     """Print what will show, what cannot be told apart, and what to add."""
-    console = console or Console(highlight=False)
-    if not console.is_terminal:
-        console.width = max(console.width, 160)
+    console = console_for(console)
     for note in plan.notes:
         say(console, f"note: {note}", "dim")
     if plan.effects:

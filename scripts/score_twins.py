@@ -91,9 +91,8 @@ def score(kind: str, robot: str, seed: int, effects: tuple[str, ...] | None) -> 
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "case"
         tensions = effects is not None and "tension_scale" in effects
-        make_twin(
-            model_path(robot), seed, effects=effects, n_effects=2, out=out, tensions=tensions
-        )
+        path = Path(robot) if robot.endswith(".xml") else model_path(robot)
+        make_twin(path, seed, effects=effects, n_effects=2, out=out, tensions=tensions)
         answer = unseal(out)
         machine = load_robot(out / "robot.xml")
         data = load_measurements(out / "measured.csv", machine)
@@ -148,7 +147,9 @@ def main() -> None:
     parser.add_argument("--effects", nargs="*", default=[e.name for e in BUILT_IN])
     parser.add_argument("--pairs", type=int, default=0, help="how many twins of two effects")
     parser.add_argument("--null", type=int, default=0, help="how many twins of none")
-    parser.add_argument("--robots", nargs="*", default=list(ROBOTS))
+    parser.add_argument(
+        "--robots", nargs="*", default=list(ROBOTS), help="shipped robots, or MJCF files"
+    )
     parser.add_argument("--json", type=Path, help="write every twin's score there")
     chosen = parser.parse_args()
     robots = chosen.robots

@@ -286,3 +286,19 @@ def test_a_pose_error_is_that_of_its_cables(robot, off):
     moved = pose_add(prediction.poses, np.tile(change, (len(raw), 1)))
     longer = robot.nominal_lengths(moved) - robot.nominal_lengths(prediction.poses)
     assert errors == pytest.approx(longer, abs=1e-10)
+
+
+def test_tables_name_their_units() -> None:
+    """A bare "[mm]" is a style to the terminal's library, and vanishes."""
+    from io import StringIO
+
+    from rich.console import Console
+
+    from crosscheck.lines import rms_table
+
+    out = StringIO()
+    rms = {"position_rms_m": 1e-3, "orientation_rms_rad": 1e-3, "tension_rms_N": 2.0}
+    Console(file=out, width=100).print(rms_table("rms error", [("[all] rows", rms, "")]))
+    heads, row = out.getvalue().splitlines()[1:]
+    assert heads.split() == ["rms", "error", "[mm]", "[deg]", "[N]"]
+    assert row.split() == ["[all]", "rows", "1", "0.0573", "2"]

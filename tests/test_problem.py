@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from made_data import COGIRO, SIGMA, measured, term
 
+from crosscheck.fit import fit
+from crosscheck.noise import whiteness
 from crosscheck.problem import Problem, angle_rates
 from crosscheck.sigma import Sigma
 from crosscheck.state import evaluate
@@ -61,3 +63,27 @@ def test_exact_lengths_leave_the_noise_as_stated() -> None:
     state = evaluate(problem, [], problem.noise(problem.experiment.predict()))
     assert state.table[:, :3] == pytest.approx(state.raw[:, :3] / SIGMA.position_m)
     assert state.log_det == 0.0
+
+
+def test_errors_of_values_grow_where_residuals_go_together() -> None:
+    """A tracker whose noise wanders: what is fitted is less sure than its scatter says."""
+    robot = load_robot(COGIRO)
+    rng = np.random.default_rng(5)
+    plain, grown = [], []
+    for seed in range(12):
+        data = measured(robot, points=12, seed=seed)
+        wander = np.zeros((data.n_rows, 3))
+        for k in range(1, data.n_rows):
+            wander[k] = 0.85 * wander[k - 1] + 1e-4 * rng.standard_normal(3)
+        data.position[:] += wander
+        problem = Problem(robot, data, SIGMA, np.ones(data.n_rows, dtype=bool))
+        factor = problem.noise(problem.experiment.predict())
+        found = fit(problem, [term(robot, "tracker_frame")], factor)
+        white = whiteness(problem, found.state.white, 6)
+        assert white.structured
+        far = found.terms[0].vector[:3] / found.stderr[:3]
+        plain.append(far / max(1.0, white.scale))
+        grown.append(far / white.inflation)
+    # in standard errors these should scatter by one
+    assert np.sqrt(np.mean(np.square(plain))) > 2.0
+    assert 0.5 < np.sqrt(np.mean(np.square(grown))) < 1.6

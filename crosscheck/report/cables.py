@@ -149,9 +149,8 @@ def draw_wall(wall: Wall, salt: str) -> str:
         for place, k in enumerate(rows):
             for axes, (_name, values) in zip(panels[place], wall.abscissae, strict=True):
                 _panel(axes, values if values.ndim == 1 else values[:, k], wall, k)
-            panels[place, 0].set_ylabel(
-                wall.names[k], rotation=0, ha="right", va="center", labelpad=6
-            )
+            name = wall.names[k].replace(" about ", "\nabout ")  # else it leaves the page
+            panels[place, 0].set_ylabel(name, rotation=0, ha="right", va="center", labelpad=6)
         for axes, (name, _values) in zip(panels[-1], wall.abscissae, strict=True):
             axes.set_xlabel(name)
         unit = f" [{wall.unit}]" if wall.unit else ""
