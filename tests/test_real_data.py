@@ -45,7 +45,7 @@ def test_irma_tension_mismatch_is_mass_or_scale_and_the_advice_is_to_weigh(
 
 
 def test_irma_sheaves_are_found(irma: dict[str, Any]) -> None:
-    """0.03 m by the caliper; what the model still lacks pulls at the value, and its error says so."""
+    """0.03 m by the caliper; what the model lacks pulls at the value, and its error says so."""
     assert "pulley_radius" in named(irma)
     radius = next(m for m in irma["missing"] if m["effect"] == "pulley_radius")
     found = radius["parameters"]["radius_m"]
