@@ -11,11 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from crosscheck.equation_start import equation_start
 from crosscheck.evidence import Evidence, evidence, p_value
 from crosscheck.fit import Fit, fit, flat
 from crosscheck.problem import Problem
 from crosscheck.state import derivatives, evaluate
 from crosscheck.subspace import projected
+from seecr import cable_law
 from seecr.effects import catalogue, layout_of
 from seecr.effects.base import Layout
 from seecr.errors import InputError
@@ -26,6 +28,10 @@ from seecr.sensitivity import Term
 _START_SIZES = 3.0
 # Most Gauss-Newton steps of a trial; what is chosen is fitted to the end.
 _TRIAL_ITERATIONS = 12
+# A chi2 of this many readings is noise, or nearly.
+_WHITE = 1.3
+# Part of the cables that are slack from which a fit may end in a hollow.
+_SLACK_PART = 0.02
 # Effects that shift no reading by this part of its noise, for plausible sizes, are not seen.
 _UNSEEN = 0.02
 
@@ -162,6 +168,8 @@ def fit_candidate(
     out = Candidate(layout, starts=first)
     best: Fit | None = None
     for vector in first.vectors:
+        if best is not None and best.chi2 < _WHITE * noise_scale**2 * len(best.state.white):
+            break  # it leaves noise: no other start does better
         terms = ordered((*base.terms, Term(layout, vector)))
         try:
             found = fit(
@@ -228,8 +236,17 @@ def _starts(problem: Problem, base: Fit, layout: Layout, factor: Array) -> Start
         vectors = [vectors[0], np.where(layout.shape, inside, inside + 0.5 * layout.scale)]
     elif len(shapes) == 1:
         vectors = vectors[:1]
+    if int(np.sum(~layout.shape)) > 1 and _some_slack(base):
+        balanced = equation_start(problem, base.state, layout, layout.start(scored[0][3]), factor)
+        vectors += [] if balanced is None else [balanced]
     # neighbouring shapes are alike: about every third is one more chance of its own
     return Starts(vectors, scored[0][0], scored[0][1], max(1.0, len(shapes) / 3.0), seen)
+
+
+def _some_slack(base: Fit) -> bool:
+    """Whether cables go slack in enough places for a fit to end in a hollow."""
+    slack = base.state.prediction.found.states[..., cable_law.SLACK] > 0
+    return float(np.mean(slack)) > _SLACK_PART
 
 
 def amplitude_columns(

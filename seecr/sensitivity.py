@@ -294,7 +294,7 @@ def _response(at: Prediction, plus: Tables, minus: Tables, apart: float, inverse
     """Change of pose and tensions (n, 6 + m) between two tables, per unit of ``apart``."""
     force, tension = response.difference(plus, minus, at.found)
     step = -inverse @ (force / apart)[..., None]
-    move = (_motion_of(at) @ step)[..., 0]
+    move = (motion_of(at) @ step)[..., 0]
     return np.concatenate([move, tension / apart + (at.found.slopes @ step)[..., 0]], axis=1)
 
 
@@ -302,13 +302,13 @@ def _response_by_cable(at: Prediction, plus: Tables, minus: Tables, apart: Any) 
     """The same (n, 6 + m, m) where each cable was changed, by the change of each."""
     force, own = response.by_cable(plus, minus, at.found)
     step = -_kept(at, "inverse", _inverse_stiffness) @ (force / apart)
-    out = np.concatenate([_motion_of(at) @ step, at.found.slopes @ step], axis=1)
+    out = np.concatenate([motion_of(at) @ step, at.found.slopes @ step], axis=1)
     cable = np.arange(own.shape[1])
     out[:, 6 + cable, cable] += own / apart
     return out
 
 
-def _motion_of(at: Prediction) -> Array:
+def motion_of(at: Prediction) -> Array:
     """Displacement and rotation vector (n, 6, d) by steps in the loop's coordinates."""
     return _kept(at, "motion", _motion_columns)
 
