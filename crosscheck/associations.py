@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import signal, stats
 
 from crosscheck.cable_space import cable_errors, cable_lengths, independent_part
 from crosscheck.noise import as_table
@@ -32,6 +32,9 @@ EVERYWHERE = "nothing: it is the same everywhere"
 """The quantity of what does not change from row to row."""
 
 _BINS, _IN_A_BIN = 6, 4
+# A period is one that was seen so many times, of at most so many tried, and that explains so much
+# more of the variance than anything else.
+_CYCLES, _FREQUENCIES, _CLEARLY = 3.0, 20000, 0.15
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +73,7 @@ def associations(problem: Problem, white: Array, prediction: Prediction) -> list
         out.append(_row(quantity, "readings", table, raw, names, units, 1.0))
     out += _in_cables(problem, raw, prediction, way)
     found = [row for row in out if row is not None]
+    found += _swinging(problem, table, raw, max((row["share"] for row in found), default=0.0))
     for row in found:
         row["p"] = min(1.0, row["p"] * len(found))
     return sorted(found, key=_order)
@@ -141,6 +145,47 @@ def _in_cables(
         _row(q, "cable lengths", table, errors.reshape(-1, 1), ["cable length"], ["m"], part)
         for q in quantities
     ]
+
+
+def _swinging(problem: Problem, table: Array, raw: Array, least: float) -> list[dict[str, Any]]:
+    """What comes again and again in time, by its phase; only if it explains clearly more.
+
+    Commands that go to and fro make every error of place come again with them.
+    """
+    period, tried = _period(problem, table)
+    if period is None or problem.data.t_s is None:
+        return []
+    phase = _Quantity(
+        f"time, again every {period:.3g} s", 360.0 * (problem.data.t_s / period % 1.0), "deg"
+    )
+    names, units = channels(problem)
+    row = _row(phase, "readings", table, raw, names, units, 1.0)
+    if row is None or row["share"] < least + _CLEARLY:
+        return []
+    row["p"] = min(1.0, row["p"] * tried)
+    return [row]
+
+
+def _period(problem: Problem, table: Array) -> tuple[float | None, int]:
+    """The period [s] that explains most (Lomb and Scargle's), and how many were tried."""
+    t = problem.data.t_s
+    some = np.isfinite(table).any(axis=1)
+    if t is None or some.sum() < 4 * _BINS:
+        return None, 0
+    span, steps = float(np.ptp(t[some])), np.diff(np.unique(t[some]))
+    if span <= 0.0:
+        return None, 0
+    most = min(0.5 / float(np.median(steps)), _FREQUENCIES * 0.25 / span)
+    frequencies = np.arange(_CYCLES / span, most, 0.25 / span)
+    if len(frequencies) == 0:
+        return None, 0
+    power = np.zeros(len(frequencies))
+    for column in table.T:
+        read = np.isfinite(column)
+        if read.sum() >= 4 * _BINS:
+            part = column[read] - column[read].mean()
+            power += signal.lombscargle(t[read], part, 2.0 * np.pi * frequencies)
+    return 1.0 / float(frequencies[np.argmax(power)]), len(frequencies)
 
 
 def _row(
