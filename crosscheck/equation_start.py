@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from crosscheck.problem import Problem
 from crosscheck.state import State
-from seecr import statics
+from seecr import kernel, statics
 from seecr.effects.base import Effect, Layout
 from seecr.equilibrium import start_of
 from seecr.experiment import Prediction
@@ -24,6 +24,8 @@ from seecr.sensitivity import Term, effects_of, motion_of, sensitivities
 _STEPS, _HALVINGS = 12, 5
 # Directions softer than this part of a row's stiffest say little about forces.
 _SOFT = 0.02
+# No cable is as stiff as this [N/m].
+_ABSURD = 1e20
 # The weak prior, in plausible sizes.
 _PRIOR = 10.0
 
@@ -118,6 +120,12 @@ class _Forces:
             start.values[:] = joints
         found = statics.evaluate(tables, start)
         found.values[:], found.deviation[:] = start.values, start.deviation
+        # where a law has no answer the numbers are what was left of trying
+        size = np.where(np.isfinite(found.hessian), np.abs(found.hessian), np.inf)
+        broken = (found.outcome != kernel.CONVERGED) | (size.max(axis=(1, 2)) > _ABSURD)
+        if np.any(broken & self.rows):
+            return np.inf, np.zeros(0), None
+        found.hessian[broken], found.gradient[broken] = 0.0, 0.0
         at = Prediction(setup, tables, found, self.base.prediction.readings, False)
         at.kept["inverse"] = _damped_inverse(found.hessian)
         moved = at.kept["inverse"] @ found.gradient[..., None]
@@ -143,8 +151,7 @@ class _Forces:
 
 def _damped_inverse(stiffness: Array) -> Array:
     """(K^2 + mu^2)^-1 K: what is soft or pushes away at the measured pose is not followed far."""
-    whole = np.where(np.isfinite(stiffness), stiffness, 0.0)
-    power, vectors = np.linalg.eigh(whole)
+    power, vectors = np.linalg.eigh(stiffness)
     soft = _SOFT * np.max(np.abs(power), axis=1, keepdims=True)
     damped = power / np.maximum(power**2 + soft**2, 1e-300)
     return np.asarray((vectors * damped[:, None, :]) @ np.swapaxes(vectors, 1, 2), float)
