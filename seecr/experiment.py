@@ -12,7 +12,8 @@ from seecr import cable_law, kernel, statics
 from seecr.effects.base import Effect, Readings
 from seecr.effects.checked import edit_readings, edit_setup
 from seecr.equilibrium import Solution, certify, start_of
-from seecr.history import Path, path_of, walk
+from seecr.history import walk
+from seecr.path import Path, path_of
 from seecr.pose import Array
 from seecr.robot import Robot
 from seecr.setup import Commands, Setup, plain_setup

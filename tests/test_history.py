@@ -10,8 +10,8 @@ from effect_cases import experiment_of, robot_of
 
 from seecr.effects import Effect, effect_named
 from seecr.experiment import Experiment, Prediction
-from seecr.history import path_of
 from seecr.joints import pose_of_values, values_of_pose
+from seecr.path import path_of
 from seecr.pose import pose_add, pose_difference
 from seecr.robot import Joint, Robot
 from seecr.setup import Commands, play

@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parent.parent
 SEECR = {
     "errors": 0, "shipped": 1, "pose": 1, "robot": 2,
     "joints": 3, "mjcf": 3, "setup": 3, "cable_law": 3,
-    "effects": 4, "forces": 4, "kernel": 4,
+    "effects": 4, "forces": 4, "kernel": 4, "path": 4,
     "statics": 5,
     "seed_methods": 6, "response": 6,
     "equilibrium": 7,
