@@ -19,15 +19,9 @@ from crosscheck.measurements import Measurements
 from crosscheck.noise import rms_by_kind, whiteness
 from crosscheck.prepare import noise_floor, outlying_rows, prepare
 from crosscheck.problem import Problem
-from crosscheck.search import (
-    Progress,
-    Search,
-    is_plausible,
-    search,
-    share_of,
-    smallest_sure,
-)
+from crosscheck.search import Progress, Search, search
 from crosscheck.state import derivatives
+from crosscheck.sure import is_plausible, share_of, smallest_sure
 from seecr.pose import Array
 from seecr.robot import Robot
 from seecr.sensitivity import Term, effects_of

@@ -10,7 +10,7 @@ it looks back, drops what is needless, and puts the rest in the order in which a
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -21,11 +21,10 @@ from crosscheck.candidates import (
     layouts_for,
     ordered,
     screen,
-    try_candidate,
 )
 from crosscheck.evidence import Evidence, evidence
-from crosscheck.fit import Fit, fit, flat, sizes, with_values
-from crosscheck.held_out import HeldOut, hold_out, improves, surely_improves, unfitted
+from crosscheck.fit import Fit, fit, flat, with_values
+from crosscheck.held_out import HeldOut, hold_out, improves, unfitted
 from crosscheck.noise import Whiteness, whiteness
 from crosscheck.problem import Problem
 from seecr.effects import catalogue
@@ -38,8 +37,6 @@ FALSE_ALARM = 0.01
 # explain equally well.
 LEAST_GAIN, EQUAL = 3.0, 3.0
 MOST_EFFECTS = 4
-# Where structure is left over, an effect of more plausible sizes than this is not believed.
-PLAUSIBLE = 20.0
 # An effect that takes away less than this part of what noise does not explain is no cause.
 LEAST_PART = 0.25
 # The best few models are fitted again, so often, from values so many plausible sizes away.
@@ -282,40 +279,57 @@ class _Searcher:
     def in_order(
         self, root: _Node, last: _Node, held: set[str], seen: dict[frozenset[str], _Node]
     ) -> list[Step]:
-        """Steps from the start to the last model, at each the effect that pays most."""
+        """Steps from the start to the last model, at each the effect that pays most.
+
+        Each is to predict runs left out better than what came before. One that only pays
+        together with the next (alone it extrapolates wildly, say) waits for that.
+        """
         steps = [self.step("", root)]
+        waiting: list[Step] = []
         todo = [t for t in last.fit.terms if t.name not in held]
         terms = list(self.base.terms)
         while todo:
-            options = []
-            for term in todo:
-                known = seen.get(frozenset(t.name for t in [*terms, term]))
-                if len(todo) == 1:
-                    options.append((term, last))
-                    continue
-                start = known.fit if known is not None else last.fit
-                values = {t.name: t for t in start.terms}
-                some = ordered([values.get(t.name, t) for t in [*terms, term]])
-                found = known.fit if known is not None else None
-                if found is None:
-                    found = fit(self.problem, some, self.factor, last.fit.state, iterations=8)
-                if found.valid:
-                    options.append((term, self.node(found)))
+            options = self.options(terms, todo, last, seen)
             if not options:
                 break
-            term, node = min(options, key=lambda o: o[1].fit.chi2)
-            known = seen.get(node.names)
-            if known is not None:
-                node.candidates = known.candidates
-            step = self.step(term.name, node)
-            mean, error = improves(steps[-1].held_out, step.held_out)
-            if not step.held_out.valid or mean <= 0.0 or mean < 0.5 * error:
-                self.blame(root, term.name)
-                break
-            steps.append(step)
-            terms = list(node.fit.terms)
-            todo = [t for t in todo if t.name != term.name]
+            tried = []
+            for name, node in options:
+                known = seen.get(node.names)
+                if known is not None:
+                    node.candidates = known.candidates
+                tried.append(self.step(name, node))
+                if _pays(steps[-1], tried[-1]):
+                    steps += [*waiting, tried[-1]]
+                    waiting, chosen = [], tried[-1]
+                    break
+            else:
+                chosen = tried[0]
+                waiting.append(chosen)
+            terms = list(chosen.fit.terms)
+            todo = [t for t in todo if t.name != chosen.added]
+        for step in waiting:
+            self.blame(root, step.added)
         return steps
+
+    def options(
+        self, terms: list[Term], todo: list[Term], last: _Node,
+        seen: dict[frozenset[str], _Node],
+    ) -> list[tuple[str, _Node]]:  # fmt: skip
+        """The model with each of the effects that are still to come, the best first."""
+        if len(todo) == 1:
+            return [(todo[0].name, last)]
+        out = []
+        for term in todo:
+            known = seen.get(frozenset(t.name for t in [*terms, term]))
+            if known is not None:
+                found = known.fit
+            else:
+                values = {t.name: t for t in last.fit.terms}
+                some = ordered([values.get(t.name, t) for t in [*terms, term]])
+                found = fit(self.problem, some, self.factor, last.fit.state, iterations=8)
+            if found.valid:
+                out.append((term.name, self.node(found)))
+        return sorted(out, key=lambda option: option[1].fit.chi2)
 
     def blame(self, root: _Node, name: str) -> None:
         for c in root.candidates:
@@ -329,6 +343,12 @@ class _Searcher:
         else:
             held = unfitted(self.problem, best.terms, best)
         return Step(added, best, node.evidence, node.whiteness, held, node.candidates)
+
+
+def _pays(before: Step, step: Step) -> bool:
+    """Whether a step predicts runs left out better."""
+    mean, error = improves(before.held_out, step.held_out)
+    return step.held_out.valid and mean > 0.0 and mean >= 0.5 * error
 
 
 def search(
@@ -345,82 +365,6 @@ def search(
     """
     known = {} if before is None else before.known
     return _Searcher(problem, factor, noise_scale, base, progress, known).run()
-
-
-def smallest_sure(found: Search, parameters: int, shares: tuple[float, float]) -> Search | None:
-    """The way by small effects alone, each of which explains much by itself.
-
-    For data that keep some structure whatever is added: large groups imitate anything, but an
-    effect of a few parameters that takes away nearly all is there; and so may be the next one,
-    if it takes away a good part of what the first leaves.
-
-    Args:
-        found: a search that did not end with noise.
-        parameters: most that an effect may have.
-        shares: least part of what runs left out leave unexplained that the first effect and
-            each after it must take away.
-    """
-    way = Search(
-        found.problem, found.factor, found.noise_scale, found.steps[:1], found.base, found.known
-    )
-    while len(way.found) < MOST_EFFECTS:
-        step = _small_step(way, parameters, shares[1] if way.found else shares[0])
-        if step is None:
-            break
-        way = replace(way, steps=[*way.steps, step])
-    return way if way.found else None
-
-
-def _small_step(way: Search, parameters: int, share: float) -> Step | None:
-    problem, last = way.problem, way.last
-    if way.found:
-        last.candidates = _small_candidates(way, parameters)
-    small = [
-        c
-        for c in last.candidates
-        if c.fit is not None and c.evidence is not None and len(c.layout) <= parameters
-        and not np.any(c.fit.at_bound) and is_plausible(_term(c.fit, c.name))
-    ]  # fmt: skip
-    if not small:
-        return None
-    best = max(small, key=lambda c: c.evidence.log if c.evidence else -np.inf)
-    assert best.fit is not None
-    full = fit(problem, best.fit.terms, way.factor, best.fit.state)
-    if not full.valid:
-        return None
-    ev = evidence(full, way.noise_scale)
-    white = whiteness(problem, full.state.white / way.noise_scale, ev.parameters)
-    step = Step(best.name, full, ev, white, hold_out(problem, full, way.factor))
-    sure = surely_improves(last.held_out, step.held_out) and not np.any(full.at_bound)
-    return step if sure and share_of(last, step) > share else None
-
-
-def _term(of: Fit, name: str) -> Term:
-    return next(t for t in of.terms if t.name == name)
-
-
-def is_plausible(term: Term) -> bool:
-    """Whether an effect is of a size that happens; what shapes it has no such size."""
-    amplitudes = ~term.layout.shape
-    return bool(np.all(np.abs(sizes([term]))[amplitudes] < PLAUSIBLE))
-
-
-def _small_candidates(way: Search, parameters: int) -> list[Candidate]:
-    """The small effects that the last model does not have, fitted beside it."""
-    held = {t.name for t in way.last.fit.terms}
-    out = []
-    for c in layouts_for(way.problem):
-        if c.name in held or c.why_not or len(c.layout) > parameters:
-            continue
-        out.append(try_candidate(way.problem, way.last.fit, c.layout, way.factor, way.noise_scale))
-    return out
-
-
-def share_of(before: Step, step: Step) -> float:
-    """Part of the unexplained chi2 of runs left out that a step took away."""
-    unexplained = float(before.held_out.chi2.sum() - before.held_out.readings.sum())
-    fall = float(before.held_out.chi2.sum() - step.held_out.chi2.sum())
-    return float(np.clip(fall / unexplained, 0.0, 1.0)) if unexplained > 0 else 0.0
 
 
 def _promise(c: Candidate) -> float:
