@@ -103,9 +103,10 @@ def _of_rows(problem: Problem, prediction: Prediction, way: Travel) -> Iterator[
     yield _Quantity("speed of travel", way.speed, "m/s")
     if data.t_s is not None:
         yield _Quantity("time", data.t_s - data.t_s.min(), "s")
-        starts = {name: data.t_s[data.run == name].min() for name in data.runs}
-        into = data.t_s - np.array([starts[name] for name in data.run.tolist()])
-        yield _Quantity("time since the start of the run", into, "s")
+        if len(data.runs) > 1:
+            starts = {name: data.t_s[data.run == name].min() for name in data.runs}
+            into = data.t_s - np.array([starts[name] for name in data.run.tolist()])
+            yield _Quantity("time since the start of the run", into, "s")
     if data.temperature_C is not None:
         yield _Quantity("temperature", data.temperature_C, "C")
     slack = prediction.found.states[..., cable_law.SLACK] > 0
