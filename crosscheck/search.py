@@ -43,7 +43,9 @@ LEAST_PART = 0.25
 _SHAKEN, _SHAKES, _SHAKE = 2, 4, 0.2
 # Models abreast, at least so many though none is small, and candidates fitted beside each of
 # them after the first round.
-_ABREAST, _LARGE, _FITTED = 4, 2, 5
+_ABREAST, _LARGE, _FITTED, _FITTED_SMALL = 4, 2, 7, 2
+# Most parameters of a small effect.
+_SMALL = 3
 # Beside a model that leaves noise, an effect is only fitted if chance explains what its
 # derivative promises with less than this; beside others it must be very likely chance.
 _PRUNE_NOISE, _PRUNE_OTHER = 0.02, 0.3
@@ -168,10 +170,10 @@ class _Searcher:
                 c.why_not = f"chance explains it (p {min(1.0, c.p):.2g})"
             (node.candidates if c.why_not else open_).append(c)
         open_.sort(key=lambda c: -_promise(c))
-        most = len(open_) if depth == 0 else _FITTED
+        chosen = open_ if depth == 0 else _promising(open_)
         best = np.inf
         for k, c in enumerate(open_):
-            if k >= most:
+            if c not in chosen:
                 c.why_not = "promises less than others beside it"
                 node.candidates.append(c)
                 continue
@@ -373,6 +375,17 @@ def _promise(c: Candidate) -> float:
     return 0.5 * c.drop - 3.0 * directions
 
 
+def _promising(ranked: list[Candidate]) -> list[Candidate]:
+    """A few candidates to fit: those that promise most, and the small ones that do.
+
+    Large groups promise more than any small effect beside them, true or not.
+    """
+    first = ranked[: _FITTED - _FITTED_SMALL]
+    small = [c for c in ranked if len(c.layout) <= _SMALL and c not in first][:_FITTED_SMALL]
+    rest = [c for c in ranked if c not in first and c not in small]
+    return [*first, *small, *rest[: _FITTED - len(first) - len(small)]]
+
+
 def _standing(node: _Node) -> tuple[float, int]:
     """Evidence; of models alike in it (friction that is null, say) the smaller one counts.
 
@@ -389,7 +402,7 @@ def _diverse(nodes: list[_Node], root: _Node) -> list[_Node]:
     ranked = sorted(nodes, key=lambda c: -c.evidence.log)
     enough = (1.0 - LEAST_PART) * root.excess
     out = ranked[:1]
-    for most, count in ((3, 2), (8, 1)):
+    for most, count in ((_SMALL, 2), (8, 1)):
         small = [c for c in ranked if c.fit.jacobian.shape[1] <= most and c.excess < enough]
         out += [c for c in small if c not in out][:count]
     others = [c for c in ranked if c not in out and c.excess < enough]

@@ -1,4 +1,4 @@
-"""Real robots' measurements, through the command line; see the sources in docs/effects.md."""
+"""Real robots' measurements, through the command line; see the sources in docs/diagnosis.md."""
 
 from __future__ import annotations
 
