@@ -130,7 +130,8 @@ class Backlash(Effect):
 
     The paid-out length p lags the commanded change c by at most half the gap:
     p <- min(max(p, c - gap/2), c + gap/2), the play operator (Krasnosel'skii and Pokrovskii,
-    Systems with Hysteresis, 1989). It starts centred, p = c, at the beginning of each run.
+    Systems with Hysteresis, 1989). It starts centred, p = c, at the reference pose, where each
+    run starts, and follows c all along the straight way from row to row.
     """
 
     name: ClassVar[str] = "backlash"
