@@ -15,7 +15,6 @@ from crosscheck.problem import Problem
 from crosscheck.state import State
 from seecr import kernel, statics
 from seecr.effects.base import Effect, Layout
-from seecr.equilibrium import start_of
 from seecr.experiment import Prediction
 from seecr.pose import Array, pose_add, pose_difference
 from seecr.sensitivity import Term, effects_of, motion_of, sensitivities
@@ -44,12 +43,14 @@ def equation_start(
 
     Returns:
         (p,) values, or None where this says nothing: effects of the sensors, rows that depend
-        on the rows before, rotations that were not read.
+        on the rows before, rotations that were not read, platforms on joints.
     """
     data = problem.data
     senses = layout.effect.edit_readings is not Effect.edit_readings
     if senses or data.quat_wxyz is None or base.prediction.has_history:
         return None
+    if problem.robot.joints:
+        return None  # a measured pose is off what joints can reach, by its noise
     whole = np.isfinite(data.position).all(axis=1) & np.isfinite(data.quat_wxyz).all(axis=1)
     rows = problem.use & whole
     if not rows.any() or base.prediction.setup.laws:
@@ -112,14 +113,11 @@ class _Forces:
         if setup.has_history:
             return np.inf, np.zeros(0), None
         tables = statics.assemble(setup)
-        deviation, joints = start_of(problem.robot, tables, self.poses)
         n, m = tables.cables.shape[:2]
         start = statics.Evaluation.empty(n, m, tables.n_dof)
-        start.deviation[:] = deviation
-        if joints is not None:
-            start.values[:] = joints
+        start.deviation[:] = statics.deviations(tables, self.poses)
         found = statics.evaluate(tables, start)
-        found.values[:], found.deviation[:] = start.values, start.deviation
+        found.deviation[:] = start.deviation
         # where a law has no answer the numbers are what was left of trying
         size = np.where(np.isfinite(found.hessian), np.abs(found.hessian), np.inf)
         broken = (found.outcome != kernel.CONVERGED) | (size.max(axis=(1, 2)) > _ABSURD)

@@ -68,3 +68,15 @@ def test_values_stay_within_their_bounds(case) -> None:
         found = equation_start(problem, base.state, layout, layout.start({}), factor)
         assert found is not None
         assert np.all((found >= layout.lower) & (found <= layout.upper) & np.isfinite(found))
+
+
+def test_platforms_on_joints_go_without() -> None:
+    """A measured pose is never quite on the joints; the diagnosis does not stumble over it."""
+    robot = load_robot(model_path("planar_vertical"))
+    data = measured(robot, points=6)
+    data.position[:, 1] += 1e-4
+    problem = Problem(robot, data, SIGMA, np.ones(data.n_rows, dtype=bool))
+    factor = problem.noise(problem.experiment.predict())
+    base = null_fit(problem, (), factor, refit=False)
+    layout = layout_named(problem, "cable_length_offset")
+    assert equation_start(problem, base.state, layout, layout.start({}), factor) is None
