@@ -181,6 +181,9 @@ class _Searcher:
                 f"round {depth + 1}: fitting {c.name}", (which + 0.5 + 0.5 * k / len(open_)) / of
             )
             hopeless = 4.0 * best + 0.02 * node.fit.chi2
+            if best < (1.0 - LEAST_PART) * node.fit.chi2:
+                # nobody goes on from what explains little where another explains much
+                hopeless = min(hopeless, (1.0 - LEAST_PART) * node.fit.chi2)
             tried = self.tried(node, c, hopeless)
             if tried.fit is not None:
                 best = min(best, tried.fit.chi2)
