@@ -32,7 +32,7 @@ def quat_conjugate(quat_wxyz: Array) -> Array:
 
 
 def cross(a: Array, b: Array) -> Array:
-    """Cross product of vectors (..., 3); NumPy's own takes five times as long on small arrays."""
+    """Cross product of vectors (..., 3); NumPy's own takes twice as long on small arrays."""
     ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
     bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)

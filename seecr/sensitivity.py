@@ -327,7 +327,7 @@ def _inverse_stiffness(at: Prediction) -> Array:
     stiffness = statics.stiffness(at.tables, at.found)
     whole = np.where(np.isfinite(stiffness), stiffness, 0.0)
     out = np.empty_like(whole)
-    # a stable row's stiffness is far from singular, and inverting takes a third of the time
+    # a stable row's stiffness is far from singular, and inverting takes a fifth of the time
     out[at.solved] = np.linalg.inv(whole[at.solved])
     out[~at.solved] = np.linalg.pinv(whole[~at.solved], rcond=1e-12)
     return out
