@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from crosscheck.candidates import layouts_for, null_fit, ordered, seen_directions, try_candidate
-from crosscheck.diagnosis import Rms
 from crosscheck.errors import CrosscheckError
 from crosscheck.evidence import p_value
 from crosscheck.fit import Fit, fit, sizes
-from crosscheck.held_out import HeldOut, hold_out, improves, unfitted
+from crosscheck.held_out import hold_out, improves, pays, unfitted
+from crosscheck.kinds import Rms, rms_by_kind
 from crosscheck.measurements import Measurements
 from crosscheck.model_file import Fitted
-from crosscheck.noise import Whiteness, rms_by_kind, whiteness
+from crosscheck.noise import Whiteness, whiteness
 from crosscheck.prepare import outlying_rows, prepare
 from crosscheck.problem import Problem
 from crosscheck.search import FALSE_ALARM, Progress
@@ -171,7 +171,7 @@ def _weigh(
     stood = evaluate(problem, ordered(terms), factor)
     fall = improves(without, held)
     drop = (base.chi2 - best.chi2) / max(1.0, white.scale) ** 2
-    p = p_value(drop, seen_directions(best, layout.name, base), False)
+    p = p_value(drop, seen_directions(best, layout.name), False)
     # stated noise that is too small, or noise that goes together, makes standard errors too small
     fitted = _split(best, white.inflation)
     return Addition(
@@ -183,17 +183,11 @@ def _weigh(
         held_out=held.rms,
         fall=fall,
         p=p,
-        pays=_pays(held, fall, p),
+        pays=pays(without, held) and p < FALSE_ALARM,
         whiteness=white,
         warnings=tuple(_warnings(best, fitted, layout.name)),
         notes=tuple(dict.fromkeys(notes)),
     )
-
-
-def _pays(held: HeldOut, fall: tuple[float, float], p: float) -> bool:
-    """The same as a search asks of an effect, for the one that was named."""
-    mean, error = fall
-    return bool(held.valid and mean > 0.0 and mean >= 0.5 * error and p < FALSE_ALARM)
 
 
 def _split(best: Fit, scale: float) -> tuple[Fitted, ...]:

@@ -8,13 +8,11 @@ import numpy as np
 
 from crosscheck.confounding import Rival
 from crosscheck.diagnosis import Finding
+from crosscheck.numbers import in_unit, parameter_name
 from crosscheck.search import Search
 from crosscheck.separation import measured_directly, proposals
 from seecr.robot import Robot
 from seecr.sensitivity import Term
-
-# What people read: millimetres, degrees.
-_SHOWN = {"m": 1e3, "rad": 180.0 / np.pi, "m_per_N": 1e3}
 
 
 def check_of(term: Term, robot: Robot) -> str:
@@ -22,17 +20,16 @@ def check_of(term: Term, robot: Robot) -> str:
     layout = term.layout
     values: dict[str, Any] = {}
     for name, unit, value in zip(layout.names, layout.units, term.vector, strict=True):
-        short = name.removesuffix(f"_{unit}") if unit else name
-        values[short] = _SHOWN.get(unit, 1.0) * float(value)
+        short = parameter_name(name, unit)
+        values[short] = in_unit(unit)[0] * float(value)
         if short == "weight":
             values["weight_10m"] = 10.0 * float(value)
     values["ea"] = float(np.mean(robot.ea)) * values.get("factor", 1.0)
     # of several alike, the one that stands out most
     size = np.abs(term.vector - layout.null) / layout.scale * ~layout.shape
     k = int(np.argmax(size))
-    unit = layout.units[k]
-    values["which"] = layout.names[k].removesuffix(f"_{unit}") if unit else layout.names[k]
-    values["largest"] = _SHOWN.get(unit, 1.0) * float(term.vector[k])
+    values["which"] = parameter_name(layout.names[k], layout.units[k])
+    values["largest"] = in_unit(layout.units[k])[0] * float(term.vector[k])
     try:
         return layout.effect.advice.format(**values)
     except (KeyError, IndexError, ValueError):
@@ -47,10 +44,10 @@ def measure_next(
     for finding in findings:
         for rival in finding.rivals:
             out += _to_separate(found, finding, rival)
-        if finding.effect and not finding.rivals:
+        if not finding.rivals:
             out.append(f"to confirm {finding.effect}: {finding.check}")
     if verdict == "unknown_effect":
-        out.append(_to_find(found, where))
+        out.append(_to_find(where))
     if verdict == "no_effect_missing":
         out.append("nothing is missing; to see smaller effects, see crosscheck plan")
     return list(dict.fromkeys(out))
@@ -75,7 +72,7 @@ def _to_separate(found: Search, finding: Finding, rival: Rival) -> list[str]:
     ]
 
 
-def _to_find(found: Search, where: tuple[dict[str, Any], ...]) -> str:
+def _to_find(where: tuple[dict[str, Any], ...]) -> str:
     again = "repeat the same poses forward, back and an hour later"
     if not where:
         return f"{again}, to see what the error follows"

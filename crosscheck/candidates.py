@@ -191,14 +191,14 @@ def judged(found: Fit, base: Fit, screened: Candidate, noise_scale: float) -> Ca
     """A candidate with its fit: how much better than without it, and by what chance."""
     layout, first = screened.layout, screened.starts
     assert first is not None
-    columns = seen_directions(found, layout.name, base)
+    columns = seen_directions(found, layout.name)
     one_sided = bool(np.isfinite(layout.lower[0])) and layout.lower[0] == layout.null[0]
     drop = (base.chi2 - found.chi2) / noise_scale**2
     p = p_value(drop, columns, one_sided) * first.shapes
     return Candidate(layout, found, evidence(found, noise_scale), drop, p, starts=first)
 
 
-def seen_directions(found: Fit, name: str, base: Fit) -> int:
+def seen_directions(found: Fit, name: str) -> int:
     """How many directions of an effect's parameters the data see beside the other terms."""
     own = own_columns(found.terms, name)
     others = projected(found.jacobian[:, own], found.jacobian[:, ~own])
@@ -219,7 +219,7 @@ def _starts(problem: Problem, base: Fit, layout: Layout, factor: Array) -> Start
     for shape in shapes:
         null = layout.start(shape)
         scale = layout.scale * ~layout.shape
-        white = amplitude_columns(problem, base, layout, null, factor) * scale
+        white = amplitude_columns(problem, base, layout, null) * scale
         seen = seen or bool(np.max(np.abs(white), initial=0.0) > _UNSEEN)
         left = white - orthogonal @ (orthogonal.T @ white)
         z, gain, directions = _linear(left, base.state.white)
@@ -249,9 +249,7 @@ def _some_slack(base: Fit) -> bool:
     return float(np.mean(slack)) > _SLACK_PART
 
 
-def amplitude_columns(
-    problem: Problem, base: Fit, layout: Layout, null: Array, factor: Array
-) -> Array:
+def amplitude_columns(problem: Problem, base: Fit, layout: Layout, null: Array) -> Array:
     """(N, p) whitened derivatives by the effect's own parameters at null; 0 for shapes."""
     terms = ordered((*base.terms, Term(layout, null)))
     own = own_columns(terms, layout.name)
@@ -260,9 +258,7 @@ def amplitude_columns(
     out = np.zeros((len(base.state.white), len(layout)))
     state = base.state.of(terms)
     if len(amplitudes):
-        out[:, ~layout.shape] = derivatives(
-            problem, state, factor, amplitudes.tolist(), frozen=True
-        )
+        out[:, ~layout.shape] = derivatives(problem, state, amplitudes.tolist(), frozen=True)
     return out
 
 

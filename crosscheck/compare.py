@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from crosscheck.associations import EVERYWHERE, SIGNIFICANT, associations, channels
 from crosscheck.candidates import ordered
-from crosscheck.diagnosis import Rms
 from crosscheck.held_out import blocks_of
+from crosscheck.kinds import BY_NAME, Rms, rms_by_kind
 from crosscheck.measurements import Measurements
-from crosscheck.noise import Whiteness, as_table, rms_by_kind, whiteness
+from crosscheck.noise import Whiteness, as_table, whiteness
 from crosscheck.prepare import noise_floor, outlying_rows, prepare
-from crosscheck.problem import ORIENTATION, POSITION, TENSION, Problem
+from crosscheck.problem import Problem
 from crosscheck.regions import regions_of
 from crosscheck.state import State, evaluate
 from crosscheck.travel import Travel, travel
@@ -30,7 +30,6 @@ from seecr.robot import Robot
 from seecr.sensitivity import Term, effects_of
 
 _MOST_WORST = 10
-_KINDS = {"position": POSITION, "orientation": ORIENTATION, "tension": TENSION}
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,14 +90,7 @@ class Comparison:
 
         NaN in rows that were not compared.
         """
-        problem = self.problem
-        some = problem.counted[:, _KINDS[kind]]
-        raw = np.where(some, self.state.raw[:, _KINDS[kind]], 0.0)
-        if kind == "tension":
-            size = np.max(np.abs(raw), axis=1, initial=0.0)
-        else:
-            size = np.linalg.norm(raw, axis=1)
-        return np.where(some.any(axis=1), size, np.nan)
+        return BY_NAME[kind].sizes(self.problem, self.state.raw)
 
 
 def compare(robot: Robot, data: Measurements, terms: Sequence[Term] = ()) -> Comparison:

@@ -13,11 +13,11 @@ from rich.text import Text
 
 from crosscheck.associations import EVERYWHERE, SIGNIFICANT
 from crosscheck.compare import Comparison
-from crosscheck.diagnosis import Rms
+from crosscheck.kinds import KINDS, Kind, Rms
 from crosscheck.limits import Exceeded, place
-from crosscheck.lines import KINDS, Kind, console_for, say, table_of
+from crosscheck.lines import cell, console_for, heading, say, table_of
+from crosscheck.numbers import in_unit
 
-_SHOWN = {"m": (1e3, "mm"), "rad": (180.0 / np.pi, "deg"), "N": (1.0, "N")}
 _MOST, _MOST_WORST, _MOST_UNSOLVED = 12, 5, 5
 
 
@@ -54,7 +54,7 @@ def _coordinates(found: Comparison) -> Table:
         ["measured less predicted", "bias", "rms", "max", "unit", "at line", "rows"]
     )
     for row in found.coordinates:
-        factor, unit = _SHOWN[row["unit"]]
+        factor, unit = in_unit(row["unit"])
         numbers = [f"{factor * row[key]:.4g}" for key in ("bias", "rms", "max")]
         table.add_row(row["name"], *numbers, unit, str(row["line"]), str(row["rows"]))
     return table
@@ -63,7 +63,7 @@ def _coordinates(found: Comparison) -> Table:
 def _errors(found: Comparison) -> Table:
     """rms errors overall and of each run, direction and region."""
     kinds = [k for k in KINDS if found.rms.get(k.key) is not None]
-    table = table_of(["rms error", *(k.head for k in kinds), "rows"])
+    table = table_of(["rms error", *(heading(k) for k in kinds), "rows"])
     _add(table, kinds, "all rows", found.rms, int(found.problem.use.sum()), "bold")
     _add(table, kinds, "noise alone", found.floor, "", "dim")
     for title, groups in (
@@ -90,7 +90,7 @@ def _biggest(groups: Sequence[dict[str, Any]]) -> Iterable[dict[str, Any]]:
 def _add(
     table: Table, kinds: Sequence[Kind], name: str, rms: Rms, rows: int | str, style: str = ""
 ) -> None:
-    table.add_row(Text(name), *(k.cell(rms) for k in kinds), str(rows), style=style)
+    table.add_row(Text(name), *(cell(k, rms) for k in kinds), str(rows), style=style)
 
 
 def _print_associations(console: Console, found: Comparison) -> None:
@@ -99,7 +99,7 @@ def _print_associations(console: Console, found: Comparison) -> None:
         say(console, "The errors go with nothing that was tried: place, time, tension, travel ...")
         return
     for row in strong[:4]:
-        factor, unit = _SHOWN[row["unit"]]
+        factor, unit = in_unit(row["unit"])
         steps = [b for b in row["bins"] if b["mean"] is not None]
         means = ", ".join(f"{factor * b['mean']:.3g} at {b['label']}" for b in steps[:6])
         share = f"{100 * row['share']:.0f} %"
@@ -114,12 +114,10 @@ def _print_worst(console: Console, found: Comparison) -> None:
     for row in found.worst[:_MOST_WORST]:
         k = row["row"]
         parts = []
-        for kind, (factor, unit) in zip(
-            ("position", "orientation", "tension"), _SHOWN.values(), strict=True
-        ):
-            size = found.errors_of(kind)[k]
+        for kind in KINDS:
+            size = found.errors_of(kind.name)[k]
             if np.isfinite(size):
-                parts.append(f"{factor * size:.4g} {unit}")
+                parts.append(f"{kind.factor * size:.4g} {kind.unit}")
         say(
             console,
             f"worst: line {row['line']}, run {row['run']}, {place(found, k)}: {', '.join(parts)} "

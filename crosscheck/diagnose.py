@@ -13,10 +13,11 @@ from threadpoolctl import threadpool_limits
 from crosscheck.advice import check_of, measure_next
 from crosscheck.candidates import Candidate, null_fit
 from crosscheck.confounding import rivals_of
-from crosscheck.diagnosis import Diagnosis, Finding, Rms
+from crosscheck.diagnosis import Diagnosis, Finding
 from crosscheck.fit import Fit, flat
+from crosscheck.kinds import Rms, rms_by_kind
 from crosscheck.measurements import Measurements
-from crosscheck.noise import rms_by_kind, whiteness
+from crosscheck.noise import whiteness
 from crosscheck.prepare import noise_floor, outlying_rows, prepare
 from crosscheck.problem import Problem
 from crosscheck.search import Progress, Search, search
@@ -62,7 +63,7 @@ def diagnose(
             notes.append("the model's values were refitted to these data before the search")
             base = settled
         else:
-            base = _with_derivatives(problem, base, factor)
+            base = _with_derivatives(problem, base)
     found = search(problem, base, factor, 1.0, progress)
     found, more = _without_outliers(problem, found, base, factor, progress)
     notes += more
@@ -71,8 +72,8 @@ def diagnose(
     return conclude(found, notes)
 
 
-def _with_derivatives(problem: Problem, base: Fit, factor: Array) -> Fit:
-    jacobian = derivatives(problem, base.state, factor) * flat(base.terms, "scale")
+def _with_derivatives(problem: Problem, base: Fit) -> Fit:
+    jacobian = derivatives(problem, base.state) * flat(base.terms, "scale")
     return replace(base, jacobian=jacobian)
 
 
@@ -103,7 +104,7 @@ def _without_outliers(
         return found, []
     again = null_fit(cleaned, base.terms, factor, refit=False)
     if base.terms:
-        again = _with_derivatives(cleaned, again, factor)
+        again = _with_derivatives(cleaned, again)
     better = search(cleaned, again, factor, found.noise_scale, progress)
     note = f"{word} {lines} left out: outliers, far from all the others"
     if better.found != found.found:

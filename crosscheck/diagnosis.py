@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from crosscheck.confounding import Rival
-from crosscheck.noise import Rms, Whiteness
+from crosscheck.kinds import Rms
+from crosscheck.noise import Whiteness
 from crosscheck.search import Search
 from seecr.effects.base import Layout
 from seecr.pose import Array

@@ -140,7 +140,7 @@ def fit(
     while count < iterations and p:
         count += 1
         if stale == 0:
-            jacobian = derivatives(problem, state, factor, frozen=quick) * scale
+            jacobian = derivatives(problem, state, frozen=quick) * scale
         step_state, damping, gain = _step(
             problem, state, factor, jacobian, free, (scale, lower, upper), damping
         )
@@ -161,7 +161,7 @@ def fit(
             break
     jacobian = np.zeros((len(state.white), 0))
     if p:
-        jacobian = derivatives(problem, state, factor, frozen=quick) * scale
+        jacobian = derivatives(problem, state, frozen=quick) * scale
     values = flat(state.terms, "vector")
     at_bound = (values <= lower) | (values >= upper)
     covariance = _covariance(jacobian, scale, free & ~at_bound)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.fit import Fit, fit, flat
-from crosscheck.noise import rms_by_kind
+from crosscheck.kinds import rms_by_kind
 from crosscheck.problem import Problem
 from seecr.pose import Array
 from seecr.sensitivity import Term
@@ -82,6 +82,12 @@ def improves(without: HeldOut, with_effect: HeldOut) -> tuple[float, float]:
     delta = without.chi2 - with_effect.chi2
     error = float(np.std(delta, ddof=1) / np.sqrt(len(delta))) if len(delta) > 1 else np.inf
     return float(delta.mean()), error
+
+
+def pays(without: HeldOut, with_effect: HeldOut) -> bool:
+    """Whether blocks left out are predicted better with an effect."""
+    mean, error = improves(without, with_effect)
+    return with_effect.valid and mean > 0.0 and mean >= 0.5 * error
 
 
 def surely_improves(without: HeldOut, with_effect: HeldOut) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import math
 import tomllib
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -13,14 +12,8 @@ import numpy as np
 
 from crosscheck.compare import Comparison
 from crosscheck.errors import CrosscheckError, InputFileError
+from crosscheck.kinds import BY_NAME
 from crosscheck.quantity import EXAMPLE, parse_quantity
-
-_SHOWN = {"position": (1e3, "mm"), "orientation": (180.0 / math.pi, "deg"), "tension": (1.0, "N")}
-_SUM = {
-    "position": "position_rms_m",
-    "orientation": "orientation_rms_rad",
-    "tension": "tension_rms_N",
-}
 
 
 @dataclass(frozen=True)
@@ -140,7 +133,7 @@ def check(limits: Limits, found: Comparison) -> list[Exceeded]:
         sizes = found.errors_of(kind)
         if not np.isfinite(sizes).any():
             continue
-        value = found.rms[_SUM[kind]]
+        value = found.rms[BY_NAME[kind].key]
         if name.endswith("_worst"):
             value = float(np.nanmax(sizes))
         if value is not None and value > limit:
@@ -155,7 +148,7 @@ def _measured(found: Comparison, kind: str) -> bool:
 
 def _words(found: Comparison, name: str, limit: float, value: float) -> str:
     kind = kind_of(name)
-    factor, unit = _SHOWN[kind]
+    factor, unit = BY_NAME[kind].factor, BY_NAME[kind].unit
     sizes = found.errors_of(kind)
     k = int(np.nanargmax(sizes))
     data = found.problem.data

@@ -3,41 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from crosscheck.noise import Rms
+from crosscheck.kinds import KINDS, Kind, Rms
+from crosscheck.numbers import in_unit, parameter_name
 from seecr.effects.base import Layout
 from seecr.pose import Array
 
-# How a parameter is shown: factor and unit for people.
-_SHOWN = {"m": (1e3, "mm"), "rad": (180.0 / np.pi, "deg"), "m_per_N": (1e3, "mm/N")}
 _WIDE = 160
 
 
-@dataclass(frozen=True)
-class Kind:
-    """A kind of reading as a column: its key in rms errors, factor from SI, heading."""
-
-    key: str
-    factor: float
-    head: str
-
-    def cell(self, rms: Rms) -> str:
-        """Its rms error, or a dash."""
-        value = rms.get(self.key)
-        return "-" if value is None else f"{self.factor * value:.4g}"
+def heading(kind: Kind) -> str:
+    """Over a column of its errors."""
+    return f"{kind.name}\n[{kind.unit}]"
 
 
-KINDS = (
-    Kind("position_rms_m", 1e3, "position\n[mm]"),
-    Kind("orientation_rms_rad", 180.0 / np.pi, "orientation\n[deg]"),
-    Kind("tension_rms_N", 1.0, "tension\n[N]"),
-)
+def cell(kind: Kind, rms: Rms) -> str:
+    """Its rms error in the unit of the heading, or a dash."""
+    value = rms.get(kind.key)
+    return "-" if value is None else f"{kind.factor * value:.4g}"
 
 
 def console_for(console: Console | None) -> Console:
@@ -55,7 +43,7 @@ def say(console: Console, line: str, style: str = "") -> None:
 
 def shown(value: float, unit: str) -> str:
     """A number with its unit as people read it."""
-    factor, word = _SHOWN.get(unit, (1.0, unit.replace("_per_", "/")))
+    factor, word = in_unit(unit)
     return f"{factor * value:.4g} {word}".strip()
 
 
@@ -68,7 +56,7 @@ def print_parameters(
     for name, unit, value, error, bound in rows[:most]:
         spread = f"+- {shown(error, unit)}" if np.isfinite(error) else "not seen by these data"
         stop = " (at its bound)" if bound else ""
-        say(console, f"  {name.removesuffix('_' + unit)} = {shown(value, unit)} {spread}{stop}")
+        say(console, f"  {parameter_name(name, unit)} = {shown(value, unit)} {spread}{stop}")
     if len(rows) > most:
         say(console, f"  and {len(rows) - most} more in {file}")
 
@@ -79,9 +67,9 @@ def rms_table(title: str, rows: Sequence[tuple[str, Rms, str]]) -> Table:
     Kinds that were not read have no column.
     """
     kinds = [k for k in KINDS if any(rms.get(k.key) is not None for _name, rms, _style in rows)]
-    table = table_of([title, *(k.head for k in kinds)])
+    table = table_of([title, *(heading(k) for k in kinds)])
     for name, rms, style in rows:
-        table.add_row(Text(name), *(k.cell(rms) for k in kinds), style=style)
+        table.add_row(Text(name), *(cell(k, rms) for k in kinds), style=style)
     return table
 
 

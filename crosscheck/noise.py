@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import spatial, stats
 
-from crosscheck.problem import ORIENTATION, POSITION, TENSION, Problem
+from crosscheck.kinds import kinds_read
+from crosscheck.problem import Problem
 from seecr.pose import Array, rotvec_from_quat
-
-Rms = dict[str, float | None]
 
 # Residuals are structured where neighbours agree by more than this many standard errors.
 STRUCTURED = 4.0
@@ -167,23 +166,6 @@ def _runs_test(problem: Problem, table: Array) -> float:
     return min(1.0, smallest * max(tests, 1))
 
 
-def rms_by_kind(problem: Problem, raw: Array) -> dict[str, float | None]:
-    """Root mean square of the counted residuals: position [m], orientation [rad], tension [N].
-
-    Of single components, so that noise alone gives its sigma; None where nothing was read.
-    """
-    out: dict[str, float | None] = {}
-    kinds = (
-        ("position_rms_m", POSITION),
-        ("orientation_rms_rad", ORIENTATION),
-        ("tension_rms_N", TENSION),
-    )
-    for name, part in kinds:
-        values = raw[:, part][problem.counted[:, part]]
-        out[name] = float(np.sqrt((values**2).mean())) if len(values) else None
-    return out
-
-
 def estimate_sigma(problem: Problem, raw: Array) -> tuple[Problem, tuple[str, ...]]:
     """Fill in noise that nobody stated, from how much neighbours along a run differ.
 
@@ -191,19 +173,14 @@ def estimate_sigma(problem: Problem, raw: Array) -> tuple[Problem, tuple[str, ..
     all of the noise (times sqrt(20)); the median keeps jumps out.
     """
     sigma, notes = problem.sigma, []
-    kinds = (
-        ("position_m", POSITION, "m"),
-        ("orientation_rad", ORIENTATION, "rad"),
-        ("tension_N", TENSION, "N"),
-    )
-    for name, part, unit in kinds:
-        if getattr(sigma, name) is not None or not problem.counted[:, part].any():
+    for kind in kinds_read(problem):
+        if getattr(sigma, kind.sigma) is not None:
             continue
-        value = _by_differences(problem, raw[:, part])
-        sigma = replace(sigma, **{name: value})
+        value = _by_differences(problem, raw[:, kind.columns])
+        sigma = replace(sigma, **{kind.sigma: value})
         notes.append(
-            f"{name} is not stated: estimated from differences between neighbouring rows as "
-            f"{value:.2g} {unit}"
+            f"{kind.sigma} is not stated: estimated from differences between neighbouring rows as "
+            f"{value:.2g} {kind.si}"
         )
     return problem.with_sigma(sigma), tuple(notes)
 

@@ -53,7 +53,7 @@ def print_plan(plan: Plan, out: Path, console: Console | None = None) -> None:
     _print_slack(console, plan)
     say(console, sentence(plan), "bold")
     for suggestion in plan.suggestions:
-        _print_suggestion(console, plan, suggestion)
+        _print_suggestion(console, suggestion)
     say(console, f"Results in {out}/", "dim")
 
 
@@ -105,7 +105,7 @@ def _print_slack(console: Console, plan: Plan) -> None:
     )
 
 
-def _print_suggestion(console: Console, plan: Plan, item: Suggestion) -> None:
+def _print_suggestion(console: Console, item: Suggestion) -> None:
     reached = item.reached
     if not reached:
         return

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from crosscheck.held_out import blocks_of
+from crosscheck.kinds import Rms, rms_by_kind
 from crosscheck.measurements import Measurements
-from crosscheck.noise import Rms, estimate_sigma, rms_by_kind
+from crosscheck.noise import estimate_sigma
 from crosscheck.problem import Problem
 from crosscheck.state import State
 from seecr.robot import Robot

@@ -35,7 +35,6 @@ from seecr.setup import Commands
 
 # Columns of a residual row: position, orientation, then tensions.
 POSITION, ORIENTATION, TENSION = slice(0, 3), slice(3, 6), slice(6, None)
-KINDS = ("position", "orientation", "tension")
 
 
 def commands_of(robot: Robot, data: Measurements) -> Commands:

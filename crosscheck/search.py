@@ -24,7 +24,7 @@ from crosscheck.candidates import (
 )
 from crosscheck.evidence import Evidence, evidence
 from crosscheck.fit import Fit, fit, flat, with_values
-from crosscheck.held_out import HeldOut, hold_out, improves, unfitted
+from crosscheck.held_out import HeldOut, hold_out, pays, unfitted
 from crosscheck.noise import Whiteness, whiteness
 from crosscheck.problem import Problem
 from seecr.effects import catalogue
@@ -303,7 +303,7 @@ class _Searcher:
                 if known is not None:
                     node.candidates = known.candidates
                 tried.append(self.step(name, node))
-                if _pays(steps[-1], tried[-1]):
+                if pays(steps[-1].held_out, tried[-1].held_out):
                     steps += [*waiting, tried[-1]]
                     waiting, chosen = [], tried[-1]
                     break
@@ -348,12 +348,6 @@ class _Searcher:
         else:
             held = unfitted(self.problem, best.terms, best)
         return Step(added, best, node.evidence, node.whiteness, held, node.candidates)
-
-
-def _pays(before: Step, step: Step) -> bool:
-    """Whether a step predicts runs left out better."""
-    mean, error = improves(before.held_out, step.held_out)
-    return step.held_out.valid and mean > 0.0 and mean >= 0.5 * error
 
 
 def search(

@@ -80,7 +80,7 @@ def _split(
     terms = ordered([t for t in final.terms if t.name != rival.name] + [term])
     state = final.state.of(terms)
     scale = flat(terms, "scale")
-    columns = derivatives(problem, state, state.factor, frozen=True) * scale
+    columns = derivatives(problem, state, frozen=True) * scale
     own = own_columns(terms, name)
     values = sizes([t for t in final.terms if t.name == name])
     return columns[:, own] @ values, columns[:, ~own]

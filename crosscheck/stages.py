@@ -8,8 +8,8 @@ import numpy as np
 
 from crosscheck.diagnosis import Diagnosis
 from crosscheck.held_out import blocks_of
-from crosscheck.noise import rms_by_kind
-from crosscheck.problem import ORIENTATION, POSITION, TENSION, Problem
+from crosscheck.kinds import KINDS, Kind, rms_by_kind
+from crosscheck.problem import Problem
 from crosscheck.search import Step
 from crosscheck.state import State
 from seecr.pose import Array
@@ -18,29 +18,6 @@ from seecr.pose import Array
 _ARROW, _LARGEST = 0.13, 98.0
 # A side that is shorter than this part of the longest is flat.
 _FLAT = 0.02
-
-
-@dataclass(frozen=True)
-class Kind:
-    """A kind of reading as people read it.
-
-    Attributes:
-        name: in words. key: of the rms errors. columns: of the residuals.
-        factor: from SI to ``unit``.
-    """
-
-    name: str
-    key: str
-    columns: slice
-    factor: float
-    unit: str
-
-
-KINDS = (
-    Kind("position", "position_rms_m", POSITION, 1e3, "mm"),
-    Kind("orientation", "orientation_rms_rad", ORIENTATION, 180.0 / np.pi, "deg"),
-    Kind("tension", "tension_rms_N", TENSION, 1.0, "N"),
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,11 +68,6 @@ def shown_stages(found: Diagnosis) -> tuple[Stage, Stage]:
     return stages[0], last
 
 
-def kinds_read(problem: Problem) -> list[Kind]:
-    """Kinds of reading that the data hold."""
-    return [kind for kind in KINDS if problem.counted[:, kind.columns].any()]
-
-
 def by_block(problem: Problem, stage: Stage, kind: Kind) -> Array:
     """The rms error of each run (or block of time) left out, in SI; NaN where nothing was read."""
     blocks, _note = blocks_of(problem)
@@ -106,27 +78,13 @@ def by_block(problem: Problem, stage: Stage, kind: Kind) -> Array:
     return np.array(out)
 
 
-def sizes_of(problem: Problem, state: State, kind: Kind) -> Array:
-    """(n,) size of each row's error: length of the vector, or the largest tension; SI.
-
-    NaN where nothing of the kind was read or the row does not count.
-    """
-    some = problem.counted[:, kind.columns]
-    raw = np.where(some, state.raw[:, kind.columns], 0.0)
-    if kind.name == "tension":
-        size = np.max(np.abs(raw), axis=1, initial=0.0)
-    else:
-        size = np.linalg.norm(raw, axis=1)
-    return np.where(some.any(axis=1), size, np.nan)
-
-
 def magnification(problem: Problem, state: State) -> float:
     """How many times too long arrows of the position error are drawn; 0 where there are none.
 
     A round number with which all but the largest are within a part of the measured region.
     """
     place = state.prediction.poses[:, :3]
-    size = sizes_of(problem, state, KINDS[0])
+    size = KINDS[0].sizes(problem, state.raw)
     size = size[np.isfinite(size)]
     if len(size) == 0 or not np.any(size > 0):
         return 0.0

@@ -77,9 +77,7 @@ def evaluate(
         raw = problem.residuals(prediction.readings)
         state = _compared(problem, terms, prediction, raw, factor, experiment)
         return _on_measured_branch(problem, state)
-    at = with_length_errors(
-        problem, effects, experiment.length_errors, None if near is None else near.prediction
-    )
+    at = with_length_errors(problem, effects, experiment.length_errors, start)
     experiment = experiment.with_length_errors(at.length_errors)
     return _compared(problem, terms, at.prediction, at.linear_raw(), at.factor, experiment)
 
@@ -141,7 +139,6 @@ def _compared(
 def derivatives(
     problem: Problem,
     state: State,
-    factor: Array,
     columns: Sequence[int] = (),
     frozen: bool = False,
 ) -> Array:

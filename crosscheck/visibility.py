@@ -108,7 +108,7 @@ def _middle_shape(plan: Planned, layout: Layout) -> dict[str, float] | None:
 
 def _columns(plan: Planned, layout: Layout, shape: dict[str, float]) -> Array:
     start = layout.start(shape)
-    columns = amplitude_columns(plan.problem, plan.base, layout, start, plan.factor)
+    columns = amplitude_columns(plan.problem, plan.base, layout, start)
     # a length behind the exit point is only where friction is looked for: its own signal is
     # another effect's
     given = (start != layout.null) | layout.shape

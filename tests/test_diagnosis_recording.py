@@ -15,13 +15,14 @@ from recordings import Readback, headless_viewer
 from crosscheck.compare import Comparison, compare
 from crosscheck.diagnosis import Diagnosis
 from crosscheck.errors import CrosscheckError
+from crosscheck.kinds import KINDS
 from crosscheck.numbers import short
 from crosscheck.problem import POSITION
 from crosscheck.recording import write_comparison_recording, write_diagnosis_recording
 from crosscheck.recording.diagnosis_words import plain
 from crosscheck.recording.misfit import Misfit, read_poses, states_of, worst_row
 from crosscheck.recording.words import short_names
-from crosscheck.stages import KINDS, Stage, sizes_of, stages_of
+from crosscheck.stages import Stage, stages_of
 
 STEP = "model_step"
 
@@ -95,7 +96,7 @@ def test_maps_dim_as_the_error_falls(back: Readback, shown: Misfit) -> None:
         colours = back.column(f"/map/{kind.name}/errors", "Points2D:colors", STEP)
         before, after = (np.array(c) >> 16 & 255 for c in colours)  # viridis: green goes with size
         assert len(before) == shown.problem.data.n_rows
-        sizes = sizes_of(shown.problem, shown.first, kind)
+        sizes = kind.sizes(shown.problem, shown.first.raw)
         assert np.all(np.diff(before[np.argsort(sizes)]) >= 0)
         assert after.mean() < before.mean()
 
@@ -154,7 +155,7 @@ def test_plots_over_poses_are_each_models_errors(
 ) -> None:
     for kind in shown.kinds:
         for k, stage in enumerate(stages):
-            sizes = sizes_of(shown.problem, stage.state, kind) * kind.factor
+            sizes = kind.sizes(shown.problem, stage.state.raw) * kind.factor
             assert back.scalars(f"/plot/{kind.name}/model_{k}") == pytest.approx(sizes)
         rms = [s.step.held_out.rms[kind.key] * kind.factor for s in stages]  # type: ignore[operator]
         assert back.scalars(f"/plot/{kind.name}/left_out", STEP) == pytest.approx(rms)

@@ -21,6 +21,7 @@ from crosscheck.confounding import containment
 from crosscheck.diagnosis import Diagnosis
 from crosscheck.errors import CrosscheckError
 from crosscheck.fit import sizes
+from crosscheck.kinds import KINDS
 from crosscheck.numbers import short, with_error
 from crosscheck.report import write_report
 from crosscheck.report.cables import Wall, draw_wall, paid_out, walls_of
@@ -28,15 +29,7 @@ from crosscheck.report.confusion import confusion_of
 from crosscheck.report.page import render
 from crosscheck.report.tables import candidate_rows, checks, finding_context
 from crosscheck.report.waterfall import waterfall
-from crosscheck.stages import (
-    KINDS,
-    by_block,
-    drawn,
-    magnification,
-    shown_stages,
-    stages_of,
-    views_of,
-)
+from crosscheck.stages import by_block, drawn, magnification, shown_stages, stages_of, views_of
 
 ALL = ("pulleys", "nothing", "unknown", "none", "position_only", "tensions_only", "one_angle")
 EVIL = '<script>alert("1")</script>&$x$'

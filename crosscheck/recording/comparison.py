@@ -10,13 +10,13 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from crosscheck.associations import channels
-from crosscheck.numbers import short
+from crosscheck.kinds import Kind
+from crosscheck.numbers import in_unit, short
 from crosscheck.recording import colours, layout, misfit, plots, shapes, words
 from crosscheck.recording.diagnosis_words import plain
 from crosscheck.recording.misfit import MEASURED, Misfit
 from crosscheck.recording.scene import Scene
 from crosscheck.recording.stream import Recording, pose_index, recording_file
-from crosscheck.stages import KINDS, Kind
 
 if TYPE_CHECKING:
     from crosscheck.compare import Comparison
@@ -152,9 +152,8 @@ def _pose(found: Comparison, k: int) -> str:
     if not found.problem.use[k]:
         return head + "\nLeft out, see the notes."
     names, units = channels(found.problem)
-    factors = {"m": KINDS[0], "rad": KINDS[1], "N": KINDS[2]}
     rows = [
-        (name, short(factors[unit].factor * float(found.state.raw[k, c])), factors[unit].unit)
+        (name, short(in_unit(unit)[0] * float(found.state.raw[k, c])), in_unit(unit)[1])
         for c, (name, unit) in enumerate(zip(names, units, strict=True))
         if found.problem.counted[k, c]
     ]

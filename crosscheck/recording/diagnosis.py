@@ -14,12 +14,13 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from crosscheck.diagnosis import Diagnosis
+from crosscheck.kinds import Kind
 from crosscheck.recording import bars, colours, layout, misfit, plots, shapes, words
 from crosscheck.recording.diagnosis_words import model_words, pose_words, verdict_words
 from crosscheck.recording.misfit import MEASURED, Misfit
 from crosscheck.recording.scene import Scene
 from crosscheck.recording.stream import MODEL_STEP, Recording, pose_index, recording_file
-from crosscheck.stages import Kind, Stage, sizes_of, stages_of
+from crosscheck.stages import Stage, stages_of
 from seecr.pose import Array
 
 _MARKDOWN = rr.MediaType.MARKDOWN
@@ -143,7 +144,7 @@ def _plots(
     """The error of each pose under each model; over the steps, that of all runs left out."""
     for k, stage in enumerate(stages):
         entity = f"plot/{kind.name}/model_{k}"
-        sizes = sizes_of(shown.problem, stage.state, kind) * kind.factor
+        sizes = kind.sizes(shown.problem, stage.state.raw) * kind.factor
         recording.scalars(entity, index, sizes)
         shade = colours.VERMILION if k == 0 else _BETWEEN[(k - 1) % len(_BETWEEN)]
         shade = colours.SKY if 0 < k == len(stages) - 1 else shade

@@ -6,11 +6,11 @@ import numpy as np
 
 from crosscheck.diagnose import percent
 from crosscheck.diagnosis import Diagnosis, Finding
-from crosscheck.noise import rms_by_kind
+from crosscheck.kinds import rms_by_kind
 from crosscheck.numbers import in_unit, parameter_name, short, with_error
 from crosscheck.recording import misfit, words
 from crosscheck.recording.misfit import Misfit
-from crosscheck.stages import Stage, floor_of, sizes_of
+from crosscheck.stages import Stage, floor_of
 
 _MOST_PARAMETERS, _MOST_CANDIDATES, _MOST_LISTED = 9, 6, 6
 
@@ -122,6 +122,6 @@ def pose_words(stages: list[Stage], shown: Misfit, k: int) -> str:
     ends = stages if len(stages) < 2 else [stages[0], stages[-1]]
     rows = []
     for kind in shown.kinds:
-        values = [kind.factor * float(sizes_of(shown.problem, s.state, kind)[k]) for s in ends]
+        values = [kind.factor * float(kind.sizes(shown.problem, s.state.raw)[k]) for s in ends]
         rows.append((f"{kind.name} error [{kind.unit}]", *(short(v) for v in values)))
     return head + "\n" + words.table(rows, ("", *(plain(s.label) for s in ends)))

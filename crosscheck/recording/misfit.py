@@ -9,11 +9,12 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
+from crosscheck.kinds import Kind, kinds_read
 from crosscheck.problem import POSITION, Problem
 from crosscheck.recording import colours, layout
 from crosscheck.recording.states import States
 from crosscheck.recording.stream import Recording
-from crosscheck.stages import Kind, drawn, kinds_read, magnification, sizes_of, views_of
+from crosscheck.stages import drawn, magnification, views_of
 from crosscheck.state import State
 from seecr import cable_law
 from seecr.pose import Array, quat_from_rxyz, rxyz_from_quat
@@ -60,12 +61,12 @@ class Misfit:
 
     def top(self, kind: Kind) -> float:
         """End of the colour scale of a kind, in its unit for people."""
-        sizes = sizes_of(self.problem, self.first, kind)
+        sizes = kind.sizes(self.problem, self.first.raw)
         return colours.round_up(float(np.nanpercentile(sizes, _LARGEST)) * kind.factor)
 
     def shades(self, state: State, kind: Kind) -> colours.Colours:
         """(k, 4) colours of the rows that count."""
-        sizes = np.nan_to_num(sizes_of(self.problem, state, kind)[self.rows])
+        sizes = np.nan_to_num(kind.sizes(self.problem, state.raw)[self.rows])
         return colours.scale_colours(sizes * kind.factor, self.top(kind))
 
     @property

@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 
 from crosscheck.associations import channels
 from crosscheck.cable_space import cable_errors, cable_lengths
+from crosscheck.kinds import KINDS
 from crosscheck.problem import TENSION, Problem
 from crosscheck.report.drawing import (
     AFTER,
@@ -26,7 +27,7 @@ from crosscheck.report.drawing import (
     styled,
     svg,
 )
-from crosscheck.stages import KINDS, Stage
+from crosscheck.stages import Stage
 from crosscheck.travel import travel
 from seecr.experiment import Prediction
 from seecr.pose import Array

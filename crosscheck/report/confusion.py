@@ -95,7 +95,7 @@ def _columns(found: Search, name: str) -> Array | None:
             return None
         shapes = layout.effect.shapes(final.state.prediction.setup)
         null = layout.start(shapes[0] if shapes else {})
-        own = amplitude_columns(found.problem, final, layout, null, found.factor) * layout.scale
+        own = amplitude_columns(found.problem, final, layout, null) * layout.scale
     return projected(own, base)
 
 

@@ -11,14 +11,15 @@ from markupsafe import Markup
 
 from crosscheck.diagnosis import Diagnosis
 from crosscheck.errors import CrosscheckError
-from crosscheck.numbers import short
+from crosscheck.kinds import kinds_read
+from crosscheck.numbers import in_unit, short
 from crosscheck.problem import Problem
 from crosscheck.report.cables import draw_wall, walls_of
 from crosscheck.report.confusion import confusion_of, draw_confusion
 from crosscheck.report.tables import candidate_rows, checks, errors_of, finding_context
 from crosscheck.report.waterfall import waterfall
 from crosscheck.report.where import caption, failure_map
-from crosscheck.stages import KINDS, kinds_read, shown_stages, stages_of
+from crosscheck.stages import shown_stages, stages_of
 from seecr import __version__
 
 _VERDICTS = {
@@ -143,10 +144,7 @@ def facts(problem: Problem) -> list[tuple[str, str]]:
 
 def _association(row: dict[str, Any]) -> dict[str, Any]:
     """One thing that the unexplained part goes with, its bins in units for people."""
-    factor, unit = next(
-        ((k.factor, k.unit) for k in KINDS if {"m": "mm", "rad": "deg"}.get(row["unit"]) == k.unit),
-        (1.0, str(row["unit"])),
-    )
+    factor, unit = in_unit(str(row["unit"]))
     means = [bin_["mean"] for bin_ in row["bins"]]
     top = max((abs(m) for m in means if m is not None), default=0.0)
     return {

@@ -10,13 +10,14 @@ import numpy as np
 
 from crosscheck.candidates import Candidate, own_columns
 from crosscheck.diagnose import percent
-from crosscheck.diagnosis import Diagnosis, Finding, Rms
+from crosscheck.diagnosis import Diagnosis, Finding
 from crosscheck.evidence import p_value
 from crosscheck.fit import sizes
+from crosscheck.kinds import KINDS, Rms
 from crosscheck.noise import POOR_FIT, STRUCTURED
 from crosscheck.numbers import chance, in_unit, parameter_name, short, with_error
 from crosscheck.search import FALSE_ALARM, Step
-from crosscheck.stages import KINDS, stages_of
+from crosscheck.stages import stages_of
 
 # Correlations above this are named; parameters beyond this many plausible sizes are doubtful.
 _CORRELATED, _PLAUSIBLE = 0.9, 5.0

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from crosscheck.diagnosis import Diagnosis
-from crosscheck.noise import rms_by_kind
+from crosscheck.kinds import Kind, kinds_read, rms_by_kind
 from crosscheck.numbers import short
 from crosscheck.report.drawing import (
     AFTER,
@@ -21,7 +21,7 @@ from crosscheck.report.drawing import (
     styled,
     svg,
 )
-from crosscheck.stages import Kind, Stage, by_block, floor_of, kinds_read, stages_of
+from crosscheck.stages import Stage, by_block, floor_of, stages_of
 
 # Errors this many times the noise need a logarithmic axis for both to be seen.
 _FAR = 12.0

@@ -10,9 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 
+from crosscheck.kinds import Kind, kinds_read
 from crosscheck.problem import POSITION, Problem
 from crosscheck.report.drawing import GREY, INK, MANY, blank, grid, styled, svg
-from crosscheck.stages import Kind, Stage, drawn, kinds_read, magnification, sizes_of, views_of
+from crosscheck.stages import Stage, drawn, magnification, views_of
 from seecr.pose import Array
 
 # Colours end at this percentile of the errors.
@@ -91,7 +92,7 @@ def _coloured(problem: Problem) -> Kind | None:
 
 
 def _top(problem: Problem, stage: Stage, kind: Kind) -> float:
-    size = sizes_of(problem, stage.state, kind) * kind.factor
+    size = kind.sizes(problem, stage.state.raw) * kind.factor
     return max(float(np.nanpercentile(size, _LARGEST)), 1e-12)
 
 
@@ -111,7 +112,7 @@ def _dots(
     if kind is None:
         axes.scatter(x, y, s=5, color=GREY, **style)
         return None
-    size = (sizes_of(problem, stage.state, kind) * kind.factor)[rows]
+    size = (kind.sizes(problem, stage.state.raw) * kind.factor)[rows]
     worst_last = np.argsort(np.nan_to_num(size))
     return axes.scatter(
         x[worst_last], y[worst_last], s=9 if many else 16, c=size[worst_last], cmap=_COLOURS,
