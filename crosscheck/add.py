@@ -8,19 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.candidates import layouts_for, null_fit, ordered, seen_directions, try_candidate
+from crosscheck.diagnosis.search import FALSE_ALARM, Progress
 from crosscheck.errors import CrosscheckError
-from crosscheck.evidence import p_value
-from crosscheck.fit import Fit, fit, sizes
-from crosscheck.held_out import hold_out, improves, pays, unfitted
-from crosscheck.kinds import Rms, rms_by_kind
-from crosscheck.measurements import Measurements
-from crosscheck.model_file import Fitted
-from crosscheck.noise import Whiteness, whiteness
-from crosscheck.prepare import outlying_rows, prepare
-from crosscheck.problem import Problem
-from crosscheck.search import FALSE_ALARM, Progress
-from crosscheck.state import evaluate
+from crosscheck.fit.candidates import layouts_for, null_fit, ordered, seen_directions, try_candidate
+from crosscheck.fit.evidence import p_value
+from crosscheck.fit.gauss_newton import Fit, fit, sizes
+from crosscheck.fit.held_out import hold_out, improves, pays, unfitted
+from crosscheck.fit.kinds import Rms, rms_by_kind
+from crosscheck.fit.noise import Whiteness, whiteness
+from crosscheck.fit.prepare import outlying_rows, prepare
+from crosscheck.fit.problem import Problem
+from crosscheck.fit.state import evaluate
+from crosscheck.measurements.read import Measurements
+from crosscheck.model.write import Fitted
 from seecr.effects import effect_named, layout_of
 from seecr.effects.base import Layout
 from seecr.pose import Array

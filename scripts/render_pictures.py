@@ -24,13 +24,13 @@ from pathlib import Path
 from PIL import Image
 from rerun.experimental import ViewerClient
 
-from crosscheck.cases import select, shipped_cases
-from crosscheck.diagnose import diagnose
+from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.recording import write_diagnosis_recording
 from crosscheck.report import write_report
-from crosscheck.suite import run_case
-from crosscheck.thresholds import load_thresholds
-from crosscheck.twin import make_twin
+from crosscheck.suite.cases import select, shipped_cases
+from crosscheck.suite.run import run_case
+from crosscheck.suite.thresholds import load_thresholds
+from crosscheck.twin.make import make_twin
 from seecr.shipped import model_path
 
 FOLDER = Path(__file__).resolve().parents[1] / "docs" / "pictures"

@@ -22,11 +22,11 @@ from pathlib import Path
 
 import numpy as np
 
-from crosscheck.diagnose import diagnose
-from crosscheck.diagnosis import Diagnosis
-from crosscheck.measurements import load_measurements
-from crosscheck.sealed import unseal
-from crosscheck.twin import make_twin
+from crosscheck.diagnosis.result import Diagnosis
+from crosscheck.diagnosis.verdict import diagnose
+from crosscheck.measurements.read import load_measurements
+from crosscheck.twin.make import make_twin
+from crosscheck.twin.sealed import unseal
 from seecr.effects import BUILT_IN
 from seecr.mjcf import load_robot
 from seecr.shipped import model_path

@@ -9,7 +9,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seecr import cable_law, kernel, statics
+from seecr import statics
+from seecr.compiled import descent as kernel
+from seecr.compiled import law as cable_law
 from seecr.errors import InputError
 from seecr.joints import values_of_pose
 from seecr.pose import Array, rotvec_from_quat
@@ -208,7 +210,7 @@ def solve_setup(
     if method == "newton":
         found = statics.descend(tables, first, max_iterations, threads, values)
     else:
-        from seecr.seed_methods import solve_with_scipy
+        from seecr.scipy_search import solve_with_scipy
 
         found = solve_with_scipy(setup, tables, method, first, max_iterations, values)
     return certify(setup.robot, tables, found)

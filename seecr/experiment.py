@@ -8,7 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr import cable_law, kernel, statics
+from seecr import statics
+from seecr.compiled import descent as kernel
+from seecr.compiled import law as cable_law
 from seecr.effects.base import Effect, Readings
 from seecr.effects.checked import edit_readings, edit_setup
 from seecr.equilibrium import Solution, certify, start_of

@@ -12,8 +12,9 @@ from itertools import pairwise
 import numpy as np
 from numba import njit
 
-from seecr import kernel, statics
-from seecr.cable_law import (
+from seecr import statics
+from seecr.compiled import descent as kernel
+from seecr.compiled.law import (
     CREEP,
     CREEP_RATE,
     EA,

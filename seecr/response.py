@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from seecr import cable_law
-from seecr.cable_law import TENSION
-from seecr.forces import N_LOAD, N_READY, N_WORK, UP, evaluate, place_joints, prepare
+from seecr.compiled import law as cable_law
+from seecr.compiled.law import TENSION
+from seecr.compiled.platform import N_LOAD, N_READY, N_WORK, UP, evaluate, place_joints, prepare
 from seecr.pose import Array
 from seecr.statics import Evaluation, Tables, in_parts
 

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr import cable_law, response, statics
+from seecr import response, statics
+from seecr.compiled import law as cable_law
 from seecr.effects.base import Effect, Layout, Readings
 from seecr.effects.checked import is_built_in
 from seecr.experiment import Experiment, Prediction, read

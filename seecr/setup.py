@@ -174,7 +174,7 @@ class Setup:
 
     def geometric_lengths(self, poses: Array) -> Array:
         """Lengths (k, m) [m] of straight cables over their pulleys at poses (k, 7)."""
-        from seecr.cable_law import lengths_at  # compiled: takes a while to import
+        from seecr.compiled.law import lengths_at  # compiled: takes a while to import
 
         out = np.empty((len(poses), self.robot.n_cables))
         lengths_at(

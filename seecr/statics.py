@@ -11,7 +11,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr import cable_law, kernel
+from seecr.compiled import descent as kernel
+from seecr.compiled import law as cable_law
 from seecr.joints import values_of_pose
 from seecr.pose import Array, quat_conjugate, quat_multiply
 from seecr.robot import Robot

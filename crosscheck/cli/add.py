@@ -11,7 +11,7 @@ from crosscheck.cli.options import FILE, json_option, progress_share
 
 if TYPE_CHECKING:
     from crosscheck.add import Addition
-    from crosscheck.model import Model
+    from crosscheck.model.read import Model
     from seecr.robot import Robot
 
 
@@ -57,8 +57,8 @@ def command(
     equilibrium.
     """
     from crosscheck.add import add_effect
-    from crosscheck.measurements import load_measurements
-    from crosscheck.model import load_model, new_model
+    from crosscheck.measurements.read import load_measurements
+    from crosscheck.model.read import load_model, new_model
     from seecr.effects import effect_named
     from seecr.mjcf import load_robot
 
@@ -91,7 +91,7 @@ def _check_names(old: Model, effect: str, refit: bool, path: Path) -> None:
 def _write(found: Addition, old: Model, robot: Robot, data: Path, path: Path) -> None:
     from datetime import date
 
-    from crosscheck.model_file import Provenance, renewed, save_model, with_fit
+    from crosscheck.model.write import Provenance, renewed, save_model, with_fit
     from seecr import __version__
 
     source = Provenance(
@@ -107,9 +107,9 @@ def _write(found: Addition, old: Model, robot: Robot, data: Path, path: Path) ->
 def _tell(
     found: Addition, old: Model, model: Path, written: bool, out: Path | None, as_json: bool
 ) -> None:
-    from crosscheck.addition_text import as_json as document_of
-    from crosscheck.addition_text import print_addition
     from crosscheck.document import json_text
+    from crosscheck.terminal.addition import as_json as document_of
+    from crosscheck.terminal.addition import print_addition
 
     text = json_text({**document_of(found, model, written), "model_notes": list(old.notes)})
     if out is not None:

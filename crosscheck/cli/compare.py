@@ -58,12 +58,12 @@ def command(
     as in the tables, or on the worst row (the length of its error vector).
     Exit status: 0 all well, 1 a limit exceeded, 2 bad input, 3 rows without an equilibrium.
     """
-    from crosscheck.compare import as_json as document_of
-    from crosscheck.compare import compare
+    from crosscheck.comparison.limits import Limits, check, load_limits, with_options
+    from crosscheck.comparison.residuals import as_json as document_of
+    from crosscheck.comparison.residuals import compare
     from crosscheck.document import json_text
-    from crosscheck.limits import Limits, check, load_limits, with_options
-    from crosscheck.measurements import load_measurements
-    from crosscheck.model import load_model
+    from crosscheck.measurements.read import load_measurements
+    from crosscheck.model.read import load_model
     from crosscheck.output import staged
     from seecr.mjcf import load_robot
 
@@ -92,7 +92,7 @@ def command(
     if as_json:
         click.echo(text)
         return status
-    from crosscheck.comparison_text import print_comparison
+    from crosscheck.terminal.comparison import print_comparison
 
     for note in own.notes if own else ():
         click.echo(f"note: {note}")

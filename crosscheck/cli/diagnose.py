@@ -31,8 +31,8 @@ def command(
     ROBOT.xml is the robot's MJCF, DATA.csv its measurements, with sigma in a TOML beside it.
     Writes diagnosis.json, diagnosis.html and diagnosis.rrd.
     """
-    from crosscheck.diagnose import diagnose
-    from crosscheck.measurements import load_measurements
+    from crosscheck.diagnosis.verdict import diagnose
+    from crosscheck.measurements.read import load_measurements
     from crosscheck.output import staged
     from crosscheck.report import write_report
     from seecr.mjcf import load_robot
@@ -41,7 +41,7 @@ def command(
     measured = load_measurements(data, machine)
     terms: tuple[Term, ...] = ()
     if model is not None:
-        from crosscheck.model import load_model
+        from crosscheck.model.read import load_model
 
         terms = load_model(model, machine).terms
     with staged(out) as folder:
@@ -57,7 +57,7 @@ def command(
     if as_json:
         click.echo(text)
     else:
-        from crosscheck.diagnosis_text import print_diagnosis
+        from crosscheck.terminal.diagnosis import print_diagnosis
 
         print_diagnosis(found, out)
     return 3 if found.unsolved else 0

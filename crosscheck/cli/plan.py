@@ -49,12 +49,12 @@ def command(
     Exit status: 0 all well, 2 bad input, 3 poses without an equilibrium.
     """
     from crosscheck.document import json_text
-    from crosscheck.measurements import load_commands
+    from crosscheck.measurements.read import load_commands
     from crosscheck.output import staged
-    from crosscheck.plan import make_plan
-    from crosscheck.plan_text import as_json as document_of
-    from crosscheck.plan_text import print_plan
+    from crosscheck.planning.design import make_plan
     from crosscheck.quantity import parse_quantity
+    from crosscheck.terminal.plan import as_json as document_of
+    from crosscheck.terminal.plan import print_plan
     from seecr.mjcf import load_robot
 
     texts = {

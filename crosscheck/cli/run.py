@@ -20,11 +20,11 @@ from crosscheck.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from crosscheck.cases import Case
-    from crosscheck.effect_suite import EffectResult, EffectTask
-    from crosscheck.results import Run
-    from crosscheck.suite import CaseResult
-    from crosscheck.thresholds import Thresholds
+    from crosscheck.suite.cases import Case
+    from crosscheck.suite.effect_suite import EffectResult, EffectTask
+    from crosscheck.suite.results import Run
+    from crosscheck.suite.run import CaseResult
+    from crosscheck.suite.thresholds import Thresholds
 
 
 @click.command(
@@ -106,8 +106,8 @@ def command(
     Exit status: 0 all agree, 1 a threshold exceeded, 2 bad input, 3 a solve did not converge
     (and nothing exceeded a threshold).
     """
-    from crosscheck.cases import select, user_cases
-    from crosscheck.thresholds import load_thresholds
+    from crosscheck.suite.cases import select, user_cases
+    from crosscheck.suite.thresholds import load_thresholds
 
     if mujoco_robot is not None and robot is None:
         raise click.UsageError("--mujoco-robot needs --robot: the MJCF that SEECR reads")
@@ -127,15 +127,15 @@ def command(
 
 def _shipped(seed: int, patterns: Sequence[str]) -> list[Case | EffectTask]:
     """The selected pose cases and effects; the group's name stands for all its effects."""
-    from crosscheck.cases import select, shipped_cases
-    from crosscheck.effect_suite import GROUP, PREFIX, effect_tasks
+    from crosscheck.suite.cases import select, shipped_cases
+    from crosscheck.suite.effect_suite import GROUP, PREFIX, effect_tasks
 
     every: list[Case | EffectTask] = [*shipped_cases(seed), *effect_tasks(seed)]
     return select(every, [f"{PREFIX}*" if name == GROUP else name for name in patterns])
 
 
 def _list(chosen: list[Case | EffectTask]) -> None:
-    from crosscheck.cases import Case
+    from crosscheck.suite.cases import Case
 
     width = max(len(case.name) for case in chosen)
     for case in chosen:
@@ -157,16 +157,16 @@ def _run(
     began = time.perf_counter()
     with staged(out) as folder:
         results, effects = _results(chosen, thresholds, jobs, folder if recordings else None)
-        from crosscheck.results import Run
+        from crosscheck.suite.results import Run
 
         run = Run(results, thresholds, seed, jobs, time.perf_counter() - began, effects)
         _write(run, folder)
     if as_json:
-        from crosscheck.results import results_json
+        from crosscheck.suite.results import results_json
 
         click.echo(results_json(run), nl=False)
     else:
-        from crosscheck.terminal import print_run
+        from crosscheck.terminal.suite import print_run
 
         print_run(run, out)
     return run.exit_status
@@ -176,15 +176,15 @@ def _results(
     chosen: list[Case | EffectTask], thresholds: Thresholds, jobs: int, folder: Path | None
 ) -> tuple[list[CaseResult], list[EffectResult]]:
     """The poses' cases, then the effects, in the same processes and under one bar."""
-    from crosscheck.cases import Case
+    from crosscheck.suite.cases import Case
 
     cases = [case for case in chosen if isinstance(case, Case)]
     tasks = [case for case in chosen if not isinstance(case, Case)]
     total = sum(len(case.poses) for case in cases) + sum(task.n_poses for task in tasks)
     with progress_bar("compiling", total) as advance:
-        from crosscheck.effect_suite import run_effects
-        from crosscheck.pool import Pool
-        from crosscheck.suite import run_suite
+        from crosscheck.suite.effect_suite import run_effects
+        from crosscheck.suite.pool import Pool
+        from crosscheck.suite.run import run_suite
 
         with Pool(min(jobs, len(chosen))) as pool:
             results = run_suite(
@@ -201,11 +201,11 @@ def _results(
 
 
 def _write(run: Run, folder: Path) -> None:
-    from crosscheck.junit import junit_xml
-    from crosscheck.results import results_json
-    from crosscheck.summary import summary_md
-    from crosscheck.thresholds import thresholds_toml
-    from crosscheck.worst import write_worst_pose
+    from crosscheck.suite.junit import junit_xml
+    from crosscheck.suite.results import results_json
+    from crosscheck.suite.summary import summary_md
+    from crosscheck.suite.thresholds import thresholds_toml
+    from crosscheck.suite.worst import write_worst_pose
 
     sentence = write_worst_pose(run.results, folder) if run.results else ""
     texts = {

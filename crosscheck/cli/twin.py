@@ -11,7 +11,7 @@ import click
 from crosscheck.cli.options import FILE, json_option, out_option, progress_bar
 
 if TYPE_CHECKING:
-    from crosscheck.twin import Twin
+    from crosscheck.twin.make import Twin
 
 
 @click.command(
@@ -84,7 +84,7 @@ def command(
         raise click.UsageError("expected ROBOT.xml and --hide SEED, or --open FILE")
     if names and count is not None:
         raise click.UsageError("--effect says how many there are: leave out --effects")
-    from crosscheck.twin import make_twin
+    from crosscheck.twin.make import make_twin
 
     # whatever is hidden, the bar shows the same: rows of one kind, done or not
     with progress_bar("measuring", 1) as advance:
@@ -118,7 +118,7 @@ def _tell(twin: Twin, seed: int, out: Path, as_json: bool) -> None:
 
 
 def _summary(twin: Twin, seed: int, out: Path) -> dict[str, Any]:
-    from crosscheck.sealed import NAME
+    from crosscheck.twin.sealed import NAME
 
     return {
         "robot": twin.robot.name,
@@ -132,7 +132,7 @@ def _summary(twin: Twin, seed: int, out: Path) -> dict[str, Any]:
 
 
 def _open(path: Path, as_json: bool) -> int:
-    from crosscheck.sealed import unseal
+    from crosscheck.twin.sealed import unseal
 
     answer = unseal(path)
     if as_json:

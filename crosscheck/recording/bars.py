@@ -6,13 +6,13 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from crosscheck.diagnosis import Diagnosis
-from crosscheck.kinds import Kind, kinds_read
+from crosscheck.diagnosis.result import Diagnosis
+from crosscheck.diagnosis.steps import Stage, floor_of
+from crosscheck.fit.kinds import Kind, kinds_read
 from crosscheck.numbers import short
 from crosscheck.recording import colours, layout
 from crosscheck.recording.colours import Rgba
 from crosscheck.recording.stream import Recording
-from crosscheck.stages import Stage, floor_of
 
 ROOT = "bars"
 # The drawing is 100 wide; y points down, a row a model.

@@ -22,14 +22,14 @@ from crosscheck.recording.stream import (
 )
 
 if TYPE_CHECKING:
-    from crosscheck.suite import CaseResult
+    from crosscheck.suite.run import CaseResult
 
 
 def write_case_recording(result: CaseResult, path: str | Path) -> None:
     """Write what a person wants to see of a case: scene, plots, lanes, text, layout.
 
     Args:
-        result: of :func:`crosscheck.suite.run_case`.
+        result: of :func:`crosscheck.suite.run.run_case`.
         path: the ``.rrd`` file; a temporary one takes its place when complete.
 
     Raises:

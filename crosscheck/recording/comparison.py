@@ -9,8 +9,8 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from crosscheck.associations import channels
-from crosscheck.kinds import Kind
+from crosscheck.comparison.associations import channels
+from crosscheck.fit.kinds import Kind
 from crosscheck.numbers import in_unit, short
 from crosscheck.recording import colours, layout, misfit, plots, shapes, words
 from crosscheck.recording.diagnosis_words import plain
@@ -19,7 +19,7 @@ from crosscheck.recording.scene import Scene
 from crosscheck.recording.stream import Recording, pose_index, recording_file
 
 if TYPE_CHECKING:
-    from crosscheck.compare import Comparison
+    from crosscheck.comparison.residuals import Comparison
 
 _MARKDOWN = rr.MediaType.MARKDOWN
 _MOST_LISTED, _MOST_WORST = 5, 6

@@ -13,14 +13,14 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from crosscheck.diagnosis import Diagnosis
-from crosscheck.kinds import Kind
+from crosscheck.diagnosis.result import Diagnosis
+from crosscheck.diagnosis.steps import Stage, stages_of
+from crosscheck.fit.kinds import Kind
 from crosscheck.recording import bars, colours, layout, misfit, plots, shapes, words
 from crosscheck.recording.diagnosis_words import model_words, pose_words, verdict_words
 from crosscheck.recording.misfit import MEASURED, Misfit
 from crosscheck.recording.scene import Scene
 from crosscheck.recording.stream import MODEL_STEP, Recording, pose_index, recording_file
-from crosscheck.stages import Stage, stages_of
 from seecr.pose import Array
 
 _MARKDOWN = rr.MediaType.MARKDOWN

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from crosscheck.diagnose import percent
-from crosscheck.diagnosis import Diagnosis, Finding
-from crosscheck.kinds import rms_by_kind
+from crosscheck.diagnosis.result import Diagnosis, Finding
+from crosscheck.diagnosis.steps import Stage, floor_of
+from crosscheck.diagnosis.verdict import percent
+from crosscheck.fit.kinds import rms_by_kind
 from crosscheck.numbers import in_unit, parameter_name, short, with_error
 from crosscheck.recording import misfit, words
 from crosscheck.recording.misfit import Misfit
-from crosscheck.stages import Stage, floor_of
 
 _MOST_PARAMETERS, _MOST_CANDIDATES, _MOST_LISTED = 9, 6, 6
 

@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.agreement import Differences
-from crosscheck.motion import Motion, record_motion
 from crosscheck.recording import colours, words
+from crosscheck.recording.motion import Motion, record_motion
 from crosscheck.recording.states import States
-from crosscheck.verdicts import Verdict
+from crosscheck.suite.agreement import Differences
+from crosscheck.suite.verdicts import Verdict
 from seecr.equilibrium import Status
 from seecr.pose import Array, pose_difference
 from seecr.robot import Robot
 
 if TYPE_CHECKING:
-    from crosscheck.suite import CaseResult
+    from crosscheck.suite.run import CaseResult
 
 _EQUILIBRIA = (Status.CONVERGED, Status.SINGULAR)
 _FRAMES = 240

@@ -9,14 +9,14 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from crosscheck.kinds import Kind, kinds_read
-from crosscheck.problem import POSITION, Problem
+from crosscheck.diagnosis.steps import drawn, magnification, views_of
+from crosscheck.fit.kinds import Kind, kinds_read
+from crosscheck.fit.problem import POSITION, Problem
+from crosscheck.fit.state import State
 from crosscheck.recording import colours, layout
 from crosscheck.recording.states import States
 from crosscheck.recording.stream import Recording
-from crosscheck.stages import drawn, magnification, views_of
-from crosscheck.state import State
-from seecr import cable_law
+from seecr.compiled import law as cable_law
 from seecr.pose import Array, quat_from_rxyz, rxyz_from_quat
 
 MEASURED: colours.Rgba = colours.MUJOCO

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from crosscheck.recording import words
 from crosscheck.recording.material import Material
 from crosscheck.recording.stream import Recording
-from crosscheck.verdicts import Verdict
+from crosscheck.suite.verdicts import Verdict
 from seecr.pose import pose_difference
 
 READ_ME, NOW = "text/read_me", "text/now"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from crosscheck.recording.colours import Rgba
 from crosscheck.recording.stream import Recording
-from crosscheck.verdicts import UNSOLVED, Verdict
+from crosscheck.suite.verdicts import UNSOLVED, Verdict
 from seecr.pose import Array, pose_difference
 
 MM, DEG = 1e3, 180.0 / np.pi

@@ -11,10 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 
-from crosscheck.associations import channels
-from crosscheck.cable_space import cable_errors, cable_lengths
-from crosscheck.kinds import KINDS
-from crosscheck.problem import TENSION, Problem
+from crosscheck.comparison.associations import channels
+from crosscheck.comparison.cable_space import cable_errors, cable_lengths
+from crosscheck.comparison.travel import travel
+from crosscheck.diagnosis.steps import Stage
+from crosscheck.fit.kinds import KINDS
+from crosscheck.fit.problem import TENSION, Problem
 from crosscheck.report.drawing import (
     AFTER,
     INK,
@@ -27,8 +29,6 @@ from crosscheck.report.drawing import (
     styled,
     svg,
 )
-from crosscheck.stages import Stage
-from crosscheck.travel import travel
 from seecr.experiment import Prediction
 from seecr.pose import Array
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.patches import Rectangle
 
-from crosscheck.candidates import amplitude_columns, own_columns
-from crosscheck.diagnosis import Diagnosis
-from crosscheck.fit import Fit
+from crosscheck.diagnosis.result import Diagnosis
+from crosscheck.diagnosis.search import Search
+from crosscheck.fit.candidates import amplitude_columns, own_columns
+from crosscheck.fit.gauss_newton import Fit
+from crosscheck.fit.subspace import basis, projected
 from crosscheck.report.drawing import BEFORE, INK, WIDTH, blank, styled, svg
-from crosscheck.search import Search
-from crosscheck.subspace import basis, projected
 from seecr.effects.base import Layout
 from seecr.pose import Array
 
@@ -67,7 +67,7 @@ def confusion_of(found: Diagnosis) -> Confusion | None:
 
 
 def _contained(columns: Array, basis: Array) -> float:
-    """Part of an effect's signal in a space: :func:`crosscheck.confounding.containment`."""
+    """Part of an effect's signal in a space: :func:`crosscheck.diagnosis.rivals.containment`."""
     return float(np.sum((basis.T @ columns) ** 2) / np.sum(columns**2))
 
 

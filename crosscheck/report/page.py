@@ -9,17 +9,17 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from crosscheck.diagnosis import Diagnosis
+from crosscheck.diagnosis.result import Diagnosis
+from crosscheck.diagnosis.steps import shown_stages, stages_of
 from crosscheck.errors import CrosscheckError
-from crosscheck.kinds import kinds_read
+from crosscheck.fit.kinds import kinds_read
+from crosscheck.fit.problem import Problem
 from crosscheck.numbers import in_unit, short
-from crosscheck.problem import Problem
 from crosscheck.report.cables import draw_wall, walls_of
 from crosscheck.report.confusion import confusion_of, draw_confusion
 from crosscheck.report.tables import candidate_rows, checks, errors_of, finding_context
 from crosscheck.report.waterfall import waterfall
 from crosscheck.report.where import caption, failure_map
-from crosscheck.stages import shown_stages, stages_of
 from seecr import __version__
 
 _VERDICTS = {

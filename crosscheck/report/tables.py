@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.candidates import Candidate, own_columns
-from crosscheck.diagnose import percent
-from crosscheck.diagnosis import Diagnosis, Finding
-from crosscheck.evidence import p_value
-from crosscheck.fit import sizes
-from crosscheck.kinds import KINDS, Rms
-from crosscheck.noise import POOR_FIT, STRUCTURED
+from crosscheck.diagnosis.result import Diagnosis, Finding
+from crosscheck.diagnosis.search import FALSE_ALARM, Step
+from crosscheck.diagnosis.steps import stages_of
+from crosscheck.diagnosis.verdict import percent
+from crosscheck.fit.candidates import Candidate, own_columns
+from crosscheck.fit.evidence import p_value
+from crosscheck.fit.gauss_newton import sizes
+from crosscheck.fit.kinds import KINDS, Rms
+from crosscheck.fit.noise import POOR_FIT, STRUCTURED
 from crosscheck.numbers import chance, in_unit, parameter_name, short, with_error
-from crosscheck.search import FALSE_ALARM, Step
-from crosscheck.stages import stages_of
 
 # Correlations above this are named; parameters beyond this many plausible sizes are doubtful.
 _CORRELATED, _PLAUSIBLE = 0.9, 5.0

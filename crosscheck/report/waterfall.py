@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
-from crosscheck.diagnosis import Diagnosis
-from crosscheck.kinds import Kind, kinds_read, rms_by_kind
+from crosscheck.diagnosis.result import Diagnosis
+from crosscheck.diagnosis.steps import Stage, by_block, floor_of, stages_of
+from crosscheck.fit.kinds import Kind, kinds_read, rms_by_kind
 from crosscheck.numbers import short
 from crosscheck.report.drawing import (
     AFTER,
@@ -21,7 +22,6 @@ from crosscheck.report.drawing import (
     styled,
     svg,
 )
-from crosscheck.stages import Stage, by_block, floor_of, stages_of
 
 # Errors this many times the noise need a logarithmic axis for both to be seen.
 _FAR = 12.0

@@ -10,10 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 
-from crosscheck.kinds import Kind, kinds_read
-from crosscheck.problem import POSITION, Problem
+from crosscheck.diagnosis.steps import Stage, drawn, magnification, views_of
+from crosscheck.fit.kinds import Kind, kinds_read
+from crosscheck.fit.problem import POSITION, Problem
 from crosscheck.report.drawing import GREY, INK, MANY, blank, grid, styled, svg
-from crosscheck.stages import Stage, drawn, magnification, views_of
 from seecr.pose import Array
 
 # Colours end at this percentile of the errors.

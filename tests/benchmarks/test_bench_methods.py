@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import seecr
-from crosscheck.cases import shipped_cases
+from crosscheck.suite.cases import shipped_cases
 from seecr.equilibrium import METHODS
 from seecr.pose import pose_difference
 from seecr.shipped import CABLES, model_path

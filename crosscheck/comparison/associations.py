@@ -1,0 +1,290 @@
+"""What residuals go with: time, tension, direction of travel, place ... in binned means.
+
+For each quantity the rows fall into a few bins; the share of the residuals' variance that lies
+between the bins (corrected for their number) and its F test say how much they go together. The
+quantities are commanded ones and the model's own, never measured ones: an error in both would
+make them agree by itself. Structure makes rows alike that are near each other, so small p are a
+hint where to look, not a proof.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import signal, stats
+
+from crosscheck.comparison.cable_space import cable_errors, cable_lengths, independent_part
+from crosscheck.comparison.travel import AXES, Travel, travel
+from crosscheck.fit.noise import as_table
+from crosscheck.fit.problem import Problem
+from seecr.compiled import law as cable_law
+from seecr.experiment import Prediction
+from seecr.pose import Array, rotvec_from_quat
+
+SIGNIFICANT = 0.01
+"""An association of a smaller p, over all that were tried, counts."""
+
+EVERYWHERE = "nothing: it is the same everywhere"
+"""The quantity of what does not change from row to row."""
+
+_BINS, _IN_A_BIN = 6, 4
+# A period is one that was seen so many times, of at most so many tried, and that explains so much
+# more of the variance than anything else.
+_CYCLES, _FREQUENCIES, _CLEARLY = 3.0, 20000, 0.15
+
+
+@dataclass(frozen=True, eq=False)
+class _Quantity:
+    """What residuals may go with.
+
+    Attributes:
+        name: for people. values: (k,) numbers or names of groups. unit: of the numbers.
+    """
+
+    name: str
+    values: NDArray[Any]
+    unit: str = ""
+
+
+def associations(problem: Problem, white: Array, prediction: Prediction) -> list[dict[str, Any]]:
+    """What residuals go with, the strongest first.
+
+    Args:
+        problem: the data.
+        white: (N,) whitened residuals.
+        prediction: of the model they belong to.
+
+    Returns:
+        dicts with ``against`` (the quantity), ``of`` ("readings" or "cable lengths"), ``share``
+        of the variance, ``p`` over all quantities tried, ``strongest`` reading with its
+        ``unit``, and ``bins``: their ``label``, ``rows`` and the strongest reading's ``mean``
+        error.
+    """
+    raw = problem.residuals(prediction.readings)
+    way = travel(problem, prediction)
+    table = as_table(problem, white)
+    names, units = channels(problem)
+    out = []
+    for quantity in _of_rows(problem, prediction, way):
+        out.append(_row(quantity, "readings", table, raw, names, units, 1.0))
+    out += _in_cables(problem, raw, prediction, way)
+    found = [row for row in out if row is not None]
+    found += _swinging(problem, table, raw, max((row["share"] for row in found), default=0.0))
+    for row in found:
+        row["p"] = min(1.0, row["p"] * len(found))
+    return sorted(found, key=_order)
+
+
+def _order(row: dict[str, Any]) -> tuple[bool, float, float]:
+    significant = row["p"] < SIGNIFICANT
+    return (not significant, -row["share"] if significant else row["p"], row["p"])
+
+
+def channels(problem: Problem) -> tuple[list[str], list[str]]:
+    """Names and units of the 6 + m readings."""
+    turns = [f"angle {a}" if problem.uses_angles else f"rotation about {a[1]}" for a in AXES[3:]]
+    names = [*AXES[:3], *turns, *(f"tension of {c}" for c in problem.robot.cable_names)]
+    return names, ["m"] * 3 + ["rad"] * 3 + ["N"] * problem.robot.n_cables
+
+
+def _of_rows(problem: Problem, prediction: Prediction, way: Travel) -> Iterator[_Quantity]:
+    n, data = problem.data.n_rows, problem.data
+    yield _Quantity(EVERYWHERE, np.zeros(n))
+    turn = rotvec_from_quat(way.pose[:, 3:])
+    place = np.concatenate([way.pose[:, :3], turn], axis=1)
+    for k, axis in enumerate(AXES):
+        yield _Quantity(f"commanded {axis}", place[:, k], "m" if k < 3 else "rad")
+    yield _Quantity("the run", data.run)
+    yield _Quantity("direction of travel", way.direction)
+    yield _Quantity("speed of travel", way.speed, "m/s")
+    if data.t_s is not None:
+        yield _Quantity("time", data.t_s - data.t_s.min(), "s")
+        if len(data.runs) > 1:
+            starts = {name: data.t_s[data.run == name].min() for name in data.runs}
+            into = data.t_s - np.array([starts[name] for name in data.run.tolist()])
+            yield _Quantity("time since the start of the run", into, "s")
+    if data.temperature_C is not None:
+        yield _Quantity("temperature", data.temperature_C, "C")
+    slack = prediction.found.states[..., cable_law.SLACK] > 0
+    yield _Quantity("number of slack cables", slack.sum(axis=1).astype(float))
+    taut = np.where(slack, np.nan, prediction.tensions)
+    some = np.isfinite(taut).any(axis=1)
+    for name, pick in (("smallest", np.nanmin), ("mean", np.nanmean)):
+        values = np.full(n, np.nan)
+        values[some] = pick(taut[some], axis=1)
+        yield _Quantity(f"{name} tension of the taut cables", values, "N")
+
+
+def _in_cables(
+    problem: Problem, raw: Array, prediction: Prediction, way: Travel
+) -> list[dict[str, Any] | None]:
+    """Errors of cable length against each cable's own length, tension and motion."""
+    errors, noise = cable_errors(problem, raw, prediction)
+    if not np.isfinite(errors).any() or not np.all(noise > 0):
+        return []
+    n = len(errors)
+    lengths = cable_lengths(problem, prediction)
+    first = np.concatenate([[True], problem.data.run_index[1:] != problem.data.run_index[:-1]])
+    home = problem.robot.nominal_lengths(problem.robot.reference_pose[None])
+    nominal = problem.robot.nominal_lengths(way.pose)
+    before = np.where(first[:, None], home, np.concatenate([home, nominal[:-1]]))
+    paid = nominal - before
+    motion = np.where(paid > 0, "paid out", "reeled in")
+    quantities = (
+        _Quantity("the cable", np.tile(np.array(problem.robot.cable_names), n)),
+        _Quantity("the cable's length", lengths.ravel(), "m"),
+        _Quantity("the cable's tension", prediction.tensions.ravel(), "N"),
+        _Quantity("whether the cable was paid out or reeled in", motion.ravel()),
+    )
+    part = independent_part(problem, prediction)
+    table = (errors / noise).reshape(-1, 1)
+    return [
+        _row(q, "cable lengths", table, errors.reshape(-1, 1), ["cable length"], ["m"], part)
+        for q in quantities
+    ]
+
+
+def _swinging(problem: Problem, table: Array, raw: Array, least: float) -> list[dict[str, Any]]:
+    """What comes again and again in time, by its phase; only if it explains clearly more.
+
+    Commands that go to and fro make every error of place come again with them.
+    """
+    period, tried = _period(problem, table)
+    if period is None or problem.data.t_s is None:
+        return []
+    phase = _Quantity(
+        f"time, again every {period:.3g} s", 360.0 * (problem.data.t_s / period % 1.0), "deg"
+    )
+    names, units = channels(problem)
+    row = _row(phase, "readings", table, raw, names, units, 1.0)
+    if row is None or row["share"] < least + _CLEARLY:
+        return []
+    row["p"] = min(1.0, row["p"] * tried)
+    return [row]
+
+
+def _period(problem: Problem, table: Array) -> tuple[float | None, int]:
+    """The period [s] that explains most (Lomb and Scargle's), and how many were tried."""
+    t = problem.data.t_s
+    some = np.isfinite(table).any(axis=1)
+    if t is None or some.sum() < 4 * _BINS:
+        return None, 0
+    span, steps = float(np.ptp(t[some])), np.diff(np.unique(t[some]))
+    if span <= 0.0:
+        return None, 0
+    most = min(0.5 / float(np.median(steps)), _FREQUENCIES * 0.25 / span)
+    frequencies = np.arange(_CYCLES / span, most, 0.25 / span)
+    if len(frequencies) == 0:
+        return None, 0
+    power = np.zeros(len(frequencies))
+    for column in table.T:
+        read = np.isfinite(column)
+        if read.sum() >= 4 * _BINS:
+            part = column[read] - column[read].mean()
+            power += signal.lombscargle(t[read], part, 2.0 * np.pi * frequencies)
+    return 1.0 / float(frequencies[np.argmax(power)]), len(frequencies)
+
+
+def _row(
+    quantity: _Quantity,
+    of: str,
+    table: Array,
+    raw: Array,
+    names: list[str],
+    units: list[str],
+    part: float,
+) -> dict[str, Any] | None:
+    """One association, or None where the quantity never changes."""
+    index, labels = _binned(quantity, np.asarray(np.isfinite(table).any(axis=1)))
+    constant = quantity.name == EVERYWHERE
+    if len(labels) < (1 if constant else 2):
+        return None
+    between, within, counts = _squares(table, index, len(labels), constant)
+    lost = np.maximum(counts - len(labels), 0) * part
+    won = np.full(len(counts), len(labels) - (0 if constant else 1)) * (counts > len(labels))
+    if lost.sum() <= 0:
+        return None
+    each = _p(part * between, won, part * within, lost)
+    whole = _p(
+        part * between.sum(keepdims=True), won.sum(keepdims=True),
+        part * within.sum(keepdims=True), lost.sum(keepdims=True),
+    )[0]  # fmt: skip
+    total = between.sum() + within.sum()
+    spread = within.sum() / max(lost.sum(), 1e-9)
+    share = 1.0 - spread / max(total / (lost.sum() + won.sum()), 1e-300)
+    k = int(np.argmax(np.where(counts > len(labels), between, -1.0)))
+    tried = int(np.sum(won > 0))
+    return {
+        "against": quantity.name,
+        "of": of,
+        "share": float(np.clip(share, 0.0, 1.0)),
+        "p": float(min(1.0, 2.0 * min(whole, tried * float(np.min(each))))),
+        "strongest": names[k],
+        "unit": units[k],
+        "bins": _bins(index, labels, table[:, k], raw[:, k]),
+    }
+
+
+def _p(between: Array, won: Array, within: Array, lost: Array) -> Array:
+    good = (won > 0) & (lost > 0)
+    safe = np.where(good, lost, 1.0)
+    f = (between / np.maximum(won, 1)) / np.maximum(within / safe, 1e-300)
+    return np.where(good, stats.f.sf(f, np.maximum(won, 1), safe), 1.0)
+
+
+def _squares(table: Array, index: Any, bins: int, constant: bool) -> tuple[Array, Array, Array]:
+    """Sums of squares between and within bins, and readings, of each column."""
+    finite = np.isfinite(table) & (index >= 0)[:, None]
+    values = np.where(finite, table, 0.0)
+    counts = finite.sum(axis=0).astype(float)
+    mean = np.zeros(table.shape[1]) if constant else values.sum(axis=0) / np.maximum(counts, 1)
+    values = np.where(finite, values - mean, 0.0)
+    between = np.zeros(table.shape[1])
+    for b in range(bins):
+        rows = index == b
+        number = finite[rows].sum(axis=0)
+        between += values[rows].sum(axis=0) ** 2 / np.maximum(number, 1)
+    return between, np.maximum((values**2).sum(axis=0) - between, 0.0), counts
+
+
+def _binned(quantity: _Quantity, some: NDArray[np.bool_]) -> tuple[NDArray[np.int64], list[str]]:
+    """Bin of each row, -1 for none, and what the bins are called."""
+    values = quantity.values
+    index = np.full(len(values), -1, dtype=np.int64)
+    if values.dtype.kind == "U":
+        names, index[some] = np.unique(values[some], return_inverse=True)
+        return index, [str(name) for name in names]
+    some = some & np.isfinite(values)
+    rounded = np.round(values[some], 9)
+    levels, place = np.unique(rounded, return_inverse=True)
+    if len(levels) <= _BINS:
+        index[some] = place
+        return index, [_labelled(v, v, quantity.unit) for v in levels]
+    count = int(min(_BINS, max(2, len(rounded) // _IN_A_BIN)))
+    edges = np.unique(np.quantile(rounded, np.linspace(0, 1, count + 1)[1:-1]))
+    place = np.searchsorted(edges, rounded, side="right")
+    used, place = np.unique(place, return_inverse=True)
+    index[some] = place
+    labels = []
+    for b in range(len(used)):
+        inside = rounded[place == b]
+        labels.append(_labelled(float(inside.min()), float(inside.max()), quantity.unit))
+    return index, labels
+
+
+def _labelled(low: float, high: float, unit: str) -> str:
+    text = f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
+    return f"{text} {unit}".strip()
+
+
+def _bins(index: Any, labels: list[str], white: Array, raw: Array) -> list[dict[str, Any]]:
+    out = []
+    for b, label in enumerate(labels):
+        rows = (index == b) & np.isfinite(white) & np.isfinite(raw)
+        mean = float(raw[rows].mean()) if rows.any() else None
+        out.append({"label": label, "rows": int(rows.sum()), "mean": mean})
+    return out

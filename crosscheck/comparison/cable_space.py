@@ -1,0 +1,68 @@
+"""Pose errors as errors of cable length: what kind of effect it is shows here at a glance.
+
+The length error of each cable that would explain a pose error (dt, dw) is
+dl_i = -u_i . (dt + dw x R b_i), u_i from the anchor to the exit point. Constant: an offset; in
+proportion to length: a gain; a sine: a drum; with the sign of motion: friction or play.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from crosscheck.fit.problem import ORIENTATION, POSITION, Problem
+from seecr.experiment import Prediction
+from seecr.pose import Array, quat_rotate
+
+
+def cable_errors(problem: Problem, raw: Array, prediction: Prediction) -> tuple[Array, Array]:
+    """Errors of cable length and their noise, each (n, m) [m].
+
+    Args:
+        problem: the data.
+        raw: (n, 6 + m) residuals; rows without a whole pose give NaN.
+        prediction: of the model.
+    """
+    unit, arm = _cables(problem, prediction)
+    turned = np.cross(raw[:, None, ORIENTATION], arm)
+    errors = -np.sum(unit * (raw[:, None, POSITION] + turned), axis=-1)
+    lever = np.linalg.norm(np.cross(arm, unit), axis=-1)
+    sigma = problem.sigma
+    noise = np.hypot(sigma.position_m or 0.0, (sigma.orientation_rad or 0.0) * lever)
+    if problem.uses_angles:
+        # differences of Euler angles are no rotation vector
+        errors = np.full_like(errors, np.nan)
+    return np.where(problem.use[:, None], errors, np.nan), noise
+
+
+def cable_lengths(problem: Problem, prediction: Prediction) -> Array:
+    """Straight lengths (n, m) [m] of the cables where the model rests."""
+    return problem.robot.nominal_lengths(prediction.poses)
+
+
+def independent_part(problem: Problem, prediction: Prediction) -> float:
+    """Part of the m errors of cable length that is independent noise: they share one pose.
+
+    By m^2/tr(C^2) of their correlations C, which is m where they are independent and the number
+    of groups where they agree in groups.
+    """
+    unit, arm = _cables(problem, prediction)
+    sigma = problem.sigma
+    columns = np.concatenate(
+        [
+            (sigma.position_m or 0.0) * unit,
+            (sigma.orientation_rad or 0.0) * np.cross(arm, unit),
+        ],
+        axis=-1,
+    )
+    columns /= np.maximum(np.linalg.norm(columns, axis=-1, keepdims=True), 1e-300)
+    m = columns.shape[1]
+    together = np.einsum("nik,njk->nij", columns, columns)
+    return float(np.mean(m / np.sum(together**2, axis=(1, 2))))
+
+
+def _cables(problem: Problem, prediction: Prediction) -> tuple[Array, Array]:
+    """Unit vectors to the exit points and arms R b_i, (n, m, 3)."""
+    robot, pose = problem.robot, prediction.poses
+    arm = quat_rotate(pose[:, None, 3:], robot.anchor_points[None])
+    reach = robot.exit_points - pose[:, None, :3] - arm
+    return reach / np.linalg.norm(reach, axis=-1, keepdims=True), arm

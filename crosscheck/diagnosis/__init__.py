@@ -1,0 +1,1 @@
+"""Which effects a model is missing."""

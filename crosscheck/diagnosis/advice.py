@@ -1,0 +1,91 @@
+"""What to do next with a diagnosis: check an effect by itself, tell two apart, find the unknown."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from crosscheck.diagnosis.result import Finding
+from crosscheck.diagnosis.rivals import Rival
+from crosscheck.diagnosis.search import Search
+from crosscheck.numbers import in_unit, parameter_name
+from crosscheck.planning.separation import measured_directly, proposals
+from seecr.robot import Robot
+from seecr.sensitivity import Term
+
+
+def check_of(term: Term, robot: Robot) -> str:
+    """The effect's independent check, with what to expect: in mm, degrees and newtons."""
+    layout = term.layout
+    values: dict[str, Any] = {}
+    for name, unit, value in zip(layout.names, layout.units, term.vector, strict=True):
+        short = parameter_name(name, unit)
+        values[short] = in_unit(unit)[0] * float(value)
+        if short == "weight":
+            values["weight_10m"] = 10.0 * float(value)
+    values["ea"] = float(np.mean(robot.ea)) * values.get("factor", 1.0)
+    # of several alike, the one that stands out most
+    size = np.abs(term.vector - layout.null) / layout.scale * ~layout.shape
+    k = int(np.argmax(size))
+    values["which"] = parameter_name(layout.names[k], layout.units[k])
+    values["largest"] = in_unit(layout.units[k])[0] * float(term.vector[k])
+    try:
+        return layout.effect.advice.format(**values)
+    except (KeyError, IndexError, ValueError):
+        return layout.effect.advice
+
+
+def measure_next(
+    found: Search, findings: list[Finding], verdict: str, where: tuple[dict[str, Any], ...]
+) -> list[str]:
+    """What to measure to tell apart, confirm or find, a sentence each."""
+    out = []
+    for finding in findings:
+        for rival in finding.rivals:
+            out += _to_separate(found, finding, rival)
+        if not finding.rivals:
+            out.append(f"to confirm {finding.effect}: {finding.check}")
+    if verdict == "unknown_effect":
+        out.append(_to_find(where))
+    if verdict == "no_effect_missing":
+        out.append("nothing is missing; to see smaller effects, see crosscheck plan")
+    return list(dict.fromkeys(out))
+
+
+def _to_separate(found: Search, finding: Finding, rival: Rival) -> list[str]:
+    robot = found.problem.robot
+    names = f"{finding.effect} and {rival.name}"
+    direct = list(dict.fromkeys(measured_directly(n, robot) for n in (finding.effect, rival.name)))
+    ways = [
+        f"{p.words} (signal that separates them: now {p.now:.2g}, then {p.then:.2g}, needs 15)"
+        for p in proposals(found.problem, found.last.fit, finding.effect, rival)
+        if p.separates
+    ]
+    if ways:
+        return [f"to tell {names} apart: {direct[-1]}, or {ways[0]}"] + [
+            f"to tell {names} apart: {way}" for way in ways[1:2]
+        ]
+    return [
+        f"to tell {names} apart: {' or '.join(direct)}; no further pose, payload or tension that "
+        "was tried here separates them"
+    ]
+
+
+def _to_find(where: tuple[dict[str, Any], ...]) -> str:
+    again = "repeat the same poses forward, back and an hour later"
+    if not where:
+        return f"{again}, to see what the error follows"
+    against = str(where[0]["against"])
+    end = f"the unexplained error goes with {against}: "
+    if against.startswith("commanded"):
+        return (
+            f"{end}measure more poses along it, closer together, and some of them again at the "
+            "end; what stays with the place is geometry or the tracker, what does not is time or "
+            "motion"
+        )
+    if against == "the run":
+        return f"{end}zero the winches and check the tracker before each run, and repeat the runs"
+    if "time" in against or "temperature" in against:
+        return f"{end}stay at one pose and read it for as long as the measurements took"
+    return f"{end}{again}, and look at it there"

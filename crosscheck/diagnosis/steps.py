@@ -1,0 +1,123 @@
+"""The models on the way of a diagnosis, as its page and its recording show them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from crosscheck.diagnosis.result import Diagnosis
+from crosscheck.diagnosis.search import Step
+from crosscheck.fit.held_out import blocks_of
+from crosscheck.fit.kinds import KINDS, Kind, rms_by_kind
+from crosscheck.fit.problem import Problem
+from crosscheck.fit.state import State
+from seecr.pose import Array
+
+# The longest arrow over the widest side of the region, and the percentile that is as long.
+_ARROW, _LARGEST = 0.13, 98.0
+# A side that is shorter than this part of the longest is flat.
+_FLAT = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """One model on the way.
+
+    Attributes:
+        label: what was added, in words.
+        added: the effect added last, "" for the model as it stood.
+        sure: whether the diagnosis lists it.
+        step: of the search.
+    """
+
+    label: str
+    added: str
+    sure: bool
+    step: Step
+
+    @property
+    def state(self) -> State:
+        """The model fitted to all rows."""
+        return self.step.fit.state
+
+
+def stages_of(found: Diagnosis) -> list[Stage]:
+    """From the model as it stood to the last one; none where there was no search."""
+    if found.search is None:
+        return []
+    listed = {finding.effect: finding for finding in found.missing}
+    out = []
+    for step in found.search.steps:
+        if step.added:
+            label = f"+ {step.added}"
+        else:
+            label = "the model as it stands" if found.search.base else "plain SEECR"
+        out.append(Stage(label, step.added, not step.added or step.added in listed, step))
+    return out
+
+
+def shown_stages(found: Diagnosis) -> tuple[Stage, Stage]:
+    """The model as it stood, and the last one that holds only effects that are listed."""
+    stages = stages_of(found)
+    last = stages[0]
+    for stage in stages[1:]:
+        if not stage.sure:
+            break
+        last = stage
+    return stages[0], last
+
+
+def by_block(problem: Problem, stage: Stage, kind: Kind) -> Array:
+    """The rms error of each run (or block of time) left out, in SI; NaN where nothing was read."""
+    blocks, _note = blocks_of(problem)
+    out = []
+    for rows in blocks:
+        value = rms_by_kind(problem.only(rows), stage.step.held_out.raw)[kind.key]
+        out.append(np.nan if value is None else value)
+    return np.array(out)
+
+
+def magnification(problem: Problem, state: State) -> float:
+    """How many times too long arrows of the position error are drawn; 0 where there are none.
+
+    A round number with which all but the largest are within a part of the measured region.
+    """
+    place = state.prediction.poses[:, :3]
+    size = KINDS[0].sizes(problem, state.raw)
+    size = size[np.isfinite(size)]
+    if len(size) == 0 or not np.any(size > 0):
+        return 0.0
+    span = float(np.max(np.ptp(place[problem.use], axis=0)))
+    longest = max(float(np.percentile(size, _LARGEST)), 1e-12)
+    factor = _ARROW * max(span, 1e-9) / longest
+    power = 10.0 ** np.floor(np.log10(factor))
+    return float(max(s for s in (1.0, 2.0, 5.0) if s * power <= factor) * power)
+
+
+def drawn(magnify: float) -> str:
+    """How long arrows are drawn, in words."""
+    if magnify == 1.0:
+        return "to scale"
+    return f"{magnify:g} times {'too long' if magnify > 1.0 else 'as long as they are'}"
+
+
+def floor_of(found: Diagnosis, kind: Kind) -> float:
+    """The rms error that noise alone would give, in SI; that of the commanded lengths with it."""
+    return found.floor.get(kind.key) or 0.0
+
+
+def views_of(place: Array) -> list[tuple[int, int]]:
+    """Pairs of axes to look along: from above and from the side, or the plane of a flat robot.
+
+    Args:
+        place: (n, 3) [m] of what is to be seen.
+    """
+    span = np.ptp(place, axis=0)
+    wide = span > _FLAT * max(float(span.max()), 1e-12)
+    if wide.all():
+        return [(0, 1), (0, 2)]
+    kept = [int(k) for k in np.flatnonzero(wide)]
+    kept += [k for k in (0, 2, 1) if k not in kept]
+    first, second = sorted(kept[:2])
+    return [(first, second)]

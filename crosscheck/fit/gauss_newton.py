@@ -1,0 +1,255 @@
+"""Fit effects to measurements: damped Gauss-Newton in plausible sizes, with honest errors.
+
+Unknowns are counted in plausible sizes from null, z = (value - null)/scale. A weak prior of ten
+plausible sizes keeps directions that the data do not see at null instead of at random. A trial
+with a row that cannot be solved is no trial; a fit that ends on one is invalid, never a number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.fit.problem import Problem
+from crosscheck.fit.state import State, derivatives, evaluate
+from crosscheck.fit.subspace import basis
+from seecr.pose import Array
+from seecr.sensitivity import Term
+
+# The weak prior: this many plausible sizes are one standard deviation.
+PRIOR_SIZES = 10.0
+# A direction seen no better than this many plausible sizes is not seen.
+UNSEEN_SIZES = 100.0
+_ITERATIONS = 40
+_GAIN = 1e-3
+# A trial is given up after a few steps, or fewer where it is that much further off.
+_FEW, _FEW_FAR, _FAR = 4, 2, 10.0
+# Steps that derivatives serve at most beyond their own.
+_STALE = 2
+
+
+@dataclass(eq=False)
+class Fit:
+    """Fitted terms and what the data say of their parameters.
+
+    Attributes:
+        state: the model at its best values.
+        jacobian: (N, p) whitened derivatives by z.
+        covariance: (p, p) of the values in their units; inf on the diagonal where unseen.
+        at_bound: (p,) bool parameters that ended on a bound.
+        valid: the fit settled and every counted row was solved.
+        why: a sentence where it is not valid.
+        iterations: Gauss-Newton steps.
+    """
+
+    state: State
+    jacobian: Array
+    covariance: Array
+    at_bound: NDArray[np.bool_]
+    valid: bool
+    why: str
+    iterations: int
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """The effects with their fitted values."""
+        return self.state.terms
+
+    @property
+    def chi2(self) -> float:
+        """Sum of squared whitened residuals."""
+        return self.state.chi2
+
+    @cached_property
+    def span(self) -> Array:
+        """Orthonormal basis (N, k) of what the parameters can imitate."""
+        return basis(self.jacobian)
+
+    @property
+    def stderr(self) -> Array:
+        """(p,) standard errors; inf where the data do not see a parameter."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def correlation(self) -> Array:
+        """(p, p) correlations; 0 beside parameters that are not seen."""
+        error = np.where(np.isfinite(self.stderr) & (self.stderr > 0), self.stderr, np.inf)
+        finite = np.where(np.isfinite(self.covariance), self.covariance, 0.0)
+        out = finite / error[:, None] / error[None, :]
+        np.fill_diagonal(out, 1.0)
+        return out
+
+
+def flat(terms: Sequence[Term], name: str) -> Array:
+    """A column of the terms' layouts, or their values (``"vector"``), as one vector."""
+    parts = [t.vector if name == "vector" else getattr(t.layout, name) for t in terms]
+    return np.concatenate(parts) if parts else np.zeros(0)
+
+
+def sizes(terms: Sequence[Term]) -> Array:
+    """(p,) values less their null, in plausible sizes."""
+    return (flat(terms, "vector") - flat(terms, "null")) / flat(terms, "scale")
+
+
+def with_values(terms: Sequence[Term], values: Array) -> tuple[Term, ...]:
+    """The same effects with other values (p,)."""
+    out, first = [], 0
+    for term in terms:
+        count = len(term.layout)
+        out.append(Term(term.layout, values[first : first + count].copy()))
+        first += count
+    return tuple(out)
+
+
+def fit(
+    problem: Problem,
+    terms: Sequence[Term],
+    factor: Array,
+    start: State | None = None,
+    free: NDArray[np.bool_] | None = None,
+    iterations: int = _ITERATIONS,
+    hopeless: float = np.inf,
+    quick: bool = False,
+) -> Fit:
+    """Fit the terms' parameters from their values.
+
+    Args:
+        problem: readings and their noise.
+        terms: effects; their values are the start.
+        factor: noise factors, :meth:`Problem.noise`, kept through the fit.
+        start: a state near the start, to save solving.
+        free: (p,) which parameters may move; all by default.
+        iterations: most Gauss-Newton steps.
+        quick: take rows' history as given when deriving; near enough to compare models, not for
+            values.
+        hopeless: stop after a few steps where chi2 is still above this.
+    """
+    state = evaluate(problem, terms, factor, start)
+    p = len(flat(terms, "null"))
+    free = np.ones(p, dtype=bool) if free is None else free
+    if not state.valid:
+        return _invalid(state, p, "rows could not be solved at the start of the fit")
+    scale, lower, upper = (flat(terms, k) for k in ("scale", "lower", "upper"))
+    damping, count = 1e-3, 0
+    stale = 0
+    jacobian = np.zeros((0, p))
+    while count < iterations and p:
+        count += 1
+        if stale == 0:
+            jacobian = derivatives(problem, state, frozen=quick) * scale
+        step_state, damping, gain = _step(
+            problem, state, factor, jacobian, free, (scale, lower, upper), damping
+        )
+        if step_state is None:
+            if stale == 0:
+                break
+            stale = 0  # not the derivatives' last word: they are of an earlier step
+            continue
+        # derivatives cost much more than a trial: they serve again where steps go well
+        if stale < _STALE and step_state.chi2 < 0.3 * state.chi2:
+            stale += 1
+            jacobian = _corrected(jacobian, state, step_state)
+        else:
+            stale = 0
+        state = step_state
+        lost = state.chi2 > (hopeless if count >= _FEW else _FAR * hopeless)
+        if gain < _GAIN or (count >= _FEW_FAR and lost):
+            break
+    jacobian = np.zeros((len(state.white), 0))
+    if p:
+        jacobian = derivatives(problem, state, frozen=quick) * scale
+    values = flat(state.terms, "vector")
+    at_bound = (values <= lower) | (values >= upper)
+    covariance = _covariance(jacobian, scale, free & ~at_bound)
+    return Fit(state, jacobian, covariance, at_bound, True, "", count)
+
+
+def _invalid(state: State, p: int, why: str) -> Fit:
+    empty = np.zeros((len(state.white), p))
+    unknown = np.full((p, p), np.inf)
+    return Fit(state, empty, unknown, np.zeros(p, dtype=bool), False, why, 0)
+
+
+def _corrected(jacobian: Array, before: State, after: State) -> Array:
+    """Broyden's update: the derivatives made to agree with what the last step did."""
+    step = sizes(after.terms) - sizes(before.terms)
+    change = before.white - after.white  # of the prediction
+    length = float(step @ step)
+    if length == 0.0:
+        return jacobian
+    return jacobian + np.outer(change - jacobian @ step, step) / length
+
+
+def _objective(state: State) -> float:
+    z = sizes(state.terms) / PRIOR_SIZES
+    return state.chi2 + state.log_det + float(z @ z)
+
+
+def _step(
+    problem: Problem,
+    state: State,
+    factor: Array,
+    jacobian: Array,
+    free: NDArray[np.bool_],
+    limits: tuple[Array, Array, Array],
+    damping: float,
+) -> tuple[State | None, float, float]:
+    """One accepted step, or None where no step improves."""
+    scale, lower, upper = limits
+    values = flat(state.terms, "vector")
+    z = sizes(state.terms)
+    gradient = -jacobian.T @ state.white + z / PRIOR_SIZES**2
+    normal = jacobian.T @ jacobian + np.eye(len(z)) / PRIOR_SIZES**2
+    held = ~free
+    held = held | ((values <= lower) & (gradient > 0)) | ((values >= upper) & (gradient < 0))
+    move = np.flatnonzero(~held)
+    if len(move) == 0:
+        return None, damping, 0.0
+    before = _objective(state)
+    diagonal = np.diag(normal)[move]
+    for _ in range(12):
+        matrix = normal[np.ix_(move, move)] + np.diag(damping * diagonal)
+        step = np.zeros(len(z))
+        step[move] = -np.linalg.solve(matrix, gradient[move])
+        # no parameter moves by more than a few plausible sizes at once
+        step *= min(1.0, 5.0 / max(float(np.max(np.abs(step))), 1e-300))
+        trial_values = np.clip(values + step * scale, lower, upper)
+        trial = evaluate(
+            problem, with_values(state.terms, trial_values), factor, state
+        )
+        after = _objective(trial) if trial.valid else np.inf
+        if after < before:
+            gain = before - after
+            return trial, max(0.2 * damping, 1e-9), gain
+        expected = -(gradient @ step + 0.5 * step @ normal @ step)
+        if trial.valid and 2.0 * expected < _GAIN:  # nothing left to gain
+            return None, damping, 0.0
+        damping = max(10.0 * damping, 1e-4)
+    return None, damping, 0.0
+
+
+def _covariance(jacobian: Array, scale: Array, moved: NDArray[np.bool_]) -> Array:
+    """Covariance of the values; inf where the data see a parameter no better than not at all."""
+    p = jacobian.shape[1]
+    out = np.zeros((p, p))
+    index = np.flatnonzero(moved)
+    if len(index):
+        _u, s, vt = np.linalg.svd(jacobian[:, index], full_matrices=False)
+        seen = s > 1.0 / UNSEEN_SIZES
+        v = vt[seen].T / s[seen]
+        block = v @ v.T
+        lost = 1.0 - np.sum(vt[seen] ** 2, axis=0)
+        unseen = lost > 1e-4
+        block[unseen, :] = 0.0
+        block[:, unseen] = 0.0
+        block[unseen, unseen] = np.inf
+        out[np.ix_(index, index)] = block * scale[index][:, None] * scale[index][None, :]
+    # a parameter on its bound has an error of its own scale at least: it was not measured
+    for k in np.flatnonzero(~moved):
+        norm = float(np.linalg.norm(jacobian[:, k])) if len(jacobian) else 0.0
+        out[k, k] = (scale[k] / norm) ** 2 if norm * UNSEEN_SIZES > 1.0 else np.inf
+    return out

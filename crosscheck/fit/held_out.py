@@ -1,0 +1,115 @@
+"""Errors on runs that were not fitted to: the only ones that say whether a model is right."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.fit.gauss_newton import Fit, fit, flat
+from crosscheck.fit.kinds import rms_by_kind
+from crosscheck.fit.problem import Problem
+from seecr.pose import Array
+from seecr.sensitivity import Term
+
+# One run alone is cut into this many blocks of time.
+_BLOCKS = 5
+# Standard errors by which blocks left out must be predicted better to be sure.
+_SURE_ERRORS = 2.0
+
+
+@dataclass(eq=False)
+class HeldOut:
+    """Cross-validation of a model.
+
+    Attributes:
+        raw: (n, 6 + m) residuals, each row by a model that was not fitted to its block.
+        chi2: (blocks,) of each block left out.
+        readings: (blocks,) their number of readings.
+        values: (blocks, p) parameters fitted without each block.
+        rms: by kind, of the left-out rows.
+        valid: every fold could be fitted and predicted.
+    """
+
+    raw: Array
+    chi2: Array
+    readings: Array
+    values: Array
+    rms: dict[str, float | None]
+    valid: bool
+
+
+def blocks_of(problem: Problem) -> tuple[list[NDArray[np.bool_]], str]:
+    """Rows of each block to leave out: runs, or blocks of time where there is one run only."""
+    run = problem.data.run_index
+    names = np.unique(run[problem.use])
+    if len(names) >= 3:
+        return [(run == k) & problem.use for k in names], ""
+    rows = np.flatnonzero(problem.use)
+    count = min(_BLOCKS, max(2, len(rows) // 2))
+    blocks = []
+    for part in np.array_split(rows, count):
+        chosen = np.zeros(len(run), dtype=bool)
+        chosen[part] = True
+        blocks.append(chosen)
+    word = "a single run" if len(names) == 1 else f"only {len(names)} runs"
+    return blocks, f"{word}: cross-validation leaves out {count} blocks of time instead of runs"
+
+
+def hold_out(problem: Problem, best: Fit, factor: Array) -> HeldOut:
+    """Refit without each block, from the full fit, and predict the block."""
+    blocks, _note = blocks_of(problem)
+    raw = np.full(problem.measured.shape, np.nan)
+    chi2, readings = np.zeros(len(blocks)), np.zeros(len(blocks))
+    values = np.zeros((len(blocks), len(flat(best.terms, "null"))))
+    valid = best.valid
+    for b, rows in enumerate(blocks):
+        fold = fit(problem.only(~rows), best.terms, factor, best.state, iterations=6, quick=True)
+        valid = valid and fold.valid
+        values[b] = flat(fold.terms, "vector")
+        raw[rows] = fold.state.raw[rows]
+        white = fold.state.table[rows[:, None] & problem.counted]
+        solved = bool(np.all(fold.state.prediction.solved[rows]))
+        valid = valid and solved
+        chi2[b], readings[b] = float(white @ white), len(white)
+    return HeldOut(raw, chi2, readings, values, rms_by_kind(problem, raw), valid)
+
+
+def improves(without: HeldOut, with_effect: HeldOut) -> tuple[float, float]:
+    """Mean fall of chi2 over the blocks left out, and its standard error."""
+    delta = without.chi2 - with_effect.chi2
+    error = float(np.std(delta, ddof=1) / np.sqrt(len(delta))) if len(delta) > 1 else np.inf
+    return float(delta.mean()), error
+
+
+def pays(without: HeldOut, with_effect: HeldOut) -> bool:
+    """Whether blocks left out are predicted better with an effect."""
+    mean, error = improves(without, with_effect)
+    return with_effect.valid and mean > 0.0 and mean >= 0.5 * error
+
+
+def surely_improves(without: HeldOut, with_effect: HeldOut) -> bool:
+    """Whether blocks left out are predicted better beyond doubt.
+
+    By two standard errors of the mean fall, or every one of at least five blocks: one block that
+    falls much more than the others makes the mean uncertain, not the sign.
+    """
+    mean, error = improves(without, with_effect)
+    delta = without.chi2 - with_effect.chi2
+    every = len(delta) >= _BLOCKS and bool(np.all(delta > 0.0))
+    return with_effect.valid and (mean > _SURE_ERRORS * error or every)
+
+
+def unfitted(problem: Problem, terms: Sequence[Term], base: Fit) -> HeldOut:
+    """The model as it stands, without a parameter to fit: every row is left out of nothing."""
+    blocks, _note = blocks_of(problem)
+    table = np.zeros(problem.measured.shape)
+    table[problem.row_of, problem.column_of] = base.state.white
+    chi2 = np.array([float((table[rows] ** 2).sum()) for rows in blocks])
+    readings = np.array([float(problem.counted[rows].sum()) for rows in blocks])
+    values = np.tile(flat(terms, "vector"), (len(blocks), 1))
+    return HeldOut(
+        base.state.raw, chi2, readings, values, rms_by_kind(problem, base.state.raw), base.valid
+    )

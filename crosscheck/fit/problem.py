@@ -1,0 +1,221 @@
+"""Measurements as a weighted least-squares problem: residuals, their noise, their rows.
+
+A residual is measured less predicted: position [m], orientation as the rotation vector from the
+predicted to the measured one [rad] (or the differences of those angles that were read), tension
+[N]. The noise of a row is that of its readings plus that of the commanded lengths, which reaches
+the readings through the robot's own sensitivity:
+
+    Sigma = diag(sigma^2) + (dy/dl0) sigma_length^2 (dy/dl0)^T
+
+Residuals are whitened by its Cholesky factor, so that noise alone has unit variance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.measurements.read import Measurements
+from crosscheck.measurements.sigma import Sigma
+from seecr.effects.base import Readings
+from seecr.experiment import Experiment, Prediction
+from seecr.pose import (
+    Array,
+    quat_conjugate,
+    quat_multiply,
+    rotvec_from_quat,
+    rxyz_from_quat,
+)
+from seecr.robot import Robot
+from seecr.sensitivity import length_sensitivities
+from seecr.setup import Commands
+
+# Columns of a residual row: position, orientation, then tensions.
+POSITION, ORIENTATION, TENSION = slice(0, 3), slice(3, 6), slice(6, None)
+
+
+def commands_of(robot: Robot, data: Measurements) -> Commands:
+    """The commands of measurements, as the statics takes them."""
+    poses = data.command_pose
+    if poses is None:
+        poses = np.tile(robot.reference_pose, (data.n_rows, 1))
+    return Commands(
+        pose=np.asarray(poses, float),
+        lengths=data.command_lengths,
+        run=data.run_index,
+        time=data.t_s,
+        temperature=data.temperature_C,
+    )
+
+
+@dataclass(eq=False)
+class Problem:
+    """Readings of a robot, with their noise.
+
+    Attributes:
+        robot, data: what was measured.
+        sigma: noise of each kind of reading; every kind that was read has a number.
+        use: (n,) bool rows that count; others were left out, see ``left_out``.
+        left_out: sentences that name the rows left out and why.
+    """
+
+    robot: Robot
+    data: Measurements
+    sigma: Sigma
+    use: NDArray[np.bool_]
+    left_out: tuple[str, ...] = ()
+    experiment: Experiment = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        self.experiment = Experiment(self.robot, commands_of(self.robot, self.data))
+
+    def without(self, rows: NDArray[np.bool_], why: str) -> Problem:
+        """The same problem with some rows left out, sharing what is already computed."""
+        return self._like(use=self.use & ~rows, left_out=(*self.left_out, why))
+
+    def only(self, rows: NDArray[np.bool_]) -> Problem:
+        """The same problem on some of its rows."""
+        return self._like(use=self.use & rows)
+
+    def with_sigma(self, sigma: Sigma) -> Problem:
+        """The same problem with other noise."""
+        return self._like(sigma=sigma)
+
+    def _like(self, **changes: object) -> Problem:
+        other = replace(self, **changes)  # type: ignore[arg-type]
+        other.experiment = self.experiment
+        return other
+
+    @cached_property
+    def measured(self) -> NDArray[np.bool_]:
+        """(n, 6 + m) which readings there are."""
+        data = self.data
+        if data.quat_wxyz is not None:
+            whole = np.asarray(np.isfinite(data.quat_wxyz).all(axis=1))
+            turned = np.repeat(whole[:, None], 3, axis=1)
+        else:
+            turned = np.asarray(np.isfinite(data.angles_rad))
+        return np.concatenate(
+            [np.isfinite(data.position), turned, np.isfinite(data.tensions)], axis=1
+        )
+
+    @property
+    def counted(self) -> NDArray[np.bool_]:
+        """(n, 6 + m) readings that count."""
+        return self.measured & self.use[:, None]
+
+    @cached_property
+    def row_of(self) -> NDArray[np.int64]:
+        """Row of each counted residual, in the order of whitened vectors."""
+        return np.nonzero(self.counted)[0]
+
+    @cached_property
+    def column_of(self) -> NDArray[np.int64]:
+        """Column of each counted residual."""
+        return np.nonzero(self.counted)[1]
+
+    @property
+    def n_readings(self) -> int:
+        """Number of counted readings."""
+        return int(self.counted.sum())
+
+    @cached_property
+    def uses_angles(self) -> bool:
+        """Whether the orientation was read as some angles only."""
+        return self.data.quat_wxyz is None and bool(np.isfinite(self.data.angles_rad).any())
+
+    def residuals(self, readings: Readings) -> Array:
+        """Measured less predicted, (n, 6 + m), NaN where nothing was read."""
+        data = self.data
+        if data.quat_wxyz is not None:
+            turn = quat_multiply(data.quat_wxyz, quat_conjugate(readings.quat_wxyz))
+            turned = np.full((data.n_rows, 3), np.nan)
+            known = np.isfinite(turn).all(axis=1)
+            turned[known] = rotvec_from_quat(turn[known])
+        elif self.uses_angles:
+            turned = data.angles_rad - rxyz_from_quat(readings.quat_wxyz)
+            turned = (turned + np.pi) % (2 * np.pi) - np.pi
+        else:
+            turned = np.full((data.n_rows, 3), np.nan)
+        return np.concatenate(
+            [data.position - readings.position, turned, data.tensions - readings.tensions],
+            axis=1,
+        )
+
+    def as_read(self, change: Array, readings: Readings) -> Array:
+        """Derivatives (n, 6 + m, p) by rotation vector turned into those of what was read."""
+        if not self.uses_angles:
+            return change
+        change = change.copy()
+        change[:, ORIENTATION] = np.einsum(
+            "nij,njp->nip", angle_rates(readings.quat_wxyz), change[:, ORIENTATION]
+        )
+        return change
+
+    @cached_property
+    def reading_sigma(self) -> Array:
+        """(6 + m,) noise of each reading."""
+        return np.concatenate(
+            [
+                np.full(3, self.sigma.position_m or 1.0),
+                np.full(3, self.sigma.orientation_rad or 1.0),
+                np.full(self.data.n_cables, self.sigma.tension_N or 1.0),
+            ]
+        )
+
+    def by_length(self, at: Prediction) -> Array:
+        """Derivative of what was read by the rest lengths, (n, 6 + m, m)."""
+        return self.as_read(length_sensitivities(at), at.readings)
+
+    def noise(self, at: Prediction) -> Array:
+        """Cholesky factors of each row's noise, (n, 6 + m, 6 + m); 1 where nothing was read."""
+        return self.noise_about(self.by_length(at) if self.sigma.length_m else None)
+
+    def noise_about(self, by_length: Array | None) -> Array:
+        """The same from the derivative by lengths; None where those are exact."""
+        n, width = self.measured.shape
+        index = np.arange(width)
+        covariance = np.zeros((n, width, width))
+        if by_length is not None and self.sigma.length_m:
+            rate = by_length * self.sigma.length_m
+            covariance = rate @ np.swapaxes(rate, 1, 2)
+        covariance[:, index, index] += self.reading_sigma**2
+        blank = ~self.measured
+        covariance = np.where(blank[:, :, None] | blank[:, None, :], 0.0, covariance)
+        covariance[:, index, index] += np.where(blank, 1.0, 0.0)
+        return np.asarray(np.linalg.cholesky(covariance), float)
+
+    def whiten(self, factor: Array, values: Array) -> Array:
+        """Counted residuals (N,) or derivatives (N, p), in units of their noise."""
+        single = values.ndim == 2
+        table = values[..., None] if single else values
+        table = np.where(self.measured[..., None], table, 0.0)
+        white: Array = in_units_of(factor, table, bool(self.sigma.length_m))[self.counted]
+        return white[:, 0] if single else white
+
+
+def in_units_of(factor: Array, table: Array, correlated: bool) -> Array:
+    """Residuals or derivatives (n, k, p) in units of their noise, by its Cholesky factors."""
+    if correlated:
+        return np.asarray(np.linalg.solve(factor, table), float)
+    return table / np.diagonal(factor, axis1=1, axis2=2)[..., None]
+
+
+def angle_rates(quat_wxyz: Array) -> Array:
+    """d(rx, ry, rz)/d(rotation vector in the base frame), (n, 3, 3).
+
+    With R = Rx Ry Rz, turning on by w is w = x' rx + y' ry + z' rz with the axes x' = x,
+    y' = Rx y and z' = Rx Ry z. Its inverse; at ry = +-90 deg, where there is none, what the
+    smallest cosine that is not zero gives.
+    """
+    angles = rxyz_from_quat(quat_wxyz)
+    sx, cx = np.sin(angles[:, 0]), np.cos(angles[:, 0])
+    sy, cy = np.sin(angles[:, 1]), np.maximum(np.cos(angles[:, 1]), 1e-9)
+    one, nil = np.ones_like(sx), np.zeros_like(sx)
+    rows = [[one, sx * sy / cy, -cx * sy / cy], [nil, cx, sx], [nil, -sx / cy, cx / cy]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+

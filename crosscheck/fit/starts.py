@@ -1,0 +1,156 @@
+"""Where to start fitting an effect: from the forces at the measured poses, without solving.
+
+Where cables go slack and taut as a parameter moves, the solved pose jumps about, and a fit from
+null ends in the next hollow. At the *measured* pose the forces depend on the parameters smoothly
+but for each cable's own slackness: parameters that make them balance there are a start near
+the truth. (In identification: the equation error, in place of the output error.)
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.fit.problem import Problem
+from crosscheck.fit.state import State
+from seecr import statics
+from seecr.compiled import descent as kernel
+from seecr.effects.base import Effect, Layout
+from seecr.experiment import Prediction
+from seecr.pose import Array, pose_add, pose_difference
+from seecr.sensitivity import Term, effects_of, motion_of, sensitivities
+
+# Steps of Gauss-Newton; halvings of a step that does not pay.
+_STEPS, _HALVINGS = 12, 5
+# Directions softer than this part of a row's stiffest say little about forces.
+_SOFT = 0.02
+# No cable is as stiff as this [N/m].
+_ABSURD = 1e20
+# The weak prior, in plausible sizes.
+_PRIOR = 10.0
+
+
+def equation_start(
+    problem: Problem, base: State, layout: Layout, start: Array, factor: Array
+) -> Array | None:
+    """Values of an effect that balance the forces at the measured poses best.
+
+    Args:
+        problem: the data; poses must have been measured as a whole.
+        base: the model without the effect.
+        layout: the effect.
+        start: (p,) values to start from; shapes stay as they are there.
+        factor: noise factors, :meth:`Problem.noise`.
+
+    Returns:
+        (p,) values, or None where this says nothing: effects of the sensors, rows that depend
+        on the rows before, rotations that were not read, platforms on joints.
+    """
+    data = problem.data
+    senses = layout.effect.edit_readings is not Effect.edit_readings
+    if senses or data.quat_wxyz is None or base.prediction.has_history:
+        return None
+    if problem.robot.joints:
+        return None  # a measured pose is off what joints can reach, by its noise
+    whole = np.isfinite(data.position).all(axis=1) & np.isfinite(data.quat_wxyz).all(axis=1)
+    rows = problem.use & whole
+    if not rows.any() or base.prediction.setup.laws:
+        return None
+    forces = _Forces(problem, base, layout, factor, rows)
+    values, cost, white, at = start, *forces.at(start)
+    amplitudes = np.flatnonzero(~layout.shape)
+    scale = layout.scale[amplitudes]
+    for _ in range(_STEPS):
+        if at is None:
+            return None
+        x = forces.derivatives(values, at, amplitudes) * scale
+        z = (values - layout.null)[amplitudes] / scale
+        normal = x.T @ x + np.eye(len(z)) / _PRIOR**2
+        step = np.linalg.solve(normal, x.T @ white - z / _PRIOR**2)
+        for _half in range(_HALVINGS):
+            trial = values.copy()
+            trial[amplitudes] += step * scale
+            trial = np.clip(trial, layout.lower, layout.upper)
+            after, white_after, at_after = forces.at(trial)
+            if after < cost:
+                break
+            step = 0.5 * step
+        else:
+            break
+        paid = cost - after
+        values, cost, white, at = trial, after, white_after, at_after
+        if paid < 1e-3 * cost:
+            break
+    return values
+
+
+class _Forces:
+    """Forces left over at the measured poses, as the displacements that would balance them."""
+
+    def __init__(
+        self, problem: Problem, base: State, layout: Layout, factor: Array,
+        rows: NDArray[np.bool_],
+    ) -> None:  # fmt: skip
+        self.problem, self.base, self.layout, self.factor = problem, base, layout, factor
+        data, at = problem.data, base.prediction
+        assert data.quat_wxyz is not None
+        measured = np.concatenate([data.position, data.quat_wxyz], axis=1)
+        read = np.concatenate([at.readings.position, at.readings.quat_wxyz], axis=1)
+        # what the sensors do to a pose is taken off
+        self.rows = rows & np.isfinite(read).all(axis=1)
+        self.poses = at.poses.copy()
+        off = pose_difference(measured[self.rows], read[self.rows])
+        self.poses[self.rows] = pose_add(at.poses[self.rows], off)
+
+    def terms(self, values: Array) -> tuple[Term, ...]:
+        """The model with the effect."""
+        return (*self.base.terms, Term(self.layout, values))
+
+    def at(self, values: Array) -> tuple[float, Array, Prediction | None]:
+        """Cost and whitened displacements (N,), and the state they belong to."""
+        problem, experiment = self.problem, self.base.experiment
+        effects = effects_of(self.terms(values))
+        setup = experiment.setup(effects)
+        if setup.has_history:
+            return np.inf, np.zeros(0), None
+        tables = statics.assemble(setup)
+        n, m = tables.cables.shape[:2]
+        start = statics.Evaluation.empty(n, m, tables.n_dof)
+        start.deviation[:] = statics.deviations(tables, self.poses)
+        found = statics.evaluate(tables, start)
+        found.deviation[:] = start.deviation
+        # where a law has no answer the numbers are what was left of trying
+        size = np.where(np.isfinite(found.hessian), np.abs(found.hessian), np.inf)
+        broken = (found.outcome != kernel.CONVERGED) | (size.max(axis=(1, 2)) > _ABSURD)
+        if np.any(broken & self.rows):
+            return np.inf, np.zeros(0), None
+        found.hessian[broken], found.gradient[broken] = 0.0, 0.0
+        at = Prediction(setup, tables, found, self.base.prediction.readings, False)
+        at.kept["inverse"] = _damped_inverse(found.hessian)
+        moved = at.kept["inverse"] @ found.gradient[..., None]
+        off = (motion_of(at) @ moved)[..., 0]
+        table = np.full(problem.measured.shape, np.nan)
+        table[self.rows, :6] = off[self.rows]
+        white = self._white(np.where(np.isfinite(table), table, 0.0))
+        return float(white @ white), white, at
+
+    def derivatives(self, values: Array, at: Prediction, columns: NDArray[np.intp]) -> Array:
+        """(N, k) of the displacements, whitened."""
+        first = sum(len(t.layout) for t in self.base.terms)
+        wanted = (first + columns).tolist()
+        terms = self.terms(values)
+        rates = sensitivities(self.base.experiment, terms, at, wanted, frozen=True)
+        rates[~self.rows] = 0.0
+        rates[:, 6:] = 0.0
+        return self._white(rates)
+
+    def _white(self, values: Array) -> Array:
+        return self.problem.whiten(self.factor, values)
+
+
+def _damped_inverse(stiffness: Array) -> Array:
+    """(K^2 + mu^2)^-1 K: what is soft or pushes away at the measured pose is not followed far."""
+    power, vectors = np.linalg.eigh(stiffness)
+    soft = _SOFT * np.max(np.abs(power), axis=1, keepdims=True)
+    damped = power / np.maximum(power**2 + soft**2, 1e-300)
+    return np.asarray((vectors * damped[:, None, :]) @ np.swapaxes(vectors, 1, 2), float)

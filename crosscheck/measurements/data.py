@@ -1,0 +1,240 @@
+"""Measurements of a robot at rest: what was commanded and what was read, row by row, in SI.
+
+Each row is one resting pose. Readings may be any part of the pose and of the tensions; what
+was not read is NaN. :mod:`crosscheck.measurements.read` reads them from files.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import errno
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from crosscheck.errors import CrosscheckError
+from crosscheck.measurements.sigma import Sigma, sigma_toml
+from seecr.pose import Array
+
+Mask = NDArray[np.bool_]
+Names = NDArray[np.str_]
+
+# Default of fields that __post_init__ makes from the others when they are not given.
+_FILLED_IN: Any = None
+_PER_ROW = (
+    "run",
+    "t_s",
+    "command_pose",
+    "command_lengths",
+    "position",
+    "quat_wxyz",
+    "angles_rad",
+    "tensions",
+    "temperature_C",
+    "line",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Measurements:
+    """Commands and readings of n resting poses of a robot with m cables.
+
+    Exactly one of ``command_pose`` and ``command_lengths`` is given. Orientation is in one of
+    two places: in ``quat_wxyz`` where every row that has any has all of it, else (only some of
+    the angles read) in ``angles_rad``.
+
+    Attributes:
+        path: the file, or what it will be called.
+        n_cables: m.
+        run: (n,) name of the continuous motion each row belongs to.
+        command_pose: (n, 7) commanded platform pose, or None.
+        command_lengths: (n, m) [m] paid-out rest lengths, or None.
+        t_s: (n,) [s] or None.
+        position: (n, 3) [m] in the base frame, NaN where not read.
+        quat_wxyz: (n, 4) unit quaternions, NaN rows where not read, or None.
+        angles_rad: (n, 3) [rad] rx ry rz with R = Rx(rx) Ry(ry) Rz(rz), NaN where not read.
+        tensions: (n, m) [N], NaN where not read.
+        position_mask: (3,) coordinates that were read in some row.
+        angle_mask: (3,) angles that were read in some row; all false beside ``quat_wxyz``.
+        tension_mask: (m,) cables whose tension was read in some row.
+        temperature_C: (n,) [deg C] or None.
+        sigma: stated noise.
+        line: (n,) line of the file (row, for Parquet) each row came from.
+        unused_columns: names of columns that mean nothing here.
+        notes: sentences for the reader: what was assumed, filled in or left out.
+    """
+
+    path: Path
+    n_cables: int
+    run: Names
+    command_pose: Array | None = None
+    command_lengths: Array | None = None
+    t_s: Array | None = None
+    position: Array = _FILLED_IN
+    quat_wxyz: Array | None = None
+    angles_rad: Array = _FILLED_IN
+    tensions: Array = _FILLED_IN
+    position_mask: Mask = _FILLED_IN
+    angle_mask: Mask = _FILLED_IN
+    tension_mask: Mask = _FILLED_IN
+    temperature_C: Array | None = None
+    sigma: Sigma = field(default_factory=Sigma)
+    line: NDArray[np.int64] = _FILLED_IN
+    unused_columns: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        n, m = len(self.run), self.n_cables
+        if (self.command_pose is None) == (self.command_lengths is None):
+            raise ValueError("expected exactly one of command_pose and command_lengths")
+        self._set("run", np.array(self.run, dtype=np.str_))
+        for name, width in (("position", 3), ("angles_rad", 3), ("tensions", m)):
+            if getattr(self, name) is None:
+                self._set(name, np.full((n, width), np.nan))
+        for name, values in (
+            ("position_mask", self.position),
+            ("angle_mask", self.angles_rad),
+            ("tension_mask", self.tensions),
+        ):
+            if getattr(self, name) is None:
+                self._set(name, np.any(np.isfinite(values), axis=0))
+        line: Any = self.line
+        if line is None:
+            self._set("line", np.arange(2, n + 2))
+        self._check_shapes()
+
+    def _set(self, name: str, value: object) -> None:
+        object.__setattr__(self, name, value)
+
+    def _check_shapes(self) -> None:
+        n, m = len(self.run), self.n_cables
+        widths = {"command_pose": 7, "command_lengths": m, "position": 3, "quat_wxyz": 4}
+        widths |= {"angles_rad": 3, "tensions": m}
+        shapes: dict[str, tuple[int, ...]] = {k: (n, width) for k, width in widths.items()}
+        shapes |= {"t_s": (n,), "temperature_C": (n,), "line": (n,)}
+        for name, shape in shapes.items():
+            value = getattr(self, name)
+            if value is not None and np.shape(value) != shape:
+                raise ValueError(f"measurements: {name} must be {shape}, got {np.shape(value)}")
+
+    @property
+    def n_rows(self) -> int:
+        """Number of rows n."""
+        return len(self.run)
+
+    @property
+    def runs(self) -> tuple[str, ...]:
+        """Names of the runs, in order of appearance."""
+        return tuple(dict.fromkeys(self.run.tolist()))
+
+    @property
+    def run_index(self) -> NDArray[np.int64]:
+        """(n,) number of each row's run in :attr:`runs`."""
+        number = {name: i for i, name in enumerate(self.runs)}
+        return np.array([number[name] for name in self.run.tolist()], dtype=np.int64)
+
+    @property
+    def has_position(self) -> bool:
+        """Whether any coordinate was read."""
+        return bool(np.any(self.position_mask))
+
+    @property
+    def has_orientation(self) -> bool:
+        """Whether any part of the orientation was read."""
+        return self.quat_wxyz is not None or bool(np.any(self.angle_mask))
+
+    @property
+    def has_tension(self) -> bool:
+        """Whether any tension was read."""
+        return bool(np.any(self.tension_mask))
+
+    def rows(self, index: ArrayLike | slice) -> Measurements:
+        """Some rows: numbers, a mask (n,) or a slice. Masks of what was read stay as they are."""
+        chosen = np.arange(self.n_rows)[index if isinstance(index, slice) else np.asarray(index)]
+        values: dict[str, Any] = {}
+        for name in _PER_ROW:
+            value = getattr(self, name)
+            values[name] = None if value is None else value[chosen]
+        return dataclasses.replace(self, **values)
+
+
+def write_measurements(path: str | Path, data: Measurements) -> None:
+    """Write the CSV and, beside it, the TOML with sigma; both whole or not at all.
+
+    Numbers have 9 significant digits, readings that are missing are empty cells.
+
+    Raises:
+        CrosscheckError: the folder cannot be written.
+    """
+    path = Path(path)
+    columns = list(_columns(data))
+    header = ",".join(name for name, _ in columns)
+    rows = (",".join(cells) for cells in zip(*(cells for _, cells in columns), strict=True))
+    text = "\n".join([header, *rows]) + "\n"
+    # The CSV last: a TOML without it is no measurement.
+    _write_whole(path, {path.with_suffix(".toml"): sigma_toml(data.sigma), path: text})
+
+
+def _columns(data: Measurements) -> Iterator[tuple[str, list[str]]]:
+    yield "run", [_quoted(name) for name in data.run.tolist()]
+    if data.t_s is not None:
+        yield "t_s", _texts(data.t_s)
+    if data.command_pose is not None:
+        names = [f"cmd_{c}" for c in ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")]
+        yield from _block(names, data.command_pose)
+    if data.command_lengths is not None:
+        names = [f"length_{i + 1}_m" for i in range(data.n_cables)]
+        yield from _block(names, data.command_lengths)
+    yield from _block([f"meas_{c}_m" for c in "xyz"], data.position, data.position_mask)
+    if data.quat_wxyz is not None:
+        yield from _block([f"meas_q{c}" for c in "wxyz"], data.quat_wxyz)
+    yield from _block([f"meas_r{c}_rad" for c in "xyz"], data.angles_rad, data.angle_mask)
+    names = [f"tension_{i + 1}_N" for i in range(data.n_cables)]
+    yield from _block(names, data.tensions, data.tension_mask)
+    if data.temperature_C is not None:
+        yield "temperature_C", _texts(data.temperature_C)
+
+
+def _block(
+    names: list[str], values: Array, mask: Mask | None = None
+) -> Iterator[tuple[str, list[str]]]:
+    for k, name in enumerate(names):
+        if mask is None or mask[k]:
+            yield name, _texts(values[:, k])
+
+
+def _texts(values: Array) -> list[str]:
+    # Adding zero turns -0.0 into 0.0.
+    return ["" if v != v else f"{v + 0.0:.9g}" for v in values.tolist()]
+
+
+def _quoted(name: str) -> str:
+    """A run's name as a CSV cell; a leading # would make the line a comment."""
+    if any(mark in name for mark in ',"\n\r') or name.startswith("#"):
+        return '"' + name.replace('"', '""') + '"'
+    return name
+
+
+def _write_whole(path: Path, contents: dict[Path, str]) -> None:
+    """Write several files through temporary ones, renamed when all are complete."""
+    temporary = {p: p.with_name(f".{p.name}.{os.getpid()}.tmp") for p in contents}
+    try:
+        for target, text in contents.items():
+            if target.is_dir():
+                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+            temporary[target].write_text(text, encoding="utf-8", newline="\n")
+        for target in contents:
+            os.replace(temporary[target], target)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise CrosscheckError(f"{path}: cannot be written: {reason}") from None
+    finally:
+        for left_over in temporary.values():
+            with contextlib.suppress(OSError):
+                left_over.unlink()

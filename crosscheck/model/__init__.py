@@ -1,0 +1,1 @@
+"""The TOML file that keeps a robot's effects."""

@@ -1,0 +1,249 @@
+"""A model: a robot plus the effects added to it, in a TOML file that people keep in git.
+
+    format = 1
+    [robot]                      # whose model it is, to notice when it is used for another
+    [[effect]]                   # in the order of adding
+    name = "pulley_radius"
+    [effect.parameters]
+    radius_m = { value = 0.0099, stderr = 0.0001, unit = "m", at_bound = false }
+    [effect.provenance]          # data file, date, version, who or what put it there
+    [effect.before]              # rms errors without it, with it, and on runs left out
+    [effect.after]
+    [effect.held_out]
+
+``stderr = "unseen"`` stands for a parameter that the data do not see. A person may write a model
+by hand: name, parameters and values are all that is needed.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import tomlkit
+from tomlkit import TOMLDocument
+from tomlkit.exceptions import TOMLKitError
+
+from crosscheck.errors import InputFileError
+from crosscheck.model.fingerprint import check_robot, fingerprint
+from crosscheck.text_file import read_text
+from seecr.effects import effect_named, layout_of
+from seecr.effects.base import Layout
+from seecr.errors import InputError
+from seecr.pose import Array
+from seecr.sensitivity import Term
+
+if TYPE_CHECKING:
+    from seecr.robot import Robot
+
+FORMAT = 1
+"""Of the file; raised when a key changes its meaning or goes."""
+
+UNSEEN = "unseen"
+"""What stands in place of an infinite standard error."""
+
+_TABLES = ("format", "robot", "effect")
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A robot's effects, as read from a file.
+
+    Attributes:
+        terms: the effects with their values, in the order of adding.
+        stderr: standard errors of each term's parameters, (p,); inf where unseen, NaN where the
+            file gives none.
+        document: the file's text as a tree, comments included.
+        notes: sentences about what has changed since the model was made.
+        path: the file.
+    """
+
+    terms: tuple[Term, ...]
+    stderr: tuple[Array, ...]
+    document: TOMLDocument
+    notes: tuple[str, ...] = ()
+    path: Path | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the effects."""
+        return tuple(term.name for term in self.terms)
+
+
+def new_model(robot: Robot) -> Model:
+    """A model without effects: the seed's plain SEECR."""
+    document = tomlkit.document()
+    document.add(tomlkit.comment("Effects that this robot has beyond plain SEECR, in the order"))
+    document.add(tomlkit.comment("of adding. SI units. Written by crosscheck add; edit freely."))
+    document["format"] = FORMAT
+    document["robot"] = fingerprint(robot)
+    return Model((), (), document)
+
+
+def load_model(path: str | Path, robot: Robot) -> Model:
+    """Read a model for a robot.
+
+    Args:
+        path: the TOML file.
+        robot: that it must have been made for.
+
+    Raises:
+        InputFileError: no such file, no TOML, made for another robot, an effect or parameter
+            that is unknown, missing, given twice, no number or out of bounds.
+    """
+    path = Path(path)
+    text = read_text(path, "expected a model as crosscheck add writes it")
+    document = _parse(path, text)
+    where = _Where(path, text)
+    _check_tables(where, document)
+    notes = check_robot(path, document.get("robot"), robot)
+    terms: list[Term] = []
+    errors: list[Array] = []
+    for k, table in enumerate(_effect_tables(where, document)):
+        term, stderr = _term(where, k, table, robot)
+        if term.name in [t.name for t in terms]:
+            raise where.error(f"effect {term.name} is listed twice; expected it once", k, "name")
+        terms.append(term)
+        errors.append(stderr)
+    return Model(tuple(terms), tuple(errors), document, notes, path)
+
+
+@dataclass(frozen=True)
+class _Where:
+    """The file, to say where in it something is."""
+
+    path: Path
+    text: str
+
+    def error(self, words: str, effect: int | None = None, key: str = "") -> InputFileError:
+        """An error at the line of a key, of the k-th effect where one is given."""
+        return InputFileError.at(self.path, words, line=self.line(effect, key))
+
+    def line(self, effect: int | None, key: str) -> int | None:
+        seen, found = -1, None
+        for number, line in enumerate(self.text.splitlines(), start=1):
+            bare = line.split("#")[0].strip().replace(" ", "")
+            if bare == "[[effect]]":
+                seen += 1
+                if seen == effect:
+                    found = number
+            inside = effect is None or seen == effect
+            if inside and key and (_is_key(bare, key) or bare.strip("[]").split(".")[-1] == key):
+                return number
+        return found
+
+
+def _is_key(bare: str, key: str) -> bool:
+    return bare.split("=")[0].strip("\"'").split(".")[-1].strip("\"'") == key and "=" in bare
+
+
+def _parse(path: Path, text: str) -> TOMLDocument:
+    try:
+        return tomlkit.parse(text)
+    except TOMLKitError as error:
+        line = getattr(error, "line", None)
+        raise InputFileError.at(path, f"is not TOML: {error}", line=line) from None
+
+
+def _check_tables(where: _Where, document: Mapping[str, Any]) -> None:
+    """Tables of other names are the user's own; a misspelt one must not be passed over."""
+    for name in document:
+        near = difflib.get_close_matches(name.lower(), _TABLES, cutoff=0.7)
+        if name not in _TABLES and near:
+            raise where.error(f"unknown {name}; expected {near[0]}", key=name)
+    version = document.get("format", FORMAT)
+    if version != FORMAT:
+        raise where.error(
+            f"format {version!r} is not known to this version, which reads {FORMAT}; upgrade it",
+            key="format",
+        )
+
+
+def _effect_tables(where: _Where, document: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
+    tables = document.get("effect", [])
+    if not isinstance(tables, list) or not all(isinstance(t, Mapping) for t in tables):
+        raise where.error("effect: expected tables [[effect]], one an effect", key="effect")
+    return tables
+
+
+def _term(where: _Where, k: int, table: Mapping[str, Any], robot: Robot) -> tuple[Term, Array]:
+    name = table.get("name")
+    if not isinstance(name, str):
+        raise where.error(f'expected name = "..." of an effect, came {name!r}', k, "name")
+    try:
+        layout = layout_of(effect_named(str(name)), robot)
+    except InputError as error:
+        raise where.error(str(error), k, "name") from None
+    given = table.get("parameters")
+    if not isinstance(given, Mapping):
+        raise where.error(
+            f"effect {name}: expected a table [effect.parameters] with {_some(layout.names)}", k
+        )
+    _check_names(where, k, layout, given)
+    cells = [_cell(where, k, layout, i, given[key]) for i, key in enumerate(layout.names)]
+    values, errors = zip(*cells, strict=True)
+    return Term(layout, np.array(values)), np.array(errors)
+
+
+def _check_names(where: _Where, k: int, layout: Layout, given: Mapping[str, Any]) -> None:
+    for key in given:
+        if key not in layout.names:
+            near = difflib.get_close_matches(key, layout.names, n=len(layout), cutoff=0.0)
+            raise where.error(
+                f"effect {layout.name}: unknown parameter {key}; known, nearest first: "
+                f"{_some(near)}", k, key,
+            )  # fmt: skip
+    missing = [key for key in layout.names if key not in given]
+    if missing:
+        raise where.error(
+            f"effect {layout.name}: parameter {_some(missing)} is missing; expected a line such "
+            f"as {missing[0]} = {{ value = {layout.null[0]:g} }}", k, "parameters",
+        )  # fmt: skip
+
+
+def _some(names: Sequence[str], most: int = 8) -> str:
+    rest = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + rest
+
+
+def _cell(where: _Where, k: int, layout: Layout, i: int, cell: Any) -> tuple[float, float]:
+    """Value and standard error of parameter i."""
+    key = layout.names[i]
+    table = cell if isinstance(cell, Mapping) else {"value": cell}
+    start = f"effect {layout.name}: {key}"
+    for word in table:
+        if word not in ("value", "stderr", "unit", "at_bound"):
+            raise where.error(
+                f"{start}: unknown {word}; expected value, stderr, unit, at_bound", k, key
+            )
+    value = _number(table.get("value"))
+    if value is None:
+        raise where.error(f"{start}: expected a number, came {table.get('value')!r}", k, key)
+    low, high = layout.lower[i], layout.upper[i]
+    if not low <= value <= high:
+        raise where.error(
+            f"{start}: {value:g} is out of bounds; expected {low:g} to {high:g}", k, key
+        )
+    unit = table.get("unit", layout.units[i])
+    if unit != layout.units[i]:
+        raise where.error(f"{start}: expected unit {layout.units[i]!r}, came {unit!r}", k, key)
+    error = table.get("stderr", math.nan)
+    if error == UNSEEN:
+        return value, math.inf
+    number = math.nan if error is math.nan else _number(error)
+    if number is None or number < 0:
+        raise where.error(
+            f'{start}: stderr must be a number from 0 or "{UNSEEN}", came {error!r}', k, key
+        )
+    return value, number
+
+
+def _number(value: Any) -> float | None:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    return float(value) if math.isfinite(value) else None

@@ -1,0 +1,177 @@
+"""Write a model: fitted values into its tree, comments kept, and the tree into its file."""
+
+from __future__ import annotations
+
+import contextlib
+import copy
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomlkit
+
+from crosscheck.errors import CrosscheckError
+from crosscheck.model.fingerprint import fingerprint
+from crosscheck.model.read import UNSEEN, Model
+from seecr.effects.base import Layout
+from seecr.pose import Array
+from seecr.robot import Robot
+from seecr.sensitivity import Term
+
+Rms = Mapping[str, float | None]
+_ERRORS = ("before", "after", "held_out")
+# Digits of values and of errors: a standard error is not known better.
+_VALUE, _ERROR = 10, 3
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where values come from.
+
+    Attributes:
+        data: name of the data file. date: day of the fit. version: of the software.
+        by: who or what put them there.
+    """
+
+    data: str
+    date: str
+    version: str
+    by: str
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """An effect as fitted.
+
+    Attributes:
+        term: with its values. stderr: (p,), inf where unseen. at_bound: (p,) bool.
+    """
+
+    term: Term
+    stderr: Array
+    at_bound: Any
+
+
+def with_fit(
+    model: Model,
+    fitted: Sequence[Fitted],
+    added: str,
+    provenance: Provenance,
+    errors: Mapping[str, Rms],
+) -> Model:
+    """The model with an effect added (or fitted again), and all values as fitted.
+
+    Args:
+        model: left as it is.
+        fitted: all effects of the new model.
+        added: name of the one that is new; it gets provenance and errors. The others, whose
+            values have moved with it, get a table ``refitted``.
+        provenance: of the fit.
+        errors: rms by kind: "before", "after", "held_out".
+    """
+    document = copy.deepcopy(model.document)
+    if "effect" not in document:
+        document.append("effect", tomlkit.aot())
+    tables = {str(table["name"]): table for table in document["effect"]}  # type: ignore[union-attr]
+    order = [name for name in model.names if name != added] + [added]
+    if added in model.names:
+        order = list(model.names)
+    by_name = {f.term.name: f for f in fitted}
+    for name in order:
+        table = tables.get(name)
+        if table is None:
+            table = tomlkit.table()
+            table["name"] = name
+            table["name"].comment(by_name[name].term.layout.effect.title)
+            _fill(table, by_name[name])
+            _describe(table, provenance, errors)
+            document["effect"].append(table)  # type: ignore[union-attr]
+            table.trivia.indent = "\n"
+            continue
+        _fill(table, by_name[name])
+        if name == added:
+            _describe(table, provenance, errors)
+        else:
+            table["refitted"] = _plain(vars(provenance))
+    terms = tuple(by_name[name].term for name in order)
+    stderr = tuple(np.asarray(by_name[name].stderr, float) for name in order)
+    return replace(model, terms=terms, stderr=stderr, document=document)
+
+
+def _fill(table: Any, fitted: Fitted) -> None:
+    layout = fitted.term.layout
+    if not isinstance(table.get("parameters"), Mapping):
+        table["parameters"] = tomlkit.table()
+    parameters = table["parameters"]
+    for i, key in enumerate(layout.names):
+        cell = _cell(layout, i, fitted)
+        if isinstance(parameters.get(key), Mapping):
+            for word, value in cell.items():
+                parameters[key][word] = value
+        else:
+            parameters[key] = _inline(cell)
+
+
+def _inline(cell: Mapping[str, Any]) -> Any:
+    """A table on one line, with the spaces that people write."""
+    parts = [f"{word} = {tomlkit.item(value).as_string()}" for word, value in cell.items()]
+    return tomlkit.parse(f"x = {{ {', '.join(parts)} }}")["x"]
+
+
+def _cell(layout: Layout, i: int, fitted: Fitted) -> dict[str, Any]:
+    error = float(fitted.stderr[i])
+    value = float(f"{float(fitted.term.vector[i]):.{_VALUE}g}")
+    # rounding must not carry a value over its bound
+    value = min(max(value, float(layout.lower[i])), float(layout.upper[i]))
+    return {
+        "value": value,
+        "stderr": float(f"{error:.{_ERROR}g}") if math.isfinite(error) else UNSEEN,
+        "unit": layout.units[i],
+        "at_bound": bool(fitted.at_bound[i]),
+    }
+
+
+def _describe(table: Any, provenance: Provenance, errors: Mapping[str, Rms]) -> None:
+    table["provenance"] = _plain(vars(provenance))
+    for name in _ERRORS:
+        table[name] = _plain(
+            {k: float(f"{v:.4g}") for k, v in errors[name].items() if v is not None}
+        )
+
+
+def _plain(values: Mapping[str, Any]) -> Any:
+    table = tomlkit.table()
+    table.update(values)
+    return table
+
+
+def renewed(model: Model, robot: Robot) -> Model:
+    """The model with the robot's numbers as they are now: all values have just been fitted."""
+    document = copy.deepcopy(model.document)
+    if document.get("robot") is None or model.notes:
+        document["robot"] = fingerprint(robot)
+    return replace(model, document=document, notes=())
+
+
+def save_model(path: str | Path, model: Model) -> None:
+    """Write a model through a temporary file, so that the old one stays whole until then.
+
+    Raises:
+        CrosscheckError: the file cannot be written.
+    """
+    path = Path(path)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary.write_text(tomlkit.dumps(model.document), encoding="utf-8", newline="\n")
+        os.replace(temporary, path)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise CrosscheckError(f"{path}: the model cannot be written: {reason}") from None
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink()

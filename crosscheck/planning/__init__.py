@@ -1,0 +1,1 @@
+"""What measurements would show, before they are made."""

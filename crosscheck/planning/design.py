@@ -1,0 +1,310 @@
+"""Before measuring: what planned poses will be able to show, and what to add to them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from crosscheck.measurements.read import Measurements
+from crosscheck.measurements.sigma import Sigma
+from crosscheck.planning.extensions import Extension, extensions, more_poses
+from crosscheck.planning.greedy import chosen_poses
+from crosscheck.planning.planned import Planned, expected_sigma, near_slack, planned
+from crosscheck.planning.visibility import (
+    EXACT,
+    LEVEL,
+    POWER,
+    Signal,
+    joined,
+    left_over,
+    needed,
+    signals,
+    signals_like,
+)
+from seecr.pose import Array
+from seecr.robot import Robot
+
+Progress = Callable[[str, float], None]
+# Poses added at most.
+MORE_POSES = 6
+# Repeating everything doubles each signal: a suggestion must do more than that.
+_GAINS = 2.5
+
+
+@dataclass(frozen=True, eq=False)
+class Visible:
+    """What a plan will show of an effect.
+
+    Attributes:
+        signal: what it does to the readings.
+        needed: squared signal that a test finds.
+        factor: smallest size that shows, of all its parameters alike, in plausible sizes; inf
+            where the poses do not see it at all.
+        identifiable: the same beside the best imitator that is no exact twin.
+        imitator: its name, "" where there is none.
+        confused: (name, what it cannot imitate) of effects it cannot be told from at its
+            plausible size, the best imitator first; exact twins not included.
+        twins: effects that imitate it exactly, whatever the poses read alike.
+    """
+
+    signal: Signal
+    needed: float
+    factor: float
+    identifiable: float
+    imitator: str
+    confused: tuple[tuple[str, float], ...]
+    twins: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """Name of the effect."""
+        return self.signal.layout.name
+
+    @property
+    def visible(self) -> bool:
+        """Whether a plausible size would show."""
+        return self.factor <= 1.0
+
+    def sizes(self, factor: float) -> dict[str, float]:
+        """Parameters at a multiple of their plausible sizes, without those that only shape it."""
+        layout = self.signal.layout
+        own = np.any(self.signal.columns != 0.0, axis=0)
+        own = own if own.any() else ~layout.shape
+        return {k: factor * float(layout.scale[i]) for i, k in enumerate(layout.names) if own[i]}
+
+
+@dataclass(frozen=True, eq=False)
+class Gain:
+    """What an added measurement would show or tell apart.
+
+    Attributes:
+        effect: that gains. other: what it is told from; "" where it becomes visible.
+        now, then: squared signal. needed: for a test to find it.
+    """
+
+    effect: str
+    other: str
+    now: float
+    then: float
+    needed: float
+
+
+@dataclass(frozen=True, eq=False)
+class Suggestion:
+    """Something to add to the plan.
+
+    Attributes:
+        kind: as in :class:`crosscheck.planning.extensions.Extension`. words: what to do.
+        gains: what crosses what is needed, then what only comes nearer.
+        poses: (k, 7) to add, for poses.
+    """
+
+    kind: str
+    words: str
+    gains: tuple[Gain, ...]
+    poses: Array | None = None
+
+    @property
+    def reached(self) -> tuple[Gain, ...]:
+        """Those that a test finds then."""
+        return tuple(g for g in self.gains if g.then >= g.needed)
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """What planned commands will show.
+
+    Attributes:
+        planned: commands and noise. effects: the best visible first.
+        missing: effects that cannot be looked for, and why.
+        confusion: names and their (k, k) containment: part of the row's effect that the column's
+            imitates.
+        suggestions: what to add, the most useful first.
+        slack: (line, cable) about to go slack or taut.
+        notes: what was assumed or left out.
+    """
+
+    planned: Planned
+    effects: tuple[Visible, ...]
+    missing: Mapping[str, str]
+    confusion: tuple[tuple[str, ...], Array]
+    suggestions: tuple[Suggestion, ...]
+    slack: tuple[tuple[int, str], ...]
+    notes: tuple[str, ...]
+
+    @property
+    def converged(self) -> bool:
+        """Whether the model rests at every planned row."""
+        return not bool(self.planned.unsolved.any())
+
+
+def make_plan(
+    robot: Robot,
+    commands: Measurements,
+    sigma: Sigma | None = None,
+    progress: Progress = lambda _text, _part: None,
+) -> Plan:
+    """What planned commands will show of each effect.
+
+    Args:
+        robot: as described.
+        commands: planned poses or lengths.
+        sigma: noise to expect; the commands' own by default. With a tension noise, tensions
+            count as recorded.
+        progress: called with what is being done and the part of it that is done.
+    """
+    full, assumed = expected_sigma(robot, sigma or commands.sigma)
+    kinds = ("pose", "tension") if full.tension_N is not None else ("pose",)
+    plan = planned(robot, commands, full, kinds)
+    notes = [*commands.notes, *assumed, *_unsolved(plan)]
+    if not plan.problem.use.any():
+        return Plan(plan, (), {}, ((), np.zeros((0, 0))), (), (), tuple(notes))
+    progress("sensitivities", 0.1)
+    own, missing = signals(plan)
+    effects = _all_visible(own)
+    suggestions = _suggest(plan, own, effects, kinds, progress)
+    names = robot.cable_names
+    return Plan(
+        planned=plan,
+        effects=tuple(sorted(effects.values(), key=lambda v: v.factor)),
+        missing=missing,
+        confusion=_confusion(own),
+        suggestions=suggestions,
+        slack=tuple((int(commands.line[k]), names[i]) for k, i in near_slack(plan)),
+        notes=tuple(dict.fromkeys(notes)),
+    )
+
+
+def _unsolved(plan: Planned) -> list[str]:
+    rows = np.flatnonzero(plan.unsolved)
+    if len(rows) == 0:
+        return []
+    lines = ", ".join(str(plan.problem.data.line[k]) for k in rows[:8])
+    more = f" and {len(rows) - 8} more" if len(rows) > 8 else ""
+    status = plan.base.state.prediction.solution().status[rows[0]].value
+    return [f"lines {lines}{more} left out: {status}"]
+
+
+def _all_visible(own: Mapping[str, Signal]) -> dict[str, Visible]:
+    return {name: _visible(name, own) for name in own}
+
+
+def _visible(name: str, own: Mapping[str, Signal]) -> Visible:
+    g = own[name]
+    need = needed(g.directions, len(own))
+    power = g.power
+    left = {other: left_over(g, s) for other, s in own.items() if other != name}
+    twins = tuple(o for o, value in left.items() if power > 0 and value <= EXACT * power)
+    rest = {o: value for o, value in left.items() if o not in twins}
+    imitator = min(rest, key=lambda o: rest[o]) if rest else ""
+    least = rest[imitator] if imitator else power
+    confused: list[tuple[str, float]] = []
+    if power >= need:
+        near = sorted((value, o) for o, value in rest.items() if value < need)
+        confused = [(o, value) for value, o in near]
+    return Visible(
+        g, need, _size(need, power), _size(need, least), imitator, tuple(confused), twins
+    )
+
+
+def _size(need: float, power: float) -> float:
+    return float(np.sqrt(need / power)) if power > 0 else np.inf
+
+
+def _confusion(own: Mapping[str, Signal]) -> tuple[tuple[str, ...], Array]:
+    names = tuple(own)
+    table = np.eye(len(names))
+    for i, a in enumerate(names):
+        for j, b in enumerate(names):
+            if i != j:
+                power = own[a].power
+                table[i, j] = 1.0 - left_over(own[a], own[b]) / power if power > 0 else 0.0
+    return names, table
+
+
+def _suggest(
+    plan: Planned,
+    own: Mapping[str, Signal],
+    effects: Mapping[str, Visible],
+    kinds: Sequence[str],
+    progress: Progress,
+) -> tuple[Suggestion, ...]:
+    """What to add, each tried by itself."""
+    open_pairs = _open_pairs(own, effects)
+    out = []
+    options: list[Extension] = list(extensions(plan, kinds))
+    progress("more poses", 0.4)
+    grid = more_poses(plan, kinds)
+    for k, option in enumerate(options):
+        progress(option.words, 0.5 + 0.4 * k / len(options))
+        if option.plan.problem.use.any():
+            there = signals_like(option.plan, own)
+            out.append(_suggestion(option, own, there, open_pairs))
+    if grid is not None and grid.plan.problem.use.any():
+        progress("choosing poses", 0.9)
+        out.append(_poses(grid, own, effects, open_pairs))
+    useful = [s for s in out if s.gains]
+    return tuple(sorted(useful, key=lambda s: (-len(s.reached), -len(s.gains))))
+
+
+def _open_pairs(
+    own: Mapping[str, Signal], effects: Mapping[str, Visible]
+) -> list[tuple[str, str, float, float]]:
+    """(effect, other, signal now, needed) of what these poses do not show or tell apart.
+
+    Exact twins count: poses never part them, but a payload or a sensor may.
+    """
+    out = []
+    for name, v in effects.items():
+        if not v.visible:
+            out.append((name, "", own[name].power, v.needed))
+            continue
+        out += [(name, other, value, v.needed) for other, value in v.confused]
+        out += [(name, twin, 0.0, v.needed) for twin in v.twins]
+    return out
+
+
+def _suggestion(
+    option: Extension,
+    own: Mapping[str, Signal],
+    there: Mapping[str, Signal],
+    open_pairs: Sequence[tuple[str, str, float, float]],
+    poses: Array | None = None,
+) -> Suggestion:
+    both = joined(own, there)
+    gains = []
+    for name, other, now, need in open_pairs:
+        g = both[name]
+        then = left_over(g, both[other]) if other else g.power
+        if then > _GAINS * now and then > 0.1 * need:
+            gains.append(Gain(name, other, now, then, need))
+    gains.sort(key=lambda gain: (gain.then < gain.needed, -gain.then / gain.needed))
+    return Suggestion(option.kind, option.words, tuple(gains), poses)
+
+
+def _poses(
+    grid: Extension,
+    own: Mapping[str, Signal],
+    effects: Mapping[str, Visible],
+    open_pairs: Sequence[tuple[str, str, float, float]],
+) -> Suggestion:
+    """The few poses that do most."""
+    there = signals_like(grid.plan, own)
+    problem = grid.plan.problem
+    # twins stay twins at any pose
+    pairs = [p for p in open_pairs if not p[1] or p[1] not in effects[p[0]].twins]
+    rows = chosen_poses(own, there, problem.row_of, pairs, MORE_POSES)
+    if not rows:
+        return Suggestion("poses", "", ())
+    some = np.isin(problem.row_of, rows)
+    few = {n: Signal(s.layout, s.shape, s.columns[some]) for n, s in there.items()}
+    assert grid.poses is not None
+    poses = grid.poses[rows]
+    count = f"{len(rows)} poses" if len(rows) > 1 else "one pose"
+    option = Extension("poses", f"add the {count} listed below", grid.plan)
+    return _suggestion(option, own, few, pairs, poses)
+
+
+__all__ = ["LEVEL", "POWER", "Plan", "Suggestion", "Visible", "make_plan"]

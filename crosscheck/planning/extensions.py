@@ -1,0 +1,206 @@
+"""What could be measured besides: sensors, a payload, the way back, more poses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from crosscheck.fit.candidates import null_fit
+from crosscheck.fit.problem import Problem
+from crosscheck.measurements.read import Measurements
+from crosscheck.planning.planned import LOAD_CELL, Planned, near_slack, planned
+from seecr.joints import pose_of_values, values_of_pose
+from seecr.pose import Array, quat_from_rotvec, quat_multiply
+from seecr.robot import Robot
+from seecr.workspace import feasible
+
+PAYLOAD = 0.25
+# Candidate poses: steps along x, y, z, and how far out of the planned region they go.
+_GRID, _BEYOND = (4, 3, 3), 0.25
+_TILT_RAD = np.radians(10.0)
+_TILTS = np.array(
+    [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1], [1, 1, 0], [0, 0, -1], [-1, 1, 0]]
+)
+_JOINT_POSES = 60
+# A pose with less than this part of the usual smallest stiffness is nearly free to move.
+_SOFT = 0.05
+_AN_HOUR = 3600.0
+
+
+@dataclass(frozen=True, eq=False)
+class Extension:
+    """Readings that could be added.
+
+    Attributes:
+        kind: "tensions", "payload", "way_back", "later" or "poses".
+        words: what to do. plan: the added readings.
+        poses: (k, 7) commanded, for added poses.
+    """
+
+    kind: str
+    words: str
+    plan: Planned
+    poses: Array | None = None
+
+
+def extensions(plan: Planned, kinds: Sequence[str]) -> Iterator[Extension]:
+    """All that can be added but poses, one after the other.
+
+    Args:
+        plan: what is planned so far.
+        kinds: what is read already.
+    """
+    problem = plan.problem
+    data = problem.data.rows(problem.use)
+    robot, sigma = problem.robot, problem.sigma
+    if "tension" not in kinds:
+        mean = float(np.mean(plan.base.state.prediction.tensions[problem.use]))
+        noise = float(f"{LOAD_CELL * mean:.1g}")
+        yield Extension(
+            "tensions",
+            f"record the cable tensions (to {noise:g} N)",
+            planned(robot, data, replace(sigma, tension_N=noise), ("tension",)),
+        )
+    if robot.mass > 0:
+        heavy = replace(robot, mass=(1.0 + PAYLOAD) * robot.mass)
+        yield Extension(
+            "payload",
+            f"repeat the poses with a known {PAYLOAD * robot.mass:.2g} kg more at the centre of "
+            "mass",
+            planned(heavy, data, sigma, kinds),
+        )
+    yield Extension(
+        "way_back",
+        "repeat each run in the opposite order, so that poses are reached from the other side",
+        planned(robot, _backwards(data), sigma, kinds),
+    )
+    if data.t_s is not None:
+        later = replace(data, t_s=data.t_s + float(np.ptp(data.t_s)) + _AN_HOUR, run=_named(data))
+        yield Extension("later", "repeat the poses an hour later", _after(problem, later, kinds))
+
+
+def _named(data: Measurements) -> np.ndarray:
+    return np.array([f"{name} again" for name in data.run.tolist()], dtype=np.str_)
+
+
+def _backwards(data: Measurements) -> Measurements:
+    """Each run from its last row to its first, at the same pace."""
+    order = np.concatenate([np.flatnonzero(data.run == name)[::-1] for name in data.runs])
+    turned = data.rows(order)
+    return replace(turned, run=_named(turned), t_s=data.t_s)
+
+
+def _after(problem: Problem, later: Measurements, kinds: Sequence[str]) -> Planned:
+    """Rows that come after the planned ones: what creeps goes by the clock through all."""
+    first = problem.data.rows(problem.use)
+    both = Measurements(
+        path=first.path,
+        n_cables=first.n_cables,
+        run=np.concatenate([first.run, later.run]),
+        line=np.concatenate([first.line, later.line]),
+        t_s=_stack(first.t_s, later.t_s),
+        command_pose=_stack(first.command_pose, later.command_pose),
+        command_lengths=_stack(first.command_lengths, later.command_lengths),
+        temperature_C=_stack(first.temperature_C, later.temperature_C),
+    )
+    whole = planned(problem.robot, both, problem.sigma, kinds)
+    added = np.arange(both.n_rows) >= first.n_rows
+    rest = whole.problem.only(added)
+    return Planned(rest, null_fit(rest, (), whole.factor, refit=False), whole.factor)
+
+
+def _stack(a: Array | None, b: Array | None) -> Array | None:
+    return None if a is None or b is None else np.concatenate([a, b])
+
+
+def more_poses(plan: Planned, kinds: Sequence[str]) -> Extension | None:
+    """Poses in and around the planned region, some tilted, at which the robot can hold still."""
+    problem = plan.problem
+    robot = problem.robot
+    poses = _jointed(plan) if robot.joints else _grid(plan)
+    poses = poses[feasible(robot, poses)]
+    if len(poses) == 0:
+        return None
+    found = planned(robot, _commands(problem, poses), problem.sigma, kinds)
+    poses = poses[_trustworthy(found, plan)]
+    if len(poses) == 0:
+        return None
+    found = planned(robot, _commands(problem, poses), problem.sigma, kinds)
+    return Extension("poses", "add poses", found, poses)
+
+
+def _trustworthy(candidates: Planned, plan: Planned) -> np.ndarray:
+    """(n,) poses whose sensitivities can be relied on: solved, stiff, no cable about to switch."""
+    usual = plan.base.state.prediction.solution().smallest_eigenvalue[plan.problem.use]
+    own = candidates.base.state.prediction.solution().smallest_eigenvalue
+    good = candidates.problem.use & (own > _SOFT * float(np.median(usual)))
+    for row, _cable in near_slack(candidates):
+        good[row] = False
+    return np.asarray(good)
+
+
+def _commands(problem: Problem, poses: Array) -> Measurements:
+    """Poses as rows, each a run of its own."""
+    data, n = problem.data, len(poses)
+    in_lengths = data.command_lengths is not None
+    return Measurements(
+        path=data.path,
+        n_cables=data.n_cables,
+        run=np.array([f"added {k + 1}" for k in range(n)]),
+        command_pose=None if in_lengths else poses,
+        command_lengths=problem.robot.commanded_lengths(poses) if in_lengths else None,
+        t_s=None if data.t_s is None else data.t_s.max() + 60.0 * np.arange(1.0, n + 1.0),
+        temperature_C=None
+        if data.temperature_C is None
+        else np.full(n, float(np.mean(data.temperature_C))),
+    )
+
+
+def _planned_poses(plan: Planned) -> Array:
+    problem = plan.problem
+    pose = problem.data.command_pose
+    pose = plan.base.state.prediction.poses if pose is None else pose
+    return pose[problem.use]
+
+
+def _grid(plan: Planned) -> Array:
+    """Positions on a grid, each level and with two tilts."""
+    robot, pose = plan.problem.robot, _planned_poses(plan)
+    low, high = _box(robot, pose[:, :3])
+    axes = [np.linspace(low[k], high[k], _GRID[k]) for k in range(3)]
+    place = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    n = len(place)
+    level = np.tile(robot.reference_pose[3:], (n, 1))
+    out = [np.concatenate([place, level], axis=1)]
+    for shift in (0, 3):
+        tilt = _TILT_RAD * _TILTS[(np.arange(n) + shift) % len(_TILTS)]
+        out.append(np.concatenate([place, quat_multiply(quat_from_rotvec(tilt), level)], axis=1))
+    return np.concatenate(out)
+
+
+def _box(robot: Robot, place: Array) -> tuple[Array, Array]:
+    """The planned region and somewhat more, inside the exit points."""
+    exits_low, exits_high = robot.exit_points.min(axis=0), robot.exit_points.max(axis=0)
+    low, high = place.min(axis=0), place.max(axis=0)
+    room = np.maximum(exits_high - exits_low, 0.2 * float(np.max(exits_high - exits_low)))
+    margin = _BEYOND * np.maximum(high - low, 0.2 * room)
+    inside = 0.1 * (exits_high - exits_low)
+    new_low, new_high = low - margin, high + margin
+    # sideways not beyond the exit points; upwards not into them
+    new_low[:2] = np.maximum(new_low[:2], np.minimum(exits_low[:2] + inside[:2], low[:2]))
+    new_high[:2] = np.minimum(new_high[:2], np.maximum(exits_high[:2] - inside[:2], high[:2]))
+    new_high[2] = min(new_high[2], max(exits_high[2] - 0.1 * room[2], high[2]))
+    return new_low, new_high
+
+
+def _jointed(plan: Planned) -> Array:
+    """Random joint values in and around the planned ones."""
+    robot = plan.problem.robot
+    values = values_of_pose(robot, _planned_poses(plan))[0]
+    low, high = values.min(axis=0), values.max(axis=0)
+    margin = _BEYOND * np.maximum(high - low, 0.2 * float(np.max(high - low)))
+    random = np.random.default_rng(0)
+    chosen = random.uniform(low - margin, high + margin, (_JOINT_POSES, len(low)))
+    return np.asarray(pose_of_values(robot, chosen)[0])

@@ -1,0 +1,91 @@
+"""Choose the poses that tell most: one after the other, each the best beside those before.
+
+For an effect g and its imitator h the signal left over is tr(M_gg - M_gh M_hh^+ M_hg) with M the
+sum of J^T J over all readings (diagnosis: T-criterion), so a pose is tried by adding its own M.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.planning.visibility import Signal
+from seecr.pose import Array
+
+# Directions of M_hh this much weaker than the strongest are none (squares of columns).
+_RANK = 1e-10
+Pair = tuple[str, str, float, float]
+
+
+def chosen_poses(
+    own: Mapping[str, Signal],
+    there: Mapping[str, Signal],
+    row_of: NDArray[np.integer],
+    pairs: Sequence[Pair],
+    most: int,
+) -> list[int]:
+    """Rows of the candidate poses to add, the best first.
+
+    Args:
+        own: signals in the readings planned so far.
+        there: the same effects' signals in the readings of all candidates.
+        row_of: (N,) candidate that each of those readings belongs to.
+        pairs: (effect, other or "", signal now, signal needed).
+        most: poses to choose.
+    """
+    if not pairs:
+        return []
+    names = list(own)
+    part = _parts(own)
+    whole = np.concatenate([own[n].columns for n in names], axis=1)
+    added = np.concatenate([there[n].columns for n in names], axis=1)
+    candidates = np.unique(row_of)
+    grams = np.stack([_gram(added[row_of == k]) for k in candidates])
+    total = _gram(whole)
+    chosen: list[int] = []
+    score = _scores(total[None], part, pairs)[0]
+    for _ in range(min(most, len(candidates))):
+        scores = _scores(total[None] + grams, part, pairs)
+        # once each: a pose measured again tells nothing new
+        scores[np.isin(candidates, chosen)] = -np.inf
+        best = int(np.argmax(scores))
+        if not scores[best] > score * (1.0 + 1e-6):
+            break
+        chosen.append(int(candidates[best]))
+        total, score = total + grams[best], float(scores[best])
+    return chosen
+
+
+def _parts(own: Mapping[str, Signal]) -> dict[str, slice]:
+    out, first = {}, 0
+    for name, signal in own.items():
+        out[name] = slice(first, first + signal.columns.shape[1])
+        first += signal.columns.shape[1]
+    return out
+
+
+def _gram(columns: Array) -> Array:
+    return np.asarray(columns.T @ columns)
+
+
+def _scores(grams: Array, part: Mapping[str, slice], pairs: Sequence[Pair]) -> Array:
+    """How far each candidate (k,) brings all pairs: mostly by what is needed, a little beyond."""
+    score = np.zeros(len(grams))
+    inverse: dict[str, Array] = {}
+    for name, other, _now, need in pairs:
+        g = part[name]
+        signal = np.trace(grams[:, g, g], axis1=1, axis2=2)
+        if other:
+            h = part[other]
+            if other not in inverse:
+                inverse[other] = np.asarray(
+                    np.linalg.pinv(grams[:, h, h], rcond=_RANK, hermitian=True), dtype=float
+                )
+            cross = grams[:, g, h]
+            imitated = np.einsum("kgh,khi,kgi->k", cross, inverse[other], cross, optimize=True)
+            signal = signal - imitated
+        ratio = np.maximum(signal, 0.0) / need
+        score += np.minimum(ratio, 1.0) + 0.01 * np.log1p(ratio)
+    return score

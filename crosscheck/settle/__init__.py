@@ -1,0 +1,1 @@
+"""MuJoCo brings a robot to rest: plain settling, then a polish."""

@@ -1,0 +1,298 @@
+"""One cable robot inside MuJoCo: cables, load and pose in; forces, energy and tensions out.
+
+Nothing here comes from seecr's statics: the file is compiled by MuJoCo itself, and every force
+is MuJoCo's.
+"""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from copy import copy
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.errors import CrosscheckError
+from crosscheck.settle.mujoco_model import (
+    change_mass_unit,
+    check_cables,
+    compile_model,
+    platform_of,
+    switch_off,
+)
+from seecr.pose import Array, pose_difference
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+# MuJoCo's implicit step takes generalised forces below some 1e-8 (in its own units) for zero, so a
+# light platform would stop moving before its forces balance. The unit of mass is free in mechanics:
+# we choose it so that the platform has about this mass. A power of two, so no digit changes.
+_MASS_IN_MUJOCO = 1e6
+_FREE = int(mujoco.mjtJoint.mjJNT_FREE)
+_HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
+
+
+class Physics:
+    """MuJoCo's model and state of one platform on cables.
+
+    What the methods take and give is in SI units; ``model`` and ``data`` count mass in
+    ``mass_unit``, so forces and energies read from them have to be multiplied by it.
+
+    Attributes:
+        source: the file or the model it was made from.
+        model: MuJoCo's model, a copy of the caller's; its springs and load are ours to change.
+        data: MuJoCo's state.
+        mass_unit: MuJoCo's unit of mass here [kg].
+        body: number of the platform's body.
+        is_free: whether it has a free joint (else slide and hinge joints).
+        length: the robot's own length [m], which weighs newton-metres against newtons: half the
+            largest distance of two anchor points, at least a hundredth of the longest distance
+            from the reference position to an exit point.
+        rotations: (d,) which coordinates are angles.
+        metre: (d,) [m] what one unit of each coordinate counts as: 1, or the length for angles.
+        force_scale: [N] what residuals are relative to: weight, plus force and torque over length
+            of the wrench; without any load, the cables' own forces.
+        wrench: (6,) [N, N m] as set.
+        ignored: sentences, what of the MJCF is switched off here.
+    """
+
+    def __init__(self, source: str | Path | mujoco.MjModel) -> None:
+        """Compile an MJCF file, or copy a compiled model.
+
+        Raises:
+            InputFileError: no such file, not MJCF, or not one platform on cables.
+        """
+        self.source = copy(source) if isinstance(source, mujoco.MjModel) else source
+        self.name = "model" if isinstance(source, mujoco.MjModel) else str(source)
+        self.model = compile_model(source)
+        self.body = platform_of(self.model, self.name)
+        self.is_free = int(self.model.jnt_type[self.model.body_jntadr[self.body]]) == _FREE
+        check_cables(self.model, self.body, self.name)
+        sites = self.model.wrap_objid[: 2 * self.n_cables]
+        on_body = self.model.site_bodyid[sites] == self.body
+        self._anchor_sites, self._exit_sites = sites[on_body], sites[~on_body]
+        self.ignored = switch_off(self.model)
+        self.mass = float(self.model.body_mass[self.body])
+        self.mass_unit = 2.0 ** round(float(np.log2(self.mass / _MASS_IN_MUJOCO)))
+        change_mass_unit(self.model, self.mass_unit)
+        self.data = mujoco.MjData(self.model)
+        self.reference_qpos = self.model.qpos0.copy()
+        self.reference_gravity = self.model.opt.gravity.copy()
+        self.wrench = np.zeros(6)
+        mujoco.mj_forward(self.model, self.data)
+        self.length = self._characteristic_length()
+        # One length for rotations makes all coordinates metres: residuals and eigenvalues compare.
+        self.rotations = self._which_rotate()
+        self.metre = np.where(self.rotations, self.length, 1.0)
+        self.force_scale = 1.0
+        self.set_load()
+
+    @property
+    def n_cables(self) -> int:
+        """Number of cables m."""
+        return int(self.model.ntendon)
+
+    @property
+    def n_dof(self) -> int:
+        """Degrees of freedom d of the platform."""
+        return int(self.model.nv)
+
+    @property
+    def stiffness(self) -> Array:
+        """Stiffness of the cables, (m,) [N/m]."""
+        return np.asarray(self.model.tendon_stiffness * self.mass_unit)
+
+    @property
+    def rest_lengths(self) -> Array:
+        """Rest lengths of the cables, (m,) [m]."""
+        return np.asarray(self.model.tendon_lengthspring[:, 1])
+
+    @property
+    def inertia(self) -> Array:
+        """Inertia of each coordinate at the reference, (d,) [kg or kg m^2]."""
+        return np.asarray(self.model.dof_M0 * self.mass_unit)
+
+    @property
+    def kinetic_energy(self) -> float:
+        """Kinetic energy [J] as of the last step's beginning."""
+        return float(self.data.energy[1]) * self.mass_unit
+
+    @property
+    def steers(self) -> bool:
+        """Whether something has to be done at every step: here, a wrench to be applied."""
+        return bool(self.wrench.any())
+
+    def set_cables(self, rest_lengths: Array, ea: Array) -> None:
+        """Make each cable a spring that only pulls, of stiffness EA/l0 (paper, step 8).
+
+        Args:
+            rest_lengths: (m,) [m].
+            ea: k_c = E S of each cable, (m,) [N].
+        """
+        rest = self._per_cable("rest_lengths", rest_lengths, "m")
+        stiff = self._per_cable("ea", ea, "N")
+        self.model.tendon_lengthspring[:, 0] = 0.0
+        self.model.tendon_lengthspring[:, 1] = rest
+        self.model.tendon_stiffness[:] = stiff / rest / self.mass_unit
+
+    def set_load(self, wrench: Array | None = None, gravity: Array | None = None) -> None:
+        """Set the constant wrench and gravity, and with them the scale of forces.
+
+        Args:
+            wrench: (6,) [N, N m] at the platform's origin, in the base frame.
+            gravity: (3,) [m/s^2] in the base frame; None takes the MJCF's.
+        """
+        self.wrench = _finite("wrench", np.zeros(6) if wrench is None else wrench, (6,))
+        gravity = self.reference_gravity if gravity is None else gravity
+        self.model.opt.gravity[:] = _finite("gravity", gravity, (3,))
+        weight = self.mass * float(np.linalg.norm(self.model.opt.gravity))
+        force, torque = np.linalg.norm(self.wrench[:3]), np.linalg.norm(self.wrench[3:])
+        self.force_scale = weight + float(force) + float(torque) / self.length
+
+    def place(self, pose: Array) -> None:
+        """Put the platform at rest at a pose (7,), or as near to it as its joints allow."""
+        pose = _finite("pose", pose, (7,))
+        norm = float(np.linalg.norm(pose[3:]))
+        if abs(norm - 1.0) > 1e-3:
+            raise CrosscheckError(f"pose: expected a quaternion of norm 1, got norm {norm:g}")
+        self.data.qvel[:] = 0.0
+        self.data.time = 0.0
+        if self.is_free:
+            self.data.qpos[:3] = pose[:3]
+            self.data.qpos[3:] = pose[3:] / norm
+        else:
+            self._joints_towards(pose)
+        self.update()
+        if self.force_scale == 0.0:  # no load: the cables' own forces are the measure
+            pull = self.stiffness * self.rest_lengths
+            self.force_scale = float(max(np.sum(self.tensions()), 1e-6 * np.max(pull)))
+
+    def pose(self) -> Array:
+        """Pose (7,) of the platform's body as of the last update."""
+        quat = self.data.xquat[self.body]
+        return np.concatenate([self.data.xpos[self.body], quat * np.copysign(1.0, quat[0])])
+
+    def update(self) -> None:
+        """Bring body poses and cable lengths up to the present qpos."""
+        mujoco.mj_kinematics(self.model, self.data)
+        mujoco.mj_comPos(self.model, self.data)
+        mujoco.mj_tendon(self.model, self.data)
+
+    def residual(self) -> Array:
+        """Unbalanced generalised force (d,) [N, N m] at rest at the present qpos.
+
+        MuJoCo's inverse dynamics at zero velocity and acceleration gives the force that would
+        hold the platform there; what the external wrench does not give is unbalanced.
+        """
+        self.data.qvel[:] = 0.0
+        self.data.qacc[:] = 0.0
+        mujoco.mj_inverse(self.model, self.data)
+        self.push()
+        return np.asarray(self.mass_unit * (self.data.qfrc_applied - self.data.qfrc_inverse))
+
+    def push(self) -> None:
+        """Apply the constant wrench at the present pose, as MuJoCo's generalised force."""
+        # Not through xfrc_applied: that acts at the centre of mass, so its torque would have to
+        # follow the offset as the platform turns. Nor as qpos-independent qfrc_applied: the
+        # free joint's torque is in body axes.
+        self.data.qfrc_applied[:] = 0.0
+        if self.wrench.any():
+            where = self.data.xpos[self.body]
+            force, torque = self.wrench[:3] / self.mass_unit, self.wrench[3:] / self.mass_unit
+            mujoco.mj_applyFT(
+                self.model, self.data, force, torque, where, self.body, self.data.qfrc_applied
+            )
+
+    def relative(self, force: Array) -> float:
+        """Size of a generalised force (d,) relative to the load, torques over the length."""
+        return float(np.linalg.norm(force / self.metre)) / self.force_scale
+
+    def rounding(self) -> float:
+        """Relative residual that rounding alone can leave: stiffness times the ulp of lengths."""
+        size = np.maximum(self.rest_lengths, np.max(np.abs(self.exit_points())))
+        pull = float(np.linalg.norm(self.stiffness * size))
+        return float(np.finfo(float).eps) * pull / self.force_scale
+
+    def tensions(self) -> Array:
+        """Tensions (m,) [N] as of the last update; exactly 0 where the cable is slack."""
+        stretch = self.data.ten_length - self.rest_lengths
+        return np.asarray(self.stiffness * np.maximum(stretch, 0.0))
+
+    def exit_points(self) -> Array:
+        """Exit points A_i (m, 3) [m] in the base frame."""
+        return np.asarray(self.data.site_xpos[self._exit_sites])
+
+    def energy(self) -> float:
+        """Potential energy [J] at the present qpos: MuJoCo's springs and gravity.
+
+        Gravity counts from the base frame's origin. The external force's potential -F.t is
+        included; a constant torque has none.
+        """
+        self.update()
+        mujoco.mj_energyPos(self.model, self.data)
+        stored = float(self.data.energy[0]) * self.mass_unit
+        return stored - float(self.wrench[:3] @ self.data.xpos[self.body])
+
+    def move(self, change: Array) -> None:
+        """Move by a generalised displacement (d,), rotations of a free joint in body axes."""
+        mujoco.mj_integratePos(self.model, self.data.qpos, change, 1.0)
+
+    @contextmanager
+    def frozen_slack(self, taut: NDArray[np.bool_]) -> Iterator[None]:
+        """Let some cables (m,) pull and push, the others vanish: smooth, for Newton's method."""
+        spring, stiffness = self.model.tendon_lengthspring, self.model.tendon_stiffness
+        kept = stiffness.copy()
+        stiffness[~taut] = 0.0
+        spring[:, 0] = spring[:, 1]
+        try:
+            yield
+        finally:
+            spring[:, 0] = 0.0
+            stiffness[:] = kept
+
+    def _per_cable(self, name: str, values: Array, unit: str) -> Array:
+        array = _finite(name, values, (self.n_cables,))
+        if not np.all(array > 0.0):
+            i = int(np.argmin(array))
+            raise CrosscheckError(
+                f"{name}: expected positive numbers [{unit}], got {array[i]:g} for cable {i + 1}"
+            )
+        return array
+
+    def _joints_towards(self, pose: Array) -> None:
+        """Gauss-Newton on the joints, from the reference, until the pose is as near as it gets."""
+        self.data.qpos[:] = self.reference_qpos
+        weigh = np.array([1.0, 1.0, 1.0] + 3 * [self.length])
+        jacobian = np.zeros((6, self.n_dof))
+        for _ in range(50):
+            self.update()
+            gap = weigh * pose_difference(pose, self.pose())
+            mujoco.mj_jacBody(self.model, self.data, jacobian[:3], jacobian[3:], self.body)
+            step = np.linalg.lstsq(weigh[:, None] * jacobian, gap, rcond=None)[0]
+            self.data.qpos += step
+            if np.linalg.norm(step * self.metre) < 1e-15 * self.length:
+                break
+
+    def _which_rotate(self) -> Array:
+        if self.is_free:
+            return np.array([False] * 3 + [True] * 3)
+        return np.asarray(self.model.jnt_type == _HINGE)
+
+    def _characteristic_length(self) -> float:
+        anchors = self.model.site_pos[self._anchor_sites]
+        reach = np.max(np.linalg.norm(anchors[:, None] - anchors[None], axis=-1)) / 2.0
+        exits = self.exit_points() - self.data.xpos[self.body]
+        return float(max(reach, 0.01 * np.max(np.linalg.norm(exits, axis=-1))))
+
+
+def _finite(name: str, values: Array, shape: tuple[int, ...]) -> Array:
+    array = np.asarray(values, dtype=float)
+    if array.shape != shape:
+        raise CrosscheckError(f"{name}: expected shape {shape}, got {array.shape}")
+    if not np.all(np.isfinite(array)):
+        raise CrosscheckError(f"{name}: expected finite numbers, got {array}")
+    return array

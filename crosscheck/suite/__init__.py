@@ -1,0 +1,1 @@
+"""SEECR held against MuJoCo, pose by pose: what `crosscheck run` does."""

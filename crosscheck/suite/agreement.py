@@ -1,0 +1,144 @@
+"""How far SEECR and MuJoCo are apart at each pose, and how far they may be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seecr.pose import Array, pose_difference
+
+if TYPE_CHECKING:
+    from crosscheck.settle.settling import SettlingBatch
+    from crosscheck.suite.thresholds import Thresholds
+    from seecr.equilibrium import Solution
+
+QUANTITIES = (
+    "settled_position_m",
+    "settled_orientation_rad",
+    "position_m",
+    "orientation_rad",
+    "tension_N",
+)
+"""What thresholds apply to; ``settled_`` is MuJoCo after plain settling, the rest polished."""
+
+
+@dataclass(frozen=True, eq=False)
+class Differences:
+    """MuJoCo against SEECR at n poses; NaN where one of them has no answer.
+
+    Attributes:
+        settled_position_m: (n,) [m] distance after plain settling.
+        settled_orientation_rad: (n,) [rad] angle between them after plain settling.
+        position_m: (n,) [m] distance after the polish.
+        orientation_rad: (n,) [rad] angle after the polish.
+        cable_tension_N: (n, m) [N] of each cable, not negative, after the polish.
+        slack_same: (n,) both find the same cables slack. A cable that one of them finds slack
+            and the other taut by less than the allowed difference of tension counts as same.
+    """
+
+    settled_position_m: Array
+    settled_orientation_rad: Array
+    position_m: Array
+    orientation_rad: Array
+    cable_tension_N: Array
+    slack_same: NDArray[np.bool_]
+
+    @property
+    def tension_N(self) -> Array:
+        """Largest difference of a tension at each pose, (n,) [N]."""
+        return np.asarray(self.cable_tension_N.max(axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Allowance:
+    """Largest difference that counts as agreement at each of n poses.
+
+    The thresholds, except where a robot is so nearly singular that the forces left unbalanced
+    move it further: residual over the smallest eigenvalue of the stiffness is allowed then.
+
+    Attributes:
+        settled_position_m, settled_orientation_rad, position_m, orientation_rad, tension_N:
+            (n,) as in :class:`Differences`.
+        widened: (n,) whether any of them is wider than its threshold.
+    """
+
+    settled_position_m: Array
+    settled_orientation_rad: Array
+    position_m: Array
+    orientation_rad: Array
+    tension_N: Array
+    widened: NDArray[np.bool_]
+
+
+def allowances(thresholds: Thresholds, solution: Solution, settling: SettlingBatch) -> Allowance:
+    """Thresholds, widened by residual over smallest eigenvalue where that is more."""
+    load = solution.tables.scale
+    softest = np.fmin(solution.smallest_eigenvalue, settling.smallest_eigenvalue)
+    # At or below rounding there is no stiffness to divide by: the thresholds hold as they are.
+    firm = softest > settling.neutral
+    per_newton = np.divide(1.0, softest, out=np.zeros_like(softest), where=firm)
+    length = solution.robot.length
+    rough = load * _known(solution.residual + settling.settled_residual) * per_newton
+    fine = load * _known(solution.residual + settling.residual) * per_newton
+    slack = {
+        "settled_position_m": rough,
+        "settled_orientation_rad": rough / length,
+        "position_m": fine,
+        "orientation_rad": fine / length,
+        # A soft direction is soft because tensions hardly change along it.
+        "tension_N": np.zeros_like(fine),
+    }
+    base = _by_quantity(thresholds)
+    wide = {name: np.maximum(base[name], slack[name]) for name in QUANTITIES}
+    widened = np.any([slack[name] > base[name] for name in QUANTITIES], axis=0)
+    return Allowance(**wide, widened=widened)
+
+
+def compare(solution: Solution, settling: SettlingBatch, tension_allowed: Array) -> Differences:
+    """MuJoCo's answers against SEECR's.
+
+    Args:
+        solution: n poses.
+        settling: the same n poses.
+        tension_allowed: (n,) [N] below which a taut cable may be slack for the other.
+    """
+    rough = pose_difference(settling.settled_pose, solution.pose)
+    fine = pose_difference(settling.pose, solution.pose)
+    tension = np.abs(settling.tensions - solution.tensions)
+    larger = np.fmax(settling.tensions, solution.tensions)
+    same = (settling.slack == solution.slack) | (larger <= tension_allowed[:, None])
+    return Differences(
+        settled_position_m=np.linalg.norm(rough[:, :3], axis=1),
+        settled_orientation_rad=np.linalg.norm(rough[:, 3:], axis=1),
+        position_m=np.linalg.norm(fine[:, :3], axis=1),
+        orientation_rad=np.linalg.norm(fine[:, 3:], axis=1),
+        cable_tension_N=tension,
+        slack_same=same.all(axis=1),
+    )
+
+
+def ratios(difference: Differences, allowance: Allowance) -> Array:
+    """Each difference over what is allowed, (n, 5) in the order of ``QUANTITIES``."""
+    parts = [getattr(difference, name) / getattr(allowance, name) for name in QUANTITIES]
+    return np.stack(parts, axis=1)
+
+
+def within(difference: Differences, allowance: Allowance) -> NDArray[np.bool_]:
+    """Where all differences are allowed and the same cables are slack, (n,)."""
+    close = np.all(ratios(difference, allowance) <= 1.0, axis=1)  # False where NaN
+    return np.asarray(close & difference.slack_same)
+
+
+def _by_quantity(thresholds: Thresholds) -> dict[str, float]:
+    settled = {f"settled_{f.name}": f.name for f in fields(thresholds.settled)}
+    values = {name: getattr(thresholds.settled, key) for name, key in settled.items()}
+    polished = {f.name: getattr(thresholds.polished, f.name) for f in fields(thresholds.polished)}
+    return {**values, **polished}
+
+
+def _known(residual: Array) -> Array:
+    """Residuals, nothing where there is no answer: NaN and infinity widen no threshold."""
+    return np.where(np.isfinite(residual), residual, 0.0)

@@ -1,0 +1,261 @@
+"""The cross-check suite: every pose of every case solved by SEECR and settled by MuJoCo."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.errors import InputFileError
+from crosscheck.suite.agreement import (
+    QUANTITIES,
+    Allowance,
+    Differences,
+    allowances,
+    compare,
+    ratios,
+)
+from crosscheck.suite.cases import Case
+from crosscheck.suite.pool import Pool
+from crosscheck.suite.side import MujocoSide
+from crosscheck.suite.thresholds import Thresholds
+from crosscheck.suite.verdicts import UNSOLVED, Answers, Finding, Verdict, judge
+from seecr.equilibrium import Solution
+from seecr.equilibrium import solve as seecr_solve
+from seecr.mjcf import load_robot
+from seecr.pose import Array
+from seecr.robot import Robot
+
+if TYPE_CHECKING:
+    from crosscheck.settle.settling import SettlingBatch
+    from crosscheck.suite.effect_suite import EffectResult
+
+# SEECR takes microseconds: the best of this many runs is what it needs, the rest is the machine.
+_REPEATS = 3
+
+EXIT_AGREES, EXIT_DIFFERS, EXIT_UNSOLVED = 0, 1, 3
+
+
+@dataclass(frozen=True, eq=False)
+class Worst:
+    """The largest difference of one quantity over a case, against what was allowed there.
+
+    Attributes:
+        quantity: one of ``QUANTITIES``.
+        value: the difference [m, rad or N].
+        allowed: at that pose.
+        pose: its number in the case, from 0.
+    """
+
+    quantity: str
+    value: float
+    allowed: float
+    pose: int
+
+    @property
+    def ratio(self) -> float:
+        """Difference over what is allowed: above 1 it fails."""
+        return self.value / self.allowed
+
+
+@dataclass(frozen=True, eq=False)
+class CaseResult:
+    """One case as both physics answered it. All arrays have the n poses of the case in order.
+
+    Attributes:
+        case: what was run; ``case.poses`` (n, 7) are the commanded poses.
+        robot: as SEECR read it, on the case's cable.
+        solution: SEECR's answers: ``pose`` (n, 7), ``tensions`` (n, m) [N], ``slack`` (n, m),
+            ``deviation`` (n, 6), ``residual``, ``status``, ``smallest_eigenvalue``, ... (n,).
+        settling: MuJoCo's answers, the same way: ``settled_pose`` (n, 7) after plain settling,
+            ``pose`` (n, 7), ``tensions`` (n, m) [N], ``slack`` (n, m) after the polish,
+            ``settled_residual``, ``residual``, ``steps``, ``simulated_s``, ``settle_wall_s``,
+            ``polish_wall_s``, ``status``, ``smallest_eigenvalue``, ... (n,).
+        mujoco_rest_lengths: (n, m) [m] as MuJoCo's side paid them out.
+        difference: between the two, NaN where one has no answer.
+        allowance: what may differ, (n,) each.
+        verdict: (n,) of :class:`crosscheck.suite.verdicts.Verdict`.
+        findings: more about every pose whose verdict is not ``AGREES``.
+        seecr_s: [s] SEECR took for all poses on one processor, compiled beforehand.
+        wall_s: [s] the whole case took, recording included.
+        recording: name of its recording in the results' folder; None if there is none.
+    """
+
+    case: Case
+    robot: Robot
+    solution: Solution
+    settling: SettlingBatch
+    mujoco_rest_lengths: Array
+    difference: Differences
+    allowance: Allowance
+    verdict: NDArray[np.object_]
+    findings: tuple[Finding, ...]
+    seecr_s: float
+    wall_s: float = np.nan
+    recording: str | None = None
+
+    def __len__(self) -> int:
+        return len(self.verdict)
+
+    def count(self, verdict: Verdict) -> int:
+        """Number of poses with a verdict."""
+        return int(np.sum(self.verdict == verdict))
+
+    @property
+    def compared(self) -> NDArray[np.bool_]:
+        """Poses whose differences mean something: no free motion or branch between, (n,)."""
+        return (self.verdict == Verdict.AGREES) | (self.verdict == Verdict.DIFFERS)
+
+    @property
+    def exit_status(self) -> int:
+        """0 agrees, 1 a threshold exceeded, 3 a solve did not converge."""
+        if self.count(Verdict.DIFFERS):
+            return EXIT_DIFFERS
+        return EXIT_UNSOLVED if any(self.count(v) for v in UNSOLVED) else EXIT_AGREES
+
+    @property
+    def worst(self) -> dict[str, Worst]:
+        """Largest difference of each quantity over its allowance; none if nothing compares."""
+        rows = np.flatnonzero(self.compared)
+        if len(rows) == 0:
+            return {}
+        table = ratios(self.difference, self.allowance)[rows]
+        found = {}
+        for name, column in zip(QUANTITIES, table.T, strict=True):
+            i = int(rows[np.argmax(column)])
+            value, allowed = getattr(self.difference, name)[i], getattr(self.allowance, name)[i]
+            found[name] = Worst(name, float(value), float(allowed), i)
+        return found
+
+    @property
+    def seecr_us(self) -> float:
+        """Microseconds that SEECR takes a pose, on one processor."""
+        return 1e6 * self.seecr_s / len(self)
+
+    @property
+    def mujoco_ms(self) -> float:
+        """Milliseconds that MuJoCo takes a pose, both stages, on one processor."""
+        return 1e3 * float(np.sum(self.settling.wall_s)) / len(self)
+
+    def side(self) -> MujocoSide:
+        """MuJoCo's side of the case, anew: to settle one of its poses again."""
+        return MujocoSide(self.case.mujoco_model, self.case.mujoco_ea)
+
+
+def run_case(case: Case, thresholds: Thresholds, folder: Path | None = None) -> CaseResult:
+    """Solve and settle the poses of a case and compare them.
+
+    Args:
+        case: what to run.
+        thresholds: what counts as agreement.
+        folder: where to write its recording; None writes none.
+    """
+    began = time.perf_counter()
+    robot = load_robot(case.model)
+    if case.ea is not None:
+        robot = replace(robot, ea=np.full(robot.n_cables, case.ea))
+    solution, seecr_s = _solve(robot, case.poses)
+    side = MujocoSide(case.mujoco_model, case.mujoco_ea)
+    _check_same_cables(case, robot, side)
+    settling = side.settle(case.poses)
+    allowance = allowances(thresholds, solution, settling)
+    difference = compare(solution, settling, allowance.tension_N)
+    answers = Answers(side, solution, settling, difference, allowance)
+    verdict, findings = judge(answers)
+    result = CaseResult(
+        case=case,
+        robot=robot,
+        solution=solution,
+        settling=settling,
+        mujoco_rest_lengths=side.rest_lengths(case.poses),
+        difference=difference,
+        allowance=allowance,
+        verdict=verdict,
+        findings=findings,
+        seecr_s=seecr_s,
+    )
+    name = None if folder is None else _record(result, folder)
+    return replace(result, recording=name, wall_s=time.perf_counter() - began)
+
+
+def run_suite(
+    cases: Sequence[Case],
+    thresholds: Thresholds,
+    *,
+    jobs: int = 1,
+    folder: Path | None = None,
+    progress: Callable[[CaseResult], None] | None = None,
+    pool: Pool | None = None,
+) -> list[CaseResult]:
+    """Run cases, several at a time.
+
+    Args:
+        cases: what to run.
+        thresholds: what counts as agreement.
+        jobs: how many at a time.
+        folder: where to write recordings; None writes none.
+        progress: called with each result as it comes.
+        pool: processes to run in, instead of ``jobs`` of its own.
+
+    Returns:
+        the results in the order of the cases.
+    """
+    if not cases:
+        return []
+    if pool is None:
+        with Pool(min(jobs, len(cases))) as own:
+            return run_suite(cases, thresholds, folder=folder, progress=progress, pool=own)
+    if pool.jobs > 1:
+        warm_up(cases[0])
+    one = partial(run_case, thresholds=thresholds, folder=folder)
+    order = sorted(range(len(cases)), key=lambda i: -len(cases[i].poses))
+    return pool.run(one, cases, order, progress or (lambda result: None))
+
+
+def warm_up(case: Case) -> None:
+    """Have the compiled loop on disk before several processes want it."""
+    seecr_solve(load_robot(case.model), case.poses[:1])
+
+
+def exit_status(results: Sequence[CaseResult | EffectResult]) -> int:
+    """0 all agree (findings allowed), 1 a threshold exceeded, 3 a solve did not converge."""
+    statuses = {result.exit_status for result in results}
+    return next((s for s in (EXIT_DIFFERS, EXIT_UNSOLVED) if s in statuses), EXIT_AGREES)
+
+
+def worst_of(results: Sequence[CaseResult]) -> tuple[CaseResult, Worst] | None:
+    """The case and difference nearest to, or furthest beyond, what is allowed."""
+    pairs = [(result, worst) for result in results for worst in result.worst.values()]
+    return max(pairs, key=lambda pair: pair[1].ratio, default=None)
+
+
+def _solve(robot: Robot, poses: Array) -> tuple[Solution, float]:
+    seecr_solve(robot, poses[:1])
+    best = np.inf
+    for _ in range(_REPEATS):
+        began = time.perf_counter()
+        solution = seecr_solve(robot, poses, threads=1)
+        best = min(best, time.perf_counter() - began)
+    return solution, best
+
+
+def _check_same_cables(case: Case, robot: Robot, side: MujocoSide) -> None:
+    m = side.settler.physics.n_cables
+    if m != robot.n_cables:
+        raise InputFileError(
+            f"{case.mujoco_model}: {m} cables; expected {robot.n_cables} as in {case.model}"
+        )
+
+
+def _record(result: CaseResult, folder: Path) -> str:
+    from crosscheck.recording import write_case_recording
+
+    name = f"{result.case.name}.rrd"
+    write_case_recording(result, folder / name)
+    return name

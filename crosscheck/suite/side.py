@@ -1,0 +1,100 @@
+"""MuJoCo's side of the suite: one robot settled, with lengths that MuJoCo measured itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from crosscheck.settle.settler import Settler, settle_batch
+from crosscheck.settle.settling import Settling, SettlingBatch
+from seecr.pose import Array, pose_difference, quat_from_rotvec, quat_multiply, quat_rotate
+
+# Points looked at between two poses that should be joined by a free motion.
+_STATIONS = 9
+# A turn [rad] below which a screw is straight to rounding, and its axis is lost in it.
+_STRAIGHT = 1e-7
+
+
+class MujocoSide:
+    """A robot in MuJoCo that is commanded in poses, as SEECR is.
+
+    Attributes:
+        settler: the robot, at rest where asked.
+        pretension: (m,) [m] rest lengths of the MJCF less the straight lengths at its reference.
+    """
+
+    def __init__(self, model: str | Path, ea: float | Array | None = None) -> None:
+        """Compile the robot.
+
+        Args:
+            model: MJCF file.
+            ea: k_c = E S [N], one number or (m,); None takes the MJCF's.
+        """
+        self.settler = Settler(model, ea=ea)
+        physics = self.settler.physics
+        # The compiled model stands at its reference pose, its springs still as in the file.
+        self.pretension = physics.rest_lengths - physics.data.ten_length
+
+    def rest_lengths(self, poses: Array) -> Array:
+        """Lengths (n, m) [m] paid out for commanded poses (n, 7), from MuJoCo's kinematics."""
+        physics = self.settler.physics
+        lengths = np.empty((len(poses), physics.n_cables))
+        for i, pose in enumerate(poses):
+            physics.place(pose)
+            lengths[i] = physics.data.ten_length
+        return lengths + self.pretension
+
+    def settle(self, poses: Array) -> SettlingBatch:
+        """Bring the platform to rest from commanded poses (n, 7), each by itself."""
+        return settle_batch(self.settler, poses, self.rest_lengths(poses))
+
+    def settle_from(self, start: Array, command: Array) -> Settling:
+        """Rest with the lengths of one command (7,), started from another pose (7,)."""
+        return self.settler.settle(start, self.rest_lengths(command[None])[0])
+
+    def energy(self, pose: Array, command: Array) -> float:
+        """Potential energy [J] at a pose (7,) with the lengths of a command (7,)."""
+        return self.settler.energy(pose, self.rest_lengths(command[None])[0])
+
+    def qpos(self, pose: Array) -> Array:
+        """MuJoCo's coordinates (nq,) of a pose (7,)."""
+        self.settler.physics.place(pose)
+        return np.asarray(self.settler.physics.data.qpos.copy())
+
+    def imbalance_between(self, pose_a: Array, pose_b: Array, command: Array) -> float:
+        """Largest unbalanced force, relative to the load, on the screw from pose a to pose b.
+
+        Zero up to rounding says that the platform is free to move from one to the other.
+        """
+        physics = self.settler.physics
+        physics.set_cables(self.rest_lengths(command[None])[0], self.settler.ea)
+        physics.set_load()
+        sizes = []
+        for pose in screw_motion(pose_a, pose_b, _STATIONS):
+            physics.place(pose)
+            sizes.append(physics.relative(physics.residual()))
+        return max(sizes)
+
+
+def screw_motion(pose_a: Array, pose_b: Array, k: int) -> Array:
+    """Poses (k, 7) from pose a to pose b along the one screw that joins them (Chasles).
+
+    Unlike interpolation of position and orientation apart, it keeps to a turn about a fixed
+    axis where that is what leads from a to b.
+    """
+    change = pose_difference(pose_b, pose_a)
+    shift, turn = change[:3], change[3:]
+    angle = float(np.linalg.norm(turn))
+    part = np.linspace(0.0, 1.0, k)[:, None]
+    quats = quat_from_rotvec(part * turn)
+    along, arm = shift, np.zeros(3)
+    if angle > _STRAIGHT:
+        axis = turn / angle
+        along = (shift @ axis) * axis
+        across = shift - along
+        # From the axis to the platform: half the chord away from it, by the cotangent sideways.
+        arm = -0.5 * (across + np.cross(axis, across) / np.tan(0.5 * angle))
+    positions = pose_a[:3] + part * along + quat_rotate(quats, arm) - arm
+    turned = quat_multiply(quats, pose_a[3:])
+    return np.concatenate([positions, turned], axis=1)

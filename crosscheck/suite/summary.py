@@ -1,0 +1,82 @@
+"""The suite's results as ``summary.md``, fit for the step summary of continuous integration."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from crosscheck.suite import effect_words as effect_figures
+from crosscheck.suite import words as figures
+
+if TYPE_CHECKING:
+    from crosscheck.suite.results import Run
+    from crosscheck.suite.run import CaseResult
+
+
+def summary_md(run: Run, worst_pose: str) -> str:
+    """The verdict, a table of the cases, then failures, findings, widened thresholds, effects.
+
+    Args:
+        run: what to tell about.
+        worst_pose: sentence about the file with the worst pose.
+    """
+    parts = ["# SEECR against MuJoCo", figures.verdict_line(run)]
+    if run.results:
+        parts += _cases(run, worst_pose)
+    if run.effects:
+        parts += _effects(run)
+    parts.append(
+        f"{run.wall_s:.1f} s with {run.jobs} at a time; random numbers of seed {run.seed}."
+    )
+    return "\n\n".join(parts) + "\n"
+
+
+def _cases(run: Run, worst_pose: str) -> list[str]:
+    parts = [
+        _table(run),
+        "Largest differences between SEECR and MuJoCo over each case's poses; `settled` is MuJoCo "
+        "brought to rest by its own dynamics, `polished` and the tensions after Newton's method on "
+        f"its inverse dynamics. Times are a pose, on one processor. {worst_pose}",
+    ]
+    parts += _section(run, "Failures", figures.failures)
+    parts += _section(run, "Findings", figures.findings)
+    parts += _section(run, "Widened thresholds", figures.widened)
+    return parts
+
+
+def _effects(run: Run) -> list[str]:
+    """How they ended, those that failed, and a folded table of all."""
+    heads = effect_figures.TABLE_HEADS
+    rule = ["---", "---", *["---:"] * (len(heads) - 3), "---"]
+    table = "\n".join(_row(row) for row in [heads, rule, *map(effect_figures.cells, run.effects)])
+    failed = [f"- {line}" for line in effect_figures.failures(run.effects)]
+    return [
+        "## Effects",
+        effect_figures.line(run.effects),
+        *(["\n".join(failed)] if failed else []),
+        f"<details><summary>All {len(run.effects)}</summary>\n\n{table}\n\n</details>",
+    ]
+
+
+def _table(run: Run) -> str:
+    heads = figures.TABLE_HEADS
+    rule = ["---", *["---:"] * (len(heads) - 3), "---", "---"]
+    rows = [heads, rule, *(figures.cells(r) for r in run.results), figures.threshold_cells(run)]
+    return "\n".join(_row(row) for row in rows)
+
+
+def _row(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+def _section(run: Run, title: str, lines: Callable[[CaseResult], list[str]]) -> list[str]:
+    """A heading and, a case at a time, folded lists; nothing where there is nothing to say."""
+    found = [(result, lines(result)) for result in run.results]
+    blocks = [
+        f"<details><summary>{result.case.name}: {len(items)}</summary>\n\n"
+        + "\n".join(f"- {item}" for item in items)
+        + "\n\n</details>"
+        for result, items in found
+        if items
+    ]
+    return [f"## {title}", *blocks] if blocks else []

@@ -1,0 +1,221 @@
+"""What to make of each pose: agreement, a finding, a difference, or no answer to compare."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.settle.settling import SettleStatus
+from crosscheck.suite.agreement import Allowance, Differences, within
+from seecr.equilibrium import Status
+from seecr.equilibrium import solve as seecr_solve
+from seecr.pose import Array, pose_difference
+
+if TYPE_CHECKING:
+    from crosscheck.settle.settling import SettlingBatch
+    from crosscheck.suite.side import MujocoSide
+    from seecr.equilibrium import Solution
+
+# Unbalanced force, relative to the load, below which a platform counts as free to move: what
+# an answer may leave unbalanced itself.
+_BALANCED = 1e-9
+
+
+class Verdict(Enum):
+    """What the two physics say together about one pose; the value is the sentence."""
+
+    AGREES = "both rest at the same pose"
+    NEUTRAL = "both agree, and the platform is free to move from one answer to the other"
+    BRANCH = "two stable equilibria: each physics stays in either"
+    DIFFERS = "the answers are further apart than allowed"
+    SEECR_UNSOLVED = "SEECR has no stable equilibrium to compare"
+    MUJOCO_UNSOLVED = "MuJoCo has no settled pose to compare"
+
+
+FINDINGS = (Verdict.NEUTRAL, Verdict.BRANCH)
+"""Neither passes nor failures: counted and listed, the run still ends 0."""
+
+UNSOLVED = (Verdict.SEECR_UNSOLVED, Verdict.MUJOCO_UNSOLVED)
+"""Nothing to compare: the run ends 3."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A pose at which there is more to say than that both agree.
+
+    Attributes:
+        pose: its number in the case, from 0.
+        verdict: what it is.
+        text: one sentence with figures.
+        energy_seecr_J: MuJoCo's potential energy at SEECR's answer; NaN if not compared.
+        energy_mujoco_J: at MuJoCo's own answer.
+        mujoco_stays: whether MuJoCo, started from SEECR's answer, comes to rest there.
+        seecr_stays: whether SEECR, started from MuJoCo's answer, comes to rest there; where the
+            platform is free to move along, whether its forces balance there.
+        position_m: distance of the answers [m].
+        orientation_rad: angle between them [rad].
+        tension_N: largest difference of a tension [N].
+    """
+
+    pose: int
+    verdict: Verdict
+    text: str
+    energy_seecr_J: float = np.nan
+    energy_mujoco_J: float = np.nan
+    mujoco_stays: bool | None = None
+    seecr_stays: bool | None = None
+    position_m: float = np.nan
+    orientation_rad: float = np.nan
+    tension_N: float = np.nan
+
+    def __str__(self) -> str:
+        return f"pose {self.pose}: {self.text}"
+
+
+class Answers(NamedTuple):
+    """Everything a verdict rests on."""
+
+    side: MujocoSide
+    solution: Solution
+    settling: SettlingBatch
+    difference: Differences
+    allowance: Allowance
+
+
+def judge(answers: Answers) -> tuple[NDArray[np.object_], tuple[Finding, ...]]:
+    """Verdicts (n,) of all poses, and a finding for each that does not simply agree."""
+    n = len(answers.solution)
+    verdicts = np.full(n, Verdict.AGREES, dtype=object)
+    close = within(answers.difference, answers.allowance)
+    free = answers.settling.free_to_move
+    findings = []
+    for i in range(n):
+        plain = answers.solution.status[i] is Status.CONVERGED and answers.settling[i].settled
+        if plain and close[i] and not free[i]:
+            continue
+        finding = _look_closer(answers, i, bool(close[i]))
+        if finding is not None:
+            verdicts[i] = finding.verdict
+            findings.append(finding)
+    return verdicts, tuple(findings)
+
+
+def _look_closer(answers: Answers, i: int, close: bool) -> Finding | None:
+    status, settled = answers.solution.status[i], answers.settling[i].status
+    sentence = f"SEECR: {answers.solution.sentence(i)}; MuJoCo: {settled.value}"
+    if status not in (Status.CONVERGED, Status.SINGULAR):
+        return Finding(i, Verdict.SEECR_UNSOLVED, sentence)
+    if settled is not SettleStatus.SETTLED:
+        return Finding(i, Verdict.MUJOCO_UNSOLVED, sentence)
+    pair = _Pair.of(answers, i)
+    if pair.joined_by_a_free_motion:
+        return pair.finding(Verdict.NEUTRAL)
+    if close and status is Status.SINGULAR:
+        return Finding(i, Verdict.SEECR_UNSOLVED, f"{sentence}, held in every direction")
+    if close:
+        return None
+    return pair.finding(Verdict.BRANCH if pair.two_equilibria else Verdict.DIFFERS)
+
+
+@dataclass(frozen=True)
+class _Pair:
+    """Two answers of one pose, each tried in the other physics."""
+
+    answers: Answers
+    i: int
+    mujoco_stays: bool
+    seecr_stays: bool
+    free: bool
+    energy_seecr: float
+    energy_mujoco: float
+
+    @classmethod
+    def of(cls, answers: Answers, i: int) -> _Pair:
+        side, solution = answers.side, answers.solution
+        command, ours, theirs = solution.command[i], solution.pose[i], answers.settling[i].pose
+        again = side.settle_from(ours, command)
+        free = answers.settling[i].free_to_move or again.free_to_move
+        return cls(
+            answers,
+            i,
+            mujoco_stays=again.settled and _near(answers, i, again.pose, ours),
+            seecr_stays=(_seecr_balances if free else _seecr_stays)(answers, i, theirs),
+            free=free,
+            energy_seecr=side.energy(ours, command),
+            energy_mujoco=side.energy(theirs, command),
+        )
+
+    @property
+    def joined_by_a_free_motion(self) -> bool:
+        """Whether the platform is balanced all the way from one answer to the other."""
+        answers, i = self.answers, self.i
+        if not (self.free and self.mujoco_stays and self.seecr_stays):
+            return False
+        tension = answers.difference.tension_N[i] <= answers.allowance.tension_N[i]
+        if not (tension and answers.difference.slack_same[i]):
+            return False
+        solution, theirs = answers.solution, answers.settling[i].pose
+        apart = abs(self.energy_seecr - self.energy_mujoco)
+        work = float(solution.tables.scale[i]) * solution.robot.length
+        if not apart <= _BALANCED * work:
+            return False
+        left = answers.side.imbalance_between(theirs, solution.pose[i], solution.command[i])
+        return left <= max(_BALANCED, 10.0 * answers.settling[i].rounding)
+
+    @property
+    def two_equilibria(self) -> bool:
+        """Whether the answers are apart, and each physics confirms the other's."""
+        theirs, ours = self.answers.settling[self.i].pose, self.answers.solution.pose[self.i]
+        return (
+            self.mujoco_stays and self.seecr_stays and not _near(self.answers, self.i, theirs, ours)
+        )
+
+    def finding(self, verdict: Verdict) -> Finding:
+        """What to tell about the pair."""
+        difference, i = self.answers.difference, self.i
+        position = float(difference.position_m[i])
+        angle = float(difference.orientation_rad[i])
+        tension = float(difference.tension_N[i])
+        text = (
+            f"{verdict.value}: {position:.2e} m, {angle:.2e} rad and {tension:.2e} N apart"
+            f"{'' if difference.slack_same[i] else ', other cables slack'}; MuJoCo's energy is "
+            f"{self.energy_seecr:.9g} J at SEECR's answer and {self.energy_mujoco:.9g} J at its "
+            f"own; from SEECR's answer MuJoCo {_stays(self.mujoco_stays)}, from MuJoCo's SEECR "
+            f"{_stays(self.seecr_stays)}"
+        )
+        return Finding(
+            i, verdict, text, self.energy_seecr, self.energy_mujoco,
+            self.mujoco_stays, self.seecr_stays, position, angle, tension,
+        )  # fmt: skip
+
+
+def _seecr_stays(answers: Answers, i: int, pose: Array) -> bool:
+    command = answers.solution.command[i : i + 1]
+    back = seecr_solve(answers.solution.robot, command, start=pose[None])
+    return back.status[0] is Status.CONVERGED and _near(answers, i, back.pose[0], pose)
+
+
+def _seecr_balances(answers: Answers, i: int, pose: Array) -> bool:
+    # One evaluation moves nothing: the residual is that of the pose itself. Let go, the platform
+    # may be anywhere on its free motion.
+    command = answers.solution.command[i : i + 1]
+    here = seecr_solve(answers.solution.robot, command, start=pose[None], max_iterations=1)
+    return bool(here.residual[0] <= _BALANCED)
+
+
+def _near(answers: Answers, i: int, pose_a: Array, pose_b: Array) -> bool:
+    """Whether two poses of row i are the same as far as the polished thresholds see."""
+    away = pose_difference(pose_a, pose_b)
+    allowed = answers.allowance
+    return bool(
+        np.linalg.norm(away[:3]) <= allowed.position_m[i]
+        and np.linalg.norm(away[3:]) <= allowed.orientation_rad[i]
+    )
+
+
+def _stays(it_does: bool) -> str:
+    return "stays there" if it_does else "leaves"

@@ -1,0 +1,106 @@
+"""What came of fitting an effect, on the terminal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from crosscheck.add import Addition
+from crosscheck.diagnosis.result import number
+from crosscheck.diagnosis.search import FALSE_ALARM
+from crosscheck.terminal.lines import console_for, print_parameters, rms_table, say
+
+_MOST = 12
+
+
+def print_addition(
+    found: Addition, model: Path, written: bool, console: Console | None = None
+) -> None:
+    """Print values, errors before and after, warnings, and what was written."""
+    console = console_for(console)
+    for note in found.notes:
+        say(console, f"note: {note}", "dim")
+    for fitted in found.fitted:
+        _print_values(console, fitted)
+    console.print(_table(found))
+    for warning in found.warnings:
+        say(console, f"warning: {warning}", "bold yellow")
+    left = "what is left is noise" if found.whiteness.is_noise else _left(found)
+    say(console, f"With {found.name}, {left}.", "green" if found.whiteness.is_noise else "")
+    if not found.pays:
+        say(console, why_not(found), "bold yellow")
+    if written:
+        say(console, f"Written to {model}: {', '.join(f.term.name for f in found.fitted)}")
+
+
+def why_not(found: Addition) -> str:
+    """Why an effect is not worth adding."""
+    mean, error = found.fall
+    if found.p >= FALSE_ALARM:
+        reason = f"chance explains what {found.name} explains (p {found.p:.2g})"
+    else:
+        reason = (
+            f"{found.name} does not predict runs left out any better (chi2 of a block falls by "
+            f"{mean:.3g} +- {error:.2g})"
+        )
+    return f"{reason}: it does not pay; --force adds it all the same"
+
+
+def _left(found: Addition) -> str:
+    return f"what is left is {found.whiteness.scale:.3g} times the noise: crosscheck diagnose"
+
+
+def _print_values(console: Console, fitted: Any) -> None:
+    layout = fitted.term.layout
+    say(console, f"{layout.name}: {layout.effect.title}", "bold")
+    print_parameters(
+        console, layout, fitted.term.vector, fitted.stderr, fitted.at_bound, _MOST, "the model"
+    )
+
+
+def _table(found: Addition) -> Table:
+    rows = (
+        ("before", found.before, ""),
+        (f"with {found.name}", found.after, "bold"),
+        ("before, on runs left out", found.held_out_before, "dim"),
+        (f"with {found.name}, on runs left out", found.held_out, ""),
+    )
+    return rms_table("rms error", rows)
+
+
+def as_json(found: Addition, model: Path, written: bool) -> dict[str, Any]:
+    """The same as a document, in SI."""
+    return {
+        "effect": found.name,
+        "written": written,
+        "model": str(model),
+        "effects": {f.term.name: _parameters(f) for f in found.fitted},
+        "before": dict(found.before),
+        "after": dict(found.after),
+        "held_out_before": dict(found.held_out_before),
+        "held_out": dict(found.held_out),
+        "improves_held_out": found.pays,
+        "p": found.p,
+        "chi2_fall_a_block": found.fall[0],
+        "chi2_fall_stderr": found.fall[1],
+        "is_noise": found.whiteness.is_noise,
+        "residual": vars(found.whiteness),
+        "warnings": list(found.warnings),
+        "notes": list(found.notes),
+    }
+
+
+def _parameters(fitted: Any) -> dict[str, Any]:
+    layout = fitted.term.layout
+    return {
+        key: {
+            "value": float(fitted.term.vector[i]),
+            "stderr": number(fitted.stderr[i]),
+            "unit": layout.units[i],
+            "at_bound": bool(fitted.at_bound[i]),
+        }
+        for i, key in enumerate(layout.names)
+    }

@@ -1,0 +1,125 @@
+"""A comparison on the terminal, in millimetres and degrees."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from crosscheck.comparison.associations import EVERYWHERE, SIGNIFICANT
+from crosscheck.comparison.limits import Exceeded, place
+from crosscheck.comparison.residuals import Comparison
+from crosscheck.fit.kinds import KINDS, Kind, Rms
+from crosscheck.numbers import in_unit
+from crosscheck.terminal.lines import cell, console_for, heading, say, table_of
+
+_MOST, _MOST_WORST, _MOST_UNSOLVED = 12, 5, 5
+
+
+def print_comparison(
+    found: Comparison,
+    exceeded: Sequence[Exceeded],
+    limited: bool,
+    out: Path,
+    console: Console | None = None,
+) -> None:
+    """Print the tables, the verdict, what exceeds its limit, and where the files are."""
+    console = console_for(console)
+    for note in found.notes:
+        say(console, f"note: {note}", "dim")
+    if found.coordinates:
+        console.print(_coordinates(found))
+        console.print(_errors(found))
+        _print_associations(console, found)
+        _print_worst(console, found)
+    for row in found.unsolved[:_MOST_UNSOLVED]:
+        say(console, f"line {row['line']}, run {row['run']}: {row['why']}", "bold yellow")
+    if len(found.unsolved) > _MOST_UNSOLVED:
+        say(console, f"{len(found.unsolved) - _MOST_UNSOLVED} more rows without an equilibrium")
+    say(console, found.sentence, "green" if found.is_noise else "bold yellow")
+    for item in exceeded:
+        say(console, item.words, "bold red")
+    if limited and not exceeded:
+        say(console, "All limits hold.", "green")
+    say(console, f"Results in {out}/", "dim")
+
+
+def _coordinates(found: Comparison) -> Table:
+    table = table_of(
+        ["measured less predicted", "bias", "rms", "max", "unit", "at line", "rows"]
+    )
+    for row in found.coordinates:
+        factor, unit = in_unit(row["unit"])
+        numbers = [f"{factor * row[key]:.4g}" for key in ("bias", "rms", "max")]
+        table.add_row(row["name"], *numbers, unit, str(row["line"]), str(row["rows"]))
+    return table
+
+
+def _errors(found: Comparison) -> Table:
+    """rms errors overall and of each run, direction and region."""
+    kinds = [k for k in KINDS if found.rms.get(k.key) is not None]
+    table = table_of(["rms error", *(heading(k) for k in kinds), "rows"])
+    _add(table, kinds, "all rows", found.rms, int(found.problem.use.sum()), "bold")
+    _add(table, kinds, "noise alone", found.floor, "", "dim")
+    for title, groups in (
+        ("run", found.runs),
+        ("travel", found.directions),
+        ("region", found.regions),
+    ):
+        if len(groups) > 1:
+            for row in _biggest(groups):
+                _add(table, kinds, f"{title} {row['name']}", row, row["rows"])
+            if len(groups) > _MOST:
+                table.add_row(f"{len(groups) - _MOST} more, with smaller errors", style="dim")
+    return table
+
+
+def _biggest(groups: Sequence[dict[str, Any]]) -> Iterable[dict[str, Any]]:
+    if len(groups) <= _MOST:
+        return groups
+    return sorted(groups, key=lambda g: -(g["position_rms_m"] or g["orientation_rms_rad"] or 0.0))[
+        :_MOST
+    ]
+
+
+def _add(
+    table: Table, kinds: Sequence[Kind], name: str, rms: Rms, rows: int | str, style: str = ""
+) -> None:
+    table.add_row(Text(name), *(cell(k, rms) for k in kinds), str(rows), style=style)
+
+
+def _print_associations(console: Console, found: Comparison) -> None:
+    strong = [a for a in found.associations if a["p"] < SIGNIFICANT]
+    if not strong:
+        say(console, "The errors go with nothing that was tried: place, time, tension, travel ...")
+        return
+    for row in strong[:4]:
+        factor, unit = in_unit(row["unit"])
+        steps = [b for b in row["bins"] if b["mean"] is not None]
+        means = ", ".join(f"{factor * b['mean']:.3g} at {b['label']}" for b in steps[:6])
+        share = f"{100 * row['share']:.0f} %"
+        text = f"The errors go with {row['against']} ({share} of their variance)"
+        if row["against"] == EVERYWHERE:
+            text = f"The errors are the same everywhere ({share} of their square)"
+            means = f"{factor * steps[0]['mean']:.3g}"
+        say(console, f"{text}: {row['strongest']} [{unit}] {means}")
+
+
+def _print_worst(console: Console, found: Comparison) -> None:
+    for row in found.worst[:_MOST_WORST]:
+        k = row["row"]
+        parts = []
+        for kind in KINDS:
+            size = found.errors_of(kind.name)[k]
+            if np.isfinite(size):
+                parts.append(f"{kind.factor * size:.4g} {kind.unit}")
+        say(
+            console,
+            f"worst: line {row['line']}, run {row['run']}, {place(found, k)}: {', '.join(parts)} "
+            f"({row['times_noise']:.3g} times the noise)",
+        )

@@ -1,0 +1,64 @@
+"""A diagnosis on the terminal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.table import Table
+
+from crosscheck.diagnosis.result import Finding
+from crosscheck.terminal.lines import console_for, print_parameters, rms_table, say
+
+if TYPE_CHECKING:
+    from crosscheck.diagnosis.result import Diagnosis
+
+_STYLE = {
+    "no_effect_missing": "green",
+    "effects_found": "bold cyan",
+    "unknown_effect": "bold yellow",
+    "no_verdict": "bold red",
+}
+_MOST_CANDIDATES, _MOST_PARAMETERS = 6, 9
+
+
+def print_diagnosis(found: Diagnosis, out: Path, console: Console | None = None) -> None:
+    """Print the verdict, the errors on the way, the parameters, and what to measure next."""
+    console = console_for(console)
+    say(console, f"{found.verdict}: {found.sentence}", _STYLE[found.verdict])
+    for note in found.notes:
+        say(console, f"note: {note}", "dim")
+    if found.verdict != "no_verdict":
+        console.print(_way(found))
+        for finding in found.missing:
+            _print_finding(console, finding)
+        _print_candidates(console, found)
+    for line in found.measure_next:
+        say(console, f"next: {line}")
+    say(console, f"Results in {out}/ (open diagnosis.html)", "dim")
+
+
+def _way(found: Diagnosis) -> Table:
+    rows = [("as it stands", found.before, "")]
+    for finding in found.missing:
+        rows.append((f"+ {finding.effect}", finding.rms, ""))
+        rows.append(("  on runs left out", finding.held_out_rms, "dim"))
+    return rms_table("rms error", [*rows, ("noise alone", found.floor, "dim")])
+
+
+def _print_finding(console: Console, finding: Finding) -> None:
+    say(console, f"{finding.effect}: {finding.title}", "bold")
+    print_parameters(
+        console, finding.layout, finding.values, finding.stderr, finding.at_bound,
+        _MOST_PARAMETERS, "diagnosis.json",
+    )  # fmt: skip
+    if finding.rivals:
+        names = ", ".join(rival.name for rival in finding.rivals)
+        say(console, f"  cannot be told from: {names}")
+    say(console, f"  check: {finding.check}")
+
+
+def _print_candidates(console: Console, found: Diagnosis) -> None:
+    for row in found.candidates[:_MOST_CANDIDATES]:
+        say(console, f"not {row['effect']}: {row['why_not']}", "dim")

@@ -1,0 +1,84 @@
+"""Lines and columns that several commands print alike: values with units, rms errors by kind."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from crosscheck.fit.kinds import KINDS, Kind, Rms
+from crosscheck.numbers import in_unit, parameter_name
+from seecr.effects.base import Layout
+from seecr.pose import Array
+
+_WIDE = 160
+
+
+def heading(kind: Kind) -> str:
+    """Over a column of its errors."""
+    return f"{kind.name}\n[{kind.unit}]"
+
+
+def cell(kind: Kind, rms: Rms) -> str:
+    """Its rms error in the unit of the heading, or a dash."""
+    value = rms.get(kind.key)
+    return "-" if value is None else f"{kind.factor * value:.4g}"
+
+
+def console_for(console: Console | None) -> Console:
+    """The console to print on; wide where nobody's screen is the limit."""
+    console = console or Console(highlight=False)
+    if not console.is_terminal:
+        console.width = max(console.width, _WIDE)
+    return console
+
+
+def say(console: Console, line: str, style: str = "") -> None:
+    """One line, never broken: people search and pipe them."""
+    console.print(Text(line, style=style), soft_wrap=True)
+
+
+def shown(value: float, unit: str) -> str:
+    """A number with its unit as people read it."""
+    factor, word = in_unit(unit)
+    return f"{factor * value:.4g} {word}".strip()
+
+
+def print_parameters(
+    console: Console, layout: Layout, values: Array, stderr: Array, stopped: Array, most: int,
+    file: str,
+) -> None:  # fmt: skip
+    """A line for each of an effect's parameters, ``most`` of them; the rest are in ``file``."""
+    rows = list(zip(layout.names, layout.units, values, stderr, stopped, strict=True))
+    for name, unit, value, error, bound in rows[:most]:
+        spread = f"+- {shown(error, unit)}" if np.isfinite(error) else "not seen by these data"
+        stop = " (at its bound)" if bound else ""
+        say(console, f"  {parameter_name(name, unit)} = {shown(value, unit)} {spread}{stop}")
+    if len(rows) > most:
+        say(console, f"  and {len(rows) - most} more in {file}")
+
+
+def rms_table(title: str, rows: Sequence[tuple[str, Rms, str]]) -> Table:
+    """A table of rms errors: name, errors by kind and style of each row.
+
+    Kinds that were not read have no column.
+    """
+    kinds = [k for k in KINDS if any(rms.get(k.key) is not None for _name, rms, _style in rows)]
+    table = table_of([title, *(heading(k) for k in kinds)])
+    for name, rms, style in rows:
+        table.add_row(Text(name), *(cell(k, rms) for k in kinds), style=style)
+    return table
+
+
+def table_of(heads: Sequence[str]) -> Table:
+    """A plain table, words on the left and numbers on the right.
+
+    Headings are texts as they stand: a bare "[mm]" would be taken for a style and vanish.
+    """
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    for i, head in enumerate(heads):
+        table.add_column(Text(head), justify="right" if i else "left")
+    return table

@@ -1,0 +1,95 @@
+"""The suite's results on the terminal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from crosscheck.suite import effect_words as effect_figures
+from crosscheck.suite import words as figures
+from crosscheck.suite.verdicts import FINDINGS, Verdict
+
+if TYPE_CHECKING:
+    from crosscheck.suite.results import Run
+    from crosscheck.suite.run import CaseResult
+
+_STYLE = {0: "green", 1: "bold red", 3: "bold yellow"}
+# Failures told on the terminal; summary.md and results.json have them all.
+_MOST = 5
+# Columns of words, of the case's result, and those shown on any terminal.
+_RESULT = figures.TABLE_HEADS.index("result")
+_WORDS = (0, _RESULT, _RESULT + 1)
+_ESSENTIAL = (0, *(figures.TABLE_HEADS.index(head) for head in figures.HEADS.values()), _RESULT)
+_ROOMY = 124
+# Where there is no terminal to ask, lines are not broken below this.
+_WIDE = 160
+
+
+def print_run(run: Run, out: Path, console: Console | None = None) -> None:
+    """Print the table, what needs a look, the verdict, and where the files are.
+
+    Args:
+        run: what to tell about.
+        out: the folder of results.
+        console: where to; standard output by default.
+    """
+    console = console or Console(highlight=False)
+    if not console.is_terminal:
+        console.width = max(console.width, _WIDE)
+    if run.results:
+        console.print(_table(run, console.width))
+    for result in run.results:
+        _print_notes(console, result)
+    for verdict in FINDINGS:
+        if run.count(verdict):
+            _print(
+                console, f"Finding at {figures.count(run.count(verdict), 'pose')}: {verdict.value}."
+            )
+    _print_lines(console, effect_figures.failures(run.effects), "effects")
+    if run.effects and run.results:
+        _print(console, effect_figures.line(run.effects))
+    _print(console, figures.verdict_line(run), _STYLE[run.exit_status])
+    _print(console, f"{run.wall_s:.1f} s; results in {out}/")
+
+
+def _print(console: Console, line: str, style: str = "") -> None:
+    # Lines stay whole, for people who search or pipe them.
+    console.print(Text(line, style=style), soft_wrap=True)
+
+
+def _table(run: Run, width: int) -> Table:
+    """The cases, without the columns that are left out where the terminal is narrow."""
+    shown = [i for i in range(len(figures.TABLE_HEADS)) if width >= _ROOMY or i in _ESSENTIAL]
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    for i in shown:
+        head = Text(figures.TABLE_HEADS[i].replace(" [", "\n["))
+        table.add_column(head, justify="left" if i in _WORDS else "right", no_wrap=True)
+    for result in run.results:
+        cells = [Text(cell) for cell in figures.cells(result)]
+        cells[_RESULT].stylize(_STYLE[result.exit_status])
+        table.add_row(*(cells[i] for i in shown))
+    limits = figures.threshold_cells(run)
+    table.add_row(*(Text(limits[i], style="dim") for i in shown))
+    return table
+
+
+def _print_notes(console: Console, result: CaseResult) -> None:
+    """Failures, branches and widened thresholds of a case; its free motions are only counted."""
+    lines = figures.failures(result)
+    branches = [f for f in result.findings if f.verdict is Verdict.BRANCH]
+    lines += [f"pose {f.pose}: {f.text}" for f in branches]
+    lines += figures.widened(result)
+    name = result.case.name
+    _print_lines(console, [f"{name}, {line}" for line in lines], name)
+
+
+def _print_lines(console: Console, lines: list[str], name: str) -> None:
+    """The first few lines about a case or the effects, and how many more there are."""
+    for line in lines[:_MOST]:
+        _print(console, line)
+    if len(lines) > _MOST:
+        _print(console, f"{name}: {len(lines) - _MOST} more in summary.md")

@@ -1,0 +1,145 @@
+"""Which effects a twin hides and how large they are, drawn from its seed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from crosscheck.errors import CrosscheckError
+from crosscheck.twin.robot import TRUE_EFFECTS
+from seecr.effects import Effect, Layout, effect_named, layout_of
+from seecr.pose import Array, transform_points
+from seecr.robot import Robot
+
+# How often a seed hides none, one and two.
+_SHARES = (0.2, 0.6, 0.2)
+# Sizes drawn, in plausible sizes: of an effect with one number, of each of several numbers.
+_ONE, _SEVERAL = (1.0, 2.0), (0.5, 2.0)
+# A cable that loses stiffness as it stretches breaks in the end: these only stiffen.
+_UPWARDS = ("nonlinear_elasticity",)
+# Sheaves need anchor points this far aside of exit points, in cable lengths.
+_ASIDE = 0.15
+
+Generator = np.random.Generator
+
+
+@dataclass(frozen=True, eq=False)
+class Hidden:
+    """An effect with the numbers that a twin hides.
+
+    Attributes:
+        layout: its parameters for the robot.
+        vector: (p,) their values.
+    """
+
+    layout: Layout
+    vector: Array
+
+    @property
+    def name(self) -> str:
+        """Name of the effect."""
+        return self.layout.name
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Values by the parameters' names."""
+        return dict(zip(self.layout.names, map(float, self.vector), strict=True))
+
+    def effect(self) -> Effect:
+        """The effect itself."""
+        return self.layout.build(self.vector)
+
+    def times(self, factor: float) -> Hidden:
+        """The effect ``factor`` times as large, inside its bounds; shapes stay as they are."""
+        layout = self.layout
+        grown = layout.null + factor * (self.vector - layout.null)
+        vector = np.where(layout.shape, self.vector, np.clip(grown, layout.lower, layout.upper))
+        return Hidden(layout, vector)
+
+
+def choose(
+    robot: Robot,
+    random: Generator,
+    names: Sequence[str] | None = None,
+    count: int | None = None,
+    tensions: bool = False,
+) -> list[Hidden]:
+    """Draw the effects of a twin.
+
+    Args:
+        robot: whose plausible sizes count.
+        random: of the twin's seed.
+        names: these effects; None draws them.
+        count: how many to draw; None draws that too.
+        tensions: whether tensions are recorded (else their scale is no candidate).
+
+    Raises:
+        CrosscheckError: an effect that MuJoCo has no truth for, or more than there are.
+    """
+    if names is None:
+        names = _drawn(robot, random, count, tensions)
+    for name in names:
+        effect_named(name)  # says which are known, nearest first
+        if name not in TRUE_EFFECTS:
+            raise CrosscheckError(f"effect {name}: no truth with MuJoCo, so no twin can hide it")
+    if len(set(names)) != len(names):
+        raise CrosscheckError(f"effects {', '.join(names)}: expected each at most once")
+    return [_with_numbers(layout_of(effect_named(name), robot), robot, random) for name in names]
+
+
+def _drawn(robot: Robot, random: Generator, count: int | None, tensions: bool) -> list[str]:
+    without = set() if tensions else {"tension_scale"}
+    without |= set() if _room_for_sheaves(robot) else {"pulley_radius"}
+    known = [name for name in TRUE_EFFECTS if name not in without]
+    if count is None:
+        count = int(random.choice(len(_SHARES), p=_SHARES))
+    if count > len(known):
+        raise CrosscheckError(f"{count} effects: expected at most {len(known)}")
+    return [known[i] for i in random.choice(len(known), size=count, replace=False)]
+
+
+def _room_for_sheaves(robot: Robot) -> bool:
+    """Whether all anchor points are well aside of their exit points, seen from above."""
+    size = float(np.linalg.norm(robot.gravity))
+    up = -robot.gravity / size if size > 0 else np.array([0.0, 0.0, 1.0])
+    anchors = transform_points(robot.reference_pose[None], robot.anchor_points)[0]
+    reach = anchors - robot.exit_points
+    across = np.linalg.norm(reach - np.outer(reach @ up, up), axis=1)
+    return bool(np.all(across > _ASIDE * np.linalg.norm(reach, axis=1)))
+
+
+def _with_numbers(layout: Layout, robot: Robot, random: Generator) -> Hidden:
+    many = int(np.sum(~layout.shape)) > 1
+    size = random.uniform(*(_SEVERAL if many else _ONE), len(layout)) * layout.scale
+    sign = random.choice([-1.0, 1.0], len(layout))
+    one_sided = (layout.lower >= layout.null) | (layout.name in _UPWARDS)
+    vector = layout.null + np.where(one_sided, 1.0, sign) * size
+    # a size that leaves the bounds goes the other way: a factor is never under a tenth
+    low = np.maximum(layout.lower, np.where(layout.null > 0.0, 0.1 * layout.null, layout.lower))
+    vector = np.where(vector < low, layout.null + size, vector)
+    vector = np.minimum(vector, layout.upper)
+    for k in np.flatnonzero(layout.shape):
+        vector[k] = _shape(layout, int(k), robot, random)
+    return Hidden(layout, vector)
+
+
+def _shape(layout: Layout, k: int, robot: Robot, random: Generator) -> float:
+    draw = _SHAPES.get((layout.name, layout.names[k]))
+    return float(layout.null[k]) if draw is None else draw(layout, k, robot, random)
+
+
+def _radius(layout: Layout, k: int, robot: Robot, random: Generator) -> float:
+    length = float(np.mean(robot.nominal_lengths(robot.reference_pose[None])))
+    return length * float(random.uniform(0.04, 0.1))
+
+
+_SHAPES: dict[tuple[str, str], Callable[[Layout, int, Robot, Generator], float]] = {
+    ("drum_eccentricity", "drum_radius_m"): _radius,
+    ("thermal_expansion", "zero_temperature_C"): lambda *_: 20.0,
+    ("hysteresis", "stretch_m"): lambda layout, k, robot, random: float(
+        layout.scale[k] * random.uniform(0.3, 2.0)
+    ),
+    ("creep", "time_s"): lambda layout, k, robot, random: float(random.uniform(20.0, 200.0)),
+}

@@ -1,0 +1,194 @@
+"""What the winches really pay out, command by command."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.errors import CrosscheckError
+from crosscheck.twin.robot import TrueRobot
+from crosscheck.twin.world import World
+from seecr.pose import Array, pose_add, pose_difference, transform_points
+from seecr.setup import Commands
+
+WAYPOINTS = (12, 4)
+"""Points looked at on the way to the first row of a run, and from row to row."""
+
+# Parts of the way from point to point in which winches are watched for turning round.
+_WATCHED = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """The commands with all points on the way, N in all.
+
+    Attributes:
+        pose: (N, 7) commanded; lengths: (N, m) [m] commanded, or None.
+        row: (N,) the row a point belongs to; is_row: (N,) whether it is that row.
+        fresh: (N,) at the reference pose, before a run.
+        elapsed: (N,) [s] since the point before.
+    """
+
+    pose: Array
+    lengths: Array | None
+    row: NDArray[np.int64]
+    is_row: NDArray[np.bool_]
+    fresh: NDArray[np.bool_]
+    elapsed: Array
+
+
+def way_of(
+    true: TrueRobot, commands: Commands, waypoints: tuple[int, int] = WAYPOINTS
+) -> Way:
+    """Every run from the reference pose straight to its first row, then from row to row."""
+    robot, n = true.robot, len(commands)
+    run = np.zeros(n, dtype=int) if commands.run is None else commands.run
+    clock = np.zeros(n) if commands.time is None else commands.time
+    points: list[tuple[Array, Array, int, bool, bool, float]] = []
+    none = np.zeros(0)
+    guide = _guide(true)
+    for k in range(n):
+        starts = k == 0 or run[k] != run[k - 1]
+        passed = max(float(clock[k] - clock[k - 1]), 0.0) if k else 0.0
+        before = robot.reference_pose if starts else commands.pose[k - 1]
+        paid, told = none, none
+        if commands.lengths is not None:
+            told = commands.lengths[k]
+            paid = robot.rest_lengths if starts else commands.lengths[k - 1]
+        if starts:
+            points.append((robot.reference_pose, paid, k, False, True, passed))
+            passed = 0.0
+        steps = waypoints[0] if starts else waypoints[1]
+        parts = np.arange(1, steps + 1) / steps
+        poses = [*_straight_way(guide, before, commands.pose[k], parts[:-1]), commands.pose[k]]
+        for pose, part in zip(poses, parts, strict=True):
+            length = paid + part * (told - paid)
+            points.append((pose, length, k, part == 1.0, False, passed / steps))
+    way, lengths, *others = (np.array(part) for part in zip(*points, strict=True))
+    return Way(way, None if commands.lengths is None else lengths, *others)
+
+
+def _guide(true: TrueRobot) -> World | None:
+    """The robot as described on its joints, to be led along them; None where it is free."""
+    if not true.robot.joints:
+        return None
+    return World(replace(_bare(true), pulley_radius=0.0))
+
+
+def _straight_way(guide: World | None, before: Array, after: Array, parts: Array) -> Array:
+    """Poses (k, 7) at parts (k,) of a way, straight in pose or in the values of joints."""
+    if guide is None:
+        return pose_add(before, parts[:, None] * pose_difference(after, before))
+    n = guide.places.n_platform
+    ends = []
+    for pose in (before, after):
+        guide.place(pose)
+        ends.append(guide.data.qpos[:n].copy())
+    poses = np.empty((len(parts), 7))
+    for k, part in enumerate(parts):
+        guide.data.qpos[:n] = ends[0] + part * (ends[1] - ends[0])
+        guide.update()
+        poses[k] = guide.pose()
+    return poses
+
+
+def paid_out(true: TrueRobot, way: Way, temperature: Array | None) -> Array:
+    """Rest lengths (N, m) [m] at the points of a way.
+
+    Args:
+        true: the robot.
+        way: its commands.
+        temperature: (n,) [deg C] of the rows, or None.
+    """
+    told = way.lengths if way.lengths is not None else _straight_change(true, way.pose)
+    turned = told
+    if true.backlash > 0.0:
+        turned = _with_play(told, _watched(true, way), way.fresh, 0.5 * true.backlash)
+    paid = (1.0 + true.gain) * turned + true.offset
+    zero = 1.0 if way.lengths is None else 0.0
+    for sine, cosine, radius in true.run_out:
+        angle = told / radius
+        paid = paid + sine * np.sin(angle) + cosine * (np.cos(angle) - zero)
+    if way.lengths is None:
+        paid = paid + _zero(true)
+    if temperature is not None and true.expansion != 0.0:
+        warmer = temperature[way.row] - true.zero_temperature
+        paid = paid * (1.0 + true.expansion * warmer)[:, None]
+    return np.asarray(paid)
+
+
+def _straight_change(true: TrueRobot, poses: Array) -> Array:
+    """Straight lengths of the described robot less those at its reference, (N, m) [m]."""
+    return _straight(true, poses) - _straight(true, true.robot.reference_pose[None])
+
+
+def _straight(true: TrueRobot, poses: Array) -> Array:
+    robot = true.robot
+    anchors = transform_points(poses, robot.anchor_points)
+    return np.asarray(np.linalg.norm(anchors - robot.exit_points, axis=-1))
+
+
+def _watched(true: TrueRobot, way: Way) -> list[Array]:
+    """Lengths (k, m) [m] that winches are told on the way to each of N points, in order.
+
+    The squared length at even steps, each put right by the vertex of the parabola through it and
+    its neighbours where it turns round there; for a translation that is all of its course.
+    """
+    if way.lengths is not None:
+        return [told[None] for told in way.lengths]
+    guide, home = _guide(true), _straight(true, true.robot.reference_pose[None])[0]
+    # a step too far at either end: what turns round there is seen too
+    parts = np.arange(-1, _WATCHED + 2) / _WATCHED
+    watched = []
+    for k, pose in enumerate(way.pose):
+        before = pose if way.fresh[k] else way.pose[k - 1]
+        square = _straight(true, _straight_way(guide, before, pose, parts)) ** 2
+        watched.append(np.sqrt(_with_vertices(square, parts[1:-1])) - home)
+    return watched
+
+
+def _with_vertices(value: Array, parts: Array) -> Array:
+    """Values (k + 2, m) without the outer ones, at parts (k,) of a way, least and most in full."""
+    earlier, now, later = value[:-2], value[1:-1], value[2:]
+    rise, bend = 0.5 * (later - earlier), later - 2.0 * now + earlier
+    near = (np.abs(rise) <= 0.5 * np.abs(bend)) & (bend != 0.0)
+    steps = np.where(near, -rise / np.where(near, bend, 1.0), 0.0)
+    at = parts[:, None] + steps * (parts[1] - parts[0])
+    inside = near & (at > 0.0) & (at < 1.0)
+    return np.where(inside, np.maximum(now + 0.5 * rise * steps, 0.0), now)
+
+
+def _with_play(told: Array, watched: list[Array], fresh: NDArray[np.bool_], half: float) -> Array:
+    """The drum stands still until the motor has taken up the play; centred as a run starts."""
+    drum = told.copy()
+    for k in range(1, len(told)):
+        if not fresh[k]:
+            drum[k] = drum[k - 1]
+            for motor in (*watched[k], told[k]):
+                drum[k] = np.minimum(np.maximum(drum[k], motor - half), motor + half)
+    return drum
+
+
+def _zero(true: TrueRobot) -> Array:
+    """Lengths (m,) [m] when the winches were zeroed, over the true geometry as MuJoCo has it."""
+    robot = true.robot
+    bare = _bare(true)
+    world = World(bare)
+    if true.robot.joints and not np.array_equal(true.zero_pose, robot.reference_pose):
+        # misplaced by hand, off its joints too: put there as a free body
+        world = World(replace(bare, robot=replace(robot, joints=())))
+    world.place(true.zero_pose)
+    if not world.wraps:
+        raise CrosscheckError(
+            f"robot {robot.name}: pulley_radius {true.pulley_radius:g} m leaves a cable no way "
+            "over its sheave at the reference pose; expected anchor points aside of exit points"
+        )
+    pretension = robot.rest_lengths - _straight(true, robot.reference_pose[None])[0]
+    return world.cable_lengths() + pretension
+
+
+def _bare(true: TrueRobot) -> TrueRobot:
+    """The robot with nothing that moves but the platform and its sheaves."""
+    return replace(true, cable_weight=0.0, compliance=0.0, winch_side=0.0, friction=0.0)

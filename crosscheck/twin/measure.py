@@ -1,0 +1,252 @@
+"""Settle a true robot row by row, and read its sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.settle.relax import come_to_rest
+from crosscheck.settle.settling import SettleStatus
+from crosscheck.twin.descent import Descent, descend
+from crosscheck.twin.lengths import WAYPOINTS, Way, paid_out, way_of
+from crosscheck.twin.robot import true_robot
+from crosscheck.twin.springs import Cable, Springs
+from crosscheck.twin.world import World
+from seecr.effects import Effect
+from seecr.pose import Array, pose_add, pose_difference
+from seecr.robot import Robot
+from seecr.setup import Commands
+
+SEGMENTS = (8, 16)
+"""Segments N of a cable with weight. A chain errs by some 1/N^2 of what the weight does, from two
+of them the error of that order is taken away (Richardson)."""
+
+# Of MuJoCo's dynamics, before the last digits are polished.
+_AT_REST, _MAX_STEPS = 1e-6, 40_000
+# Tangents of a law with memory until it agrees with MuJoCo: relative to the load.
+_AGREED, _TANGENTS = 1e-9, 60
+# Steps downhill.
+_LIMIT = 300
+# Rounds until what lies on the sheaves and what hangs free agree, relative to a cable.
+_SHARE, _SHARES = 1e-10, 20
+
+Progress = Callable[[int], None]
+_NOWHERE = Descent(False, False, np.nan, 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """What MuJoCo says of n rows.
+
+    Attributes:
+        pose: (n, 7) where the platform rests; tensions: (n, m) [N] where cables leave.
+        position: (n, 3) [m]; quat_wxyz: (n, 4); tension_readings: (n, m) [N], as read, no noise.
+        rest_lengths: (n, m) [m] really paid out.
+        at_rest: (n,) bool, a stable equilibrium was found.
+        free: (n,) bool, balanced, but free to move along some direction: a pose, no rest.
+        residual: (n,) unbalanced force relative to the load.
+    """
+
+    pose: Array
+    tensions: Array
+    position: Array
+    quat_wxyz: Array
+    tension_readings: Array
+    rest_lengths: Array
+    at_rest: NDArray[np.bool_]
+    free: NDArray[np.bool_]
+    residual: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """Rests of rows: pose (n, 7), tensions (n, m) [N], how each ended (n,), residual (n,)."""
+
+    pose: Array
+    tensions: Array
+    at_rest: NDArray[np.bool_]
+    free: NDArray[np.bool_]
+    residual: Array
+
+    @classmethod
+    def empty(cls, n: int, m: int) -> _Rows:
+        no, nan = np.zeros(n, dtype=bool), np.full(n, np.nan)
+        return cls(np.full((n, 7), np.nan), np.full((n, m), np.nan), no, no.copy(), nan)
+
+
+def measure(
+    robot: Robot,
+    commands: Commands,
+    effects: Sequence[Effect] = (),
+    *,
+    segments: tuple[int, ...] = SEGMENTS,
+    waypoints: tuple[int, int] = WAYPOINTS,
+    progress: Progress | None = None,
+) -> Truth:
+    """Let MuJoCo bring a robot with effects to rest at each command, and read its sensors.
+
+    Args:
+        robot: as described.
+        commands: n rows.
+        effects: what it has besides, in the order in which they act.
+        segments: N of each cable, where cables have weight; of two, the poses are extrapolated.
+        waypoints: on the way to the first row of a run and from row to row, where what happened
+            on the way counts.
+        progress: called with the number of rows done since the last call.
+    """
+    true = true_robot(robot, effects)
+    way = way_of(true, commands, waypoints)
+    rest = paid_out(true, way, commands.temperature)
+    tell = progress or (lambda rows: None)
+    settle = _walk if true.has_history else _each
+    rows = settle(World(true, segments[-1] if true.cable_weight > 0 else 1), way, rest, tell)
+    if true.cable_weight > 0 and len(segments) > 1:
+        coarse = settle(World(true, segments[0]), way, rest, lambda rows: None)
+        rows = _extrapolated(coarse, rows, (segments[-1] / segments[0]) ** 2)
+    reading = (rows.pose[:, :3], rows.pose[:, 3:], rows.tensions)
+    for sensor in true.sensors:
+        reading = sensor(reading)
+    return Truth(
+        rows.pose, rows.tensions, *reading, rest[way.is_row], rows.at_rest, rows.free,
+        rows.residual,
+    )
+
+
+def _extrapolated(coarse: _Rows, fine: _Rows, ratio: float) -> _Rows:
+    """Rows free of the leading error, which is ``ratio`` times as large in the coarse ones."""
+    part = 1.0 / (ratio - 1.0)
+    both = np.isfinite(fine.pose[:, 0]) & np.isfinite(coarse.pose[:, 0])
+    pose = np.full_like(fine.pose, np.nan)
+    change = part * pose_difference(fine.pose[both], coarse.pose[both])
+    pose[both] = pose_add(fine.pose[both], change)
+    tensions = np.maximum(fine.tensions + part * (fine.tensions - coarse.tensions), 0.0)
+    at_rest, free = fine.at_rest & coarse.at_rest, fine.free | coarse.free
+    return _Rows(pose, tensions, at_rest, free, fine.residual)
+
+
+def _each(world: World, way: Way, rest: Array, tell: Progress) -> _Rows:
+    """Every row by itself, from its commanded pose."""
+    poses, lengths = way.pose[way.is_row], rest[way.is_row]
+    out = _Rows.empty(len(poses), world.n_cables)
+    bare = _without_weight(world)
+    for k, pose in enumerate(poses):
+        springs = Springs.plain(lengths[k], world.true)
+        go = _start(world, bare, pose, springs)
+        _note(world, out, k, _settle(world, springs) if go else _NOWHERE)
+        tell(1)
+    return out
+
+
+def _without_weight(world: World) -> World:
+    """The world itself, or one whose cables have no weight, where they do."""
+    if world.segments == 1:
+        return world
+    return World(replace(world.true, cable_weight=0.0))
+
+
+def _start(world: World, bare: World, pose: Array, springs: Springs) -> bool:
+    """Let the platform move to rest from a pose; cables with weight take theirs on there."""
+    bare.set_springs(springs)
+    bare.place(pose)
+    if not _moves_to_rest(bare):
+        return False
+    if bare is not world:
+        if world.true.pulley_radius:
+            world.free_share = bare.measure_free_share()
+        world.set_springs(springs)
+        world.place(bare.pose())
+    return True
+
+
+def _settle(
+    world: World, springs: Springs, judge: bool = True, limit: int = _LIMIT
+) -> Descent:
+    """Polish, or go downhill; with chains over sheaves until their free parts are right."""
+    found = _NOWHERE
+    for _ in range(_SHARES):
+        world.set_springs(springs)
+        found = descend(world, judge, limit)
+        if world.segments == 1 or not world.true.pulley_radius or not found.balanced:
+            break
+        share = world.measure_free_share()
+        change = float(np.max(np.abs(share - world.free_share)))
+        world.free_share = share
+        if change < _SHARE:
+            break
+    return found if world.wraps else _NOWHERE
+
+
+def _moves_to_rest(world: World) -> bool:
+    """MuJoCo's own dynamics, damped, from where the platform is placed."""
+    tolerance = max(_AT_REST, 10.0 * world.rounding())
+    return come_to_rest(world, tolerance, _MAX_STEPS).status is SettleStatus.SETTLED
+
+
+def _note(world: World, out: _Rows, k: int, found: Descent) -> None:
+    out.at_rest[k], out.free[k], out.residual[k] = found.at_rest, found.free, found.residual
+    if found.balanced:
+        out.tensions[k] = world.cable_tensions()
+        out.pose[k] = world.pose()
+
+
+def _walk(world: World, way: Way, rest: Array, tell: Progress) -> _Rows:
+    """All points of the way in order, each from where the last one rested."""
+    true = world.true
+    out = _Rows.empty(int(way.is_row.sum()), world.n_cables)
+    cables = [Cable(true, float(ea)) for ea in true.ea]
+    bare = _without_weight(world)
+    found = _NOWHERE
+    for k, pose in enumerate(way.pose):
+        for cable, length in zip(cables, rest[k], strict=True):
+            cable.pays_out(float(length), float(way.elapsed[k]), bool(way.fresh[k]))
+        go = found.balanced
+        if way.fresh[k]:
+            go = _start(world, bare, pose, Springs.plain(rest[k], true))
+        found = _agree(world, cables) if go else _NOWHERE
+        if way.is_row[k]:
+            _note(world, out, int(way.row[k]), found)
+            tell(1)
+    return out
+
+
+def _agree(world: World, cables: list[Cable]) -> Descent:
+    """Tangents of the cables' laws and MuJoCo's settling in turns until both hold."""
+    world.update()
+    springs, before = None, None
+    for turn in range(_TANGENTS):
+        tangent = _tangents(world, cables)
+        if springs is not None and turn > _TANGENTS // 3:
+            # a kink at which tangents flip: meet halfway
+            tangent = tangent.halfway(springs)
+        springs = tangent
+        # one step for each tangent is Newton's method on both; all of them where that fails
+        quick = turn < _TANGENTS // 6
+        fine = _settle(world, springs, judge=False, limit=1 if quick else _LIMIT).balanced
+        if not (fine or quick):
+            return _NOWHERE
+        tensions = world.cable_tensions()
+        moved = np.inf if before is None else float(np.max(np.abs(tensions - before)))
+        if fine and moved < _AGREED * world.force_scale:
+            break
+        before = tensions
+    else:
+        return _NOWHERE
+    found = _settle(world, springs)
+    _tangents(world, cables)
+    for cable, tension in zip(cables, world.cable_tensions(), strict=True):
+        cable.rests(bool(tension == 0.0))
+    return found
+
+
+def _tangents(world: World, cables: list[Cable]) -> Springs:
+    """Springs that touch the cables' laws at their present lengths."""
+    lengths = world.cable_lengths()
+    pairs = [cable.tangent(float(at)) for cable, at in zip(cables, lengths, strict=True)]
+    rest, stiffness = np.array(pairs).T
+    return Springs(rest, stiffness, np.zeros((len(rest), 2)))
+
+
+__all__ = ["SEGMENTS", "Truth", "measure"]

@@ -1,0 +1,202 @@
+"""The robot as it really is: its described numbers, and what each effect makes of them.
+
+Written from the effects' definitions, not from seecr's code for them: only names and parameters
+are shared. All numbers are SI; the base frame, the platform frame and signs as in the effects'
+own texts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from crosscheck.errors import CrosscheckError
+from crosscheck.twin.readings import SENSING, Sensor
+from seecr.effects import Effect
+from seecr.pose import Array, quat_from_rotvec, quat_multiply, quat_rotate
+from seecr.robot import Robot
+
+
+@dataclass(eq=False)
+class TrueRobot:
+    """Numbers that MuJoCo's model and the winches are made from; m cables.
+
+    Attributes:
+        robot: as described.
+        exit_points, anchor_points: (m, 3) [m] where they really are.
+        mass: [kg]; centre_of_mass: (3,) [m]; gravity: (3,) [m/s^2]; wrench: (6,) [N, N m].
+        ea: (m,) [N]; quadratic, cubic: of T = EA (eps + quadratic eps^2 + cubic eps^3).
+        pulley_radius: [m]; winch_side: [m]; compliance: [m/N]; cable_weight: [N/m].
+        friction: exponent of the capstan.
+        hysteresis: amplitude [N]; hysteresis_stretch: [m].
+        creep: part of the elastic strain; creep_time: [s].
+        zero_pose: (7,) of the platform when the winches were zeroed.
+        offset: (m,) [m]; gain: (m,); backlash: [m]; expansion: [1/K]; zero_temperature: [C].
+        run_out: (sine (m,) [m], cosine (m,) [m], drum radius [m]) of each eccentricity.
+        sensors: what each sensing effect makes of the readings, in order.
+    """
+
+    robot: Robot
+    exit_points: Array
+    anchor_points: Array
+    mass: float
+    centre_of_mass: Array
+    gravity: Array
+    ea: Array
+    zero_pose: Array
+    offset: Array
+    gain: Array
+    wrench: Array = field(default_factory=lambda: np.zeros(6))
+    quadratic: float = 0.0
+    cubic: float = 0.0
+    pulley_radius: float = 0.0
+    winch_side: float = 0.0
+    compliance: float = 0.0
+    cable_weight: float = 0.0
+    friction: float = 0.0
+    hysteresis: float = 0.0
+    hysteresis_stretch: float = 1.0
+    creep: float = 0.0
+    creep_time: float = 1.0
+    backlash: float = 0.0
+    expansion: float = 0.0
+    zero_temperature: float = 20.0
+    run_out: list[tuple[Array, Array, float]] = field(default_factory=list)
+    sensors: list[Sensor] = field(default_factory=list)
+
+    @property
+    def n_cables(self) -> int:
+        """Number of cables m."""
+        return len(self.exit_points)
+
+    @property
+    def up(self) -> Array:
+        """Unit vector (3,) on which pulleys swivel: the frame's own vertical."""
+        size = float(np.linalg.norm(self.robot.gravity))
+        return -self.robot.gravity / size if size > 0 else np.array([0.0, 0.0, 1.0])
+
+    @property
+    def has_history(self) -> bool:
+        """Whether a cable's pull depends on what it did before."""
+        return self.hysteresis > 0 or self.friction > 0 or self.creep > 0
+
+
+def true_robot(robot: Robot, effects: Sequence[Effect] = ()) -> TrueRobot:
+    """The robot with its effects, in the order in which they act.
+
+    Raises:
+        CrosscheckError: an effect that has no truth here, such as a user's own.
+    """
+    true = TrueRobot(
+        robot=robot,
+        exit_points=robot.exit_points.copy(),
+        anchor_points=robot.anchor_points.copy(),
+        mass=robot.mass,
+        centre_of_mass=robot.centre_of_mass.copy(),
+        gravity=robot.gravity.copy(),
+        ea=robot.ea.copy(),
+        zero_pose=robot.reference_pose.copy(),
+        offset=np.zeros(robot.n_cables),
+        gain=np.zeros(robot.n_cables),
+    )
+    for effect in effects:
+        if effect.name in SENSING:
+            true.sensors.append(SENSING[effect.name](effect))
+        elif effect.name in _BODILY:
+            _BODILY[effect.name](true, effect)
+        else:
+            raise CrosscheckError(
+                f"effect {effect.name}: no truth with MuJoCo; expected one of "
+                f"{', '.join(TRUE_EFFECTS)}"
+            )
+    return true
+
+
+def _zero_pose(true: TrueRobot, effect: Any) -> None:
+    turned = quat_multiply(quat_from_rotvec(effect.rotation), true.zero_pose[3:])
+    true.zero_pose = np.concatenate([true.zero_pose[:3] + effect.position, turned])
+
+
+def _exit_friction(true: TrueRobot, effect: Any) -> None:
+    true.friction += effect.friction
+    true.winch_side += effect.length
+
+
+def _hysteresis(true: TrueRobot, effect: Any) -> None:
+    true.hysteresis += effect.amplitude
+    true.hysteresis_stretch = effect.stretch
+
+
+def _creep(true: TrueRobot, effect: Any) -> None:
+    true.creep += effect.amount
+    true.creep_time = effect.time
+
+
+def _elasticity(true: TrueRobot, effect: Any) -> None:
+    true.quadratic += effect.quadratic
+    true.cubic += effect.cubic
+
+
+def _tilt(true: TrueRobot, effect: Any) -> None:
+    turn = quat_from_rotvec(np.array([effect.tilt_x, effect.tilt_y, 0.0]))
+    true.gravity = quat_rotate(turn, true.gravity)
+
+
+def _thermal(true: TrueRobot, effect: Any) -> None:
+    true.expansion, true.zero_temperature = effect.expansion, effect.zero_temperature
+
+
+def _eccentricity(true: TrueRobot, effect: Any) -> None:
+    true.run_out.append((effect.sine, effect.cosine, effect.drum_radius))
+
+
+def _add(name: str, parameter: str) -> Callable[[TrueRobot, Any], None]:
+    """An effect that adds its parameter to a number of the robot."""
+
+    def act(true: TrueRobot, effect: Any) -> None:
+        value = getattr(true, name)
+        more = getattr(effect, parameter)
+        setattr(true, name, value + np.reshape(more, np.shape(value)) if np.ndim(value) else
+                value + more)  # fmt: skip
+
+    return act
+
+
+def _stiffen(true: TrueRobot, effect: Any) -> None:
+    true.ea = true.ea * effect.factor
+
+
+def _wrench(true: TrueRobot, effect: Any) -> None:
+    true.wrench = true.wrench + np.concatenate([effect.force, effect.moment])
+
+
+_BODILY: dict[str, Callable[[TrueRobot, Any], None]] = {
+    "cable_length_offset": _add("offset", "offset"),
+    "initial_pose_error": _zero_pose,
+    "drum_gain": _add("gain", "gain"),
+    "drum_eccentricity": _eccentricity,
+    "backlash": _add("backlash", "gap"),
+    "thermal_expansion": _thermal,
+    "pulley_radius": _add("pulley_radius", "radius"),
+    "exit_point_error": _add("exit_points", "error"),
+    "anchor_point_error": _add("anchor_points", "error"),
+    "stiffness": _stiffen,
+    "cable_stiffness": _stiffen,
+    "nonlinear_elasticity": _elasticity,
+    "winch_side_length": _add("winch_side", "length"),
+    "cable_weight": _add("cable_weight", "weight"),
+    "hysteresis": _hysteresis,
+    "creep": _creep,
+    "exit_friction": _exit_friction,
+    "frame_compliance": _add("compliance", "compliance"),
+    "platform_mass": _add("mass", "added"),
+    "centre_of_mass": _add("centre_of_mass", "shift"),
+    "external_wrench": _wrench,
+    "gravity_tilt": _tilt,
+}
+
+TRUE_EFFECTS = (*_BODILY, *SENSING)
+"""Names of the effects that a twin can hide."""

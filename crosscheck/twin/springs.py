@@ -1,0 +1,177 @@
+"""Springs that MuJoCo's tendons are made of, and laws that it has no tendon for.
+
+A cable in MuJoCo is a one-sided spring, T = k x + p x^2 + q x^3 with x = L - rest. Hysteresis,
+creep and friction have no such spring: there the law is written out here, and its tangent at the
+present length is the spring; MuJoCo settles, the tangent is taken anew, until the two agree.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from crosscheck.twin.robot import TrueRobot
+from seecr.pose import Array
+
+_BISECTIONS = 200
+
+
+@dataclass(frozen=True, eq=False)
+class Springs:
+    """One-sided springs of m cables.
+
+    Attributes:
+        rest: (m,) [m]; stiffness: (m,) [N/m]; poly: (m, 2) [N/m^2, N/m^3].
+    """
+
+    rest: Array
+    stiffness: Array
+    poly: Array
+
+    @classmethod
+    def plain(cls, lengths: Array, true: TrueRobot) -> Springs:
+        """Elastic cables of rest lengths (m,) [m]."""
+        k = true.ea / lengths
+        poly = np.stack([k / lengths * true.quadratic, k / lengths**2 * true.cubic], axis=1)
+        return cls(lengths.copy(), k, poly)
+
+
+    def halfway(self, other: Springs) -> Springs:
+        """Springs between these and others."""
+        rest = 0.5 * (self.rest + other.rest)
+        stiffness = 0.5 * (self.stiffness + other.stiffness)
+        return Springs(rest, stiffness, 0.5 * (self.poly + other.poly))
+
+
+@dataclass(eq=False)
+class Cable:
+    """One cable with a memory.
+
+    Attributes:
+        true: the robot; ea: [N].
+        rest: paid-out length [m].
+        stretch, pull: e = l0 eps [m] and Dahl's part of the tension [N] when it last rested.
+        crept: creep strain then.
+        creep_by_tension: creep strain by the end of this step per newton of tension at its end.
+        winch_tension: [N] behind the exit point if the cable does not slip.
+        fresh: at the start of a run, without any history but creep.
+    """
+
+    true: TrueRobot
+    ea: float
+    rest: float = 1.0
+    stretch: float = 0.0
+    pull: float = 0.0
+    crept: float = 0.0
+    creep_by_tension: float = 0.0
+    winch_tension: float = 0.0
+    fresh: bool = True
+    strain: float = field(default=0.0, init=False)
+    tension_before: float = field(default=0.0, init=False)
+
+    def tension(self, strain: float) -> tuple[float, float, float]:
+        """Tension [N], its slope [N], and Dahl's part [N] at a strain >= 0."""
+        q, c = self.true.quadratic, self.true.cubic
+        tension = self.ea * (strain + q * strain**2 + c * strain**3)
+        slope = self.ea * (1.0 + 2.0 * q * strain + 3.0 * c * strain**2)
+        if self.fresh or self.true.hysteresis == 0.0:
+            return tension, slope, 0.0
+        # dz/de = (amplitude - z sign(de)) / stretch, integrated from where it last rested
+        change = self.rest * strain - self.stretch
+        end = math.copysign(self.true.hysteresis, change)
+        left = math.exp(-abs(change) / self.true.hysteresis_stretch)
+        z = end + (self.pull - end) * left
+        z_slope = abs(end - self.pull) * left * self.rest / self.true.hysteresis_stretch
+        return tension + z, slope + z_slope, z
+
+    def behind(self, tension: float) -> tuple[float, float]:
+        """Tension behind the exit point [N], and its slope, with the capstan's friction."""
+        if self.fresh or self.true.friction == 0.0:
+            return tension, 1.0
+        grip = math.exp(self.true.friction)
+        held = min(max(self.winch_tension, tension / grip), tension * grip)
+        slope = 0.0 if held == self.winch_tension else held / tension if tension > 0.0 else grip
+        return held, slope
+
+    def length(self, strain: float) -> tuple[float, float, float, float]:
+        """Length [m] and its slope, tension [N] and its slope, at a strain."""
+        tension, slope, _ = self.tension(strain)
+        if tension < 0.0:
+            tension = 0.0
+        behind, behind_slope = self.behind(tension)
+        soft = self.true.winch_side / self.ea if self.true.friction > 0.0 else 0.0
+        length = self.rest * (1.0 + strain + self.crept + self.creep_by_tension * tension)
+        length += soft * behind
+        rate = self.rest * (1.0 + self.creep_by_tension * slope) + soft * behind_slope * slope
+        return length, rate, tension, slope
+
+    def tangent(self, length: float) -> tuple[float, float]:
+        """Rest length [m] and stiffness [N/m] of the spring that touches the law there."""
+        self.strain = self._strain_at(length)
+        at, rate, tension, slope = self.length(self.strain)
+        stiffness = slope / rate
+        if tension == 0.0:
+            # slack: the spring takes up where the law does
+            return at, stiffness
+        return at - tension / stiffness, stiffness
+
+    def _strain_at(self, length: float) -> float:
+        """Strain at which the cable has this length, or at which it just goes taut.
+
+        Newton's method inside a bracket; to where a cable goes taut the bracket alone leads.
+        """
+        low, high = 0.0, max(2.0 * self.strain, 1e-6)
+        while not self._reaches(length, high):
+            low, high = high, 2.0 * high
+        strain = min(max(self.strain, low), high)
+        for _ in range(_BISECTIONS):
+            at, rate, tension, _ = self.length(strain)
+            if tension > 0.0 and abs(at - length) <= 2e-16 * length:
+                return strain
+            if tension > 0.0 and at >= length:
+                high = strain
+            else:
+                low = strain
+            following = strain - (at - length) / rate
+            if not (tension > 0.0 and low < following < high):
+                following = 0.5 * (low + high)
+            if following in (low, high):
+                break
+            strain = following
+        return high
+
+    def _reaches(self, length: float, strain: float) -> bool:
+        at, _, tension, _ = self.length(strain)
+        return tension > 0.0 and at >= length
+
+    def rests(self, slack: bool) -> None:
+        """Remember the state the cable has come to rest in."""
+        tension, _, z = self.tension(self.strain)
+        tension = 0.0 if slack else max(tension, 0.0)
+        self.winch_tension = self.behind(tension)[0]
+        self.stretch = 0.0 if slack else self.rest * self.strain
+        self.pull = 0.0 if slack or self.fresh else z
+        self.crept += self.creep_by_tension * tension
+        self.creep_by_tension = 0.0
+        self.tension_before = tension
+
+    def pays_out(self, rest: float, elapsed: float, fresh: bool) -> None:
+        """Begin a step: a new rest length [m], some time later [s].
+
+        Creep strain c follows time dc/dt = amount T/EA - c, with a tension that goes linearly
+        from the last to the coming one; between runs it is the coming one throughout.
+        """
+        paid, self.rest, self.fresh = rest - self.rest, rest, fresh
+        if self.true.friction > 0.0 and self.true.winch_side > 0.0:
+            self.winch_tension -= paid * self.ea / self.true.winch_side
+        if self.true.creep == 0.0:
+            return
+        x = elapsed / self.true.creep_time
+        left = math.exp(-x)
+        mean = -math.expm1(-x) / x if x > 0.0 else 1.0
+        now, before = (1.0 - left, 0.0) if fresh else (1.0 - mean, mean - left)
+        per_newton = self.true.creep / self.ea
+        self.crept = self.crept * left + per_newton * before * self.tension_before
+        self.creep_by_tension = per_newton * now

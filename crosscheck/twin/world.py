@@ -1,0 +1,302 @@
+"""The true robot inside MuJoCo: its cables' springs, its state, its forces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.settle.mujoco_model import change_mass_unit, switch_off
+from crosscheck.settle.physics import Physics
+from crosscheck.twin.build import Index, Places, build
+from crosscheck.twin.chain import hang
+from crosscheck.twin.robot import TrueRobot
+from crosscheck.twin.springs import Springs
+from seecr.pose import Array, pose_difference, quat_multiply
+
+# As in crosscheck.settle.physics: MuJoCo's mass unit is chosen so that the platform has this mass.
+_MASS_IN_MUJOCO = 1e6
+
+Group = tuple[Index, Index, Index]
+
+
+class World(Physics):
+    """MuJoCo's model and state of a true robot; see :class:`crosscheck.settle.physics.Physics`.
+
+    Coordinates are those of the platform, then those of each cable's exit point, winch and
+    point masses.
+
+    Attributes:
+        true: the robot.
+        places: where its parts are in the model.
+        segments: N of each cable.
+        cable_dofs: (m, h) coordinates of each cable's own parts.
+        coupling: see :func:`_coupling`.
+    """
+
+    def __init__(self, true: TrueRobot, segments: int = 1) -> None:
+        self.true, self.segments = true, segments
+        self.name = true.robot.name
+        self.model, self.places = build(true, segments)
+        self.source = self.model
+        self.body = self.places.platform
+        self.is_free = not true.robot.joints
+        self._anchor_sites, self._exit_sites = self.places.anchors, self.places.exits
+        self.ignored = switch_off(self.model)
+        self.mass = true.mass
+        self.mass_unit = 2.0 ** round(float(np.log2(self.mass / _MASS_IN_MUJOCO)))
+        change_mass_unit(self.model, self.mass_unit)
+        self.data = mujoco.MjData(self.model)
+        self.reference_qpos = self.model.qpos0.copy()
+        self.reference_gravity = true.gravity.copy()
+        self.wrench = np.zeros(6)
+        self.length = true.robot.length
+        self.rotations = self._which_rotate()
+        self.metre = np.where(self.rotations, self.length, 1.0)
+        hubs = np.concatenate([self.places.exit_dofs, self.places.slider_dofs], axis=1)
+        nodes = self.places.node_dofs.reshape(true.n_cables, -1)
+        self.cable_dofs = np.concatenate([hubs, nodes], axis=1)
+        self.coupling = _coupling(self.places, self.n_dof, segments)
+        self.force_scale = 1.0
+        self.set_load(true.wrench, true.gravity)
+        self._start_springs(true)
+        self._start_sheaves(true.up)
+
+    def _start_springs(self, true: TrueRobot) -> None:
+        self._rest = true.robot.rest_lengths.copy()
+        self.free_share = np.ones(true.n_cables)
+        self.set_springs(Springs.plain(true.robot.rest_lengths, true))
+
+    def _start_sheaves(self, up: Array) -> None:
+        """The frame in which sheaves turn: up, and two directions across it."""
+        frame = np.linalg.svd(up[None])[2]
+        frame[0] = up
+        self._ahead, self._side = frame[1], np.cross(up, frame[1])
+        upright = np.zeros(4)
+        mujoco.mju_mat2Quat(upright, np.stack([self._ahead, self._side, up], axis=1).ravel())
+        # a half turn about the sheave's own vertical follows it
+        self._swivel = np.stack([upright, quat_multiply(upright, np.array([0.0, 0.0, 0.0, 1.0]))])
+
+    @property
+    def n_cables(self) -> int:
+        """Number of cables m (each is N tendons)."""
+        return self.true.n_cables
+
+    @property
+    def steers(self) -> bool:
+        """Whether something has to be done at every step: sheaves turned, a wrench applied."""
+        return bool(self.true.pulley_radius or self.wrench.any())
+
+    def set_springs(self, springs: Springs) -> None:
+        """Give all segments their rest length, stiffness and weight.
+
+        The top segment has what lies on the sheave too: all of the cable that is not free.
+        """
+        n, model = self.segments, self.model
+        free = springs.rest * self.free_share
+        part = np.repeat((free / n / springs.rest)[:, None], n, axis=1)
+        part[:, 0] += 1.0 - self.free_share
+        rest = part * springs.rest[:, None]
+        rest[:, 0] += self.places.tail
+        at = self.places.tendons
+        model.tendon_lengthspring[at, 0] = 0.0
+        model.tendon_lengthspring[at, 1] = rest
+        model.tendon_stiffness[at] = springs.stiffness[:, None] / part / self.mass_unit
+        for k in range(2):
+            poly = springs.poly[:, k, None] / part ** (k + 2)
+            model.tendon_stiffnesspoly[at, k] = poly / self.mass_unit
+        self._rest = springs.rest
+        if n > 1:
+            self._set_weight(free / n)
+
+    def _set_weight(self, segment: Array) -> None:
+        """Lump the weight of segments (m,) [m]: half of each at either end."""
+        g = float(np.linalg.norm(self.true.gravity))
+        mass = self.true.cable_weight * segment / g / self.mass_unit
+        self.model.body_mass[self.places.node_bodies] = mass[:, None]
+        self.model.body_mass[self.places.end_bodies] = 0.5 * mass
+        mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
+        self._segment_weight = self.true.cable_weight * segment
+
+    def place(self, pose: Array) -> None:
+        """Platform at a pose (7,), cables straight, or hanging where they have weight."""
+        self.data.qpos[:] = self.reference_qpos
+        self.data.qvel[:] = 0.0
+        self.data.time = 0.0
+        if self.is_free:
+            self.data.qpos[:7] = pose
+        else:
+            self._joints_towards(pose)
+        self.update()
+        if self.segments > 1:
+            self._string()
+            self.update()
+
+    def _joints_towards(self, pose: Array) -> None:
+        """Gauss-Newton on the platform's joints until it is as near as they let it."""
+        n = self.places.n_platform
+        weigh = np.array([1.0, 1.0, 1.0] + 3 * [self.length])
+        jacobian = np.zeros((6, self.n_dof))
+        for _ in range(50):
+            mujoco.mj_kinematics(self.model, self.data)
+            mujoco.mj_comPos(self.model, self.data)
+            gap = weigh * pose_difference(pose, self.pose())
+            mujoco.mj_jacBody(self.model, self.data, jacobian[:3], jacobian[3:], self.body)
+            step = np.linalg.lstsq(weigh[:, None] * jacobian[:, :n], gap, rcond=None)[0]
+            self.data.qpos[:n] += step
+            if np.linalg.norm(step * self.metre[:n]) < 1e-15 * self.length:
+                break
+
+    def _string(self) -> None:
+        """Point masses where a chain hangs between its ends."""
+        end = self.data.site_xpos[self._anchor_sites]
+        free = self._rest * self.free_share
+        up = -self.true.gravity / np.linalg.norm(self.true.gravity)
+        weight = self.true.cable_weight * up
+        start = self._leaves_towards(end)
+        nodes = hang(start, end, free, self.true.ea, weight, self.segments)
+        self.data.qpos[self._address(self.places.node_dofs)] = nodes
+
+    def _leaves_towards(self, ends: Array) -> Array:
+        """Where straight cables to points (m, 3) leave: exit points, or sheaves' tangents."""
+        start = self.exit_points().copy()
+        if self.true.pulley_radius:
+            start += (1.0 - self.free_share)[:, None] * (ends - start)
+        return start
+
+    def _address(self, dofs: Index) -> Index:
+        """Where in qpos: a free platform has one number more there."""
+        return dofs + (1 if self.is_free else 0)
+
+    def update(self) -> None:
+        """Bring poses, sheaves and cable lengths up to the present qpos."""
+        mujoco.mj_kinematics(self.model, self.data)
+        if self.true.pulley_radius:
+            self._turn_sheaves()
+            mujoco.mj_kinematics(self.model, self.data)
+        mujoco.mj_comPos(self.model, self.data)
+        mujoco.mj_tendon(self.model, self.data)
+
+    def _turn_sheaves(self) -> None:
+        """Turn each sheave about the vertical until it faces where its cable goes."""
+        reach = self.data.site_xpos[self.places.top_next] - self.true.exit_points
+        half = 0.5 * np.arctan2(reach @ self._side, reach @ self._ahead)
+        self.data.mocap_quat[:] = np.stack([np.cos(half), np.sin(half)], axis=1) @ self._swivel
+
+    @contextmanager
+    def frozen_slack(self, taut: NDArray[np.bool_]) -> Iterator[None]:
+        """Let some tendons (m N,) pull and push, the others vanish, curved laws included."""
+        poly = self.model.tendon_stiffnesspoly
+        kept = poly.copy()
+        poly[~taut] = 0.0
+        try:
+            with super().frozen_slack(taut):
+                yield
+        finally:
+            poly[:] = kept
+
+    def residual(self) -> Array:
+        """Unbalanced generalised force (d,) [N, N m] at rest at the present qpos."""
+        if self.true.pulley_radius:
+            mujoco.mj_kinematics(self.model, self.data)
+            self._turn_sheaves()
+        return super().residual()
+
+    def push(self) -> None:
+        """Apply the wrench, and turn the sheaves for the next step."""
+        super().push()
+        if self.true.pulley_radius:
+            self._turn_sheaves()
+
+    def tensions(self) -> Array:
+        """Tensions of all tendons (m N,) [N] as of the last update; 0 where slack."""
+        x = np.maximum(self.data.ten_length - self.model.tendon_lengthspring[:, 1], 0.0)
+        poly = self.model.tendon_stiffnesspoly
+        pull = self.model.tendon_stiffness * x + poly[:, 0] * x**2 + poly[:, 1] * x**3
+        return np.asarray(self.mass_unit * pull)
+
+    def cable_tensions(self) -> Array:
+        """Tension of each cable (m,) [N] where it leaves its exit point or sheave."""
+        self.update()
+        tension = self.tensions()[self.places.tendons[:, 0]]
+        if self.segments == 1:
+            return tension
+        # half a segment's weight hangs on the exit point itself
+        along = self.data.site_xpos[self.places.top_next] - self._leaves()
+        along /= np.linalg.norm(along, axis=1, keepdims=True)
+        half = 0.5 * self._segment_weight[:, None] * self.true.gravity
+        half /= np.linalg.norm(self.true.gravity)
+        return np.asarray(np.linalg.norm(tension[:, None] * along + half, axis=1))
+
+    def _leaves(self) -> Array:
+        """Points (m, 3) [m] where cables leave their exit points or sheaves."""
+        if not self.true.pulley_radius:
+            return self.exit_points()
+        points = []
+        for i in self.places.tendons[:, 0]:
+            last = self.data.ten_wrapadr[i] + self.data.ten_wrapnum[i] - 1
+            points.append(self.data.wrap_xpos.reshape(-1, 3)[last - 1])
+        return np.array(points)
+
+    @property
+    def wraps(self) -> bool:
+        """Whether every cable lies on its sheave, as of the last update."""
+        if not self.true.pulley_radius:
+            return True
+        tops = self.places.tendons[:, 0]
+        # site, two points on the sheave, site
+        return bool(np.all(self.data.ten_wrapnum[tops] == 4))
+
+    def cable_lengths(self) -> Array:
+        """Lengths (m,) [m] from the exit points on, as of the last update."""
+        return np.asarray(
+            self.data.ten_length[self.places.tendons].sum(axis=1) - self.places.tail
+        )
+
+    def measure_free_share(self) -> Array:
+        """Part of each cable (m,) that hangs free of its sheave, at the present state."""
+        self.update()
+        top = self.data.ten_length[self.places.tendons[:, 0]] - self.places.tail
+        ends = self.data.site_xpos[self.places.top_next]
+        arc = top - np.linalg.norm(ends - self._leaves(), axis=1)
+        return np.asarray(1.0 - arc / self.cable_lengths())
+
+    def _which_rotate(self) -> Array:
+        rotate: Any = np.zeros(self.n_dof, dtype=bool)
+        if self.is_free:
+            rotate[3:6] = True
+        else:
+            hinges = [joint.kind == "hinge" for joint in self.true.robot.joints]
+            rotate[: len(hinges)] = hinges
+        return rotate
+
+
+def _coupling(places: Places, n_dof: int, segments: int) -> list[Group]:
+    """Groups of coordinates that may be shifted together to difference the forces.
+
+    Each group: the coordinates, and the (rows, columns) of the stiffness that one shift of all
+    of them gives. Cables meet only on the platform and segments only at their ends, so however
+    long the chains are, a few groups do.
+    """
+    groups: list[Group] = []
+    for k in range(places.n_platform):
+        rows = np.arange(n_dof)
+        groups.append((np.array([k]), rows, np.full(n_dof, k)))
+    hubs = np.concatenate([places.exit_dofs, places.slider_dofs], axis=1)
+    blocks = [hubs, *(places.node_dofs[:, j] for j in range(segments - 1))]
+    for colour in range(4):
+        mine = [0] if colour == 0 else list(range(colour, segments, 3))
+        for axis in range(max((blocks[b].shape[1] for b in mine), default=0)):
+            columns: list[Index] = []
+            near_rows: list[Index] = []
+            for b in mine:
+                near = np.concatenate(blocks[max(b - 1, 0) : b + 2], axis=1)
+                columns.append(np.repeat(blocks[b][:, axis], near.shape[1]))
+                near_rows.append(near.ravel())
+            flat = np.concatenate(columns)
+            groups.append((np.unique(flat), np.concatenate(near_rows), flat))
+    return groups

@@ -1,0 +1,177 @@
+"""``crosscheck add``: the error falls, the model grows, and what does not pay is not added."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_data import SIGMA, case, measured, refused, run, soft_cogiro, term
+
+from crosscheck.add import add_effect
+from crosscheck.errors import CrosscheckError
+from crosscheck.measurements.data import write_measurements
+from crosscheck.measurements.read import load_measurements
+from crosscheck.model.read import load_model
+from seecr.mjcf import load_robot
+
+HIDDEN = {"pulley_radius": {"radius_m": 0.01}, "centre_of_mass": {"shift_x_m": 0.004}}
+
+
+@pytest.fixture(scope="module")
+def both(tmp_path_factory):
+    """Pulleys and a shifted centre of mass, which the model does not know."""
+    return case(tmp_path_factory.mktemp("both"), HIDDEN)
+
+
+def add(effect, files, model, *more):
+    return run("add", effect, *files, "--model", model, *more)
+
+
+def test_added_one_after_the_other_the_error_falls_to_the_noise(both, tmp_path):
+    model, out = tmp_path / "model.toml", tmp_path / "out"
+    gate = ("--max-position", "0.04mm", "--max-orientation", "0.025deg", "--no-recording")
+    assert run("compare", *both, *gate, "--out", out).exit_code == 1
+    first = add("pulley_radius", both, model)
+    assert first.exit_code == 0
+    assert "before" in first.stdout and "on runs left out" in first.stdout
+    assert "crosscheck diagnose" in first.stdout  # something is still missing
+    compared = ("compare", *both, "--model", model, *gate, "--out", out)
+    assert run(*compared).exit_code == 1
+    second = add("centre_of_mass", both, model)
+    assert second.exit_code == 0 and "what is left is noise" in second.stdout
+    assert run(*compared).exit_code == 0
+    robot = load_robot(both[0])
+    found = load_model(model, robot)
+    assert found.names == ("pulley_radius", "centre_of_mass")
+    for one, error in zip(found.terms, found.stderr, strict=True):
+        truth = np.array([HIDDEN[one.name].get(k, 0.0) for k in one.layout.names])
+        assert np.all(np.abs(one.vector - truth) < 4.0 * error)
+    table = found.document["effect"][1]
+    assert table["before"]["orientation_rms_rad"] > 5 * SIGMA.orientation_rad
+    assert table["after"]["orientation_rms_rad"] < 1.2 * SIGMA.orientation_rad
+    assert table["held_out"]["position_rms_m"] < 1.2 * SIGMA.position_m
+    assert table["provenance"]["data"] == "measured.csv"
+    assert found.document["effect"][0]["refitted"]["by"] == "crosscheck add centre_of_mass"
+
+
+def test_an_effect_that_does_not_pay_is_not_written_unless_forced(both, tmp_path):
+    model = tmp_path / "model.toml"
+    add("pulley_radius", both, model)
+    add("centre_of_mass", both, model)
+    before = model.read_text()
+    result = add("tracker_scale", both, model)
+    assert result.exit_code == 1 and model.read_text() == before
+    assert "it does not pay; --force adds it all the same" in result.stdout
+    result = add("tracker_scale", both, model, "--force")
+    assert result.exit_code == 0 and "tracker_scale" in model.read_text()
+
+
+def test_what_is_there_already_is_only_fitted_again_when_asked(both, tmp_path):
+    model = tmp_path / "model.toml"
+    assert "has no pulley_radius to fit again (it has none)" in refused(
+        "add", "pulley_radius", *both, "--model", model, "--refit"
+    )
+    assert not model.exists()
+    add("pulley_radius", both, model)
+    assert "has pulley_radius already; --refit fits it again" in refused(
+        "add", "pulley_radius", *both, "--model", model
+    )
+    # somebody changed it by hand
+    text = model.read_text()
+    wrong = re.sub(r"radius_m = { value = [0-9.e-]+", "radius_m = { value = 0.013", text)
+    assert wrong != text
+    model.write_text(wrong)
+    assert add("pulley_radius", both, model, "--refit").exit_code == 0
+    again = load_model(model, load_robot(both[0]))
+    assert again.names == ("pulley_radius",)
+    assert again.terms[0].vector[0] == pytest.approx(0.01, abs=5e-4)
+
+
+def test_json_and_out(both, tmp_path):
+    result = add("pulley_radius", both, tmp_path / "m.toml", "--json", "--out", tmp_path / "o")
+    document = json.loads(result.stdout)
+    assert document == json.loads((tmp_path / "o" / "add.json").read_text())
+    assert document["written"] is True
+    radius = document["effects"]["pulley_radius"]["radius_m"]
+    assert radius["unit"] == "m" and radius["at_bound"] is False
+    assert document["held_out"]["position_rms_m"] < document["held_out_before"]["position_rms_m"]
+
+
+def test_unknown_effects_are_listed_nearest_first(both, tmp_path):
+    text = refused("add", "pulley_radus", *both, "--model", tmp_path / "m.toml")
+    assert "no effect 'pulley_radus'; known, nearest first: pulley_radius, " in text
+    assert not (tmp_path / "m.toml").exists()
+
+
+def test_what_the_data_cannot_carry_is_refused(both, tmp_path):
+    xml, _ = both
+    robot = load_robot(xml)
+    data = measured(robot)
+    model = ("--model", tmp_path / "m.toml")
+    few = tmp_path / "few.csv"
+    write_measurements(few, data.rows(slice(0, 10)))
+    text = refused("add", "exit_point_error", xml, few, *model)
+    assert "few.csv cannot carry exit_point_error: 24 parameters, but the data have 10 rows" in text
+    text = refused("add", "thermal_expansion", xml, both[1], *model)
+    assert "cannot carry thermal_expansion: needs temperature_C" in text
+    text = refused("add", "tension_scale", xml, both[1], *model)
+    assert "cannot carry tension_scale: needs measured tensions" in text
+    timeless = tmp_path / "timeless.csv"
+    write_measurements(timeless, replace(data, t_s=None))
+    assert "needs the time of each row (t_s)" in refused("add", "creep", xml, timeless, *model)
+    still = tmp_path / "still.csv"
+    write_measurements(still, data.rows(np.zeros(30, dtype=int)))
+    text = refused("add", "stiffness", xml, still, *model)
+    assert "all commands are the same" in text
+    assert not (tmp_path / "m.toml").exists()
+
+
+def test_a_single_run_is_cut_into_blocks_of_time_and_said_so(tmp_path):
+    xml, data = case(tmp_path, {"pulley_radius": {"radius_m": 0.01}})
+    robot = load_robot(xml)
+    rows = load_measurements(data, robot)
+    write_measurements(data, replace(rows, run=np.full(rows.n_rows, "one")))
+    result = add("pulley_radius", (xml, data), tmp_path / "m.toml")
+    assert result.exit_code == 0
+    assert "a single run: cross-validation leaves out 5 blocks of time" in result.stdout
+
+
+def test_all_slack_rows_end_3(tmp_path):
+    robot = soft_cogiro()
+    loose = replace(robot, gravity=np.zeros(3), rest_lengths=robot.rest_lengths + 1.0)
+    with pytest.raises(CrosscheckError, match="equilibrium") as error:
+        add_effect(loose, measured(robot), (), "stiffness")
+    assert error.value.exit_status == 3
+
+
+def test_values_on_a_bound_are_warned_of():
+    robot = soft_cogiro()
+    # pulleys of a negative radius, if there were such, turn these errors round
+    plain = measured(robot)
+    bent = measured(robot, [term(robot, "pulley_radius", radius_m=0.002)])
+    mirrored = replace(plain, position=2 * plain.position - bent.position)
+    found = add_effect(robot, mirrored, (), "pulley_radius")
+    assert found.own.at_bound[0] and not found.pays
+    assert any("radius_m ended on a bound" in w for w in found.warnings)
+
+
+def test_an_outlying_row_is_left_out_and_named():
+    robot = soft_cogiro()
+    data = measured(robot, [term(robot, "stiffness", factor=1.4)])
+    position = data.position.copy()
+    position[20, 1] += 0.01
+    found = add_effect(robot, replace(data, position=position), (), "stiffness")
+    assert any(f"line {data.line[20]} left out: outliers" in note for note in found.notes)
+    value, error = found.own.term.vector[0], found.own.stderr[0]
+    assert abs(value - 1.4) < 4 * error and error < 0.05
+
+
+def test_effects_that_go_together_are_named():
+    robot = soft_cogiro()
+    data = measured(robot, [term(robot, "stiffness", factor=1.4)])
+    found = add_effect(robot, data, [term(robot, "stiffness", factor=1.4)], "platform_mass")
+    assert not found.pays  # mass and stiffness move a robot alike
+    assert any("hardly determined apart" in w or "not seen" in w for w in found.warnings)

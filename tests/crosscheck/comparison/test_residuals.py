@@ -1,0 +1,304 @@
+"""Comparisons: the numbers in the tables, what errors go with, limits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_data import SIGMA, measured, soft_cogiro, term
+
+from crosscheck.comparison.associations import EVERYWHERE, SIGNIFICANT
+from crosscheck.comparison.cable_space import cable_errors, independent_part
+from crosscheck.comparison.limits import Limits, check, load_limits, parse_limit, with_options
+from crosscheck.comparison.residuals import as_json, compare
+from crosscheck.comparison.travel import STILL
+from crosscheck.document import json_text
+from crosscheck.errors import CrosscheckError, InputFileError
+from crosscheck.measurements.sigma import Sigma
+from seecr.mjcf import load_robot
+from seecr.pose import pose_add, pose_difference
+from seecr.shipped import model_path
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return soft_cogiro()
+
+
+@pytest.fixture(scope="module")
+def data(robot):
+    return measured(robot, [term(robot, "stiffness", factor=1.4)])
+
+
+@pytest.fixture(scope="module")
+def off(robot, data):
+    return compare(robot, data)
+
+
+def test_the_true_model_leaves_noise(robot, data):
+    found = compare(robot, data, [term(robot, "stiffness", factor=1.4)])
+    assert found.is_noise and found.converged
+    assert found.sentence.startswith("Model and data agree: what is left is noise")
+    assert found.rms["position_rms_m"] == pytest.approx(SIGMA.position_m, rel=0.15)
+    assert all(a["p"] > SIGNIFICANT for a in found.associations)
+
+
+def test_coordinates_are_measured_less_predicted(robot, data, off):
+    rest = off.state.prediction.poses
+    reading = np.concatenate([data.position, data.quat_wxyz], axis=1)
+    error = pose_difference(reading, rest)
+    z = next(c for c in off.coordinates if c["name"] == "z")
+    assert z["bias"] == pytest.approx(error[:, 2].mean(), rel=1e-9)
+    assert z["rms"] == pytest.approx(np.sqrt((error[:, 2] ** 2).mean()), rel=1e-9)
+    worst = int(np.argmax(np.abs(error[:, 2])))
+    assert z["max"] == pytest.approx(error[worst, 2]) and z["line"] == data.line[worst]
+    turn = next(c for c in off.coordinates if c["name"] == "rotation about y")
+    assert turn["rms"] == pytest.approx(np.sqrt((error[:, 4] ** 2).mean()), rel=1e-9)
+
+
+def test_stiffer_cables_hold_the_platform_higher(off):
+    assert not off.is_noise
+    assert off.sentence.startswith("The model misses something")
+    z = next(c for c in off.coordinates if c["name"] == "z")
+    assert z["bias"] > 3e-4
+    assert {r["name"] for r in off.runs} == set(off.problem.data.runs)
+
+
+def test_groups_hold_every_row_once(off):
+    n = off.problem.data.n_rows
+    for groups in (off.runs, off.directions, off.regions):
+        assert sum(g["rows"] for g in groups) == n
+    power = sum(g["rows"] * g["position_rms_m"] ** 2 for g in off.runs)
+    assert np.sqrt(power / n) == pytest.approx(off.rms["position_rms_m"], rel=1e-9)
+    assert len(off.regions) > 2 and all("x " in g["name"] for g in off.regions)
+
+
+def test_direction_of_travel_is_the_commanded_one(robot, off):
+    way, data = off.way, off.problem.data
+    forward = np.flatnonzero(data.run == "along_low_fwd")
+    assert set(way.direction[forward]) == {"+x", "-x"}
+    assert np.all(way.direction[forward][1:] == "+x")
+    assert way.direction[forward[0]] == "-x"  # from the reference pose to where the run starts
+    step = np.linalg.norm(np.diff(data.command_pose[forward, :3], axis=0), axis=1)
+    assert way.speed[forward][1:] == pytest.approx(step / 2.0)
+    assert np.isnan(way.speed[forward[0]])
+    still = measured(robot, points=8).rows([3, 3])
+    assert compare(robot, still).way.direction[1] == STILL
+
+
+def test_the_worst_row_is_named(robot, data):
+    position = data.position.copy()
+    position[20, 1] += 0.01
+    found = compare(robot, replace(data, position=position))
+    assert found.worst[0]["row"] == 20 and found.worst[0]["line"] == data.line[20]
+    assert found.worst[0]["errors"]["y [m]"] == pytest.approx(0.01, rel=0.1)
+    assert found.worst[0]["run"] == data.run[20]
+    assert any(f"line {data.line[20]}: far off" in note for note in found.notes)
+
+
+FOLLOWS = {
+    "time": lambda data: 4e-6 * data.t_s[:, None] * np.array([0.0, 0.0, 1.0]),
+    "direction of travel": None,
+    "commanded y": lambda data: (
+        0.003 * (data.command_pose[:, 1:2] - 0.25) * np.array([1.0, 0.0, 0.0])
+    ),
+    EVERYWHERE: lambda data: np.full((len(data.run), 3), 2e-4),
+}
+
+
+@pytest.mark.parametrize("against", FOLLOWS)
+def test_errors_are_traced_to_what_they_follow(robot, against):
+    plain = measured(robot)
+    if against == "direction of travel":
+        sign = np.array([1.0 if d[0] == "+" else -1.0 for d in compare(robot, plain).way.direction])
+        error = 3e-4 * sign[:, None] * np.array([0.0, 0.0, 1.0])
+    else:
+        error = FOLLOWS[against](plain)
+    found = compare(robot, replace(plain, position=plain.position + error))
+    first = next(a for a in found.associations if a["against"] == against)
+    # runs follow each other in time: which run it is can be as good an answer as the time
+    assert first["share"] > 0.9 * found.associations[0]["share"]
+    assert first["p"] < 1e-6 and first["share"] > 0.15
+    means = [b["mean"] for b in first["bins"]]
+    assert max(np.abs(means)) == pytest.approx(np.abs(error).max(), rel=0.5)
+    assert sum(b["rows"] for b in first["bins"]) == plain.n_rows
+
+
+def test_noise_goes_with_nothing(robot):
+    firsts = [compare(robot, measured(robot, seed=s)).associations[0]["p"] for s in range(20)]
+    assert np.sum(np.array(firsts) < 0.05) <= 3
+    assert min(firsts) > 1e-4
+
+
+def test_a_longer_cable_shows_as_that_cable(robot):
+    plain = compare(robot, measured(robot))
+    offset = {"offset_3_m": 1e-3}
+    found = compare(robot, measured(robot, [term(robot, "cable_length_offset", **offset)]))
+    errors, noise = cable_errors(found.problem, found.state.raw, found.state.prediction)
+    mean = errors.mean(axis=0)
+    assert int(np.argmax(mean)) == 2 and mean[2] > 5 * noise[:, 2].mean()
+    assert any(a["against"] == "the cable" and a["p"] < 1e-6 for a in found.associations)
+    assert 0.1 < independent_part(plain.problem, plain.state.prediction) < 0.8
+
+
+def test_half_of_the_readings_will_do(robot, data):
+    blank = np.full_like(data.position, np.nan)
+    angles = replace(data, position=blank, position_mask=np.zeros(3, dtype=bool))
+    found = compare(robot, angles)
+    assert found.rms["position_rms_m"] is None
+    assert found.rms["orientation_rms_rad"] > 0
+    assert [c["name"] for c in found.coordinates] == [f"rotation about {a}" for a in "xyz"]
+    assert np.isnan(found.errors_of("position")).all()
+    only_z = data.position.copy()
+    only_z[:, :2] = np.nan
+    found = compare(robot, replace(data, position=only_z, quat_wxyz=None))
+    assert [c["name"] for c in found.coordinates] == ["z"]
+
+
+def test_tensions_are_compared(robot):
+    noisy = replace(SIGMA, tension_N=0.01)
+    data = measured(robot, [term(robot, "tension_scale", factor=1.1)], sigma=noisy, tensions=True)
+    found = compare(robot, data)
+    assert found.rms["tension_rms_N"] > 0.05
+    assert sum(c["unit"] == "N" for c in found.coordinates) == robot.n_cables
+    assert found.errors_of("tension").max() > 0.1
+
+
+def test_noise_nobody_stated_is_estimated_and_said_so(robot, data):
+    found = compare(robot, replace(data, sigma=Sigma()), [term(robot, "stiffness", factor=1.4)])
+    assert any("position_m is not stated: estimated" in note for note in found.notes)
+    assert found.floor["position_rms_m"] == pytest.approx(SIGMA.position_m, rel=0.4)
+
+
+def test_a_planar_robot_is_compared(tmp_path):
+    robot = load_robot(model_path("planar_vertical"))
+    data = measured(robot, [term(robot, "platform_mass", added_kg=0.2 * robot.mass)])
+    found = compare(robot, data)
+    assert not found.is_noise and found.converged
+    json_text(as_json(found))
+
+
+def slack_robot(robot):
+    """No gravity, and far more cable than it takes: nothing holds the platform."""
+    return replace(robot, gravity=np.zeros(3), rest_lengths=robot.rest_lengths + 1.0)
+
+
+def test_rows_with_every_cable_slack_are_named_and_nothing_is_made_up(robot, data):
+    found = compare(slack_robot(robot), data)
+    assert not found.converged and len(found.unsolved) == data.n_rows
+    assert "every cable is slack" in found.unsolved[0]["why"]
+    assert found.sentence.startswith("Nothing could be compared: ")
+    assert found.rms["position_rms_m"] is None and found.worst == ()
+    assert not found.is_noise
+    json_text(as_json(found))
+
+
+def test_everything_is_json(off):
+    text = json_text(as_json(off))
+    assert "NaN" not in text and '"structured": true' in text
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "value"),
+    [
+        ("max_position", "0.5mm", 5e-4),
+        ("max_position", " 2e-3 m", 2e-3),
+        ("max_position_worst", "300um", 3e-4),
+        ("max_orientation", "0.2deg", np.radians(0.2)),
+        ("max_orientation", "3mrad", 3e-3),
+        ("max_tension", "1N", 1.0),
+        ("max_tension_worst", ".5kN", 500.0),
+    ],
+)
+def test_limits_are_read_with_their_unit(name, text, value):
+    assert parse_limit(name, text) == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("max_position", "0.5", r"--max-position: .*\(m, cm, mm, um, µm\).*, came no unit"),
+        ("max_position", "0.5deg", "came unit 'deg' in '0.5deg'"),
+        ("max_orientation", "1mm", "such as 0.2deg, came unit 'mm'"),
+        ("max_tension_worst", "1kg", "--max-tension-worst: .*came unit 'kg'"),
+        ("max_position", "mm", "came 'mm'"),
+        ("max_position", "1.2.3mm", "came unit '.3mm'"),
+        ("max_position", "nan mm", "came 'nan mm'"),
+        ("max_position", "0mm", "expected more than zero, came '0mm'"),
+        ("max_position", "-1mm", "expected more than zero"),
+    ],
+)
+def test_limits_without_a_right_unit_are_refused(name, text, words):
+    with pytest.raises(CrosscheckError, match=words):
+        parse_limit(name, text)
+
+
+def test_limits_from_a_file_and_the_command_line(tmp_path):
+    file = tmp_path / "limits.toml"
+    file.write_text('max_position = "0.5mm"\nmax-orientation = "0.2deg"\n')
+    limits = with_options(load_limits(file), {"max_position": "1mm", "max_tension": None})
+    assert limits == Limits(max_position=1e-3, max_orientation=np.radians(0.2))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('max_postion = "1mm"', "max_postion is no limit; known, nearest first: max_position,"),
+        ("max_position = 0.5", 'max_position: expected a text such as "0.5mm", came 0.5'),
+        ('max_position = "1deg"', "limits.toml: --max-position: .*came unit 'deg'"),
+        ("max_position = ", "is not TOML"),
+    ],
+)
+def test_bad_limit_files(tmp_path, text, words):
+    file = tmp_path / "limits.toml"
+    file.write_text(text)
+    with pytest.raises(InputFileError, match=words):
+        load_limits(file)
+
+
+def test_a_limit_says_by_how_much_and_where(off):
+    rms = off.rms["position_rms_m"]
+    (item,) = check(Limits(max_position=1e-4), off)
+    assert item.value == rms and item.limit == 1e-4
+    assert f"exceeds 0.1 mm by {1e3 * (rms - 1e-4):.4g} mm" in item.words
+    sizes = off.errors_of("position")
+    line = off.problem.data.line[int(np.argmax(sizes))]
+    assert f"worst at line {line}, run " in item.words and "commanded (" in item.words
+    assert check(Limits(max_position=1.01 * rms), off) == []
+    assert check(Limits(max_position_worst=1.01 * sizes.max()), off) == []
+    (item,) = check(Limits(max_position_worst=0.99 * sizes.max()), off)
+    assert item.words.startswith("worst position error")
+
+
+def test_a_limit_on_what_was_not_measured_is_refused(off):
+    with pytest.raises(CrosscheckError, match="holds no tension readings"):
+        check(Limits(max_tension=1.0), off)
+
+
+def test_a_pose_error_is_that_of_its_cables(robot, off):
+    """dl = -u . (dt + dw x R b): against nominal lengths of the shifted pose, to first order."""
+    problem, prediction = off.problem, off.state.prediction
+    change = np.array([1e-6, -2e-6, 1.5e-6, 3e-6, -1e-6, 2e-6])
+    raw = np.full_like(off.state.raw, np.nan)
+    raw[:, :6] = change
+    errors, _ = cable_errors(problem, raw, prediction)
+    moved = pose_add(prediction.poses, np.tile(change, (len(raw), 1)))
+    longer = robot.nominal_lengths(moved) - robot.nominal_lengths(prediction.poses)
+    assert errors == pytest.approx(longer, abs=1e-10)
+
+
+def test_tables_name_their_units() -> None:
+    """A bare "[mm]" is a style to the terminal's library, and vanishes."""
+    from io import StringIO
+
+    from rich.console import Console
+
+    from crosscheck.terminal.lines import rms_table
+
+    out = StringIO()
+    rms = {"position_rms_m": 1e-3, "orientation_rms_rad": 1e-3, "tension_rms_N": 2.0}
+    Console(file=out, width=100).print(rms_table("rms error", [("[all] rows", rms, "")]))
+    heads, row = out.getvalue().splitlines()[1:]
+    assert heads.split() == ["rms", "error", "[mm]", "[deg]", "[N]"]
+    assert row.split() == ["[all]", "rows", "1", "0.0573", "2"]

@@ -1,0 +1,118 @@
+"""Effects that no catalogue holds: the diagnosis says so, and accuses nobody."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from made_data import COGIRO, measured, term
+
+from crosscheck.diagnosis.verdict import diagnose
+from crosscheck.measurements.data import Measurements
+from seecr.mjcf import load_robot
+from seecr.pose import Array, quat_from_rotvec, quat_multiply
+from seecr.robot import Robot
+from seecr.shipped import model_path
+
+Change = Callable[[Measurements], None]
+PULLEY = {"radius_m": 0.01}
+
+
+def _centred(data: Measurements) -> Array:
+    assert data.command_pose is not None
+    place = data.command_pose[:, :3] - data.command_pose[:, :3].mean(axis=0)
+    return np.asarray(place / np.abs(place).max(), float)
+
+
+def lens(data: Measurements) -> None:
+    """A tracker whose scale grows with the distance from the middle."""
+    place = _centred(data)
+    data.position[:] += 1.5e-3 * place * (place**2).sum(axis=1, keepdims=True)
+
+
+def swaying_floor(data: Measurements) -> None:
+    """The tracker stands on a floor that sways."""
+    assert data.t_s is not None
+    phase = 2 * np.pi * data.t_s / 37.0
+    data.position[:, 2] += 6e-4 * np.sin(phase)
+    data.position[:, 0] += 4e-4 * np.sin(phase + 1.0)
+
+
+def rubbing(data: Measurements) -> None:
+    """Something touches the platform in one corner of the workspace."""
+    place = _centred(data)
+    near = np.exp(-(((place - [0.6, 0.0, 0.0]) / 0.24) ** 2).sum(axis=1))
+    data.position[:] += 1.2e-3 * near[:, None] * np.array([0.6, 0.0, 0.8])
+
+
+def bumped_tracker(data: Measurements) -> None:
+    """Somebody ran into the tracker, and set it right after the next run."""
+    bumped = data.run == np.unique(data.run)[1]
+    data.position[bumped] += np.array([8e-4, -5e-4, 6e-4])
+
+
+def wavy_target(data: Measurements) -> None:
+    """A target that seems to turn as it moves across a striped wall."""
+    across = 3 * np.pi * _centred(data)[:, 0]
+    turn = 0.01 * np.stack([np.sin(across), 0 * across, np.cos(1.3 * across)], axis=1)
+    assert data.quat_wxyz is not None
+    data.quat_wxyz[:] = quat_multiply(quat_from_rotvec(turn), data.quat_wxyz)
+
+
+CHANGES = (lens, swaying_floor, rubbing, bumped_tracker, wavy_target)
+
+
+def robot_named(name: str) -> Robot:
+    return load_robot(COGIRO if name == "cogiro" else model_path("demobot_parallel"))
+
+
+@pytest.mark.parametrize("name", ["cogiro", "parallel"])
+@pytest.mark.parametrize("change", CHANGES, ids=lambda c: c.__name__)
+def test_an_unknown_effect_is_called_unknown(name: str, change: Change) -> None:
+    robot = robot_named(name)
+    data = measured(robot, points=18, seed=3)
+    change(data)
+    found = diagnose(robot, data)
+    assert found.verdict == "unknown_effect"
+    assert [f.effect for f in found.missing] == []
+    assert found.where  # and shows where it lives
+
+
+@pytest.mark.parametrize("change", CHANGES, ids=lambda c: c.__name__)
+def test_beside_a_known_effect_the_known_one_alone_is_named(change: Change) -> None:
+    robot = robot_named("cogiro")
+    data = measured(robot, [term(robot, "pulley_radius", **PULLEY)], points=18, seed=4)
+    change(data)
+    found = diagnose(robot, data)
+    assert found.verdict == "unknown_effect"
+    assert [f.effect for f in found.missing] == ["pulley_radius"]
+    # what is not modelled pulls at it, by more than noise would
+    assert found.missing[0].values[0] == pytest.approx(0.01, rel=0.1)
+
+
+def test_a_bumped_tracker_is_traced_to_its_run() -> None:
+    robot = robot_named("cogiro")
+    data = measured(robot, points=18, seed=3)
+    bumped_tracker(data)
+    where = diagnose(robot, data).where
+    assert where[0]["against"] == "the run"
+
+
+def test_a_swaying_floor_is_traced_to_its_period() -> None:
+    robot = robot_named("cogiro")
+    data = measured(robot, points=18, seed=3)
+    swaying_floor(data)
+    where = diagnose(robot, data).where
+    found = re.fullmatch(r"time, again every (.*) s", where[0]["against"])
+    assert found is not None
+    assert float(found.group(1)) == pytest.approx(37.0, rel=0.02)
+    assert where[0]["p"] < 1e-10
+
+
+def test_an_error_of_place_is_not_called_a_period_though_the_commands_go_to_and_fro() -> None:
+    robot = robot_named("cogiro")
+    data = measured(robot, points=18, seed=3)
+    rubbing(data)
+    assert not any("again every" in row["against"] for row in diagnose(robot, data).where)

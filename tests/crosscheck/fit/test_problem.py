@@ -1,0 +1,89 @@
+"""Residuals in units of their noise."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from made_data import COGIRO, SIGMA, measured, term
+
+from crosscheck.fit.gauss_newton import fit
+from crosscheck.fit.noise import whiteness
+from crosscheck.fit.problem import Problem, angle_rates
+from crosscheck.fit.state import evaluate
+from crosscheck.measurements.sigma import Sigma
+from seecr.mjcf import load_robot
+from seecr.pose import quat_from_rotvec, quat_from_rxyz, quat_multiply, rxyz_from_quat
+
+
+def test_angles_turn_as_differences_say() -> None:
+    rng = np.random.default_rng(0)
+    quat = quat_from_rxyz(rng.uniform(-1.3, 1.3, (40, 3)))
+    found, step = angle_rates(quat), 1e-6
+    for k in range(3):
+        turn = np.zeros(3)
+        turn[k] = step
+        ahead, behind = (
+            rxyz_from_quat(quat_multiply(quat_from_rotvec(s * turn), quat)) for s in (1, -1)
+        )
+        assert found[..., k] == pytest.approx((ahead - behind) / (2 * step), abs=1e-8)
+
+
+def test_where_angles_turn_without_end_the_rates_stay_finite() -> None:
+    assert np.all(np.isfinite(angle_rates(quat_from_rxyz(np.array([[0.3, np.pi / 2, 0.1]])))))
+
+
+def test_noise_of_lengths_reaches_the_readings_and_their_likeliest_errors_are_found() -> None:
+    robot = load_robot(COGIRO)
+    spread = 2e-4
+    data = measured(robot, points=4, sigma=SIGMA)
+    noisy = Sigma(SIGMA.position_m, SIGMA.orientation_rad, None, spread)
+    problem = Problem(robot, data, noisy, np.ones(data.n_rows, dtype=bool))
+    # one row whose lengths were 0.5 mm off, read exactly where it then rests
+    errors = np.zeros((data.n_rows, robot.n_cables))
+    errors[3] = 5e-4 * np.array([1, -1, 0, 0, 1, 0, -1, 0])
+    there = problem.experiment.with_length_errors(errors).predict()
+    data.position[:] = there.readings.position
+    data.quat_wxyz[:] = there.readings.quat_wxyz
+    state = evaluate(problem, [], problem.noise(problem.experiment.predict()))
+    found = state.experiment.length_errors
+    assert found is not None
+    # only what moves the platform is seen: the prediction there says whether it was found
+    again = problem.experiment.with_length_errors(found).predict()
+    off = np.linalg.norm(again.readings.position[3] - there.readings.position[3])
+    plain = problem.experiment.predict()
+    before = np.linalg.norm(plain.readings.position[3] - there.readings.position[3])
+    assert off < 0.05 * before
+    assert np.abs(np.delete(found, 3, axis=0)).max() < 1e-3 * spread
+
+
+def test_exact_lengths_leave_the_noise_as_stated() -> None:
+    robot = load_robot(COGIRO)
+    data = measured(robot, [term(robot, "platform_mass", added_kg=0.2)], points=2)
+    problem = Problem(robot, data, SIGMA, np.ones(data.n_rows, dtype=bool))
+    state = evaluate(problem, [], problem.noise(problem.experiment.predict()))
+    assert state.table[:, :3] == pytest.approx(state.raw[:, :3] / SIGMA.position_m)
+    assert state.log_det == 0.0
+
+
+def test_errors_of_values_grow_where_residuals_go_together() -> None:
+    """A tracker whose noise wanders: what is fitted is less sure than its scatter says."""
+    robot = load_robot(COGIRO)
+    rng = np.random.default_rng(5)
+    plain, grown = [], []
+    for seed in range(12):
+        data = measured(robot, points=12, seed=seed)
+        wander = np.zeros((data.n_rows, 3))
+        for k in range(1, data.n_rows):
+            wander[k] = 0.85 * wander[k - 1] + 1e-4 * rng.standard_normal(3)
+        data.position[:] += wander
+        problem = Problem(robot, data, SIGMA, np.ones(data.n_rows, dtype=bool))
+        factor = problem.noise(problem.experiment.predict())
+        found = fit(problem, [term(robot, "tracker_frame")], factor)
+        white = whiteness(problem, found.state.white, 6)
+        assert white.structured
+        far = found.terms[0].vector[:3] / found.stderr[:3]
+        plain.append(far / max(1.0, white.scale))
+        grown.append(far / white.inflation)
+    # in standard errors these should scatter by one
+    assert np.sqrt(np.mean(np.square(plain))) > 2.0
+    assert 0.5 < np.sqrt(np.mean(np.square(grown))) < 1.6

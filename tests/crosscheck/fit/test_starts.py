@@ -1,0 +1,82 @@
+"""Starts from the forces at the measured poses, where cables go slack."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from made_data import SIGMA, measured, term
+
+from crosscheck.fit.candidates import fit_candidate, layouts_for, null_fit, screen
+from crosscheck.fit.problem import Problem
+from crosscheck.fit.starts import equation_start
+from seecr.mjcf import load_robot
+from seecr.shipped import model_path
+
+OFFSETS = (-0.0006, 0.0012, -0.0011, 0.0015, -0.0009, 0.0014, 0.0013, 0.0006)
+
+
+@pytest.fixture(scope="module")
+def case():
+    """The tilted DemoBot, whose cables' lengths are off by a millimetre each."""
+    robot = load_robot(model_path("demobot_parallel"))
+    hidden = term(
+        robot, "cable_length_offset", **{f"offset_{i + 1}_m": v for i, v in enumerate(OFFSETS)}
+    )
+    data = measured(robot, [hidden], points=12, seed=2)
+    problem = Problem(robot, data, SIGMA, np.ones(data.n_rows, dtype=bool))
+    factor = problem.noise(problem.experiment.predict())
+    return problem, factor, null_fit(problem, (), factor, refit=False)
+
+
+def layout_named(problem, name):
+    return next(c.layout for c in layouts_for(problem) if c.name == name)
+
+
+def test_it_leads_where_the_derivative_at_null_does_not(case) -> None:
+    problem, factor, base = case
+    layout = layout_named(problem, "cable_length_offset")
+    screened = screen(problem, base, layout, factor)
+    assert screened.starts is not None and len(screened.starts.vectors) == 2
+    derivative, balanced = screened.starts.vectors
+    reached = []
+    for start in (derivative, balanced):
+        screened.starts.vectors[:] = [start]
+        reached.append(fit_candidate(problem, base, screened, factor).fit)
+    assert all(found is not None for found in reached)
+    noise = len(base.state.white)
+    assert reached[1].chi2 < 1.2 * noise
+    assert reached[0].chi2 > 10 * noise
+    far = (reached[1].terms[0].vector - OFFSETS) / reached[1].stderr
+    assert np.all(np.abs(far) < 4.5)
+
+
+def test_it_is_silent_on_sensors_and_on_rows_that_depend_on_rows_before(case) -> None:
+    problem, factor, base = case
+    for name in ("tracker_frame", "tracker_scale"):
+        layout = layout_named(problem, name)
+        assert equation_start(problem, base.state, layout, layout.start({}), factor) is None
+    layout = layout_named(problem, "hysteresis")
+    shape = layout.start({"stretch_m": 1e-3})
+    shape[0] = layout.scale[0]
+    assert equation_start(problem, base.state, layout, shape, factor) is None
+
+
+def test_values_stay_within_their_bounds(case) -> None:
+    problem, factor, base = case
+    for name in ("cable_stiffness", "drum_gain", "anchor_point_error"):
+        layout = layout_named(problem, name)
+        found = equation_start(problem, base.state, layout, layout.start({}), factor)
+        assert found is not None
+        assert np.all((found >= layout.lower) & (found <= layout.upper) & np.isfinite(found))
+
+
+def test_platforms_on_joints_go_without() -> None:
+    """A measured pose is never quite on the joints; the diagnosis does not stumble over it."""
+    robot = load_robot(model_path("planar_vertical"))
+    data = measured(robot, points=6)
+    data.position[:, 1] += 1e-4
+    problem = Problem(robot, data, SIGMA, np.ones(data.n_rows, dtype=bool))
+    factor = problem.noise(problem.experiment.predict())
+    base = null_fit(problem, (), factor, refit=False)
+    layout = layout_named(problem, "cable_length_offset")
+    assert equation_start(problem, base.state, layout, layout.start({}), factor) is None

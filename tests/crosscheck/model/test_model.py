@@ -1,0 +1,220 @@
+"""Model files: what is written is read back, and what is wrong is said with its line."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import tomlkit
+from made_data import COGIRO, term
+
+from crosscheck.errors import CrosscheckError, InputFileError
+from crosscheck.model.read import load_model, new_model
+from crosscheck.model.write import Fitted, Provenance, renewed, save_model, with_fit
+from seecr.mjcf import load_robot
+from seecr.shipped import model_path
+
+SOURCE = Provenance("measured.csv", "2024-05-13", "seecr 0.1.0", "crosscheck add pulley_radius")
+ERRORS = {
+    "before": {"position_rms_m": 0.0025, "tension_rms_N": None},
+    "after": {"position_rms_m": 3e-5, "tension_rms_N": None},
+    "held_out": {"position_rms_m": 3.1e-5, "tension_rms_N": None},
+}
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return load_robot(COGIRO)
+
+
+def fitted(robot, name, error=1e-4, bound=False, **values):
+    one = term(robot, name, **values)
+    count = len(one.layout)
+    return Fitted(one, np.full(count, error), np.full(count, bound))
+
+
+@pytest.fixture
+def saved(robot, tmp_path):
+    pulley = fitted(robot, "pulley_radius", radius_m=0.01)
+    model = with_fit(new_model(robot), [pulley], "pulley_radius", SOURCE, ERRORS)
+    path = tmp_path / "model.toml"
+    save_model(path, model)
+    return path
+
+
+def changed(path, old, new):
+    text = path.read_text()
+    assert text.count(old) >= 1, old
+    path.write_text(text.replace(old, new, 1))
+    return path
+
+
+def error_of(path, robot):
+    with pytest.raises(InputFileError) as error:
+        load_model(path, robot)
+    text = str(error.value)
+    assert "\n" not in text and text.startswith(str(path))
+    return text
+
+
+def test_a_saved_model_is_read_back(robot, saved):
+    model = load_model(saved, robot)
+    assert model.names == ("pulley_radius",)
+    assert model.terms[0].vector == pytest.approx([0.01])
+    assert model.stderr[0] == pytest.approx([1e-4])
+    assert model.notes == ()
+    text = saved.read_text()
+    assert 'radius_m = { value = 0.01, stderr = 0.0001, unit = "m", at_bound = false }' in text
+    assert 'data = "measured.csv"' in text and 'date = "2024-05-13"' in text
+    assert "[effect.before]\nposition_rms_m = 0.0025\n" in text
+    assert "tension_rms_N" not in text
+
+
+def test_values_keep_their_digits(robot, tmp_path):
+    values = {"radius_m": 0.0099123456789}
+    model = with_fit(
+        new_model(robot), [fitted(robot, "pulley_radius", **values)], "pulley_radius", SOURCE,
+        ERRORS,
+    )  # fmt: skip
+    save_model(tmp_path / "m.toml", model)
+    back = load_model(tmp_path / "m.toml", robot).terms[0].vector[0]
+    assert abs(back / values["radius_m"] - 1.0) < 1e-9
+
+
+def test_what_is_unseen_is_said_so(robot, tmp_path):
+    unseen = fitted(robot, "pulley_radius", error=np.inf, bound=True, radius_m=0.0)
+    model = with_fit(new_model(robot), [unseen], "pulley_radius", SOURCE, ERRORS)
+    save_model(tmp_path / "m.toml", model)
+    assert 'stderr = "unseen", unit = "m", at_bound = true' in (tmp_path / "m.toml").read_text()
+    assert np.isinf(load_model(tmp_path / "m.toml", robot).stderr[0][0])
+
+
+def test_comments_survive_another_effect(robot, saved):
+    changed(saved, "[[effect]]", "# measured with the old tracker\n[[effect]]")
+    changed(saved, "at_bound = false }", "at_bound = false } # caliper: 9.9 mm")
+    model = load_model(saved, robot)
+    both = [
+        fitted(robot, "stiffness", factor=1.2),
+        fitted(robot, "pulley_radius", radius_m=0.011),
+    ]
+    again = replace(SOURCE, by="crosscheck add stiffness")
+    save_model(saved, with_fit(model, both, "stiffness", again, ERRORS))
+    text = saved.read_text()
+    assert "# measured with the old tracker" in text and "# caliper: 9.9 mm" in text
+    back = load_model(saved, robot)
+    assert back.names == ("pulley_radius", "stiffness")
+    assert back.terms[0].vector == pytest.approx([0.011])
+    tables = tomlkit.parse(text)["effect"]
+    assert tables[0]["provenance"]["by"] == "crosscheck add pulley_radius"
+    assert tables[0]["refitted"]["by"] == "crosscheck add stiffness"
+    assert "refitted" not in tables[1]
+    # the model that was read is as it was
+    assert model.names == ("pulley_radius",)
+
+
+def test_a_person_may_write_one_by_hand(robot, tmp_path):
+    path = tmp_path / "m.toml"
+    path.write_text('[[effect]]\nname = "stiffness"\nparameters.factor = 1.4\n')
+    model = load_model(path, robot)
+    assert model.terms[0].vector == pytest.approx([1.4])
+    assert "which robot" in model.notes[0]
+
+
+def test_no_model_is_no_effect(robot, tmp_path):
+    save_model(tmp_path / "new" / "m.toml", new_model(robot))
+    assert load_model(tmp_path / "new" / "m.toml", robot).terms == ()
+
+
+BAD = {
+    "broken": ("name = ", "name = = ", r"line \d+: is not TOML"),
+    "unknown effect": (
+        '"pulley_radius"', '"pully_radius"',
+        r"line \d+: no effect 'pully_radius'; known, nearest first: pulley_radius, ",
+    ),
+    "no name": ('name = "pulley', 'label = "pulley', r"line \d+: expected name"),
+    "unknown parameter": (
+        "radius_m = ", "radius_mm = ",
+        r"line \d+: effect pulley_radius: unknown parameter radius_mm; .*first: radius_m$",
+    ),
+    "missing parameter": (
+        "radius_m = {", "# radius_m = {", r"line \d+: .* parameter radius_m is missing",
+    ),
+    "no number": ("value = 0.01", 'value = "ten"', r"radius_m: expected a number, came 'ten'"),
+    "not finite": ("value = 0.01", "value = nan", r"radius_m: expected a number, came nan"),
+    "out of bounds": (
+        "value = 0.01", "value = -0.01",
+        r"line \d+: .* radius_m: -0.01 is out of bounds; expected 0 to 1000",
+    ),
+    "wrong unit": ('unit = "m"', 'unit = "mm"', r"radius_m: expected unit 'm', came 'mm'"),
+    "bad error": ("stderr = 0.0001", "stderr = -1", r"stderr must be a number from 0 or"),
+    "odd word": ("at_bound", "atbound", r"unknown atbound; expected value, stderr, unit"),
+    "misspelt table": (
+        "[[effect]]", "[[effects]]\n[[effect]]", r"line \d+: unknown effects; expected effect",
+    ),
+    "newer": ("format = 1", "format = 2", r"format 2 is not known to this version"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", BAD)
+def test_bad_models_are_refused_with_their_line(kind, robot, saved):
+    old, new, words = BAD[kind]
+    assert re.search(words, error_of(changed(saved, old, new), robot))
+
+
+def test_the_line_is_that_of_the_effect_meant(robot, saved):
+    text = saved.read_text()
+    extra = '\n[[effect]]\nname = "stiffness"\n[effect.parameters]\nfactor = 0.001\n'
+    saved.write_text(text + extra)
+    line = (text + extra).splitlines().index("factor = 0.001") + 1
+    assert f"line {line}: effect stiffness: factor: 0.001 is out of bounds" in error_of(
+        saved, robot
+    )
+
+
+def test_an_effect_may_stand_there_once(robot, saved):
+    text = saved.read_text()
+    saved.write_text(text + text[text.index("[[effect]]") :])
+    assert "pulley_radius is listed twice" in error_of(saved, robot)
+
+
+def test_a_model_made_for_another_robot_is_noticed(robot, saved):
+    planar = load_robot(model_path("planar_vertical"))
+    assert "made for another robot: demobot_cogiro with 8 cables; " in error_of(saved, planar)
+    parallel = load_robot(model_path("demobot_parallel"))
+    text = error_of(saved, parallel)
+    assert "made for another robot: demobot_cogiro, not demobot_parallel: the exit point of" in text
+    assert "mm away" in text
+
+
+def test_points_that_moved_are_another_robot_and_a_new_mass_is_noted(robot, saved):
+    exits = robot.exit_points.copy()
+    exits[3, 1] += 2e-3
+    text = error_of(saved, replace(robot, exit_points=exits))
+    assert "exit point of cable4 is 2 mm away" in text
+    moved = robot.reference_pose.copy()
+    moved[0] += 0.01
+    assert "reference pose is (0.4" in error_of(saved, replace(robot, reference_pose=moved))
+    heavier = load_model(saved, replace(robot, mass=0.5))
+    assert heavier.names == ("pulley_radius",)
+    assert "mass_kg of robot demobot_cogiro was 0.4; now it is 0.5" in heavier.notes[0]
+    # fitting again takes the numbers as they are now
+    again = renewed(heavier, replace(robot, mass=0.5))
+    save_model(saved, again)
+    assert load_model(saved, replace(robot, mass=0.5)).notes == ()
+
+
+def test_a_file_that_is_not_there_or_no_text(robot, tmp_path):
+    assert "no such file" in error_of(tmp_path / "none.toml", robot)
+    (tmp_path / "bytes.toml").write_bytes(b"\xff\xfe\x00")
+    assert "is not UTF-8" in error_of(tmp_path / "bytes.toml", robot)
+    assert "cannot be read" in error_of(tmp_path, robot)
+
+
+def test_an_unwritable_place_leaves_the_old_model(robot, saved, tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    with pytest.raises(CrosscheckError, match="the model cannot be written"):
+        save_model(blocked / "m.toml", new_model(robot))
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "model.toml"]

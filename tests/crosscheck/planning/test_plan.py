@@ -1,0 +1,229 @@
+"""Plans: sizes that show are found when they are there; the algebra of what is alike holds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_data import SIGMA, measured, soft_cogiro, term
+from scipy import stats
+
+from crosscheck.document import json_text
+from crosscheck.fit.candidates import null_fit, try_candidate
+from crosscheck.fit.problem import Problem
+from crosscheck.measurements.sigma import Sigma
+from crosscheck.planning.design import MORE_POSES, make_plan
+from crosscheck.planning.extensions import more_poses
+from crosscheck.planning.greedy import chosen_poses
+from crosscheck.planning.planned import near_slack
+from crosscheck.planning.visibility import joined, left_over, needed, signals, signals_like
+from crosscheck.terminal.plan import as_json, size_words
+from seecr.mjcf import load_robot
+from seecr.pose import rotvec_from_quat
+from seecr.shipped import model_path
+from seecr.workspace import feasible
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return soft_cogiro()
+
+
+@pytest.fixture(scope="module")
+def commands(robot):
+    return measured(robot)
+
+
+@pytest.fixture(scope="module")
+def few(robot):
+    return measured(robot, points=3)
+
+
+@pytest.fixture(scope="module")
+def plan(robot, commands):
+    return make_plan(robot, commands)
+
+
+def effect(plan, name):
+    return next(v for v in plan.effects if v.name == name)
+
+
+@pytest.mark.parametrize(("directions", "signal"), [(1, 15.1), (2, 17.5), (3, 19.3), (6, 23.2),
+                                                    (8, 25.2), (24, 36.1)])  # fmt: skip
+def test_the_signal_needed_for_power_and_false_alarms(directions, signal):
+    assert needed(directions, 21) == pytest.approx(signal, abs=0.06)
+    limit = stats.chi2.isf(0.05 / 21, directions)
+    power = stats.ncx2.sf(limit, directions, needed(directions, 21))
+    assert power == pytest.approx(0.8, abs=1e-6)
+
+
+def test_the_smallest_visible_size_leaves_the_signal_needed(robot, plan):
+    """chi2 of the plain model on noiseless readings with the effect at that size."""
+    found = effect(plan, "stiffness")
+    layout = found.signal.layout
+    vector = layout.null + found.factor * layout.scale
+    quiet = measured(
+        robot, [replace(term(robot, "stiffness"), vector=vector)],
+        sigma=Sigma(1e-12, 1e-12),
+    )  # fmt: skip
+    problem = Problem(robot, replace(quiet, sigma=SIGMA), SIGMA, np.ones(quiet.n_rows, dtype=bool))
+    base = null_fit(problem, (), problem.noise(problem.experiment.predict()), refit=False)
+    assert base.chi2 == pytest.approx(found.needed, rel=0.05)
+
+
+def test_effects_of_that_size_are_found_and_of_a_tenth_are_not(robot, plan):
+    """Four in five at the size that shows, hardly ever at a tenth of it."""
+    layout = effect(plan, "tracker_scale").signal.layout
+    factor = effect(plan, "tracker_scale").factor
+    hits = {}
+    for part in (1.0, 0.1):
+        vector = layout.null + part * factor * layout.scale
+        hits[part] = sum(_found(robot, layout, vector, seed) for seed in range(24))
+    assert 13 <= hits[1.0] <= 24
+    assert hits[0.1] <= 2
+
+
+def _found(robot, layout, vector, seed):
+    hidden = replace(term(robot, layout.name), vector=vector)
+    data = measured(robot, [hidden], seed=seed)
+    problem = Problem(robot, data, SIGMA, np.ones(data.n_rows, dtype=bool))
+    factor = problem.noise(problem.experiment.predict())
+    tried = try_candidate(problem, null_fit(problem, (), factor, refit=False), layout, factor)
+    return tried.fit is not None and tried.p < 0.05 / 24
+
+
+def test_what_is_alike_by_algebra_is_named(plan):
+    assert {"platform_mass", "external_wrench", "cable_stiffness"} <= set(
+        effect(plan, "stiffness").twins
+    )
+    assert "stiffness" in effect(plan, "platform_mass").twins
+    assert effect(plan, "winch_side_length").twins == ("frame_compliance",)
+    assert "external_wrench" in effect(plan, "gravity_tilt").twins
+    # a force has more directions than a mass: it is no twin of it the other way round
+    assert "platform_mass" not in effect(plan, "external_wrench").twins
+    assert effect(plan, "pulley_radius").twins == ()
+
+
+def test_the_confusion_map_is_of_parts(plan):
+    names, table = plan.confusion
+    assert np.all((table >= -1e-9) & (table <= 1 + 1e-9))
+    assert np.all(np.diag(table) == 1)
+    i, j = names.index("stiffness"), names.index("platform_mass")
+    assert table[i, j] > 1 - 1e-6 and table[j, i] > 1 - 1e-6
+    k = names.index("tracker_scale")
+    assert table[i, k] < 0.9
+
+
+def test_less_noise_shows_less(robot, few):
+    coarse = make_plan(robot, few)
+    finer = make_plan(robot, replace(few, sigma=Sigma(3e-6, 3.5e-5)))
+    for name in ("stiffness", "pulley_radius", "hysteresis"):
+        factor = effect(coarse, name).factor
+        assert effect(finer, name).factor == pytest.approx(0.1 * factor, rel=1e-3)
+
+
+def test_what_nobody_stated_is_assumed_and_said(robot, few):
+    found = make_plan(robot, replace(few, sigma=Sigma()))
+    assert any("noise of positions is not stated: 0.03" in note for note in found.notes)
+    assert any("noise of angles is not stated: 0.02 deg" in note for note in found.notes)
+
+
+def test_what_the_commands_lack_is_said(robot, few):
+    found = make_plan(robot, replace(few, t_s=None).rows(slice(0, 10)))
+    assert found.missing["creep"] == "needs the time of each row (t_s)"
+    assert found.missing["thermal_expansion"] == "needs temperature_C"
+    assert found.missing["exit_point_error"] == "24 parameters, but the data have 10 rows"
+
+
+def test_a_payload_and_tensions_tell_mass_from_stiffness(plan):
+    by_kind = {s.kind: s for s in plan.suggestions}
+    for kind in ("payload", "tensions"):
+        pairs = {(g.effect, g.other): g for g in by_kind[kind].reached}
+        gain = pairs["platform_mass", "stiffness"]
+        assert gain.now == 0.0 and gain.then > gain.needed
+    # no reading of the pose alone parts elastic cable behind the exit points from the frame
+    for suggestion in plan.suggestions:
+        assert ("winch_side_length", "frame_compliance") not in {
+            (g.effect, g.other) for g in suggestion.gains
+        }
+
+
+def test_poses_to_add_are_few_feasible_and_help(robot, plan):
+    poses = next(s for s in plan.suggestions if s.kind == "poses")
+    assert 0 < len(poses.poses) <= MORE_POSES
+    assert len(np.unique(poses.poses, axis=0)) == len(poses.poses)
+    assert np.all(feasible(robot, poses.poses))
+    assert poses.reached
+    tilt = np.linalg.norm(rotvec_from_quat(poses.poses[:, 3:]), axis=1)
+    assert np.any(tilt > np.radians(5.0))
+
+
+def test_chosen_poses_beat_the_first_ones(plan):
+    """The greedy choice against as many candidates in the order they come."""
+    own, _ = signals(plan.planned)
+    grid = more_poses(plan.planned, ("pose",))
+    there, row_of = signals_like(grid.plan, own), grid.plan.problem.row_of
+    pairs = [("centre_of_mass", "external_wrench", 0.0, 19.0)]
+    rows = chosen_poses(own, there, row_of, pairs, 4)
+    assert len(rows) == 4
+
+    def signal(chosen):
+        some = np.isin(row_of, chosen)
+        few = {n: replace(s, columns=s.columns[some]) for n, s in there.items()}
+        both = joined(own, few)
+        return left_over(both["centre_of_mass"], both["external_wrench"])
+
+    assert signal(rows) > 1.5 * signal(np.unique(row_of)[:4])
+
+
+def test_the_way_back_shows_what_has_a_history(robot):
+    there = measured(robot, sigma=Sigma(6e-4, 7e-3))
+    found = make_plan(robot, there.rows(there.run == "along_low_fwd"))
+    gains = next(s for s in found.suggestions if s.kind == "way_back").gains
+    assert ("backlash", "cable_length_offset") in {(g.effect, g.other) for g in gains}
+    # and nothing else: to measure a pose once more does not part what has no history
+    history = {"hysteresis", "backlash", "exit_friction", "creep"}
+    assert all({g.effect, g.other} & history for g in gains)
+
+
+def test_poses_near_slack_are_flagged():
+    parallel = load_robot(model_path("demobot_parallel"))
+    commands = measured(parallel, points=4)
+    found = make_plan(parallel, commands)
+    states = found.planned.base.state.prediction
+    assert found.slack
+    tensions = states.tensions
+    for (row, cable), (line, name) in zip(near_slack(found.planned), found.slack, strict=True):
+        assert tensions[row, cable] < 0.1 * tensions[tensions > 0].mean()
+        assert name == parallel.cable_names[cable] and line == commands.line[row]
+
+
+def test_sizes_are_words_in_millimetres(plan):
+    assert size_words(effect(plan, "pulley_radius"), 1.0).startswith("radius ")
+    assert size_words(effect(plan, "pulley_radius"), 1.0).endswith(" mm")
+    assert size_words(effect(plan, "stiffness"), 1.0) == "factor 1 +- 0.3"
+    assert " deg each" in size_words(effect(plan, "tracker_frame"), 1.0)
+    assert size_words(effect(plan, "hysteresis"), 1.0).endswith(" N")
+    assert size_words(effect(plan, "stiffness"), np.inf) == "none"
+
+
+def test_a_planar_robot_and_commanded_lengths(robot, few):
+    planar = load_robot(model_path("planar_vertical"))
+    found = make_plan(planar, measured(planar, points=3))
+    assert found.converged and effect(found, "stiffness").visible
+    lengths = replace(
+        few, command_pose=None, command_lengths=robot.commanded_lengths(few.command_pose),
+    )  # fmt: skip
+    found = make_plan(robot, lengths)
+    assert "initial_pose_error" in found.missing and effect(found, "stiffness").visible
+
+
+def test_constant_commands_and_slack_rows(robot, commands):
+    still = make_plan(robot, commands.rows(np.zeros(12, dtype=int)))
+    json_text(as_json(still))
+    loose = replace(robot, gravity=np.zeros(3), rest_lengths=robot.rest_lengths + 1.0)
+    found = make_plan(loose, commands)
+    assert not found.converged and found.effects == ()
+    assert "left out" in found.notes[0]
+    json_text(as_json(found))

@@ -1,0 +1,274 @@
+"""Recordings of diagnoses and comparisons, read back: the errors drawn are those found."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import made_diagnoses as made
+import numpy as np
+import pytest
+from recordings import Readback, headless_viewer
+
+from crosscheck.comparison.residuals import Comparison, compare
+from crosscheck.diagnosis.result import Diagnosis
+from crosscheck.diagnosis.steps import Stage, stages_of
+from crosscheck.errors import CrosscheckError
+from crosscheck.fit.kinds import KINDS
+from crosscheck.fit.problem import POSITION
+from crosscheck.numbers import short
+from crosscheck.recording import write_comparison_recording, write_diagnosis_recording
+from crosscheck.recording.diagnosis_words import plain
+from crosscheck.recording.misfit import Misfit, read_poses, states_of, worst_row
+from crosscheck.recording.words import short_names
+
+STEP = "model_step"
+
+
+@pytest.fixture(scope="module")
+def found() -> Diagnosis:
+    return made.pulleys()
+
+
+@pytest.fixture(scope="module")
+def stages(found: Diagnosis) -> list[Stage]:
+    return stages_of(found)
+
+
+@pytest.fixture(scope="module")
+def shown(found: Diagnosis, stages: list[Stage]) -> Misfit:
+    assert found.search is not None
+    return Misfit(found.search.problem, stages[0].state)
+
+
+@pytest.fixture(scope="module")
+def written(found: Diagnosis, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("diagnosis") / "diagnosis.rrd"
+    write_diagnosis_recording(found, path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def back(written: Path) -> Readback:
+    return Readback(written)
+
+
+@pytest.fixture(scope="module")
+def comparison() -> Comparison:
+    return compare(made.robot(), made.readings(radius_m=0.01))
+
+
+@pytest.fixture(scope="module")
+def compared(comparison: Comparison, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("comparison") / "comparison.rrd"
+    write_comparison_recording(comparison, path)
+    return path
+
+
+def test_timelines_are_models_and_poses(back: Readback) -> None:
+    assert back.timelines == {STEP, "pose"}
+
+
+def test_steps_start_with_the_model_as_it_stands(back: Readback) -> None:
+    assert back.column("/scene/errors", STEP, STEP) == [0, 1]
+
+
+def test_arrows_are_the_errors_so_many_times_too_long(
+    back: Readback, stages: list[Stage], shown: Misfit
+) -> None:
+    vectors = back.column("/scene/errors", "Arrows3D:vectors", STEP)
+    origins = back.column("/scene/errors", "Arrows3D:origins", STEP)
+    assert shown.magnify > 1.0
+    for k, stage in enumerate(stages):
+        drawn = np.array(vectors[k]) / shown.magnify
+        assert drawn == pytest.approx(stage.state.raw[:, POSITION], abs=1e-8)
+        assert np.array(origins[k]) == pytest.approx(shown.place, abs=1e-6)
+    sizes = [np.linalg.norm(vectors[k], axis=1).mean() for k in (0, 1)]
+    assert sizes[1] < 0.1 * sizes[0]
+    text = back.static("/text/verdict", "TextDocument:text")[0]
+    assert f"drawn **{shown.magnify:g} times too long**" in text
+
+
+def test_maps_dim_as_the_error_falls(back: Readback, shown: Misfit) -> None:
+    for kind in shown.kinds:
+        colours = back.column(f"/map/{kind.name}/errors", "Points2D:colors", STEP)
+        before, after = (np.array(c) >> 16 & 255 for c in colours)  # viridis: green goes with size
+        assert len(before) == shown.problem.data.n_rows
+        sizes = kind.sizes(shown.problem, shown.first.raw)
+        assert np.all(np.diff(before[np.argsort(sizes)]) >= 0)
+        assert after.mean() < before.mean()
+
+
+def test_bars_are_the_errors_on_runs_left_out(
+    back: Readback, found: Diagnosis, stages: list[Stage], shown: Misfit
+) -> None:
+    document = found.as_json()
+    for kind in shown.kinds:
+        labels = back.static(f"/bars/{kind.name}/numbers", "Points2D:labels")
+        held_out = document["missing"][0]["held_out"][kind.key]
+        assert labels == [
+            f"{short(kind.factor * document['before'][kind.key])} {kind.unit}",
+            f"{short(kind.factor * held_out)} {kind.unit}",
+        ]
+        lit = back.column(f"/bars/{kind.name}/now", "LineStrips2D:strips", STEP)
+        lengths = [strips[0][1][0] - strips[0][0][0] for strips in lit]
+        assert lengths[0] > 1.2 * lengths[1] > 0.0
+        noise = back.static(f"/bars/{kind.name}/noise", "LineStrips2D:strips")[0][0][0]
+        assert lit[1][0][1][0] == pytest.approx(noise, abs=4.0)
+    assert [s.label for s in stages] == back.static("/bars/position/names", "Points2D:labels")
+
+
+def test_the_box_is_the_worst_pose(back: Readback, stages: list[Stage], shown: Misfit) -> None:
+    worst = worst_row(shown)
+    table = np.zeros(shown.problem.measured.shape)
+    table[shown.problem.row_of, shown.problem.column_of] = shown.first.white
+    assert worst == np.argmax((table**2).sum(axis=1))
+    turned = back.column("/scene/model/platform", "Boxes3D:quaternions", STEP)
+    for k, stage in enumerate(stages):
+        quat = read_poses(stage.state)[worst, 3:]
+        assert np.roll(turned[k][0], 1) == pytest.approx(quat, abs=1e-6)
+    measured = back.column("/scene/measured/platform", "Boxes3D:quaternions", STEP)
+    assert np.roll(measured[0][0], 1) == pytest.approx(shown.measured[worst, 3:], abs=1e-6)
+    assert f"line {shown.problem.data.line[worst]}" in _steps(back)[0]
+
+
+def _steps(back: Readback) -> list[str]:
+    return [row[0] for row in back.column("/text/now", "TextDocument:text", STEP)]
+
+
+def test_texts_say_what_was_added(back: Readback, found: Diagnosis) -> None:
+    first, second = _steps(back)
+    assert first.startswith("## Step 0 of 1: plain SEECR")
+    assert second.startswith("## Step 1 of 1: + pulley\\_radius")
+    assert plain(found.missing[0].check) in second
+    radius = 1e3 * found.missing[0].values[0]
+    assert f"| radius | {radius:.3f}"[:16] in second
+    verdict = back.static("/text/verdict", "TextDocument:text")[0]
+    assert "# Effects found" in verdict
+    assert plain(found.sentence) in verdict
+
+
+def test_plots_over_poses_are_each_models_errors(
+    back: Readback, stages: list[Stage], shown: Misfit
+) -> None:
+    for kind in shown.kinds:
+        for k, stage in enumerate(stages):
+            sizes = kind.sizes(shown.problem, stage.state.raw) * kind.factor
+            assert back.scalars(f"/plot/{kind.name}/model_{k}") == pytest.approx(sizes)
+        rms = [s.step.held_out.rms[kind.key] * kind.factor for s in stages]  # type: ignore[operator]
+        assert back.scalars(f"/plot/{kind.name}/left_out", STEP) == pytest.approx(rms)
+
+
+def test_cables_are_those_of_the_last_model(
+    back: Readback, stages: list[Stage], shown: Misfit
+) -> None:
+    states = states_of(stages[-1].state)
+    taut = back.column("/scene/model/cables/taut", "LineStrips3D:strips", "pose")
+    pulls = (~states.slack).sum(axis=1)
+    assert [len(strips) for strips in taut] == pulls.tolist()
+
+
+def test_unknown_is_said_and_drawn(tmp_path: Path) -> None:
+    found = made.unknown()
+    path = tmp_path / "unknown.rrd"
+    write_diagnosis_recording(found, path)
+    back = Readback(path)
+    assert "# Unknown effect" in back.static("/text/verdict", "TextDocument:text")[0]
+    assert len(back.column("/scene/errors", STEP, STEP)) == len(stages_of(found))
+
+
+def test_what_is_not_sure_is_said_so(found: Diagnosis, tmp_path: Path) -> None:
+    path = tmp_path / "unsure.rrd"
+    write_diagnosis_recording(replace(found, missing=(), verdict="unknown_effect"), path)
+    assert "not sure" in _steps(Readback(path))[1]
+
+
+def test_no_verdict_is_words_alone(tmp_path: Path) -> None:
+    path = tmp_path / "none.rrd"
+    write_diagnosis_recording(made.none(), path)
+    back = Readback(path)
+    assert back.timelines == set()
+    assert "all commands are the same" in back.static("/text/verdict", "TextDocument:text")[0]
+
+
+@pytest.mark.parametrize("name", ["position_only", "tensions_only", "one_angle", "nothing"])
+def test_partial_data_are_drawn_as_far_as_they_go(name: str, tmp_path: Path) -> None:
+    path = tmp_path / "part.rrd"
+    write_diagnosis_recording(getattr(made, name)(), path)
+    back = Readback(path)
+    maps = {e for e in back.entities(STEP) if e.startswith("/map/")}
+    kinds = {e.split("/")[2] for e in maps}
+    wanted = {"position_only": {"position"}, "tensions_only": {"tension"},
+              "one_angle": {"orientation"},
+              "nothing": {"position", "orientation", "tension"}}[name]  # fmt: skip
+    assert kinds == wanted
+    component = "Arrows3D:vectors" if "position" in wanted else "Points3D:positions"
+    drawn = np.array(back.column("/scene/errors", component, STEP)[0])
+    assert np.isfinite(drawn).all()
+
+
+def test_users_text_means_nothing_to_markdown(found: Diagnosis, tmp_path: Path) -> None:
+    path = tmp_path / "evil.rrd"
+    write_diagnosis_recording(replace(found, sentence="**a** | [b](c) <i>", notes=()), path)
+    text = Readback(path).static("/text/verdict", "TextDocument:text")[0]
+    assert "\\*\\*a\\*\\* \\| \\[b\\](c) \\<i\\>" in text
+
+
+def test_comparison_has_the_errors_of_each_pose(compared: Path, comparison: Comparison) -> None:
+    back = Readback(compared)
+    assert back.timelines == {"pose"}
+    raw = comparison.state.raw
+    for column, kind in ((0, KINDS[0]), (4, KINDS[1]), (7, KINDS[2])):
+        k = column - kind.columns.start + 1
+        values = back.scalars(f"/plot/{kind.name}/reading_{k}")
+        assert values == pytest.approx(kind.factor * raw[:, column])
+    texts = [row[0] for row in back.column("/text/now", "TextDocument:text")]
+    assert f"| x | {short(1e3 * raw[3, 0])} | mm |" in texts[3]
+    shown = Misfit(comparison.problem, comparison.state)
+    drawn = np.array(back.column("/scene/errors", "Arrows3D:vectors")[0])
+    assert drawn == pytest.approx(shown.magnify * raw[:, POSITION], abs=1e-7)
+
+
+def test_comparison_names_the_worst_and_the_verdict(compared: Path, comparison: Comparison) -> None:
+    text = Readback(compared).static("/text/verdict", "TextDocument:text")[0]
+    assert plain(comparison.sentence) in text
+    assert "# Not noise" in text
+    worst = comparison.worst[0]
+    assert f"| {worst['row'] + 1} | {worst['line']} |" in text
+    assert f"| {short(1e3 * comparison.rms['position_rms_m'])} | 0.0300 |" in text  # type: ignore[operator]
+
+
+def test_written_whole_or_not_at_all(
+    found: Diagnosis, comparison: Comparison, tmp_path: Path
+) -> None:
+    with pytest.raises(CrosscheckError, match="cannot write the recording"):
+        write_diagnosis_recording(found, tmp_path / "gone" / "d.rrd")
+    with pytest.raises(CrosscheckError, match="cannot write the recording"):
+        write_comparison_recording(comparison, tmp_path / "gone" / "c.rrd")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_names_lose_what_they_share() -> None:
+    assert short_names(["cable1", "cable2"]) == ["1", "2"]
+    assert short_names(["a", "ab"]) == ["a", "ab"]
+    assert short_names(["left", "right"]) == ["left", "right"]
+
+
+@pytest.fixture(scope="module")
+def viewer() -> Iterator[Any]:
+    with headless_viewer() as client:
+        yield client
+
+
+def test_the_viewer_has_nothing_to_complain_about(
+    viewer: Any, written: Path, compared: Path
+) -> None:
+    for path, timeline, views in ((written, STEP, 10), (compared, "pose", 9)):
+        viewer.open(str(path))
+        viewer.set_time(timeline, sequence=1, play_state="paused")
+        assert viewer.take_screenshot().startswith(b"\x89PNG")
+        state = viewer.get_state()
+        assert len(state.views) == views
+        assert [(view.name, view.reports) for view in state.views if view.reports] == []

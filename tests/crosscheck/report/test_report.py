@@ -1,0 +1,403 @@
+"""The page of a diagnosis: everything is on it, nothing is beside it, and the numbers are right."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+import re
+import xml.etree.ElementTree as ElementTree
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import made_diagnoses as made
+import numpy as np
+import pytest
+from PIL import Image
+
+from crosscheck.diagnosis.result import Diagnosis
+from crosscheck.diagnosis.rivals import containment
+from crosscheck.diagnosis.steps import (
+    by_block,
+    drawn,
+    magnification,
+    shown_stages,
+    stages_of,
+    views_of,
+)
+from crosscheck.errors import CrosscheckError
+from crosscheck.fit.gauss_newton import sizes
+from crosscheck.fit.kinds import KINDS
+from crosscheck.numbers import short, with_error
+from crosscheck.report import write_report
+from crosscheck.report.cables import Wall, draw_wall, paid_out, walls_of
+from crosscheck.report.confusion import confusion_of
+from crosscheck.report.page import render
+from crosscheck.report.tables import candidate_rows, checks, finding_context
+from crosscheck.report.waterfall import waterfall
+
+ALL = ("pulleys", "nothing", "unknown", "none", "position_only", "tensions_only", "one_angle")
+EVIL = '<script>alert("1")</script>&$x$'
+
+
+def diagnosis(name: str) -> Diagnosis:
+    found: Diagnosis = getattr(made, name)()
+    return found
+
+
+_pages: dict[str, str] = {}
+
+
+def page(name: str) -> str:
+    if name not in _pages:
+        _pages[name] = render(diagnosis(name))
+    return _pages[name]
+
+
+def text_of(markup: str) -> str:
+    """What a reader sees."""
+    body = re.sub(r"<style.*?</style>|<defs.*?</defs>", "", markup, flags=re.DOTALL)
+    return " ".join(html.unescape(re.sub(r"<[^>]*>", " ", body)).split())
+
+
+@pytest.mark.parametrize(
+    ("name", "verdict", "heading"),
+    [
+        ("pulleys", "effects_found", "Effects found"),
+        ("nothing", "no_effect_missing", "No effect missing"),
+        ("unknown", "unknown_effect", "Unknown effect"),
+        ("none", "no_verdict", "No verdict"),
+    ],
+)
+def test_each_verdict_has_its_page(name: str, verdict: str, heading: str) -> None:
+    found = diagnosis(name)
+    assert found.verdict == verdict
+    seen = text_of(page(name))
+    assert heading in seen
+    assert found.sentence in seen
+    for line in (*found.notes, *found.measure_next):
+        assert line in seen
+    for row in found.candidates:
+        assert f"{row['effect']} " in seen
+        assert str(row["why_not"]) in seen
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_the_page_needs_nothing_else(name: str) -> None:
+    text = page(name)
+    assert "http" not in text
+    assert "<script" not in text
+    assert "<link" not in text
+    assert "@import" not in text
+    assert text.count("<style") == 1  # one inside a figure would be the whole page's
+    links = re.findall(r'(?:href|src)="([^"]*)"', text)
+    assert all(link.startswith(("#", "data:")) for link in links), links
+    assert all(u.startswith("#") for u in re.findall(r"url\(([^)]*)\)", text))
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_figures_are_well_formed_and_keep_apart(name: str) -> None:
+    figures = re.findall(r"<svg.*?</svg>", page(name), re.DOTALL)
+    assert len(figures) >= (0 if name == "none" else 3)
+    ids: Counter[str] = Counter()
+    for figure in figures:
+        # the prefix is known to browsers without being declared, not to other readers
+        declared = figure.replace("<svg ", '<svg xmlns:xlink="x" ', 1)
+        tree = ElementTree.fromstring(declared)
+        assert tree.get("aria-label")
+        ids.update({e.get("id", "") for e in tree.iter() if e.get("id", "").startswith(("p", "m"))})
+    clips = {key: n for key, n in ids.items() if re.fullmatch(r"[pm][0-9a-f]{10}", key)}
+    assert all(n == 1 for n in clips.values()), clips
+
+
+def test_the_same_diagnosis_gives_the_same_page() -> None:
+    assert render(diagnosis("pulleys")) == page("pulleys")
+
+
+def test_numbers_are_those_of_the_json() -> None:
+    found = diagnosis("pulleys")
+    document = found.as_json()
+    seen = text_of(page("pulleys"))
+    for kind in KINDS:
+        before = document["before"][kind.key]
+        held_out = document["missing"][0]["held_out"][kind.key]
+        assert f"{short(before * kind.factor)} {kind.unit}" in seen
+        assert f"{short(held_out * kind.factor)} {kind.unit}" in seen
+        assert f"noise {short(document['noise_floor'][kind.key] * kind.factor)}" in seen
+    radius = document["missing"][0]["parameters"]["radius_m"]
+    value, error = with_error(1e3 * radius["value"], 1e3 * radius["stderr"])
+    assert f"radius {value} ± {error} mm" in seen
+    assert document["missing"][0]["check"] in seen
+
+
+@pytest.mark.parametrize("name", ["nothing", "unknown"])
+def test_nothing_is_called_missing_that_is_not_sure(name: str) -> None:
+    assert "What is missing" not in page(name)
+    assert "the missing effect is" not in text_of(page("pulleys")).lower()
+
+
+def test_unknown_shows_where_structure_is_left() -> None:
+    found = diagnosis("unknown")
+    seen = text_of(page("unknown"))
+    assert found.where
+    assert "What the unexplained part goes with" in seen
+    for row in found.where:
+        assert str(row["against"]) in seen
+        assert str(row["bins"][0]["label"]) in seen or len(row["bins"]) == 1
+    assert "not explained" in seen
+    assert "not explained" not in text_of(page("pulleys"))
+
+
+def test_what_was_found_but_is_not_sure_is_hatched() -> None:
+    found = diagnosis("pulleys")
+    unsure = replace(found, missing=(), verdict="unknown_effect")
+    assert "(not sure)" in waterfall(unsure)
+    assert "(not sure)" not in page("pulleys")
+    assert shown_stages(unsure)[1].added == ""
+    assert shown_stages(found)[1].added == "pulley_radius"
+
+
+def test_text_from_users_stays_text() -> None:
+    found = diagnosis("pulleys")
+    assert found.search is not None
+    old = found.search.problem
+    robot = replace(old.robot, name=EVIL, cable_names=tuple(f"{EVIL}{k}" for k in range(4)))
+    data = replace(old.data, path=Path(EVIL.replace("/", "")))
+    problem = replace(old, robot=robot, data=data)
+    search = replace(found.search, problem=problem)
+    bad = {"effect": EVIL, "score": 0.0, "why_not": EVIL}
+    text = render(
+        replace(
+            found,
+            search=search,
+            sentence=EVIL,
+            notes=(EVIL,),
+            measure_next=(EVIL,),
+            candidates=(bad, *found.candidates),
+            missing=tuple(replace(f, check=EVIL, title=EVIL) for f in found.missing),
+        )
+    )
+    assert "<script" not in text
+    assert text_of(text).count(EVIL) >= 4 + 8  # sentence, note, next, why not; a wall has 4 names
+
+
+def test_partial_data_show_what_they_have() -> None:
+    position = text_of(page("position_only"))
+    assert "rms position error [mm]" in position
+    assert "orientation error" not in position
+    assert "Errors of what was read" in position
+    tension = text_of(page("tensions_only"))
+    assert "Errors of tension [N]" in tension
+    assert "position error" not in tension
+    assert "Arrows" not in tension
+    angle = text_of(page("one_angle"))
+    assert "angle ry" in angle
+    assert "Dots: the orientation error" in angle
+
+
+def test_the_wall_overlays_what_the_effect_accounts_for() -> None:
+    found = diagnosis("pulleys")
+    assert found.search is not None
+    before, after = shown_stages(found)
+    wall, tension = walls_of(found.search.problem, before, after)
+    left = wall.measured - wall.predicted
+    rms = np.sqrt(np.nanmean(left**2, axis=0))
+    assert np.all(rms < 2.0 * wall.noise)
+    assert np.all(np.sqrt(np.nanmean(wall.measured**2, axis=0)) > 20.0 * wall.noise)
+    assert np.nanstd(tension.measured - tension.predicted) < 1.1 * 0.03
+    nothing = diagnosis("nothing")
+    assert nothing.search is not None
+    first, last = shown_stages(nothing)
+    assert np.all(walls_of(nothing.search.problem, first, last)[0].predicted == 0.0)
+
+
+def test_paid_out_is_the_commanded_change_within_a_run() -> None:
+    found = diagnosis("pulleys")
+    assert found.search is not None
+    problem = found.search.problem
+    change = paid_out(problem, found.search.last.fit.state.prediction)
+    lengths = problem.robot.nominal_lengths(problem.data.command_pose)
+    assert np.isnan(change[0]).all()
+    assert change[1] == pytest.approx(lengths[1] - lengths[0])
+    starts = np.flatnonzero(problem.data.run_index[1:] != problem.data.run_index[:-1]) + 1
+    assert np.isnan(change[starts]).all()
+
+
+def test_the_confusion_map_holds_containments() -> None:
+    found = diagnosis("pulleys")
+    assert found.search is not None
+    confusion = confusion_of(found)
+    assert confusion is not None
+    assert confusion.names[: confusion.listed] == ("pulley_radius",)
+    assert np.diag(confusion.part) == pytest.approx(1.0)
+    a, b = (confusion.names.index(n) for n in ("pulley_radius", "exit_point_error"))
+    assert confusion.part[a, b] > 0.9  # 12 points move cables as a sheave does
+    assert confusion.part[b, a] < 0.9
+    columns = found.search.last.fit.jacobian
+    assert confusion.part[a, a] == pytest.approx(containment(columns, columns))
+    assert len(sizes(found.search.last.fit.terms)) == 1
+
+
+def test_rivals_are_named_and_framed() -> None:
+    found = diagnosis("pulleys")
+    assert found.search is not None
+    from crosscheck.diagnosis.rivals import Rival
+
+    rival = Rival("exit_point_error", found.search.last.fit, 0.3)
+    finding = replace(found.missing[0], rivals=(rival,))
+    seen = text_of(render(replace(found, missing=(finding,))))
+    assert "These data cannot tell it from exit_point_error" in seen
+    assert seen.index("+ pulley_radius or exit_point_error") < seen.index("What is missing")
+
+
+def test_a_bound_and_a_blind_parameter_are_flagged() -> None:
+    found = diagnosis("pulleys")
+    finding = replace(found.missing[0], at_bound=np.array([True]), stderr=np.array([np.inf]))
+    (row,) = finding_context(found, finding)["parameters"]
+    assert row["flags"] == "at its bound, not seen by these data"
+    assert row["stderr"] == "not seen"
+    assert "at its bound" not in text_of(page("pulleys"))
+
+
+def test_checks_tell_noise_from_structure() -> None:
+    good = {check.name: check.good for check in checks(diagnosis("pulleys"))}
+    assert good["size of what is left"] is True
+    assert good["neighbouring rows"] is True
+    assert good["runs left out"] is True
+    bad = {check.name: check.good for check in checks(diagnosis("unknown"))}
+    assert bad["size of what is left"] is False
+    assert checks(diagnosis("none")) == []
+
+
+def test_candidates_say_what_they_would_need() -> None:
+    rows = {row["effect"]: row for row in candidate_rows(diagnosis("pulleys"))}
+    exit_points = rows["exit_point_error"]
+    assert exit_points["alone"] > 0.5
+    assert "mm" in exit_points["needs"]
+    assert rows["thermal_expansion"]["alone"] is None
+    assert "alone it explains" not in text_of(page("nothing"))
+
+
+def test_blocks_are_the_runs_left_out() -> None:
+    found = diagnosis("pulleys")
+    assert found.search is not None
+    problem, last = found.search.problem, stages_of(found)[-1]
+    runs = by_block(problem, last, KINDS[0])
+    assert len(runs) == len(problem.data.runs)
+    count = np.array([(problem.data.run == name).sum() for name in problem.data.runs])
+    whole = np.sqrt((count * runs**2).sum() / count.sum())
+    assert whole == pytest.approx(last.step.held_out.rms["position_rms_m"])
+
+
+def test_arrows_fit_the_region() -> None:
+    found = diagnosis("pulleys")
+    assert found.search is not None
+    problem, before = found.search.problem, stages_of(found)[0]
+    factor = magnification(problem, before.state)
+    longest = factor * np.percentile(np.linalg.norm(before.state.raw[:, :3], axis=1), 98)
+    span = np.ptp(before.state.prediction.poses[:, :3], axis=0).max()
+    assert 0.04 * span < longest <= 0.13 * span
+    assert str(factor).rstrip("0").rstrip(".")[0] in "125"
+
+
+@pytest.mark.parametrize(
+    ("magnify", "words"),
+    [(1.0, "to scale"), (50.0, "50 times too long"), (0.5, "0.5 times as long as they are")],
+)
+def test_arrows_say_how_long_they_are(magnify: float, words: str) -> None:
+    assert drawn(magnify) == words
+
+
+@pytest.mark.parametrize(
+    ("spans", "views"),
+    [
+        ((1.0, 0.6, 0.3), [(0, 1), (0, 2)]),
+        ((1.0, 0.0, 0.3), [(0, 2)]),
+        ((1.0, 0.5, 0.0), [(0, 1)]),
+        ((0.0, 1.0, 0.5), [(1, 2)]),
+        ((0.0, 0.0, 1.0), [(0, 2)]),
+        ((0.0, 0.0, 0.0), [(0, 2)]),
+    ],
+)
+def test_views_show_the_plane_of_a_flat_robot(
+    spans: tuple[float, ...], views: list[tuple[int, int]]
+) -> None:
+    corners = np.array([[0.0, 0.0, 0.0], spans])
+    assert views_of(corners) == views
+
+
+def test_many_rows_stay_small() -> None:
+    rng = np.random.default_rng(0)
+    n, m = 2000, 8
+    values = rng.standard_normal((n, m))
+    wall = Wall(
+        "many", [f"cable{k}" for k in range(m)], values, 0.5 * values, np.ones(m), "mm",
+        [(f"abscissa {k}", rng.uniform(size=(n, m))) for k in range(4)],
+    )  # fmt: skip
+    text = draw_wall(wall, "many")
+    assert len(text) < 1_500_000
+    images = re.findall(r'"data:image/png;base64,([^"]*)"', text)
+    assert len(images) == 32
+    for image in images:
+        drawn = np.asarray(Image.open(io.BytesIO(base64.b64decode(image))).convert("RGBA"))
+        assert np.mean(drawn[..., 3] > 128) > 0.02, "dots that nobody sees"
+
+
+def test_few_dots_are_drawn_as_what_they_are() -> None:
+    values = np.linspace(-1.0, 1.0, 7)[:, None]
+    wall = Wall("few", ["a"], values, 0.5 * values, np.ones(1), "mm", [("t", np.arange(7) * 1.0)])
+    text = draw_wall(wall, "few")
+    dots = re.findall(r'd="((?:M [\d.]+ [\d.]+ ?L [\d.]+ [\d.]+ ?){7})"', text)
+    assert len(dots) == 2
+    assert "stroke-linecap: round" in text
+    assert "image/png" not in text
+
+
+def test_a_wall_of_many_cables_shows_the_worst() -> None:
+    n, m = 5, 30
+    values = np.full((n, m), 0.1)
+    values[:, 17] = 9.0
+    names = [f"rope{k:02d}" for k in range(m)]
+    wall = Wall("many", names, values, 0.0 * values, np.ones(m), "mm", [("t", np.arange(n) * 1.0)])
+    text = draw_wall(wall, "worst")
+    assert text.count(">rope") == 12
+    assert "rope17" in text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.0, "0"), (0.0296, "0.0296"), (-4.274, "−4.27"), (123456.0, "123456"),
+     (1.234e-7, "1.23e−7"), (9.9e9, "9.90e9"), (np.nan, "–"), (None, "–")],
+)  # fmt: skip
+def test_short_numbers(value: Any, text: str) -> None:
+    assert short(value) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "texts"),
+    [(10.00238, 0.005576, ("10.0024", "0.0056")), (1.3988, np.inf, ("1.40", "not seen")),
+     (-1437.0, 210.0, ("−1437", "210")), (1.5, 0.0, ("1.50000", "0"))],
+)  # fmt: skip
+def test_values_show_two_digits_of_their_error(
+    value: float, error: float, texts: tuple[str, str]
+) -> None:
+    assert with_error(value, error) == texts
+
+
+def test_written_whole_or_not_at_all(tmp_path: Path) -> None:
+    path = tmp_path / "diagnosis.html"
+    write_report(diagnosis("nothing"), path)
+    assert path.read_text(encoding="utf-8") == page("nothing")
+    assert list(tmp_path.iterdir()) == [path]
+    with pytest.raises(CrosscheckError, match=r"gone/d.html: cannot write the report: No such"):
+        write_report(diagnosis("none"), tmp_path / "gone" / "d.html")
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(CrosscheckError, match="folder: cannot write the report"):
+        write_report(diagnosis("none"), tmp_path / "folder")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["diagnosis.html", "folder"]
+
+
+def test_pages_are_small() -> None:
+    assert all(len(page(name).encode()) < 2_000_000 for name in ALL)

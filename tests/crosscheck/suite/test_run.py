@@ -1,0 +1,493 @@
+"""The suite: its cases, how far two answers may be apart, and what each kind of pose is called."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import seecr
+from crosscheck.errors import CrosscheckError, InputFileError
+from crosscheck.settle.settling import SettlingBatch
+from crosscheck.suite import run as suite
+from crosscheck.suite.cases import (
+    Case,
+    robot_random,
+    robot_sweep,
+    select,
+    shipped_cases,
+    user_cases,
+)
+from crosscheck.suite.run import (
+    CaseResult,
+    agreement,
+    cases,
+    run_case,
+    run_suite,
+    verdicts,
+    worst_of,
+)
+from crosscheck.suite.side import MujocoSide, screw_motion
+from crosscheck.suite.thresholds import SHIPPED, load_thresholds, thresholds_toml
+from crosscheck.suite.verdicts import Verdict
+from seecr.pose import pose_add, pose_difference, quat_from_rotvec
+from seecr.shipped import CABLES, model_path
+
+PARALLEL, COGIRO = model_path("demobot_parallel"), model_path("demobot_cogiro")
+# Near a corner of the frame two taut cables are left, and their line meets the centre of mass.
+CORNER = np.array([0.13489155, 0.11259351, 0.07598101, 1.0, 0.0, 0.0, 0.0])
+
+
+def case_of(model: Path, poses, *, mujoco_model: Path | None = None, cable="vectran") -> Case:
+    return Case("small", model, mujoco_model or model, cable, "random", np.atleast_2d(poses))
+
+
+def with_stiffer_cable(model: Path, folder: Path, factor: float, cable: int = 0) -> Path:
+    """A copy of an MJCF with one stiffness changed."""
+    import xml.etree.ElementTree as ET
+
+    tree = ET.parse(model)
+    tendon = tree.getroot().findall("tendon/spatial")[cable]
+    tendon.set("stiffness", repr(float(tendon.get("stiffness")) * factor))
+    path = folder / f"changed_{model.name}"
+    tree.write(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def shipped() -> list[Case]:
+    return shipped_cases()
+
+
+@pytest.fixture(scope="module")
+def ends() -> dict[tuple[str, float], CaseResult]:
+    """Both ends of the parallel configuration's sweeps, on both cables."""
+    thresholds = load_thresholds()
+    return {
+        (cable, z): run_case(case_of(PARALLEL, cases.demobot_sweep(z, 2), cable=cable), thresholds)
+        for cable in CABLES
+        for z in (0.1, 0.2)
+    }
+
+
+# --- cases ---------------------------------------------------------------------------------
+
+
+def test_shipped_cases_are_the_papers(shipped):
+    names = [case.name for case in shipped]
+    assert len(set(names)) == len(names)
+    for robot in ("cogiro", "parallel"):
+        for cable in CABLES:
+            kinds = ("z0.10", "z0.20", "random")
+            assert [f"{robot}-{cable}-{kind}" in names for kind in kinds] == [True] * 3
+    by_name = {case.name: case for case in shipped}
+    sweep = by_name["parallel-fishing-z0.20"].poses
+    assert sweep.shape == (24, 7)
+    assert (sweep[0, 0], sweep[-1, 0]) == (0.17, 0.63)
+    assert np.all(sweep[:, 1:] == [0.25, 0.2, 1, 0, 0, 0])
+    assert by_name["parallel-fishing-z0.20"].ea == 300.0
+    assert by_name["cogiro-vectran-random"].poses.shape == (200, 7)
+
+
+def test_random_poses_lie_in_the_frame_and_only_cogiro_turns(shipped):
+    for case in shipped:
+        if case.kind != "random":
+            continue
+        assert np.all(case.poses[:, :3] > 0.0)
+        assert np.all(case.poses[:, :3] < [0.8, 0.5, 0.45])
+        turn = 2 * np.arccos(np.clip(case.poses[:, 3], -1, 1))
+        if case.name.startswith("cogiro"):
+            assert np.deg2rad(8) < turn.max() <= np.deg2rad(12)
+        else:
+            assert np.all(turn == 0.0)
+
+
+def test_the_seed_decides_the_random_poses():
+    one, same, other = shipped_cases(3), shipped_cases(3), shipped_cases(4)
+    for a, b, c in zip(one, same, other, strict=True):
+        assert np.array_equal(a.poses, b.poses)
+        assert np.array_equal(a.poses, c.poses) == (a.kind == "sweep")
+    poses = {case.name: case.poses for case in one if case.kind == "random"}
+    assert not np.array_equal(poses["cogiro-vectran-random"], poses["cogiro-fishing-random"])
+
+
+@pytest.mark.parametrize("name", ["demobot_cogiro", "planar_two_cable", "planar_vertical"])
+def test_poses_for_any_robot_scale_with_it(name):
+    robot = seecr.load_robot(model_path(name))
+    hull = np.vstack([robot.exit_points, robot.reference_pose[:3]])
+    for poses in (robot_sweep(robot), robot_random(robot, np.random.default_rng(1), 50)):
+        assert np.all(poses[:, :3] >= hull.min(axis=0) - 1e-12)
+        assert np.all(poses[:, :3] <= hull.max(axis=0) + 1e-12)
+        # also with joints, whose manifold these poses must not leave
+        assert seecr.solve(robot, poses).converged.all()
+    assert np.ptp(robot_sweep(robot)[:, 0]) > 0.4
+
+
+def test_a_robot_a_hundred_times_larger_gets_poses_a_hundred_times_larger():
+    robot = seecr.load_robot(COGIRO)
+    pose = robot.reference_pose.copy()
+    pose[:3] *= 100
+    large = replace(
+        robot,
+        exit_points=100 * robot.exit_points,
+        anchor_points=100 * robot.anchor_points,
+        rest_lengths=100 * robot.rest_lengths,
+        reference_pose=pose,
+    )
+    small_poses, large_poses = robot_sweep(robot), robot_sweep(large)
+    np.testing.assert_allclose(large_poses[:, :3], 100 * small_poses[:, :3], rtol=1e-12)
+
+
+def test_select_by_pattern_and_refuses_unknown_names(shipped):
+    chosen = select(shipped, ["parallel-*-z0.10", "planar-vertical"])
+    names = ["parallel-vectran-z0.10", "parallel-fishing-z0.10", "planar-vertical"]
+    assert [case.name for case in chosen] == names
+    assert select(shipped, []) == shipped
+    with pytest.raises(CrosscheckError, match=r"--case cogiro-vektran-z0\.1: .*cogiro-vectran-z0"):
+        select(shipped, ["planar-*", "cogiro-vektran-z0.1"])
+
+
+# --- thresholds ----------------------------------------------------------------------------
+
+
+def test_shipped_thresholds_are_those_agreed():
+    assert load_thresholds().as_dict() == {
+        "settled": {"position_m": 1e-6, "orientation_rad": 1e-5},
+        "polished": {"position_m": 1e-8, "orientation_rad": 1e-7, "tension_N": 1e-6},
+    }
+
+
+def test_a_copy_may_change_one_value_and_is_written_back(tmp_path):
+    copy = tmp_path / "mine.toml"
+    copy.write_text("[polished]\ntension_N = 2e-3\n")
+    thresholds = load_thresholds(copy)
+    assert thresholds.polished.tension_N == 2e-3
+    assert thresholds.polished.position_m == 1e-8
+    copy.write_text(thresholds_toml(thresholds))
+    assert load_thresholds(copy) == thresholds
+    assert thresholds_toml(load_thresholds()) == SHIPPED.read_text()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[polish]\nposition_m = 1", r"'polish' is no table of thresholds; expected polished or"),
+        (
+            "[polished]\nposition_mm = 1",
+            r"'position_mm' is no key of \[polished\] of thresholds; expected position_m or",
+        ),
+        ("[settled]\nposition_m = 0", r"\[settled\] position_m: expected a positive number, got 0"),
+        ("[settled]\nposition_m = -1e-6", r"expected a positive number, got -1e-06"),
+        ("[settled]\nposition_m = nan", r"expected a positive number, got nan"),
+        ("[settled]\nposition_m = inf", r"expected a positive number, got inf"),
+        ("[settled]\nposition_m = true", r"expected a positive number, got True"),
+        ("[settled]\nposition_m = '1e-6'", r"expected a positive number, got '1e-6'"),
+        ("settled = 3", r"settled: expected a table \[settled\], got 3"),
+        ("[settled\n", r"not TOML: .*line 1"),
+    ],
+)
+def test_bad_thresholds(tmp_path, text, message):
+    path = tmp_path / "bad.toml"
+    path.write_text(text)
+    with pytest.raises(InputFileError, match=message) as caught:
+        load_thresholds(path)
+    assert str(caught.value).startswith(f"{path}: ")
+    assert "\n" not in str(caught.value)
+
+
+def test_thresholds_that_cannot_be_read(tmp_path):
+    with pytest.raises(InputFileError, match=r"none\.toml: cannot read .*No such file"):
+        load_thresholds(tmp_path / "none.toml")
+    (tmp_path / "latin.toml").write_bytes(b"# caf\xe9\n")
+    with pytest.raises(InputFileError, match=r"expected TOML in UTF-8.* offset 5"):
+        load_thresholds(tmp_path / "latin.toml")
+
+
+# --- both physics --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("z", [0.1, 0.2])
+@pytest.mark.parametrize("cable", list(CABLES))
+def test_parallel_tilts_with_four_slack_cables_in_both_physics(ends, cable, z):
+    result = ends[cable, z]
+    expected = {0.1: 26.5, 0.2: 22.0}[z]
+    # Vectran is the paper's stiffer cable; fishing line gives way a little more
+    for pose in (result.solution.pose, result.settling.pose):
+        tilt = np.rad2deg(2 * np.arccos(np.abs(pose[:, 3])))
+        np.testing.assert_allclose(tilt, expected, atol=0.6 if cable == "fishing" else 0.3)
+    assert np.all(result.solution.slack.sum(axis=1) == 4)
+    assert np.all(result.settling.slack.sum(axis=1) == 4)
+    assert list(result.verdict) == [Verdict.AGREES] * 2
+    assert result.exit_status == 0
+
+
+def test_agreement_leaves_room(ends):
+    # far inside the thresholds: what is left is rounding, not luck
+    for result in ends.values():
+        assert all(worst.ratio < 0.05 for worst in result.worst.values())
+
+
+@pytest.mark.parametrize("model", [PARALLEL, COGIRO, model_path("planar_vertical")])
+def test_a_stiffness_changed_by_a_thousandth_on_one_side_differs(tmp_path, model):
+    changed = with_stiffer_cable(model, tmp_path, 1.001)
+    robot = seecr.load_robot(model)
+    case = case_of(model, robot_sweep(robot, 3), mujoco_model=changed, cable=None)
+    result = run_case(case, load_thresholds())
+    assert result.exit_status == 1
+    assert result.count(Verdict.DIFFERS) >= 2
+    assert "further apart than allowed" in result.findings[0].text
+    assert result.worst["position_m"].ratio > 1 or result.worst["tension_N"].ratio > 1
+
+
+def test_another_mjcf_for_mujoco_keeps_its_own_stiffness(tmp_path):
+    changed = with_stiffer_cable(COGIRO, tmp_path, 1.001)
+    poses = cases.demobot_sweep(0.1, 1)
+    case = case_of(COGIRO, poses, mujoco_model=changed, cable="vectran")
+    np.testing.assert_allclose(MujocoSide(changed, case.mujoco_ea).settler.ea[0], 3003.0)
+    assert run_case(case, load_thresholds()).exit_status == 1
+
+
+def test_mujoco_measures_the_lengths_it_pays_out_itself(tmp_path):
+    side = MujocoSide(PARALLEL)
+    robot = seecr.load_robot(PARALLEL)
+    poses = cases.demobot_random(np.random.default_rng(5), 10, 0.2)
+    expected = robot.commanded_lengths(poses)
+    np.testing.assert_allclose(side.rest_lengths(poses), expected, rtol=0, atol=1e-15)
+    side.settle(poses[:1])  # changes the springs; the reference must not follow
+    np.testing.assert_allclose(side.rest_lengths(poses), expected, rtol=0, atol=1e-15)
+
+
+def test_cable_counts_must_match():
+    planar = model_path("planar_vertical")
+    case = case_of(COGIRO, cases.demobot_sweep(0.1, 1), mujoco_model=planar, cable=None)
+    with pytest.raises(InputFileError, match=r"planar_vertical\.xml: 4 cables; expected 8 as in"):
+        run_case(case, load_thresholds())
+
+
+# --- findings ------------------------------------------------------------------------------
+
+
+def test_a_platform_free_to_turn_is_a_finding():
+    result = run_case(case_of(PARALLEL, CORNER), load_thresholds())
+    assert result.solution.slack[0].sum() == 6
+    assert result.difference.orientation_rad[0] > 1e-3  # each stops somewhere on the free turn
+    assert list(result.verdict) == [Verdict.NEUTRAL]
+    (finding,) = result.findings
+    assert finding.mujoco_stays
+    assert finding.seecr_stays
+    assert math.isclose(finding.energy_seecr_J, finding.energy_mujoco_J, rel_tol=1e-12)
+    assert finding.tension_N < 1e-9
+    assert "free to move" in finding.text
+    assert result.exit_status == 0
+    assert result.worst == {}  # nothing that is determined was compared: it is not a pass
+
+
+def test_a_platform_free_to_turn_does_not_hide_a_difference(tmp_path):
+    changed = with_stiffer_cable(PARALLEL, tmp_path, 1.001, cable=0)
+    case = case_of(PARALLEL, CORNER, mujoco_model=changed, cable=None)
+    result = run_case(case, load_thresholds())
+    assert result.solution.tensions[0, 0] > 1.0
+    assert list(result.verdict) == [Verdict.DIFFERS]
+
+
+def test_a_cable_on_the_border_of_slack_is_polished_and_holds_nothing():
+    # On its free turn the platform stops where a third cable is about to pull: the polish must
+    # balance the forces there, and not take that cable's rounding for stiffness.
+    command = np.array([0.6080615721734167, 0.38888280018700916, 0.20581767053691352, 1, 0, 0, 0])
+    (settling,) = MujocoSide(PARALLEL, 1000.0).settle(command[None])
+    assert settling.settled, settling.status.value
+    assert settling.residual < 1e-11
+    third = np.sort(settling.tensions)[-3]
+    assert 0.0 < third < 1e-9
+    assert settling.free_to_move
+
+
+SEESAW = """<mujoco>
+  <option gravity="0 0 -9.81"/>
+  <worldbody>
+    <site name="A1" pos="-1 0 0"/><site name="A2" pos="1 0 0"/>
+    <body name="platform">
+      <joint name="tilt" type="hinge" axis="0 1 0"/>
+      <inertial pos="0 0 0.2" mass="1" diaginertia="0.01 0.01 0.01"/>
+      <site name="B1" pos="-0.1 0 0.2"/><site name="B2" pos="0.1 0 0.2"/>
+    </body>
+  </worldbody>
+  <tendon>
+    <spatial springlength="0 0.95" stiffness="100"><site site="A1"/><site site="B1"/></spatial>
+    <spatial springlength="0 0.95" stiffness="100"><site site="A2"/><site site="B2"/></spatial>
+  </tendon>
+</mujoco>"""
+
+
+@pytest.fixture
+def seesaw(tmp_path) -> Path:
+    """A mass on top of a hinge between two loose cables: it rests to the left or to the right."""
+    path = tmp_path / "seesaw.xml"
+    path.write_text(SEESAW)
+    return path
+
+
+def seesaw_answers(path: Path) -> verdicts.Answers:
+    """SEECR to the one side, MuJoCo to the other, of the same command."""
+    command = np.array([[0.0, 0, 0, 1, 0, 0, 0]])
+    left, right = (np.r_[0.0, 0, 0, quat_from_rotvec(np.array([0, a, 0]))] for a in (-0.4, 0.4))
+    robot, side = seecr.load_robot(path), MujocoSide(path)
+    solution = seecr.solve(robot, command, start=left[None])
+    settling = SettlingBatch([side.settle_from(right, command[0])])
+    allowance = agreement.allowances(load_thresholds(), solution, settling)
+    difference = agreement.compare(solution, settling, allowance.tension_N)
+    return verdicts.Answers(side, solution, settling, difference, allowance)
+
+
+def test_two_stable_equilibria_are_a_finding_with_both_energies(seesaw):
+    answers = seesaw_answers(seesaw)
+    assert answers.difference.orientation_rad[0] > 0.2
+    verdict, (finding,) = verdicts.judge(answers)
+    assert list(verdict) == [Verdict.BRANCH]
+    assert finding.mujoco_stays
+    assert finding.seecr_stays
+    # mirror images
+    assert math.isclose(finding.energy_seecr_J, finding.energy_mujoco_J, rel_tol=1e-9)
+    assert f"{finding.energy_mujoco_J:.9g} J" in finding.text
+
+
+def test_an_answer_that_mujoco_leaves_is_no_equilibrium(seesaw):
+    answers = seesaw_answers(seesaw)
+    # SEECR's answer, moved by a hundredth of a radian: it is stable for nobody
+    wrong = pose_add(answers.solution.pose, np.array([[0, 0, 0, 0, 0.01, 0]]))
+    answers = answers._replace(solution=replace(answers.solution, pose=wrong))
+    verdict, (finding,) = verdicts.judge(answers)
+    assert list(verdict) == [Verdict.DIFFERS]
+    assert finding.mujoco_stays is False
+    assert "MuJoCo leaves" in finding.text
+
+
+def test_unsolved_poses_are_neither_passes_nor_differences(monkeypatch):
+    def hurried(robot, poses, **options):
+        return seecr.solve(robot, poses, **{**options, "max_iterations": 2})
+
+    monkeypatch.setattr(suite, "seecr_solve", hurried)
+    result = run_case(case_of(PARALLEL, cases.demobot_sweep(0.1, 2)), load_thresholds())
+    assert list(result.verdict) == [Verdict.SEECR_UNSOLVED] * 2
+    assert "limit of iterations" in result.findings[0].text
+    assert result.exit_status == 3
+    assert result.worst == {}
+
+
+def test_mujoco_that_does_not_settle_is_unsolved(monkeypatch):
+    original = MujocoSide.__init__
+
+    def impatient(self, *arguments, **options):
+        original(self, *arguments, **options)
+        self.settler.max_steps = 5
+
+    monkeypatch.setattr(MujocoSide, "__init__", impatient)
+    result = run_case(case_of(COGIRO, cases.demobot_sweep(0.1, 2)), load_thresholds())
+    assert list(result.verdict) == [Verdict.MUJOCO_UNSOLVED] * 2
+    assert np.isnan(result.difference.position_m).all()
+    assert result.exit_status == 3
+
+
+# --- agreement -----------------------------------------------------------------------------
+
+
+def test_thresholds_widen_only_where_residual_over_stiffness_is_more(ends):
+    result = ends["vectran", 0.1]
+    thresholds = load_thresholds()
+    assert not result.allowance.widened.any()
+    assert np.all(result.allowance.position_m == 1e-8)
+    soft = SettlingBatch(
+        replace(one, smallest_eigenvalue=eigenvalue, residual=1e-9, settled_residual=1e-9)
+        for one, eigenvalue in zip(result.settling, (1e-2, 1e3), strict=True)
+    )
+    solution = result.solution
+    wide = agreement.allowances(thresholds, solution, soft)
+    force = solution.tables.scale * (solution.residual + 1e-9)
+    np.testing.assert_allclose(wide.position_m, [force[0] / 1e-2, 1e-8])
+    length = solution.robot.length
+    np.testing.assert_allclose(wide.orientation_rad, [force[0] / 1e-2 / length, 1e-7])
+    assert np.all(wide.tension_N == 1e-6)
+    assert list(wide.widened) == [True, False]
+    lost = replace(solution, residual=np.array([np.inf, np.nan]))
+    assert not agreement.allowances(thresholds, lost, soft).widened.any()
+    none = SettlingBatch(replace(one, smallest_eigenvalue=0.0) for one in soft)
+    assert not agreement.allowances(thresholds, solution, none).widened.any()
+
+
+def test_a_cable_slack_for_one_only_matters_when_the_other_pulls(ends):
+    result = ends["vectran", 0.1]
+    slack = int(np.argmax(result.solution.slack[0]))
+    for tension, same in ((1e-9, True), (1e-3, False)):
+        tensions, mask = result.solution.tensions.copy(), result.solution.slack.copy()
+        tensions[0, slack], mask[0, slack] = tension, False
+        changed = replace(result.solution, tensions=tensions, slack=mask)
+        difference = agreement.compare(changed, result.settling, np.full(2, 1e-6))
+        assert difference.slack_same[0] == same
+        assert difference.tension_N[0] == pytest.approx(tension, rel=1e-3)
+        # also where tensions may differ by that much
+        generous = replace(result.allowance, tension_N=np.full(2, 1.0))
+        assert agreement.within(difference, generous)[0] == same
+
+
+def test_a_screw_keeps_to_a_fixed_axis():
+    random = np.random.default_rng(7)
+    point, axis = random.normal(size=3), np.array([0.6, 0.0, 0.8])
+    start = np.r_[random.normal(size=3), quat_from_rotvec(random.normal(size=3))]
+
+    def turned(angle):
+        from seecr.pose import quat_multiply, quat_rotate
+
+        q = quat_from_rotvec(angle * axis)
+        return np.r_[point + quat_rotate(q, start[:3] - point), quat_multiply(q, start[3:])]
+
+    path = screw_motion(start, turned(1.2), 5)
+    for pose, angle in zip(path, (0, 0.3, 0.6, 0.9, 1.2), strict=True):
+        assert np.abs(pose_difference(pose, turned(angle))).max() < 1e-14
+    shift = screw_motion(start, pose_add(start, np.array([1.0, 2, 3, 0, 0, 0])), 3)
+    np.testing.assert_allclose(shift[1, :3], start[:3] + np.array([0.5, 1, 1.5]), atol=1e-14)
+
+
+# --- running -------------------------------------------------------------------------------
+
+
+def test_processes_give_the_same_results_in_the_same_order():
+    few = [
+        replace(case, poses=case.poses[:3])
+        for case in select(shipped_cases(), ["parallel-vectran-*", "planar-two-cable"])
+    ]
+    seen: list[str] = []
+    alone = run_suite(few, load_thresholds(), progress=lambda r: seen.append(r.case.name))
+    assert seen == [case.name for case in few]
+    together = run_suite(few, load_thresholds(), jobs=2)
+    for one, two, case in zip(alone, together, few, strict=True):
+        assert one.case.name == two.case.name == case.name
+        assert np.array_equal(one.solution.pose, two.solution.pose)
+        assert np.array_equal(one.settling.pose, two.settling.pose)
+        assert np.array_equal(one.settling.tensions, two.settling.tensions)
+        assert list(one.verdict) == list(two.verdict)
+
+
+def test_errors_cross_processes(tmp_path):
+    broken = [case_of(tmp_path / f"no{i}.xml", CORNER) for i in range(2)]
+    with pytest.raises(seecr.RobotError, match=r"no0\.xml: no such file"):
+        run_suite(broken, load_thresholds(), jobs=2)
+
+
+def test_worst_is_the_largest_share_of_what_is_allowed(ends):
+    results = list(ends.values())
+    result, worst = worst_of(results)
+    ratios = [w.ratio for r in results for w in r.worst.values()]
+    assert worst.ratio == max(ratios)
+    assert getattr(result.difference, worst.quantity)[worst.pose] == worst.value
+    assert worst_of([]) is None
+
+
+def test_user_cases_name_the_file():
+    robot = seecr.load_robot(COGIRO)
+    sweep, random = user_cases(robot, Path("some/my robot.xml"), n_random=7)
+    assert (sweep.name, random.name) == ("my robot-sweep", "my robot-random")
+    assert len(random.poses) == 7
+    assert sweep.mujoco_model == sweep.model

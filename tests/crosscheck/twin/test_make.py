@@ -1,0 +1,274 @@
+"""Twins: case folders with something hidden, MuJoCo being the truth."""
+
+from __future__ import annotations
+
+import dataclasses
+import filecmp
+import json
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from scipy.stats import chi2
+
+from crosscheck.cli import main
+from crosscheck.errors import CrosscheckError, InputFileError
+from crosscheck.measurements.read import load_measurements
+from crosscheck.twin.hidden import Hidden, choose
+from crosscheck.twin.make import make_twin
+from crosscheck.twin.robot import TRUE_EFFECTS
+from crosscheck.twin.sealed import NAME, seal, unseal
+from crosscheck.twin.trajectory import trajectory
+from seecr.effects import effect_named, layout_of
+from seecr.errors import InputError
+from seecr.experiment import Experiment
+from seecr.mjcf import load_robot
+from seecr.pose import pose_difference
+from seecr.setup import Commands
+from seecr.shipped import model_path
+
+COGIRO = model_path("demobot_cogiro")
+# Short sweeps: 24 rows. History between far rows is a matter of the points looked at, see below.
+POINTS = 3
+FAST = [name for name in TRUE_EFFECTS if name not in ("backlash", "hysteresis", "exit_friction")]
+
+
+def residuals(twin):
+    """Readings less seecr's prediction with what is hidden, over their noise, (n, k)."""
+    data, sigma = twin.measured, twin.measured.sigma
+    commands = Commands(
+        pose=data.command_pose, run=data.run_index, time=data.t_s, temperature=data.temperature_C
+    )
+    seen = Experiment(twin.robot, commands).predict([one.effect() for one in twin.hidden])
+    assert seen.solved.all()
+    ours = np.concatenate([seen.readings.position, seen.readings.quat_wxyz], axis=1)
+    theirs = np.concatenate([data.position, data.quat_wxyz], axis=1)
+    scale = np.repeat([sigma.position_m, sigma.orientation_rad], 3)
+    parts = [pose_difference(theirs, ours) / scale]
+    if sigma.tension_N is not None:
+        parts.append((data.tensions - seen.readings.tensions) / sigma.tension_N)
+    return np.concatenate(parts, axis=1)
+
+
+def is_noise(values):
+    """Whether standard normal numbers may well have this sum of squares (99.98 %)."""
+    low, high = chi2.ppf([1e-4, 1 - 1e-4], values.size)
+    return low < np.sum(values**2) < high
+
+
+def test_a_twin_is_a_case_folder_that_loads(tmp_path):
+    twin = make_twin(COGIRO, 3, out=tmp_path, points=POINTS)
+    assert {f.name for f in tmp_path.iterdir()} == {
+        "robot.xml", "measured.csv", "measured.toml", NAME
+    }  # fmt: skip
+    assert filecmp.cmp(COGIRO, tmp_path / "robot.xml", shallow=False)
+    robot = load_robot(tmp_path / "robot.xml")
+    data = load_measurements(tmp_path / "measured.csv", robot)
+    assert data.n_rows == 8 * POINTS and not data.unused_columns
+    assert data.sigma == twin.measured.sigma
+    np.testing.assert_allclose(data.position, twin.measured.position, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(data.quat_wxyz, twin.measured.quat_wxyz, rtol=0, atol=1e-8)
+
+
+def test_the_usual_size_and_clock_are_those_of_a_day_in_the_laboratory():
+    robot = load_robot(COGIRO)
+    way = trajectory(robot)
+    assert len(way.pose) == 144 and len(set(way.run)) == 7
+    assert way.pose[0, 0] == pytest.approx(0.1696) and way.pose[17, 0] == pytest.approx(0.6304)
+    steps = np.diff(way.t_s)
+    same = way.run[1:] == way.run[:-1]
+    assert np.all(steps[same] == 2.0) and np.all(steps[~same] == 60.0)
+
+
+@pytest.mark.parametrize("name", ["planar_two_cable", "planar_horizontal", "planar_vertical"])
+def test_a_planar_platform_is_sent_where_its_joints_go(name):
+    robot = load_robot(model_path(name))
+    way = trajectory(robot, POINTS)
+    off = np.abs(way.pose[:, 1] - robot.reference_pose[1])
+    assert np.max(off) < 1e-12
+    for run in sorted(set(way.run)):
+        assert np.ptp(way.pose[way.run == run, :3], axis=0).max() > 0.01
+
+
+def test_the_answer_is_sealed_and_says_all(tmp_path):
+    make_twin(COGIRO, 4, effects=("centre_of_mass",), out=tmp_path, points=POINTS)
+    for file in tmp_path.iterdir():
+        text = file.read_text(encoding="utf-8")
+        assert "centre_of_mass" not in text and "shift_x" not in text, file.name
+    answer = unseal(tmp_path)
+    assert answer == unseal(tmp_path / NAME)
+    assert answer["hidden"] == ["centre_of_mass"]
+    assert set(answer["values"]["centre_of_mass"]) == {"shift_x_m", "shift_y_m", "shift_z_m"}
+    assert answer["moves_over_noise"]["centre_of_mass"]["max"] > 2.0
+
+
+def test_a_seed_makes_the_same_twin_again():
+    first, again = (make_twin(COGIRO, 11, points=POINTS) for _ in range(2))
+    assert first.answer == again.answer
+    np.testing.assert_array_equal(first.measured.position, again.measured.position)
+    other = make_twin(COGIRO, 12, points=POINTS)
+    assert not np.array_equal(first.measured.position, other.measured.position)
+
+
+def test_the_noise_says_nothing_of_what_is_hidden():
+    """The same seed gives the same noise, whatever is hidden."""
+    none, some = (
+        make_twin(COGIRO, 5, effects=names, points=POINTS) for names in ((), ("stiffness",))
+    )
+    noise = [twin.measured.position - twin.truth.position for twin in (none, some)]
+    np.testing.assert_allclose(noise[0], noise[1], atol=1e-15)
+    np.testing.assert_array_equal(none.measured.temperature_C, some.measured.temperature_C)
+
+
+def test_seeds_hide_nothing_one_or_two():
+    robot = load_robot(COGIRO)
+    drawn = [choose(robot, np.random.default_rng([seed, 0])) for seed in range(200)]
+    counts = np.bincount([len(one) for one in drawn], minlength=3) / 200
+    assert len(counts) == 3
+    assert np.all(np.abs(counts - [0.2, 0.6, 0.2]) < 0.1)
+    names = {hidden.name for one in drawn for hidden in one}
+    # the scale of load cells shows in nothing that is recorded here
+    assert names == set(TRUE_EFFECTS) - {"tension_scale"}
+
+
+@pytest.mark.parametrize("name", TRUE_EFFECTS)
+def test_sizes_lie_inside_their_bounds_and_away_from_nothing(name):
+    robot = load_robot(COGIRO)
+    layout = layout_of(effect_named(name), robot)
+    for seed in range(20):
+        vector = choose(robot, np.random.default_rng(seed), [name])[0].vector
+        assert np.all(vector >= layout.lower) and np.all(vector <= layout.upper)
+        sizes = np.abs(vector - layout.null)[~layout.shape] / layout.scale[~layout.shape]
+        assert np.all(sizes >= 0.4) and np.all(sizes <= 2.0)
+
+
+def test_an_effect_grows_inside_its_bounds():
+    robot = load_robot(COGIRO)
+    layout = layout_of(effect_named("exit_friction"), robot)
+    hidden = Hidden(layout, np.array([2.0, 0.1]))
+    np.testing.assert_allclose(hidden.times(3.0).vector, [5.0, 0.3])
+
+
+@pytest.mark.parametrize("robot", ["demobot_cogiro", "demobot_parallel"])
+@pytest.mark.parametrize("seed", range(4))
+def test_null_twins_leave_white_noise(robot, seed):
+    twin = make_twin(model_path(robot), seed, effects=(), points=6, tensions=True)
+    left = residuals(twin)
+    assert is_noise(left)
+    # white: no column and no neighbour in time knows of the others
+    neighbours = np.sum(left[1:] * left[:-1]) / np.sqrt(left[1:].size)
+    assert abs(neighbours) < 4.0
+    assert np.all(np.abs(left.mean(axis=0)) * np.sqrt(len(left)) < 4.5)
+
+
+@pytest.mark.parametrize("robot", ["demobot_cogiro", "demobot_parallel"])
+@pytest.mark.parametrize("name", FAST)
+def test_what_is_hidden_explains_the_readings(robot, name):
+    twin = make_twin(model_path(robot), 21, effects=(name,), points=POINTS, tensions=True)
+    assert is_noise(residuals(twin))
+
+
+@pytest.mark.parametrize(
+    ("robot", "name"),
+    [
+        ("demobot_cogiro", "backlash"),
+        ("demobot_parallel", "hysteresis"),
+        ("demobot_cogiro", "exit_friction"),
+    ],
+)
+def test_what_happens_on_the_way_explains_the_readings(robot, name):
+    """Here the rows must lie as near as they usually do: both look at points between them."""
+    twin = make_twin(model_path(robot), 21, effects=(name,), points=12)
+    assert is_noise(residuals(twin))
+
+
+def test_two_hidden_effects_act_together():
+    names = ("pulley_radius", "frame_compliance")
+    twin = make_twin(COGIRO, 2, effects=names, points=POINTS)
+    assert is_noise(residuals(twin))
+    assert set(twin.answer["moves_over_noise"]) == set(names)
+    absent = Hidden(twin.hidden[0].layout, twin.hidden[0].layout.null)
+    without = dataclasses.replace(twin, hidden=(absent, twin.hidden[1]))
+    assert not is_noise(residuals(without))
+
+
+def test_a_robot_of_another_size_has_noise_of_another_size(tmp_path):
+    big = tmp_path / "big.xml"
+    big.write_text(_scaled(COGIRO.read_text(encoding="utf-8"), 20.0), encoding="utf-8")
+    twin = make_twin(big, 1, effects=("initial_pose_error",), points=POINTS)
+    assert twin.measured.sigma.position_m == pytest.approx(20 * 3e-5, rel=0.1)
+    assert is_noise(residuals(twin))
+
+
+def _scaled(text, factor):
+    """The MJCF with its lengths (and springs) as many times as large."""
+    root = ElementTree.fromstring(text)
+    for node in root.iter():
+        for key in ("pos", "springlength", "size", "fromto"):
+            if key in node.attrib and not (key == "size" and node.tag == "statistic"):
+                numbers = [factor * float(v) for v in node.attrib[key].split()]
+                node.attrib[key] = " ".join(map(repr, numbers))
+        if "stiffness" in node.attrib:
+            node.attrib["stiffness"] = repr(float(node.attrib["stiffness"]) / factor)
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def test_the_command_writes_a_case_and_does_not_tell(tmp_path):
+    out = tmp_path / "case"
+    args = ["twin", str(COGIRO), "--hide", "3", "--effect", "tracker_scale", "--out", str(out)]
+    run = CliRunner().invoke(main, args)
+    assert run.exit_code == 0, run.output
+    assert "144 rows of demobot_cogiro in 7 runs" in run.output
+    assert "tracker_scale" not in run.output and "factor" not in run.output
+    opened = CliRunner().invoke(main, ["twin", "--open", str(out)])
+    assert opened.exit_code == 0 and "tracker_scale" in opened.output
+    as_json = CliRunner().invoke(main, ["twin", "--open", str(out / NAME), "--json"])
+    assert json.loads(as_json.output)["hidden"] == ["tracker_scale"]
+
+
+def test_the_command_s_json_is_all_it_prints(tmp_path):
+    args = ["twin", str(COGIRO), "--hide", "1", "--effects", "0", "--out", str(tmp_path), "--json"]
+    run = CliRunner().invoke(main, args)
+    assert run.exit_code == 0
+    result = json.loads(run.output)
+    assert result["rows"] == 144 and "hidden" not in result and "values" not in result
+    assert unseal(tmp_path)["hidden"] == ["null"]
+
+
+@pytest.mark.parametrize(
+    ("args", "text"),
+    [
+        ([], "expected ROBOT.xml and --hide SEED, or --open FILE"),
+        (["ROBOT"], "expected ROBOT.xml and --hide SEED"),
+        (["ROBOT", "--hide", "1", "--effect", "pully_radius"], "nearest first: pulley_radius"),
+        (["ROBOT", "--hide", "1", "--effect", "stiffness", "--effects", "1"], "leave out --effect"),
+        (["missing.xml", "--hide", "1"], "missing.xml"),
+        (["--open", "ROBOT"], "is no sealed answer; expected a file answer.sealed"),
+        (["--open", "nowhere"], "cannot be read"),
+    ],
+)
+def test_bad_usage_is_one_line_and_status_2(tmp_path, args, text):
+    args = [str(COGIRO) if arg == "ROBOT" else arg for arg in args]
+    run = CliRunner().invoke(main, ["twin", *args, "--out", str(tmp_path / "out")])
+    assert run.exit_code == 2
+    assert text in run.output and run.output.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_seal_comes_off_again_and_only_a_seal_does(tmp_path):
+    file = tmp_path / NAME
+    file.write_text(seal({"hidden": ["null"]}), encoding="ascii")
+    assert unseal(file) == {"hidden": ["null"]}
+    file.write_text(seal({"hidden": ["null"]})[:-9], encoding="ascii")
+    with pytest.raises(InputFileError, match="is no sealed answer"):
+        unseal(file)
+
+
+def test_effects_that_cannot_be_hidden_are_refused():
+    with pytest.raises(InputError, match="no effect 'gravity'; known, nearest first: gravity_tilt"):
+        make_twin(COGIRO, 1, effects=("gravity",))
+    with pytest.raises(CrosscheckError, match="expected each at most once"):
+        make_twin(COGIRO, 1, effects=("stiffness", "stiffness"))
+    with pytest.raises(CrosscheckError, match="99 effects: expected at most"):
+        make_twin(COGIRO, 1, n_effects=99)

@@ -1,0 +1,237 @@
+"""Robots whose effects MuJoCo has by its own means, against seecr's physics of the same effects."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from effect_cases import experiment_of
+
+import crosscheck.twin
+from crosscheck.errors import CrosscheckError
+from crosscheck.settle.relax import come_to_rest
+from crosscheck.settle.settling import SettleStatus
+from crosscheck.suite.effect_cases import ROBOTS, effect_cases, run_effect_case
+from crosscheck.twin.chain import hang
+from crosscheck.twin.descent import descend
+from crosscheck.twin.lengths import paid_out, way_of
+from crosscheck.twin.measure import measure
+from crosscheck.twin.robot import TRUE_EFFECTS, true_robot
+from crosscheck.twin.springs import Springs
+from crosscheck.twin.world import World
+from seecr.effects import BUILT_IN, Effect, effect_named, parameter
+from seecr.experiment import Experiment
+from seecr.mjcf import load_robot
+from seecr.pose import pose_difference, quat_from_rotvec
+from seecr.setup import Commands
+from seecr.shipped import model_path
+
+CASES = {case.name: case for case in effect_cases(ROBOTS)}
+# What these move no reading of, by their nature.
+UNMOVED = {"tension_scale"}
+
+
+def robot_named(name="demobot_parallel"):
+    return load_robot(model_path(name))
+
+
+def commands_of(robot, x):
+    poses = np.tile(robot.reference_pose, (len(x), 1))
+    poses[:, 0] += x
+    return Commands(pose=poses)
+
+
+def effect(name, **values):
+    return effect_named(name)(**values)
+
+
+def distance(a, b):
+    return np.linalg.norm(pose_difference(a, b)[:, :3], axis=1)
+
+
+def test_every_built_in_effect_has_a_truth():
+    assert {one.name for one in BUILT_IN} == set(TRUE_EFFECTS)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_seecr_and_mujoco_agree_on_an_effect(name):
+    found = run_effect_case(CASES[name])
+    assert found.compared.all(), "not every pose came to rest in both"
+    position, orientation, tension = found.worst
+    # both are exact: what is left is rounding, and for chains what Richardson leaves
+    assert position < 1e-8 and orientation < 1e-7 and tension < 1e-6
+    if found.case.hidden.name not in UNMOVED and "planar" not in name:
+        # the agreement means something: the effect moves what is compared by far more
+        assert found.moved_m > 1e-6
+
+
+def test_an_effect_a_hundredth_off_does_not_agree():
+    case = CASES["demobot_cogiro-pulley_radius"]
+    truth = measure(case.robot, case.commands, [case.hidden.times(1.01).effect()])
+    ours = Experiment(case.robot, case.commands).predict([case.hidden.effect()])
+    assert np.max(distance(truth.pose, ours.poses)) > 1e-6
+
+
+@pytest.mark.parametrize("weight", [0.02, 0.2])
+def test_chains_come_to_the_catenary_with_the_square_of_the_segments(weight):
+    robot = robot_named()
+    commands = commands_of(robot, [-0.2, 0.03])
+    effects = [effect("cable_weight", weight=weight)]
+    exact = Experiment(robot, commands).predict(effects)
+    errors = []
+    for segments in (4, 8, 16):
+        truth = measure(robot, commands, effects, segments=(segments,))
+        errors.append(np.max(distance(truth.pose, exact.poses)))
+    assert 3.7 < errors[0] / errors[1] < 4.4
+    assert 3.8 < errors[1] / errors[2] < 4.3
+    extrapolated = measure(robot, commands, effects, segments=(8, 16))
+    assert np.max(distance(extrapolated.pose, exact.poses)) < 0.02 * errors[2]
+    # a cable that the weightless robot has slack hangs, and carries its own weight
+    assert np.all(extrapolated.tensions > 0.0)
+
+
+def test_mujoco_moves_a_chain_to_where_newton_says_it_rests():
+    robot = robot_named("planar_two_cable")
+    true = true_robot(robot, [effect("cable_weight", weight=2.0)])
+    world = World(true, 3)
+    world.set_springs(Springs.plain(robot.rest_lengths, true))
+    world.place(robot.reference_pose)
+    assert descend(world).at_rest
+    rest = world.pose()
+    world.data.qpos[:] += 1e-3 * np.sin(np.arange(len(world.data.qpos)))
+    world.update()
+    assert come_to_rest(world, 1e-6, 400_000).status is SettleStatus.SETTLED
+    assert np.linalg.norm(pose_difference(world.pose(), rest)[:3]) < 1e-5
+
+
+def test_a_hanging_chain_balances_at_every_mass():
+    start, end = np.array([[0.0, 0.0, 1.0]]), np.array([[0.4, 0.0, 0.7]])
+    weight, rest, n = 0.5, 0.8, 7
+    up = np.array([0.0, 0.0, weight])
+    nodes = hang(start, end, np.array([rest]), np.array([300.0]), up, n)[0]
+    points = np.concatenate([start, nodes, end])
+    pieces = np.diff(points, axis=0)
+    lengths = np.linalg.norm(pieces, axis=1, keepdims=True)
+    pull = 300.0 * (lengths * n / rest - 1.0) * pieces / lengths
+    load = np.array([0.0, 0.0, -weight * rest / n])
+    np.testing.assert_allclose(pull[1:] - pull[:-1] + load, 0.0, atol=1e-10)
+
+
+@pytest.mark.parametrize("x", [0.05, 0.3, 1.0])
+@pytest.mark.parametrize("z", [-0.9, -0.2, 0.05, 0.4])
+def test_cables_over_sheaves_have_the_contract_s_length(x, z):
+    robot = robot_named()
+    r = 0.01
+    true = true_robot(robot, [effect("pulley_radius", radius=r)])
+    towards = np.array([0.6, 0.8, 0.0])
+    true.anchor_points = true.exit_points + x * towards + np.array([0.0, 0.0, z])
+    true.anchor_points -= robot.reference_pose[:3]
+    world = World(true)
+    world.place(robot.reference_pose)
+    assert world.wraps
+    # seen from the sheave's centre: the anchor, the tangent to it, the wrap from the entry on
+    far = np.hypot(x - r, z)
+    free = np.sqrt(far**2 - r**2)
+    psi = np.arctan2(z, x - r) + np.arccos(r / far)
+    np.testing.assert_allclose(world.cable_lengths(), free + r * (np.pi - psi), rtol=1e-12)
+
+
+def test_a_platform_that_is_free_to_move_is_not_at_rest():
+    # two cables stay taut, and the platform turns about the line through their anchor points
+    robot = robot_named()
+    pose = np.array([0.5378879997614161, 0.17352922227061454, 0.14737443955367602, 1, 0, 0, 0])
+    turn = quat_from_rotvec(np.array([0.0535, -0.0662, -0.0308]))
+    pose[3:] = turn
+    truth = measure(
+        robot, Commands(pose=pose[None]), [effect("pulley_radius", radius=0.01737460411527584)]
+    )
+    taut = np.sum(truth.tensions > 0.0)
+    assert taut == 2 and truth.free[0] and not truth.at_rest[0]
+
+
+def test_hysteresis_leaves_a_loop_and_forgets_it_between_runs():
+    robot = dataclasses.replace(robot_named(), ea=np.full(8, 300.0))
+    forth = np.linspace(-0.2, 0.2, 5)
+    x = np.concatenate([forth, forth[::-1], forth])
+    run = np.repeat([0, 0, 1], 5)
+    commands = Commands(pose=commands_of(robot, x).pose, run=run)
+    truth = measure(robot, commands, [effect("hysteresis", amplitude=0.05, stretch=3e-4)])
+    there, back, again = truth.pose.reshape(3, 5, 7)
+    apart = distance(there[1:-1], back[::-1][1:-1])
+    assert np.all(apart > 5e-5)
+    np.testing.assert_allclose(again, there, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind, seed", [
+    ("demobot_cogiro", 0), ("jointed", 1), ("jointed", 2), ("lengths", 0),
+])  # fmt: skip
+def test_winches_that_turn_round_between_points_take_up_their_play_there(kind, seed):
+    experiment = experiment_of(kind, seed=seed, rows=8)
+    robot, commands = experiment.robot, experiment.commands
+    backlash = [effect("backlash", gap=2e-3)]
+    true = true_robot(robot, backlash)
+    found = []
+    for waypoints in ((6, 2), (7, 3)):
+        way = way_of(true, commands, waypoints)
+        found.append(paid_out(true, way, None)[way.is_row])
+    # what 64 parts of a way leave: two ways of looking for the same extrema
+    np.testing.assert_allclose(found[0], found[1], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(
+        found[0], experiment.setup(backlash).rest_lengths(), rtol=0, atol=1e-9
+    )
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_robot_on_joints_is_led_straight_along_them(seed):
+    experiment = experiment_of("jointed", seed=seed, rows=4)
+    robot, commands = experiment.robot, experiment.commands
+    way = way_of(true_robot(robot, []), commands, (6, 2))
+    np.testing.assert_allclose(way.pose, experiment.path.commands.pose, atol=1e-12)
+
+
+def test_creep_under_a_held_pose_goes_as_kelvin_and_voigt_say():
+    robot = robot_named("planar_two_cable")
+    n, step, time, amount = 12, 20.0, 60.0, 0.3
+    commands = commands_of(robot, np.zeros(n))
+    commands = Commands(pose=commands.pose, run=np.zeros(n), time=step * np.arange(n))
+    effects = [effect("creep", amount=amount, time=time)]
+    truth = measure(robot, commands, effects)
+    stretched = robot.nominal_lengths(truth.pose) - truth.rest_lengths
+    elastic = truth.tensions * truth.rest_lengths / robot.ea
+    expected = amount * elastic[0] * (1.0 - np.exp(-step * np.arange(n) / time))[:, None]
+    np.testing.assert_allclose(stretched - elastic, expected, rtol=1e-3, atol=1e-12)
+
+
+@dataclass(frozen=True, eq=False)
+class Moonlight(Effect):
+    name: ClassVar[str] = "moonlight"
+
+    amount: float = parameter("", 1.0)
+
+
+def test_an_effect_without_a_truth_is_refused():
+    with pytest.raises(CrosscheckError, match="moonlight: no truth with MuJoCo; expected one of"):
+        true_robot(robot_named(), [Moonlight()])
+
+
+def test_the_truth_shares_no_physics_with_seecr():
+    """Only names and parameters of effects, the robot's numbers, commands and pose algebra."""
+    allowed = {"seecr.effects", "seecr.robot", "seecr.setup", "seecr.pose"}
+    folder = Path(crosscheck.twin.__file__).parent
+    for file in sorted(folder.glob("*.py")):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                assert not any(alias.name.startswith("seecr") for alias in node.names), file
+            if not isinstance(node, ast.ImportFrom) or not (node.module or "").startswith("seecr"):
+                continue
+            assert node.module in allowed, file
+            names = {alias.name for alias in node.names}
+            assert node.module != "seecr.setup" or names == {"Commands"}, file
+            assert node.module != "seecr.effects" or names == {"Effect"}, file
+    text = "\n".join(file.read_text(encoding="utf-8") for file in folder.glob("*.py"))
+    assert "edit_setup" not in text and "edit_readings" not in text

@@ -1,0 +1,371 @@
+"""The law of one cable: straight, over a pulley, hanging; each against an independent truth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.optimize import brentq, root
+
+from seecr.compiled import law
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass
+class Pull:
+    """What the compiled law says of one cable."""
+
+    force: np.ndarray
+    stiffness: np.ndarray
+    slope: np.ndarray
+    state: np.ndarray
+    guess: np.ndarray
+    ok: bool
+
+    @property
+    def tension(self) -> float:
+        return float(self.state[law.TENSION])
+
+
+def cable(**columns: Any) -> np.ndarray:
+    """A row of the table: E S = 1000 N, 2 m, from the origin of the base frame."""
+    row = np.zeros(law.N_COLUMNS)
+    row[law.EA], row[law.REST] = 1000.0, 2.0
+    row[law.HYSTERESIS_STRETCH] = 1.0
+    for name, value in columns.items():
+        row[getattr(law, name)] = value
+    return row
+
+
+def pull(row: np.ndarray, anchor: Any, move: Any = (0.0, 0.0, 0.0)) -> Pull:
+    """The law with the anchor at ``anchor`` + ``move``, the former being the command."""
+    row, start = row.copy(), np.array(anchor, float)
+    row[law.GAP] = law.geometric_length(row, start, UP) - row[law.REST]
+    force, slope, guess = np.zeros(3), np.zeros(3), np.zeros(3)
+    stiffness, state, work = np.zeros((3, 3)), np.zeros(law.N_STATE), np.zeros((28, 3))
+    ok = law.cable_pull(
+        row, start, np.array(move, float), UP, guess, work, force, stiffness, slope, state
+    )
+    return Pull(force, stiffness, slope, state, guess, ok)
+
+
+def in_direction(degrees_below: float, length: float, azimuth: float = 0.7) -> np.ndarray:
+    below = np.deg2rad(degrees_below)
+    flat = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+    return length * (np.cos(below) * flat - np.sin(below) * UP)
+
+
+DIRECTIONS = (-40.0, 0.0, 20.0, 60.0, 89.0)
+KINDS: dict[str, dict[str, float]] = {
+    "straight": {},
+    "pulley": {"RADIUS": 0.03},
+    "hanging": {"WEIGHT": 0.4},
+    "hanging-pulley": {"WEIGHT": 0.4, "RADIUS": 0.03},
+    "nonlinear": {"QUADRATIC": 3.0, "CUBIC": 40.0},
+    "series": {"WINCH_SIDE": 1.5, "COMPLIANCE": 2e-4, "CREEP": 1e-3, "CREEP_RATE": 1e-6},
+    "hysteresis": {"HYSTERESIS": 1.5, "HYSTERESIS_STRETCH": 0.004},
+    "friction": {"FRICTION": 0.2, "STUCK": 4.0, "WINCH_SIDE": 1.5},
+    "hanging-all": {
+        "WEIGHT": 0.4, "QUADRATIC": 3.0, "WINCH_SIDE": 1.5, "COMPLIANCE": 2e-4, "RADIUS": 0.03,
+        "CREEP_RATE": 1e-6,
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("below", DIRECTIONS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_stiffness_and_slope_against_differences(kind: str, below: float) -> None:
+    row = cable(**KINDS[kind])
+    for stretch in (0.01, 1e-5, -0.05):  # taut, barely, slack
+        anchor = in_direction(below, row[law.REST] * (1 + row[law.CREEP]) + stretch)
+        here = pull(row, anchor)
+        assert here.ok
+        size = 1e-7
+        for k in range(3):
+            step = size * np.eye(3)[k]
+            ahead, behind = pull(row, anchor, step), pull(row, anchor, -step)
+            top = 1e-6 * (np.abs(here.stiffness).max() + 1.0)
+            stiffness = -(ahead.force - behind.force) / (2 * size)
+            assert stiffness == pytest.approx(here.stiffness[:, k], rel=1e-5, abs=20 * top)
+            slope = (ahead.tension - behind.tension) / (2 * size)
+            assert slope == pytest.approx(here.slope[k], rel=1e-5, abs=20 * top)
+
+
+@pytest.mark.parametrize("kind", ["straight", "pulley", "series"])
+def test_force_is_the_gradient_of_the_energy(kind: str) -> None:
+    row = cable(**KINDS[kind])
+    anchor = in_direction(25.0, 2.03)
+    here = pull(row, anchor)
+    for k in range(3):
+        step = 1e-5 * np.eye(3)[k]
+        energies = [pull(row, anchor, s).state[law.ENERGY] for s in (step, -step)]
+        assert -(energies[0] - energies[1]) / 2e-5 == pytest.approx(here.force[k], rel=1e-7)
+
+
+# --- straight ----------------------------------------------------------------------------------
+
+
+def test_tension_is_equation_10_and_never_pushes() -> None:
+    taut, slack = pull(cable(), [0, 0, -2.02]), pull(cable(), [0, 0, -1.9])
+    assert taut.tension == pytest.approx(1000 * 0.02 / 2.0, rel=1e-13)
+    assert taut.force == pytest.approx([0, 0, 10.0], rel=1e-13)
+    assert taut.stiffness == pytest.approx(np.diag([10 / 2.02, 10 / 2.02, 500.0]), rel=1e-12)
+    assert slack.tension == 0.0 and not np.any(slack.force) and not np.any(slack.stiffness)
+    assert (taut.state[law.SLACK], slack.state[law.SLACK]) == (0.0, 1.0)
+
+
+def test_a_stiff_cable_keeps_the_digits_of_a_tiny_stretch() -> None:
+    row = cable(EA=1e7)
+    anchor = in_direction(30.0, 2.0)
+    away = anchor / np.linalg.norm(anchor)
+    for stretch in (1e-8, 1e-11, 1e-14):
+        taut = pull(row, anchor, away * stretch)
+        first = pull(row, anchor).tension
+        assert taut.tension - first == pytest.approx(1e7 * stretch / 2.0, rel=1e-5, abs=1e-9)
+
+
+def test_what_is_in_series_adds_its_stretch() -> None:
+    row = cable(**KINDS["series"])
+    for tension in (0.5, 20.0):
+        stretch = 2.0 * (tension / 1000 + 1e-3 + 1e-6 * tension)
+        stretch += 1.5 / 1000 * tension + 2e-4 * tension
+        assert pull(row, [2.0 + stretch, 0, 0]).tension == pytest.approx(tension, rel=1e-11)
+
+
+def test_a_curved_law_is_met_at_its_strain() -> None:
+    for sign in (1.0, -1.0):
+        row = cable(QUADRATIC=3.0 * sign, CUBIC=40.0, COMPLIANCE=2e-4)
+        for strain in (1e-6, 1e-3, 0.05):
+            tension = 1000 * (strain + 3 * sign * strain**2 + 40 * strain**3)
+            found = pull(row, [2.0 * (1 + strain) + 2e-4 * tension, 0, 0])
+            assert found.tension == pytest.approx(tension, rel=1e-9)
+            assert found.state[law.STRAIN] == pytest.approx(strain, rel=1e-9)
+
+
+# --- pulley (contracts: a swivelling pulley) ---------------------------------------------------
+
+
+def brute_pulley(across: float, rise: float, r: float) -> tuple[float, np.ndarray]:
+    """Length and leaving direction by search for the point of the rim where a tangent hits B."""
+    centre, anchor = np.array([r, 0.0]), np.array([across, rise])
+
+    def leaves(psi: float) -> np.ndarray:
+        return centre + r * np.array([np.cos(psi), np.sin(psi)])
+
+    def misses(psi: float) -> float:
+        """How far B lies beside the tangent at psi."""
+        return float((anchor - leaves(psi)) @ np.array([np.cos(psi), np.sin(psi)]))
+
+    found = []
+    grid = np.linspace(-np.pi / 2, np.pi, 4001)
+    values = [misses(psi) for psi in grid]
+    for a, b, fa, fb in zip(grid[:-1], grid[1:], values[:-1], values[1:], strict=True):
+        if fa * fb < 0:
+            psi = brentq(misses, a, b, xtol=1e-15)
+            tangent = np.array([np.sin(psi), -np.cos(psi)])  # onwards over the top
+            free = float((anchor - leaves(psi)) @ tangent)
+            if free > 0:
+                found.append((free + r * (np.pi - psi), tangent))
+    assert len(found) == 1
+    return found[0]
+
+
+@pytest.mark.parametrize("r", [0.01, 0.05, 0.2])
+@pytest.mark.parametrize("place", [(1.0, -0.5), (0.9, 0.3), (0.5, -2.0), (2.0, 0.0), (0.41, -1.0)])
+def test_pulley_by_search(place: tuple[float, float], r: float) -> None:
+    length, direction = brute_pulley(*place, r)
+    whole, free, tx, tz = law.pulley_geometry(*place, r)
+    assert whole == pytest.approx(length, rel=1e-12)
+    assert [tx, tz] == pytest.approx(direction, abs=1e-12)
+    assert free == pytest.approx(np.sqrt((place[0] - r) ** 2 + place[1] ** 2 - r**2), rel=1e-12)
+
+
+def test_pulley_of_no_radius_is_no_pulley() -> None:
+    for place in ((1.0, -0.5), (0.5, 0.7)):
+        assert law.pulley_geometry(*place, 0.0)[0] == pytest.approx(np.hypot(*place), rel=1e-15)
+    differences = [law.pulley_geometry(1.0, -0.5, r)[0] - np.hypot(1, 0.5) for r in (1e-3, 1e-5)]
+    assert differences[0] / differences[1] == pytest.approx(100, rel=0.01)
+
+
+def test_pulley_swivels_to_face_its_anchor() -> None:
+    row = cable(RADIUS=0.05, EXIT=0.2)
+    for azimuth in (0.0, 1.0, 2.5, -2.0):
+        anchor = np.array([0.2, 0, 0]) + in_direction(30.0, 2.1, azimuth)
+        found = pull(row, anchor)
+        turned = pull(row, np.array([0.2, 0, 0]) + in_direction(30.0, 2.1, 0.0))
+        assert found.tension == pytest.approx(turned.tension, rel=1e-12)
+        sideways = np.array([-np.sin(azimuth), np.cos(azimuth), 0])
+        assert found.force @ sideways == pytest.approx(0, abs=1e-10)
+        length, direction = brute_pulley(2.1 * np.cos(np.pi / 6), -1.05, 0.05)
+        assert found.tension == pytest.approx(500 * (length - 2.0), rel=1e-10)
+        assert found.force[2] == pytest.approx(-found.tension * direction[1], rel=1e-10)
+
+
+# --- catenary ----------------------------------------------------------------------------------
+
+
+def irvine(h: float, v: float, w: float, length: float, ea: float) -> tuple[float, float]:
+    """Span of an elastic catenary by quadrature along it, from the lower end."""
+
+    def part(s: float, horizontal: bool) -> float:
+        tension = np.hypot(h, v + w * s)
+        return float((h if horizontal else v + w * s) * (1 / tension + 1 / ea))
+
+    spans = [quad(part, 0, length, args=(flag,), epsabs=1e-12, epsrel=1e-11, limit=200,
+                  points=[min(max(-v / w, 0), length)])[0] for flag in (True, False)]  # fmt: skip
+    return spans[0], spans[1]
+
+
+HANGING = [(50.0, 3.0), (5.0, 0.2), (5.0, -0.9), (0.5, -0.3), (0.05, -0.4), (2.0, -3.0)]
+
+
+@pytest.mark.parametrize(("h", "v"), HANGING)
+def test_span_of_a_catenary_by_quadrature(h: float, v: float) -> None:
+    x, z, xh, xv, zv, xl, zl = law.catenary_span(h, v, 0.4, 2.0, 1000.0)
+    assert (x, z) == pytest.approx(irvine(h, v, 0.4, 2.0, 1000.0), rel=1e-10, abs=1e-11)
+    at = np.array([h, v, 0.4, 2.0])
+    for k, column in ((0, (xh, xv)), (1, (xv, zv)), (3, (xl, zl))):
+        step = 1e-6 * np.eye(4)[k]
+        ahead, behind = (law.catenary_span(*there, 1000.0) for there in (at + step, at - step))
+        slope = (np.array(ahead[:2]) - behind[:2]) / 2e-6
+        assert slope == pytest.approx(column, rel=1e-6, abs=1e-8 * max(1.0, abs(xh)))
+
+
+@pytest.mark.parametrize("chord", [2.05, 2.0001, 1.99, 1.7, 0.8], ids=lambda c: f"chord{c}")
+@pytest.mark.parametrize("below", [-50.0, 0.0, 35.0, 80.0])
+def test_catenary_between_two_points_by_quadrature(below: float, chord: float) -> None:
+    """Taut, near slack and slack: the pull at both ends, by a root search on the quadrature."""
+    row = cable(WEIGHT=0.4)
+    anchor = in_direction(below, chord)
+    found = pull(row, anchor)
+    assert found.ok
+    across, rise = chord * np.cos(np.deg2rad(below)), chord * np.sin(np.deg2rad(below))
+    start = np.array([max(np.hypot(*found.force[:2]), 1e-3), found.force[2] * -1.0]) * [1.2, 0.9]
+
+    def misses(hv: np.ndarray) -> list[float]:
+        x, z = irvine(abs(hv[0]), -hv[1] * -1.0, 0.4, 2.0, 1000.0)
+        return [x - across, z - rise]
+
+    truth = root(misses, [start[0], -start[1]], method="hybr", tol=1e-12)
+    assert truth.success or np.abs(truth.fun).max() < 1e-10
+    h, v = abs(truth.x[0]), truth.x[1]
+    assert np.hypot(*found.force[:2]) == pytest.approx(h, rel=1e-6)
+    assert found.force[2] == pytest.approx(v, rel=1e-6, abs=1e-8)
+    assert found.tension == pytest.approx(np.hypot(h, v + 0.4 * 2.0), rel=1e-6)
+    assert found.state[law.SLACK] == float(chord < 2.0)
+
+
+def test_the_weight_of_a_hanging_cable_is_shared_by_its_ends() -> None:
+    found = pull(cable(WEIGHT=0.4), in_direction(0.0, 1.5))
+    assert found.force[2] == pytest.approx(-0.4, rel=1e-9)  # half of 0.8 N each
+    straight_down = pull(cable(WEIGHT=0.4), [0, 0, -1.0])
+    assert straight_down.ok
+    # a loop: of 2 m, 1.5 m hang from the exit point and 0.5 m from the anchor, but for stretch
+    assert straight_down.tension == pytest.approx(0.4 * 1.5, rel=1e-3)
+    assert straight_down.force[2] == pytest.approx(-0.4 * 0.5, rel=1e-3)
+
+
+SLOPES = [(b, r) for r in (0.0, 0.05) for b in (-40.0, 0.0, 30.0, 85.0)]
+
+
+@pytest.mark.parametrize(("below", "radius"), SLOPES)
+def test_no_weight_is_the_straight_law(below: float, radius: float) -> None:
+    anchor = in_direction(below, 2.05)
+    straight = pull(cable(RADIUS=radius), anchor)
+    differences = []
+    for weight in (1e-3, 1e-6, 1e-9, 1e-13):
+        light = pull(cable(WEIGHT=weight, RADIUS=radius), anchor)
+        assert light.ok
+        differences.append(float(np.linalg.norm(light.force - straight.force)))
+        if radius == 0.0:
+            near = pytest.approx(straight.stiffness, rel=1e-3, abs=10 * weight + 1e-5)
+            assert light.stiffness == near
+    # of first order in the weight: the two cables share it
+    assert differences[0] == pytest.approx(1e3 * differences[1], rel=0.05)
+    assert differences[2] < 1e-8 and differences[3] < 1e-8
+
+
+def test_a_hanging_cable_pulls_more_than_a_weightless_one_and_less_when_longer() -> None:
+    anchor = in_direction(20.0, 2.0)
+    pulls = [pull(cable(WEIGHT=0.4, REST=rest), anchor).tension for rest in (1.98, 2.0, 2.02, 2.2)]
+    assert np.all(np.diff(pulls) < 0)
+    assert pulls[1] > pull(cable(), anchor).tension
+
+
+# --- hysteresis and friction -------------------------------------------------------------------
+
+
+def follow(strains: np.ndarray, amplitude: float, turning: float) -> np.ndarray:
+    """Hysteretic tension along a path of strains, carried from state to state."""
+    row = cable(HYSTERESIS=amplitude, HYSTERESIS_STRETCH=turning)
+    z = []
+    for strain in strains:
+        z.append(law.dahl(row, strain)[0])
+        row[law.STRETCH_BEFORE], row[law.HYSTERESIS_BEFORE] = strain * row[law.REST], z[-1]
+    return np.array(z)
+
+
+def test_dahl_in_one_step_or_in_many() -> None:
+    many = follow(np.linspace(0, 0.01, 1001), 1.5, 0.008)[-1]
+    once = follow(np.array([0.0, 0.01]), 1.5, 0.008)[-1]
+    assert many == pytest.approx(once, rel=1e-12)
+    assert once == pytest.approx(1.5 * (1 - np.exp(-0.02 / 0.008)), rel=1e-12)
+
+
+def test_dahl_against_its_differential_equation() -> None:
+    """dz/de = (Z - z sign(de)) / e_c, integrated with small steps."""
+    stretch = 0.02 * np.sin(np.linspace(0, 7, 200_001))
+    z = 0.0
+    for change in np.diff(stretch):
+        z += (1.5 - z * np.sign(change)) / 0.008 * change
+    assert follow(stretch[::10] / 2.0, 1.5, 0.008)[-1] == pytest.approx(z, abs=1e-3)
+
+
+def test_dahl_loop_area_in_closed_form() -> None:
+    """Work lost in a settled cycle of +-a: 4 Z (a - e_c tanh(a/e_c)) [J]."""
+    amplitude, turning, a = 1.5, 0.008, 0.01
+    cycle = np.concatenate([np.linspace(-a, a, 2001), np.linspace(a, -a, 2001)[1:]])
+    stretch = np.concatenate([np.linspace(0, -a, 1001), np.tile(cycle, 6)])
+    z = follow(stretch / 2.0, amplitude, turning)
+    last = slice(-len(cycle), None)
+    area = np.trapezoid(z[last], stretch[last])
+    assert area == pytest.approx(4 * amplitude * (a - turning * np.tanh(a / turning)), rel=1e-5)
+    assert z[last].max() == pytest.approx(amplitude * np.tanh(a / turning), rel=1e-6)
+
+
+def test_no_amplitude_no_hysteresis() -> None:
+    assert law.dahl(cable(STRETCH_BEFORE=0.1, HYSTERESIS_BEFORE=3.0), 0.01) == (0.0, 0.0)
+
+
+def test_capstan_band() -> None:
+    """Euler-Eytelwein: between T e^-mu and T e^mu the winch side keeps what it had."""
+    row = cable(FRICTION=0.2, STUCK=10.0)
+    grip = np.exp(0.2)
+    for tension, behind, slope in (
+        (10.0, 10.0, 0.0),
+        (10.0 * grip * 0.999, 10.0, 0.0),
+        (10.0 / grip * 1.001, 10.0, 0.0),
+        (20.0, 20.0 / grip, 1 / grip),
+        (5.0, 5.0 * grip, grip),
+        (0.0, 0.0, grip),
+    ):
+        assert law.winch_tension(row, tension) == pytest.approx((behind, slope), rel=1e-14)
+    assert law.winch_tension(cable(STUCK=10.0), 3.0) == (3.0, 1.0)
+
+
+def test_friction_holds_the_stretch_behind_the_exit_point() -> None:
+    """While it sticks, the cable behind keeps its stretch and the free part works alone."""
+    row = cable(FRICTION=0.2, STUCK=10.0, WINCH_SIDE=1.5)
+    behind = 1.5 * 10.0 / 1000
+    for tension in (9.0, 11.0):
+        found = pull(row, [2.0 * (1 + tension / 1000) + behind, 0, 0])
+        assert found.tension == pytest.approx(tension, rel=1e-9)
+        assert found.state[law.WINCH_TENSION] == 10.0
+        assert found.slope[0] == pytest.approx(1000 / 2.0, rel=1e-6)
+    slipping = pull(row, [2.0 * 1.03 + 1.5 * 30 * np.exp(-0.2) / 1000, 0, 0])
+    assert slipping.tension == pytest.approx(30.0, rel=1e-9)
+    assert slipping.state[law.WINCH_TENSION] == pytest.approx(30 * np.exp(-0.2), rel=1e-9)

@@ -1,0 +1,133 @@
+"""Predictions: warm starts, unsolved rows and readings."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from effect_cases import KINDS, experiment_of, random_effect
+
+from seecr import experiment as experiment_module
+from seecr import statics
+from seecr.compiled import descent as kernel
+from seecr.effects import effect_named
+from seecr.equilibrium import Status, solve
+from seecr.errors import InputError
+from seecr.experiment import Experiment
+from seecr.history import walk
+from seecr.robot import Joint, Robot
+from seecr.sensitivity import readings_difference
+from seecr.setup import Commands, plain_setup
+
+FAMILIES = [
+    ("stiffness", "pulley_radius"),
+    ("cable_weight", "tracker_frame"),
+    ("anchor_point_error", "external_wrench", "drum_gain"),
+]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_without_effects_it_is_the_papers_robot(kind: str) -> None:
+    experiment = experiment_of(kind)
+    found = experiment.predict()
+    commands = experiment.commands
+    own = solve(experiment.robot, commands.pose, rest_lengths=commands.lengths)
+    assert np.all(found.solved) and not found.has_history
+    assert np.array_equal(found.readings.position, own.pose[:, :3])
+    assert np.array_equal(found.readings.tensions, own.tensions)
+    assert np.array_equal(found.solution().pose, own.pose)
+
+
+@pytest.mark.parametrize("kind", ["demobot_cogiro", "demobot_parallel", "jointed"])
+@pytest.mark.parametrize("names", FAMILIES)
+def test_a_warm_start_ends_where_a_cold_one_does(kind: str, names: tuple[str, ...]) -> None:
+    experiment = experiment_of(kind, seed=5)
+    effects = [random_effect(experiment, name) for name in names]
+    near = experiment.predict([random_effect(experiment, name, part=0.2) for name in names])
+    cold, warm = experiment.predict(effects), experiment.predict(effects, near)
+    assert np.all(cold.solved) and np.all(warm.solved)
+    assert np.abs(readings_difference(warm.readings, cold.readings)).max() < 1e-9
+    assert warm.found.count.sum() < cold.found.count.sum()
+
+
+def test_a_warm_start_from_a_lost_row_starts_that_row_afresh() -> None:
+    experiment = experiment_of("demobot_cogiro")
+    near = experiment.predict()
+    near.found.deviation[2, :3] += 50.0
+    again = experiment.predict([], near)
+    assert np.all(again.solved)
+    cold = experiment.predict()
+    assert np.abs(readings_difference(again.readings, cold.readings)).max() < 1e-9
+
+
+def test_a_prediction_with_history_is_no_start_for_one_without() -> None:
+    experiment = experiment_of("demobot_cogiro")
+    walked = experiment.predict([random_effect(experiment, "backlash")])
+    assert walked.has_history
+    cold, warm = experiment.predict(), experiment.predict([], walked)
+    assert np.array_equal(warm.readings.position, cold.readings.position)
+
+
+def weightless_lift() -> Robot:
+    """A platform between two cables, one up and one down, and no gravity."""
+    return Robot(
+        "lift", np.array([[0.0, 0, 1], [0, 0, -1]]), np.zeros((2, 3)), np.full(2, 1000.0),
+        np.full(2, 0.95), 2.0, gravity=np.zeros(3),
+        joints=(Joint("slide", "z", np.array([0.0, 0, 1]), np.zeros(3)),),
+    )  # fmt: skip
+
+
+def test_rows_that_are_not_solved_are_flagged_and_the_others_stand() -> None:
+    robot = weightless_lift()
+    lengths = np.array([[0.95, 0.95], [1.5, 1.5], [0.9, 1.0]])  # the second: both slack
+    experiment = Experiment(
+        robot, Commands(np.tile(robot.reference_pose, (3, 1)), lengths=lengths)
+    )
+    found = experiment.predict()
+    assert found.solved.tolist() == [True, False, True]
+    assert found.singular.tolist() == [False, True, False]
+    assert list(found.solution().status) == [Status.CONVERGED, Status.SINGULAR, Status.CONVERGED]
+    # length l pulls with E S (L/l - 1): 0.9 (1 + z) = 1.0 (1 - z) at balance
+    assert found.readings.position[:, 2][[0, 2]] == pytest.approx([0.0, 0.1 / 1.9], abs=1e-12)
+
+
+def test_a_lost_waypoint_spoils_the_rows_after_it_in_its_run_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """What a row remembers is worth nothing if the way to it is not known."""
+    experiment = experiment_of("demobot_cogiro")
+    path = experiment.path
+
+    def lose_one(*args: object) -> statics.Evaluation:
+        found = walk(*args)  # type: ignore[arg-type]
+        found.outcome[path.rows[1] - 1] = kernel.STALLED  # on the way to the second row
+        return found
+
+    monkeypatch.setattr(experiment_module, "walk", lose_one)
+    found = experiment.predict([effect_named("backlash")(gap=1e-3)])
+    assert found.solved.tolist() == [True, False, False, True, True, True]
+
+
+def test_readings_belong_to_the_prediction_alone() -> None:
+    experiment = experiment_of("demobot_cogiro")
+    found = experiment.predict()
+    before = found.poses.copy()
+    found.readings.position[:] = 0.0
+    found.readings.tensions[:] = 0.0
+    assert np.array_equal(found.poses, before) and found.tensions.max() > 0.1
+
+
+def test_a_wrench_of_the_wrong_shape_is_refused() -> None:
+    experiment = experiment_of("demobot_cogiro")
+    with pytest.raises(InputError, match=r"wrench must be \(6,\) or \(6, 6\), got \(3,\)"):
+        plain_setup(experiment.robot, experiment.commands, np.zeros(3))
+
+
+def test_temperature_of_one_run_does_not_reach_another() -> None:
+    experiment = experiment_of("demobot_cogiro")
+    commands = experiment.commands
+    assert commands.temperature is not None
+    warm = effect_named("thermal_expansion")(expansion=1e-4, zero_temperature=20.0)
+    whole = experiment.predict([warm]).readings.position
+    one = Commands(commands.pose[3:], temperature=commands.temperature[3:])
+    part = Experiment(experiment.robot, one).predict([warm]).readings.position
+    assert part == pytest.approx(whole[3:], abs=1e-12)
