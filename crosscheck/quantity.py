@@ -29,9 +29,7 @@ def parse_quantity(label: str, kind: str, text: str) -> float:
         CrosscheckError: no number above zero with a unit of that kind.
     """
     units = UNITS[kind]
-    words = (
-        f"{label}: expected a number with its unit ({', '.join(units)}) such as {EXAMPLE[kind]}"
-    )
+    words = f"{label}: expected a number with its unit ({', '.join(units)}) such as {EXAMPLE[kind]}"
     match = _NUMBER.fullmatch(text)
     if match is None:
         raise CrosscheckError(f"{words}, came {text!r}")

@@ -1,8 +1,8 @@
 """Static equilibrium of cable-driven parallel robots with elastic cables (SEECR).
 
-    import seecr
-    robot = seecr.load_robot("models/demobot_cogiro/demobot_cogiro.xml")
-    solution = seecr.solve(robot, [[0.4, 0.25, 0.1, 1, 0, 0, 0]])
+import seecr
+robot = seecr.load_robot("models/demobot_cogiro/demobot_cogiro.xml")
+solution = seecr.solve(robot, [[0.4, 0.25, 0.1, 1, 0, 0, 0]])
 """
 
 from __future__ import annotations

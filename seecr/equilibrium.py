@@ -246,9 +246,7 @@ def certify(robot: Robot, tables: statics.Tables, found: statics.Evaluation) -> 
         evaluation=check,
         command=tables.poses,
         pose=_blank(statics.platform_poses(tables, moved), lost),
-        deviation=_blank(
-            np.concatenate([moved[:, :3], rotvec_from_quat(turn)], axis=1), lost
-        ),
+        deviation=_blank(np.concatenate([moved[:, :3], rotvec_from_quat(turn)], axis=1), lost),
         tensions=_blank(check.states[..., cable_law.TENSION], lost),
         slack=is_slack(tables, check),
         rest_lengths=tables.cables[..., cable_law.REST],
@@ -313,9 +311,7 @@ def _array(values: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
 def _poses(values: ArrayLike, name: str) -> Array:
     array = np.atleast_2d(_finite(values, name))
     if array.ndim != 2 or array.shape[1] != 7:
-        raise InputError(
-            f"{name} must be (n, 7), x y z qw qx qy qz, got {np.shape(values)}"
-        )
+        raise InputError(f"{name} must be (n, 7), x y z qw qx qy qz, got {np.shape(values)}")
     norm = np.linalg.norm(array[:, 3:], axis=1)
     if np.any(np.abs(norm - 1.0) > 1e-3):
         row = int(np.argmax(np.abs(norm - 1.0)))
@@ -327,5 +323,3 @@ def _poses(values: ArrayLike, name: str) -> Array:
     exact = np.abs(norm - 1.0) > 1e-15
     out[exact, 3:] /= norm[exact, None]
     return out
-
-

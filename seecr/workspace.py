@@ -90,9 +90,7 @@ def slack_zones(solution: Solution) -> list[Zone]:
     ]
     edges = [0, *(i for i in range(1, len(counts)) if counts[i] != counts[i - 1]), len(counts)]
     return [
-        Zone(first, after - 1, counts[first])
-        for first, after in pairwise(edges)
-        if after > first
+        Zone(first, after - 1, counts[first]) for first, after in pairwise(edges) if after > first
     ]
 
 

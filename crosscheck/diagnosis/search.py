@@ -250,9 +250,7 @@ class _Searcher:
             out.append(better)
         return out
 
-    def conclude(
-        self, root: _Node, best: _Node, seen: dict[frozenset[str], _Node]
-    ) -> Search:
+    def conclude(self, root: _Node, best: _Node, seen: dict[frozenset[str], _Node]) -> Search:
         """Fit to the end, look back, and put the effects in order."""
         held = {t.name for t in self.base.terms}
         last = self.settled(best)

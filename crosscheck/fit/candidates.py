@@ -278,6 +278,4 @@ def null_fit(problem: Problem, terms: Sequence[Term], factor: Array, refit: bool
     state = evaluate(problem, ordered(terms), factor)
     p = len(flat(terms, "null"))
     jacobian = np.zeros((len(state.white), p))
-    return Fit(
-        state, jacobian, np.zeros((p, p)), np.zeros(p, dtype=bool), state.valid, "", 0
-    )
+    return Fit(state, jacobian, np.zeros((p, p)), np.zeros(p, dtype=bool), state.valid, "", 0)

@@ -218,9 +218,7 @@ def _step(
         # no parameter moves by more than a few plausible sizes at once
         step *= min(1.0, 5.0 / max(float(np.max(np.abs(step))), 1e-300))
         trial_values = np.clip(values + step * scale, lower, upper)
-        trial = evaluate(
-            problem, with_values(state.terms, trial_values), factor, state
-        )
+        trial = evaluate(problem, with_values(state.terms, trial_values), factor, state)
         after = _objective(trial) if trial.valid else np.inf
         if after < before:
             gain = before - after

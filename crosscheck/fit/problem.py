@@ -217,5 +217,3 @@ def angle_rates(quat_wxyz: Array) -> Array:
     one, nil = np.ones_like(sx), np.zeros_like(sx)
     rows = [[one, sx * sy / cy, -cx * sy / cy], [nil, cx, sx], [nil, -sx / cy, cx / cy]]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-
-

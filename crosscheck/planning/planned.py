@@ -57,9 +57,7 @@ def expected_sigma(robot: Robot, stated: Sigma) -> tuple[Sigma, tuple[str, ...]]
     return sigma, tuple(notes)
 
 
-def planned(
-    robot: Robot, commands: Measurements, sigma: Sigma, kinds: Sequence[str]
-) -> Planned:
+def planned(robot: Robot, commands: Measurements, sigma: Sigma, kinds: Sequence[str]) -> Planned:
     """The problem of commands as they would be measured.
 
     Args:

@@ -72,9 +72,7 @@ def replace_state(final: Fit, state: State) -> Fit:
     return replace(final, state=state)
 
 
-def _split(
-    problem: Problem, final: Fit, name: str, rival: Layout
-) -> tuple[Array, Array]:
+def _split(problem: Problem, final: Fit, name: str, rival: Layout) -> tuple[Array, Array]:
     """Signal of the effect (N,) and columns of all that could imitate it (N, q)."""
     term = Term(rival, rival.start(_first_shape(rival, final)))
     terms = ordered([t for t in final.terms if t.name != rival.name] + [term])
@@ -125,9 +123,7 @@ def _options(problem: Problem, final: Fit) -> list[tuple[str, Problem]]:
 
 
 def _like(problem: Problem, data: Measurements, robot: Robot | None = None) -> Problem:
-    return Problem(
-        robot or problem.robot, data, problem.sigma, np.ones(data.n_rows, dtype=bool)
-    )
+    return Problem(robot or problem.robot, data, problem.sigma, np.ones(data.n_rows, dtype=bool))
 
 
 def _with_tensions(problem: Problem, final: Fit) -> Problem:

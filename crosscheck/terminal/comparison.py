@@ -50,9 +50,7 @@ def print_comparison(
 
 
 def _coordinates(found: Comparison) -> Table:
-    table = table_of(
-        ["measured less predicted", "bias", "rms", "max", "unit", "at line", "rows"]
-    )
+    table = table_of(["measured less predicted", "bias", "rms", "max", "unit", "at line", "rows"])
     for row in found.coordinates:
         factor, unit = in_unit(row["unit"])
         numbers = [f"{factor * row[key]:.4g}" for key in ("bias", "rms", "max")]

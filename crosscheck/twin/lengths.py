@@ -39,9 +39,7 @@ class Way:
     elapsed: Array
 
 
-def way_of(
-    true: TrueRobot, commands: Commands, waypoints: tuple[int, int] = WAYPOINTS
-) -> Way:
+def way_of(true: TrueRobot, commands: Commands, waypoints: tuple[int, int] = WAYPOINTS) -> Way:
     """Every run from the reference pose straight to its first row, then from row to row."""
     robot, n = true.robot, len(commands)
     run = np.zeros(n, dtype=int) if commands.run is None else commands.run

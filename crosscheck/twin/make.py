@@ -226,9 +226,7 @@ def _one_digit(value: float) -> float:
     return float(f"{value:.0e}")
 
 
-def _read(
-    made: _Measured, random: np.random.Generator, robot: Robot
-) -> Measurements:
+def _read(made: _Measured, random: np.random.Generator, robot: Robot) -> Measurements:
     """Readings with noise."""
     case, truth, sigma = made.case, made.truth, made.sigma
     assert sigma.position_m is not None and sigma.orientation_rad is not None

@@ -110,7 +110,12 @@ def measure(
     for sensor in true.sensors:
         reading = sensor(reading)
     return Truth(
-        rows.pose, rows.tensions, *reading, rest[way.is_row], rows.at_rest, rows.free,
+        rows.pose,
+        rows.tensions,
+        *reading,
+        rest[way.is_row],
+        rows.at_rest,
+        rows.free,
         rows.residual,
     )
 
@@ -161,9 +166,7 @@ def _start(world: World, bare: World, pose: Array, springs: Springs) -> bool:
     return True
 
 
-def _settle(
-    world: World, springs: Springs, judge: bool = True, limit: int = _LIMIT
-) -> Descent:
+def _settle(world: World, springs: Springs, judge: bool = True, limit: int = _LIMIT) -> Descent:
     """Polish, or go downhill; with chains over sheaves until their free parts are right."""
     found = _NOWHERE
     for _ in range(_SHARES):

@@ -37,7 +37,6 @@ class Springs:
         poly = np.stack([k / lengths * true.quadratic, k / lengths**2 * true.cubic], axis=1)
         return cls(lengths.copy(), k, poly)
 
-
     def halfway(self, other: Springs) -> Springs:
         """Springs between these and others."""
         rest = 0.5 * (self.rest + other.rest)

@@ -42,9 +42,7 @@ def trajectory(robot: Robot, points: int = 18, extent: float = 1.0) -> Trajector
     _to_and_fro(runs, "across", _across(points, reach))
     changes = {name: _base_change(robot, frame, reach, part) for name, part in runs.items()}
     changes["loop"] = _loop(robot, frame, reach, 2 * points)
-    poses = np.concatenate(
-        [_reachable(robot, extent * change) for change in changes.values()]
-    )
+    poses = np.concatenate([_reachable(robot, extent * change) for change in changes.values()])
     counts = [len(change) for change in changes.values()]
     return Trajectory(poses, np.repeat(np.array(list(changes)), counts), _clock(counts))
 
@@ -101,9 +99,7 @@ def _loop(robot: Robot, frame: Array, reach: Array, points: int) -> Array:
         ],
         axis=1,
     )
-    tilt = _TILT * np.stack(
-        [np.sin(angle), np.sin(2.0 * angle + 0.5), np.cos(angle - 0.4)], axis=1
-    )
+    tilt = _TILT * np.stack([np.sin(angle), np.sin(2.0 * angle + 0.5), np.cos(angle - 0.4)], axis=1)
     return np.concatenate([local @ frame, tilt @ frame], axis=1)
 
 

@@ -253,9 +253,7 @@ class World(Physics):
 
     def cable_lengths(self) -> Array:
         """Lengths (m,) [m] from the exit points on, as of the last update."""
-        return np.asarray(
-            self.data.ten_length[self.places.tendons].sum(axis=1) - self.places.tail
-        )
+        return np.asarray(self.data.ten_length[self.places.tendons].sum(axis=1) - self.places.tail)
 
     def measure_free_share(self) -> Array:
         """Part of each cable (m,) that hangs free of its sheave, at the present state."""

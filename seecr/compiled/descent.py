@@ -243,9 +243,7 @@ def is_idle(states, i, scale):
 
 
 @_jit
-def _holds_without_idle(
-    cables, load, pose, deviation, length, guess, states, scale, space
-):
+def _holds_without_idle(cables, load, pose, deviation, length, guess, states, scale, space):
     """Whether the equilibrium is stable without the cables whose tension is mere rounding.
 
     A cable that is exactly as long as its rest length resists on one side only.

@@ -513,9 +513,7 @@ def cable_pull(row, start, move, up, guess, work, force, stiffness, gradient, st
         False when the cable's own equations could not be solved.
     """
     if row[WEIGHT] > 0.0:
-        return _catenary_pull(
-            row, start, move, up, guess, work, force, stiffness, gradient, state
-        )
+        return _catenary_pull(row, start, move, up, guess, work, force, stiffness, gradient, state)
     if row[RADIUS] > 0.0:
         return _pulley_pull(row, start, move, up, work, force, stiffness, gradient, state)
     return _straight_pull(row, start, move, force, stiffness, gradient, state)

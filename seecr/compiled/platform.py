@@ -94,9 +94,7 @@ def turned(x, y, z, a, b, c, d):
 @_jit
 def turn(rotvec, q, out):
     """out = exp(rotvec) q, of unit length."""
-    out[0], out[1], out[2], out[3] = turned(
-        rotvec[0], rotvec[1], rotvec[2], q[0], q[1], q[2], q[3]
-    )
+    out[0], out[1], out[2], out[3] = turned(rotvec[0], rotvec[1], rotvec[2], q[0], q[1], q[2], q[3])
 
 
 @_jit

@@ -97,9 +97,7 @@ class WinchSideLength(Effect):
     name: ClassVar[str] = "winch_side_length"
     place: ClassVar[str] = "cable"
     title: ClassVar[str] = "elastic cable behind the exit points"
-    advice: ClassVar[str] = (
-        "measure the cable between drum and exit point: expect {length:.0f} mm"
-    )
+    advice: ClassVar[str] = "measure the cable between drum and exit point: expect {length:.0f} mm"
 
     length: float = parameter("m", of_length(0.5), bounds=(0.0, 1e4))
 

@@ -45,10 +45,7 @@ def check_class(effect: type[Effect], where: str) -> None:
                 f"{where}: effect {effect.name} has a field {item.name} that is no parameter; "
                 "expected seecr.effects.parameter(unit, scale, ...)"
             )
-    if (
-        effect.edit_setup is Effect.edit_setup
-        and effect.edit_readings is Effect.edit_readings
-    ):
+    if effect.edit_setup is Effect.edit_setup and effect.edit_readings is Effect.edit_readings:
         raise InputError(
             f"{where}: effect {effect.name} changes nothing; expected it to define edit_setup or "
             "edit_readings"

@@ -198,10 +198,7 @@ def test_sensitivities_are_what_solving_again_gives(name: str, kind: str) -> Non
 
 COMBINATIONS = [
     ("cable_weight", "pulley_radius", "hysteresis", "creep", "exit_friction", "frame_compliance"),
-    *[
-        tuple(np.random.default_rng(seed).permutation(NAMES)[: 2 + seed % 3])
-        for seed in range(20)
-    ],
+    *[tuple(np.random.default_rng(seed).permutation(NAMES)[: 2 + seed % 3]) for seed in range(20)],
 ]
 
 

@@ -79,9 +79,7 @@ def weightless_lift() -> Robot:
 def test_rows_that_are_not_solved_are_flagged_and_the_others_stand() -> None:
     robot = weightless_lift()
     lengths = np.array([[0.95, 0.95], [1.5, 1.5], [0.9, 1.0]])  # the second: both slack
-    experiment = Experiment(
-        robot, Commands(np.tile(robot.reference_pose, (3, 1)), lengths=lengths)
-    )
+    experiment = Experiment(robot, Commands(np.tile(robot.reference_pose, (3, 1)), lengths=lengths))
     found = experiment.predict()
     assert found.solved.tolist() == [True, False, True]
     assert found.singular.tolist() == [False, True, False]

@@ -50,9 +50,7 @@ def test_each_run_starts_at_the_reference_pose_and_goes_straight_from_row_to_row
     path = path_of(robot, commands)
     assert np.array_equal(path.commands.pose[path.rows], commands.pose)
     assert path.fresh.sum() == 2
-    assert np.array_equal(
-        path.commands.pose[path.fresh], np.tile(robot.reference_pose, (2, 1))
-    )
+    assert np.array_equal(path.commands.pose[path.fresh], np.tile(robot.reference_pose, (2, 1)))
     first, second = path.rows[0], path.rows[1]
     whole = pose_difference(commands.pose[1], commands.pose[0])
     for k in range(first, second + 1):

@@ -34,9 +34,7 @@ def experiment_of(kind: str, seed: int = 0, rows: int = 6, reach: float = 1.0) -
     robot = robot_of(kind, seed)
     poses = random_poses(rng, robot, rows)
     if reach != 1.0:
-        poses[:, :3] = robot.reference_pose[:3] + reach * (
-            poses[:, :3] - robot.reference_pose[:3]
-        )
+        poses[:, :3] = robot.reference_pose[:3] + reach * (poses[:, :3] - robot.reference_pose[:3])
     return Experiment(robot, Commands(
         poses,
         lengths=robot.commanded_lengths(poses) if kind == "lengths" else None,

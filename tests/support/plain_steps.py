@@ -53,9 +53,7 @@ def plain_fsolve(robot: Robot, pose: np.ndarray, start: np.ndarray | None = None
         height = np.mean(robot.exit_points[:, 2] - robot.anchor_points[:, 2] - pose[2])
         fall = robot.mass * 9.81 * height / robot.ea[0]
         start = np.array([0.0, 0.0, -fall, 0.0, 0.0, 0.0])
-    found, info, flag, _ = fsolve(
-        lambda d: wrench(robot, pose, d, rest), start, full_output=True
-    )
+    found, info, flag, _ = fsolve(lambda d: wrench(robot, pose, d, rest), start, full_output=True)
     return Plain(found, flag == 1, info["nfev"])
 
 

@@ -95,9 +95,7 @@ def write_mjcf(robot: Robot, path: Path) -> Path:
         for j in robot.joints
     )
     inertia = _row(np.full(3, robot.mass * robot.length**2))
-    exits = "".join(
-        f'<site name="A{i}" pos="{_row(p)}"/>' for i, p in enumerate(robot.exit_points)
-    )
+    exits = "".join(f'<site name="A{i}" pos="{_row(p)}"/>' for i, p in enumerate(robot.exit_points))
     anchors = "".join(
         f'<site name="B{i}" pos="{_row(p)}"/>' for i, p in enumerate(robot.anchor_points)
     )
