@@ -8,16 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.diagnosis.search import FALSE_ALARM, Progress
 from crosscheck.errors import CrosscheckError
-from crosscheck.fit.candidates import layouts_for, null_fit, ordered, seen_directions, try_candidate
-from crosscheck.fit.evidence import p_value
-from crosscheck.fit.gauss_newton import Fit, fit, sizes
+from crosscheck.fit.candidates import layouts_for, null_fit, seen_directions, try_candidate
+from crosscheck.fit.evidence import FALSE_ALARM, p_value
+from crosscheck.fit.gauss_newton import Fit, fit, ordered, sizes
 from crosscheck.fit.held_out import hold_out, improves, pays, unfitted
-from crosscheck.fit.kinds import Rms, rms_by_kind
 from crosscheck.fit.noise import Whiteness, whiteness
-from crosscheck.fit.prepare import outlying_rows, prepare
-from crosscheck.fit.problem import Problem
+from crosscheck.fit.prepare import Progress, outlying_rows, prepare
+from crosscheck.fit.problem import Problem, Rms, rms_by_kind
 from crosscheck.fit.state import evaluate
 from crosscheck.measurements.read import Measurements
 from crosscheck.model.write import Fitted

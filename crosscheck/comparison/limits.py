@@ -12,7 +12,7 @@ import numpy as np
 
 from crosscheck.comparison.residuals import Comparison
 from crosscheck.errors import CrosscheckError, InputFileError
-from crosscheck.fit.kinds import BY_NAME
+from crosscheck.fit.problem import BY_NAME
 from crosscheck.quantity import EXAMPLE, parse_quantity
 
 

@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 from crosscheck.comparison.associations import EVERYWHERE, SIGNIFICANT, associations, channels
 from crosscheck.comparison.regions import regions_of
 from crosscheck.comparison.travel import Travel, travel
-from crosscheck.fit.candidates import ordered
+from crosscheck.fit.gauss_newton import ordered
 from crosscheck.fit.held_out import blocks_of
-from crosscheck.fit.kinds import BY_NAME, Rms, rms_by_kind
 from crosscheck.fit.noise import Whiteness, as_table, whiteness
 from crosscheck.fit.prepare import noise_floor, outlying_rows, prepare
-from crosscheck.fit.problem import Problem
+from crosscheck.fit.problem import BY_NAME, Problem, Rms, rms_by_kind
 from crosscheck.fit.state import State, evaluate
 from crosscheck.measurements.read import Measurements
 from seecr.compiled import law as cable_law

@@ -59,7 +59,7 @@ def _to_separate(found: Search, finding: Finding, rival: Rival) -> list[str]:
     direct = list(dict.fromkeys(measured_directly(n, robot) for n in (finding.effect, rival.name)))
     ways = [
         f"{p.words} (signal that separates them: now {p.now:.2g}, then {p.then:.2g}, needs 15)"
-        for p in proposals(found.problem, found.last.fit, finding.effect, rival)
+        for p in proposals(found.problem, found.last.fit, finding.effect, rival.layout)
         if p.separates
     ]
     if ways:

@@ -9,8 +9,8 @@ import numpy as np
 
 from crosscheck.diagnosis.rivals import Rival
 from crosscheck.diagnosis.search import Search
-from crosscheck.fit.kinds import Rms
 from crosscheck.fit.noise import Whiteness
+from crosscheck.fit.problem import Rms
 from seecr.effects.base import Layout
 from seecr.pose import Array
 from seecr.sensitivity import Term

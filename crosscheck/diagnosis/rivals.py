@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from crosscheck.diagnosis.search import EQUAL, Search
-from crosscheck.fit.candidates import Candidate, ordered, own_columns, try_candidate
+from crosscheck.fit.candidates import Candidate, try_candidate
 from crosscheck.fit.evidence import evidence
-from crosscheck.fit.gauss_newton import Fit, fit, sizes
-from crosscheck.fit.subspace import basis, projected
+from crosscheck.fit.gauss_newton import Fit, basis, fit, ordered, own_columns, projected, sizes
 from seecr.effects import catalogue
+from seecr.effects.base import Layout
 from seecr.pose import Array
 
 # An effect that can imitate less than this part of another's signal is not refitted for it.
@@ -31,6 +31,11 @@ class Rival:
     name: str
     fit: Fit
     loss: float
+
+    @property
+    def layout(self) -> Layout:
+        """Its parameters."""
+        return next(t.layout for t in self.fit.terms if t.name == self.name)
 
 
 def rivals_of(found: Search, name: str) -> list[Rival]:

@@ -9,30 +9,21 @@ it looks back, drops what is needless, and puts the rest in the order in which a
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from crosscheck.fit.candidates import (
-    Candidate,
-    fit_candidate,
-    judged,
-    layouts_for,
-    ordered,
-    screen,
-)
-from crosscheck.fit.evidence import Evidence, evidence
-from crosscheck.fit.gauss_newton import Fit, fit, flat, with_values
+from crosscheck.fit.candidates import Candidate, fit_candidate, judged, layouts_for, screen
+from crosscheck.fit.evidence import FALSE_ALARM, Evidence, evidence
+from crosscheck.fit.gauss_newton import Fit, fit, flat, ordered, with_values
 from crosscheck.fit.held_out import HeldOut, hold_out, pays, unfitted
 from crosscheck.fit.noise import Whiteness, whiteness
+from crosscheck.fit.prepare import Progress
 from crosscheck.fit.problem import Problem
 from seecr.effects import catalogue
 from seecr.pose import Array
 from seecr.sensitivity import Term
 
-# Family-wise chance of a false alarm, over all candidates of a step.
-FALSE_ALARM = 0.01
 # Least gain in log evidence for one more effect (20:1), and the margin within which two models
 # explain equally well.
 LEAST_GAIN, EQUAL = 3.0, 3.0
@@ -49,8 +40,6 @@ _SMALL = 3
 # Beside a model that leaves noise, an effect is only fitted if chance explains what its
 # derivative promises with less than this; beside others it must be very likely chance.
 _PRUNE_NOISE, _PRUNE_OTHER = 0.02, 0.3
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(eq=False)

@@ -9,8 +9,7 @@ import numpy as np
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.search import Step
 from crosscheck.fit.held_out import blocks_of
-from crosscheck.fit.kinds import KINDS, Kind, rms_by_kind
-from crosscheck.fit.problem import Problem
+from crosscheck.fit.problem import KINDS, Kind, Problem, rms_by_kind
 from crosscheck.fit.state import State
 from seecr.pose import Array
 

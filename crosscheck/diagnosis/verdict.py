@@ -13,14 +13,13 @@ from threadpoolctl import threadpool_limits
 from crosscheck.diagnosis.advice import check_of, measure_next
 from crosscheck.diagnosis.result import Diagnosis, Finding
 from crosscheck.diagnosis.rivals import rivals_of
-from crosscheck.diagnosis.search import Progress, Search, search
+from crosscheck.diagnosis.search import Search, search
 from crosscheck.diagnosis.small import is_plausible, share_of, smallest_sure
 from crosscheck.fit.candidates import Candidate, null_fit
 from crosscheck.fit.gauss_newton import Fit, flat
-from crosscheck.fit.kinds import Rms, rms_by_kind
 from crosscheck.fit.noise import whiteness
-from crosscheck.fit.prepare import noise_floor, outlying_rows, prepare
-from crosscheck.fit.problem import Problem
+from crosscheck.fit.prepare import Progress, noise_floor, outlying_rows, prepare
+from crosscheck.fit.problem import Problem, Rms, rms_by_kind
 from crosscheck.fit.state import derivatives
 from crosscheck.measurements.read import Measurements
 from seecr.pose import Array

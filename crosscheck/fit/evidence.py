@@ -20,6 +20,9 @@ from scipy import special, stats
 
 from crosscheck.fit.gauss_newton import Fit, sizes
 
+# Family-wise chance of a false alarm, over all candidates of a step.
+FALSE_ALARM = 0.01
+
 _LAMBDAS = (0.1, 0.3, 1.0, 3.0, 10.0)
 
 

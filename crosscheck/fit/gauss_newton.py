@@ -13,10 +13,11 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import linalg
 
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.state import State, derivatives, evaluate
-from crosscheck.fit.subspace import basis
+from seecr.effects import catalogue
 from seecr.pose import Array
 from seecr.sensitivity import Term
 
@@ -103,6 +104,17 @@ def with_values(terms: Sequence[Term], values: Array) -> tuple[Term, ...]:
         out.append(Term(term.layout, values[first : first + count].copy()))
         first += count
     return tuple(out)
+
+
+def ordered(terms: Sequence[Term]) -> tuple[Term, ...]:
+    """Terms in the order of the catalogue, in which effects act."""
+    order = {name: i for i, name in enumerate(catalogue())}
+    return tuple(sorted(terms, key=lambda t: order.get(t.name, len(order))))
+
+
+def own_columns(terms: Sequence[Term], name: str) -> np.ndarray:
+    """(p,) bool, the parameters of one effect."""
+    return np.concatenate([np.full(len(t.layout), t.name == name) for t in terms])
 
 
 def fit(
@@ -251,3 +263,24 @@ def _covariance(jacobian: Array, scale: Array, moved: NDArray[np.bool_]) -> Arra
         norm = float(np.linalg.norm(jacobian[:, k])) if len(jacobian) else 0.0
         out[k, k] = (scale[k] / norm) ** 2 if norm * UNSEEN_SIZES > 1.0 else np.inf
     return out
+
+
+def projected(columns: Array, base: Array) -> Array:
+    """What is left of ``columns`` beside those of ``base``."""
+    u = basis(base)
+    return columns - u @ (u.T @ columns)
+
+
+def basis(columns: Array) -> Array:
+    """Orthonormal basis of what columns span.
+
+    By pivoted QR of columns of unit length: a singular value decomposition takes half as long
+    again, and this is done thousands of times.
+    """
+    norm = np.linalg.norm(columns, axis=0)
+    some = columns[:, norm > 0.0] / norm[norm > 0.0]
+    if some.shape[1] == 0:
+        return np.zeros((len(columns), 0))
+    q, r, _order = linalg.qr(some, mode="economic", pivoting=True, check_finite=False)
+    rank = int(np.sum(np.abs(np.diag(r)) > 1e-9))
+    return np.asarray(q[:, :rank], float)

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.fit.gauss_newton import Fit, fit, flat
-from crosscheck.fit.kinds import rms_by_kind
-from crosscheck.fit.problem import Problem
+from crosscheck.fit.problem import Problem, rms_by_kind
 from seecr.pose import Array
 from seecr.sensitivity import Term
 

@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import spatial, stats
 
-from crosscheck.fit.kinds import kinds_read
-from crosscheck.fit.problem import Problem
+from crosscheck.fit.problem import Problem, kinds_read
 from seecr.pose import Array, rotvec_from_quat
 
 # Residuals are structured where neighbours agree by more than this many standard errors.

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from crosscheck.fit.held_out import blocks_of
-from crosscheck.fit.kinds import Rms, rms_by_kind
 from crosscheck.fit.noise import estimate_sigma
-from crosscheck.fit.problem import Problem
+from crosscheck.fit.problem import Problem, Rms, rms_by_kind
 from crosscheck.fit.state import State
 from crosscheck.measurements.read import Measurements
 from seecr.robot import Robot
 from seecr.sensitivity import Term, effects_of
+
+Progress = Callable[[str, float], None]
+"""Called with what is being done and the part of it that is done, 0 to 1."""
 
 # More rows than this part without an answer, and the data are not fit for a verdict.
 _LOST = 0.05

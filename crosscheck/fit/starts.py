@@ -1,20 +1,25 @@
-"""Where to start fitting an effect: from the forces at the measured poses, without solving.
+"""Where to start fitting an effect: what its derivative promises, and the forces as measured.
 
-Where cables go slack and taut as a parameter moves, the solved pose jumps about, and a fit from
-null ends in the next hollow. At the *measured* pose the forces depend on the parameters smoothly
-but for each cable's own slackness: parameters that make them balance there are a start near
-the truth. (In identification: the equation error, in place of the output error.)
+The derivative at null says where a linear fit would end. Where cables go slack and taut as a
+parameter moves, the solved pose jumps about, and a fit from null ends in the next hollow. At the
+*measured* pose the forces depend on the parameters smoothly but for each cable's own slackness:
+parameters that make them balance there are a start near the truth. (In identification: the
+equation error, in place of the output error.)
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
+from crosscheck.fit.gauss_newton import Fit, ordered, own_columns
 from crosscheck.fit.problem import Problem
-from crosscheck.fit.state import State
+from crosscheck.fit.state import State, derivatives
 from seecr import statics
 from seecr.compiled import descent as kernel
+from seecr.compiled import law as cable_law
 from seecr.effects.base import Effect, Layout
 from seecr.experiment import Prediction
 from seecr.pose import Array, pose_add, pose_difference
@@ -28,6 +33,91 @@ _SOFT = 0.02
 _ABSURD = 1e20
 # The weak prior, in plausible sizes.
 _PRIOR = 10.0
+# A start is at most this many plausible sizes from null.
+_START_SIZES = 3.0
+# Part of the cables that are slack from which a fit may end in a hollow.
+_SLACK_PART = 0.02
+# Effects that shift no reading by this part of its noise, for plausible sizes, are not seen.
+_UNSEEN = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Starts:
+    """Where to start fitting an effect, and what its derivative at null promises.
+
+    Attributes:
+        vectors: starting values, the most promising first.
+        gain: linearised fall of chi2 of the best. directions: that the data see.
+        shapes: about how many shapes were tried for it.
+        seen: whether any reading moves by more than a trace of its noise.
+    """
+
+    vectors: list[Array]
+    gain: float
+    directions: int
+    shapes: float
+    seen: bool
+
+
+def starts_of(problem: Problem, base: Fit, layout: Layout, factor: Array) -> Starts:
+    """The most promising starts of an effect beside the base model."""
+    shapes = layout.effect.shapes(base.state.prediction.setup)
+    scored: list[tuple[float, int, Array, dict[str, float]]] = []
+    seen = False
+    orthogonal = base.span
+    for shape in shapes:
+        null = layout.start(shape)
+        scale = layout.scale * ~layout.shape
+        white = amplitude_columns(problem, base, layout, null) * scale
+        seen = seen or bool(np.max(np.abs(white), initial=0.0) > _UNSEEN)
+        left = white - orthogonal @ (orthogonal.T @ white)
+        z, gain, directions = _linear(left, base.state.white)
+        z = np.clip(z, -_START_SIZES, _START_SIZES)
+        vector = np.clip(null + z * scale, layout.lower, layout.upper)
+        scored.append((gain, directions, vector, shape))
+    if not scored:
+        return Starts([], 0.0, 1, 1.0, False)
+    scored.sort(key=lambda item: -item[0])
+    vectors = [vector for _g, _d, vector, _s in scored[:2]]
+    if np.any((layout.lower == layout.null) & ~layout.shape):
+        # the derivative at a bound can point the wrong way: start inside as well
+        inside = layout.start(scored[0][3])
+        vectors = [vectors[0], np.where(layout.shape, inside, inside + 0.5 * layout.scale)]
+    elif len(shapes) == 1:
+        vectors = vectors[:1]
+    if int(np.sum(~layout.shape)) > 1 and _some_slack(base):
+        balanced = equation_start(problem, base.state, layout, layout.start(scored[0][3]), factor)
+        vectors += [] if balanced is None else [balanced]
+    # neighbouring shapes are alike: about every third is one more chance of its own
+    return Starts(vectors, scored[0][0], scored[0][1], max(1.0, len(shapes) / 3.0), seen)
+
+
+def _some_slack(base: Fit) -> bool:
+    """Whether cables go slack in enough places for a fit to end in a hollow."""
+    slack = base.state.prediction.found.states[..., cable_law.SLACK] > 0
+    return float(np.mean(slack)) > _SLACK_PART
+
+
+def amplitude_columns(problem: Problem, base: Fit, layout: Layout, null: Array) -> Array:
+    """(N, p) whitened derivatives by the effect's own parameters at null; 0 for shapes."""
+    terms = ordered((*base.terms, Term(layout, null)))
+    own = own_columns(terms, layout.name)
+    wanted = np.flatnonzero(own)
+    amplitudes = wanted[~layout.shape]
+    out = np.zeros((len(base.state.white), len(layout)))
+    state = base.state.of(terms)
+    if len(amplitudes):
+        out[:, ~layout.shape] = derivatives(problem, state, amplitudes.tolist(), frozen=True)
+    return out
+
+
+def _linear(x: Array, r: Array) -> tuple[Array, float, int]:
+    """Linear fit of r by columns x with a weak prior: values, fall of chi2, directions seen."""
+    normal = x.T @ x
+    z: Array = np.asarray(np.linalg.solve(normal + 1e-2 * np.eye(x.shape[1]), x.T @ r), float)
+    left = r - x @ z
+    directions = int(np.sum(np.linalg.eigvalsh(normal) > 1e-2))
+    return z, float(r @ r - left @ left), max(1, directions)
 
 
 def equation_start(

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from crosscheck.fit.prepare import Progress
 from crosscheck.measurements.read import Measurements
 from crosscheck.measurements.sigma import Sigma
 from crosscheck.planning.extensions import Extension, extensions, more_poses
@@ -26,7 +27,6 @@ from crosscheck.planning.visibility import (
 from seecr.pose import Array
 from seecr.robot import Robot
 
-Progress = Callable[[str, float], None]
 # Poses added at most.
 MORE_POSES = 6
 # Repeating everything doubles each signal: a suggestion must do more than that.

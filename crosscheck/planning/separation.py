@@ -12,12 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from crosscheck.diagnosis.rivals import Rival
-from crosscheck.fit.candidates import ordered, own_columns
-from crosscheck.fit.gauss_newton import Fit, flat, sizes
+from crosscheck.fit.gauss_newton import Fit, flat, ordered, own_columns, projected, sizes
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.state import State, derivatives, evaluate
-from crosscheck.fit.subspace import projected
 from crosscheck.measurements.read import Measurements
 from seecr.effects.base import Layout, layout_of
 from seecr.pose import Array, quat_from_rotvec, quat_multiply
@@ -50,9 +47,8 @@ class Proposal:
         return self.then >= NEEDED and self.then > 2.0 * self.now
 
 
-def proposals(problem: Problem, final: Fit, name: str, rival: Rival) -> list[Proposal]:
-    """Measurements that would tell an effect from its rival, the most telling first."""
-    layout = next(t.layout for t in rival.fit.terms if t.name == rival.name)
+def proposals(problem: Problem, final: Fit, name: str, layout: Layout) -> list[Proposal]:
+    """Measurements that would tell an effect from another layout, the most telling first."""
     here = _split(problem, final, name, layout)
     now = _signal(*here)
     out = []

@@ -15,7 +15,8 @@ from functools import cached_property, lru_cache
 import numpy as np
 from scipy import optimize, stats
 
-from crosscheck.fit.candidates import amplitude_columns, layouts_for
+from crosscheck.fit.candidates import layouts_for
+from crosscheck.fit.starts import amplitude_columns
 from crosscheck.planning.planned import Planned
 from seecr.effects.base import Layout
 from seecr.pose import Array

@@ -8,7 +8,7 @@ import rerun.blueprint as rrb
 
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import Stage, floor_of
-from crosscheck.fit.kinds import Kind, kinds_read
+from crosscheck.fit.problem import Kind, kinds_read
 from crosscheck.numbers import short
 from crosscheck.recording import colours, layout
 from crosscheck.recording.colours import Rgba

@@ -10,7 +10,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from crosscheck.comparison.associations import channels
-from crosscheck.fit.kinds import Kind
+from crosscheck.fit.problem import Kind
 from crosscheck.numbers import in_unit, short
 from crosscheck.recording import colours, layout, misfit, plots, shapes, words
 from crosscheck.recording.diagnosis_words import plain

@@ -7,7 +7,7 @@ import numpy as np
 from crosscheck.diagnosis.result import Diagnosis, Finding
 from crosscheck.diagnosis.steps import Stage, floor_of
 from crosscheck.diagnosis.verdict import percent
-from crosscheck.fit.kinds import rms_by_kind
+from crosscheck.fit.problem import rms_by_kind
 from crosscheck.numbers import in_unit, parameter_name, short, with_error
 from crosscheck.recording import misfit, words
 from crosscheck.recording.misfit import Misfit

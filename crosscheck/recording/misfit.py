@@ -10,8 +10,7 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from crosscheck.diagnosis.steps import drawn, magnification, views_of
-from crosscheck.fit.kinds import Kind, kinds_read
-from crosscheck.fit.problem import POSITION, Problem
+from crosscheck.fit.problem import POSITION, Kind, Problem, kinds_read
 from crosscheck.fit.state import State
 from crosscheck.recording import colours, layout
 from crosscheck.recording.states import States

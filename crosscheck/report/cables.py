@@ -15,8 +15,7 @@ from crosscheck.comparison.associations import channels
 from crosscheck.comparison.cable_space import cable_errors, cable_lengths
 from crosscheck.comparison.travel import travel
 from crosscheck.diagnosis.steps import Stage
-from crosscheck.fit.kinds import KINDS
-from crosscheck.fit.problem import TENSION, Problem
+from crosscheck.fit.problem import KINDS, TENSION, Problem
 from crosscheck.report.drawing import (
     AFTER,
     INK,

@@ -9,9 +9,8 @@ from matplotlib.patches import Rectangle
 
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.search import Search
-from crosscheck.fit.candidates import amplitude_columns, own_columns
-from crosscheck.fit.gauss_newton import Fit
-from crosscheck.fit.subspace import basis, projected
+from crosscheck.fit.gauss_newton import Fit, basis, own_columns, projected
+from crosscheck.fit.starts import amplitude_columns
 from crosscheck.report.drawing import BEFORE, INK, WIDTH, blank, styled, svg
 from seecr.effects.base import Layout
 from seecr.pose import Array

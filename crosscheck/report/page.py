@@ -12,8 +12,7 @@ from markupsafe import Markup
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import shown_stages, stages_of
 from crosscheck.errors import CrosscheckError
-from crosscheck.fit.kinds import kinds_read
-from crosscheck.fit.problem import Problem
+from crosscheck.fit.problem import Problem, kinds_read
 from crosscheck.numbers import in_unit, short
 from crosscheck.report.cables import draw_wall, walls_of
 from crosscheck.report.confusion import confusion_of, draw_confusion

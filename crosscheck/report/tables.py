@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from crosscheck.diagnosis.result import Diagnosis, Finding
-from crosscheck.diagnosis.search import FALSE_ALARM, Step
+from crosscheck.diagnosis.search import Step
 from crosscheck.diagnosis.steps import stages_of
 from crosscheck.diagnosis.verdict import percent
-from crosscheck.fit.candidates import Candidate, own_columns
-from crosscheck.fit.evidence import p_value
-from crosscheck.fit.gauss_newton import sizes
-from crosscheck.fit.kinds import KINDS, Rms
+from crosscheck.fit.candidates import Candidate
+from crosscheck.fit.evidence import FALSE_ALARM, p_value
+from crosscheck.fit.gauss_newton import own_columns, sizes
 from crosscheck.fit.noise import POOR_FIT, STRUCTURED
+from crosscheck.fit.problem import KINDS, Rms
 from crosscheck.numbers import chance, in_unit, parameter_name, short, with_error
 
 # Correlations above this are named; parameters beyond this many plausible sizes are doubtful.

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import Stage, by_block, floor_of, stages_of
-from crosscheck.fit.kinds import Kind, kinds_read, rms_by_kind
+from crosscheck.fit.problem import Kind, kinds_read, rms_by_kind
 from crosscheck.numbers import short
 from crosscheck.report.drawing import (
     AFTER,

@@ -11,8 +11,7 @@ from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 
 from crosscheck.diagnosis.steps import Stage, drawn, magnification, views_of
-from crosscheck.fit.kinds import Kind, kinds_read
-from crosscheck.fit.problem import POSITION, Problem
+from crosscheck.fit.problem import POSITION, Kind, Problem, kinds_read
 from crosscheck.report.drawing import GREY, INK, MANY, blank, grid, styled, svg
 from seecr.pose import Array
 

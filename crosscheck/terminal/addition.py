@@ -10,7 +10,7 @@ from rich.table import Table
 
 from crosscheck.add import Addition
 from crosscheck.diagnosis.result import number
-from crosscheck.diagnosis.search import FALSE_ALARM
+from crosscheck.fit.evidence import FALSE_ALARM
 from crosscheck.terminal.lines import console_for, print_parameters, rms_table, say
 
 _MOST = 12

@@ -14,7 +14,7 @@ from rich.text import Text
 from crosscheck.comparison.associations import EVERYWHERE, SIGNIFICANT
 from crosscheck.comparison.limits import Exceeded, place
 from crosscheck.comparison.residuals import Comparison
-from crosscheck.fit.kinds import KINDS, Kind, Rms
+from crosscheck.fit.problem import KINDS, Kind, Rms
 from crosscheck.numbers import in_unit
 from crosscheck.terminal.lines import cell, console_for, heading, say, table_of
 

@@ -16,8 +16,7 @@ from crosscheck.comparison.residuals import Comparison, compare
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import Stage, stages_of
 from crosscheck.errors import CrosscheckError
-from crosscheck.fit.kinds import KINDS
-from crosscheck.fit.problem import POSITION
+from crosscheck.fit.problem import KINDS, POSITION
 from crosscheck.numbers import short
 from crosscheck.recording import write_comparison_recording, write_diagnosis_recording
 from crosscheck.recording.diagnosis_words import plain

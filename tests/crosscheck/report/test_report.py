@@ -29,7 +29,7 @@ from crosscheck.diagnosis.steps import (
 )
 from crosscheck.errors import CrosscheckError
 from crosscheck.fit.gauss_newton import sizes
-from crosscheck.fit.kinds import KINDS
+from crosscheck.fit.problem import KINDS
 from crosscheck.numbers import short, with_error
 from crosscheck.report import write_report
 from crosscheck.report.cables import Wall, draw_wall, paid_out, walls_of
