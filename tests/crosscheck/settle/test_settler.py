@@ -11,9 +11,10 @@ import pytest
 
 from crosscheck.errors import CrosscheckError, InputFileError
 from crosscheck.recording.motion import record_motion
+from crosscheck.settle import polish, relax
 from crosscheck.settle import settler as settle
 from crosscheck.settle.physics import Physics
-from crosscheck.settle.settler import Settler, polish, relax, settle_batch
+from crosscheck.settle.settler import Settler, settle_batch
 from crosscheck.settle.settling import SettleStatus
 from crosscheck.suite.worst_pose import write_worst_pose_mjcf
 from seecr.pose import pose_difference, quat_from_rotvec, quat_rotate, transform_points

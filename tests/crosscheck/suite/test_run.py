@@ -12,6 +12,7 @@ import pytest
 import seecr
 from crosscheck.errors import CrosscheckError, InputFileError
 from crosscheck.settle.settling import SettlingBatch
+from crosscheck.suite import agreement, cases, verdicts
 from crosscheck.suite import run as suite
 from crosscheck.suite.cases import (
     Case,
@@ -21,15 +22,7 @@ from crosscheck.suite.cases import (
     shipped_cases,
     user_cases,
 )
-from crosscheck.suite.run import (
-    CaseResult,
-    agreement,
-    cases,
-    run_case,
-    run_suite,
-    verdicts,
-    worst_of,
-)
+from crosscheck.suite.run import CaseResult, run_case, run_suite, worst_of
 from crosscheck.suite.side import MujocoSide, screw_motion
 from crosscheck.suite.thresholds import SHIPPED, load_thresholds, thresholds_toml
 from crosscheck.suite.verdicts import Verdict
