@@ -32,7 +32,7 @@ class InputFileError(CrosscheckError):
 
         Args:
             path: the file.
-            text: what was expected, what came, what to do.
+            text: what was expected, what was found, what to do.
             line: counted from 1.
             column: name of the column.
             line_word: ``"row"`` for files that have no lines.

@@ -107,16 +107,14 @@ def _write(found: Addition, old: Model, robot: Robot, data: Path, path: Path) ->
 def _tell(
     found: Addition, old: Model, model: Path, written: bool, out: Path | None, as_json: bool
 ) -> None:
-    from crosscheck.document import json_text
+    from crosscheck.files import json_text, staged, write_text
     from crosscheck.terminal.addition import as_json as document_of
     from crosscheck.terminal.addition import print_addition
 
     text = json_text({**document_of(found, model, written), "model_notes": list(old.notes)})
     if out is not None:
-        from crosscheck.output import staged
-
         with staged(out) as folder:
-            (folder / "add.json").write_text(text + "\n", encoding="utf-8")
+            write_text(folder / "add.json", text + "\n")
     if as_json:
         click.echo(text)
         return

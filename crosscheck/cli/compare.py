@@ -61,10 +61,9 @@ def command(
     from crosscheck.comparison.limits import Limits, check, load_limits, with_options
     from crosscheck.comparison.residuals import as_json as document_of
     from crosscheck.comparison.residuals import compare
-    from crosscheck.document import json_text
+    from crosscheck.files import json_text, staged, write_text
     from crosscheck.measurements.read import load_measurements
     from crosscheck.model.read import load_model
-    from crosscheck.output import staged
     from seecr.mjcf import load_robot
 
     limits = with_options(load_limits(limits_file) if limits_file else Limits(), options)
@@ -83,7 +82,7 @@ def command(
             "model_notes": list(own.notes) if own else [],
         }
         text = json_text(document)
-        (folder / "comparison.json").write_text(text + "\n", encoding="utf-8")
+        write_text(folder / "comparison.json", text + "\n")
         if not no_recording:
             # takes a second or two to import
             from crosscheck.recording import write_comparison_recording

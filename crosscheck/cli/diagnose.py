@@ -32,8 +32,8 @@ def command(
     Writes diagnosis.json, diagnosis.html and diagnosis.rrd.
     """
     from crosscheck.diagnosis.verdict import diagnose
+    from crosscheck.files import staged, write_text
     from crosscheck.measurements.read import load_measurements
-    from crosscheck.output import staged
     from crosscheck.report import write_report
     from seecr.mjcf import load_robot
 
@@ -48,7 +48,7 @@ def command(
         with progress_share("diagnosing") as progress:
             found = diagnose(machine, measured, terms, progress)
         text = json.dumps(found.as_json(), indent=1)
-        (folder / "diagnosis.json").write_text(text + "\n", encoding="utf-8")
+        write_text(folder / "diagnosis.json", text + "\n")
         write_report(found, folder / "diagnosis.html")
         if not no_recording and found.search is not None:
             from crosscheck.recording import write_diagnosis_recording

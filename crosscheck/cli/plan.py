@@ -48,13 +48,12 @@ def command(
     \b
     Exit status: 0 all well, 2 bad input, 3 poses without an equilibrium.
     """
-    from crosscheck.document import json_text
+    from crosscheck.files import json_text, staged, write_text
     from crosscheck.measurements.read import load_commands
-    from crosscheck.output import staged
     from crosscheck.planning.design import make_plan
-    from crosscheck.quantity import parse_quantity
     from crosscheck.terminal.plan import as_json as document_of
     from crosscheck.terminal.plan import print_plan
+    from crosscheck.units import parse_quantity
     from seecr.mjcf import load_robot
 
     texts = {
@@ -73,7 +72,7 @@ def command(
         with progress_share("planning") as progress:
             plan = make_plan(machine, commands, replace(commands.sigma, **given), progress)
         text = json_text({"exit_status": 0 if plan.converged else 3, **document_of(plan)})
-        (folder / "plan.json").write_text(text + "\n", encoding="utf-8")
+        write_text(folder / "plan.json", text + "\n")
     if as_json:
         click.echo(text)
     else:

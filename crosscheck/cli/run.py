@@ -152,7 +152,7 @@ def _run(
     out: Path,
     as_json: bool,
 ) -> int:
-    from crosscheck.output import staged
+    from crosscheck.files import staged
 
     began = time.perf_counter()
     with staged(out) as folder:
@@ -201,6 +201,7 @@ def _results(
 
 
 def _write(run: Run, folder: Path) -> None:
+    from crosscheck.files import write_text
     from crosscheck.suite.junit import junit_xml
     from crosscheck.suite.results import results_json
     from crosscheck.suite.summary import summary_md
@@ -215,4 +216,4 @@ def _write(run: Run, folder: Path) -> None:
         "thresholds.toml": thresholds_toml(run.thresholds),
     }
     for name, text in texts.items():
-        (folder / name).write_text(text, encoding="utf-8")
+        write_text(folder / name, text)

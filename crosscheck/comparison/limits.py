@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import tomllib
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -11,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from crosscheck.comparison.residuals import Comparison
-from crosscheck.errors import CrosscheckError, InputFileError
+from crosscheck.errors import CrosscheckError
+from crosscheck.files import read_toml
 from crosscheck.fit.problem import BY_NAME
-from crosscheck.quantity import EXAMPLE, parse_quantity
+from crosscheck.units import EXAMPLE, parse_quantity
 
 
 @dataclass(frozen=True)
@@ -77,33 +77,22 @@ def load_limits(path: str | Path) -> Limits:
     Raises:
         InputFileError: no TOML, an unknown key, a value without a unit.
     """
-    path = Path(path)
     expected = 'expected a TOML file with lines such as max_position = "0.5mm"'
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        reason = error.strerror or error
-        raise InputFileError.at(path, f"cannot be read: {reason}; {expected}") from None
-    except UnicodeDecodeError:
-        raise InputFileError.at(path, f"is not UTF-8; {expected}") from None
-    except tomllib.TOMLDecodeError as error:
-        raise InputFileError.at(path, f"is not TOML: {error}; {expected}") from None
+    toml = read_toml(Path(path), expected)
     values: dict[str, float] = {}
-    for key, value in content.items():
+    for key, value in toml.content.items():
         name = key.replace("-", "_")
         if name not in NAMES:
             near = difflib.get_close_matches(name, NAMES, n=len(NAMES), cutoff=0.0)
-            raise InputFileError.at(
-                path, f"{key} is no limit; known, nearest first: {', '.join(near)}"
-            )
+            raise toml.error(f"{key} is no limit; known, nearest first: {', '.join(near)}", key)
         if not isinstance(value, str):
             example = EXAMPLE[kind_of(name)]
-            text = f'{key}: expected a text such as "{example}", came {value!r}'
-            raise InputFileError.at(path, text)
+            text = f'{key}: expected a text such as "{example}", got {value!r}'
+            raise toml.error(text, key)
         try:
             values[name] = parse_limit(name, value)
         except CrosscheckError as error:
-            raise InputFileError.at(path, str(error)) from None
+            raise toml.error(str(error), key) from None
     return Limits(**values)
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from crosscheck.diagnosis.result import Finding
 from crosscheck.diagnosis.rivals import Rival
 from crosscheck.diagnosis.search import Search
-from crosscheck.numbers import in_unit, parameter_name
 from crosscheck.planning.separation import measured_directly, proposals
+from crosscheck.units import in_unit, parameter_name
 from seecr.robot import Robot
 from seecr.sensitivity import Term
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from crosscheck.measurements.read import Measurements
 from crosscheck.measurements.sigma import Sigma
-from crosscheck.numbers import in_unit
+from crosscheck.units import in_unit
 from seecr.effects.base import Readings
 from seecr.experiment import Experiment, Prediction
 from seecr.pose import (

@@ -8,32 +8,22 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from crosscheck.measurements.table import Table, show
-from seecr.pose import Array
+from crosscheck.units import Unit, of_columns
 
 POSITION = ("x", "y", "z")
 QUATERNION = ("qw", "qx", "qy", "qz")
 ANGLES = ("rx", "ry", "rz")
 
-_Units = dict[str, Callable[[Array], Array]]
+_Units = dict[str, Unit]
 
-
-def _same(values: Array) -> Array:
-    return values
-
-
-# Dividing by 1000 rounds once: 170 mm is the double 0.17, which 170 * 1e-3 need not be.
-_LENGTH: _Units = {"m": _same, "mm": lambda values: values / 1000.0}
-_ANGLE: _Units = {"rad": _same, "deg": np.deg2rad}
-_SECONDS: _Units = {"s": _same}
-_NEWTONS: _Units = {"N": _same}
-_CELSIUS: _Units = {"C": _same}
-_NO_UNIT: _Units = {"": _same}
+_PURE = Unit("", "")
+_LENGTH, _ANGLE = of_columns("m"), of_columns("rad")
+_SECONDS, _NEWTONS, _CELSIUS = of_columns("s"), of_columns("N"), of_columns("C")
+_NO_UNIT: _Units = {"": _PURE}
 
 _QUANTITY = re.compile(
     r"(t|temperature|run|(?:cmd|meas)_(?:q[wxyz]|r?[xyz])|(?:length|tension)_\d+)(?:_([^_]*))?"
@@ -46,11 +36,11 @@ _ALIASES = {"time": "t_s", "time_s": "t_s", "timestamp": "t_s", "temp_c": "tempe
 
 @dataclass(frozen=True)
 class Column:
-    """One known column: its name and place in the file, and how its numbers become SI."""
+    """One known column: its name and place in the file, and the unit of its numbers."""
 
     name: str
     index: int
-    to_si: Callable[[Array], Array]
+    unit: Unit
 
 
 @dataclass(frozen=True)
@@ -91,11 +81,11 @@ def parse_header(table: Table, n_cables: int) -> Header:
         if known is None:
             unused.append(name or f"(column {index + 1}, without a name)")
             continue
-        quantity, to_si = known
+        quantity, unit = known
         if quantity in columns:
             other = columns[quantity].name
             raise table.error(f"says the same as {other}; expected one of the two", column=name)
-        columns[quantity] = Column(name, index, to_si)
+        columns[quantity] = Column(name, index, unit)
     header = Header(columns, tuple(unused), _unused_notes(unused, columns, n_cables))
     _check_one_way(table, header)
     return header
@@ -111,20 +101,18 @@ def _check_is_header(table: Table) -> None:
     numbers = [name for name in table.names if re.fullmatch(r"[+-]?\d*\.?\d+(e[+-]?\d+)?", name)]
     if numbers:
         raise table.error(
-            f"expected a header row with column names such as cmd_x_m, came the number "
+            f"expected a header row with column names such as cmd_x_m, got the number "
             f"{show(numbers[0])}; put the names in the first row, without a # before them"
         )
 
 
-def _parse_name(
-    table: Table, name: str, n_cables: int
-) -> tuple[str, Callable[[Array], Array]] | None:
+def _parse_name(table: Table, name: str, n_cables: int) -> tuple[str, Unit] | None:
     match = _QUANTITY.fullmatch(name)
     if match is None:
         return None
     quantity, unit = match[1], match[2]
     if quantity == "run":
-        return None if unit is not None else ("run", _same)
+        return None if unit is not None else ("run", _PURE)
     if quantity == "t" and unit != "s" and (unit or "") not in _TIME_UNITS:
         return None
     units = _units_of(quantity)
@@ -149,10 +137,10 @@ def _units_of(quantity: str) -> _Units:
 
 def _unit_fault(quantity: str, unit: str | None, units: _Units) -> str:
     if "" in units:
-        return f"a quaternion has no unit, came {show(unit or '')}; expected {quantity}"
+        return f"a quaternion has no unit, got {show(unit or '')}; expected {quantity}"
     expected = " or ".join(f"{quantity}_{known}" for known in units)
-    came = f"unknown unit {show(unit)}" if unit else "missing unit"
-    return f"{came}; expected {expected}"
+    fault = f"unknown unit {show(unit)}" if unit else "missing unit"
+    return f"{fault}; expected {expected}"
 
 
 def _check_cable(table: Table, quantity: str, name: str, n_cables: int) -> None:

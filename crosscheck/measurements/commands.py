@@ -39,7 +39,7 @@ def _length(source: Source, quantity: str) -> Array:
     source.refuse(
         length <= 0,
         quantity,
-        lambda row: f"expected a length above zero, came {length[row]:g} m",
+        lambda row: f"expected a length above zero, got {length[row]:g} m",
     )
     return length
 

@@ -6,10 +6,7 @@ was not read is NaN. :mod:`crosscheck.measurements.read` reads them from files.
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
-import errno
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from crosscheck.errors import CrosscheckError
+from crosscheck.files import write_texts
 from crosscheck.measurements.sigma import Sigma, sigma_toml
 from seecr.pose import Array
 
@@ -170,7 +167,7 @@ def write_measurements(path: str | Path, data: Measurements) -> None:
     Numbers have 9 significant digits, readings that are missing are empty cells.
 
     Raises:
-        CrosscheckError: the folder cannot be written.
+        InputFileError: the folder cannot be written.
     """
     path = Path(path)
     columns = list(_columns(data))
@@ -178,7 +175,7 @@ def write_measurements(path: str | Path, data: Measurements) -> None:
     rows = (",".join(cells) for cells in zip(*(cells for _, cells in columns), strict=True))
     text = "\n".join([header, *rows]) + "\n"
     # The CSV last: a TOML without it is no measurement.
-    _write_whole(path, {path.with_suffix(".toml"): sigma_toml(data.sigma), path: text})
+    write_texts({path.with_suffix(".toml"): sigma_toml(data.sigma), path: text})
 
 
 def _columns(data: Measurements) -> Iterator[tuple[str, list[str]]]:
@@ -219,22 +216,3 @@ def _quoted(name: str) -> str:
     if any(mark in name for mark in ',"\n\r') or name.startswith("#"):
         return '"' + name.replace('"', '""') + '"'
     return name
-
-
-def _write_whole(path: Path, contents: dict[Path, str]) -> None:
-    """Write several files through temporary ones, renamed when all are complete."""
-    temporary = {p: p.with_name(f".{p.name}.{os.getpid()}.tmp") for p in contents}
-    try:
-        for target, text in contents.items():
-            if target.is_dir():
-                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
-            temporary[target].write_text(text, encoding="utf-8", newline="\n")
-        for target in contents:
-            os.replace(temporary[target], target)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise CrosscheckError(f"{path}: cannot be written: {reason}") from None
-    finally:
-        for left_over in temporary.values():
-            with contextlib.suppress(OSError):
-                left_over.unlink()

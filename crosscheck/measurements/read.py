@@ -114,7 +114,7 @@ def _runs(source: Source) -> Names:
     last_row: dict[str, int] = {}
     for row, name in enumerate(names):
         if not name:
-            text = "expected the name of a run in every row, came an empty cell"
+            text = "expected the name of a run in every row, got an empty cell"
             raise source.table.error(text, row=row, column="run")
         if last_row.get(name, row - 1) != row - 1:
             raise _run_came_back(source, name, last_row[name], row)
@@ -142,7 +142,7 @@ def _times(source: Source, run: Names) -> Array | None:
         "t",
         lambda row: (
             f"rows out of time order: expected {t_s[row - 1]:.9g} s or later within run "
-            f"{show(str(run[row]))}, came {t_s[row]:.9g} s; sort the rows by time"
+            f"{show(str(run[row]))}, got {t_s[row]:.9g} s; sort the rows by time"
         ),
     )
     return t_s
@@ -156,7 +156,7 @@ def _temperature(source: Source) -> Array | None:
     source.refuse(
         celsius < _ABSOLUTE_ZERO_C,
         "temperature",
-        lambda row: f"expected a temperature above {_ABSOLUTE_ZERO_C} C, came {celsius[row]:g} C",
+        lambda row: f"expected a temperature above {_ABSOLUTE_ZERO_C} C, got {celsius[row]:g} C",
     )
     return celsius
 

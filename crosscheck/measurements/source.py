@@ -43,7 +43,7 @@ class Source:
     def column(self, quantity: str, *, blank_is_nan: bool = False) -> Array:
         """One column (n,) in SI."""
         column = self.header.columns[quantity]
-        return column.to_si(self.table.numbers(column.index, blank_is_nan=blank_is_nan))
+        return column.unit.to_si(self.table.numbers(column.index, blank_is_nan=blank_is_nan))
 
     def readings(self, prefix: str, parts: Sequence[str]) -> Array:
         """Columns ``prefix_part`` (n, k) in SI; NaN where there is no column or an empty cell."""
@@ -78,9 +78,9 @@ class Source:
 
     def _check_norm(self, prefix: str, quat: Array, norm: Array) -> None:
         def text(row: int) -> str:
-            came = " ".join(f"{value:g}" for value in quat[row])
+            got = " ".join(f"{value:g}" for value in quat[row])
             return (
-                f"expected a unit quaternion, scalar first, came {came} with norm {norm[row]:.6g}; "
+                f"expected a unit quaternion, scalar first, got {got} with norm {norm[row]:.6g}; "
                 "check the order and the columns"
             )
 

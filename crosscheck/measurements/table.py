@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.errors import CrosscheckError, InputFileError
+from crosscheck.files import read_bytes
 from seecr.pose import Array
 
 EXPECTED_FILE = "expected a CSV file in UTF-8 with a header row and one row a resting pose"
@@ -110,13 +111,7 @@ def read_table(path: Path) -> Table:
 def _read_bytes(path: Path) -> bytes:
     if path.is_dir():
         raise InputFileError.at(path, f"is a folder; {EXPECTED_FILE}")
-    try:
-        return path.read_bytes()
-    except FileNotFoundError:
-        raise InputFileError.at(path, f"no such file; {EXPECTED_FILE}") from None
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise InputFileError.at(path, f"cannot be read: {reason}; {EXPECTED_FILE}") from None
+    return read_bytes(path, EXPECTED_FILE)
 
 
 def _decode(path: Path, data: bytes) -> str:
@@ -166,7 +161,7 @@ def _check_first_line(path: Path, number: int, line: str) -> None:
         raise InputFileError.at(path, f"looks like {kind}; {EXPECTED_FILE}", line=number)
     for mark, word in _SEPARATORS.items():
         if line.count(mark) > line.count(","):
-            text = f"expected commas between cells, came {word}; write 1.5,2.5 for two cells"
+            text = f"expected commas between cells, got {word}; write 1.5,2.5 for two cells"
             raise InputFileError.at(path, text, line=number)
 
 
@@ -189,7 +184,7 @@ def _check_cell_counts(
     for line, row in body:
         if len(row) != n_columns:
             cells = "1 cell" if len(row) == 1 else f"{len(row)} cells"
-            text = f"expected {n_columns} cells as in the header (line {header_line}), came {cells}"
+            text = f"expected {n_columns} cells as in the header (line {header_line}), got {cells}"
             if len(row) > n_columns:
                 text += "; a decimal comma splits a number in two: write 1.5, not 1,5"
             raise InputFileError.at(path, text, line=line)
@@ -227,16 +222,16 @@ def _cell_fault(cell: str, blank_is_nan: bool) -> str | None:
     if not blank_is_nan:
         expected = "expected a number in every row"
     if not cell:
-        return None if blank_is_nan else f"{expected}, came an empty cell; fill it or drop the row"
+        return None if blank_is_nan else f"{expected}, got an empty cell; fill it or drop the row"
     if cell.lower().lstrip("+-") in _NO_NUMBER or cell.lower() in _NO_NUMBER:
-        return f"{expected}, came {show(cell)}"
+        return f"{expected}, got {show(cell)}"
     if re.fullmatch(r"[+-]?\d*,\d+(e[+-]?\d+)?", cell, re.IGNORECASE):
         point = cell.replace(",", ".")
-        return f"{expected}, came a decimal comma in {show(cell)}; write {point}"
+        return f"{expected}, got a decimal comma in {show(cell)}; write {point}"
     if re.fullmatch(r"[+-]?[\d.]+(e[+-]?\d+)?\s*[^\W\d_]+", cell, re.IGNORECASE):
-        return f"{expected}, came {show(cell)}; a unit belongs in the column's name, not in a cell"
+        return f"{expected}, got {show(cell)}; a unit belongs in the column's name, not in a cell"
     try:
         finite = "_" not in cell and math.isfinite(float(cell))
     except ValueError:
         finite = False
-    return None if finite else f"{expected}, came {show(cell)}"
+    return None if finite else f"{expected}, got {show(cell)}"

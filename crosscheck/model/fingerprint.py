@@ -67,7 +67,7 @@ def check_robot(path: Path, table: Any, robot: Robot) -> tuple[str, ...]:
     if table is None:
         return (f"{path} does not say which robot it was made for",)
     if not isinstance(table, Mapping):
-        raise InputFileError.at(path, f"robot: expected a table [robot], came {table!r}")
+        raise InputFileError.at(path, f"robot: expected a table [robot], got {table!r}")
     _check_cables(path, table, robot)
     own = fingerprint(robot)
     tolerance = _SAME * float(np.max(robot.nominal_lengths(robot.reference_pose[None])))

@@ -30,8 +30,8 @@ from tomlkit import TOMLDocument
 from tomlkit.exceptions import TOMLKitError
 
 from crosscheck.errors import InputFileError
+from crosscheck.files import read_text
 from crosscheck.model.fingerprint import check_robot, fingerprint
-from crosscheck.text_file import read_text
 from seecr.effects import effect_named, layout_of
 from seecr.effects.base import Layout
 from seecr.errors import InputError
@@ -174,7 +174,7 @@ def _effect_tables(where: _Where, document: Mapping[str, Any]) -> Sequence[Mappi
 def _term(where: _Where, k: int, table: Mapping[str, Any], robot: Robot) -> tuple[Term, Array]:
     name = table.get("name")
     if not isinstance(name, str):
-        raise where.error(f'expected name = "..." of an effect, came {name!r}', k, "name")
+        raise where.error(f'expected name = "..." of an effect, got {name!r}', k, "name")
     try:
         layout = layout_of(effect_named(str(name)), robot)
     except InputError as error:
@@ -223,7 +223,7 @@ def _cell(where: _Where, k: int, layout: Layout, i: int, cell: Any) -> tuple[flo
             )
     value = _number(table.get("value"))
     if value is None:
-        raise where.error(f"{start}: expected a number, came {table.get('value')!r}", k, key)
+        raise where.error(f"{start}: expected a number, got {table.get('value')!r}", k, key)
     low, high = layout.lower[i], layout.upper[i]
     if not low <= value <= high:
         raise where.error(
@@ -231,14 +231,14 @@ def _cell(where: _Where, k: int, layout: Layout, i: int, cell: Any) -> tuple[flo
         )
     unit = table.get("unit", layout.units[i])
     if unit != layout.units[i]:
-        raise where.error(f"{start}: expected unit {layout.units[i]!r}, came {unit!r}", k, key)
+        raise where.error(f"{start}: expected unit {layout.units[i]!r}, got {unit!r}", k, key)
     error = table.get("stderr", math.nan)
     if error == UNSEEN:
         return value, math.inf
     number = math.nan if error is math.nan else _number(error)
     if number is None or number < 0:
         raise where.error(
-            f'{start}: stderr must be a number from 0 or "{UNSEEN}", came {error!r}', k, key
+            f'{start}: stderr must be a number from 0 or "{UNSEEN}", got {error!r}', k, key
         )
     return value, number
 

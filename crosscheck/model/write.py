@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import copy
 import math
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,7 +12,7 @@ from typing import Any
 import numpy as np
 import tomlkit
 
-from crosscheck.errors import CrosscheckError
+from crosscheck.files import written
 from crosscheck.model.fingerprint import fingerprint
 from crosscheck.model.read import UNSEEN, Model
 from seecr.effects.base import Layout
@@ -161,17 +159,9 @@ def save_model(path: str | Path, model: Model) -> None:
     """Write a model through a temporary file, so that the old one stays whole until then.
 
     Raises:
-        CrosscheckError: the file cannot be written.
+        InputFileError: the file cannot be written.
     """
     path = Path(path)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
+    with written(path, failure="the model cannot be written") as (partial,):
         path.parent.mkdir(parents=True, exist_ok=True)
-        temporary.write_text(tomlkit.dumps(model.document), encoding="utf-8", newline="\n")
-        os.replace(temporary, path)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise CrosscheckError(f"{path}: the model cannot be written: {reason}") from None
-    finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink()
+        partial.write_text(tomlkit.dumps(model.document), encoding="utf-8", newline="\n")

@@ -11,12 +11,12 @@ import rerun.blueprint as rrb
 
 from crosscheck.comparison.associations import channels
 from crosscheck.fit.problem import Kind
-from crosscheck.numbers import in_unit, short
 from crosscheck.recording import colours, layout, misfit, plots, shapes, words
 from crosscheck.recording.diagnosis_words import plain
 from crosscheck.recording.misfit import MEASURED, Misfit
 from crosscheck.recording.scene import Scene
 from crosscheck.recording.stream import Recording, pose_index, recording_file
+from crosscheck.units import in_unit, short
 
 if TYPE_CHECKING:
     from crosscheck.comparison.residuals import Comparison

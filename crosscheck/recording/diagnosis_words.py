@@ -8,9 +8,9 @@ from crosscheck.diagnosis.result import Diagnosis, Finding
 from crosscheck.diagnosis.steps import Stage, floor_of
 from crosscheck.diagnosis.verdict import percent
 from crosscheck.fit.problem import rms_by_kind
-from crosscheck.numbers import in_unit, parameter_name, short, with_error
 from crosscheck.recording import misfit, words
 from crosscheck.recording.misfit import Misfit
+from crosscheck.units import in_unit, parameter_name, short, with_error
 
 _MOST_PARAMETERS, _MOST_CANDIDATES, _MOST_LISTED = 9, 6, 6
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -14,7 +13,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import ArrayLike
 
-from crosscheck.errors import CrosscheckError
+from crosscheck.files import written
 from seecr.pose import Array
 
 POSE, SETTLING, MODEL_STEP = "pose", "settling_time", "model_step"
@@ -64,24 +63,18 @@ def recording_file(path: str | Path, name: str, blueprint: rrb.Blueprint) -> Ite
         blueprint: the layout, embedded.
 
     Raises:
-        CrosscheckError: the file cannot be written.
+        InputFileError: the file cannot be written.
     """
-    path = Path(path)
-    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
     stream = rr.RecordingStream(_application(name), recording_id=name)
-    try:
-        partial.touch()  # Rerun reports a folder that cannot be written only in its log
-        stream.save(partial, default_blueprint=blueprint)
-        stream.send_recording_name(name)
-        yield Recording(stream)
-        stream.flush()
-        stream.disconnect()
-        partial.replace(path)
-    except OSError as error:
-        raise CrosscheckError(f"{path}: cannot write the recording: {error.strerror}") from None
-    finally:
-        stream.disconnect()
-        partial.unlink(missing_ok=True)
+    with written(Path(path), failure="cannot write the recording") as (partial,):
+        try:
+            partial.touch()  # Rerun reports a folder that cannot be written only in its log
+            stream.save(partial, default_blueprint=blueprint)
+            stream.send_recording_name(name)
+            yield Recording(stream)
+            stream.flush()
+        finally:
+            stream.disconnect()
 
 
 def _application(name: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +10,14 @@ from markupsafe import Markup
 
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import shown_stages, stages_of
-from crosscheck.errors import CrosscheckError
+from crosscheck.files import write_text
 from crosscheck.fit.problem import Problem, kinds_read
-from crosscheck.numbers import in_unit, short
 from crosscheck.report.cables import draw_wall, walls_of
 from crosscheck.report.confusion import confusion_of, draw_confusion
 from crosscheck.report.tables import candidate_rows, checks, errors_of, finding_context
 from crosscheck.report.waterfall import waterfall
 from crosscheck.report.where import caption, failure_map
+from crosscheck.units import in_unit, short
 from seecr import __version__
 
 _VERDICTS = {
@@ -42,18 +41,9 @@ def write_report(found: Diagnosis, path: str | Path) -> None:
         path: the ``.html`` file; a temporary one takes its place when complete.
 
     Raises:
-        CrosscheckError: the file cannot be written.
+        InputFileError: the file cannot be written.
     """
-    path = Path(path)
-    text = render(found)
-    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        partial.write_text(text, encoding="utf-8")
-        partial.replace(path)
-    except OSError as error:
-        raise CrosscheckError(f"{path}: cannot write the report: {error.strerror}") from None
-    finally:
-        partial.unlink(missing_ok=True)
+    write_text(Path(path), render(found), failure="cannot write the report")
 
 
 def render(found: Diagnosis) -> str:

@@ -17,7 +17,7 @@ from crosscheck.fit.evidence import FALSE_ALARM, p_value
 from crosscheck.fit.gauss_newton import own_columns, sizes
 from crosscheck.fit.noise import POOR_FIT, STRUCTURED
 from crosscheck.fit.problem import KINDS, Rms
-from crosscheck.numbers import chance, in_unit, parameter_name, short, with_error
+from crosscheck.units import chance, in_unit, parameter_name, short, with_error
 
 # Correlations above this are named; parameters beyond this many plausible sizes are doubtful.
 _CORRELATED, _PLAUSIBLE = 0.9, 5.0

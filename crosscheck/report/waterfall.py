@@ -8,7 +8,6 @@ from matplotlib.axes import Axes
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import Stage, by_block, floor_of, stages_of
 from crosscheck.fit.problem import Kind, kinds_read, rms_by_kind
-from crosscheck.numbers import short
 from crosscheck.report.drawing import (
     AFTER,
     BEFORE,
@@ -22,6 +21,7 @@ from crosscheck.report.drawing import (
     styled,
     svg,
 )
+from crosscheck.units import short
 
 # Errors this many times the noise need a logarithmic axis for both to be seen.
 _FAR = 12.0

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import json
-import math
 import platform
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from enum import Enum
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from crosscheck.files import json_text
 from crosscheck.suite.run import EXIT_AGREES, EXIT_DIFFERS, CaseResult, Worst, exit_status, worst_of
 from crosscheck.suite.thresholds import Thresholds
 from crosscheck.suite.verdicts import Verdict
@@ -64,11 +62,8 @@ class Run:
 
 def results_json(run: Run) -> str:
     """The text of ``results.json``: a head to read, then one line a case."""
-    head = json.dumps(_plain(_head(run)), indent=2, allow_nan=False, ensure_ascii=False)
-    lines = [
-        json.dumps(_plain(_case(result)), allow_nan=False, ensure_ascii=False)
-        for result in run.results
-    ]
+    head = json_text(_head(run), indent=2)
+    lines = [json_text(_case(result), indent=None) for result in run.results]
     return head[: head.rindex("\n}")] + ',\n  "cases": [\n' + ",\n".join(lines) + "\n  ]\n}\n"
 
 
@@ -190,20 +185,3 @@ def _mujoco(result: CaseResult) -> dict[str, Any]:
         "simulated_s": settling.simulated_s,
         "status": [status.name.lower() for status in settling.status],
     }
-
-
-def _plain(value: Any) -> Any:
-    """What JSON can say: lists and numbers, null for what is not finite."""
-    if isinstance(value, dict):
-        return {key: _plain(part) for key, part in value.items()}
-    if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [_plain(part) for part in value]
-    if isinstance(value, Enum):
-        return value.name.lower()
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    if isinstance(value, np.generic):
-        return _plain(value.item())
-    return value

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
 
 from crosscheck.errors import InputFileError
+from crosscheck.files import written
 from seecr.pose import Array
 
 KEYFRAME = "worst"
@@ -47,13 +47,8 @@ def write_worst_pose_mjcf(
         ET.SubElement(root, "keyframe"), "key", name=KEYFRAME, qpos=_numbers(np.asarray(qpos))
     )
     ET.indent(tree)
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
+    with written(path, failure="cannot write the MJCF") as (partial,):
         tree.write(partial, encoding="utf-8")
-        partial.replace(path)
-    except OSError as error:
-        partial.unlink(missing_ok=True)
-        raise InputFileError(f"{path}: cannot write the MJCF: {error.strerror}") from None
 
 
 def _set_springs(root: ET.Element, rest_lengths: Array, ea: Array, path: Path) -> None:

@@ -15,8 +15,8 @@ from crosscheck.comparison.associations import EVERYWHERE, SIGNIFICANT
 from crosscheck.comparison.limits import Exceeded, place
 from crosscheck.comparison.residuals import Comparison
 from crosscheck.fit.problem import KINDS, Kind, Rms
-from crosscheck.numbers import in_unit
 from crosscheck.terminal.lines import cell, console_for, heading, say, table_of
+from crosscheck.units import in_unit
 
 _MOST, _MOST_WORST, _MOST_UNSOLVED = 12, 5, 5
 

@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from crosscheck.fit.problem import KINDS, Kind, Rms
-from crosscheck.numbers import in_unit, parameter_name
+from crosscheck.units import in_unit, parameter_name
 from seecr.effects.base import Layout
 from seecr.pose import Array
 

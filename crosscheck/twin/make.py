@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.errors import CrosscheckError
+from crosscheck.files import staged, write_text
 from crosscheck.measurements.data import Measurements, write_measurements
 from crosscheck.measurements.sigma import Sigma
-from crosscheck.output import staged
 from crosscheck.twin.hidden import Hidden, choose
 from crosscheck.twin.measure import Truth, measure
 from crosscheck.twin.sealed import NAME, seal
@@ -277,7 +277,7 @@ def _write(twin: Twin, robot_path: Path, out: Path) -> None:
         write_measurements(folder / "measured.csv", twin.measured)
         shutil.copyfile(robot_path, folder / "robot.xml")
         _check_alone(folder / "robot.xml", robot_path)
-        (folder / NAME).write_text(seal(twin.answer), encoding="ascii")
+        write_text(folder / NAME, seal(twin.answer))
 
 
 def _check_alone(copy: Path, source: Path) -> None:

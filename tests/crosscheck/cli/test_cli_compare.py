@@ -73,7 +73,7 @@ def test_bad_limits_write_nothing(stiff, tmp_path):
     text = refused("compare", *stiff, "--max-position", "0.5", "--out", out)
     assert "--max-position: expected a number with its unit (m, cm, mm, um, µm)" in text
     text = refused("compare", *stiff, "--max-orientation", "1mm", "--out", out)
-    assert "came unit 'mm'" in text
+    assert "got unit 'mm'" in text
     text = refused("compare", *stiff, "--max-tension", "1N", "--out", out)
     assert "holds no tension readings" in text
     assert not out.exists()

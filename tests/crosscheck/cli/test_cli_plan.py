@@ -59,6 +59,6 @@ def test_noise_without_a_right_unit_is_refused(poses, tmp_path):
     out = tmp_path / "out"
     text = refused("plan", *poses, "--position-sigma", "0.1", "--out", out)
     assert "--position-sigma: expected a number with its unit" in text
-    assert "came unit 'mm'" in refused("plan", *poses, "--tension-sigma", "1mm", "--out", out)
+    assert "got unit 'mm'" in refused("plan", *poses, "--tension-sigma", "1mm", "--out", out)
     assert "none.csv" in refused("plan", poses[0], tmp_path / "none.csv", "--out", out)
     assert not out.exists()

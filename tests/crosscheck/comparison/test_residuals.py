@@ -13,8 +13,8 @@ from crosscheck.comparison.cable_space import cable_errors, independent_part
 from crosscheck.comparison.limits import Limits, check, load_limits, parse_limit, with_options
 from crosscheck.comparison.residuals import as_json, compare
 from crosscheck.comparison.travel import STILL
-from crosscheck.document import json_text
 from crosscheck.errors import CrosscheckError, InputFileError
+from crosscheck.files import json_text
 from crosscheck.measurements.sigma import Sigma
 from seecr.mjcf import load_robot
 from seecr.pose import pose_add, pose_difference
@@ -218,14 +218,14 @@ def test_limits_are_read_with_their_unit(name, text, value):
 @pytest.mark.parametrize(
     ("name", "text", "words"),
     [
-        ("max_position", "0.5", r"--max-position: .*\(m, cm, mm, um, µm\).*, came no unit"),
-        ("max_position", "0.5deg", "came unit 'deg' in '0.5deg'"),
-        ("max_orientation", "1mm", "such as 0.2deg, came unit 'mm'"),
-        ("max_tension_worst", "1kg", "--max-tension-worst: .*came unit 'kg'"),
-        ("max_position", "mm", "came 'mm'"),
-        ("max_position", "1.2.3mm", "came unit '.3mm'"),
-        ("max_position", "nan mm", "came 'nan mm'"),
-        ("max_position", "0mm", "expected more than zero, came '0mm'"),
+        ("max_position", "0.5", r"--max-position: .*\(m, cm, mm, um, µm\).*, got no unit"),
+        ("max_position", "0.5deg", "got unit 'deg' in '0.5deg'"),
+        ("max_orientation", "1mm", "such as 0.2deg, got unit 'mm'"),
+        ("max_tension_worst", "1kg", "--max-tension-worst: .*got unit 'kg'"),
+        ("max_position", "mm", "got 'mm'"),
+        ("max_position", "1.2.3mm", "got unit '.3mm'"),
+        ("max_position", "nan mm", "got 'nan mm'"),
+        ("max_position", "0mm", "expected more than zero, got '0mm'"),
         ("max_position", "-1mm", "expected more than zero"),
     ],
 )
@@ -245,8 +245,8 @@ def test_limits_from_a_file_and_the_command_line(tmp_path):
     ("text", "words"),
     [
         ('max_postion = "1mm"', "max_postion is no limit; known, nearest first: max_position,"),
-        ("max_position = 0.5", 'max_position: expected a text such as "0.5mm", came 0.5'),
-        ('max_position = "1deg"', "limits.toml: --max-position: .*came unit 'deg'"),
+        ("max_position = 0.5", 'max_position: expected a text such as "0.5mm", got 0.5'),
+        ('max_position = "1deg"', "limits.toml: line 1: --max-position: .*got unit 'deg'"),
         ("max_position = ", "is not TOML"),
     ],
 )

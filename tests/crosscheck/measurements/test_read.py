@@ -318,12 +318,12 @@ REFUSED = {
     "xml": (["<mujoco>", "</mujoco>"], "line 1: looks like XML, such as a robot's MJCF; expected"),
     "semicolons": (
         [POSE.replace(",", ";"), "0;0;0;0,5"],
-        "line 1: expected commas between cells, came semicolons",
+        "line 1: expected commas between cells, got semicolons",
     ),
-    "tabs": ([POSE.replace(",", "\t"), "0\t0\t0\t0"], "came tabs"),
+    "tabs": ([POSE.replace(",", "\t"), "0\t0\t0\t0"], "got tabs"),
     "no header": (
         ["0,0,0,1.5", "0,0,0,1.6"],
-        "line 1: expected a header row with column names such as cmd_x_m, came the number '0'",
+        "line 1: expected a header row with column names such as cmd_x_m, got the number '0'",
     ),
     "commented header": (
         ["#" + POSE, "0,0,0,1.5", "0,0,0,1.6"],
@@ -351,7 +351,7 @@ REFUSED = {
     "kelvin": (["temperature_K," + POSE, "0,0,0,0,0"], "unknown unit 'K'; expected temperature_C"),
     "quaternion unit": (
         [CMD + ",meas_qw_rad", "0,0,0,1"],
-        "column meas_qw_rad: a quaternion has no unit, came 'rad'; expected meas_qw",
+        "column meas_qw_rad: a quaternion has no unit, got 'rad'; expected meas_qw",
     ),
     "repeated": (
         [CMD + ",meas_x_m,meas_x_m", "0,0,0,0,0"],
@@ -434,62 +434,62 @@ REFUSED = {
     "cable zero": ([POSE + ",tension_0_N", "0,0,0,0,1"], "there is no cable 0"),
     "too few cells": (
         [POSE, "0,0,0,0", "0,0,0"],
-        r"line 3: expected 4 cells as in the header \(line 1\), came 3 cells$",
+        r"line 3: expected 4 cells as in the header \(line 1\), got 3 cells$",
     ),
     "too many cells": (
         [POSE, "0,0,0,0,5"],
-        "line 2: expected 4 cells .* came 5 cells; a decimal comma splits a number in two",
+        "line 2: expected 4 cells .* got 5 cells; a decimal comma splits a number in two",
     ),
     "word": (
         [POSE, "0,0,0,0", "0,0,zero,0"],
-        "line 3, column cmd_z_m: expected a number in every row, came 'zero'",
+        "line 3, column cmd_z_m: expected a number in every row, got 'zero'",
     ),
     "unit in cell": (
         [POSE, "0,0,0,12.5 mm"],
-        "line 2, column meas_x_m: .*came '12.5 mm'; a unit belongs in the column's name",
+        "line 2, column meas_x_m: .*got '12.5 mm'; a unit belongs in the column's name",
     ),
-    "decimal comma": ([POSE, '0,0,0,"1,5"'], "came a decimal comma in '1,5'; write 1.5"),
-    "underscore": ([POSE, "0,0,0,1_000"], "line 2, column meas_x_m: .*came '1_000'"),
+    "decimal comma": ([POSE, '0,0,0,"1,5"'], "got a decimal comma in '1,5'; write 1.5"),
+    "underscore": ([POSE, "0,0,0,1_000"], "line 2, column meas_x_m: .*got '1_000'"),
     "NaN command": (
         [POSE, "0,NaN,0,0"],
-        "line 2, column cmd_y_m: expected a number in every row, came 'NaN'",
+        "line 2, column cmd_y_m: expected a number in every row, got 'NaN'",
     ),
     "NaN reading": (
         [POSE, "0,0,0,0", "0,0,0,nan"],
         "line 3, column meas_x_m: expected a number, or an empty cell where the "
-        "reading is missing, came 'nan'",
+        "reading is missing, got 'nan'",
     ),
-    "infinite": ([POSE, "0,0,0,-inf"], "line 2, column meas_x_m: .*came '-inf'"),
-    "overflow": ([POSE, "0,0,0,1e999"], "line 2, column meas_x_m: .*came '1e999'"),
+    "infinite": ([POSE, "0,0,0,-inf"], "line 2, column meas_x_m: .*got '-inf'"),
+    "overflow": ([POSE, "0,0,0,1e999"], "line 2, column meas_x_m: .*got '1e999'"),
     "blank command": (
         [POSE, "0,0,,0"],
-        "line 2, column cmd_z_m: expected a number in every row, came an empty "
+        "line 2, column cmd_z_m: expected a number in every row, got an empty "
         "cell; fill it or drop the row",
     ),
     "blank length": (
         [LENGTHS + ",meas_x_m", "1,1,1,1,0", "1,,1,1,0"],
-        "line 3, column length_2_m: .*came an empty cell",
+        "line 3, column length_2_m: .*got an empty cell",
     ),
-    "blank time": (["t_s," + POSE, ",0,0,0,0"], "line 2, column t_s: .*came an empty cell"),
+    "blank time": (["t_s," + POSE, ",0,0,0,0"], "line 2, column t_s: .*got an empty cell"),
     "blank temperature": (
         ["temperature_C," + POSE, "20,0,0,0,0", ",0,0,0,0"],
-        "line 3, column temperature_C: .*came an empty cell",
+        "line 3, column temperature_C: .*got an empty cell",
     ),
     "blank run": (
         ["run," + POSE, "a,0,0,0,0", ",0,0,0,0"],
-        "line 3, column run: expected the name of a run in every row, came an empty cell",
+        "line 3, column run: expected the name of a run in every row, got an empty cell",
     ),
     "cold": (
         ["temperature_C," + POSE, "-300,0,0,0,0"],
-        "line 2, column temperature_C: expected a temperature above -273.15 C, came -300 C",
+        "line 2, column temperature_C: expected a temperature above -273.15 C, got -300 C",
     ),
     "length zero": (
         [LENGTHS + ",meas_x_m", "1,1,0,1,0"],
-        "line 2, column length_3_m: expected a length above zero, came 0 m",
+        "line 2, column length_3_m: expected a length above zero, got 0 m",
     ),
     "norm": (
         [QUAT, "0,0,0,1,0,0,0", "0,0,0,0.9,0,0,0"],
-        "line 3, column meas_qw: expected a unit quaternion, scalar first, came 0.9 "
+        "line 3, column meas_qw: expected a unit quaternion, scalar first, got 0.9 "
         "0 0 0 with norm 0.9;",
     ),
     "zero quaternion": ([QUAT, "0,0,0,0,0,0,0"], "line 2, column meas_qw: .* with norm 0;"),
@@ -501,7 +501,7 @@ REFUSED = {
     "time falls": (
         ["run,t_s," + POSE, "a,0,0,0,0,0", "a,4.5,0,0,0,0", "a,3,0,0,0,0"],
         "line 4, column t_s: rows out of time order: expected 4.5 s or later within "
-        "run 'a', came 3 s; sort the rows by time",
+        "run 'a', got 3 s; sort the rows by time",
     ),
     "run comes back": (
         ["run," + POSE, "a,0,0,0,0", "b,0,0,0,0", "a,0,0,0,0"],
@@ -578,16 +578,16 @@ def test_sigma_beside_the_data_or_named(csv_file, robot, tmp_path):
         ("[sigma]\nposition_m = \n", "measured.toml: is not TOML: .*line 2"),
         (
             "[sigma]\nposition_m = 0\n",
-            r"line 2: position_m must be a positive number \[m\], came 0;",
+            r"line 2: position_m must be a positive number \[m\], got 0;",
         ),
         (
             "[sigma]\n\ntension_N = -1.5\n",
-            r"line 3: tension_N must be a positive number \[N\], came -1.5",
+            r"line 3: tension_N must be a positive number \[N\], got -1.5",
         ),
-        ("[sigma]\nposition_m = '3 mm'\n", "came '3 mm'; leave it out if it is not known"),
-        ("[sigma]\nposition_m = nan\n", "line 2: position_m must be .* came nan"),
-        ("[sigma]\nlength_m = inf\n", "came inf"),
-        ("[sigma]\nlength_m = true\n", "came True"),
+        ("[sigma]\nposition_m = '3 mm'\n", "got '3 mm'; leave it out if it is not known"),
+        ("[sigma]\nposition_m = nan\n", "line 2: position_m must be .* got nan"),
+        ("[sigma]\nlength_m = inf\n", "got inf"),
+        ("[sigma]\nlength_m = true\n", "got True"),
         (
             "[sigma]\nposition_mm = 3\n",
             "line 2: unknown key position_mm in .sigma.; known are position_m, ",
@@ -721,11 +721,11 @@ def test_parquet_has_the_same_columns(tmp_path, robot):
     [
         (
             {"meas_x_m": [0.0, float("nan")]},
-            "measured.parquet: row 2, column meas_x_m: .*came 'nan'",
+            "measured.parquet: row 2, column meas_x_m: .*got 'nan'",
         ),
-        ({"cmd_y_m": [None, 1.0]}, "row 1, column cmd_y_m: .*came an empty cell"),
+        ({"cmd_y_m": [None, 1.0]}, "row 1, column cmd_y_m: .*got an empty cell"),
         ({"cmd_y_in": [1.0, 1.0]}, "measured.parquet: column cmd_y_in: unknown unit 'in'"),
-        ({"meas_x_m": ["1.5", "b"]}, "row 2, column meas_x_m: .*came 'b'"),
+        ({"meas_x_m": ["1.5", "b"]}, "row 2, column meas_x_m: .*got 'b'"),
         ({"t_s": [2.0, 1.0]}, "row 2, column t_s: rows out of time order"),
         (
             {k: [] for k in ("cmd_x_m", "cmd_y_m", "cmd_z_m", "meas_x_m")},

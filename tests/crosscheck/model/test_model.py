@@ -141,13 +141,13 @@ BAD = {
     "missing parameter": (
         "radius_m = {", "# radius_m = {", r"line \d+: .* parameter radius_m is missing",
     ),
-    "no number": ("value = 0.01", 'value = "ten"', r"radius_m: expected a number, came 'ten'"),
-    "not finite": ("value = 0.01", "value = nan", r"radius_m: expected a number, came nan"),
+    "no number": ("value = 0.01", 'value = "ten"', r"radius_m: expected a number, got 'ten'"),
+    "not finite": ("value = 0.01", "value = nan", r"radius_m: expected a number, got nan"),
     "out of bounds": (
         "value = 0.01", "value = -0.01",
         r"line \d+: .* radius_m: -0.01 is out of bounds; expected 0 to 1000",
     ),
-    "wrong unit": ('unit = "m"', 'unit = "mm"', r"radius_m: expected unit 'm', came 'mm'"),
+    "wrong unit": ('unit = "m"', 'unit = "mm"', r"radius_m: expected unit 'm', got 'mm'"),
     "bad error": ("stderr = 0.0001", "stderr = -1", r"stderr must be a number from 0 or"),
     "odd word": ("at_bound", "atbound", r"unknown atbound; expected value, stderr, unit"),
     "misspelt table": (

@@ -9,7 +9,7 @@ import pytest
 from made_data import SIGMA, measured, soft_cogiro, term
 from scipy import stats
 
-from crosscheck.document import json_text
+from crosscheck.files import json_text
 from crosscheck.fit.candidates import null_fit, try_candidate
 from crosscheck.fit.problem import Problem
 from crosscheck.measurements.sigma import Sigma

@@ -17,11 +17,11 @@ from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import Stage, stages_of
 from crosscheck.errors import CrosscheckError
 from crosscheck.fit.problem import KINDS, POSITION
-from crosscheck.numbers import short
 from crosscheck.recording import write_comparison_recording, write_diagnosis_recording
 from crosscheck.recording.diagnosis_words import plain
 from crosscheck.recording.misfit import Misfit, read_poses, states_of, worst_row
 from crosscheck.recording.words import short_names
+from crosscheck.units import short
 
 STEP = "model_step"
 

@@ -30,13 +30,13 @@ from crosscheck.diagnosis.steps import (
 from crosscheck.errors import CrosscheckError
 from crosscheck.fit.gauss_newton import sizes
 from crosscheck.fit.problem import KINDS
-from crosscheck.numbers import short, with_error
 from crosscheck.report import write_report
 from crosscheck.report.cables import Wall, draw_wall, paid_out, walls_of
 from crosscheck.report.confusion import confusion_of
 from crosscheck.report.page import render
 from crosscheck.report.tables import candidate_rows, checks, finding_context
 from crosscheck.report.waterfall import waterfall
+from crosscheck.units import short, with_error
 
 ALL = ("pulleys", "nothing", "unknown", "none", "position_only", "tensions_only", "one_angle")
 EVIL = '<script>alert("1")</script>&$x$'

@@ -14,7 +14,7 @@ import pytest
 from rich.console import Console
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.output import staged
+from crosscheck.files import staged
 from crosscheck.suite import words as figures
 from crosscheck.suite.cases import Case, demobot_sweep
 from crosscheck.suite.junit import junit_xml

@@ -1,0 +1,154 @@
+"""Units: as files spell them, as people type and read them, and what they are in SI.
+
+Inside the package all numbers are in SI. People read them in the units of this table, with no
+more digits than are known.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from crosscheck.errors import CrosscheckError
+from seecr.pose import Array
+
+Numbers = TypeVar("Numbers", float, Array)
+
+
+@dataclass(frozen=True)
+class Unit:
+    """One unit.
+
+    A factor is a product and a quotient, each exact, so that 103 mm is the double 0.103, which
+    103 * 1e-3 is not.
+
+    Attributes:
+        suffix: as a column's or a parameter's name ends. si: the SI's for the same quantity.
+        times, over: x of this unit are ``x * times / over`` in SI.
+        symbol: as people read it. also: other ways to type it.
+        column: whether a column of measurements may be in it.
+        shown: whether results in ``si`` are printed in it.
+    """
+
+    suffix: str
+    si: str
+    times: float = 1.0
+    over: float = 1.0
+    symbol: str = ""
+    also: tuple[str, ...] = ()
+    column: bool = False
+    shown: bool = False
+
+    def to_si(self, values: Numbers) -> Numbers:
+        """Numbers of this unit in SI."""
+        return values * self.times / self.over
+
+
+UNITS = (
+    Unit("m", "m", column=True),
+    Unit("cm", "m", over=100.0),
+    Unit("mm", "m", over=1000.0, column=True, shown=True),
+    Unit("um", "m", over=1e6, also=("µm",)),
+    Unit("rad", "rad", column=True),
+    Unit("mrad", "rad", over=1000.0),
+    Unit("deg", "rad", times=math.pi / 180.0, also=("°",), column=True, shown=True),
+    Unit("N", "N", column=True),
+    Unit("mN", "N", over=1000.0),
+    Unit("kN", "N", times=1000.0),
+    Unit("s", "s", column=True),
+    Unit("C", "C", symbol="°C", column=True, shown=True),
+    Unit("Nm", "Nm", symbol="N m", shown=True),
+    Unit("mm_per_N", "m_per_N", over=1000.0, symbol="mm/N", shown=True),
+    Unit("um_per_m_K", "1_per_K", over=1e6, symbol="µm/(m K)", shown=True),
+)
+"""Every unit that files, people and results use."""
+
+SI = {"position": "m", "orientation": "rad", "tension": "N"}
+"""The SI unit of each kind of reading."""
+
+EXAMPLE = {"position": "0.5mm", "orientation": "0.2deg", "tension": "1N"}
+"""What a person may type for each kind of reading."""
+
+_SHOWN = {unit.si: unit for unit in UNITS if unit.shown}
+_NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
+# Larger numbers are written with an exponent.
+_MOST_DIGITS = 6
+
+
+def of_columns(si: str) -> dict[str, Unit]:
+    """Units, by suffix, of columns of measurements that hold a quantity of this SI unit."""
+    return {unit.suffix: unit for unit in UNITS if unit.si == si and unit.column}
+
+
+def in_unit(si: str) -> tuple[float, str]:
+    """Factor from SI and the name of the unit that people read; of a parameter's unit."""
+    unit = _SHOWN.get(si)
+    if unit is None:
+        return 1.0, si.replace("_per_", "/")
+    return unit.over / unit.times, unit.symbol or unit.suffix
+
+
+def parse_quantity(label: str, kind: str, text: str) -> float:
+    """A positive number with its unit, in SI.
+
+    Args:
+        label: the option or key, to say where.
+        kind: "position", "orientation" or "tension".
+        text: such as ``0.5mm``.
+
+    Raises:
+        CrosscheckError: no number above zero with a unit of that kind.
+    """
+    units = {name: u for u in UNITS if u.si == SI[kind] for name in (u.suffix, *u.also)}
+    words = f"{label}: expected a number with its unit ({', '.join(units)}) such as {EXAMPLE[kind]}"
+    match = _NUMBER.fullmatch(text)
+    if match is None:
+        raise CrosscheckError(f"{words}, got {text!r}")
+    value, unit = float(match.group(1)), match.group(2)
+    if unit not in units:
+        got = f"unit {unit!r}" if unit else "no unit"
+        raise CrosscheckError(f"{words}, got {got} in {text!r}")
+    if not (value > 0 and math.isfinite(value)):
+        raise CrosscheckError(f"{label}: expected more than zero, got {text!r}")
+    return units[unit].to_si(value)
+
+
+def short(value: float | None, digits: int = 3) -> str:
+    """A number of so many digits, without an exponent where that is readable."""
+    if value is None or not np.isfinite(value):
+        return "–"
+    if value == 0.0:
+        return "0"
+    size = int(np.floor(np.log10(abs(value)))) + 1
+    if not -4 < size <= _MOST_DIGITS:
+        mantissa, power = f"{value:.{digits - 1}e}".split("e")
+        return f"{mantissa}e{int(power)}".replace("-", "−")
+    decimals = max(digits - size, 0)
+    return f"{value:.{decimals}f}".replace("-", "−")
+
+
+def with_error(value: float, error: float) -> tuple[str, str]:
+    """A value and its standard error, to two digits of the error."""
+    if not np.isfinite(error):
+        return short(value), "not seen"
+    if error <= 0.0:
+        return short(value, 6), "0"
+    decimals = 1 - int(np.floor(np.log10(error)))
+    if decimals > 9 or abs(value) >= 10.0**_MOST_DIGITS:
+        return short(value, 6), short(error, 2)
+    decimals = max(decimals, 0)
+    return f"{value:.{decimals}f}".replace("-", "−"), f"{error:.{decimals}f}"
+
+
+def chance(p: float) -> str:
+    """A probability."""
+    return "< 1e−12" if p < 1e-12 else short(p, 2)
+
+
+def parameter_name(name: str, unit: str) -> str:
+    """A parameter's name without its unit."""
+    return name.removesuffix(f"_{unit}") if unit else name

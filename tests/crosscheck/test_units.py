@@ -1,0 +1,101 @@
+"""Units as files spell them, people type them and results show them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from crosscheck.errors import CrosscheckError
+from crosscheck.units import (
+    EXAMPLE,
+    SI,
+    UNITS,
+    chance,
+    in_unit,
+    of_columns,
+    parameter_name,
+    parse_quantity,
+    short,
+    with_error,
+)
+
+
+def test_columns_of_millimetres_are_rounded_once() -> None:
+    # 103 * 1e-3 is another double than 0.103
+    assert of_columns("m")["mm"].to_si(np.array([103.0]))[0] == 0.103 != 103.0 * 1e-3
+    assert set(of_columns("m")) == {"m", "mm"} and set(of_columns("rad")) == {"rad", "deg"}
+    assert of_columns("rad")["deg"].to_si(180.0) == np.deg2rad(180.0)
+
+
+@pytest.mark.parametrize(
+    ("si", "factor", "name"),
+    [
+        ("m", 1e3, "mm"),
+        ("rad", 180.0 / math.pi, "deg"),
+        ("C", 1.0, "°C"),
+        ("Nm", 1.0, "N m"),
+        ("m_per_N", 1e3, "mm/N"),
+        ("1_per_K", 1e6, "µm/(m K)"),
+        ("N_per_m", 1.0, "N/m"),
+        ("", 1.0, ""),
+    ],
+)
+def test_results_are_shown_in(si: str, factor: float, name: str) -> None:
+    assert in_unit(si) == (factor, name)
+
+
+def test_each_spelling_and_each_shown_unit_is_there_once() -> None:
+    spelt = [name for unit in UNITS for name in (unit.suffix, *unit.also)]
+    assert len(spelt) == len(set(spelt))
+    shown = [unit.si for unit in UNITS if unit.shown]
+    assert len(shown) == len(set(shown))
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "value"),
+    [
+        ("position", "0.5mm", 0.0005),
+        ("position", " 3 µm ", 3e-6),
+        ("orientation", "180°", math.pi),
+        ("orientation", "1e1 mrad", 0.01),
+        ("tension", "2kN", 2000.0),
+    ],
+)
+def test_quantities_with_their_unit(kind: str, text: str, value: float) -> None:
+    assert parse_quantity("--x", kind, text) == pytest.approx(value, rel=1e-15)
+
+
+@pytest.mark.parametrize("kind", list(SI))
+def test_the_example_of_each_kind_is_one(kind: str) -> None:
+    assert parse_quantity("--x", kind, EXAMPLE[kind]) > 0
+
+
+def test_a_unit_of_another_kind_is_refused() -> None:
+    with pytest.raises(CrosscheckError) as error:
+        parse_quantity("--x", "tension", "1mm")
+    expected = "--x: expected a number with its unit (N, mN, kN) such as 1N, got unit 'mm' in '1mm'"
+    assert str(error.value) == expected
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (None, "–"), (math.nan, "–"), (0.0, "0"), (-0.012345, "−0.0123"), (1234.5, "1234"),
+        (1.5e-7, "1.50e−7"), (12345678.0, "1.23e7"),
+    ],
+)  # fmt: skip
+def test_short_numbers(value: float | None, text: str) -> None:
+    assert short(value) == text
+
+
+def test_no_more_digits_than_are_known() -> None:
+    assert with_error(0.0123456, 0.00012) == ("0.01235", "0.00012")
+    assert with_error(1.5, math.inf) == ("1.50", "not seen")
+    assert with_error(-2.0, 0.0) == ("−2.00000", "0")
+
+
+def test_names_and_chances() -> None:
+    assert parameter_name("radius_m", "m") == "radius" and parameter_name("gain", "") == "gain"
+    assert chance(1e-20) == "< 1e−12" and chance(0.25) == "0.25"
