@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from crosscheck.settle.physics import Physics
-from crosscheck.settle.settler import Settler
-from crosscheck.settle.settling import Settling
+from crosscheck.settle.settler import Settler, Settling
 from seecr.pose import Array
 
 MAX_FRAMES = 300

@@ -7,7 +7,7 @@ is MuJoCo's.
 from __future__ import annotations
 
 from contextlib import contextmanager
-from copy import copy
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.settle.mujoco_model import (
+from crosscheck.settle.model import (
     change_mass_unit,
     check_cables,
     compile_model,
@@ -32,8 +32,25 @@ if TYPE_CHECKING:
 # light platform would stop moving before its forces balance. The unit of mass is free in mechanics:
 # we choose it so that the platform has about this mass. A power of two, so no digit changes.
 _MASS_IN_MUJOCO = 1e6
+Index = NDArray[np.int64]
+Group = tuple[Index, Index, Index]
+"""Coordinates, and the (rows, columns) of the stiffness that one shift of all of them gives."""
 _FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """Where a robot's parts are in MuJoCo's model.
+
+    Attributes:
+        platform: number of its body.
+        exits, anchors: (m,) numbers of the sites.
+    """
+
+    platform: int
+    exits: Index
+    anchors: Index
 
 
 class Physics:
@@ -43,12 +60,13 @@ class Physics:
     ``mass_unit``, so forces and energies read from them have to be multiplied by it.
 
     Attributes:
-        source: the file or the model it was made from.
-        model: MuJoCo's model, a copy of the caller's; its springs and load are ours to change.
+        model: MuJoCo's model; its springs and load are ours to change.
         data: MuJoCo's state.
         mass_unit: MuJoCo's unit of mass here [kg].
+        parts: where the platform and its sites are in the model.
         body: number of the platform's body.
         is_free: whether it has a free joint (else slide and hinge joints).
+        mass: of the platform [kg].
         length: the robot's own length [m], which weighs newton-metres against newtons: half the
             largest distance of two anchor points, at least a hundredth of the longest distance
             from the reference position to an exit point.
@@ -56,40 +74,53 @@ class Physics:
         metre: (d,) [m] what one unit of each coordinate counts as: 1, or the length for angles.
         force_scale: [N] what residuals are relative to: weight, plus force and torque over length
             of the wrench; without any load, the cables' own forces.
+        coupling: groups of coordinates that may be shifted together to difference the forces.
         wrench: (6,) [N, N m] as set.
-        ignored: sentences, what of the MJCF is switched off here.
+        ignored: what of the MJCF is switched off here, in words such as "contacts".
     """
 
-    def __init__(self, source: str | Path | mujoco.MjModel) -> None:
+    def __init__(self, model: mujoco.MjModel, parts: Parts, length: float | None = None) -> None:
+        """Take a model over: it is changed from now on.
+
+        Args:
+            model: compiled; nobody else's.
+            parts: where the platform and its sites are in it.
+            length: the robot's own [m]; None takes it from the sites.
+        """
+        self.model, self.parts, self.body = model, parts, parts.platform
+        self.is_free = int(model.jnt_type[model.body_jntadr[parts.platform]]) == _FREE
+        self.ignored = switch_off(model)
+        self.mass = float(model.body_mass[parts.platform])
+        self.mass_unit = 2.0 ** round(float(np.log2(self.mass / _MASS_IN_MUJOCO)))
+        change_mass_unit(model, self.mass_unit)
+        self.data = mujoco.MjData(model)
+        self.reference_qpos = model.qpos0.copy()
+        self.reference_gravity = model.opt.gravity.copy()
+        self.wrench = np.zeros(6)
+        mujoco.mj_forward(model, self.data)
+        self.length = self._characteristic_length() if length is None else length
+        # One length for rotations makes all coordinates metres: residuals and eigenvalues compare.
+        self.rotations = self._which_rotate()
+        self.metre = np.where(self.rotations, self.length, 1.0)
+        every = np.arange(self.n_dof)
+        self.coupling: list[Group] = [(every[k : k + 1], every, 0 * every + k) for k in every]
+        self.force_scale = 1.0
+        self.set_load()
+
+    @classmethod
+    def of(cls, source: str | Path | mujoco.MjModel) -> Physics:
         """Compile an MJCF file, or copy a compiled model.
 
         Raises:
             InputFileError: no such file, not MJCF, or not one platform on cables.
         """
-        self.source = copy(source) if isinstance(source, mujoco.MjModel) else source
-        self.name = "model" if isinstance(source, mujoco.MjModel) else str(source)
-        self.model = compile_model(source)
-        self.body = platform_of(self.model, self.name)
-        self.is_free = int(self.model.jnt_type[self.model.body_jntadr[self.body]]) == _FREE
-        check_cables(self.model, self.body, self.name)
-        sites = self.model.wrap_objid[: 2 * self.n_cables]
-        on_body = self.model.site_bodyid[sites] == self.body
-        self._anchor_sites, self._exit_sites = sites[on_body], sites[~on_body]
-        self.ignored = switch_off(self.model)
-        self.mass = float(self.model.body_mass[self.body])
-        self.mass_unit = 2.0 ** round(float(np.log2(self.mass / _MASS_IN_MUJOCO)))
-        change_mass_unit(self.model, self.mass_unit)
-        self.data = mujoco.MjData(self.model)
-        self.reference_qpos = self.model.qpos0.copy()
-        self.reference_gravity = self.model.opt.gravity.copy()
-        self.wrench = np.zeros(6)
-        mujoco.mj_forward(self.model, self.data)
-        self.length = self._characteristic_length()
-        # One length for rotations makes all coordinates metres: residuals and eigenvalues compare.
-        self.rotations = self._which_rotate()
-        self.metre = np.where(self.rotations, self.length, 1.0)
-        self.force_scale = 1.0
-        self.set_load()
+        name = "model" if isinstance(source, mujoco.MjModel) else str(source)
+        model = compile_model(source)
+        platform = platform_of(model, name)
+        check_cables(model, platform, name)
+        sites = model.wrap_objid[: 2 * model.ntendon]
+        on_platform = model.site_bodyid[sites] == platform
+        return cls(model, Parts(platform, sites[~on_platform], sites[on_platform]))
 
     @property
     def n_cables(self) -> int:
@@ -100,6 +131,11 @@ class Physics:
     def n_dof(self) -> int:
         """Degrees of freedom d of the platform."""
         return int(self.model.nv)
+
+    @property
+    def n_platform(self) -> int:
+        """How many of the coordinates are the platform's own: the first ones."""
+        return self.n_dof
 
     @property
     def stiffness(self) -> Array:
@@ -165,6 +201,7 @@ class Physics:
             self.data.qpos[:3] = pose[:3]
             self.data.qpos[3:] = pose[3:] / norm
         else:
+            self.data.qpos[:] = self.reference_qpos
             self._joints_towards(pose)
         self.update()
         if self.force_scale == 0.0:  # no load: the cables' own forces are the measure
@@ -204,7 +241,13 @@ class Physics:
             where = self.data.xpos[self.body]
             force, torque = self.wrench[:3] / self.mass_unit, self.wrench[3:] / self.mass_unit
             mujoco.mj_applyFT(
-                self.model, self.data, force, torque, where, self.body, self.data.qfrc_applied
+                self.model,
+                self.data,
+                force,
+                torque,
+                where,
+                self.body,
+                self.data.qfrc_applied,
             )
 
     def relative(self, force: Array) -> float:
@@ -224,7 +267,7 @@ class Physics:
 
     def exit_points(self) -> Array:
         """Exit points A_i (m, 3) [m] in the base frame."""
-        return np.asarray(self.data.site_xpos[self._exit_sites])
+        return np.asarray(self.data.site_xpos[self.parts.exits])
 
     def energy(self) -> float:
         """Potential energy [J] at the present qpos: MuJoCo's springs and gravity.
@@ -264,17 +307,18 @@ class Physics:
         return array
 
     def _joints_towards(self, pose: Array) -> None:
-        """Gauss-Newton on the joints, from the reference, until the pose is as near as it gets."""
-        self.data.qpos[:] = self.reference_qpos
+        """Gauss-Newton on the platform's joints until it is as near to the pose as they let it."""
+        n = self.n_platform
         weigh = np.array([1.0, 1.0, 1.0] + 3 * [self.length])
         jacobian = np.zeros((6, self.n_dof))
         for _ in range(50):
-            self.update()
+            mujoco.mj_kinematics(self.model, self.data)
+            mujoco.mj_comPos(self.model, self.data)
             gap = weigh * pose_difference(pose, self.pose())
             mujoco.mj_jacBody(self.model, self.data, jacobian[:3], jacobian[3:], self.body)
-            step = np.linalg.lstsq(weigh[:, None] * jacobian, gap, rcond=None)[0]
-            self.data.qpos += step
-            if np.linalg.norm(step * self.metre) < 1e-15 * self.length:
+            step = np.linalg.lstsq(weigh[:, None] * jacobian[:, :n], gap, rcond=None)[0]
+            self.data.qpos[:n] += step
+            if np.linalg.norm(step * self.metre[:n]) < 1e-15 * self.length:
                 break
 
     def _which_rotate(self) -> Array:
@@ -283,7 +327,7 @@ class Physics:
         return np.asarray(self.model.jnt_type == _HINGE)
 
     def _characteristic_length(self) -> float:
-        anchors = self.model.site_pos[self._anchor_sites]
+        anchors = self.model.site_pos[self.parts.anchors]
         reach = np.max(np.linalg.norm(anchors[:, None] - anchors[None], axis=-1)) / 2.0
         exits = self.exit_points() - self.data.xpos[self.body]
         return float(max(reach, 0.01 * np.max(np.linalg.norm(exits, axis=-1))))

@@ -14,7 +14,7 @@ from seecr.pose import Array, pose_difference
 Mask = NDArray[np.bool_]
 
 # Differences across this much of the robot's length: central, so the truncation is its square.
-_DIFFERENCE = 2e-5
+DIFFERENCE = 2e-5
 _MAX_ITERATIONS = 30
 
 
@@ -52,26 +52,33 @@ class Polished:
 def stiffness(physics: Physics, taut: Mask) -> Array:
     """Stiffness (d, d) [N/m] at the present qpos, rotations as metres at the robot's length.
 
-    Central differences of MuJoCo's unbalanced force with the set of taut cables (m,) held: a
-    stiff cable is stretched by less than any useful difference, so plain differences would
-    straddle taut and slack.
+    Central differences of MuJoCo's unbalanced force with the set of taut tendons held: a stiff
+    cable is stretched by less than any useful difference, so plain differences would straddle
+    taut and slack.
+
+    Args:
+        physics: in the state asked about.
+        taut: (k,) tendons that pull; the others are left out.
     """
-    step = _DIFFERENCE * physics.length
-    start = physics.data.qpos.copy()
-    columns = np.zeros((physics.n_dof, physics.n_dof))
+    step, data, n = DIFFERENCE * physics.length, physics.data, physics.n_dof
+    start = data.qpos.copy()
+    matrix = np.zeros((n, n))
     with physics.frozen_slack(taut):
-        for i in range(physics.n_dof):
+        for dofs, rows, columns in physics.coupling:
+            change = np.zeros(n)
+            change[dofs] = step / physics.metre[dofs]
             forces = []
             for sign in (1.0, -1.0):
-                change = np.zeros(physics.n_dof)
-                change[i] = sign * step / physics.metre[i]
-                physics.data.qpos[:] = start
-                physics.move(change)
+                data.qpos[:] = start
+                physics.move(sign * change)
                 forces.append(physics.residual() / physics.metre)
-            columns[:, i] = (forces[1] - forces[0]) / (2.0 * step)
-    physics.data.qpos[:] = start
+            matrix[rows, columns] = ((forces[1] - forces[0]) / (2.0 * step))[rows]
+    data.qpos[:] = start
     physics.update()
-    return 0.5 * (columns + columns.T)
+    # what cables with parts of their own do to the platform is what the platform does to them
+    d = physics.n_platform
+    matrix[:d, d:] = matrix[d:, :d].T
+    return np.asarray(0.5 * (matrix + matrix.T))
 
 
 def polish(physics: Physics) -> Polished:
@@ -103,7 +110,7 @@ def polish(physics: Physics) -> Polished:
         moved_rad=float(np.linalg.norm(moved[3:])),
         smallest_eigenvalue=value,
         softest=softest,
-        neutral=_neutral(physics),
+        neutral=neutral_stiffness(physics),
         wall_s=time.perf_counter() - began,
     )
 
@@ -117,14 +124,14 @@ def _softest(physics: Physics) -> tuple[float, Array]:
     tensions = physics.tensions()
     firm = tensions > 10.0 * physics.rounding() * physics.force_scale
     values, vectors = np.linalg.eigh(stiffness(physics, firm))
-    if values[0] < -_neutral(physics) and np.any((tensions > 0.0) & ~firm):
+    if values[0] < -neutral_stiffness(physics) and np.any((tensions > 0.0) & ~firm):
         values, vectors = np.linalg.eigh(stiffness(physics, tensions > 0.0))
     return float(values[0]), np.asarray(vectors[:, 0])
 
 
-def _neutral(physics: Physics) -> float:
+def neutral_stiffness(physics: Physics) -> float:
     """Stiffness [N/m] that rounding of the forces can pretend in a difference."""
-    return 10.0 * physics.rounding() * physics.force_scale / (_DIFFERENCE * physics.length)
+    return 10.0 * physics.rounding() * physics.force_scale / (DIFFERENCE * physics.length)
 
 
 def _taut(physics: Physics) -> Mask:
@@ -171,7 +178,7 @@ def _newton_step(physics: Physics, taut: Mask) -> Array:
     with physics.frozen_slack(taut):
         force = physics.residual() / physics.metre
     values, vectors = np.linalg.eigh(stiffness(physics, taut))
-    stiff = np.abs(values) > _neutral(physics)
+    stiff = np.abs(values) > neutral_stiffness(physics)
     along = vectors.T @ force
     return np.asarray(vectors[:, stiff] @ (along[stiff] / values[stiff])) / physics.metre
 

@@ -14,13 +14,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import Enum
 
 import mujoco
 import numpy as np
 
-from crosscheck.settle.mujoco_model import quiet_mujoco
+from crosscheck.settle.model import quiet_mujoco
 from crosscheck.settle.physics import Physics
-from crosscheck.settle.settling import SettleStatus
 
 Observer = Callable[[Physics], None]
 
@@ -47,6 +47,18 @@ _RETRIES = 3
 _SHORTER = 8.0
 # How many times the robot's size a platform may travel before it counts as fallen.
 _FALL = 10.0
+
+
+class SettleStatus(Enum):
+    """How a settling ended; the value is the sentence a person reads."""
+
+    SETTLED = "MuJoCo came to rest in a stable equilibrium"
+    DIVERGED = "MuJoCo's state became infinite or not a number, also with shorter time steps"
+    TIME_LIMIT = "MuJoCo had not come to rest after the allowed number of steps"
+    FELL = "nothing holds the platform: in MuJoCo it left by over ten times the robot's size"
+    UNSTABLE = "MuJoCo stopped on an unstable equilibrium again and again, though pushed off it"
+    POLISH_MOVED = "the polish left the equilibrium in which MuJoCo had come to rest"
+    POLISH_STALLED = "the polish could not balance the forces down to rounding"
 
 
 @dataclass(frozen=True)

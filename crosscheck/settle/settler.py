@@ -8,21 +8,19 @@ reported.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.settle.physics import Physics
 from crosscheck.settle.polish import Polished, polish
-from crosscheck.settle.relax import Observer, Rest, come_to_rest
-from crosscheck.settle.settling import SettleStatus, Settling, SettlingBatch
-from seecr.pose import Array, pose_difference
+from crosscheck.settle.relax import Observer, Rest, SettleStatus, come_to_rest
+from seecr.pose import Array
 
 # Relative residual after the polish; where rounding leaves more, that is the limit.
 _POLISHED = 1e-9
@@ -33,8 +31,111 @@ _NUDGE = 1e-3
 _NUDGES = 3
 
 
+@dataclass(frozen=True, eq=False)
+class Settling:
+    """One platform at rest, or why not: on failure every number of the answer is NaN.
+
+    Attributes:
+        status: how it ended.
+        pose: (7,) after the polish.
+        qpos: (nq,) MuJoCo's coordinates of that pose.
+        tensions: (m,) [N] after the polish.
+        slack: (m,) which cables carry nothing; all False on failure.
+        energy: potential energy [J], see :meth:`crosscheck.settle.physics.Physics.energy`.
+        settled_pose: (7,) after stage 1 alone.
+        rounding: the relative residual that rounding alone may leave.
+        rest: what stage 1 did, also on failure.
+        polished: what stage 2 did.
+        nudges: how often the platform was pushed off an unstable equilibrium.
+    """
+
+    status: SettleStatus
+    pose: Array
+    qpos: Array
+    tensions: Array
+    slack: NDArray[np.bool_]
+    energy: float
+    settled_pose: Array
+    rounding: float
+    rest: Rest
+    polished: Polished
+    nudges: int
+
+    @property
+    def residual(self) -> float:
+        """Unbalanced force after the polish relative to the load (torques over length)."""
+        return self.polished.residual
+
+    @property
+    def settled_residual(self) -> float:
+        """As :attr:`residual`, after stage 1 alone; also given on failure."""
+        return self.rest.residual
+
+    @property
+    def smallest_eigenvalue(self) -> float:
+        """Of the stiffness [N/m]; within ``neutral`` of zero the platform may move freely."""
+        return self.polished.smallest_eigenvalue
+
+    @property
+    def neutral(self) -> float:
+        """Below this an eigenvalue is rounding [N/m]."""
+        return self.polished.neutral
+
+    @property
+    def steps(self) -> int:
+        """Steps of MuJoCo in stage 1."""
+        return self.rest.steps
+
+    @property
+    def simulated_s(self) -> float:
+        """Simulated time of stage 1 [s]."""
+        return self.rest.simulated_s
+
+    @property
+    def settled(self) -> bool:
+        """Whether there is an answer."""
+        return self.status is SettleStatus.SETTLED
+
+    @property
+    def free_to_move(self) -> bool:
+        """Whether some motion changes no force: where it stops along it is then arbitrary.
+
+        Two taut cables, say, leave a platform free to turn about the line through their
+        anchor points when its centre of mass lies on that line.
+        """
+        return self.settled and self.smallest_eigenvalue <= self.neutral
+
+    @property
+    def wall_s(self) -> float:
+        """Time of both stages [s]."""
+        return self.rest.wall_s + self.polished.wall_s
+
+
+class SettlingBatch(tuple[Settling, ...]):
+    """Settlings in the order of their poses; any attribute of one, stacked: ``batch.pose``.
+
+    ``batch.pose`` is (n, 7), ``batch.tensions`` (n, m), ``batch.status`` (n,) of
+    :class:`SettleStatus`, ``batch.settled`` (n,) bool, and so on.
+    """
+
+    __slots__ = ()
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_") or not (name in _FIELDS or hasattr(Settling, name)):
+            raise AttributeError(f"a settling has no {name}")
+        values = [getattr(one, name) for one in self]
+        if name == "status":
+            stacked = np.empty(len(values), dtype=object)
+            stacked[:] = values
+            return stacked
+        return np.array(values)
+
+
+_FIELDS = frozenset(Settling.__dataclass_fields__)
+
+
 class Settler:
-    """Settles one robot in MuJoCo, pose after pose. It can be pickled; one thread at a time.
+    """Settles one robot in MuJoCo, pose after pose. One thread at a time.
 
     Attributes:
         physics: the robot in MuJoCo.
@@ -62,22 +163,11 @@ class Settler:
         Raises:
             InputFileError: the file is not one platform on cables.
         """
-        self.physics = Physics(source)
+        self.physics = Physics.of(source)
         own = self.physics.stiffness * self.physics.rest_lengths
         self.ea = np.array(np.broadcast_to(own if ea is None else ea, own.shape), dtype=float)
         self.tolerance = tolerance
         self.max_steps = max_steps
-
-    def clone(self) -> Settler:
-        """Another one of the same robot, for another thread."""
-        return _rebuild(*self._parts())
-
-    def __reduce__(self) -> tuple[Callable[..., Settler], tuple[Any, ...]]:
-        """Pickle what it was made from: MuJoCo's state does not travel."""
-        return _rebuild, self._parts()
-
-    def _parts(self) -> tuple[Any, ...]:
-        return self.physics.source, self.ea, self.tolerance, self.max_steps
 
     def settle(
         self,
@@ -117,29 +207,6 @@ class Settler:
             rest = self._rest(observe).after(rest)
         return _result(physics, rest, polished, settled_pose, nudges)
 
-    def stays(
-        self,
-        pose: Array,
-        rest_lengths: Array,
-        *,
-        position_m: float = 1e-6,
-        rotation_rad: float = 1e-5,
-        ea: Array | None = None,
-        wrench: Array | None = None,
-        gravity: Array | None = None,
-    ) -> tuple[bool, Settling]:
-        """Whether MuJoCo, started from a pose (7,), comes to rest there.
-
-        For two stable equilibria: each physics should stay in the other's. Returns the
-        settling too.
-        """
-        settling = self.settle(pose, rest_lengths, ea=ea, wrench=wrench, gravity=gravity)
-        if not settling.settled:
-            return False, settling
-        away = pose_difference(settling.pose, pose)
-        near = np.linalg.norm(away[:3]) <= position_m and np.linalg.norm(away[3:]) <= rotation_rad
-        return bool(near), settling
-
     def energy(
         self,
         pose: Array,
@@ -170,21 +237,8 @@ class Settler:
         return come_to_rest(self.physics, tolerance, self.max_steps, observe)
 
 
-def _rebuild(
-    source: str | Path | mujoco.MjModel, ea: Array, tolerance: float, max_steps: int
-) -> Settler:
-    return Settler(source, ea=ea, tolerance=tolerance, max_steps=max_steps)
-
-
 def settle_batch(
-    settler: Settler,
-    poses: Array,
-    rest_lengths: Array,
-    *,
-    jobs: int = 1,
-    ea: Array | None = None,
-    wrench: Array | None = None,
-    gravity: Array | None = None,
+    settler: Settler, poses: Array, rest_lengths: Array, *, wrench: Array | None = None
 ) -> SettlingBatch:
     """Settle many poses, each from its own commanded pose, so that their order is irrelevant.
 
@@ -192,12 +246,7 @@ def settle_batch(
         settler: the robot.
         poses: (n, 7).
         rest_lengths: (n, m) [m].
-        jobs: processes. Threads would not help: a step takes MuJoCo 3 microseconds, too short to
-            share Python's interpreter. A process takes half a second to start, 200 poses' worth,
-            and a script that asks for them needs ``if __name__ == "__main__"``.
-        ea: (m,) or (n, m) [N]; None takes the settler's.
         wrench: (6,) or (n, 6) [N, N m].
-        gravity: (3,) or (n, 3) [m/s^2].
     """
     poses = np.asarray(poses, dtype=float)
     n = len(poses)
@@ -206,31 +255,15 @@ def settle_batch(
             f"poses and rest_lengths: expected (n, 7) and (n, {settler.physics.n_cables}), "
             f"got {poses.shape} and {np.shape(rest_lengths)}"
         )
-    inputs = {"ea": ea, "wrench": wrench, "gravity": gravity}
-    each = {
-        name: np.broadcast_to(value, (n, np.shape(value)[-1]))
-        for name, value in inputs.items()
-        if value is not None
-    }
-    each |= {"pose": poses, "rest_lengths": np.asarray(rest_lengths, dtype=float)}
-    jobs = min(jobs, n)
-    if jobs <= 1:
-        return SettlingBatch(_settle_rows(settler, each))
-    shares = [{name: rows[k::jobs] for name, rows in each.items()} for k in range(jobs)]
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        parts = list(pool.map(_settle_rows, [settler.clone() for _ in shares], shares))
-    return SettlingBatch(parts[i % jobs][i // jobs] for i in range(n))
-
-
-def _settle_rows(settler: Settler, rows: dict[str, Array]) -> list[Settling]:
-    names, n = list(rows), len(rows["pose"])
-    return [settler.settle(**{name: rows[name][i] for name in names}) for i in range(n)]
+    loads = np.broadcast_to(np.zeros(6) if wrench is None else wrench, (n, 6))
+    rows = zip(poses, np.asarray(rest_lengths, dtype=float), loads, strict=True)
+    return SettlingBatch(settler.settle(pose, rest, wrench=load) for pose, rest, load in rows)
 
 
 def _result(
     physics: Physics, rest: Rest, polished: Polished, settled_pose: Array, nudges: int
 ) -> Settling:
-    status = _verdict(physics, polished)
+    status = _judge(physics, polished)
     if status is not SettleStatus.SETTLED:
         return _failure(physics, rest, nudges, status, polished)
     tensions = physics.tensions()
@@ -241,25 +274,15 @@ def _result(
         tensions=tensions,
         slack=tensions == 0.0,
         energy=physics.energy(),
-        smallest_eigenvalue=polished.smallest_eigenvalue,
-        neutral=polished.neutral,
-        residual=polished.residual,
-        rounding=physics.rounding(),
         settled_pose=settled_pose,
-        settled_residual=rest.residual,
-        steps=rest.steps,
-        time_step=rest.time_step,
-        simulated_s=rest.simulated_s,
-        settle_wall_s=rest.wall_s,
-        polish_steps=polished.iterations,
-        polish_wall_s=polished.wall_s,
-        polish_moved_m=polished.moved_m,
-        polish_moved_rad=polished.moved_rad,
+        rounding=physics.rounding(),
+        rest=rest,
+        polished=polished,
         nudges=nudges,
     )
 
 
-def _verdict(physics: Physics, polished: Polished) -> SettleStatus:
+def _judge(physics: Physics, polished: Polished) -> SettleStatus:
     moved = np.hypot(polished.moved_m, polished.moved_rad * physics.length)
     if moved > _MOVED * physics.length:
         return SettleStatus.POLISH_MOVED
@@ -277,27 +300,17 @@ def _failure(
     status: SettleStatus | None = None,
     polished: Polished | None = None,
 ) -> Settling:
-    m = physics.n_cables
+    m, nan = physics.n_cables, np.nan
     return Settling(
         status=status or rest.status,
-        pose=np.full(7, np.nan),
-        qpos=np.full(physics.model.nq, np.nan),
-        tensions=np.full(m, np.nan),
+        pose=np.full(7, nan),
+        qpos=np.full(physics.model.nq, nan),
+        tensions=np.full(m, nan),
         slack=np.zeros(m, dtype=bool),
-        energy=np.nan,
-        smallest_eigenvalue=polished.smallest_eigenvalue if polished else np.nan,
-        neutral=polished.neutral if polished else np.nan,
-        residual=polished.residual if polished else np.nan,
+        energy=nan,
+        settled_pose=np.full(7, nan),
         rounding=physics.rounding(),
-        settled_pose=np.full(7, np.nan),
-        settled_residual=rest.residual,
-        steps=rest.steps,
-        time_step=rest.time_step,
-        simulated_s=rest.simulated_s,
-        settle_wall_s=rest.wall_s,
-        polish_steps=polished.iterations if polished else 0,
-        polish_wall_s=polished.wall_s if polished else 0.0,
-        polish_moved_m=polished.moved_m if polished else np.nan,
-        polish_moved_rad=polished.moved_rad if polished else np.nan,
+        rest=rest,
+        polished=polished or Polished(nan, 0, nan, nan, nan, np.full(0, nan), nan, 0.0),
         nudges=nudges,
     )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from seecr.pose import Array, pose_difference
 
 if TYPE_CHECKING:
-    from crosscheck.settle.settling import SettlingBatch
+    from crosscheck.settle.settler import SettlingBatch
     from crosscheck.suite.thresholds import Thresholds
     from seecr.equilibrium import Solution
 

@@ -22,8 +22,8 @@ from crosscheck.suite.agreement import (
     ratios,
 )
 from crosscheck.suite.cases import Case
+from crosscheck.suite.mujoco_robot import MujocoRobot
 from crosscheck.suite.pool import Pool
-from crosscheck.suite.side import MujocoSide
 from crosscheck.suite.thresholds import Thresholds
 from crosscheck.suite.verdicts import UNSOLVED, Answers, Finding, Verdict, judge
 from seecr.equilibrium import Solution
@@ -33,7 +33,7 @@ from seecr.pose import Array
 from seecr.robot import Robot
 
 if TYPE_CHECKING:
-    from crosscheck.settle.settling import SettlingBatch
+    from crosscheck.settle.settler import SettlingBatch
     from crosscheck.suite.effect_suite import EffectResult
 
 # SEECR takes microseconds: the best of this many runs is what it needs, the rest is the machine.
@@ -75,8 +75,8 @@ class CaseResult:
             ``deviation`` (n, 6), ``residual``, ``status``, ``smallest_eigenvalue``, ... (n,).
         settling: MuJoCo's answers, the same way: ``settled_pose`` (n, 7) after plain settling,
             ``pose`` (n, 7), ``tensions`` (n, m) [N], ``slack`` (n, m) after the polish,
-            ``settled_residual``, ``residual``, ``steps``, ``simulated_s``, ``settle_wall_s``,
-            ``polish_wall_s``, ``status``, ``smallest_eigenvalue``, ... (n,).
+            ``settled_residual``, ``residual``, ``steps``, ``simulated_s``, ``status``,
+            ``smallest_eigenvalue``, ... (n,).
         mujoco_rest_lengths: (n, m) [m] as MuJoCo's side paid them out.
         difference: between the two, NaN where one has no answer.
         allowance: what may differ, (n,) each.
@@ -143,9 +143,9 @@ class CaseResult:
         """Milliseconds that MuJoCo takes a pose, both stages, on one processor."""
         return 1e3 * float(np.sum(self.settling.wall_s)) / len(self)
 
-    def side(self) -> MujocoSide:
+    def side(self) -> MujocoRobot:
         """MuJoCo's side of the case, anew: to settle one of its poses again."""
-        return MujocoSide(self.case.mujoco_model, self.case.mujoco_ea)
+        return MujocoRobot(self.case.mujoco_model, self.case.mujoco_ea)
 
 
 def run_case(case: Case, thresholds: Thresholds, folder: Path | None = None) -> CaseResult:
@@ -161,7 +161,7 @@ def run_case(case: Case, thresholds: Thresholds, folder: Path | None = None) -> 
     if case.ea is not None:
         robot = replace(robot, ea=np.full(robot.n_cables, case.ea))
     solution, seecr_s = _solve(robot, case.poses)
-    side = MujocoSide(case.mujoco_model, case.mujoco_ea)
+    side = MujocoRobot(case.mujoco_model, case.mujoco_ea)
     _check_same_cables(case, robot, side)
     settling = side.settle(case.poses)
     allowance = allowances(thresholds, solution, settling)
@@ -245,7 +245,7 @@ def _solve(robot: Robot, poses: Array) -> tuple[Solution, float]:
     return solution, best
 
 
-def _check_same_cables(case: Case, robot: Robot, side: MujocoSide) -> None:
+def _check_same_cables(case: Case, robot: Robot, side: MujocoRobot) -> None:
     m = side.settler.physics.n_cables
     if m != robot.n_cables:
         raise InputFileError(

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.settle.settling import SettleStatus
+from crosscheck.settle.relax import SettleStatus
 from crosscheck.suite.agreement import Allowance, Differences, within
 from seecr.equilibrium import Status
 from seecr.equilibrium import solve as seecr_solve
 from seecr.pose import Array, pose_difference
 
 if TYPE_CHECKING:
-    from crosscheck.settle.settling import SettlingBatch
-    from crosscheck.suite.side import MujocoSide
+    from crosscheck.settle.settler import SettlingBatch
+    from crosscheck.suite.mujoco_robot import MujocoRobot
     from seecr.equilibrium import Solution
 
 # Unbalanced force, relative to the load, below which a platform counts as free to move: what
@@ -79,7 +79,7 @@ class Finding:
 class Answers(NamedTuple):
     """Everything a verdict rests on."""
 
-    side: MujocoSide
+    side: MujocoRobot
     solution: Solution
     settling: SettlingBatch
     difference: Differences

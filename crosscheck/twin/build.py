@@ -22,12 +22,10 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from crosscheck.settle.physics import Index
 from crosscheck.twin.robot import TrueRobot
 from seecr.pose import Array, quat_conjugate, quat_rotate
-
-Index = NDArray[np.int64]
 
 # Mass of the bodies that carry exit points and winches, over that of the platform; it moves no
 # equilibrium (their springs start from where it has sunk them to).

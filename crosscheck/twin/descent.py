@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from crosscheck.settle.polish import neutral_stiffness, stiffness
 from crosscheck.twin.world import World
 from seecr.pose import Array, pose_difference
 
-# Differences across this much of the robot's length.
-_DIFFERENCE = 2e-5
 _MAX_ITERATIONS = 300
 _TOLERANCE = 1e-11
 # Longest step, in the robot's own lengths.
@@ -39,35 +37,6 @@ class Descent:
     def at_rest(self) -> bool:
         """In a stable equilibrium."""
         return self.balanced and not self.free
-
-
-def stiffness(world: World, taut: NDArray[np.bool_]) -> Array:
-    """Stiffness (d, d) [N/m], rotations as metres, by differences of MuJoCo's forces.
-
-    Args:
-        world: in the state asked about.
-        taut: (m N,) tendons that pull; the others are left out.
-    """
-    step = _DIFFERENCE * world.length
-    data, n = world.data, world.n_dof
-    start = data.qpos.copy()
-    matrix = np.zeros((n, n))
-    with world.frozen_slack(taut):
-        for dofs, rows, columns in world.coupling:
-            change = np.zeros(n)
-            change[dofs] = step / world.metre[dofs]
-            forces = []
-            for sign in (1.0, -1.0):
-                data.qpos[:] = start
-                world.move(sign * change)
-                forces.append(world.residual() / world.metre)
-            matrix[rows, columns] = ((forces[1] - forces[0]) / (2.0 * step))[rows]
-    data.qpos[:] = start
-    world.update()
-    # what chains do to the platform is what the platform does to them
-    d = world.places.n_platform
-    matrix[:d, d:] = matrix[d:, :d].T
-    return 0.5 * (matrix + matrix.T)
 
 
 def descend(world: World, judge: bool = True, limit: int = _MAX_ITERATIONS) -> Descent:
@@ -102,7 +71,7 @@ def _softest(world: World) -> tuple[float, Array, float]:
     world.update()
     tensions = world.tensions()
     firm = tensions > 1e-9 * world.force_scale
-    neutral = 10.0 * world.rounding() * world.force_scale / (_DIFFERENCE * world.length)
+    neutral = neutral_stiffness(world)
     for taut in (firm, tensions > 0.0):
         matrix = stiffness(world, taut)
         zero = neutral + 1e-9 * float(np.max(np.abs(matrix)))
@@ -141,7 +110,7 @@ def _minimise(world: World, limit: int) -> tuple[float, int]:
 
 def _damped_step(world: World, matrix: Array, force: Array, damping: float) -> Array | None:
     """Solve (matrix + damping) step = force cable by cable; None if not positive definite."""
-    d, own = world.places.n_platform, world.cable_dofs
+    d, own = world.n_platform, world.cable_dofs
     h = own.shape[1]
     try:
         blocks = matrix[own[:, :, None], own[:, None, :]] + damping * np.eye(h)
@@ -163,7 +132,7 @@ def _try(world: World, step: Array, size: float) -> Array | None:
     """Force after the longest of the shortened steps that goes downhill; None if none does."""
     start, pose = world.data.qpos.copy(), world.pose()
     energy = world.energy()
-    longest = float(np.max(np.abs(step[: world.places.n_platform])))
+    longest = float(np.max(np.abs(step[: world.n_platform])))
     part = min(1.0, _REACH * world.length / longest) if longest > 0 else 1.0
     for _ in range(6):
         world.move(part * step / world.metre)

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.settle.relax import come_to_rest
-from crosscheck.settle.settling import SettleStatus
+from crosscheck.settle.relax import SettleStatus, come_to_rest
 from crosscheck.twin.descent import Descent, descend
 from crosscheck.twin.lengths import WAYPOINTS, Way, paid_out, way_of
 from crosscheck.twin.robot import true_robot
@@ -250,6 +249,3 @@ def _tangents(world: World, cables: list[Cable]) -> Springs:
     pairs = [cable.tangent(float(at)) for cable, at in zip(cables, lengths, strict=True)]
     rest, stiffness = np.array(pairs).T
     return Springs(rest, stiffness, np.zeros((len(rest), 2)))
-
-
-__all__ = ["SEGMENTS", "Truth", "measure"]

@@ -14,10 +14,13 @@ from typing import Any
 import numpy as np
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.twin.readings import SENSING, Sensor
 from seecr.effects import Effect
 from seecr.pose import Array, quat_from_rotvec, quat_multiply, quat_rotate
 from seecr.robot import Robot
+
+Reading = tuple[Array, Array, Array]
+"""Position (n, 3) [m], quaternion (n, 4), tensions (n, m) [N]."""
+Sensor = Callable[[Reading], Reading]
 
 
 @dataclass(eq=False)
@@ -103,8 +106,8 @@ def true_robot(robot: Robot, effects: Sequence[Effect] = ()) -> TrueRobot:
         gain=np.zeros(robot.n_cables),
     )
     for effect in effects:
-        if effect.name in SENSING:
-            true.sensors.append(SENSING[effect.name](effect))
+        if effect.name in _SENSING:
+            true.sensors.append(_SENSING[effect.name](effect))
         elif effect.name in _BODILY:
             _BODILY[effect.name](true, effect)
         else:
@@ -173,6 +176,39 @@ def _wrench(true: TrueRobot, effect: Any) -> None:
     true.wrench = true.wrench + np.concatenate([effect.force, effect.moment])
 
 
+def _frame(effect: Any) -> Sensor:
+    def read(reading: Reading) -> Reading:
+        position, quat, tensions = reading
+        turn = quat_from_rotvec(effect.rotation)
+        return quat_rotate(turn, position) + effect.shift, quat_multiply(turn, quat), tensions
+
+    return read
+
+
+def _target(effect: Any) -> Sensor:
+    def read(reading: Reading) -> Reading:
+        position, quat, tensions = reading
+        turned = quat_multiply(quat, quat_from_rotvec(effect.rotation))
+        return position + quat_rotate(quat, effect.shift), turned, tensions
+
+    return read
+
+
+def _scale(effect: Any) -> Sensor:
+    return lambda reading: (effect.factor * reading[0], reading[1], reading[2])
+
+
+def _tension_scale(effect: Any) -> Sensor:
+    return lambda reading: (reading[0], reading[1], effect.factor * reading[2])
+
+
+_SENSING: dict[str, Callable[[Any], Sensor]] = {
+    "tracker_frame": _frame,
+    "tracker_target": _target,
+    "tracker_scale": _scale,
+    "tension_scale": _tension_scale,
+}
+
 _BODILY: dict[str, Callable[[TrueRobot, Any], None]] = {
     "cable_length_offset": _add("offset", "offset"),
     "initial_pose_error": _zero_pose,
@@ -198,5 +234,5 @@ _BODILY: dict[str, Callable[[TrueRobot, Any], None]] = {
     "gravity_tilt": _tilt,
 }
 
-TRUE_EFFECTS = (*_BODILY, *SENSING)
+TRUE_EFFECTS = (*_BODILY, *_SENSING)
 """Names of the effects that a twin can hide."""

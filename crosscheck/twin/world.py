@@ -10,18 +10,12 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.settle.mujoco_model import change_mass_unit, switch_off
-from crosscheck.settle.physics import Physics
-from crosscheck.twin.build import Index, Places, build
+from crosscheck.settle.physics import Group, Index, Parts, Physics
+from crosscheck.twin.build import Places, build
 from crosscheck.twin.chain import hang
 from crosscheck.twin.robot import TrueRobot
 from crosscheck.twin.springs import Springs
-from seecr.pose import Array, pose_difference, quat_multiply
-
-# As in crosscheck.settle.physics: MuJoCo's mass unit is chosen so that the platform has this mass.
-_MASS_IN_MUJOCO = 1e6
-
-Group = tuple[Index, Index, Index]
+from seecr.pose import Array, quat_multiply
 
 
 class World(Physics):
@@ -35,33 +29,19 @@ class World(Physics):
         places: where its parts are in the model.
         segments: N of each cable.
         cable_dofs: (m, h) coordinates of each cable's own parts.
-        coupling: see :func:`_coupling`.
+        coupling: a few groups, however long the chains are, see :func:`_coupling`.
     """
 
     def __init__(self, true: TrueRobot, segments: int = 1) -> None:
         self.true, self.segments = true, segments
-        self.name = true.robot.name
-        self.model, self.places = build(true, segments)
-        self.source = self.model
-        self.body = self.places.platform
-        self.is_free = not true.robot.joints
-        self._anchor_sites, self._exit_sites = self.places.anchors, self.places.exits
-        self.ignored = switch_off(self.model)
-        self.mass = true.mass
-        self.mass_unit = 2.0 ** round(float(np.log2(self.mass / _MASS_IN_MUJOCO)))
-        change_mass_unit(self.model, self.mass_unit)
-        self.data = mujoco.MjData(self.model)
-        self.reference_qpos = self.model.qpos0.copy()
-        self.reference_gravity = true.gravity.copy()
-        self.wrench = np.zeros(6)
-        self.length = true.robot.length
-        self.rotations = self._which_rotate()
-        self.metre = np.where(self.rotations, self.length, 1.0)
-        hubs = np.concatenate([self.places.exit_dofs, self.places.slider_dofs], axis=1)
-        nodes = self.places.node_dofs.reshape(true.n_cables, -1)
+        model, self.places = build(true, segments)
+        places = self.places
+        parts = Parts(places.platform, places.exits, places.anchors)
+        super().__init__(model, parts, true.robot.length)
+        hubs = np.concatenate([places.exit_dofs, places.slider_dofs], axis=1)
+        nodes = places.node_dofs.reshape(true.n_cables, -1)
         self.cable_dofs = np.concatenate([hubs, nodes], axis=1)
-        self.coupling = _coupling(self.places, self.n_dof, segments)
-        self.force_scale = 1.0
+        self.coupling = _coupling(places, self.n_dof, segments)
         self.set_load(true.wrench, true.gravity)
         self._start_springs(true)
         self._start_sheaves(true.up)
@@ -85,6 +65,11 @@ class World(Physics):
     def n_cables(self) -> int:
         """Number of cables m (each is N tendons)."""
         return self.true.n_cables
+
+    @property
+    def n_platform(self) -> int:
+        """How many of the coordinates are the platform's own: the first ones."""
+        return self.places.n_platform
 
     @property
     def steers(self) -> bool:
@@ -136,24 +121,9 @@ class World(Physics):
             self._string()
             self.update()
 
-    def _joints_towards(self, pose: Array) -> None:
-        """Gauss-Newton on the platform's joints until it is as near as they let it."""
-        n = self.places.n_platform
-        weigh = np.array([1.0, 1.0, 1.0] + 3 * [self.length])
-        jacobian = np.zeros((6, self.n_dof))
-        for _ in range(50):
-            mujoco.mj_kinematics(self.model, self.data)
-            mujoco.mj_comPos(self.model, self.data)
-            gap = weigh * pose_difference(pose, self.pose())
-            mujoco.mj_jacBody(self.model, self.data, jacobian[:3], jacobian[3:], self.body)
-            step = np.linalg.lstsq(weigh[:, None] * jacobian[:, :n], gap, rcond=None)[0]
-            self.data.qpos[:n] += step
-            if np.linalg.norm(step * self.metre[:n]) < 1e-15 * self.length:
-                break
-
     def _string(self) -> None:
         """Point masses where a chain hangs between its ends."""
-        end = self.data.site_xpos[self._anchor_sites]
+        end = self.data.site_xpos[self.parts.anchors]
         free = self._rest * self.free_share
         up = -self.true.gravity / np.linalg.norm(self.true.gravity)
         weight = self.true.cable_weight * up
@@ -276,8 +246,7 @@ class World(Physics):
 def _coupling(places: Places, n_dof: int, segments: int) -> list[Group]:
     """Groups of coordinates that may be shifted together to difference the forces.
 
-    Each group: the coordinates, and the (rows, columns) of the stiffness that one shift of all
-    of them gives. Cables meet only on the platform and segments only at their ends, so however
+    Cables meet only on the platform and segments only at their ends, so however
     long the chains are, a few groups do.
     """
     groups: list[Group] = []
@@ -286,8 +255,9 @@ def _coupling(places: Places, n_dof: int, segments: int) -> list[Group]:
         groups.append((np.array([k]), rows, np.full(n_dof, k)))
     hubs = np.concatenate([places.exit_dofs, places.slider_dofs], axis=1)
     blocks = [hubs, *(places.node_dofs[:, j] for j in range(segments - 1))]
-    for colour in range(4):
-        mine = [0] if colour == 0 else list(range(colour, segments, 3))
+    for part in range(4):
+        # hubs first, then every third mass: what lies between them keeps their forces apart
+        mine = [0] if part == 0 else list(range(part, segments, 3))
         for axis in range(max((blocks[b].shape[1] for b in mine), default=0)):
             columns: list[Index] = []
             near_rows: list[Index] = []

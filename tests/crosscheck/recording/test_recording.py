@@ -17,7 +17,8 @@ from crosscheck.errors import CrosscheckError
 from crosscheck.recording import shapes, write_case_recording
 from crosscheck.recording.colours import cable_colours, round_up, scale_colours
 from crosscheck.recording.series import Series
-from crosscheck.settle.settling import SettleStatus, SettlingBatch
+from crosscheck.settle.relax import SettleStatus
+from crosscheck.settle.settler import SettlingBatch
 from crosscheck.suite.cases import Case, demobot_sweep, user_cases
 from crosscheck.suite.results import Run, results_json
 from crosscheck.suite.run import CaseResult, run_case

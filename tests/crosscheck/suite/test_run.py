@@ -11,7 +11,7 @@ import pytest
 
 import seecr
 from crosscheck.errors import CrosscheckError, InputFileError
-from crosscheck.settle.settling import SettlingBatch
+from crosscheck.settle.settler import Settling, SettlingBatch
 from crosscheck.suite import agreement, cases, verdicts
 from crosscheck.suite import run as suite
 from crosscheck.suite.cases import (
@@ -22,8 +22,8 @@ from crosscheck.suite.cases import (
     shipped_cases,
     user_cases,
 )
+from crosscheck.suite.mujoco_robot import MujocoRobot, screw_motion
 from crosscheck.suite.run import CaseResult, run_case, run_suite, worst_of
-from crosscheck.suite.side import MujocoSide, screw_motion
 from crosscheck.suite.thresholds import SHIPPED, load_thresholds, thresholds_toml
 from crosscheck.suite.verdicts import Verdict
 from seecr.pose import pose_add, pose_difference, quat_from_rotvec
@@ -48,6 +48,12 @@ def with_stiffer_cable(model: Path, folder: Path, factor: float, cable: int = 0)
     path = folder / f"changed_{model.name}"
     tree.write(path)
     return path
+
+
+def with_eigenvalue(settling: Settling, eigenvalue: float, residual: float = 1e-9) -> Settling:
+    """A settling as if the robot were that soft [N/m], and so much were left unbalanced."""
+    polished = replace(settling.polished, smallest_eigenvalue=eigenvalue, residual=residual)
+    return replace(settling, polished=polished, rest=replace(settling.rest, residual=residual))
 
 
 @pytest.fixture(scope="module")
@@ -239,12 +245,12 @@ def test_another_mjcf_for_mujoco_keeps_its_own_stiffness(tmp_path):
     changed = with_stiffer_cable(COGIRO, tmp_path, 1.001)
     poses = cases.demobot_sweep(0.1, 1)
     case = case_of(COGIRO, poses, mujoco_model=changed, cable="vectran")
-    np.testing.assert_allclose(MujocoSide(changed, case.mujoco_ea).settler.ea[0], 3003.0)
+    np.testing.assert_allclose(MujocoRobot(changed, case.mujoco_ea).settler.ea[0], 3003.0)
     assert run_case(case, load_thresholds()).exit_status == 1
 
 
 def test_mujoco_measures_the_lengths_it_pays_out_itself(tmp_path):
-    side = MujocoSide(PARALLEL)
+    side = MujocoRobot(PARALLEL)
     robot = seecr.load_robot(PARALLEL)
     poses = cases.demobot_random(np.random.default_rng(5), 10, 0.2)
     expected = robot.commanded_lengths(poses)
@@ -290,7 +296,7 @@ def test_a_cable_on_the_border_of_slack_is_polished_and_holds_nothing():
     # On its free turn the platform stops where a third cable is about to pull: the polish must
     # balance the forces there, and not take that cable's rounding for stiffness.
     command = np.array([0.6080615721734167, 0.38888280018700916, 0.20581767053691352, 1, 0, 0, 0])
-    (settling,) = MujocoSide(PARALLEL, 1000.0).settle(command[None])
+    (settling,) = MujocoRobot(PARALLEL, 1000.0).settle(command[None])
     assert settling.settled, settling.status.value
     assert settling.residual < 1e-11
     third = np.sort(settling.tensions)[-3]
@@ -327,7 +333,7 @@ def seesaw_answers(path: Path) -> verdicts.Answers:
     """SEECR to the one side, MuJoCo to the other, of the same command."""
     command = np.array([[0.0, 0, 0, 1, 0, 0, 0]])
     left, right = (np.r_[0.0, 0, 0, quat_from_rotvec(np.array([0, a, 0]))] for a in (-0.4, 0.4))
-    robot, side = seecr.load_robot(path), MujocoSide(path)
+    robot, side = seecr.load_robot(path), MujocoRobot(path)
     solution = seecr.solve(robot, command, start=left[None])
     settling = SettlingBatch([side.settle_from(right, command[0])])
     allowance = agreement.allowances(load_thresholds(), solution, settling)
@@ -371,13 +377,13 @@ def test_unsolved_poses_are_neither_passes_nor_differences(monkeypatch):
 
 
 def test_mujoco_that_does_not_settle_is_unsolved(monkeypatch):
-    original = MujocoSide.__init__
+    original = MujocoRobot.__init__
 
     def impatient(self, *arguments, **options):
         original(self, *arguments, **options)
         self.settler.max_steps = 5
 
-    monkeypatch.setattr(MujocoSide, "__init__", impatient)
+    monkeypatch.setattr(MujocoRobot, "__init__", impatient)
     result = run_case(case_of(COGIRO, cases.demobot_sweep(0.1, 2)), load_thresholds())
     assert list(result.verdict) == [Verdict.MUJOCO_UNSOLVED] * 2
     assert np.isnan(result.difference.position_m).all()
@@ -393,7 +399,7 @@ def test_thresholds_widen_only_where_residual_over_stiffness_is_more(ends):
     assert not result.allowance.widened.any()
     assert np.all(result.allowance.position_m == 1e-8)
     soft = SettlingBatch(
-        replace(one, smallest_eigenvalue=eigenvalue, residual=1e-9, settled_residual=1e-9)
+        with_eigenvalue(one, eigenvalue, residual=1e-9)
         for one, eigenvalue in zip(result.settling, (1e-2, 1e3), strict=True)
     )
     solution = result.solution
@@ -406,7 +412,7 @@ def test_thresholds_widen_only_where_residual_over_stiffness_is_more(ends):
     assert list(wide.widened) == [True, False]
     lost = replace(solution, residual=np.array([np.inf, np.nan]))
     assert not agreement.allowances(thresholds, lost, soft).widened.any()
-    none = SettlingBatch(replace(one, smallest_eigenvalue=0.0) for one in soft)
+    none = SettlingBatch(with_eigenvalue(one, 0.0) for one in soft)
     assert not agreement.allowances(thresholds, solution, none).widened.any()
 
 

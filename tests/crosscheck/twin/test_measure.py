@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import ast
 import dataclasses
 from dataclasses import dataclass
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 import pytest
 from effect_cases import experiment_of
 
-import crosscheck.twin
 from crosscheck.errors import CrosscheckError
-from crosscheck.settle.relax import come_to_rest
-from crosscheck.settle.settling import SettleStatus
+from crosscheck.settle.relax import SettleStatus, come_to_rest
 from crosscheck.suite.effect_cases import ROBOTS, effect_cases, run_effect_case
 from crosscheck.twin.chain import hang
 from crosscheck.twin.descent import descend
@@ -217,21 +213,3 @@ class Moonlight(Effect):
 def test_an_effect_without_a_truth_is_refused():
     with pytest.raises(CrosscheckError, match="moonlight: no truth with MuJoCo; expected one of"):
         true_robot(robot_named(), [Moonlight()])
-
-
-def test_the_truth_shares_no_physics_with_seecr():
-    """Only names and parameters of effects, the robot's numbers, commands and pose algebra."""
-    allowed = {"seecr.effects", "seecr.robot", "seecr.setup", "seecr.pose"}
-    folder = Path(crosscheck.twin.__file__).parent
-    for file in sorted(folder.glob("*.py")):
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Import):
-                assert not any(alias.name.startswith("seecr") for alias in node.names), file
-            if not isinstance(node, ast.ImportFrom) or not (node.module or "").startswith("seecr"):
-                continue
-            assert node.module in allowed, file
-            names = {alias.name for alias in node.names}
-            assert node.module != "seecr.setup" or names == {"Commands"}, file
-            assert node.module != "seecr.effects" or names == {"Effect"}, file
-    text = "\n".join(file.read_text(encoding="utf-8") for file in folder.glob("*.py"))
-    assert "edit_setup" not in text and "edit_readings" not in text

@@ -1,4 +1,4 @@
-"""MuJoCo's side of the suite: one robot settled, with lengths that MuJoCo measured itself."""
+"""A robot in MuJoCo commanded in poses, as SEECR is, with lengths that MuJoCo measured itself."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from crosscheck.settle.settler import Settler, settle_batch
-from crosscheck.settle.settling import Settling, SettlingBatch
+from crosscheck.settle.settler import Settler, Settling, SettlingBatch, settle_batch
 from seecr.pose import Array, pose_difference, quat_from_rotvec, quat_multiply, quat_rotate
 
 # Points looked at between two poses that should be joined by a free motion.
@@ -16,7 +15,7 @@ _STATIONS = 9
 _STRAIGHT = 1e-7
 
 
-class MujocoSide:
+class MujocoRobot:
     """A robot in MuJoCo that is commanded in poses, as SEECR is.
 
     Attributes:

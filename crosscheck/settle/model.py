@@ -98,7 +98,7 @@ def check_cables(model: mujoco.MjModel, body: int, where: str) -> None:
 
 
 def switch_off(model: mujoco.MjModel) -> tuple[str, ...]:
-    """Leave springs, gravity and inertia; return sentences on what was there besides."""
+    """Leave springs, gravity and inertia; return names of what was there besides."""
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
     model.opt.disableflags |= sum(int(flag) for flag in _DISABLE)
     model.opt.tolerance = 1e-8  # relative, of the solve for the implicit step
@@ -111,7 +111,7 @@ def switch_off(model: mujoco.MjModel) -> tuple[str, ...]:
         "damping": model.dof_damping.any() or model.tendon_damping.any(),
         "contacts": model.geom_contype.any() and model.geom_conaffinity.any(),
     }
-    return tuple(f"{what} of the MJCF ignored" for what, there in found.items() if there)
+    return tuple(what for what, there in found.items() if there)
 
 
 def change_mass_unit(model: mujoco.MjModel, mass_unit: float) -> None:
