@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 from crosscheck.errors import CrosscheckError
 from crosscheck.fit.candidates import layouts_for, null_fit, seen_directions, try_candidate
 from crosscheck.fit.evidence import FALSE_ALARM, p_value
-from crosscheck.fit.gauss_newton import Fit, fit, ordered, sizes
+from crosscheck.fit.gauss_newton import Fit, fit
 from crosscheck.fit.held_out import hold_out, improves, pays, unfitted
 from crosscheck.fit.noise import Whiteness, whiteness
 from crosscheck.fit.prepare import Progress, outlying_rows, prepare
@@ -19,11 +19,11 @@ from crosscheck.fit.problem import Problem, Rms, rms_by_kind
 from crosscheck.fit.state import evaluate
 from crosscheck.measurements.read import Measurements
 from crosscheck.model.write import Fitted
-from seecr.effects import effect_named, layout_of
+from seecr.effects import Terms, effect_named, layout_of
 from seecr.effects.base import Layout
 from seecr.pose import Array
 from seecr.robot import Robot
-from seecr.sensitivity import Term, effects_of
+from seecr.sensitivity import Term
 
 # A value this many plausible sizes from null deserves a second look.
 _IMPLAUSIBLE = 5.0
@@ -76,7 +76,7 @@ class Addition:
 def add_effect(
     robot: Robot,
     data: Measurements,
-    terms: Sequence[Term],
+    terms: Iterable[Term],
     name: str,
     progress: Progress = lambda _text, _part: None,
 ) -> Addition:
@@ -94,15 +94,16 @@ def add_effect(
         CrosscheckError: the data cannot carry it.
     """
     layout = layout_of(effect_named(name), robot)
-    problem, notes, why = prepare(robot, data, terms)
+    model = Terms(terms)
+    problem, notes, why = prepare(robot, data, model)
     if why:
         kind = UnsolvedError if not problem.n_readings or "equilibrium" in why else CrosscheckError
         raise kind(f"{data.path}: {why}; {name} was not fitted")
     _refuse(problem, layout)
     progress(f"fitting {name}", 0.0)
-    plain = problem.experiment.predict(effects_of(ordered(terms)))
+    plain = problem.experiment.predict(model.effects)
     factor = problem.noise(plain)
-    best = _fitted(problem, terms, layout, factor)
+    best = _fitted(problem, model, layout, factor)
     progress("looking for outliers", 0.4)
     outliers = outlying_rows(problem, best.state)
     if outliers.any():
@@ -111,9 +112,9 @@ def add_effect(
         words = f"{word} {lines} left out: outliers, far off the others"
         notes.append(words)
         problem = problem.without(outliers, words)
-        best = _fitted(problem, terms, layout, factor)
+        best = _fitted(problem, model, layout, factor)
     progress("predicting runs left out", 0.6)
-    return _weigh(problem, terms, layout, factor, best, notes)
+    return _weigh(problem, model, layout, factor, best, notes)
 
 
 def _refuse(problem: Problem, layout: Layout) -> None:
@@ -124,24 +125,20 @@ def _refuse(problem: Problem, layout: Layout) -> None:
         )
 
 
-def _rest(terms: Sequence[Term], layout: Layout) -> tuple[Term, ...]:
-    return ordered([t for t in terms if t.name != layout.name])
-
-
-def _base(problem: Problem, terms: Sequence[Term], layout: Layout, factor: Array) -> Fit:
+def _base(problem: Problem, terms: Terms, layout: Layout, factor: Array) -> Fit:
     """The model without the effect, at its own best."""
-    rest = _rest(terms, layout)
+    rest = terms.without(layout.name)
     base = null_fit(problem, rest, factor, refit=bool(rest))
     if not base.valid:
         raise UnsolvedError(f"{problem.data.path}: the model without {layout.name}: {base.why}")
     return base
 
 
-def _fitted(problem: Problem, terms: Sequence[Term], layout: Layout, factor: Array) -> Fit:
+def _fitted(problem: Problem, terms: Terms, layout: Layout, factor: Array) -> Fit:
     """The best joint fit, from where the effect stands and from its most promising starts."""
     trials = []
-    if layout.name in [t.name for t in terms]:
-        trials.append(fit(problem, ordered(terms), factor))
+    if layout.name in terms:
+        trials.append(fit(problem, terms, factor))
     tried = try_candidate(problem, _base(problem, terms, layout, factor), layout, factor)
     if tried.fit is not None:
         trials.append(fit(problem, tried.fit.terms, factor, tried.fit.state))
@@ -155,18 +152,18 @@ def _fitted(problem: Problem, terms: Sequence[Term], layout: Layout, factor: Arr
 
 def _weigh(
     problem: Problem,
-    terms: Sequence[Term],
+    terms: Terms,
     layout: Layout,
     factor: Array,
     best: Fit,
     notes: list[str],
 ) -> Addition:
     base = _base(problem, terms, layout, factor)
-    rest = _rest(terms, layout)
-    without = hold_out(problem, base, factor) if rest else unfitted(problem, (), base)
+    rest = terms.without(layout.name)
+    without = hold_out(problem, base, factor) if rest else unfitted(problem, Terms(), base)
     held = hold_out(problem, best, factor)
     white = whiteness(problem, best.state.white, int(np.sum(np.isfinite(best.stderr))))
-    stood = evaluate(problem, ordered(terms), factor)
+    stood = evaluate(problem, terms, factor)
     fall = improves(without, held)
     drop = (base.chi2 - best.chi2) / max(1.0, white.scale) ** 2
     p = p_value(drop, seen_directions(best, layout.name), False)
@@ -189,12 +186,8 @@ def _weigh(
 
 
 def _split(best: Fit, scale: float) -> tuple[Fitted, ...]:
-    out, first = [], 0
-    for term in best.terms:
-        part = slice(first, first + len(term.layout))
-        out.append(Fitted(term, best.stderr[part] * scale, best.at_bound[part]))
-        first += len(term.layout)
-    return tuple(out)
+    parts = [(term, best.terms.part(term.name)) for term in best.terms]
+    return tuple(Fitted(t, best.stderr[own] * scale, best.at_bound[own]) for t, own in parts)
 
 
 def _warnings(best: Fit, fitted: Sequence[Fitted], name: str) -> list[str]:
@@ -206,7 +199,7 @@ def _warnings(best: Fit, fitted: Sequence[Fitted], name: str) -> list[str]:
             out.append(f"{f.term.name}: {_some(names[stopped])} ended on a bound")
         if (unseen & ~stopped).any():
             out.append(f"{f.term.name}: {_some(names[unseen & ~stopped])} not seen by these data")
-        size = np.abs(sizes([f.term]))
+        size = np.abs(f.term.sizes)
         large = (size > _IMPLAUSIBLE) & ~f.term.layout.shape
         if large.any():
             out.append(
@@ -218,14 +211,13 @@ def _warnings(best: Fit, fitted: Sequence[Fitted], name: str) -> list[str]:
 
 def _together(best: Fit, name: str) -> list[str]:
     """Parameters of the effect that are hardly determined apart from those of another."""
-    owner = [t.name for t in best.terms for _ in t.layout.names]
-    labels = [f"{t.name}.{key}" for t in best.terms for key in t.layout.names]
+    own, labels = best.terms.own(name), [".".join(label) for label in best.terms.labels]
     table = np.abs(best.correlation)
     pairs = [
         (float(table[i, j]), i, j)
-        for i in range(len(owner))
-        for j in range(len(owner))
-        if owner[i] == name and owner[j] != name and table[i, j] > _CORRELATED
+        for i in np.flatnonzero(own).tolist()
+        for j in np.flatnonzero(~own).tolist()
+        if table[i, j] > _CORRELATED
     ]
     return [
         f"{labels[i]} and {labels[j]} are hardly determined apart (correlation {c:.3f})"

@@ -59,7 +59,7 @@ class Solution:
         deviation: (n, 6) [m, rad] pose less command: displacement and rotation vector, base
             frame. It carries more digits than the difference of the two poses.
         tensions: (n, m) [N] at the exit point.
-        slack: (n, m) bool.
+        slack: (n, m) bool, as :func:`seecr.statics.is_slack` has it.
         rest_lengths: (n, m) [m].
         iterations: (n,) evaluations of the wrench.
         residual: (n,) unbalanced force, and torque over the robot's length, relative to the
@@ -127,10 +127,7 @@ class Solution:
 
     def _units(self) -> Array:
         """Robot's length for rotations, 1 for translations, (d,)."""
-        if not self.robot.joints:
-            return np.repeat([1.0, self.robot.length], 3)
-        hinges = [joint.kind == "hinge" for joint in self.robot.joints]
-        return np.where(hinges, self.robot.length, 1.0)
+        return np.where(self.robot.hinges, self.robot.length, 1.0)
 
     def sentence(self, i: int) -> str:
         """What became of pose i, with the direction where it is singular or unstable."""
@@ -224,9 +221,8 @@ def start_of(
         return None, None
     if not robot.joints:
         return statics.deviations(tables, start), None
-    hinge = np.array([joint.kind == "hinge" for joint in robot.joints])
     change = values_of_pose(robot, start)[0] - values_of_pose(robot, tables.poses)[0]
-    return statics.deviations(tables, start), change * np.where(hinge, robot.length, 1.0)
+    return statics.deviations(tables, start), change * np.where(robot.hinges, robot.length, 1.0)
 
 
 def certify(robot: Robot, tables: statics.Tables, found: statics.Evaluation) -> Solution:
@@ -248,21 +244,13 @@ def certify(robot: Robot, tables: statics.Tables, found: statics.Evaluation) -> 
         pose=_blank(statics.platform_poses(tables, moved), lost),
         deviation=_blank(np.concatenate([moved[:, :3], rotvec_from_quat(turn)], axis=1), lost),
         tensions=_blank(check.states[..., cable_law.TENSION], lost),
-        slack=is_slack(tables, check),
+        slack=statics.is_slack(tables, check),
         rest_lengths=tables.cables[..., cable_law.REST],
         iterations=found.count,
         residual=np.where(lost, np.inf, check.residual),
         energy=check.energy,
         status=status,
     )
-
-
-def is_slack(tables: statics.Tables, found: statics.Evaluation) -> NDArray[np.bool_]:
-    """Cables that do not pull, (n, m); a tension of mere rounding is none."""
-    rounding = kernel.IDLE * tables.scale[:, None]
-    loose = found.states[..., cable_law.SLACK] > 0.5
-    idle = found.states[..., cable_law.TENSION] < rounding
-    return np.asarray(loose | idle)
 
 
 def _blank(values: Array, rows: NDArray[np.bool_]) -> Array:

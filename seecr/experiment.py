@@ -55,9 +55,14 @@ class Prediction:
         return np.asarray(self.found.outcome == kernel.SINGULAR)
 
     @property
-    def poses(self) -> Array:
+    def pose(self) -> Array:
         """(n, 7) where the platform rests."""
         return statics.platform_poses(self.tables, self.found.deviation)
+
+    @property
+    def slack(self) -> NDArray[np.bool_]:
+        """(n, m) cables that are slack, as :func:`seecr.statics.is_slack` has it."""
+        return statics.is_slack(self.tables, self.found)
 
     @property
     def tensions(self) -> Array:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from seecr.joints import motion_columns, pose_of_values, values_of_pose
 from seecr.pose import Array, cross, pose_add, pose_difference, quat_rotate
 from seecr.robot import Robot
-from seecr.setup import Commands, run_starts
+from seecr.setup import Commands
 
 # Waypoints on the way to the first row of a run, and from row to row.
 _APPROACH, _BETWEEN = 6, 2
@@ -130,16 +130,15 @@ class _Ways:
 
 
 def _ways(robot: Robot, commands: Commands) -> _Ways:
-    fresh = run_starts(commands.run, len(commands))
+    fresh = commands.starts
     if not robot.joints:
         start = _before(commands.pose, robot.reference_pose, fresh)
         change = pose_difference(commands.pose, start)
         return _Ways(robot, fresh, start, change, np.linalg.norm(change[:, 3:], axis=1))
     values = values_of_pose(robot, commands.pose)[0]
     start = _before(values, np.zeros(robot.n_dof), fresh)
-    hinges = [joint.kind == "hinge" for joint in robot.joints]
     change = values - start
-    return _Ways(robot, fresh, start, change, np.abs(change[:, hinges]).sum(axis=1))
+    return _Ways(robot, fresh, start, change, np.abs(change[:, robot.hinges]).sum(axis=1))
 
 
 def _before(rows: Array, home: Array, fresh: NDArray[np.bool_]) -> Array:
@@ -156,7 +155,7 @@ def turning(robot: Robot, commands: Commands) -> Commands:
     as such never do.
     """
     if commands.lengths is not None:
-        fresh = run_starts(commands.run, len(commands))
+        fresh = commands.starts
         start = _before(commands.lengths, robot.rest_lengths, fresh)
         return replace(commands, passed=start[None])
     ways, told = _ways(robot, commands), commands.nominal_change(robot)

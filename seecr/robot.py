@@ -7,6 +7,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seecr.errors import InputError, RobotError
 from seecr.pose import Array, transform_points
@@ -117,8 +118,25 @@ class Robot:
 
     @property
     def n_dof(self) -> int:
-        """Degrees of freedom of the platform: 6 when free, else one a joint."""
+        """Degrees of freedom of the platform: 6 when free, else one per joint."""
         return len(self.joints) or 6
+
+    @cached_property
+    def hinges(self) -> NDArray[np.bool_]:
+        """(d,) which coordinates of the platform turn it: hinges; the last three when free."""
+        if not self.joints:
+            return np.repeat([False, True], 3)
+        return np.array([joint.kind == "hinge" for joint in self.joints])
+
+    @property
+    def up(self) -> Array:
+        """Unit vector (3,) against gravity; base z where there is none.
+
+        It is the axis on which pulleys swivel. The frame carries the pulleys, so a tilt of
+        gravity against the frame does not turn it.
+        """
+        g = np.linalg.norm(self.gravity)
+        return -self.gravity / g if g > 0 else np.array([0.0, 0.0, 1.0])
 
     @property
     def weight(self) -> float:

@@ -11,7 +11,7 @@ from seecr import statics
 from seecr.compiled import descent as kernel
 from seecr.compiled import law as cable_law
 from seecr.pose import Array, quat_from_rotvec, quat_multiply
-from seecr.setup import Setup, upwards
+from seecr.setup import Setup
 
 # Not an outcome of the compiled loop: SciPy said that it failed.
 GAVE_UP = 100
@@ -23,7 +23,7 @@ def first_guess(setup: Setup) -> Array:
     l_vmean is the mean vertical extent of the cables; the paper prints their sum and calls it
     the mean.
     """
-    up = upwards(setup.robot)
+    up = setup.robot.up
     poses = setup.commands.pose
     tables = statics.assemble(setup)
     anchors = tables.cables[0, :, cable_law.ANCHOR : cable_law.ANCHOR + 3]
@@ -55,7 +55,7 @@ def solve_with_scipy(
     n, m = tables.cables.shape[:2]
     found = statics.Evaluation.empty(n, m, tables.n_dof)
     fall = first_guess(setup)
-    down = -upwards(setup.robot)
+    down = -setup.robot.up
     for i in range(n):
         one = statics.take(tables, np.array([i]))
         point = statics.Evaluation.empty(1, m, tables.n_dof)

@@ -19,6 +19,7 @@ from seecr import response, statics
 from seecr.compiled import law as cable_law
 from seecr.effects.base import Effect, Layout, Readings
 from seecr.effects.checked import is_built_in
+from seecr.effects.terms import Term, Terms
 from seecr.experiment import Experiment, Prediction, read
 from seecr.joints import motion_columns
 from seecr.pose import Array, pose_add, quat_conjugate, quat_multiply, rotvec_from_quat
@@ -29,31 +30,9 @@ from seecr.statics import Tables
 _CENTRAL, _ONE_SIDED, _WALK = 1e-4, 1e-5, 1e-4
 
 
-@dataclass(frozen=True, eq=False)
-class Term:
-    """An effect with values: ``layout`` says which, ``vector`` (p,) how much."""
-
-    layout: Layout
-    vector: Array
-
-    @property
-    def name(self) -> str:
-        """Name of the effect."""
-        return self.layout.name
-
-    def effect(self) -> Effect:
-        """The effect itself."""
-        return self.layout.build(self.vector)
-
-
-def effects_of(terms: Sequence[Term]) -> list[Effect]:
-    """The effects of terms, in their order."""
-    return [term.effect() for term in terms]
-
-
 def sensitivities(
     experiment: Experiment,
-    terms: Sequence[Term],
+    terms: Terms,
     at: Prediction,
     columns: Sequence[int] = (),
     frozen: bool = False,
@@ -62,7 +41,7 @@ def sensitivities(
 
     Args:
         experiment: robot and commands.
-        terms: effects with values, in the order in which they act.
+        terms: effects with values.
         at: the prediction with those values.
         columns: which parameters (counted through all terms); all by default.
         frozen: take the history of each row as given, where the model has history: quick, and
@@ -71,34 +50,32 @@ def sensitivities(
     Returns:
         (n, 6 + m, p): position [m], rotation vector [rad], tensions [N], by each parameter.
     """
-    wanted = list(columns) if len(columns) else list(range(sum(len(t.layout) for t in terms)))
+    wanted = list(columns) if len(columns) else list(range(len(terms)))
     if at.has_history and not frozen:
         return _by_walking(experiment, terms, at, wanted)
     out = np.zeros((*_shape(at), len(wanted)))
     by_wrench = _ByWrench(experiment, at, _sensing(terms))
     todo = {position: c for c, position in enumerate(_positions(terms, wanted))}
-    for which, group in _blocks(terms, todo):
-        block = by_wrench.block(_shifted(terms, which, group))
+    for term, group in _blocks(terms, todo):
+        block = by_wrench.block(_shifted(terms, term, group))
         if block is not None:
-            out[..., [todo.pop((which, k)) for k in group.tolist()]] = block
-    for (which, k), c in todo.items():
-        out[..., c] = by_wrench.column(_shifted(terms, which, k))
+            out[..., [todo.pop((term, k)) for k in group.tolist()]] = block
+    for (term, k), c in todo.items():
+        out[..., c] = by_wrench.column(_shifted(terms, term, k))
     return out
 
 
-def _blocks(
-    terms: Sequence[Term], todo: Container[tuple[int, int]]
-) -> list[tuple[int, NDArray[np.intp]]]:
+def _blocks(terms: Terms, todo: Container[tuple[Term, int]]) -> list[tuple[Term, NDArray[np.intp]]]:
     """What every cable has one of: shifted together, told apart by what each cable does.
 
     Of our own effects alone: nobody has tested that others' leave the other cables be.
     """
     return [
-        (which, group)
-        for which, term in enumerate(terms)
+        (term, group)
+        for term in terms
         if is_built_in(term.layout.effect)
         for group in term.layout.cable_by_cable
-        if all((which, k) in todo for k in group.tolist())
+        if all((term, k) in todo for k in group.tolist())
     ]
 
 
@@ -122,9 +99,10 @@ def _shape(at: Prediction) -> tuple[int, int]:
     return n, 6 + m
 
 
-def _positions(terms: Sequence[Term], wanted: list[int]) -> list[tuple[int, int]]:
-    flat = [(i, k) for i, term in enumerate(terms) for k in range(len(term.layout))]
-    return [flat[c] for c in wanted]
+def _positions(terms: Terms, wanted: list[int]) -> list[tuple[Term, int]]:
+    """Whose parameters are wanted, and which of the term's own each is."""
+    every = [(term, k) for term in terms for k in range(len(term.layout))]
+    return [every[c] for c in wanted]
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,8 +112,8 @@ class _Shift:
     ``apart`` is by how much plus and minus differ, a number or one for each of several.
     """
 
-    plus: list[Term]
-    minus: list[Term]
+    plus: Terms
+    minus: Terms
     apart: Any
     layout: Layout
 
@@ -150,9 +128,8 @@ class _Shift:
         return self.layout.effect.edit_readings is not Effect.edit_readings
 
 
-def _shifted(terms: Sequence[Term], which: int, k: Any, part: float | None = None) -> _Shift:
+def _shifted(terms: Terms, term: Term, k: Any, part: float | None = None) -> _Shift:
     """Shift parameter ``k`` (or those of an index array, together) of one of the terms."""
-    term = terms[which]
     layout, value = term.layout, term.vector[k]
     lower, upper = layout.lower[k], layout.upper[k]
     # a time constant, a radius: what counts is by which part of itself it changes; finely, since
@@ -165,15 +142,15 @@ def _shifted(terms: Sequence[Term], which: int, k: Any, part: float | None = Non
     up = np.where(low, value + small, np.where(high, value, value + step))
     down = np.where(low, value, np.where(high, value - small, value - step))
 
-    def with_value(numbers: Array) -> list[Term]:
+    def with_value(numbers: Array) -> Terms:
         vector = term.vector.copy()
         vector[k] = numbers
-        return [Term(layout, vector) if i == which else t for i, t in enumerate(terms)]
+        return terms.with_term(Term(layout, vector))
 
     return _Shift(with_value(up), with_value(down), up - down, layout)
 
 
-def _sensing(terms: Sequence[Term]) -> bool:
+def _sensing(terms: Terms) -> bool:
     return any(t.layout.effect.edit_readings is not Effect.edit_readings for t in terms)
 
 
@@ -215,8 +192,8 @@ class _ByWrench:
         n, width = _shape(self.at)
         change = np.zeros((n, width))
         if shift.physical:
-            plus = self.experiment.setup(effects_of(shift.plus))
-            minus = self.experiment.setup(effects_of(shift.minus))
+            plus = self.experiment.setup(shift.plus.effects)
+            minus = self.experiment.setup(shift.minus.effects)
             if _differ(plus, minus, _HISTORY_FIELDS):
                 return _difference(self.experiment, shift, self.at)
             change = self._physical(plus, minus, shift.apart)
@@ -228,8 +205,8 @@ class _ByWrench:
         """Derivatives (n, 6 + m, m) by what each cable has of its own, shifted together."""
         if shift.sensing:
             return None
-        plus = self.experiment.setup(effects_of(shift.plus))
-        minus = self.experiment.setup(effects_of(shift.minus))
+        plus = self.experiment.setup(shift.plus.effects)
+        minus = self.experiment.setup(shift.minus.effects)
         if _differ(plus, minus, _HISTORY_FIELDS):
             return None
         if _differ_by_length_only(plus, minus):
@@ -261,11 +238,9 @@ class _ByWrench:
     def _read(self, shift: _Shift, change: Array, apart: float) -> Array:
         at, half = self.at, 0.5 * apart
         move, tension = half * change[:, :6], half * change[:, 6:]
-        ahead = read(
-            effects_of(shift.plus), at.setup, pose_add(at.poses, move), at.tensions + tension
-        )
+        ahead = read(shift.plus.effects, at.setup, pose_add(at.pose, move), at.tensions + tension)
         behind = read(
-            effects_of(shift.minus), at.setup, pose_add(at.poses, -move), at.tensions - tension
+            shift.minus.effects, at.setup, pose_add(at.pose, -move), at.tensions - tension
         )
         return readings_difference(ahead, behind) / apart
 
@@ -320,7 +295,7 @@ def _motion_columns(at: Prediction) -> Array:
         return np.diag(1.0 / np.repeat([1.0, tables.length], 3))[None]
     screws = statics.joints_at_rest(at.tables, at.found)
     per = np.where(screws[..., 0] == 1.0, 1.0 / tables.length, 1.0)
-    return motion_columns(screws, at.poses[:, :3]) * per[:, None, :]
+    return motion_columns(screws, at.pose[:, :3]) * per[:, None, :]
 
 
 def _inverse_stiffness(at: Prediction) -> Array:
@@ -334,20 +309,18 @@ def _inverse_stiffness(at: Prediction) -> Array:
     return out
 
 
-def _by_walking(
-    experiment: Experiment, terms: Sequence[Term], at: Prediction, wanted: list[int]
-) -> Array:
+def _by_walking(experiment: Experiment, terms: Terms, at: Prediction, wanted: list[int]) -> Array:
     out = np.zeros((*_shape(at), len(wanted)))
-    for c, (which, k) in enumerate(_positions(terms, wanted)):
-        out[..., c] = _difference(experiment, _shifted(terms, which, k, _WALK), at)
+    for c, (term, k) in enumerate(_positions(terms, wanted)):
+        out[..., c] = _difference(experiment, _shifted(terms, term, k, _WALK), at)
     return out
 
 
 def _difference(experiment: Experiment, shift: _Shift, at: Prediction) -> Array:
     """Difference of two predictions that are solved in full."""
     near = None if at.has_history else at
-    ahead = experiment.predict(effects_of(shift.plus), near)
-    behind = experiment.predict(effects_of(shift.minus), near)
+    ahead = experiment.predict(shift.plus.effects, near)
+    behind = experiment.predict(shift.minus.effects, near)
     change = readings_difference(ahead.readings, behind.readings) / shift.apart
     change[~(ahead.solved & behind.solved)] = 0.0
     return change

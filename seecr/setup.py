@@ -42,6 +42,11 @@ class Commands:
     def __len__(self) -> int:
         return len(self.pose)
 
+    @property
+    def starts(self) -> NDArray[np.bool_]:
+        """(n,) rows that start a run."""
+        return run_starts(self.run, len(self))
+
     def nominal_change(self, robot: Robot) -> Array:
         """Straight lengths at the commanded poses less those at the reference, (n, m) [m]."""
         if not self._kept or self._kept[0][0] is not robot:
@@ -179,7 +184,7 @@ class Setup:
         out = np.empty((len(poses), self.robot.n_cables))
         lengths_at(
             np.ascontiguousarray(poses, dtype=float), self.anchor_points, self.exit_points,
-            self.pulley_radius, upwards(self.robot), out,
+            self.pulley_radius, self.robot.up, out,
         )  # fmt: skip
         return out
 
@@ -192,16 +197,6 @@ class Setup:
             or np.any(self.creep)
             or np.any(self.backlash)
         )
-
-
-def upwards(robot: Robot) -> Array:
-    """Unit vector (3,) against the robot's gravity; base z where there is none.
-
-    It is the axis on which pulleys swivel. The frame carries the pulleys, so a tilt of
-    gravity against the frame does not turn it.
-    """
-    g = np.linalg.norm(robot.gravity)
-    return -robot.gravity / g if g > 0 else np.array([0.0, 0.0, 1.0])
 
 
 def plain_setup(robot: Robot, commands: Commands, wrench: Array | None = None) -> Setup:

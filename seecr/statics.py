@@ -16,7 +16,7 @@ from seecr.compiled import law as cable_law
 from seecr.joints import values_of_pose
 from seecr.pose import Array, quat_conjugate, quat_multiply
 from seecr.robot import Robot
-from seecr.setup import Setup, upwards
+from seecr.setup import Setup
 
 # Fewer poses than this are not worth a second thread.
 _CHUNK = 128
@@ -151,7 +151,7 @@ def _hanging(setup: Setup) -> Array:
     """Vertical of the planes in which cables hang: gravity's, or the pulleys' own."""
     g = np.linalg.norm(setup.gravity)
     if g == 0.0 or np.any(setup.pulley_radius):
-        return upwards(setup.robot)
+        return setup.robot.up
     return -setup.gravity / g
 
 
@@ -279,6 +279,16 @@ def without_idle(tables: Tables, at: Evaluation) -> Evaluation:
     rest.cables[idle, cable_law.GAP] = -rest.cables[idle, cable_law.REST]
     rest.cables[idle, cable_law.RADIUS] = 0.0
     return evaluate(rest, at)
+
+
+def is_slack(tables: Tables, at: Evaluation) -> NDArray[np.bool_]:
+    """Slack cables, (n, m): those longer than the way they bridge, and those that pull nothing.
+
+    A heavy cable that is longer than its way hangs through and pulls by its weight alone. A
+    tension below what rounding leaves of the load is none.
+    """
+    nothing = at.states[..., cable_law.TENSION] < kernel.IDLE * tables.scale[:, None]
+    return np.asarray((at.states[..., cable_law.SLACK] > 0.5) | nothing)
 
 
 def joints_at_rest(tables: Tables, at: Evaluation) -> Array:

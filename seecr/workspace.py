@@ -115,12 +115,11 @@ def _balance(robot: Robot, poses: Array, wrench: ArrayLike | None) -> tuple[Arra
     load = outer + np.concatenate([np.tile(weight, (n, 1)), np.cross(arm, weight)], axis=1)
     matrix = wrench_matrix(robot, poses)
     if not robot.joints:
-        unit = np.repeat([1.0, 1.0 / robot.length], 3)
+        unit = np.where(robot.hinges, 1.0 / robot.length, 1.0)
         return matrix * unit[:, None], -load * unit
     # the joints take up what they do not move along: only work on their motions must vanish
     columns = motion_columns(values_of_pose(robot, poses)[1], poses[:, :3])
-    hinges = np.array([joint.kind == "hinge" for joint in robot.joints])
-    columns = columns * np.where(hinges, 1.0 / robot.length, 1.0)
+    columns = columns * np.where(robot.hinges, 1.0 / robot.length, 1.0)
     along = np.swapaxes(columns, 1, 2)
     return along @ matrix, -np.einsum("ndk,nk->nd", along, load)
 

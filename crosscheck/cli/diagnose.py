@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,7 @@ import click
 from crosscheck.cli.options import FILE, json_option, out_option, progress_share
 
 if TYPE_CHECKING:
-    from seecr.sensitivity import Term
+    from seecr.effects import Term
 
 
 @click.command(
@@ -39,7 +40,7 @@ def command(
 
     machine = load_robot(robot)
     measured = load_measurements(data, machine)
-    terms: tuple[Term, ...] = ()
+    terms: Iterable[Term] = ()
     if model is not None:
         from crosscheck.model.read import load_model
 

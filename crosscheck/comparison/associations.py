@@ -21,7 +21,6 @@ from crosscheck.comparison.cable_space import cable_errors, cable_lengths, indep
 from crosscheck.comparison.travel import AXES, Travel, travel
 from crosscheck.fit.noise import as_table
 from crosscheck.fit.problem import Problem
-from seecr.compiled import law as cable_law
 from seecr.experiment import Prediction
 from seecr.pose import Array, rotvec_from_quat
 
@@ -109,7 +108,7 @@ def _of_rows(problem: Problem, prediction: Prediction, way: Travel) -> Iterator[
             yield _Quantity("time since the start of the run", into, "s")
     if data.temperature_C is not None:
         yield _Quantity("temperature", data.temperature_C, "C")
-    slack = prediction.found.states[..., cable_law.SLACK] > 0
+    slack = prediction.slack
     yield _Quantity("number of slack cables", slack.sum(axis=1).astype(float))
     taut = np.where(slack, np.nan, prediction.tensions)
     some = np.isfinite(taut).any(axis=1)
@@ -128,7 +127,7 @@ def _in_cables(
         return []
     n = len(errors)
     lengths = cable_lengths(problem, prediction)
-    first = np.concatenate([[True], problem.data.run_index[1:] != problem.data.run_index[:-1]])
+    first = problem.experiment.commands.starts
     home = problem.robot.nominal_lengths(problem.robot.reference_pose[None])
     nominal = problem.robot.nominal_lengths(way.pose)
     before = np.where(first[:, None], home, np.concatenate([home, nominal[:-1]]))

@@ -36,7 +36,7 @@ def cable_errors(problem: Problem, raw: Array, prediction: Prediction) -> tuple[
 
 def cable_lengths(problem: Problem, prediction: Prediction) -> Array:
     """Straight lengths (n, m) [m] of the cables where the model rests."""
-    return problem.robot.nominal_lengths(prediction.poses)
+    return problem.robot.nominal_lengths(prediction.pose)
 
 
 def independent_part(problem: Problem, prediction: Prediction) -> float:
@@ -62,7 +62,7 @@ def independent_part(problem: Problem, prediction: Prediction) -> float:
 
 def _cables(problem: Problem, prediction: Prediction) -> tuple[Array, Array]:
     """Unit vectors to the exit points and arms R b_i, (n, m, 3)."""
-    robot, pose = problem.robot, prediction.poses
+    robot, pose = problem.robot, prediction.pose
     arm = quat_rotate(pose[:, None, 3:], robot.anchor_points[None])
     reach = robot.exit_points - pose[:, None, :3] - arm
     return reach / np.linalg.norm(reach, axis=-1, keepdims=True), arm

@@ -6,7 +6,7 @@ Errors are measured less predicted: position [m] and rotation vector [rad] in th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,17 +16,16 @@ from numpy.typing import NDArray
 from crosscheck.comparison.associations import EVERYWHERE, SIGNIFICANT, associations, channels
 from crosscheck.comparison.regions import regions_of
 from crosscheck.comparison.travel import Travel, travel
-from crosscheck.fit.gauss_newton import ordered
 from crosscheck.fit.held_out import blocks_of
 from crosscheck.fit.noise import Whiteness, as_table, whiteness
 from crosscheck.fit.prepare import noise_floor, outlying_rows, prepare
 from crosscheck.fit.problem import BY_NAME, Problem, Rms, rms_by_kind
 from crosscheck.fit.state import State, evaluate
 from crosscheck.measurements.read import Measurements
-from seecr.compiled import law as cable_law
+from seecr.effects import Terms
 from seecr.pose import Array
 from seecr.robot import Robot
-from seecr.sensitivity import Term, effects_of
+from seecr.sensitivity import Term
 
 _MOST_WORST = 10
 
@@ -65,7 +64,7 @@ class Comparison:
     notes: tuple[str, ...]
 
     @property
-    def terms(self) -> tuple[Term, ...]:
+    def terms(self) -> Terms:
         """The model's effects."""
         return self.state.terms
 
@@ -92,7 +91,7 @@ class Comparison:
         return BY_NAME[kind].sizes(self.problem, self.state.raw)
 
 
-def compare(robot: Robot, data: Measurements, terms: Sequence[Term] = ()) -> Comparison:
+def compare(robot: Robot, data: Measurements, terms: Iterable[Term] = ()) -> Comparison:
     """Hold a model against measurements; nothing is fitted.
 
     Args:
@@ -100,12 +99,13 @@ def compare(robot: Robot, data: Measurements, terms: Sequence[Term] = ()) -> Com
         data: its measurements.
         terms: the model's effects with their values.
     """
-    problem, notes, why = prepare(robot, data, terms)
+    model = Terms(terms)
+    problem, notes, why = prepare(robot, data, model)
     # nothing is fitted here, so nobody asks how cross-validation would cut the data
     notes = [note for note in [*notes, why] if note and note != blocks_of(problem)[1]]
-    plain = problem.experiment.predict(effects_of(ordered(terms)))
+    plain = problem.experiment.predict(model.effects)
     factor = problem.noise(plain)
-    state = evaluate(problem, ordered(terms), factor)
+    state = evaluate(problem, model, factor)
     way = travel(problem, state.prediction)
     some = problem.n_readings > 0
     if some:
@@ -200,7 +200,7 @@ def _unsolved(problem: Problem, state: State) -> list[dict[str, Any]]:
     if len(rows) == 0:
         return []
     status = prediction.solution().status
-    slack = np.asarray((prediction.found.states[..., cable_law.SLACK] > 0).all(axis=1))
+    slack = np.asarray(prediction.slack.all(axis=1))
     return [
         {
             "row": int(k),
@@ -269,14 +269,13 @@ def _rows(found: Comparison) -> dict[str, Any]:
     problem = found.problem
     names, units = channels(problem)
     raw = np.where(problem.counted, found.state.raw, np.nan)
-    slack = found.state.prediction.found.states[..., cable_law.SLACK] > 0
     return {
         "line": problem.data.line.tolist(),
         "run": problem.data.run.tolist(),
         "command": found.way.pose.tolist(),
         "direction": found.way.direction,
         "speed_m_per_s": found.way.speed,
-        "slack_cables": slack.sum(axis=1).tolist(),
+        "slack_cables": found.state.prediction.slack.sum(axis=1).tolist(),
         "channels": [f"{n} [{u}]" for n, u in zip(names, units, strict=True)],
         "error": raw,
     }

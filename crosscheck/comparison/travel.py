@@ -36,11 +36,10 @@ class Travel:
 
 def travel(problem: Problem, prediction: Prediction) -> Travel:
     """The motion that was commanded, never the one measured."""
-    commands, run = problem.experiment.commands, problem.data.run_index
-    pose = commands.pose if commands.lengths is None else prediction.poses
-    first = np.concatenate([[True], run[1:] != run[:-1]])
+    commands = problem.experiment.commands
+    pose = commands.pose if commands.lengths is None else prediction.pose
     before = np.concatenate([pose[:1], pose[:-1]])
-    before = np.where(first[:, None], problem.robot.reference_pose, before)
+    before = np.where(commands.starts[:, None], problem.robot.reference_pose, before)
     step = pose_difference(pose, before)
     weighed = step * np.repeat([1.0, problem.robot.length], 3)
     axis = np.argmax(np.abs(weighed), axis=1)
@@ -52,6 +51,6 @@ def travel(problem: Problem, prediction: Prediction) -> Travel:
     time = problem.data.t_s
     if time is not None:
         apart = np.concatenate([[0.0], np.diff(time)])
-        known = ~first & (apart > 0)
+        known = ~commands.starts & (apart > 0)
         speed[known] = np.linalg.norm(weighed[known], axis=1) / apart[known]
     return Travel(pose, step, direction, speed)

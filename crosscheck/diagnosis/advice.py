@@ -11,8 +11,8 @@ from crosscheck.diagnosis.rivals import Rival
 from crosscheck.diagnosis.search import Search
 from crosscheck.planning.separation import measured_directly, proposals
 from crosscheck.units import in_unit, parameter_name
+from seecr.effects import Term
 from seecr.robot import Robot
-from seecr.sensitivity import Term
 
 
 def check_of(term: Term, robot: Robot) -> str:

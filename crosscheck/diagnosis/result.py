@@ -11,9 +11,9 @@ from crosscheck.diagnosis.rivals import Rival
 from crosscheck.diagnosis.search import Search
 from crosscheck.fit.noise import Whiteness
 from crosscheck.fit.problem import Rms
+from seecr.effects import Term
 from seecr.effects.base import Layout
 from seecr.pose import Array
-from seecr.sensitivity import Term
 
 VERDICTS = ("no_effect_missing", "effects_found", "unknown_effect", "no_verdict")
 

@@ -9,7 +9,7 @@ import numpy as np
 from crosscheck.diagnosis.search import EQUAL, Search
 from crosscheck.fit.candidates import Candidate, try_candidate
 from crosscheck.fit.evidence import evidence
-from crosscheck.fit.gauss_newton import Fit, basis, fit, ordered, own_columns, projected, sizes
+from crosscheck.fit.gauss_newton import Fit, basis, fit, projected
 from seecr.effects import catalogue
 from seecr.effects.base import Layout
 from seecr.pose import Array
@@ -42,7 +42,7 @@ def rivals_of(found: Search, name: str) -> list[Rival]:
     """Effects that could stand in for ``name`` in the final model, the best first."""
     problem, factor, scale = found.problem, found.factor, found.noise_scale
     final = found.last
-    rest = ordered([t for t in final.fit.terms if t.name != name])
+    rest = final.fit.terms.without(name)
     without = fit(problem, rest, factor, final.fit.state) if rest else found.steps[0].fit
     if not without.valid:
         return []
@@ -72,9 +72,9 @@ def rivals_of(found: Search, name: str) -> list[Rival]:
 def _likely(found: Search, name: str, without: Fit) -> list[Candidate]:
     """Candidates that fitted nearly as well as the effect, or can imitate what it does."""
     final = found.last
-    have = {t.name for t in final.fit.terms}
-    own = own_columns(final.fit.terms, name)
-    signal = final.fit.jacobian[:, own] @ sizes(final.fit.terms)[own]
+    have = final.fit.terms.names
+    own = final.fit.terms.own(name)
+    signal = final.fit.jacobian[:, own] @ final.fit.terms.sizes[own]
     signal = projected(signal[:, None], final.fit.jacobian[:, ~own])[:, 0]
     pool, best = _tried_beside(found, name)
     # structure that was left over then counts as noise
@@ -87,7 +87,7 @@ def _likely(found: Search, name: str, without: Fit) -> list[Candidate]:
             out.append(c)
         elif len(found.found) > 1:
             # fitted beside another model, its own fit does not say all
-            columns = c.fit.jacobian[:, own_columns(c.fit.terms, c.name)]
+            columns = c.fit.jacobian[:, c.fit.terms.own(c.name)]
             if contained(signal, projected(columns, without.jacobian)) > _LIKELY:
                 out.append(c)
     return out

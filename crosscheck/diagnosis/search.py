@@ -15,14 +15,13 @@ import numpy as np
 
 from crosscheck.fit.candidates import Candidate, fit_candidate, judged, layouts_for, screen
 from crosscheck.fit.evidence import FALSE_ALARM, Evidence, evidence
-from crosscheck.fit.gauss_newton import Fit, fit, flat, ordered, with_values
+from crosscheck.fit.gauss_newton import Fit, fit
 from crosscheck.fit.held_out import HeldOut, hold_out, pays, unfitted
 from crosscheck.fit.noise import Whiteness, whiteness
 from crosscheck.fit.prepare import Progress
 from crosscheck.fit.problem import Problem
-from seecr.effects import catalogue
+from seecr.effects import Term, Terms, catalogue
 from seecr.pose import Array
-from seecr.sensitivity import Term
 
 # Least gain in log evidence for one more effect (20:1), and the margin within which two models
 # explain equally well.
@@ -101,7 +100,7 @@ class _Node:
 
     @property
     def names(self) -> frozenset[str]:
-        return frozenset(t.name for t in self.fit.terms)
+        return frozenset(self.fit.terms.names)
 
     @property
     def excess(self) -> float:
@@ -222,13 +221,13 @@ class _Searcher:
         out = ranked[_SHAKEN:]
         for node in ranked[:_SHAKEN]:
             best = node.fit
-            scale, lower, upper = (flat(best.terms, k) for k in ("scale", "lower", "upper"))
+            scale, lower, upper = best.terms.scale, best.terms.lower, best.terms.upper
             for k in range(_SHAKES):
                 shake = _SHAKE * scale * rng.normal(size=len(scale))
-                values = np.clip(flat(best.terms, "vector") + shake, lower, upper)
+                values = np.clip(best.terms.vector + shake, lower, upper)
                 self.progress("fitting again from values nearby", k / _SHAKES)
                 again = fit(
-                    self.problem, with_values(best.terms, values), self.factor, best.state,
+                    self.problem, best.terms.with_vector(values), self.factor, best.state,
                     iterations=12, quick=True,
                 )  # fmt: skip
                 if again.valid and again.chi2 < best.chi2:
@@ -241,7 +240,7 @@ class _Searcher:
 
     def conclude(self, root: _Node, best: _Node, seen: dict[frozenset[str], _Node]) -> Search:
         """Fit to the end, look back, and put the effects in order."""
-        held = {t.name for t in self.base.terms}
+        held = set(self.base.terms.names)
         last = self.settled(best)
         last = self.without_needless(last, held)
         steps = self.in_order(root, last, held, seen)
@@ -255,12 +254,11 @@ class _Searcher:
 
     def without_needless(self, node: _Node, held: set[str]) -> _Node:
         """Drop effects whose absence costs no evidence."""
-        own = [t.name for t in node.fit.terms if t.name not in held]
+        own = [name for name in node.fit.terms.names if name not in held]
         if len(own) < 2:
             return node
         for name in own:
-            rest = [t for t in node.fit.terms if t.name != name]
-            shorter = fit(self.problem, rest, self.factor, node.fit.state)
+            shorter = fit(self.problem, node.fit.terms.without(name), self.factor, node.fit.state)
             if not shorter.valid:
                 continue
             other = self.node(shorter)
@@ -279,7 +277,7 @@ class _Searcher:
         steps = [self.step("", root)]
         waiting: list[Step] = []
         todo = [t for t in last.fit.terms if t.name not in held]
-        terms = list(self.base.terms)
+        terms = self.base.terms
         while todo:
             options = self.options(terms, todo, last, seen)
             if not options:
@@ -297,14 +295,14 @@ class _Searcher:
             else:
                 chosen = tried[0]
                 waiting.append(chosen)
-            terms = list(chosen.fit.terms)
+            terms = chosen.fit.terms
             todo = [t for t in todo if t.name != chosen.added]
         for step in waiting:
             self.blame(root, step.added)
         return steps
 
     def options(
-        self, terms: list[Term], todo: list[Term], last: _Node,
+        self, terms: Terms, todo: list[Term], last: _Node,
         seen: dict[frozenset[str], _Node],
     ) -> list[tuple[str, _Node]]:  # fmt: skip
         """The model with each of the effects that are still to come, the best first."""
@@ -312,12 +310,11 @@ class _Searcher:
             return [(todo[0].name, last)]
         out = []
         for term in todo:
-            known = seen.get(frozenset(t.name for t in [*terms, term]))
+            known = seen.get(frozenset([*terms.names, term.name]))
             if known is not None:
                 found = known.fit
             else:
-                values = {t.name: t for t in last.fit.terms}
-                some = ordered([values.get(t.name, t) for t in [*terms, term]])
+                some = last.fit.terms.only([*terms.names, term.name])
                 found = fit(self.problem, some, self.factor, last.fit.state, iterations=8)
             if found.valid:
                 out.append((term.name, self.node(found)))

@@ -13,10 +13,10 @@ import numpy as np
 from crosscheck.diagnosis.search import MOST_EFFECTS, Search, Step
 from crosscheck.fit.candidates import Candidate, layouts_for, try_candidate
 from crosscheck.fit.evidence import evidence
-from crosscheck.fit.gauss_newton import Fit, fit, sizes
+from crosscheck.fit.gauss_newton import fit
 from crosscheck.fit.held_out import hold_out, surely_improves
 from crosscheck.fit.noise import whiteness
-from seecr.sensitivity import Term
+from seecr.effects import Term
 
 # Where structure is left over, an effect of more plausible sizes than this is not believed.
 PLAUSIBLE = 20.0
@@ -54,7 +54,7 @@ def _small_step(way: Search, parameters: int, share: float) -> Step | None:
         c
         for c in last.candidates
         if c.fit is not None and c.evidence is not None and len(c.layout) <= parameters
-        and not np.any(c.fit.at_bound) and is_plausible(_term(c.fit, c.name))
+        and not np.any(c.fit.at_bound) and is_plausible(c.fit.terms[c.name])
     ]  # fmt: skip
     if not small:
         return None
@@ -70,19 +70,15 @@ def _small_step(way: Search, parameters: int, share: float) -> Step | None:
     return step if sure and share_of(last, step) > share else None
 
 
-def _term(of: Fit, name: str) -> Term:
-    return next(t for t in of.terms if t.name == name)
-
-
 def is_plausible(term: Term) -> bool:
     """Whether an effect is of a size that happens; what shapes it has no such size."""
     amplitudes = ~term.layout.shape
-    return bool(np.all(np.abs(sizes([term]))[amplitudes] < PLAUSIBLE))
+    return bool(np.all(np.abs(term.sizes)[amplitudes] < PLAUSIBLE))
 
 
 def _small_candidates(way: Search, parameters: int) -> list[Candidate]:
     """The small effects that the last model does not have, fitted beside it."""
-    held = {t.name for t in way.last.fit.terms}
+    held = way.last.fit.terms.names
     out = []
     for c in layouts_for(way.problem):
         if c.name in held or c.why_not or len(c.layout) > parameters:

@@ -82,7 +82,7 @@ def magnification(problem: Problem, state: State) -> float:
 
     A round number with which all but the largest are within a part of the measured region.
     """
-    place = state.prediction.poses[:, :3]
+    place = state.prediction.pose[:, :3]
     size = KINDS[0].sizes(problem, state.raw)
     size = size[np.isfinite(size)]
     if len(size) == 0 or not np.any(size > 0):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from itertools import takewhile
 from typing import Any
@@ -16,15 +16,15 @@ from crosscheck.diagnosis.rivals import rivals_of
 from crosscheck.diagnosis.search import Search, search
 from crosscheck.diagnosis.small import is_plausible, share_of, smallest_sure
 from crosscheck.fit.candidates import Candidate, null_fit
-from crosscheck.fit.gauss_newton import Fit, flat
+from crosscheck.fit.gauss_newton import Fit
 from crosscheck.fit.noise import whiteness
 from crosscheck.fit.prepare import Progress, noise_floor, outlying_rows, prepare
 from crosscheck.fit.problem import Problem, Rms, rms_by_kind
 from crosscheck.fit.state import derivatives
 from crosscheck.measurements.read import Measurements
+from seecr.effects import Term, Terms
 from seecr.pose import Array
 from seecr.robot import Robot
-from seecr.sensitivity import Term, effects_of
 
 # Where structure is left over, an effect is sure only if it has few parameters and took away
 # most of what was unexplained; by itself, two thirds of all and then a third of the rest.
@@ -39,7 +39,7 @@ _UNDERSTATED = 3.0
 def diagnose(
     robot: Robot,
     data: Measurements,
-    terms: Sequence[Term] = (),
+    terms: Iterable[Term] = (),
     progress: Progress = lambda _text, _part: None,
 ) -> Diagnosis:
     """Find the effects that a model misses.
@@ -50,14 +50,15 @@ def diagnose(
         terms: effects the model has already.
         progress: called with what is being done and the part of it that is done.
     """
-    problem, notes, why = prepare(robot, data, terms)
-    factor = problem.noise(problem.experiment.predict(effects_of(terms)))
-    base = null_fit(problem, terms, factor, refit=False)
+    model = Terms(terms)
+    problem, notes, why = prepare(robot, data, model)
+    factor = problem.noise(problem.experiment.predict(model.effects))
+    base = null_fit(problem, model, factor, refit=False)
     if why or not base.valid:
         return no_verdict(problem, base, notes, why or base.why)
-    if terms:
+    if model:
         # the values of a model come from other fits: they may settle on these data first
-        settled = null_fit(problem, terms, factor, refit=True)
+        settled = null_fit(problem, model, factor, refit=True)
         if settled.valid and settled.chi2 < base.chi2 - 30.0:
             notes.append("the model's values were refitted to these data before the search")
             base = settled
@@ -72,7 +73,7 @@ def diagnose(
 
 
 def _with_derivatives(problem: Problem, base: Fit) -> Fit:
-    jacobian = derivatives(problem, base.state) * flat(base.terms, "scale")
+    jacobian = derivatives(problem, base.state) * base.terms.scale
     return replace(base, jacobian=jacobian)
 
 
@@ -175,13 +176,7 @@ def _is_sure(finding: Finding) -> bool:
 def _finding(found: Search, name: str) -> Finding:
     problem, last = found.problem, found.last
     best = last.fit
-    term = next(t for t in best.terms if t.name == name)
-    first = 0
-    for t in best.terms:
-        if t.name == name:
-            break
-        first += len(t.layout)
-    part = slice(first, first + len(term.layout))
+    term, part = best.terms[name], best.terms.part(name)
     stderr = best.stderr[part] * last.whiteness.inflation
     index = next((k for k, s in enumerate(found.steps) if s.added == name), len(found.steps) - 1)
     step, before = found.steps[index], found.steps[max(index - 1, 0)]
@@ -265,7 +260,7 @@ def _later_reason(found: Search, name: str) -> str:
     for step in reversed(found.steps[1:]):
         for c in step.candidates:
             if c.name == name and c.why_not:
-                return f"beside {', '.join(t.name for t in step.fit.terms)}: {c.why_not}"
+                return f"beside {', '.join(step.fit.terms.names)}: {c.why_not}"
     return ""
 
 

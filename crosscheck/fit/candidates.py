@@ -6,21 +6,19 @@ every candidate is fitted for itself; the derivative only chooses its starts.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from crosscheck.fit.evidence import Evidence, evidence, p_value
-from crosscheck.fit.gauss_newton import Fit, fit, flat, ordered, own_columns, projected
+from crosscheck.fit.gauss_newton import Fit, fit, projected
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.starts import Starts, starts_of
 from crosscheck.fit.state import evaluate
-from seecr.effects import catalogue, layout_of
+from seecr.effects import Term, Terms, catalogue, layout_of
 from seecr.effects.base import Layout
 from seecr.errors import InputError
 from seecr.pose import Array
-from seecr.sensitivity import Term
 
 # Most Gauss-Newton steps of a trial; what is chosen is fitted to the end.
 _TRIAL_ITERATIONS = 12
@@ -138,7 +136,7 @@ def fit_candidate(
     for vector in first.vectors:
         if best is not None and best.chi2 < _WHITE * noise_scale**2 * len(best.state.white):
             break  # it leaves noise: no other start does better
-        terms = ordered((*base.terms, Term(layout, vector)))
+        terms = base.terms.with_term(Term(layout, vector))
         try:
             found = fit(
                 problem, terms, factor, base.state,
@@ -168,17 +166,17 @@ def judged(found: Fit, base: Fit, screened: Candidate, noise_scale: float) -> Ca
 
 def seen_directions(found: Fit, name: str) -> int:
     """How many directions of an effect's parameters the data see beside the other terms."""
-    own = own_columns(found.terms, name)
+    own = found.terms.own(name)
     others = projected(found.jacobian[:, own], found.jacobian[:, ~own])
     power = np.linalg.eigvalsh(others.T @ others)
     return max(1, int(np.sum(power > 1e-2)))
 
 
-def null_fit(problem: Problem, terms: Sequence[Term], factor: Array, refit: bool) -> Fit:
+def null_fit(problem: Problem, terms: Terms, factor: Array, refit: bool) -> Fit:
     """The model as it stands, as a fit: refitted, or at its stated values."""
     if refit and terms:
-        return fit(problem, ordered(terms), factor)
-    state = evaluate(problem, ordered(terms), factor)
-    p = len(flat(terms, "null"))
+        return fit(problem, terms, factor)
+    state = evaluate(problem, terms, factor)
+    p = len(terms)
     jacobian = np.zeros((len(state.white), p))
     return Fit(state, jacobian, np.zeros((p, p)), np.zeros(p, dtype=bool), state.valid, "", 0)

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special, stats
 
-from crosscheck.fit.gauss_newton import Fit, sizes
+from crosscheck.fit.gauss_newton import Fit
 
 # Family-wise chance of a false alarm, over all candidates of a step.
 FALSE_ALARM = 0.01
@@ -50,7 +50,7 @@ def evidence(fit: Fit, noise_scale: float = 1.0) -> Evidence:
     # a parameter stopped by its bound is not at the optimum the formula is about
     free = ~fit.at_bound
     x = fit.jacobian[:, free] / noise_scale
-    y = white + x @ sizes(fit.terms)[free]
+    y = white + x @ fit.terms.sizes[free]
     power, v = np.linalg.eigh(x.T @ x)
     s = np.sqrt(np.maximum(power, 0.0))
     c2 = (v.T @ (x.T @ y)) ** 2 / np.maximum(power, 1e-300)

@@ -7,7 +7,6 @@ with a row that cannot be solved is no trial; a fit that ends on one is invalid,
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -17,9 +16,8 @@ from scipy import linalg
 
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.state import State, derivatives, evaluate
-from seecr.effects import catalogue
+from seecr.effects import Terms
 from seecr.pose import Array
-from seecr.sensitivity import Term
 
 # The weak prior: this many plausible sizes are one standard deviation.
 PRIOR_SIZES = 10.0
@@ -56,7 +54,7 @@ class Fit:
     iterations: int
 
     @property
-    def terms(self) -> tuple[Term, ...]:
+    def terms(self) -> Terms:
         """The effects with their fitted values."""
         return self.state.terms
 
@@ -85,41 +83,9 @@ class Fit:
         return out
 
 
-def flat(terms: Sequence[Term], name: str) -> Array:
-    """A column of the terms' layouts, or their values (``"vector"``), as one vector."""
-    parts = [t.vector if name == "vector" else getattr(t.layout, name) for t in terms]
-    return np.concatenate(parts) if parts else np.zeros(0)
-
-
-def sizes(terms: Sequence[Term]) -> Array:
-    """(p,) values less their null, in plausible sizes."""
-    return (flat(terms, "vector") - flat(terms, "null")) / flat(terms, "scale")
-
-
-def with_values(terms: Sequence[Term], values: Array) -> tuple[Term, ...]:
-    """The same effects with other values (p,)."""
-    out, first = [], 0
-    for term in terms:
-        count = len(term.layout)
-        out.append(Term(term.layout, values[first : first + count].copy()))
-        first += count
-    return tuple(out)
-
-
-def ordered(terms: Sequence[Term]) -> tuple[Term, ...]:
-    """Terms in the order of the catalogue, in which effects act."""
-    order = {name: i for i, name in enumerate(catalogue())}
-    return tuple(sorted(terms, key=lambda t: order.get(t.name, len(order))))
-
-
-def own_columns(terms: Sequence[Term], name: str) -> np.ndarray:
-    """(p,) bool, the parameters of one effect."""
-    return np.concatenate([np.full(len(t.layout), t.name == name) for t in terms])
-
-
 def fit(
     problem: Problem,
-    terms: Sequence[Term],
+    terms: Terms,
     factor: Array,
     start: State | None = None,
     free: NDArray[np.bool_] | None = None,
@@ -141,11 +107,11 @@ def fit(
         hopeless: stop after a few steps where chi2 is still above this.
     """
     state = evaluate(problem, terms, factor, start)
-    p = len(flat(terms, "null"))
+    p = len(terms)
     free = np.ones(p, dtype=bool) if free is None else free
     if not state.valid:
         return _invalid(state, p, "rows could not be solved at the start of the fit")
-    scale, lower, upper = (flat(terms, k) for k in ("scale", "lower", "upper"))
+    scale, lower, upper = terms.scale, terms.lower, terms.upper
     damping, count = 1e-3, 0
     stale = 0
     jacobian = np.zeros((0, p))
@@ -174,7 +140,7 @@ def fit(
     jacobian = np.zeros((len(state.white), 0))
     if p:
         jacobian = derivatives(problem, state, frozen=quick) * scale
-    values = flat(state.terms, "vector")
+    values = state.terms.vector
     at_bound = (values <= lower) | (values >= upper)
     covariance = _covariance(jacobian, scale, free & ~at_bound)
     return Fit(state, jacobian, covariance, at_bound, True, "", count)
@@ -188,7 +154,7 @@ def _invalid(state: State, p: int, why: str) -> Fit:
 
 def _corrected(jacobian: Array, before: State, after: State) -> Array:
     """Broyden's update: the derivatives made to agree with what the last step did."""
-    step = sizes(after.terms) - sizes(before.terms)
+    step = after.terms.sizes - before.terms.sizes
     change = before.white - after.white  # of the prediction
     length = float(step @ step)
     if length == 0.0:
@@ -197,7 +163,7 @@ def _corrected(jacobian: Array, before: State, after: State) -> Array:
 
 
 def _objective(state: State) -> float:
-    z = sizes(state.terms) / PRIOR_SIZES
+    z = state.terms.sizes / PRIOR_SIZES
     return state.chi2 + state.log_det + float(z @ z)
 
 
@@ -212,8 +178,8 @@ def _step(
 ) -> tuple[State | None, float, float]:
     """One accepted step, or None where no step improves."""
     scale, lower, upper = limits
-    values = flat(state.terms, "vector")
-    z = sizes(state.terms)
+    values = state.terms.vector
+    z = state.terms.sizes
     gradient = -jacobian.T @ state.white + z / PRIOR_SIZES**2
     normal = jacobian.T @ jacobian + np.eye(len(z)) / PRIOR_SIZES**2
     held = ~free
@@ -230,7 +196,7 @@ def _step(
         # no parameter moves by more than a few plausible sizes at once
         step *= min(1.0, 5.0 / max(float(np.max(np.abs(step))), 1e-300))
         trial_values = np.clip(values + step * scale, lower, upper)
-        trial = evaluate(problem, with_values(state.terms, trial_values), factor, state)
+        trial = evaluate(problem, state.terms.with_vector(trial_values), factor, state)
         after = _objective(trial) if trial.valid else np.inf
         if after < before:
             gain = before - after

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.fit.gauss_newton import Fit, fit, flat
+from crosscheck.fit.gauss_newton import Fit, fit
 from crosscheck.fit.problem import Problem, rms_by_kind
+from seecr.effects import Terms
 from seecr.pose import Array
-from seecr.sensitivity import Term
 
 # One run alone is cut into this many blocks of time.
 _BLOCKS = 5
@@ -62,12 +61,12 @@ def hold_out(problem: Problem, best: Fit, factor: Array) -> HeldOut:
     blocks, _note = blocks_of(problem)
     raw = np.full(problem.measured.shape, np.nan)
     chi2, readings = np.zeros(len(blocks)), np.zeros(len(blocks))
-    values = np.zeros((len(blocks), len(flat(best.terms, "null"))))
+    values = np.zeros((len(blocks), len(best.terms)))
     valid = best.valid
     for b, rows in enumerate(blocks):
         fold = fit(problem.only(~rows), best.terms, factor, best.state, iterations=6, quick=True)
         valid = valid and fold.valid
-        values[b] = flat(fold.terms, "vector")
+        values[b] = fold.terms.vector
         raw[rows] = fold.state.raw[rows]
         white = fold.state.table[rows[:, None] & problem.counted]
         solved = bool(np.all(fold.state.prediction.solved[rows]))
@@ -101,14 +100,14 @@ def surely_improves(without: HeldOut, with_effect: HeldOut) -> bool:
     return with_effect.valid and (mean > _SURE_ERRORS * error or every)
 
 
-def unfitted(problem: Problem, terms: Sequence[Term], base: Fit) -> HeldOut:
+def unfitted(problem: Problem, terms: Terms, base: Fit) -> HeldOut:
     """The model as it stands, without a parameter to fit: every row is left out of nothing."""
     blocks, _note = blocks_of(problem)
     table = np.zeros(problem.measured.shape)
     table[problem.row_of, problem.column_of] = base.state.white
     chi2 = np.array([float((table[rows] ** 2).sum()) for rows in blocks])
     readings = np.array([float(problem.counted[rows].sum()) for rows in blocks])
-    values = np.tile(flat(terms, "vector"), (len(blocks), 1))
+    values = np.tile(terms.vector, (len(blocks), 1))
     return HeldOut(
         base.state.raw, chi2, readings, values, rms_by_kind(problem, base.state.raw), base.valid
     )

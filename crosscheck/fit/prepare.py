@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
@@ -11,8 +11,8 @@ from crosscheck.fit.noise import estimate_sigma
 from crosscheck.fit.problem import Problem, Rms, rms_by_kind
 from crosscheck.fit.state import State
 from crosscheck.measurements.read import Measurements
+from seecr.effects import Terms
 from seecr.robot import Robot
-from seecr.sensitivity import Term, effects_of
 
 Progress = Callable[[str, float], None]
 """Called with what is being done and the part of it that is done, 0 to 1."""
@@ -24,15 +24,13 @@ _OUTLIER = 6.0
 _MOST_OUTLIERS = 0.05
 
 
-def prepare(
-    robot: Robot, data: Measurements, terms: Sequence[Term]
-) -> tuple[Problem, list[str], str]:
+def prepare(robot: Robot, data: Measurements, terms: Terms) -> tuple[Problem, list[str], str]:
     """The problem without rows that have no answer; notes; why there can be no verdict."""
     problem = Problem(robot, data, data.sigma, np.ones(data.n_rows, dtype=bool))
     notes = list(data.notes)
     if not problem.measured.any():
         return problem, notes, "the data hold no readings"
-    plain = problem.experiment.predict(effects_of(terms))
+    plain = problem.experiment.predict(terms.effects)
     n = data.n_rows
     for rows, words in (
         (plain.singular, "the platform is free to move there"),

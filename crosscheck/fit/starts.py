@@ -14,16 +14,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.fit.gauss_newton import Fit, ordered, own_columns
+from crosscheck.fit.gauss_newton import Fit
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.state import State, derivatives
 from seecr import statics
 from seecr.compiled import descent as kernel
-from seecr.compiled import law as cable_law
+from seecr.effects import Term, Terms
 from seecr.effects.base import Effect, Layout
 from seecr.experiment import Prediction
 from seecr.pose import Array, pose_add, pose_difference
-from seecr.sensitivity import Term, effects_of, motion_of, sensitivities
+from seecr.sensitivity import motion_of, sensitivities
 
 # Steps of Gauss-Newton; halvings of a step that does not pay.
 _STEPS, _HALVINGS = 12, 5
@@ -94,14 +94,14 @@ def starts_of(problem: Problem, base: Fit, layout: Layout, factor: Array) -> Sta
 
 def _some_slack(base: Fit) -> bool:
     """Whether cables go slack in enough places for a fit to end in a hollow."""
-    slack = base.state.prediction.found.states[..., cable_law.SLACK] > 0
+    slack = base.state.prediction.slack
     return float(np.mean(slack)) > _SLACK_PART
 
 
 def amplitude_columns(problem: Problem, base: Fit, layout: Layout, null: Array) -> Array:
     """(N, p) whitened derivatives by the effect's own parameters at null; 0 for shapes."""
-    terms = ordered((*base.terms, Term(layout, null)))
-    own = own_columns(terms, layout.name)
+    terms = base.terms.with_term(Term(layout, null))
+    own = terms.own(layout.name)
     wanted = np.flatnonzero(own)
     amplitudes = wanted[~layout.shape]
     out = np.zeros((len(base.state.white), len(layout)))
@@ -188,18 +188,18 @@ class _Forces:
         read = np.concatenate([at.readings.position, at.readings.quat_wxyz], axis=1)
         # what the sensors do to a pose is taken off
         self.rows = rows & np.isfinite(read).all(axis=1)
-        self.poses = at.poses.copy()
+        self.poses = at.pose.copy()
         off = pose_difference(measured[self.rows], read[self.rows])
-        self.poses[self.rows] = pose_add(at.poses[self.rows], off)
+        self.poses[self.rows] = pose_add(at.pose[self.rows], off)
 
-    def terms(self, values: Array) -> tuple[Term, ...]:
+    def terms(self, values: Array) -> Terms:
         """The model with the effect."""
-        return (*self.base.terms, Term(self.layout, values))
+        return self.base.terms.with_term(Term(self.layout, values))
 
     def at(self, values: Array) -> tuple[float, Array, Prediction | None]:
         """Cost and whitened displacements (N,), and the state they belong to."""
         problem, experiment = self.problem, self.base.experiment
-        effects = effects_of(self.terms(values))
+        effects = self.terms(values).effects
         setup = experiment.setup(effects)
         if setup.has_history:
             return np.inf, np.zeros(0), None
@@ -226,9 +226,8 @@ class _Forces:
 
     def derivatives(self, values: Array, at: Prediction, columns: NDArray[np.intp]) -> Array:
         """(N, k) of the displacements, whitened."""
-        first = sum(len(t.layout) for t in self.base.terms)
-        wanted = (first + columns).tolist()
         terms = self.terms(values)
+        wanted = np.flatnonzero(terms.own(self.layout.name))[columns].tolist()
         rates = sensitivities(self.base.experiment, terms, at, wanted, frozen=True)
         rates[~self.rows] = 0.0
         rates[:, 6:] = 0.0

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.fit.problem import Problem, in_units_of
+from seecr.effects import Terms
 from seecr.effects.base import Effect
 from seecr.experiment import Experiment, Prediction
 from seecr.pose import Array
-from seecr.sensitivity import Term, effects_of, sensitivities
+from seecr.sensitivity import sensitivities
 
 # A row is far off beyond this mean square of its whitened residuals; only where few rows are
 # (this part of all), it may be that they rest in another equilibrium.
@@ -35,7 +36,7 @@ class State:
         experiment: with the likeliest length errors.
     """
 
-    terms: tuple[Term, ...]
+    terms: Terms
     prediction: Prediction
     raw: Array
     table: Array
@@ -50,14 +51,12 @@ class State:
         """Whether every counted row was solved."""
         return bool(np.isfinite(self.chi2))
 
-    def of(self, terms: Sequence[Term]) -> State:
+    def of(self, terms: Terms) -> State:
         """The same state seen as that of other terms (some more, at null)."""
-        return replace(self, terms=tuple(terms))
+        return replace(self, terms=terms)
 
 
-def evaluate(
-    problem: Problem, terms: Sequence[Term], factor: Array, near: State | None = None
-) -> State:
+def evaluate(problem: Problem, terms: Terms, factor: Array, near: State | None = None) -> State:
     """Predict with the terms and compare.
 
     Where commanded lengths are noisy, the errors they most likely had are found row by row
@@ -70,7 +69,7 @@ def evaluate(
         factor: :meth:`Problem.noise`; used as it is where commanded lengths are exact.
         near: a state to start from.
     """
-    effects = effects_of(terms)
+    effects = terms.effects
     experiment = problem.experiment if near is None else near.experiment
     start = None if near is None else near.prediction
     if not problem.sigma.length_m:
@@ -98,7 +97,7 @@ def _on_measured_branch(problem: Problem, state: State) -> State:
     if len(rows) == 0 or len(rows) > _FEW_ROWS * problem.use.sum():
         return state
     poses = np.concatenate([data.position, data.quat_wxyz], axis=1)[rows]
-    effects = effects_of(state.terms)
+    effects = state.terms.effects
     other = state.experiment.from_other_starts(effects, at, rows, poses)
     there = _compared(
         problem, state.terms, other, problem.residuals(other.readings), state.factor,
@@ -109,7 +108,7 @@ def _on_measured_branch(problem: Problem, state: State) -> State:
     keep = rows[better[rows]]
     if len(keep) == 0:
         return state
-    mixed = state.experiment.from_other_starts(effects, at, keep, other.poses[keep])
+    mixed = state.experiment.from_other_starts(effects, at, keep, other.pose[keep])
     return _compared(
         problem, state.terms, mixed, problem.residuals(mixed.readings), state.factor,
         state.experiment,
@@ -118,7 +117,7 @@ def _on_measured_branch(problem: Problem, state: State) -> State:
 
 def _compared(
     problem: Problem,
-    terms: Sequence[Term],
+    terms: Terms,
     prediction: Prediction,
     raw: Array,
     factor: Array,
@@ -132,7 +131,7 @@ def _compared(
     diagonal = np.log(np.diagonal(factor, axis1=1, axis2=2)) - np.log(problem.reading_sigma)
     log_det = 2.0 * float(diagonal[problem.counted].sum()) if problem.sigma.length_m else 0.0
     return State(
-        tuple(terms), prediction, raw, np.where(problem.measured, table, np.nan), white, factor,
+        terms, prediction, raw, np.where(problem.measured, table, np.nan), white, factor,
         chi2, log_det, experiment,
     )  # fmt: skip
 

@@ -32,11 +32,10 @@ from tomlkit.exceptions import TOMLKitError
 from crosscheck.errors import InputFileError
 from crosscheck.files import read_text
 from crosscheck.model.fingerprint import check_robot, fingerprint
-from seecr.effects import effect_named, layout_of
+from seecr.effects import Term, Terms, effect_named, layout_of
 from seecr.effects.base import Layout
 from seecr.errors import InputError
 from seecr.pose import Array
-from seecr.sensitivity import Term
 
 if TYPE_CHECKING:
     from seecr.robot import Robot
@@ -55,24 +54,24 @@ class Model:
     """A robot's effects, as read from a file.
 
     Attributes:
-        terms: the effects with their values, in the order of adding.
-        stderr: standard errors of each term's parameters, (p,); inf where unseen, NaN where the
-            file gives none.
+        terms: the effects with their values.
+        stderr: standard errors (p,) of each effect's parameters by its name; inf where unseen,
+            NaN where the file gives none.
         document: the file's text as a tree, comments included.
         notes: sentences about what has changed since the model was made.
         path: the file.
     """
 
-    terms: tuple[Term, ...]
-    stderr: tuple[Array, ...]
+    terms: Terms
+    stderr: Mapping[str, Array]
     document: TOMLDocument
     notes: tuple[str, ...] = ()
     path: Path | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the effects."""
-        return tuple(term.name for term in self.terms)
+        """Names of the effects, in the order of adding."""
+        return tuple(self.stderr)
 
 
 def new_model(robot: Robot) -> Model:
@@ -82,7 +81,7 @@ def new_model(robot: Robot) -> Model:
     document.add(tomlkit.comment("of adding. SI units. Written by crosscheck add; edit freely."))
     document["format"] = FORMAT
     document["robot"] = fingerprint(robot)
-    return Model((), (), document)
+    return Model(Terms(), {}, document)
 
 
 def load_model(path: str | Path, robot: Robot) -> Model:
@@ -103,14 +102,14 @@ def load_model(path: str | Path, robot: Robot) -> Model:
     _check_tables(where, document)
     notes = check_robot(path, document.get("robot"), robot)
     terms: list[Term] = []
-    errors: list[Array] = []
+    errors: dict[str, Array] = {}
     for k, table in enumerate(_effect_tables(where, document)):
         term, stderr = _term(where, k, table, robot)
-        if term.name in [t.name for t in terms]:
+        if term.name in errors:
             raise where.error(f"effect {term.name} is listed twice; expected it once", k, "name")
         terms.append(term)
-        errors.append(stderr)
-    return Model(tuple(terms), tuple(errors), document, notes, path)
+        errors[term.name] = stderr
+    return Model(Terms(terms), errors, document, notes, path)
 
 
 @dataclass(frozen=True)

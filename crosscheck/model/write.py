@@ -15,10 +15,10 @@ import tomlkit
 from crosscheck.files import written
 from crosscheck.model.fingerprint import fingerprint
 from crosscheck.model.read import UNSEEN, Model
+from seecr.effects import Term, Terms
 from seecr.effects.base import Layout
 from seecr.pose import Array
 from seecr.robot import Robot
-from seecr.sensitivity import Term
 
 Rms = Mapping[str, float | None]
 _ERRORS = ("before", "after", "held_out")
@@ -95,8 +95,8 @@ def with_fit(
             _describe(table, provenance, errors)
         else:
             table["refitted"] = _plain(vars(provenance))
-    terms = tuple(by_name[name].term for name in order)
-    stderr = tuple(np.asarray(by_name[name].stderr, float) for name in order)
+    terms = Terms(by_name[name].term for name in order)
+    stderr = {name: np.asarray(by_name[name].stderr, float) for name in order}
     return replace(model, terms=terms, stderr=stderr, document=document)
 
 

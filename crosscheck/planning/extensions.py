@@ -11,6 +11,7 @@ from crosscheck.fit.candidates import null_fit
 from crosscheck.fit.problem import Problem
 from crosscheck.measurements.read import Measurements
 from crosscheck.planning.planned import LOAD_CELL, Planned, near_slack, planned
+from seecr.effects import Terms
 from seecr.joints import pose_of_values, values_of_pose
 from seecr.pose import Array, quat_from_rotvec, quat_multiply
 from seecr.robot import Robot
@@ -108,7 +109,7 @@ def _after(problem: Problem, later: Measurements, kinds: Sequence[str]) -> Plann
     whole = planned(problem.robot, both, problem.sigma, kinds)
     added = np.arange(both.n_rows) >= first.n_rows
     rest = whole.problem.only(added)
-    return Planned(rest, null_fit(rest, (), whole.factor, refit=False), whole.factor)
+    return Planned(rest, null_fit(rest, Terms(), whole.factor, refit=False), whole.factor)
 
 
 def _stack(a: Array | None, b: Array | None) -> Array | None:
@@ -161,7 +162,7 @@ def _commands(problem: Problem, poses: Array) -> Measurements:
 def _planned_poses(plan: Planned) -> Array:
     problem = plan.problem
     pose = problem.data.command_pose
-    pose = plan.base.state.prediction.poses if pose is None else pose
+    pose = plan.base.state.prediction.pose if pose is None else pose
     return pose[problem.use]
 
 

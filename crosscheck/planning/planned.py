@@ -13,6 +13,7 @@ from crosscheck.fit.problem import Problem
 from crosscheck.measurements.read import Measurements
 from crosscheck.measurements.sigma import Sigma
 from seecr.compiled import law as cable_law
+from seecr.effects import Terms
 from seecr.pose import Array
 from seecr.robot import Robot
 
@@ -72,7 +73,7 @@ def planned(robot: Robot, commands: Measurements, sigma: Sigma, kinds: Sequence[
     full = _with_readings(commands, prediction, kinds)
     problem = Problem(robot, full, sigma, np.asarray(prediction.solved))
     factor = problem.noise(prediction)
-    return Planned(problem, null_fit(problem, (), factor, refit=False), factor)
+    return Planned(problem, null_fit(problem, Terms(), factor, refit=False), factor)
 
 
 def _with_readings(

@@ -12,14 +12,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from crosscheck.fit.gauss_newton import Fit, flat, ordered, own_columns, projected, sizes
+from crosscheck.fit.gauss_newton import Fit, projected
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.state import State, derivatives, evaluate
 from crosscheck.measurements.read import Measurements
 from seecr.effects.base import Layout, layout_of
 from seecr.pose import Array, quat_from_rotvec, quat_multiply
 from seecr.robot import Robot
-from seecr.sensitivity import Term, effects_of
+from seecr.sensitivity import Term
 
 # Squared signal, in units of the noise, that tells two effects apart (diagnosis: about 15).
 NEEDED = 15.0
@@ -53,7 +53,7 @@ def proposals(problem: Problem, final: Fit, name: str, layout: Layout) -> list[P
     now = _signal(*here)
     out = []
     for words, other in _options(problem, final):
-        plain = other.experiment.predict(effects_of(final.terms))
+        plain = other.experiment.predict(final.terms.effects)
         state = evaluate(other, final.terms, other.noise(plain))
         if not state.valid:
             continue
@@ -71,13 +71,11 @@ def replace_state(final: Fit, state: State) -> Fit:
 def _split(problem: Problem, final: Fit, name: str, rival: Layout) -> tuple[Array, Array]:
     """Signal of the effect (N,) and columns of all that could imitate it (N, q)."""
     term = Term(rival, rival.start(_first_shape(rival, final)))
-    terms = ordered([t for t in final.terms if t.name != rival.name] + [term])
+    terms = final.terms.with_term(term)
     state = final.state.of(terms)
-    scale = flat(terms, "scale")
-    columns = derivatives(problem, state, frozen=True) * scale
-    own = own_columns(terms, name)
-    values = sizes([t for t in final.terms if t.name == name])
-    return columns[:, own] @ values, columns[:, ~own]
+    columns = derivatives(problem, state, frozen=True) * terms.scale
+    own = terms.own(name)
+    return columns[:, own] @ final.terms[name].sizes, columns[:, ~own]
 
 
 def _first_shape(layout: Layout, final: Fit) -> dict[str, float]:

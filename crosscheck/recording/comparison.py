@@ -111,7 +111,7 @@ def _plots(recording: Recording, index: rr.TimeColumn, found: Comparison, kind: 
 def _verdict(recording: Recording, found: Comparison, shown: Misfit | None) -> None:
     parts = [f"# {'Noise' if found.is_noise else 'Not noise'}\n{plain(found.sentence)}\n"]
     if found.terms:
-        parts.append("Model: SEECR + " + ", ".join(plain(t.name) for t in found.terms) + ".\n")
+        parts.append("Model: SEECR + " + ", ".join(map(plain, found.terms.names)) + ".\n")
     if shown is not None:
         parts.append(_errors(found, shown))
         parts.append(

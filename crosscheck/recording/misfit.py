@@ -15,7 +15,6 @@ from crosscheck.fit.state import State
 from crosscheck.recording import colours, layout
 from crosscheck.recording.states import States
 from crosscheck.recording.stream import Recording
-from seecr.compiled import law as cable_law
 from seecr.pose import Array, quat_from_rxyz, rxyz_from_quat
 
 MEASURED: colours.Rgba = colours.MUJOCO
@@ -92,9 +91,9 @@ def read_poses(state: State) -> Array:
 def states_of(state: State) -> States:
     """The model's platform and cables at every row; NaN where it has no equilibrium."""
     prediction = state.prediction
-    pose = np.where(prediction.solved[:, None], prediction.poses, np.nan)
-    slack = prediction.found.states[..., cable_law.SLACK] > 0
-    return States(pose, prediction.tensions, prediction.setup.rest_lengths(), slack)
+    pose = np.where(prediction.solved[:, None], prediction.pose, np.nan)
+    lengths = prediction.setup.rest_lengths()
+    return States(pose, prediction.tensions, lengths, prediction.slack)
 
 
 def stacked(rows: list[tuple[State, int]]) -> States:

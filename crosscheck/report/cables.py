@@ -124,8 +124,7 @@ def paid_out(problem: Problem, prediction: Prediction) -> Array:
 
     NaN for the first row of a run: its long way from the reference pose would hide the others.
     """
-    run = problem.data.run_index
-    first = np.concatenate([[True], run[1:] != run[:-1]])
+    first = problem.experiment.commands.starts
     lengths = problem.experiment.commands.lengths
     if lengths is None:
         lengths = problem.robot.nominal_lengths(travel(problem, prediction).pose)

@@ -9,7 +9,7 @@ from matplotlib.patches import Rectangle
 
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.search import Search
-from crosscheck.fit.gauss_newton import Fit, basis, own_columns, projected
+from crosscheck.fit.gauss_newton import Fit, basis, projected
 from crosscheck.fit.starts import amplitude_columns
 from crosscheck.report.drawing import BEFORE, INK, WIDTH, blank, styled, svg
 from seecr.effects.base import Layout
@@ -86,8 +86,8 @@ def _columns(found: Search, name: str) -> Array | None:
     """(N, p) what an effect does beside the base model, by plausible sizes."""
     final = found.last.fit
     base = _base_columns(final, found.base)
-    if name in [t.name for t in final.terms]:
-        own = final.jacobian[:, own_columns(final.terms, name)]
+    if name in final.terms:
+        own = final.jacobian[:, final.terms.part(name)]
     else:
         layout = _layout(found, name)
         if layout is None:
@@ -102,7 +102,7 @@ def _base_columns(final: Fit, held: tuple[str, ...]) -> Array:
     """Columns of the effects that the model had before the diagnosis."""
     keep = np.zeros(final.jacobian.shape[1], dtype=bool)
     for name in held:
-        keep |= own_columns(final.terms, name)
+        keep |= final.terms.own(name)
     return final.jacobian[:, keep]
 
 

@@ -102,7 +102,7 @@ def _of_search(found: Diagnosis) -> dict[str, Any]:
         "caption": caption(problem, before),
         "together": bool(problem.sigma.length_m),
         "unsure": not all(stage.sure for stage in stages_of(found)),
-        "added": [t.name for t in last.state.terms if t.name not in found.search.base],
+        "added": [n for n in last.state.terms.names if n not in found.search.base],
     }
 
 

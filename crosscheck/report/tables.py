@@ -14,7 +14,6 @@ from crosscheck.diagnosis.steps import stages_of
 from crosscheck.diagnosis.verdict import percent
 from crosscheck.fit.candidates import Candidate
 from crosscheck.fit.evidence import FALSE_ALARM, p_value
-from crosscheck.fit.gauss_newton import own_columns, sizes
 from crosscheck.fit.noise import POOR_FIT, STRUCTURED
 from crosscheck.fit.problem import KINDS, Rms
 from crosscheck.units import chance, in_unit, parameter_name, short, with_error
@@ -96,13 +95,12 @@ def _better_runs(steps: list[Step]) -> tuple[int, int]:
 
 
 def _largest_sizes(step: Step) -> float:
-    own = own_columns(step.fit.terms, step.added)
-    return float(np.max(np.abs(sizes(step.fit.terms)[own])))
+    return float(np.max(np.abs(step.fit.terms[step.added].sizes)))
 
 
 def _chance(before: Step, after: Step) -> float:
     """Chance of the fall of chi2, for as many effects as were tried."""
-    count = int(own_columns(after.fit.terms, after.added).sum())
+    count = len(after.fit.terms[after.added].layout)
     p = p_value(before.whiteness.chi2 - after.whiteness.chi2, count, False)
     return min(1.0, p * max(_tried(before), 1))
 
@@ -154,8 +152,8 @@ def _correlations(found: Diagnosis, finding: Finding) -> list[str]:
     """Parameters that the data hold together, the strongest first."""
     assert found.search is not None
     best = found.search.last.fit
-    every = [(t.name, n) for t in best.terms for n in t.layout.names]
-    own = np.flatnonzero(own_columns(best.terms, finding.effect))
+    every = best.terms.labels
+    own = np.flatnonzero(best.terms.own(finding.effect))
     correlation = best.correlation
     pairs = {
         (min(i, j), max(i, j)): float(correlation[i, j])
@@ -223,9 +221,9 @@ def _largest_parameter(candidate: Candidate) -> str:
     """What it would take: the parameter that is largest in plausible sizes."""
     if candidate.fit is None:
         return ""
-    term = next(t for t in candidate.fit.terms if t.name == candidate.name)
+    term = candidate.fit.terms[candidate.name]
     layout = term.layout
-    size = np.where(layout.shape, 0.0, (term.vector - layout.null) / layout.scale)
+    size = np.where(layout.shape, 0.0, term.sizes)
     k = int(np.argmax(np.abs(size)))
     factor, unit = in_unit(layout.units[k])
     name = parameter_name(layout.names[k], layout.units[k])

@@ -26,7 +26,7 @@ _COLOURS = ListedColormap(colormaps["viridis_r"](np.linspace(0.12, 1.0, 128)))
 
 def failure_map(problem: Problem, before: Stage, after: Stage) -> str:
     """Arrows of the position error and dots of the orientation error at each measured pose."""
-    place = before.state.prediction.poses[:, :3]
+    place = before.state.prediction.pose[:, :3]
     views = views_of(place[problem.use])
     stages = [before] if after is before else [before, after]
     # a model alone has its views side by side, two have them one below the other
@@ -79,7 +79,7 @@ def _draw(
 def _title(stages: list[Stage], column: int, magnify: float) -> str:
     stage = stages[column]
     when = "" if len(stages) == 1 else ("before: ", "after: ")[column]
-    names = [stage.label] if column == 0 else ["+ " + t.name for t in stage.state.terms]
+    names = [stage.label] if column == 0 else ["+ " + name for name in stage.state.terms.names]
     scale = f"   (arrows drawn {drawn(magnify)})" if magnify and column == 0 else ""
     return when + " ".join(names) + scale
 

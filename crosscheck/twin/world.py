@@ -238,7 +238,7 @@ class World(Physics):
         if self.is_free:
             rotate[3:6] = True
         else:
-            hinges = [joint.kind == "hinge" for joint in self.true.robot.joints]
+            hinges = self.true.robot.hinges
             rotate[: len(hinges)] = hinges
         return rotate
 

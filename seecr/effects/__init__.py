@@ -2,110 +2,9 @@
 
 from __future__ import annotations
 
-import difflib
-from functools import lru_cache
-from importlib.metadata import EntryPoint, entry_points
-
-from seecr.effects.actuation import (
-    Backlash,
-    CableLengthOffset,
-    DrumEccentricity,
-    DrumGain,
-    InitialPoseError,
-    ThermalExpansion,
-)
 from seecr.effects.base import PLACES, Effect, Layout, Readings, layout_of, parameter
-from seecr.effects.cable import (
-    CableStiffness,
-    CableWeight,
-    Creep,
-    ExitFriction,
-    Hysteresis,
-    NonlinearElasticity,
-    Stiffness,
-    WinchSideLength,
-)
-from seecr.effects.checked import check_class
-from seecr.effects.geometry import AnchorPointError, ExitPointError, PulleyRadius
-from seecr.effects.load import CentreOfMass, ExternalWrench, GravityTilt, PlatformMass
-from seecr.effects.sensing import TensionScale, TrackerFrame, TrackerScale, TrackerTarget
-from seecr.effects.structure import FrameCompliance
-from seecr.errors import InputError
-
-BUILT_IN: tuple[type[Effect], ...] = (
-    CableLengthOffset,
-    InitialPoseError,
-    DrumGain,
-    DrumEccentricity,
-    Backlash,
-    ThermalExpansion,
-    PulleyRadius,
-    ExitPointError,
-    AnchorPointError,
-    Stiffness,
-    CableStiffness,
-    NonlinearElasticity,
-    WinchSideLength,
-    CableWeight,
-    Hysteresis,
-    Creep,
-    ExitFriction,
-    FrameCompliance,
-    PlatformMass,
-    CentreOfMass,
-    ExternalWrench,
-    GravityTilt,
-    TrackerFrame,
-    TrackerTarget,
-    TrackerScale,
-    TensionScale,
-)
-
-
-def _load(entry: EntryPoint) -> object:
-    """What an entry point names, or one line about why it cannot be had."""
-    try:
-        return entry.load()
-    except (ImportError, AttributeError, SyntaxError) as error:
-        raise InputError(
-            f"entry point {entry.name} ({entry.value}) cannot be loaded: {error}; correct the "
-            "package that declares it, or uninstall it"
-        ) from error
-
-
-@lru_cache(maxsize=1)
-def catalogue() -> dict[str, type[Effect]]:
-    """All effects by name: the built-in ones, then those of entry points ``seecr.effects``."""
-    found = {effect.name: effect for effect in BUILT_IN}
-    for entry in entry_points(group="seecr.effects"):
-        effect = _load(entry)
-        if not (isinstance(effect, type) and issubclass(effect, Effect) and effect.name):
-            raise InputError(
-                f"entry point {entry.name} ({entry.value}) is no effect; expected a subclass of "
-                "seecr.effects.Effect with a name"
-            )
-        if effect.name in found:
-            raise InputError(
-                f"entry point {entry.name} ({entry.value}) names its effect {effect.name}, which "
-                "exists already; expected a name of its own"
-            )
-        check_class(effect, f"entry point {entry.name} ({entry.value})")
-        found[effect.name] = effect
-    return found
-
-
-def effect_named(name: str) -> type[Effect]:
-    """The effect of that name.
-
-    Raises:
-        InputError: there is none; lists the known ones, nearest first.
-    """
-    known = catalogue()
-    if name in known:
-        return known[name]
-    near = difflib.get_close_matches(name, known, n=len(known), cutoff=0.0)
-    raise InputError(f"no effect {name!r}; known, nearest first: {', '.join(near)}")
-
+from seecr.effects.registry import BUILT_IN, catalogue, effect_named
+from seecr.effects.terms import Term, Terms
 
 __all__ = [
     "BUILT_IN",
@@ -113,6 +12,8 @@ __all__ = [
     "Effect",
     "Layout",
     "Readings",
+    "Term",
+    "Terms",
     "catalogue",
     "effect_named",
     "layout_of",

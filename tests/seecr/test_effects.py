@@ -21,10 +21,19 @@ from effect_cases import (
 )
 from random_robots import random_robot
 
-from seecr.effects import BUILT_IN, PLACES, Effect, Layout, catalogue, effect_named, layout_of
+from seecr.effects import (
+    BUILT_IN,
+    PLACES,
+    Effect,
+    Layout,
+    Terms,
+    catalogue,
+    effect_named,
+    layout_of,
+)
 from seecr.errors import InputError
 from seecr.robot import Robot
-from seecr.sensitivity import effects_of, sensitivities
+from seecr.sensitivity import sensitivities
 
 # the contract's table of effects
 CONTRACT = {
@@ -189,8 +198,8 @@ def test_a_small_effect_makes_a_small_change(name: str, kind: str) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_sensitivities_are_what_solving_again_gives(name: str, kind: str) -> None:
     experiment = experiment_of(kind, seed=5)
-    terms = [random_term(np.random.default_rng(7), experiment, name)]
-    at = experiment.predict(effects_of(terms))
+    terms = Terms([random_term(np.random.default_rng(7), experiment, name)])
+    at = experiment.predict(terms.effects)
     assert np.all(at.solved)
     worst, whose = worst_mismatch(experiment, terms, sensitivities(experiment, terms, at))
     assert worst < 1e-4, whose
@@ -206,8 +215,8 @@ COMBINATIONS = [
 def test_effects_together_are_solved_and_differentiated(seed: int) -> None:
     experiment = experiment_of((*SHAPES, *KINDS)[seed % 7], seed=seed)
     rng = np.random.default_rng(seed)
-    terms = [random_term(rng, experiment, name) for name in COMBINATIONS[seed]]
-    at = experiment.predict(effects_of(terms))
+    terms = Terms(random_term(rng, experiment, name) for name in COMBINATIONS[seed])
+    at = experiment.predict(terms.effects)
     assert np.all(at.solved), COMBINATIONS[seed]
     worst, whose = worst_mismatch(experiment, terms, sensitivities(experiment, terms, at))
     assert worst < 1e-3, (COMBINATIONS[seed], whose)

@@ -52,7 +52,7 @@ def test_offsets_are_lengths_paid_out_beyond_the_command() -> None:
     there = experiment.predict([effect("cable_length_offset", offset=offset)])
     rest = experiment.robot.commanded_lengths(experiment.commands.pose) + offset
     own = solve(experiment.robot, experiment.commands.pose, rest_lengths=rest)
-    assert pose_difference(there.poses, own.pose) == pytest.approx(np.zeros((6, 6)), abs=1e-12)
+    assert pose_difference(there.pose, own.pose) == pytest.approx(np.zeros((6, 6)), abs=1e-12)
 
 
 def test_drum_gain_does_nothing_at_the_reference_pose_and_acts_on_the_change_elsewhere() -> None:
@@ -89,7 +89,7 @@ def test_a_platform_zeroed_in_the_wrong_place_goes_back_there(kind: str) -> None
         [effect("initial_pose_error", position=wrong[:3], rotation=wrong[3:])]
     )
     assert np.all(there.solved)
-    found = pose_difference(there.poses, robot.reference_pose)[0]
+    found = pose_difference(there.pose, robot.reference_pose)[0]
     assert found == pytest.approx(wrong, abs=2e-5)  # the sag of 4 N on 1e7 N, on soft directions
 
 
@@ -175,7 +175,7 @@ def test_wrong_points_are_the_robot_with_these_points_zeroed_at_its_reference(na
     )
     own = solve(true, experiment.commands.pose, rest_lengths=zero + told)
     there = experiment.predict([effect(name, error=error.ravel())])
-    assert pose_difference(there.poses, own.pose) == pytest.approx(np.zeros((6, 6)), abs=1e-11)
+    assert pose_difference(there.pose, own.pose) == pytest.approx(np.zeros((6, 6)), abs=1e-11)
     assert there.tensions == pytest.approx(own.tensions, abs=1e-8)
 
 
@@ -281,14 +281,14 @@ def test_mass_centre_and_wrench_are_the_robots_own() -> None:
     pushed = experiment.predict(
         [effect("external_wrench", force=[0.1, -0.2, 0.3], moment=[0.004, 0.002, -0.003])]
     )
-    assert pose_difference(pushed.poses, own.pose) == pytest.approx(np.zeros((6, 6)), abs=1e-11)
+    assert pose_difference(pushed.pose, own.pose) == pytest.approx(np.zeros((6, 6)), abs=1e-11)
     shift = np.array([3e-3, -2e-3, 4e-3])
     other = replace(robot, mass=robot.mass + 0.05, centre_of_mass=robot.centre_of_mass + shift)
     heavy = experiment.predict(
         [effect("platform_mass", added=0.05), effect("centre_of_mass", shift=shift)]
     )
     own = solve(other, poses)
-    assert pose_difference(heavy.poses, own.pose) == pytest.approx(np.zeros((6, 6)), abs=1e-11)
+    assert pose_difference(heavy.pose, own.pose) == pytest.approx(np.zeros((6, 6)), abs=1e-11)
 
 
 def test_gravity_tilts_by_the_right_hand_and_is_a_horizontal_force() -> None:
@@ -313,7 +313,7 @@ def test_a_tilt_of_gravity_is_the_robot_turned_the_other_way() -> None:
     )
     turn = quat_from_rotvec(np.array([0.02, -0.03, 0.0]))
     own = solve(replace(robot, gravity=quat_rotate(turn, robot.gravity)), poses)
-    assert pose_difference(leaning.poses, own.pose) == pytest.approx(np.zeros((4, 6)), abs=1e-11)
+    assert pose_difference(leaning.pose, own.pose) == pytest.approx(np.zeros((4, 6)), abs=1e-11)
 
 
 # --- sensing -------------------------------------------------------------------------------------

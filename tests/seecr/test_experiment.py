@@ -108,10 +108,10 @@ def test_a_lost_waypoint_spoils_the_rows_after_it_in_its_run_alone(
 def test_readings_belong_to_the_prediction_alone() -> None:
     experiment = experiment_of("demobot_cogiro")
     found = experiment.predict()
-    before = found.poses.copy()
+    before = found.pose.copy()
     found.readings.position[:] = 0.0
     found.readings.tensions[:] = 0.0
-    assert np.array_equal(found.poses, before) and found.tensions.max() > 0.1
+    assert np.array_equal(found.pose, before) and found.tensions.max() > 0.1
 
 
 def test_a_wrench_of_the_wrong_shape_is_refused() -> None:

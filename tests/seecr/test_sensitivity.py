@@ -9,13 +9,11 @@ import pytest
 from effect_cases import KINDS, experiment_of, random_term, robot_of, worst_mismatch
 from random_robots import random_poses
 
-from seecr.effects import effect_named, layout_of
+from seecr.effects import Term, Terms, effect_named, layout_of
 from seecr.equilibrium import solve
 from seecr.experiment import Experiment
 from seecr.pose import pose_difference
 from seecr.sensitivity import (
-    Term,
-    effects_of,
     length_sensitivities,
     readings_difference,
     sensitivities,
@@ -46,8 +44,8 @@ def test_a_constant_moment_has_no_potential_and_is_accounted_for(kind: str, seed
     """It skews the stiffness, which an energy's second derivative cannot show."""
     experiment = experiment_of(kind, seed=seed)
     rng = np.random.default_rng(seed)
-    terms = [random_term(rng, experiment, "external_wrench", part=3.0)]
-    at = experiment.predict(effects_of(terms))
+    terms = Terms([random_term(rng, experiment, "external_wrench", part=3.0)])
+    at = experiment.predict(terms.effects)
     if not np.all(at.solved):
         pytest.skip("this robot does not hold against such a moment")
     worst, whose = worst_mismatch(experiment, terms, sensitivities(experiment, terms, at))
@@ -58,8 +56,8 @@ def test_columns_picks_parameters_through_all_terms() -> None:
     experiment = experiment_of("demobot_cogiro")
     rng = np.random.default_rng(0)
     names = ("pulley_radius", "drum_gain", "tracker_target")
-    terms = [random_term(rng, experiment, name) for name in names]
-    at = experiment.predict(effects_of(terms))
+    terms = Terms(random_term(rng, experiment, name) for name in names)
+    at = experiment.predict(terms.effects)
     whole = sensitivities(experiment, terms, at)
     assert whole.shape == (6, 14, 1 + 8 + 6)
     some = sensitivities(experiment, terms, at, columns=(9, 0, 3))
@@ -73,8 +71,8 @@ def test_history_that_is_not_there_yet_is_seen_from_its_null(name: str) -> None:
     layout = layout_of(effect_named(name), experiment.robot)
     shapes = layout.effect.shapes(experiment.setup([]))
     term = Term(layout, layout.start(shapes[len(shapes) // 2]))
-    plain = experiment.predict(effects_of([term]))
-    found = sensitivities(experiment, [term], plain)[..., 0]
+    plain = experiment.predict([term.effect()])
+    found = sensitivities(experiment, Terms([term]), plain)[..., 0]
     step = 1e-4 * layout.scale[0]
     vector = term.vector.copy()
     vector[0] = step
@@ -99,7 +97,7 @@ def test_at_a_bound_the_difference_stays_inside() -> None:
 
     term = Term(replace(layout, effect=Watched), layout.null)
     at = experiment.predict([term.effect()])
-    found = sensitivities(experiment, [term], at)
+    found = sensitivities(experiment, Terms([term]), at)
     assert min(seen) >= 0.0 and max(seen) > 0.0
     assert np.abs(found).max() > 1e-2
 
@@ -111,8 +109,8 @@ def test_sensitivities_do_not_care_where_the_rows_stand() -> None:
     both = []
     for rows in (poses, poses[order]):
         experiment = Experiment(robot, Commands(rows))
-        terms = [random_term(np.random.default_rng(1), experiment, "anchor_point_error")]
-        at = experiment.predict(effects_of(terms))
+        terms = Terms([random_term(np.random.default_rng(1), experiment, "anchor_point_error")])
+        at = experiment.predict(terms.effects)
         both.append(sensitivities(experiment, terms, at))
     assert both[1] == pytest.approx(both[0][order], rel=1e-6, abs=1e-9)
 
@@ -124,6 +122,6 @@ def test_a_row_that_is_free_to_move_gives_finite_numbers() -> None:
     at = experiment.predict()
     assert at.singular.tolist() == [True] and not at.solved.any()
     layout = layout_of(effect_named("stiffness"), robot)
-    found = sensitivities(experiment, [Term(layout, layout.null)], at)
+    found = sensitivities(experiment, Terms([Term(layout, layout.null)]), at)
     assert np.all(np.isfinite(found))
     assert np.abs(found[:, 3:6]).max() < 1e-6 and found[0, 2, 0] > 0  # stiffer: higher

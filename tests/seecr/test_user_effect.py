@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from effect_cases import experiment_of, moved, worst_mismatch
 
-from seecr.effects import Effect, catalogue, effect_named, layout_of, parameter
+from seecr.effects import Effect, Term, Terms, catalogue, effect_named, layout_of, parameter
 from seecr.errors import InputError
-from seecr.sensitivity import Term, effects_of, sensitivities
+from seecr.sensitivity import sensitivities
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "effects.md").read_text(encoding="utf-8")
 PYTHON = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
@@ -83,8 +83,8 @@ def test_the_pages_effects_are_absent_at_null_and_differentiated_without_derivat
     absent = experiment.predict([layout.build(layout.null)]).readings
     assert np.array_equal(absent.position, plain.position)
     assert np.array_equal(absent.tensions, plain.tensions)
-    terms = [Term(layout, np.array(vector))]
-    at = experiment.predict(effects_of(terms))
+    terms = Terms([Term(layout, np.array(vector))])
+    at = experiment.predict(terms.effects)
     assert np.all(at.solved)
     worst, whose = worst_mismatch(experiment, terms, sensitivities(experiment, terms, at))
     assert worst < 1e-4, whose
@@ -104,8 +104,8 @@ def test_the_pages_effects_work_beside_built_in_ones(
     own, built_in = (layout_of(effect_named(n), robot) for n in (name, others[0]))
     vector = own.null.copy()
     vector[0] += 0.3
-    terms = [Term(own, vector), Term(built_in, np.array([others[1]]))]
-    at = experiment.predict(effects_of(terms))
+    terms = Terms([Term(own, vector), Term(built_in, np.array([others[1]]))])
+    at = experiment.predict(terms.effects)
     assert np.all(at.solved)
     worst, whose = worst_mismatch(experiment, terms, sensitivities(experiment, terms, at))
     assert worst < 1e-4, whose

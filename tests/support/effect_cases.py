@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from random_robots import random_poses, random_robot
 
-from seecr.effects import Effect, effect_named, layout_of
+from seecr.effects import Effect, Term, Terms, effect_named, layout_of
 from seecr.experiment import Experiment, Prediction
 from seecr.mjcf import load_robot
 from seecr.robot import Robot
-from seecr.sensitivity import Term, effects_of, readings_difference
+from seecr.sensitivity import readings_difference
 from seecr.setup import Commands
 from seecr.shipped import model_path
 
@@ -71,27 +71,24 @@ def moved(experiment: Experiment, effects: Sequence[Effect]) -> np.ndarray:
 
 
 def full_difference(
-    experiment: Experiment, terms: Sequence[Term], which: int, k: int, step: float
+    experiment: Experiment, terms: Terms, term: Term, k: int, step: float
 ) -> np.ndarray:
     """Derivative of the readings (n, 6 + m) by a parameter, everything solved again at +-step."""
 
     def at(value: float) -> Prediction:
-        shifted = list(terms)
-        vector = terms[which].vector.copy()
+        vector = term.vector.copy()
         vector[k] = value
-        shifted[which] = Term(terms[which].layout, vector)
-        found = experiment.predict(effects_of(shifted))
+        shifted = terms.with_term(Term(term.layout, vector))
+        found = experiment.predict(shifted.effects)
         assert np.all(found.solved)
         return found
 
-    value = float(terms[which].vector[k])
+    value = float(term.vector[k])
     ahead, behind = at(value + step), at(value - step)
     return readings_difference(ahead.readings, behind.readings) / (2 * step)
 
 
-def worst_mismatch(
-    experiment: Experiment, terms: Sequence[Term], found: np.ndarray
-) -> tuple[float, str]:
+def worst_mismatch(experiment: Experiment, terms: Terms, found: np.ndarray) -> tuple[float, str]:
     """Largest error of sensitivities (n, 6 + m, p) against full differences, and whose it is.
 
     In parts of the largest change of that kind of reading when the parameter changes by its
@@ -101,14 +98,14 @@ def worst_mismatch(
     robot = experiment.robot
     kinds = ((slice(0, 3), robot.length), (slice(3, 6), 1.0), (slice(6, None), robot.weight))
     worst, whose, column = 0.0, "", 0
-    for which, term in enumerate(terms):
+    for term in terms:
         layout = term.layout
         for k in range(len(layout)):
             relative = bool(layout.shape[k]) and layout.lower[k] > 0
             size = float(term.vector[k] if relative else layout.scale[k])
             # of another size than the differences found rest on; below, rounding of the solved
             # rows (1e-13 of the load) shows in steps of readings that barely change
-            full = full_difference(experiment, terms, which, k, 5e-5 * size if relative else
+            full = full_difference(experiment, terms, term, k, 5e-5 * size if relative else
                                    1e-4 * size)  # fmt: skip
             for part, unit in kinds:
                 largest = max(np.abs(full[:, part]).max() * size, 1e-6 * unit)

@@ -14,12 +14,11 @@ from crosscheck.cli import main
 from crosscheck.measurements.data import Measurements, write_measurements
 from crosscheck.measurements.sigma import Sigma
 from crosscheck.twin.trajectory import trajectory
-from seecr.effects import effect_named, layout_of
+from seecr.effects import Term, Terms, effect_named, layout_of
 from seecr.experiment import Experiment
 from seecr.mjcf import load_robot
 from seecr.pose import quat_from_rotvec, quat_multiply
 from seecr.robot import Robot
-from seecr.sensitivity import Term, effects_of
 from seecr.setup import Commands
 from seecr.shipped import model_path
 
@@ -63,7 +62,8 @@ def measured(
     """What a tracker with noise would read of a robot with these effects."""
     way = trajectory(robot, points)
     run = np.unique(way.run, return_inverse=True)[1]
-    found = Experiment(robot, Commands(way.pose, run=run, time=way.t_s)).predict(effects_of(terms))
+    experiment = Experiment(robot, Commands(way.pose, run=run, time=way.t_s))
+    found = experiment.predict(Terms(terms).effects)
     assert np.all(found.solved)
     rng = np.random.default_rng(seed)
     n = len(way.pose)

@@ -45,7 +45,7 @@ def test_the_true_model_leaves_noise(robot, data):
 
 
 def test_coordinates_are_measured_less_predicted(robot, data, off):
-    rest = off.state.prediction.poses
+    rest = off.state.prediction.pose
     reading = np.concatenate([data.position, data.quat_wxyz], axis=1)
     error = pose_difference(reading, rest)
     z = next(c for c in off.coordinates if c["name"] == "z")
@@ -283,8 +283,8 @@ def test_a_pose_error_is_that_of_its_cables(robot, off):
     raw = np.full_like(off.state.raw, np.nan)
     raw[:, :6] = change
     errors, _ = cable_errors(problem, raw, prediction)
-    moved = pose_add(prediction.poses, np.tile(change, (len(raw), 1)))
-    longer = robot.nominal_lengths(moved) - robot.nominal_lengths(prediction.poses)
+    moved = pose_add(prediction.pose, np.tile(change, (len(raw), 1)))
+    longer = robot.nominal_lengths(moved) - robot.nominal_lengths(prediction.pose)
     assert errors == pytest.approx(longer, abs=1e-10)
 
 

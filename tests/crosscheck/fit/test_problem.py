@@ -11,6 +11,7 @@ from crosscheck.fit.noise import whiteness
 from crosscheck.fit.problem import Problem, angle_rates
 from crosscheck.fit.state import evaluate
 from crosscheck.measurements.sigma import Sigma
+from seecr.effects import Terms
 from seecr.mjcf import load_robot
 from seecr.pose import quat_from_rotvec, quat_from_rxyz, quat_multiply, rxyz_from_quat
 
@@ -44,7 +45,7 @@ def test_noise_of_lengths_reaches_the_readings_and_their_likeliest_errors_are_fo
     there = problem.experiment.with_length_errors(errors).predict()
     data.position[:] = there.readings.position
     data.quat_wxyz[:] = there.readings.quat_wxyz
-    state = evaluate(problem, [], problem.noise(problem.experiment.predict()))
+    state = evaluate(problem, Terms(), problem.noise(problem.experiment.predict()))
     found = state.experiment.length_errors
     assert found is not None
     # only what moves the platform is seen: the prediction there says whether it was found
@@ -60,7 +61,7 @@ def test_exact_lengths_leave_the_noise_as_stated() -> None:
     robot = load_robot(COGIRO)
     data = measured(robot, [term(robot, "platform_mass", added_kg=0.2)], points=2)
     problem = Problem(robot, data, SIGMA, np.ones(data.n_rows, dtype=bool))
-    state = evaluate(problem, [], problem.noise(problem.experiment.predict()))
+    state = evaluate(problem, Terms(), problem.noise(problem.experiment.predict()))
     assert state.table[:, :3] == pytest.approx(state.raw[:, :3] / SIGMA.position_m)
     assert state.log_det == 0.0
 
@@ -78,10 +79,10 @@ def test_errors_of_values_grow_where_residuals_go_together() -> None:
         data.position[:] += wander
         problem = Problem(robot, data, SIGMA, np.ones(data.n_rows, dtype=bool))
         factor = problem.noise(problem.experiment.predict())
-        found = fit(problem, [term(robot, "tracker_frame")], factor)
+        found = fit(problem, Terms([term(robot, "tracker_frame")]), factor)
         white = whiteness(problem, found.state.white, 6)
         assert white.structured
-        far = found.terms[0].vector[:3] / found.stderr[:3]
+        far = found.terms.vector[:3] / found.stderr[:3]
         plain.append(far / max(1.0, white.scale))
         grown.append(far / white.inflation)
     # in standard errors these should scatter by one

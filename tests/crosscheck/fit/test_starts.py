@@ -9,6 +9,7 @@ from made_data import SIGMA, measured, term
 from crosscheck.fit.candidates import fit_candidate, layouts_for, null_fit, screen
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.starts import equation_start
+from seecr.effects import Terms
 from seecr.mjcf import load_robot
 from seecr.shipped import model_path
 
@@ -25,7 +26,7 @@ def case():
     data = measured(robot, [hidden], points=12, seed=2)
     problem = Problem(robot, data, SIGMA, np.ones(data.n_rows, dtype=bool))
     factor = problem.noise(problem.experiment.predict())
-    return problem, factor, null_fit(problem, (), factor, refit=False)
+    return problem, factor, null_fit(problem, Terms(), factor, refit=False)
 
 
 def layout_named(problem, name):
@@ -46,7 +47,7 @@ def test_it_leads_where_the_derivative_at_null_does_not(case) -> None:
     noise = len(base.state.white)
     assert reached[1].chi2 < 1.2 * noise
     assert reached[0].chi2 > 10 * noise
-    far = (reached[1].terms[0].vector - OFFSETS) / reached[1].stderr
+    far = (reached[1].terms.vector - OFFSETS) / reached[1].stderr
     assert np.all(np.abs(far) < 4.5)
 
 
@@ -77,6 +78,6 @@ def test_platforms_on_joints_go_without() -> None:
     data.position[:, 1] += 1e-4
     problem = Problem(robot, data, SIGMA, np.ones(data.n_rows, dtype=bool))
     factor = problem.noise(problem.experiment.predict())
-    base = null_fit(problem, (), factor, refit=False)
+    base = null_fit(problem, Terms(), factor, refit=False)
     layout = layout_named(problem, "cable_length_offset")
     assert equation_start(problem, base.state, layout, layout.start({}), factor) is None

@@ -19,6 +19,7 @@ from crosscheck.planning.greedy import chosen_poses
 from crosscheck.planning.planned import near_slack
 from crosscheck.planning.visibility import joined, left_over, needed, signals, signals_like
 from crosscheck.terminal.plan import as_json, size_words
+from seecr.effects import Terms
 from seecr.mjcf import load_robot
 from seecr.pose import rotvec_from_quat
 from seecr.shipped import model_path
@@ -68,7 +69,7 @@ def test_the_smallest_visible_size_leaves_the_signal_needed(robot, plan):
         sigma=Sigma(1e-12, 1e-12),
     )  # fmt: skip
     problem = Problem(robot, replace(quiet, sigma=SIGMA), SIGMA, np.ones(quiet.n_rows, dtype=bool))
-    base = null_fit(problem, (), problem.noise(problem.experiment.predict()), refit=False)
+    base = null_fit(problem, Terms(), problem.noise(problem.experiment.predict()), refit=False)
     assert base.chi2 == pytest.approx(found.needed, rel=0.05)
 
 
@@ -89,7 +90,7 @@ def _found(robot, layout, vector, seed):
     data = measured(robot, [hidden], seed=seed)
     problem = Problem(robot, data, SIGMA, np.ones(data.n_rows, dtype=bool))
     factor = problem.noise(problem.experiment.predict())
-    tried = try_candidate(problem, null_fit(problem, (), factor, refit=False), layout, factor)
+    tried = try_candidate(problem, null_fit(problem, Terms(), factor, refit=False), layout, factor)
     return tried.fit is not None and tried.p < 0.05 / 24
 
 

@@ -28,7 +28,6 @@ from crosscheck.diagnosis.steps import (
     views_of,
 )
 from crosscheck.errors import CrosscheckError
-from crosscheck.fit.gauss_newton import sizes
 from crosscheck.fit.problem import KINDS
 from crosscheck.report import write_report
 from crosscheck.report.cables import Wall, draw_wall, paid_out, walls_of
@@ -237,7 +236,7 @@ def test_the_confusion_map_holds_containments() -> None:
     assert confusion.part[b, a] < 0.9
     columns = found.search.last.fit.jacobian
     assert confusion.part[a, a] == pytest.approx(containment(columns, columns))
-    assert len(sizes(found.search.last.fit.terms)) == 1
+    assert len(found.search.last.fit.terms) == 1
 
 
 def test_rivals_are_named_and_framed() -> None:
@@ -297,7 +296,7 @@ def test_arrows_fit_the_region() -> None:
     problem, before = found.search.problem, stages_of(found)[0]
     factor = magnification(problem, before.state)
     longest = factor * np.percentile(np.linalg.norm(before.state.raw[:, :3], axis=1), 98)
-    span = np.ptp(before.state.prediction.poses[:, :3], axis=0).max()
+    span = np.ptp(before.state.prediction.pose[:, :3], axis=0).max()
     assert 0.04 * span < longest <= 0.13 * span
     assert str(factor).rstrip("0").rstrip(".")[0] in "125"
 

@@ -70,7 +70,7 @@ def test_an_effect_a_hundredth_off_does_not_agree():
     case = CASES["demobot_cogiro-pulley_radius"]
     truth = measure(case.robot, case.commands, [case.hidden.times(1.01).effect()])
     ours = Experiment(case.robot, case.commands).predict([case.hidden.effect()])
-    assert np.max(distance(truth.pose, ours.poses)) > 1e-6
+    assert np.max(distance(truth.pose, ours.pose)) > 1e-6
 
 
 @pytest.mark.parametrize("weight", [0.02, 0.2])
@@ -82,11 +82,11 @@ def test_chains_come_to_the_catenary_with_the_square_of_the_segments(weight):
     errors = []
     for segments in (4, 8, 16):
         truth = measure(robot, commands, effects, segments=(segments,))
-        errors.append(np.max(distance(truth.pose, exact.poses)))
+        errors.append(np.max(distance(truth.pose, exact.pose)))
     assert 3.7 < errors[0] / errors[1] < 4.4
     assert 3.8 < errors[1] / errors[2] < 4.3
     extrapolated = measure(robot, commands, effects, segments=(8, 16))
-    assert np.max(distance(extrapolated.pose, exact.poses)) < 0.02 * errors[2]
+    assert np.max(distance(extrapolated.pose, exact.pose)) < 0.02 * errors[2]
     # a cable that the weightless robot has slack hangs, and carries its own weight
     assert np.all(extrapolated.tensions > 0.0)
 

@@ -1,0 +1,171 @@
+"""Effects with values: one of them, and the ordered collection of them that makes a model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from seecr.effects.base import Effect, Layout
+from seecr.effects.registry import catalogue
+from seecr.errors import InputError
+from seecr.pose import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Term:
+    """An effect with values: ``layout`` says which, ``vector`` (p,) how much."""
+
+    layout: Layout
+    vector: Array
+
+    @property
+    def name(self) -> str:
+        """Name of the effect."""
+        return self.layout.name
+
+    @property
+    def sizes(self) -> Array:
+        """(p,) z = (value - null)/scale: how many plausible sizes the values are from null."""
+        return (self.vector - self.layout.null) / self.layout.scale
+
+    def effect(self) -> Effect:
+        """The effect itself."""
+        return self.layout.build(self.vector)
+
+
+class Terms:
+    """The effects of a model with their values, in the order in which they act.
+
+    That order is the catalogue's; effects that it does not know come last. The parameters of all
+    terms count through as one vector: ``len`` is their number p, and every array of a collection
+    is (p,). Iterating gives the terms. Nothing changes in place; every change is a new collection.
+    """
+
+    def __init__(self, terms: Iterable[Term] = ()) -> None:
+        """Put terms in order.
+
+        Raises:
+            InputError: an effect is there twice.
+        """
+        place = {name: i for i, name in enumerate(catalogue())}
+        self._terms = tuple(sorted(terms, key=lambda t: place.get(t.name, len(place))))
+        for name in self.names:
+            if self.names.count(name) > 1:
+                raise InputError(f"effect {name} is among the terms twice; expected it once")
+
+    def __iter__(self) -> Iterator[Term]:
+        return iter(self._terms)
+
+    def __len__(self) -> int:
+        return sum(len(term.layout) for term in self._terms)
+
+    def __bool__(self) -> bool:
+        return bool(self._terms)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.names
+
+    def __getitem__(self, name: str) -> Term:
+        """The term of an effect, by its name."""
+        return self._terms[self._place(name)]
+
+    def __repr__(self) -> str:
+        return f"Terms({', '.join(self.names)})"
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the effects."""
+        return tuple(term.name for term in self._terms)
+
+    @cached_property
+    def labels(self) -> tuple[tuple[str, str], ...]:
+        """Of every parameter: the effect's name and its own, such as ("drum_gain", "gain_3")."""
+        return tuple((term.name, key) for term in self._terms for key in term.layout.names)
+
+    @property
+    def effects(self) -> list[Effect]:
+        """The effects themselves."""
+        return [term.effect() for term in self._terms]
+
+    @cached_property
+    def vector(self) -> Array:
+        """(p,) values, each in its own unit."""
+        return _joined([term.vector for term in self._terms])
+
+    @cached_property
+    def null(self) -> Array:
+        """(p,) values at which the effects are absent."""
+        return _joined([term.layout.null for term in self._terms])
+
+    @cached_property
+    def scale(self) -> Array:
+        """(p,) plausible sizes."""
+        return _joined([term.layout.scale for term in self._terms])
+
+    @cached_property
+    def lower(self) -> Array:
+        """(p,) lowest values."""
+        return _joined([term.layout.lower for term in self._terms])
+
+    @cached_property
+    def upper(self) -> Array:
+        """(p,) highest values."""
+        return _joined([term.layout.upper for term in self._terms])
+
+    @property
+    def sizes(self) -> Array:
+        """(p,) z = (value - null)/scale: how many plausible sizes the values are from null."""
+        return (self.vector - self.null) / self.scale
+
+    def part(self, name: str) -> slice:
+        """Where the parameters of an effect stand among all.
+
+        Raises:
+            KeyError: no such effect here.
+        """
+        place = self._place(name)
+        first = sum(len(term.layout) for term in self._terms[:place])
+        return slice(first, first + len(self._terms[place].layout))
+
+    def own(self, name: str) -> NDArray[np.bool_]:
+        """(p,) which of all parameters are those of an effect; none, if it is not here."""
+        return np.array([effect == name for effect, _key in self.labels], dtype=bool)
+
+    def with_vector(self, values: ArrayLike) -> Terms:
+        """The same effects with other values (p,)."""
+        vector = np.asarray(values, float)
+        if vector.shape != (len(self),):
+            raise InputError(f"values must be ({len(self)},), got {vector.shape}")
+        ends = np.cumsum([len(term.layout) for term in self._terms], dtype=int)[:-1]
+        parts = np.split(vector, ends)
+        return Terms(
+            Term(term.layout, part.copy()) for term, part in zip(self._terms, parts, strict=False)
+        )
+
+    def with_term(self, term: Term) -> Terms:
+        """These and one more, in place of that of the same name if there is one."""
+        return Terms([*self.without(term.name), term])
+
+    def without(self, name: str) -> Terms:
+        """All but that of an effect."""
+        return Terms(term for term in self._terms if term.name != name)
+
+    def only(self, names: Iterable[str]) -> Terms:
+        """Those of some effects alone."""
+        kept = set(names)
+        return Terms(term for term in self._terms if term.name in kept)
+
+    def _place(self, name: str) -> int:
+        if name not in self.names:
+            raise KeyError(f"{name} is not among {', '.join(self.names) or 'no terms'}")
+        return self.names.index(name)
+
+
+def _joined(parts: list[Array]) -> Array:
+    whole = np.concatenate(parts) if parts else np.zeros(0)
+    whole.flags.writeable = False
+    return whole
