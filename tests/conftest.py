@@ -10,8 +10,10 @@ import pytest
 from stale import forget_stale
 
 
-def pytest_sessionstart() -> None:
-    """Forget what was compiled from older sources."""
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Forget what was compiled from older sources, before any worker starts to use it."""
+    if hasattr(session.config, "workerinput"):
+        return
     spec = importlib.util.find_spec("seecr")
     assert spec is not None and spec.origin is not None
     forget_stale(Path(spec.origin).parent)

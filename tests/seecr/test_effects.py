@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.util
 import inspect
 import itertools
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -48,7 +46,6 @@ CONTRACT = {
 }
 NAMES = [name for names in CONTRACT.values() for name in names.split()]
 UNITS = {"", "m", "rad", "N", "Nm", "s", "C", "kg", "1_per_K", "N_per_m", "m_per_N"}
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "effects.md"
 
 
 def layouts(robot: Robot) -> list[Layout]:
@@ -76,17 +73,6 @@ def test_an_effect_says_what_it_is_and_how_to_check_it(effect: type[Effect]) -> 
     assert len(effect.advice.split()) > 4
     assert set(effect.needs) <= {"time", "temperature", "poses", "tensions"}
     assert effect.parent == "" or effect.parent in catalogue()
-
-
-def test_the_page_about_effects_is_up_to_date() -> None:
-    """Run docs/make_effects.py where this goes red."""
-    source = importlib.util.spec_from_file_location("make_effects", PAGE.parent / "make_effects.py")
-    assert source and source.loader
-    script = importlib.util.module_from_spec(source)
-    source.loader.exec_module(script)
-    page = PAGE.read_text(encoding="utf-8")
-    assert script.with_table(page) == page
-    assert all(f"| `{name}` |" in page for name in NAMES)
 
 
 # --- parameters ----------------------------------------------------------------------------------

@@ -1,6 +1,6 @@
 """Write the table of built-in effects into docs/effects.md, from the effects themselves.
 
-    python docs/make_effects.py
+    python scripts/make_effects.py
 
 A test runs :func:`with_table` and goes red where the table is out of date.
 """
@@ -17,12 +17,12 @@ import numpy as np
 from seecr.effects import BUILT_IN, PLACES, Effect
 
 BEGIN, END = "<!-- effects: begin -->", "<!-- effects: end -->"
-PAGE = Path(__file__).resolve().parent / "effects.md"
-_SIZES = {"one": "", "cable": ", one a cable", "vector": ", x y z", "point": ", x y z a cable"}
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "effects.md"
+_SIZES = {"one": "", "cable": ", one per cable", "vector": ", x y z", "point": ", x y z per cable"}
 
 
 def table() -> str:
-    """One Markdown table a place: name, parameters, and the effect's own docstring."""
+    """One Markdown table per place: name, parameters, and the effect's own docstring."""
     lines = []
     for place in PLACES:
         lines += [f"### {place}", "", "| effect | parameters | what it is |", "|---|---|---|"]

@@ -1,0 +1,34 @@
+# The tasks of this repository; `make` lists them. They use .venv, which `make setup` makes.
+BIN := .venv/bin
+
+.PHONY: help setup quick test bench docs suite ci
+
+help: ## list the tasks
+	@sed -n 's/^\([a-z]*\): .*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 8
+
+setup: ## a virtual environment with this checkout in it, and the hooks that run before a commit
+	python3 -m venv .venv
+	$(BIN)/pip install -q -e '.[test,dev]'
+	if [ -d .git ]; then $(BIN)/pre-commit install; fi
+
+quick: ## while working: lint, format, types, and the tests that take less than a minute
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/python -m pytest -m 'not slow and not benchmark'
+
+test: ## all tests
+	$(BIN)/python -m pytest
+
+bench: ## how fast it is, one process at a time
+	$(BIN)/python -m pytest -m benchmark -n 0 -s
+
+docs: ## write the pages and pictures that are made from the sources
+	$(BIN)/python scripts/make_effects.py
+	$(BIN)/python scripts/draw_floors.py
+
+suite: ## SEECR against MuJoCo, every case; results in crosscheck-results/
+	$(BIN)/crosscheck run
+
+ci: ## all that continuous integration runs, with the wheel instead of this checkout in .venv
+	.ci/run

@@ -1,0 +1,70 @@
+"""Pages and pictures that are made from the sources are current, and what pages point to exists."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import draw_floors
+import make_effects
+import pytest
+
+from seecr import __version__
+from seecr.effects import BUILT_IN
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), ROOT / "models" / "README.md"]
+AGAIN = "run: make docs"
+
+
+def anchors(page: str) -> set[str]:
+    """Names by which GitHub links a page's headings."""
+    titles = re.findall(r"^#+ +(.*)$", page, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_links_lead_somewhere(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    for target in re.findall(r"\]\((?!http)([^)]+)\)", text):
+        name, _, anchor = target.partition("#")
+        other = page.parent / name if name else page
+        assert other.exists(), target
+        assert not anchor or anchor in anchors(other.read_text(encoding="utf-8")), target
+
+
+def test_the_page_about_effects_is_current() -> None:
+    page = make_effects.PAGE.read_text(encoding="utf-8")
+    assert make_effects.with_table(page) == page, AGAIN
+    assert all(f"| `{effect.name}` |" in page for effect in BUILT_IN)
+
+
+def test_the_picture_of_the_floors_is_current() -> None:
+    assert draw_floors.picture() == draw_floors.PICTURE.read_text(encoding="utf-8"), AGAIN
+
+
+def test_the_picture_shows_each_room_and_no_detours() -> None:
+    assert draw_floors.without_detours(
+        {
+            "top": frozenset({"middle", "ground"}),
+            "middle": frozenset({"ground"}),
+            "ground": frozenset(),
+        }
+    ) == {"top": {"middle"}, "middle": {"ground"}, "ground": set()}
+    drawn = draw_floors.picture()
+    names = {name.split(".")[1] for name in draw_floors.FLOORS}
+    assert all(re.search(rf">{name}/?</text>", drawn) for name in names)
+
+
+def test_the_citation_names_this_version_and_the_paper() -> None:
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {__version__}\n" in citation
+    assert "10.1109/ICRA57147.2024.10610384" in citation
+
+
+def test_tasks_are_listed() -> None:
+    text = (ROOT / "Makefile").read_text(encoding="utf-8")
+    listed = set(re.findall(r"^([a-z]+):.*##", text, re.MULTILINE))
+    assert listed >= {"setup", "quick", "test", "bench", "docs", "suite", "ci"}
+    for script in re.findall(r"scripts/\w+\.py", text):
+        assert (ROOT / script).exists(), script
