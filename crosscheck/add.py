@@ -17,7 +17,7 @@ from crosscheck.fit.noise import Whiteness, whiteness
 from crosscheck.fit.prepare import Progress, outlying_rows, prepare
 from crosscheck.fit.problem import Problem, Rms, rms_by_kind
 from crosscheck.fit.state import evaluate
-from crosscheck.measurements.read import Measurements
+from crosscheck.measurements.data import Measurements
 from crosscheck.model.write import Fitted
 from seecr.effects import Terms, effect_named, layout_of
 from seecr.effects.base import Layout

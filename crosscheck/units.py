@@ -49,6 +49,7 @@ class Unit:
 
 
 UNITS = (
+    Unit("", "", column=True),
     Unit("m", "m", column=True),
     Unit("cm", "m", over=100.0),
     Unit("mm", "m", over=1000.0, column=True, shown=True),

@@ -21,7 +21,7 @@ from crosscheck.fit.noise import Whiteness, as_table, whiteness
 from crosscheck.fit.prepare import noise_floor, outlying_rows, prepare
 from crosscheck.fit.problem import BY_NAME, Problem, Rms, rms_by_kind
 from crosscheck.fit.state import State, evaluate
-from crosscheck.measurements.read import Measurements
+from crosscheck.measurements.data import Measurements
 from seecr.effects import Terms
 from seecr.pose import Array
 from seecr.robot import Robot

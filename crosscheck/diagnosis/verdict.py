@@ -21,7 +21,7 @@ from crosscheck.fit.noise import whiteness
 from crosscheck.fit.prepare import Progress, noise_floor, outlying_rows, prepare
 from crosscheck.fit.problem import Problem, Rms, rms_by_kind
 from crosscheck.fit.state import derivatives
-from crosscheck.measurements.read import Measurements
+from crosscheck.measurements.data import Measurements
 from seecr.effects import Term, Terms
 from seecr.pose import Array
 from seecr.robot import Robot

@@ -10,7 +10,7 @@ from crosscheck.fit.held_out import blocks_of
 from crosscheck.fit.noise import estimate_sigma
 from crosscheck.fit.problem import Problem, Rms, rms_by_kind
 from crosscheck.fit.state import State
-from crosscheck.measurements.read import Measurements
+from crosscheck.measurements.data import Measurements
 from seecr.effects import Terms
 from seecr.robot import Robot
 

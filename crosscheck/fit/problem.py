@@ -18,8 +18,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.measurements.read import Measurements
-from crosscheck.measurements.sigma import Sigma
+from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.units import in_unit
 from seecr.effects.base import Readings
 from seecr.experiment import Experiment, Prediction

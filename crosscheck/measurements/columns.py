@@ -8,28 +8,26 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 
+import numpy as np
+
+from crosscheck.errors import InputFileError
+from crosscheck.measurements.data import Mask
 from crosscheck.measurements.table import Table, show
 from crosscheck.units import Unit, of_columns
+from seecr.pose import Array
 
 POSITION = ("x", "y", "z")
 QUATERNION = ("qw", "qx", "qy", "qz")
 ANGLES = ("rx", "ry", "rz")
 
-_Units = dict[str, Unit]
-
-_PURE = Unit("", "")
-_LENGTH, _ANGLE = of_columns("m"), of_columns("rad")
-_SECONDS, _NEWTONS, _CELSIUS = of_columns("s"), of_columns("N"), of_columns("C")
-_NO_UNIT: _Units = {"": _PURE}
-
 _QUANTITY = re.compile(
     r"(t|temperature|run|(?:cmd|meas)_(?:q[wxyz]|r?[xyz])|(?:length|tension)_\d+)(?:_([^_]*))?"
 )
 # "t" begins many other names; only these endings are surely meant as a unit of time.
-_TIME_UNITS = {"", "ms", "us", "ns", "sec", "min", "h", "S"}
+_TIME_UNITS = {"", "s", "ms", "us", "ns", "sec", "min", "h", "S"}
 # What others call a column, where the spelling is not close enough to be guessed from.
 _ALIASES = {"time": "t_s", "time_s": "t_s", "timestamp": "t_s", "temp_c": "temperature_C"}
 
@@ -43,103 +41,148 @@ class Column:
     unit: Unit
 
 
-@dataclass(frozen=True)
-class Header:
-    """Known columns by quantity (``"cmd_x"``, ``"length_3"``), and what was left over."""
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """The columns of a table that are known, as numbers in SI.
 
-    columns: dict[str, Column]
+    Attributes:
+        table: the cells. known: columns by quantity (``"cmd_x"``, ``"length_3"``).
+        unused: names of the others. meant: what those of them are thought to mean that are near
+            a name that is not there.
+        notes: sentences for the reader, taken while reading.
+    """
+
+    table: Table
+    known: dict[str, Column]
     unused: tuple[str, ...]
-    notes: tuple[str, ...]
+    meant: dict[str, str]
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def n_rows(self) -> int:
+        """Number of rows n."""
+        return len(self.table.line)
 
     def present(self, prefix: str, parts: Sequence[str]) -> tuple[str, ...]:
         """Those of the parts that have a column ``prefix_part``."""
-        return tuple(part for part in parts if f"{prefix}_{part}" in self.columns)
+        return tuple(part for part in parts if f"{prefix}_{part}" in self.known)
 
     def cables(self, prefix: str) -> tuple[int, ...]:
         """Numbers, from 1, of the cables that have a column ``prefix_i``."""
         start = f"{prefix}_"
-        return tuple(sorted(int(q[len(start) :]) for q in self.columns if q.startswith(start)))
+        return tuple(sorted(int(q.removeprefix(start)) for q in self.known if q.startswith(start)))
+
+    def numbers(self, quantity: str, *, blank_is_nan: bool = False) -> Array:
+        """One column (n,) in SI."""
+        column = self.known[quantity]
+        return column.unit.to_si(self.table.numbers(column.index, blank_is_nan=blank_is_nan))
+
+    def readings(self, prefix: str, parts: Sequence[str]) -> Array:
+        """Columns ``prefix_part`` (n, k) in SI; NaN where there is no column or an empty cell."""
+        values = np.full((self.n_rows, len(parts)), np.nan)
+        for k, part in enumerate(parts):
+            quantity = f"{prefix}_{part}"
+            if quantity in self.known:
+                values[:, k] = self.numbers(quantity, blank_is_nan=True)
+                if np.all(np.isnan(values[:, k])):
+                    name = self.known[quantity].name
+                    self.notes.append(f"Column {name} is empty: not measured.")
+        return values
+
+    def refuse(self, wrong: Mask, quantity: str, text: Callable[[int], str]) -> None:
+        """Raise at the first row that is wrong (n,), if any."""
+        if np.any(wrong):
+            row = int(np.argmax(wrong))
+            raise self.table.error(text(row), row=row, column=self.known[quantity].name)
+
+    def half_there(self, what: str, missing: Sequence[str], need: str) -> InputFileError:
+        """Error for a group of columns that is not complete."""
+        text = f"{what} columns half there; expected {need}, {' '.join(missing)} missing"
+        return self.table.error(text + self.near_misses())
+
+    def near_misses(self) -> str:
+        """`` (NOTE; NOTE)`` of misspelt columns, for errors about a column that is not there."""
+        notes = [_misspelt(name, meant) for name, meant in self.meant.items()]
+        return f" ({'; '.join(notes)})" if notes else ""
 
 
-def parse_header(table: Table, n_cables: int) -> Header:
+def know_columns(table: Table, n_cables: int) -> Columns:
     """Know the columns of a table for a robot with ``n_cables`` cables.
 
     Raises:
         InputFileError: missing or unknown unit, repeated column, a cable that the robot has
             not, no header at all, two ways of saying the same.
     """
-    _check_is_header(table)
-    columns: dict[str, Column] = {}
+    _check_names(table)
+    known: dict[str, Column] = {}
     unused = []
-    seen: dict[str, int] = {}
     for index, name in enumerate(table.names):
-        if name and name in seen:
-            text = f"repeated header, columns {seen[name] + 1} and {index + 1}; expected each once"
-            raise table.error(f"{text}; rename or remove one", column=name)
-        seen[name] = index
-        known = _parse_name(table, name, n_cables)
-        if known is None:
+        found = _parse_name(table, name, n_cables)
+        if found is None:
             unused.append(name or f"(column {index + 1}, without a name)")
             continue
-        quantity, unit = known
-        if quantity in columns:
-            other = columns[quantity].name
-            raise table.error(f"says the same as {other}; expected one of the two", column=name)
-        columns[quantity] = Column(name, index, unit)
-    header = Header(columns, tuple(unused), _unused_notes(unused, columns, n_cables))
-    _check_one_way(table, header)
-    return header
+        quantity, unit = found
+        if quantity in known:
+            text = f"says the same as {known[quantity].name}; expected one of the two"
+            raise table.error(text, column=name)
+        known[quantity] = Column(name, index, unit)
+    meant = _meant(unused, known, n_cables)
+    notes = [_misspelt(name, near) for name, near in meant.items()]
+    columns = Columns(table, known, tuple(unused), meant, notes)
+    _check_one_way(columns)
+    return columns
 
 
-def near_misses(header: Header) -> str:
-    """`` (NOTE; NOTE)`` of misspelt columns, for errors about a column that is not there."""
-    close = [note.rstrip(".") for note in header.notes if "did you mean" in note]
-    return f" ({'; '.join(close)})" if close else ""
-
-
-def _check_is_header(table: Table) -> None:
+def _check_names(table: Table) -> None:
+    """A header is there, and no name in it twice."""
     numbers = [name for name in table.names if re.fullmatch(r"[+-]?\d*\.?\d+(e[+-]?\d+)?", name)]
     if numbers:
         raise table.error(
             f"expected a header row with column names such as cmd_x_m, got the number "
             f"{show(numbers[0])}; put the names in the first row, without a # before them"
         )
+    for index, name in enumerate(table.names):
+        first = table.names.index(name)
+        if name and first < index:
+            text = f"repeated header, columns {first + 1} and {index + 1}; expected each once"
+            raise table.error(f"{text}; rename or remove one", column=name)
 
 
 def _parse_name(table: Table, name: str, n_cables: int) -> tuple[str, Unit] | None:
     match = _QUANTITY.fullmatch(name)
     if match is None:
         return None
-    quantity, unit = match[1], match[2]
-    if quantity == "run":
-        return None if unit is not None else ("run", _PURE)
-    if quantity == "t" and unit != "s" and (unit or "") not in _TIME_UNITS:
+    quantity, suffix = match[1], match[2] or ""
+    foreign = suffix not in _TIME_UNITS if quantity == "t" else name.startswith("run_")
+    if foreign:
         return None
-    units = _units_of(quantity)
-    if (unit or "") not in units:
-        raise table.error(_unit_fault(quantity, unit, units), column=name)
+    units = of_columns(_si_of(quantity))
+    if suffix not in units:
+        raise table.error(_unit_fault(quantity, suffix, units), column=name)
     _check_cable(table, quantity, name, n_cables)
-    return quantity, units[unit or ""]
+    return quantity, units[suffix]
 
 
-def _units_of(quantity: str) -> _Units:
-    if quantity == "t":
-        return _SECONDS
-    if quantity == "temperature":
-        return _CELSIUS
-    if quantity.startswith("tension_"):
-        return _NEWTONS
-    last = quantity.rpartition("_")[2]
+def _si_of(quantity: str) -> str:
+    """The SI unit of a quantity; "" for names of runs and parts of quaternions."""
+    if quantity in _SI:
+        return _SI[quantity]
+    prefix, _, last = quantity.rpartition("_")
+    if prefix == "tension":
+        return "N"
     if last in QUATERNION:
-        return _NO_UNIT
-    return _ANGLE if last in ANGLES else _LENGTH
+        return ""
+    return "rad" if last in ANGLES else "m"
 
 
-def _unit_fault(quantity: str, unit: str | None, units: _Units) -> str:
+_SI = {"run": "", "t": "s", "temperature": "C"}
+
+
+def _unit_fault(quantity: str, suffix: str, units: dict[str, Unit]) -> str:
     if "" in units:
-        return f"a quaternion has no unit, got {show(unit or '')}; expected {quantity}"
-    expected = " or ".join(f"{quantity}_{known}" for known in units)
-    fault = f"unknown unit {show(unit)}" if unit else "missing unit"
+        return f"a quaternion has no unit, got {show(suffix)}; expected {quantity}"
+    expected = " or ".join(f"{quantity}_{unit}" for unit in units)
+    fault = f"unknown unit {show(suffix)}" if suffix else "missing unit"
     return f"{fault}; expected {expected}"
 
 
@@ -155,45 +198,39 @@ def _check_cable(table: Table, quantity: str, name: str, n_cables: int) -> None:
         )
 
 
-def _known_names(n_cables: int) -> list[str]:
-    """Every name a column may have, usual unit first."""
-    quantities = ["t", *(f"cmd_{p}" for p in POSITION + QUATERNION + ANGLES)]
-    quantities += [f"meas_{p}" for p in POSITION + QUATERNION + ANGLES]
-    quantities += [f"{p}_{i}" for p in ("length", "tension") for i in range(1, n_cables + 1)]
-    names = ["run"]
-    for quantity in [*quantities, "temperature"]:
-        names += [f"{quantity}_{unit}" if unit else quantity for unit in _units_of(quantity)]
-    return names
+def _quantities(n_cables: int) -> list[str]:
+    """Every quantity that a column may hold."""
+    of_poses = [f"{p}_{part}" for p in ("cmd", "meas") for part in POSITION + QUATERNION + ANGLES]
+    of_cables = [f"{p}_{i}" for p in ("length", "tension") for i in range(1, n_cables + 1)]
+    return ["run", "t", *of_poses, *of_cables, "temperature"]
 
 
-def _unused_notes(
-    unused: Sequence[str], columns: dict[str, Column], n_cables: int
-) -> tuple[str, ...]:
-    absent = {n.lower(): n for n in _known_names(n_cables) if not _is_taken(n, columns)}
-    absent |= {alias: n for alias, n in _ALIASES.items() if not _is_taken(n, columns)}
-    notes = []
-    for name in unused:
-        close = difflib.get_close_matches(name.lower(), absent, n=1, cutoff=0.75)
-        if close:
-            meant = absent[close[0]]
-            notes.append(f"Column {show(name)} is not used; did you mean {meant}?")
-    return tuple(notes)
+def _meant(unused: Sequence[str], known: dict[str, Column], n_cables: int) -> dict[str, str]:
+    """Of the unused names, what those are thought to mean that are near one that is absent."""
+    absent: dict[str, str] = {}
+    for quantity in _quantities(n_cables):
+        if quantity not in known:
+            units = of_columns(_si_of(quantity))
+            names = [f"{quantity}_{unit}" if unit else quantity for unit in units]
+            absent |= {name.lower(): name for name in names}
+    absent |= {alias: n for alias, n in _ALIASES.items() if n.rpartition("_")[0] not in known}
+    near = {n: difflib.get_close_matches(n.lower(), absent, n=1, cutoff=0.75) for n in unused}
+    return {name: absent[close[0]] for name, close in near.items() if close}
 
 
-def _is_taken(name: str, columns: dict[str, Column]) -> bool:
-    match = _QUANTITY.fullmatch(name)
-    return match is not None and match[1] in columns
+def _misspelt(name: str, meant: str) -> str:
+    return f"Column {show(name)} is not used; did you mean {meant}?"
 
 
-def _check_one_way(table: Table, header: Header) -> None:
+def _check_one_way(columns: Columns) -> None:
+    table, known = columns.table, columns.known
     for prefix in ("cmd", "meas"):
-        quats, angles = header.present(prefix, QUATERNION), header.present(prefix, ANGLES)
+        quats, angles = columns.present(prefix, QUATERNION), columns.present(prefix, ANGLES)
         if quats and angles:
-            a, b = (header.columns[f"{prefix}_{p[0]}"].name for p in (quats, angles))
+            a, b = (known[f"{prefix}_{p[0]}"].name for p in (quats, angles))
             raise table.error(f"orientation twice, as {a} and as {b}; expected one of the two ways")
-    poses = header.present("cmd", POSITION + QUATERNION + ANGLES)
-    lengths = header.cables("length")
+    poses = columns.present("cmd", POSITION + QUATERNION + ANGLES)
+    lengths = columns.cables("length")
     if poses and lengths:
-        a = header.columns[f"cmd_{poses[0]}"].name
-        b = header.columns[f"length_{lengths[0]}"].name
+        a, b = known[f"cmd_{poses[0]}"].name, known[f"length_{lengths[0]}"].name
         raise table.error(f"commands twice, as {a} and as {b}; expected poses or lengths, not both")

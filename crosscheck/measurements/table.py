@@ -10,7 +10,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,7 +21,7 @@ from crosscheck.errors import CrosscheckError, InputFileError
 from crosscheck.files import read_bytes
 from seecr.pose import Array
 
-EXPECTED_FILE = "expected a CSV file in UTF-8 with a header row and one row a resting pose"
+EXPECTED_FILE = "expected a CSV file in UTF-8 with a header row and one row per resting pose"
 
 _PARQUET_MAGIC = b"PAR1"
 _BEGINNINGS = (
@@ -51,14 +51,14 @@ class Table:
         names: of the columns, stripped, as in the header.
         line: (n,) where each row begins, counted from 1.
         header_line: where the header is; None where the file has no lines.
-        cells: stripped text of one column, by its number from 0.
+        cells: of each column the stripped texts, (n,) each.
     """
 
     path: Path
     names: tuple[str, ...]
     line: NDArray[np.int64]
     header_line: int | None
-    cells: Callable[[int], list[str]]
+    cells: Sequence[Sequence[str]]
 
     def error(
         self, text: str, *, row: int | None = None, column: str | None = None
@@ -71,7 +71,7 @@ class Table:
 
     def numbers(self, index: int, *, blank_is_nan: bool) -> Array:
         """Numbers (n,) of one column, as written; NaN for an empty cell where that is allowed."""
-        cells = self.cells(index)
+        cells = self.cells[index]
         try:
             values = np.array([float(cell) if cell else math.nan for cell in cells])
         except ValueError:
@@ -143,7 +143,7 @@ def _read_csv(path: Path, data: bytes) -> Table:
     (header_line, header), *body = _csv_rows(path, numbered)
     if not body:
         raise InputFileError.at(
-            path, "has a header but no rows; expected one row a resting pose", line=header_line
+            path, "has a header but no rows; expected one row per resting pose", line=header_line
         )
     _check_cell_counts(path, header_line, len(header), body)
     return Table(
@@ -151,7 +151,7 @@ def _read_csv(path: Path, data: bytes) -> Table:
         names=tuple(name.strip() for name in header),
         line=np.array([line for line, _ in body]),
         header_line=header_line,
-        cells=lambda index: [row[index].strip() for _, row in body],
+        cells=[[c.strip() for c in cells] for cells in zip(*(row for _, row in body), strict=True)],
     )
 
 
@@ -203,15 +203,15 @@ def _read_parquet(path: Path) -> Table:
     except (pyarrow.ArrowException, OSError) as error:
         raise InputFileError.at(path, f"cannot be read as Parquet: {error}") from None
     if content.num_rows == 0:
-        raise InputFileError.at(path, "has columns but no rows; expected one row a resting pose")
+        raise InputFileError.at(path, "has columns but no rows; expected one row per resting pose")
     return Table(
         path=path,
         names=tuple(name.strip() for name in content.column_names),
         line=np.arange(1, content.num_rows + 1),
         header_line=None,
-        cells=lambda index: [
-            "" if value is None else str(value).strip()
-            for value in content.column(index).to_pylist()
+        cells=[
+            ["" if value is None else str(value).strip() for value in column.to_pylist()]
+            for column in content.columns
         ],
     )
 

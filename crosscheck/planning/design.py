@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from crosscheck.fit.prepare import Progress
-from crosscheck.measurements.read import Measurements
-from crosscheck.measurements.sigma import Sigma
+from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.planning.extensions import Extension, extensions, more_poses
 from crosscheck.planning.greedy import chosen_poses
 from crosscheck.planning.planned import Planned, expected_sigma, near_slack, planned

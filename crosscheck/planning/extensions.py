@@ -9,7 +9,7 @@ import numpy as np
 
 from crosscheck.fit.candidates import null_fit
 from crosscheck.fit.problem import Problem
-from crosscheck.measurements.read import Measurements
+from crosscheck.measurements.data import Measurements
 from crosscheck.planning.planned import LOAD_CELL, Planned, near_slack, planned
 from seecr.effects import Terms
 from seecr.joints import pose_of_values, values_of_pose

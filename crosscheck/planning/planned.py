@@ -10,8 +10,7 @@ import numpy as np
 from crosscheck.fit.candidates import null_fit
 from crosscheck.fit.gauss_newton import Fit
 from crosscheck.fit.problem import Problem
-from crosscheck.measurements.read import Measurements
-from crosscheck.measurements.sigma import Sigma
+from crosscheck.measurements.data import Measurements, Sigma
 from seecr.compiled import law as cable_law
 from seecr.effects import Terms
 from seecr.pose import Array

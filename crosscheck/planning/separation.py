@@ -15,7 +15,7 @@ import numpy as np
 from crosscheck.fit.gauss_newton import Fit, projected
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.state import State, derivatives, evaluate
-from crosscheck.measurements.read import Measurements
+from crosscheck.measurements.data import Measurements
 from seecr.effects.base import Layout, layout_of
 from seecr.pose import Array, quat_from_rotvec, quat_multiply
 from seecr.robot import Robot

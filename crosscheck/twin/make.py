@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.files import staged, write_text
-from crosscheck.measurements.data import Measurements, write_measurements
-from crosscheck.measurements.sigma import Sigma
+from crosscheck.measurements.data import Measurements, Sigma
+from crosscheck.measurements.write import write_measurements
 from crosscheck.twin.hidden import Hidden, choose
 from crosscheck.twin.measure import Truth, measure
 from crosscheck.twin.sealed import NAME, seal

@@ -11,8 +11,8 @@ import numpy as np
 from click.testing import CliRunner, Result
 
 from crosscheck.cli import main
-from crosscheck.measurements.data import Measurements, write_measurements
-from crosscheck.measurements.sigma import Sigma
+from crosscheck.measurements.data import Measurements, Sigma
+from crosscheck.measurements.write import write_measurements
 from crosscheck.twin.trajectory import trajectory
 from seecr.effects import Term, Terms, effect_named, layout_of
 from seecr.experiment import Experiment

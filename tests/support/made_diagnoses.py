@@ -10,8 +10,7 @@ from made_data import measured, term
 
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.verdict import diagnose
-from crosscheck.measurements.read import Measurements
-from crosscheck.measurements.sigma import Sigma
+from crosscheck.measurements.data import Measurements, Sigma
 from seecr.mjcf import load_robot
 from seecr.robot import Robot
 from seecr.shipped import model_path

@@ -12,8 +12,8 @@ from made_data import SIGMA, case, measured, refused, run, soft_cogiro, term
 
 from crosscheck.add import add_effect
 from crosscheck.errors import CrosscheckError
-from crosscheck.measurements.data import write_measurements
 from crosscheck.measurements.read import load_measurements
+from crosscheck.measurements.write import write_measurements
 from crosscheck.model.read import load_model
 from seecr.mjcf import load_robot
 

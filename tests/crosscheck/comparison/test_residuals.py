@@ -15,7 +15,7 @@ from crosscheck.comparison.residuals import as_json, compare
 from crosscheck.comparison.travel import STILL
 from crosscheck.errors import CrosscheckError, InputFileError
 from crosscheck.files import json_text
-from crosscheck.measurements.sigma import Sigma
+from crosscheck.measurements.data import Sigma
 from seecr.mjcf import load_robot
 from seecr.pose import pose_add, pose_difference
 from seecr.shipped import model_path

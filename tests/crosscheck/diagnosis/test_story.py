@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from crosscheck.cli import main
-from crosscheck.measurements.data import Measurements
-from crosscheck.measurements.read import write_measurements
-from crosscheck.measurements.sigma import Sigma
+from crosscheck.measurements.data import Measurements, Sigma
+from crosscheck.measurements.write import write_measurements
 from seecr.effects.geometry import PulleyRadius
 from seecr.experiment import Experiment
 from seecr.mjcf import load_robot

@@ -10,7 +10,7 @@ from crosscheck.fit.gauss_newton import fit
 from crosscheck.fit.noise import whiteness
 from crosscheck.fit.problem import Problem, angle_rates
 from crosscheck.fit.state import evaluate
-from crosscheck.measurements.sigma import Sigma
+from crosscheck.measurements.data import Sigma
 from seecr.effects import Terms
 from seecr.mjcf import load_robot
 from seecr.pose import quat_from_rotvec, quat_from_rxyz, quat_multiply, rxyz_from_quat

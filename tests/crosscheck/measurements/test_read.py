@@ -9,13 +9,9 @@ import numpy as np
 import pytest
 
 from crosscheck.errors import CrosscheckError, InputFileError
-from crosscheck.measurements.read import (
-    Measurements,
-    Sigma,
-    load_commands,
-    load_measurements,
-    write_measurements,
-)
+from crosscheck.measurements.data import Measurements, Sigma
+from crosscheck.measurements.read import load_commands, load_measurements
+from crosscheck.measurements.write import write_measurements
 from seecr.mjcf import load_robot
 from seecr.pose import pose_difference, quat_from_rxyz, quat_rotate, quat_to_matrix
 from seecr.robot import Robot
@@ -729,7 +725,7 @@ def test_parquet_has_the_same_columns(tmp_path, robot):
         ({"t_s": [2.0, 1.0]}, "row 2, column t_s: rows out of time order"),
         (
             {k: [] for k in ("cmd_x_m", "cmd_y_m", "cmd_z_m", "meas_x_m")},
-            "has columns but no rows; expected one row a resting pose",
+            "has columns but no rows; expected one row per resting pose",
         ),
     ],
 )

@@ -12,7 +12,7 @@ from scipy import stats
 from crosscheck.files import json_text
 from crosscheck.fit.candidates import null_fit, try_candidate
 from crosscheck.fit.problem import Problem
-from crosscheck.measurements.sigma import Sigma
+from crosscheck.measurements.data import Sigma
 from crosscheck.planning.design import MORE_POSES, make_plan
 from crosscheck.planning.extensions import more_poses
 from crosscheck.planning.greedy import chosen_poses
