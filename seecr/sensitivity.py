@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterable, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,8 @@ from seecr.statics import Tables
 
 # Differencing steps, in plausible sizes of a parameter.
 _CENTRAL, _ONE_SIDED, _WALK = 1e-4, 1e-5, 1e-4
+# Differencing step of what the sensors make of a pose: rad, or part of a length or tension.
+_READ = 1e-5
 
 
 def sensitivities(
@@ -54,7 +57,7 @@ def sensitivities(
     if at.has_history and not frozen:
         return _by_walking(experiment, terms, at, wanted)
     out = np.zeros((*_shape(at), len(wanted)))
-    by_wrench = _ByWrench(experiment, at, _sensing(terms))
+    by_wrench = _ByWrench(experiment, at, terms)
     todo = {position: c for c, position in enumerate(_positions(terms, wanted))}
     for term, group in _blocks(terms, todo):
         block = by_wrench.block(_shifted(terms, term, group))
@@ -150,10 +153,6 @@ def _shifted(terms: Terms, term: Term, k: Any, part: float | None = None) -> _Sh
     return _Shift(with_value(up), with_value(down), up - down, layout)
 
 
-def _sensing(terms: Terms) -> bool:
-    return any(t.layout.effect.edit_readings is not Effect.edit_readings for t in terms)
-
-
 # Fields of a setup that reach the statics through the rest lengths alone.
 _LENGTH_FIELDS = {"extra_length", "length_gain", "length_factor", "zero_pose"}
 _OTHER_FIELDS = tuple(
@@ -177,7 +176,31 @@ class _ByWrench:
 
     experiment: Experiment
     at: Prediction
-    sensing: bool
+    terms: Terms
+
+    @cached_property
+    def sensing(self) -> bool:
+        """Whether any term edits the readings."""
+        return any(t.layout.effect.edit_readings is not Effect.edit_readings for t in self.terms)
+
+    @cached_property
+    def read_rates(self) -> Array:
+        """Derivative of the readings by pose and tensions, (n, 6 + m, 6 + m)."""
+        at, (n, width) = self.at, _shape(self.at)
+        out = np.empty((n, width, width))
+        for k in range(width):
+            step = np.zeros(width)
+            step[k] = _READ * (self.at.tables.length if k < 3 else 1.0)
+            if k >= 6:
+                step[k] *= max(1.0, float(np.max(np.abs(at.tensions))))
+            move, tension = np.tile(step[:6], (n, 1)), step[6:]
+            ahead, behind = (
+                read(self.terms.effects, at.setup, pose_add(at.pose, s * move),
+                     at.tensions + s * tension)
+                for s in (1.0, -1.0)
+            )  # fmt: skip
+            out[..., k] = readings_difference(ahead, behind) / (2.0 * step[k])
+        return out
 
     @property
     def inverse(self) -> Array:
@@ -197,9 +220,9 @@ class _ByWrench:
             if _differ(plus, minus, _HISTORY_FIELDS):
                 return _difference(self.experiment, shift, self.at)
             change = self._physical(plus, minus, shift.apart)
-        if not self.sensing:
-            return change
-        return self._read(shift, change, shift.apart)
+        if shift.sensing:
+            return self._read(shift, change, shift.apart)
+        return (self.read_rates @ change[..., None])[..., 0] if self.sensing else change
 
     def block(self, shift: _Shift) -> Array | None:
         """Derivatives (n, 6 + m, m) by what each cable has of its own, shifted together."""
@@ -215,10 +238,7 @@ class _ByWrench:
         else:
             ahead, behind = self._tables(plus, minus)
             change = _response_by_cable(self.at, ahead, behind, shift.apart)
-        if not self.sensing:
-            return change
-        columns = [self._read(shift, change[..., i], by) for i, by in enumerate(shift.apart)]
-        return np.stack(columns, axis=-1)
+        return self.read_rates @ change if self.sensing else change
 
     def _physical(self, plus: Setup, minus: Setup, apart: float) -> Array:
         if _differ_by_length_only(plus, minus):
