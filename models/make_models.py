@@ -76,6 +76,8 @@ class Model:
         planar: moves in the x-z plane only.
         mass: of the platform [kg].
         bar: edge of the frame's square profile [m].
+        cable_factors: stiffness of each cable over Vectran's; None for all alike.
+        centre: of mass, in the platform frame [m].
     """
 
     name: str
@@ -87,11 +89,25 @@ class Model:
     planar: bool = False
     mass: float = 0.4
     bar: float = 0.02
+    cable_factors: tuple[float, ...] | None = None
+    centre: Vector = (0.0, 0.0, 0.0)
 
 
 MODELS = (
     Model("demobot_cogiro", "DemoBot, eight cables in the Cogiro configuration", COGIRO),
     Model("demobot_parallel", "DemoBot, eight cables in the parallel configuration", PARALLEL),
+    Model(
+        "demobot_uneven",
+        "DemoBot, parallel configuration, no two cables of the same stiffness",
+        PARALLEL,
+        cable_factors=(1.0, 0.5, 1.4, 0.1, 0.8, 2.0, 0.3, 1.2),
+    ),
+    Model(
+        "demobot_off_centre",
+        "DemoBot, Cogiro configuration, its centre of mass off the middle",
+        COGIRO,
+        centre=(0.012, -0.007, -0.015),
+    ),
     Model(
         "planar_two_cable",
         "Bar on two cables, under-actuated, in the x-z plane",
@@ -155,6 +171,11 @@ def box_inertia(mass: float, edges: Vector) -> Vector:
 def numbers(*values: float) -> str:
     """Floats as MJCF wants them, by repr; minus zero would only puzzle a reader."""
     return " ".join(repr(float(v) + 0.0) for v in values)
+
+
+def _bare(*values: float) -> str:
+    """Floats as :func:`numbers`, those that are nothing as plain 0."""
+    return " ".join("0" if v == 0.0 else repr(v) for v in values)
 
 
 def write_mjcf(model: Model) -> str:
@@ -302,7 +323,8 @@ def _platform(model: Model) -> Iterator[str]:
     else:
         yield "      <freejoint/>"
     inertia = numbers(*box_inertia(model.mass, model.box))
-    yield f'      <inertial pos="0 0 0" mass="{numbers(model.mass)}" diaginertia="{inertia}"/>'
+    centre, mass = _bare(*model.centre), numbers(model.mass)
+    yield f'      <inertial pos="{centre}" mass="{mass}" diaginertia="{inertia}"/>'
     halves = numbers(*(0.5 * edge for edge in model.box))
     yield f'      <geom name="platform" type="box" size="{halves}" material="platform"/>'
     yield from _anchor_pins(model)
@@ -325,10 +347,11 @@ def _anchor_pins(model: Model) -> Iterator[str]:
 
 
 def _tendons(model: Model) -> Iterator[str]:
+    factors = model.cable_factors or (1.0,) * len(model.cables)
     yield "  <tendon>"
     for i, (a, b) in enumerate(model.cables, start=1):
         on_base = [t + p for t, p in zip(model.reference, b, strict=True)]
-        stiffness, rest = exact_spring(VECTRAN, math.dist(a, on_base))
+        stiffness, rest = exact_spring(VECTRAN * factors[i - 1], math.dist(a, on_base))
         yield (
             f'    <spatial name="cable{i}" width="0.0012" rgba="0.10 0.12 0.14 1" '
             f'springlength="0 {rest!r}" stiffness="{stiffness!r}">'

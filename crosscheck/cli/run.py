@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,7 +22,7 @@ from crosscheck.cli.options import (
 
 if TYPE_CHECKING:
     from crosscheck.suite.cases import Case
-    from crosscheck.suite.effect_suite import EffectResult, EffectTask
+    from crosscheck.suite.effects import EffectCase, EffectResult
     from crosscheck.suite.results import Run
     from crosscheck.suite.run import CaseResult
     from crosscheck.suite.thresholds import Thresholds
@@ -86,19 +87,21 @@ def command(
     """Solve each pose with SEECR, settle it in MuJoCo, and hold the two against thresholds.
 
     The shipped cases: DemoBot in the Cogiro and the parallel configuration, on Vectran and on
-    fishing line, along the paper's sweeps (x 0.17 to 0.63 m at z 0.1 and 0.2 m) and at 200 random
-    poses each; and three planar robots. After them the group 'effects': every effect that MuJoCo
-    can express, on both DemoBots (--case effects runs only these).
+    fishing line, along the paper's sweeps (x 0.17 to 0.63 m at z 0.1 and 0.2 m), turned on the
+    way, and at 200 random poses each; three planar robots; a DemoBot with uneven cables, one with
+    its centre of mass off. After them the group 'effects': every effect on both DemoBots, held
+    against a robot in MuJoCo that really has it (--case effects runs only these).
 
     A pose where the platform is free to move, or has two stable equilibria that both physics
-    confirm, is a finding: it is listed, and fails nothing.
+    confirm, is a finding: it is listed, and fails its case where the thresholds' [findings] do
+    not allow it.
 
     \b
     Writes into --out:
       results.json     every number, pose by pose
-      junit.xml        one test a case, for continuous integration
+      junit.xml        one test per case, for continuous integration
       summary.md       the table, failures and findings
-      CASE.rrd         a recording a case: open it with 'rerun CASE.rrd'
+      CASE.rrd         a recording per case: open it with 'rerun CASE.rrd'
       worst_pose.xml   the pose nearest to its threshold, for MuJoCo's viewer
       thresholds.toml  what the run was held against
 
@@ -125,16 +128,16 @@ def command(
     return _run(chosen, thresholds, seed, jobs or processors(), not no_recordings, out, as_json)
 
 
-def _shipped(seed: int, patterns: Sequence[str]) -> list[Case | EffectTask]:
+def _shipped(seed: int, patterns: Sequence[str]) -> list[Case | EffectCase]:
     """The selected pose cases and effects; the group's name stands for all its effects."""
     from crosscheck.suite.cases import select, shipped_cases
-    from crosscheck.suite.effect_suite import GROUP, PREFIX, effect_tasks
+    from crosscheck.suite.effects import GROUP, PREFIX, effect_cases
 
-    every: list[Case | EffectTask] = [*shipped_cases(seed), *effect_tasks(seed)]
+    every: list[Case | EffectCase] = [*shipped_cases(seed), *effect_cases(seed=seed)]
     return select(every, [f"{PREFIX}*" if name == GROUP else name for name in patterns])
 
 
-def _list(chosen: list[Case | EffectTask]) -> None:
+def _list(chosen: list[Case | EffectCase]) -> None:
     from crosscheck.suite.cases import Case
 
     width = max(len(case.name) for case in chosen)
@@ -144,7 +147,7 @@ def _list(chosen: list[Case | EffectTask]) -> None:
 
 
 def _run(
-    chosen: list[Case | EffectTask],
+    chosen: list[Case | EffectCase],
     thresholds: Thresholds,
     seed: int,
     jobs: int,
@@ -169,20 +172,23 @@ def _run(
         from crosscheck.terminal.suite import print_run
 
         print_run(run, out)
-    return run.exit_status
+    for note in run.notes:
+        click.echo(f"note: {note}", err=True)
+    return run.outcome.exit_status
 
 
 def _results(
-    chosen: list[Case | EffectTask], thresholds: Thresholds, jobs: int, folder: Path | None
+    chosen: list[Case | EffectCase], thresholds: Thresholds, jobs: int, folder: Path | None
 ) -> tuple[list[CaseResult], list[EffectResult]]:
     """The poses' cases, then the effects, in the same processes and under one bar."""
     from crosscheck.suite.cases import Case
 
     cases = [case for case in chosen if isinstance(case, Case)]
-    tasks = [case for case in chosen if not isinstance(case, Case)]
-    total = sum(len(case.poses) for case in cases) + sum(task.n_poses for task in tasks)
+    effects = [case for case in chosen if not isinstance(case, Case)]
+    total = sum(len(case.poses) for case in cases)
+    total += sum(len(case.commands) for case in effects)
     with progress_bar("compiling", total) as advance:
-        from crosscheck.suite.effect_suite import run_effects
+        from crosscheck.suite.effects import run_effects
         from crosscheck.suite.pool import Pool
         from crosscheck.suite.run import run_suite
 
@@ -190,14 +196,23 @@ def _results(
             results = run_suite(
                 cases,
                 thresholds,
-                folder=folder,
+                record=None if folder is None else partial(_record, folder=folder),
                 progress=lambda result: advance(len(result), result.case.name),
                 pool=pool,
             )
-            effects = run_effects(
-                tasks, pool, lambda result: advance(result.rows, result.task.name)
+            found = run_effects(
+                effects, pool, lambda result: advance(len(result.compared), result.case.name)
             )
-    return results, effects
+    return results, found
+
+
+def _record(result: CaseResult, folder: Path) -> str:
+    """Write the recording of a case into a folder; its name."""
+    from crosscheck.recording import write_case_recording
+
+    name = f"{result.case.name}.rrd"
+    write_case_recording(result, folder / name)
+    return name
 
 
 def _write(run: Run, folder: Path) -> None:
@@ -206,7 +221,7 @@ def _write(run: Run, folder: Path) -> None:
     from crosscheck.suite.results import results_json
     from crosscheck.suite.summary import summary_md
     from crosscheck.suite.thresholds import thresholds_toml
-    from crosscheck.suite.worst import write_worst_pose
+    from crosscheck.suite.worst_pose import write_worst_pose
 
     sentence = write_worst_pose(run.results, folder) if run.results else ""
     texts = {

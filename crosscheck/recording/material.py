@@ -131,7 +131,7 @@ def gather(result: CaseResult) -> Material:
     if watched is None:
         return Material(result, 0, None)
     lengths = result.mujoco_rest_lengths[watched]
-    settler = result.side().settler
+    settler = result.mujoco_robot().settler
     motion = record_motion(settler, result.case.poses[watched], lengths, max_frames=_FRAMES)
     return Material(result, watched, motion)
 

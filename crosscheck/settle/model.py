@@ -7,7 +7,7 @@ no rest state, only delays it).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from copy import copy
 from pathlib import Path
@@ -112,6 +112,14 @@ def switch_off(model: mujoco.MjModel) -> tuple[str, ...]:
         "contacts": model.geom_contype.any() and model.geom_conaffinity.any(),
     }
     return tuple(what for what, there in found.items() if there)
+
+
+def ignored_note(name: str | Path, ignored: Sequence[str]) -> str:
+    """One sentence about what :func:`switch_off` found in a file."""
+    return (
+        f"{name}: switched off here: {', '.join(ignored)}; the platform hangs on springs and "
+        "gravity alone, as statics has it"
+    )
 
 
 def change_mass_unit(model: mujoco.MjModel, mass_unit: float) -> None:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr.pose import Array, pose_difference
+from crosscheck.suite.gap import gap
+from seecr.pose import Array
 
 if TYPE_CHECKING:
     from crosscheck.settle.settler import SettlingBatch
@@ -105,16 +106,16 @@ def compare(solution: Solution, settling: SettlingBatch, tension_allowed: Array)
         settling: the same n poses.
         tension_allowed: (n,) [N] below which a taut cable may be slack for the other.
     """
-    rough = pose_difference(settling.settled_pose, solution.pose)
-    fine = pose_difference(settling.pose, solution.pose)
+    settled_m, settled_rad = gap(settling.settled_pose, solution.pose)
+    position_m, orientation_rad = gap(settling.pose, solution.pose)
     tension = np.abs(settling.tensions - solution.tensions)
     larger = np.fmax(settling.tensions, solution.tensions)
     same = (settling.slack == solution.slack) | (larger <= tension_allowed[:, None])
     return Differences(
-        settled_position_m=np.linalg.norm(rough[:, :3], axis=1),
-        settled_orientation_rad=np.linalg.norm(rough[:, 3:], axis=1),
-        position_m=np.linalg.norm(fine[:, :3], axis=1),
-        orientation_rad=np.linalg.norm(fine[:, 3:], axis=1),
+        settled_position_m=settled_m,
+        settled_orientation_rad=settled_rad,
+        position_m=position_m,
+        orientation_rad=orientation_rad,
         cable_tension_N=tension,
         slack_same=same.all(axis=1),
     )

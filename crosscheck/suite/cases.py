@@ -39,8 +39,13 @@ _SWEEP_Z = (0.1, 0.2)
 _FRAME = ((0.10, 0.10, 0.05), (0.70, 0.40, 0.35))
 # Cogiro withstands moments: its random poses are turned, by up to this about a random axis.
 _COGIRO_TURN = np.deg2rad(12.0)
-# Planar robots: half the width of the sweep, and joint values about the reference pose.
+# Turned sweeps: by up to this about each axis.
+_SWEEP_TURN = np.deg2rad(6.0)
+# Planar robots: half the width of the sweep [m], tilt of the turned one, and other heights in
+# parts of what is between the reference position and the exit points.
 _PLANAR_HALF_WIDTH = 0.15
+_PLANAR_TURN = np.deg2rad(8.0)
+_PLANAR_HEIGHTS = (-0.3, -0.15, 0.2, 0.4)
 # Of the way from the reference position to the exit points that a user's robot is sent.
 _USER_REACH = 0.6
 _USER_TURN = np.deg2rad(10.0)
@@ -57,6 +62,8 @@ class Case:
         cable: name of one of ``seecr.shipped.CABLES``; None leaves the MJCF's stiffness.
         kind: ``"sweep"``, whose poses follow each other along a line, or ``"random"``.
         poses: (n, 7) commanded.
+        has_names: whether thresholds can name its poses: not those of another seed or of a
+            user's robot.
     """
 
     name: str
@@ -65,6 +72,7 @@ class Case:
     cable: str | None
     kind: str
     poses: Array
+    has_names: bool = True
 
     @property
     def ea(self) -> float | None:
@@ -78,7 +86,7 @@ class Case:
 
 
 def shipped_cases(seed: int = 0, n_random: int = N_RANDOM) -> list[Case]:
-    """Both DemoBots on both cables, along the paper's sweeps and at random; planar robots."""
+    """DemoBots along the paper's sweeps, turned and at random; planar robots; uneven ones."""
     cases = []
     for robot, turn in (("cogiro", _COGIRO_TURN), ("parallel", 0.0)):
         path = model_path(f"demobot_{robot}")
@@ -86,10 +94,16 @@ def shipped_cases(seed: int = 0, n_random: int = N_RANDOM) -> list[Case]:
             for z in _SWEEP_Z:
                 name = f"{robot}-{cable}-z{z:.2f}"
                 cases.append(Case(name, path, path, cable, "sweep", demobot_sweep(z)))
+            name = f"{robot}-{cable}-turned"
+            cases.append(Case(name, path, path, cable, "sweep", demobot_turned_sweep()))
             name = f"{robot}-{cable}-random"
             poses = demobot_random(_generator(seed, name), n_random, turn)
-            cases.append(Case(name, path, path, cable, "random", poses))
-    return cases + [_planar_case(robot) for robot in ("two_cable", "vertical", "horizontal")]
+            cases.append(Case(name, path, path, cable, "random", poses, has_names=seed == 0))
+    for robot in ("two_cable", "vertical", "horizontal"):
+        cases += _planar_cases(robot)
+    for robot, turn in (("uneven", 0.0), ("off_centre", _COGIRO_TURN)):
+        cases += _own_cable_cases(robot, turn, seed, n_random)
+    return cases
 
 
 def user_cases(
@@ -111,8 +125,8 @@ def user_cases(
     name, other = model.stem, mujoco_model or model
     random = robot_random(robot, _generator(seed, f"{name}-random"), n_random)
     return [
-        Case(f"{name}-sweep", model, other, None, "sweep", robot_sweep(robot)),
-        Case(f"{name}-random", model, other, None, "random", random),
+        Case(f"{name}-sweep", model, other, None, "sweep", robot_sweep(robot), has_names=False),
+        Case(f"{name}-random", model, other, None, "random", random, has_names=False),
     ]
 
 
@@ -140,6 +154,15 @@ def demobot_sweep(z: float, n: int = N_SWEEP) -> Array:
     poses = np.zeros((n, 7))
     poses[:, 0] = np.linspace(*_SWEEP_X, n)
     poses[:, 1], poses[:, 2], poses[:, 3] = _SWEEP_Y, z, 1.0
+    return poses
+
+
+def demobot_turned_sweep(n: int = N_SWEEP) -> Array:
+    """The same line between the two heights, (n, 7), the platform commanded to turn on the way."""
+    poses = demobot_sweep(0.5 * sum(_SWEEP_Z), n)
+    angle = np.linspace(0.0, 2.0 * np.pi, n)
+    parts = [np.sin(angle), np.sin(angle + 1.0), np.cos(2.0 * angle)]
+    poses[:, 3:] = quat_from_rotvec(_SWEEP_TURN * np.stack(parts, axis=1))
     return poses
 
 
@@ -177,14 +200,35 @@ def robot_random(robot: Robot, random: np.random.Generator, n: int) -> Array:
     return _reachable(robot, poses)
 
 
-def _planar_case(robot: str) -> Case:
-    """A planar robot of the paper (Figs 2 to 9) along a short sweep about its reference."""
+def _planar_cases(robot: str) -> list[Case]:
+    """A planar robot of the paper (Figs 2 to 9): along a short sweep, at other heights, turned."""
     from seecr.mjcf import load_robot
 
-    path = model_path(f"planar_{robot}")
-    poses = np.tile(load_robot(path).reference_pose, (N_SWEEP, 1))
-    poses[:, 0] += np.linspace(-_PLANAR_HALF_WIDTH, _PLANAR_HALF_WIDTH, N_SWEEP)
-    return Case(f"planar-{robot}".replace("_", "-"), path, path, "vectran", "sweep", poses)
+    path, stem = model_path(f"planar_{robot}"), f"planar-{robot}".replace("_", "-")
+    home, exits = load_robot(path).reference_pose, load_robot(path).exit_points
+    level = np.tile(home, (N_SWEEP, 1))
+    level[:, 0] += np.linspace(-_PLANAR_HALF_WIDTH, _PLANAR_HALF_WIDTH, N_SWEEP)
+    room = float(exits[:, 2].min() - home[2])
+    lines = [level[::2] + part * room * np.eye(7)[2] for part in _PLANAR_HEIGHTS]
+    turned = level.copy()
+    tilt = _PLANAR_TURN * np.sin(np.linspace(0.0, 2.0 * np.pi, N_SWEEP))
+    turned[:, 3:] = quat_from_rotvec(tilt[:, None] * np.array([0.0, 1.0, 0.0]))
+    cases = [Case(stem, path, path, "vectran", "sweep", level)]
+    for cable in CABLES:
+        heights = np.concatenate(lines)
+        cases.append(Case(f"{stem}-{cable}-heights", path, path, cable, "random", heights))
+        cases.append(Case(f"{stem}-{cable}-turned", path, path, cable, "sweep", turned))
+    return cases
+
+
+def _own_cable_cases(robot: str, turn: float, seed: int, n_random: int) -> list[Case]:
+    """A DemoBot whose cables are those of its file, along a turned sweep and at random."""
+    path, stem = model_path(f"demobot_{robot}"), robot.replace("_", "-")
+    random = demobot_random(_generator(seed, f"{stem}-random"), n_random // 2, turn)
+    return [
+        Case(f"{stem}-turned", path, path, None, "sweep", demobot_turned_sweep()),
+        Case(f"{stem}-random", path, path, None, "random", random, has_names=seed == 0),
+    ]
 
 
 def _generator(seed: int, name: str) -> np.random.Generator:

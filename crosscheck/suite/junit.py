@@ -7,13 +7,12 @@ import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from crosscheck.suite import effect_words as effect_figures
-from crosscheck.suite import words as figures
-from crosscheck.suite.effect_suite import GROUP
-from crosscheck.suite.run import EXIT_DIFFERS, EXIT_UNSOLVED
+from crosscheck.suite import words
+from crosscheck.suite.effects import GROUP
+from crosscheck.suite.run import Outcome
 
 if TYPE_CHECKING:
-    from crosscheck.suite.effect_suite import EffectResult
+    from crosscheck.suite.effects import EffectResult
     from crosscheck.suite.results import Run
     from crosscheck.suite.run import CaseResult
 
@@ -21,8 +20,11 @@ if TYPE_CHECKING:
 _FORBIDDEN = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
+_TAGS = {Outcome.DIFFER: "failure", Outcome.NOT_CONVERGED: "error"}
+
+
 def junit_xml(run: Run) -> str:
-    """One test case a case of the suite; differences are failures, unsolved poses errors.
+    """One test case per case of the suite; differences are failures, unsolved poses errors.
 
     Poses and effects are a suite each, where there are any.
     """
@@ -43,11 +45,11 @@ def junit_xml(run: Run) -> str:
 
 
 def _counts(results: Sequence[CaseResult | EffectResult], seconds: float) -> dict[str, str]:
-    statuses = [result.exit_status for result in results]
+    outcomes = [result.outcome for result in results]
     return {
-        "tests": str(len(statuses)),
-        "failures": str(statuses.count(EXIT_DIFFERS)),
-        "errors": str(statuses.count(EXIT_UNSOLVED)),
+        "tests": str(len(outcomes)),
+        "failures": str(outcomes.count(Outcome.DIFFER)),
+        "errors": str(outcomes.count(Outcome.NOT_CONVERGED)),
         "time": f"{seconds:.3f}",
     }
 
@@ -57,13 +59,13 @@ def _add_effect(suite: ET.Element, result: EffectResult) -> None:
         suite,
         "testcase",
         classname=f"crosscheck.{GROUP}",
-        name=_clean(result.task.name),
+        name=_clean(result.case.name),
         time=f"{result.wall_s:.3f}",
     )
-    text = _clean(effect_figures.text(result))
-    tag = {EXIT_DIFFERS: "failure", EXIT_UNSOLVED: "error"}.get(result.exit_status)
+    text = _clean(words.effect_text(result))
+    tag = _TAGS.get(result.outcome)
     if tag is not None:
-        message = f"{_clean(result.task.name)}: {text}"
+        message = f"{_clean(result.case.name)}: {text}"
         ET.SubElement(case, tag, message=message, type=tag).text = message
     ET.SubElement(case, "system-out").text = text
 
@@ -76,10 +78,10 @@ def _add_case(suite: ET.Element, result: CaseResult) -> None:
         name=_clean(result.case.name),
         time=f"{result.wall_s:.3f}",
     )
-    tag = {EXIT_DIFFERS: "failure", EXIT_UNSOLVED: "error"}.get(result.exit_status)
+    tag = _TAGS.get(result.outcome)
     if tag is not None:
-        lines = figures.failures(result)
-        message = f"{result.case.name}: {figures.remarks(result)}"
+        lines = words.failures(result)
+        message = f"{result.case.name}: {words.remarks(result)}"
         bad = ET.SubElement(case, tag, message=_clean(message), type=tag)
         bad.text = _clean("\n".join(lines))
     ET.SubElement(case, "system-out").text = _clean("\n".join(_report(result)))
@@ -87,10 +89,10 @@ def _add_case(suite: ET.Element, result: CaseResult) -> None:
 
 def _report(result: CaseResult) -> list[str]:
     lines = [
-        f"{figures.NAMES[name]}: {worst.value:.3e}, allowed {worst.allowed:.3e}, pose {worst.pose}"
+        f"{words.NAMES[name]}: {worst.value:.3e}, allowed {worst.allowed:.3e}, pose {worst.pose}"
         for name, worst in result.worst.items()
     ]
-    return [*lines, *figures.findings(result), *figures.widened(result)]
+    return [*lines, *words.findings(result), *words.widened(result)]
 
 
 def _clean(text: str) -> str:

@@ -35,6 +35,11 @@ class MujocoRobot:
         # The compiled model stands at its reference pose, its springs still as in the file.
         self.pretension = physics.rest_lengths - physics.data.ten_length
 
+    @property
+    def ignored(self) -> tuple[str, ...]:
+        """What of the MJCF is switched off, such as "contacts"."""
+        return self.settler.physics.ignored
+
     def rest_lengths(self, poses: Array) -> Array:
         """Lengths (n, m) [m] paid out for commanded poses (n, 7), from MuJoCo's kinematics."""
         physics = self.settler.physics

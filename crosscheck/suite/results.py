@@ -11,18 +11,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from crosscheck.files import json_text
-from crosscheck.suite.run import EXIT_AGREES, EXIT_DIFFERS, CaseResult, Worst, exit_status, worst_of
+from crosscheck.settle.model import ignored_note
+from crosscheck.suite.run import CaseResult, Outcome, Worst, worst_of
 from crosscheck.suite.thresholds import Thresholds
 from crosscheck.suite.verdicts import Verdict
 
 if TYPE_CHECKING:
-    from crosscheck.suite.effect_suite import EffectResult
+    from crosscheck.suite.effects import EffectResult
 
 FORMAT = 1
 """Of ``results.json``; raised when a key changes its meaning or goes."""
 
 _PACKAGES = ("seecr", "mujoco", "numpy", "scipy", "numba", "rerun-sdk")
-_WORDS = {EXIT_AGREES: "agree", EXIT_DIFFERS: "differ"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,14 +46,25 @@ class Run:
     effects: Sequence[EffectResult] = ()
 
     @property
-    def exit_status(self) -> int:
-        """0 all agree, 1 a threshold exceeded, 3 a solve did not converge."""
-        return exit_status([*self.results, *self.effects])
+    def every(self) -> list[CaseResult | EffectResult]:
+        """Results of cases and effects."""
+        return [*self.results, *self.effects]
 
     @property
-    def verdict(self) -> str:
-        """``agree``, ``differ`` or ``not_converged``."""
-        return _WORDS.get(self.exit_status, "not_converged")
+    def outcome(self) -> Outcome:
+        """How it ended."""
+        return Outcome.of_all(result.outcome for result in self.every)
+
+    @property
+    def worst(self) -> tuple[CaseResult, Worst] | None:
+        """The case and difference nearest to, or furthest beyond, what is allowed."""
+        return worst_of(self.results)
+
+    @property
+    def notes(self) -> list[str]:
+        """What of the robots' files MuJoCo's side leaves out, a sentence per file."""
+        found = {result.case.mujoco_model: result.ignored for result in self.results}
+        return [ignored_note(path, names) for path, names in found.items() if names]
 
     def count(self, verdict: Verdict) -> int:
         """Number of poses with a verdict."""
@@ -61,7 +72,7 @@ class Run:
 
 
 def results_json(run: Run) -> str:
-    """The text of ``results.json``: a head to read, then one line a case."""
+    """The text of ``results.json``: a head to read, then one line per case."""
     head = json_text(_head(run), indent=2)
     lines = [json_text(_case(result), indent=None) for result in run.results]
     return head[: head.rindex("\n}")] + ',\n  "cases": [\n' + ",\n".join(lines) + "\n  ]\n}\n"
@@ -79,44 +90,25 @@ def package_versions() -> dict[str, str]:
 
 
 def _head(run: Run) -> dict[str, Any]:
-    worst = worst_of(run.results)
+    worst = run.worst
     return {
         "format": FORMAT,
-        "verdict": run.verdict,
-        "exit_status": run.exit_status,
-        "worst": None if worst is None else {"case": worst[0].case.name, **_worst(worst[1])},
+        "verdict": run.outcome,
+        "exit_status": run.outcome.exit_status,
+        "worst": None if worst is None else {"case": worst[0].case.name, **worst[1].as_json()},
         "poses": {"total": sum(len(r) for r in run.results), **_counts(run)},
-        "thresholds": run.thresholds.as_dict(),
+        "thresholds": run.thresholds,
+        "notes": run.notes,
         "seed": run.seed,
         "jobs": run.jobs,
         "wall_s": run.wall_s,
         "packages": package_versions(),
-        "effects": [_effect(result) for result in run.effects],
+        "effects": run.effects,
     }
 
 
 def _counts(counted: Run | CaseResult) -> dict[str, int]:
     return {verdict.name.lower(): counted.count(verdict) for verdict in Verdict}
-
-
-def _worst(worst: Worst) -> dict[str, Any]:
-    return {**asdict(worst), "ratio": worst.ratio}
-
-
-def _effect(result: EffectResult) -> dict[str, Any]:
-    return {
-        "name": result.task.name,
-        "robot": result.task.robot,
-        "effect": result.task.effect,
-        "agrees": result.agrees,
-        "exit_status": result.exit_status,
-        "position_m": result.position_m,
-        "orientation_rad": result.orientation_rad,
-        "tension_N": result.tension_N,
-        "moved_m": result.moved_m,
-        "poses": {"total": result.rows, "unsolved": result.unsolved},
-        "wall_s": result.wall_s,
-    }
 
 
 def _case(result: CaseResult) -> dict[str, Any]:
@@ -127,11 +119,11 @@ def _case(result: CaseResult) -> dict[str, Any]:
         "mujoco_model": str(case.mujoco_model),
         "cable": case.cable,
         "kind": case.kind,
-        "exit_status": result.exit_status,
+        "exit_status": result.outcome.exit_status,
         "poses": {"total": len(result), **_counts(result)},
-        "worst": {name: _worst(worst) for name, worst in result.worst.items()},
+        "worst": result.worst,
         "widened": np.flatnonzero(result.allowance.widened),
-        "findings": [asdict(finding) for finding in result.findings],
+        "findings": result.findings,
         "timing": _timing(result),
         "recording": result.recording,
         "ea_N": result.robot.ea,

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass, replace
+from enum import Enum
 from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ from crosscheck.suite.cases import Case
 from crosscheck.suite.mujoco_robot import MujocoRobot
 from crosscheck.suite.pool import Pool
 from crosscheck.suite.thresholds import Thresholds
-from crosscheck.suite.verdicts import UNSOLVED, Answers, Finding, Verdict, judge
+from crosscheck.suite.verdicts import UNSOLVED, Answers, PoseFinding, Verdict, held_to, judge
 from seecr.equilibrium import Solution
 from seecr.equilibrium import solve as seecr_solve
 from seecr.mjcf import load_robot
@@ -34,12 +34,28 @@ from seecr.robot import Robot
 
 if TYPE_CHECKING:
     from crosscheck.settle.settler import SettlingBatch
-    from crosscheck.suite.effect_suite import EffectResult
 
 # SEECR takes microseconds: the best of this many runs is what it needs, the rest is the machine.
 _REPEATS = 3
 
-EXIT_AGREES, EXIT_DIFFERS, EXIT_UNSOLVED = 0, 1, 3
+
+class Outcome(Enum):
+    """How a case or a run ended; the value is the word that people read."""
+
+    AGREE = "agree"
+    DIFFER = "DIFFER"
+    NOT_CONVERGED = "NOT CONVERGED"
+
+    @property
+    def exit_status(self) -> int:
+        """0 agree (findings within limits), 1 differ by too much, 3 a solve did not converge."""
+        return {Outcome.AGREE: 0, Outcome.DIFFER: 1, Outcome.NOT_CONVERGED: 3}[self]
+
+    @classmethod
+    def of_all(cls, outcomes: Iterable[Outcome]) -> Outcome:
+        """A difference outweighs a solve without an answer."""
+        found = set(outcomes)
+        return next((one for one in (cls.DIFFER, cls.NOT_CONVERGED) if one in found), cls.AGREE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +79,10 @@ class Worst:
         """Difference over what is allowed: above 1 it fails."""
         return self.value / self.allowed
 
+    def as_json(self) -> dict[str, Any]:
+        """As in ``results.json``."""
+        return {**asdict(self), "ratio": self.ratio}
+
 
 @dataclass(frozen=True, eq=False)
 class CaseResult:
@@ -78,6 +98,7 @@ class CaseResult:
             ``settled_residual``, ``residual``, ``steps``, ``simulated_s``, ``status``,
             ``smallest_eigenvalue``, ... (n,).
         mujoco_rest_lengths: (n, m) [m] as MuJoCo's side paid them out.
+        ignored: what of MuJoCo's MJCF was switched off, such as "contacts".
         difference: between the two, NaN where one has no answer.
         allowance: what may differ, (n,) each.
         verdict: (n,) of :class:`crosscheck.suite.verdicts.Verdict`.
@@ -92,10 +113,11 @@ class CaseResult:
     solution: Solution
     settling: SettlingBatch
     mujoco_rest_lengths: Array
+    ignored: tuple[str, ...]
     difference: Differences
     allowance: Allowance
     verdict: NDArray[np.object_]
-    findings: tuple[Finding, ...]
+    findings: tuple[PoseFinding, ...]
     seecr_s: float
     wall_s: float = np.nan
     recording: str | None = None
@@ -113,11 +135,12 @@ class CaseResult:
         return (self.verdict == Verdict.AGREES) | (self.verdict == Verdict.DIFFERS)
 
     @property
-    def exit_status(self) -> int:
-        """0 agrees, 1 a threshold exceeded, 3 a solve did not converge."""
-        if self.count(Verdict.DIFFERS):
-            return EXIT_DIFFERS
-        return EXIT_UNSOLVED if any(self.count(v) for v in UNSOLVED) else EXIT_AGREES
+    def outcome(self) -> Outcome:
+        """How it ended."""
+        if self.count(Verdict.DIFFERS) or any(one.beyond_limits for one in self.findings):
+            return Outcome.DIFFER
+        unsolved = any(self.count(verdict) for verdict in UNSOLVED)
+        return Outcome.NOT_CONVERGED if unsolved else Outcome.AGREE
 
     @property
     def worst(self) -> dict[str, Worst]:
@@ -143,44 +166,48 @@ class CaseResult:
         """Milliseconds that MuJoCo takes a pose, both stages, on one processor."""
         return 1e3 * float(np.sum(self.settling.wall_s)) / len(self)
 
-    def side(self) -> MujocoRobot:
-        """MuJoCo's side of the case, anew: to settle one of its poses again."""
+    def mujoco_robot(self) -> MujocoRobot:
+        """MuJoCo's robot of the case, anew: to settle one of its poses again."""
         return MujocoRobot(self.case.mujoco_model, self.case.mujoco_ea)
 
 
-def run_case(case: Case, thresholds: Thresholds, folder: Path | None = None) -> CaseResult:
+Record = Callable[[CaseResult], str]
+"""Writes the recording of a case and returns its name."""
+
+
+def run_case(case: Case, thresholds: Thresholds, record: Record | None = None) -> CaseResult:
     """Solve and settle the poses of a case and compare them.
 
     Args:
         case: what to run.
         thresholds: what counts as agreement.
-        folder: where to write its recording; None writes none.
+        record: called with the result; returns the name of the recording that it wrote.
     """
     began = time.perf_counter()
     robot = load_robot(case.model)
     if case.ea is not None:
         robot = replace(robot, ea=np.full(robot.n_cables, case.ea))
     solution, seecr_s = _solve(robot, case.poses)
-    side = MujocoRobot(case.mujoco_model, case.mujoco_ea)
-    _check_same_cables(case, robot, side)
-    settling = side.settle(case.poses)
+    mujoco = MujocoRobot(case.mujoco_model, case.mujoco_ea)
+    _check_same_cables(case, robot, mujoco)
+    settling = mujoco.settle(case.poses)
     allowance = allowances(thresholds, solution, settling)
     difference = compare(solution, settling, allowance.tension_N)
-    answers = Answers(side, solution, settling, difference, allowance)
-    verdict, findings = judge(answers)
+    verdict, findings = judge(Answers(mujoco, solution, settling, difference, allowance))
     result = CaseResult(
         case=case,
         robot=robot,
         solution=solution,
         settling=settling,
-        mujoco_rest_lengths=side.rest_lengths(case.poses),
+        mujoco_rest_lengths=mujoco.rest_lengths(case.poses),
+        ignored=mujoco.ignored,
         difference=difference,
         allowance=allowance,
         verdict=verdict,
-        findings=findings,
+        findings=held_to(thresholds.findings, case, findings),
         seecr_s=seecr_s,
     )
-    name = None if folder is None else _record(result, folder)
+    name = None if record is None else record(result)
     return replace(result, recording=name, wall_s=time.perf_counter() - began)
 
 
@@ -189,7 +216,7 @@ def run_suite(
     thresholds: Thresholds,
     *,
     jobs: int = 1,
-    folder: Path | None = None,
+    record: Record | None = None,
     progress: Callable[[CaseResult], None] | None = None,
     pool: Pool | None = None,
 ) -> list[CaseResult]:
@@ -199,7 +226,7 @@ def run_suite(
         cases: what to run.
         thresholds: what counts as agreement.
         jobs: how many at a time.
-        folder: where to write recordings; None writes none.
+        record: see :func:`run_case`; of a module, so that other processes find it.
         progress: called with each result as it comes.
         pool: processes to run in, instead of ``jobs`` of its own.
 
@@ -210,10 +237,10 @@ def run_suite(
         return []
     if pool is None:
         with Pool(min(jobs, len(cases))) as own:
-            return run_suite(cases, thresholds, folder=folder, progress=progress, pool=own)
+            return run_suite(cases, thresholds, record=record, progress=progress, pool=own)
     if pool.jobs > 1:
         warm_up(cases[0])
-    one = partial(run_case, thresholds=thresholds, folder=folder)
+    one = partial(run_case, thresholds=thresholds, record=record)
     order = sorted(range(len(cases)), key=lambda i: -len(cases[i].poses))
     return pool.run(one, cases, order, progress or (lambda result: None))
 
@@ -221,12 +248,6 @@ def run_suite(
 def warm_up(case: Case) -> None:
     """Have the compiled loop on disk before several processes want it."""
     seecr_solve(load_robot(case.model), case.poses[:1])
-
-
-def exit_status(results: Sequence[CaseResult | EffectResult]) -> int:
-    """0 all agree (findings allowed), 1 a threshold exceeded, 3 a solve did not converge."""
-    statuses = {result.exit_status for result in results}
-    return next((s for s in (EXIT_DIFFERS, EXIT_UNSOLVED) if s in statuses), EXIT_AGREES)
 
 
 def worst_of(results: Sequence[CaseResult]) -> tuple[CaseResult, Worst] | None:
@@ -245,17 +266,9 @@ def _solve(robot: Robot, poses: Array) -> tuple[Solution, float]:
     return solution, best
 
 
-def _check_same_cables(case: Case, robot: Robot, side: MujocoRobot) -> None:
-    m = side.settler.physics.n_cables
+def _check_same_cables(case: Case, robot: Robot, mujoco: MujocoRobot) -> None:
+    m = mujoco.settler.physics.n_cables
     if m != robot.n_cables:
         raise InputFileError(
             f"{case.mujoco_model}: {m} cables; expected {robot.n_cables} as in {case.model}"
         )
-
-
-def _record(result: CaseResult, folder: Path) -> str:
-    from crosscheck.recording import write_case_recording
-
-    name = f"{result.case.name}.rrd"
-    write_case_recording(result, folder / name)
-    return name

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from crosscheck.suite import effect_words as effect_figures
-from crosscheck.suite import words as figures
+from crosscheck.suite import words
 
 if TYPE_CHECKING:
     from crosscheck.suite.results import Run
@@ -20,9 +19,10 @@ def summary_md(run: Run, worst_pose: str) -> str:
         run: what to tell about.
         worst_pose: sentence about the file with the worst pose.
     """
-    parts = ["# SEECR against MuJoCo", figures.verdict_line(run)]
+    parts = ["# SEECR against MuJoCo", words.verdict_line(run)]
     if run.results:
         parts += _cases(run, worst_pose)
+    parts += [f"Note: {note}." for note in run.notes]
     if run.effects:
         parts += _effects(run)
     parts.append(
@@ -38,30 +38,31 @@ def _cases(run: Run, worst_pose: str) -> list[str]:
         "brought to rest by its own dynamics, `polished` and the tensions after Newton's method on "
         f"its inverse dynamics. Times are a pose, on one processor. {worst_pose}",
     ]
-    parts += _section(run, "Failures", figures.failures)
-    parts += _section(run, "Findings", figures.findings)
-    parts += _section(run, "Widened thresholds", figures.widened)
+    parts += _section(run, "Failures", words.failures)
+    parts += _section(run, "Findings", words.findings)
+    parts += _section(run, "Widened thresholds", words.widened)
     return parts
 
 
 def _effects(run: Run) -> list[str]:
     """How they ended, those that failed, and a folded table of all."""
-    heads = effect_figures.TABLE_HEADS
-    rule = ["---", "---", *["---:"] * (len(heads) - 3), "---"]
-    table = "\n".join(_row(row) for row in [heads, rule, *map(effect_figures.cells, run.effects)])
-    failed = [f"- {line}" for line in effect_figures.failures(run.effects)]
+    heads = words.EFFECT_HEADS
+    rule = ["---", "---", *["---:"] * (len(heads) - 4), "---", "---"]
+    table = "\n".join(_row(row) for row in [heads, rule, *map(words.effect_cells, run.effects)])
+    failed = [f"- {line}" for line in words.effect_failures(run.effects)]
     return [
         "## Effects",
-        effect_figures.line(run.effects),
+        words.effects_line(run.effects),
+        words.against_line(run.effects),
         *(["\n".join(failed)] if failed else []),
         f"<details><summary>All {len(run.effects)}</summary>\n\n{table}\n\n</details>",
     ]
 
 
 def _table(run: Run) -> str:
-    heads = figures.TABLE_HEADS
+    heads = words.TABLE_HEADS
     rule = ["---", *["---:"] * (len(heads) - 3), "---", "---"]
-    rows = [heads, rule, *(figures.cells(r) for r in run.results), figures.threshold_cells(run)]
+    rows = [heads, rule, *(words.cells(r) for r in run.results), words.threshold_cells(run)]
     return "\n".join(_row(row) for row in rows)
 
 
@@ -70,7 +71,7 @@ def _row(cells: Sequence[str]) -> str:
 
 
 def _section(run: Run, title: str, lines: Callable[[CaseResult], list[str]]) -> list[str]:
-    """A heading and, a case at a time, folded lists; nothing where there is nothing to say."""
+    """A heading and, case by case, folded lists; nothing where there is nothing to say."""
     found = [(result, lines(result)) for result in run.results]
     blocks = [
         f"<details><summary>{result.case.name}: {len(items)}</summary>\n\n"

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import difflib
+import fnmatch
 import math
-import tomllib
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from crosscheck.errors import InputFileError
+from crosscheck.files import Toml, plain, read_toml
 
 SHIPPED = Path(__file__).with_name("thresholds.toml")
 
@@ -32,18 +33,39 @@ class Polished:
 
 
 @dataclass(frozen=True)
-class Thresholds:
-    """Largest differences between SEECR and MuJoCo that count as agreement.
+class FindingLimits:
+    """How many poses of a case may have more than one right answer.
 
     Attributes:
-        settled: against MuJoCo after plain settling.
-        polished: against MuJoCo after the polish.
+        branches: at most so many with two stable equilibria.
+        free_to_move: names ``CASE POSE``, or patterns, of those that may be free to move.
+        free_elsewhere: largest share of those in a case whose poses no name can know.
+    """
+
+    branches: int = 0
+    free_to_move: tuple[str, ...] = ()
+    free_elsewhere: float = 0.0
+
+    def names(self, case: str, pose: int) -> bool:
+        """Whether a pose is one of those named as free to move."""
+        return any(fnmatch.fnmatchcase(f"{case} {pose}", name) for name in self.free_to_move)
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """What counts as agreement between SEECR and MuJoCo.
+
+    Attributes:
+        settled: largest differences against MuJoCo after plain settling.
+        polished: largest differences against MuJoCo after the polish.
+        findings: how many poses may have more than one right answer.
     """
 
     settled: Settled = field(default_factory=Settled)
     polished: Polished = field(default_factory=Polished)
+    findings: FindingLimits = field(default_factory=FindingLimits)
 
-    def as_dict(self) -> dict[str, dict[str, float]]:
+    def as_json(self) -> dict[str, dict[str, Any]]:
         """Tables and values as in the file."""
         return asdict(self)
 
@@ -55,7 +77,7 @@ def load_thresholds(path: str | Path | None = None) -> Thresholds:
         path: a TOML file; None for the shipped one.
 
     Raises:
-        InputFileError: not TOML, an unknown table or key, a value that is no positive number.
+        InputFileError: not TOML, an unknown table or key, a value of another kind.
     """
     shipped = _merge(Thresholds(), SHIPPED)
     return shipped if path is None else _merge(shipped, Path(path))
@@ -66,7 +88,7 @@ def thresholds_toml(thresholds: Thresholds) -> str:
     import tomlkit
 
     document = tomlkit.parse(SHIPPED.read_text(encoding="utf-8"))
-    for table, values in thresholds.as_dict().items():
+    for table, values in plain(thresholds).items():
         for key, value in values.items():
             if document[table][key] != value:  # type: ignore[index]
                 document[table][key] = value  # type: ignore[index]
@@ -74,46 +96,58 @@ def thresholds_toml(thresholds: Thresholds) -> str:
 
 
 def _merge(thresholds: Thresholds, path: Path) -> Thresholds:
-    tables = _read(path)
-    _check_names(path, tables, thresholds.as_dict(), "table")
+    file = read_toml(path, f"expected thresholds such as those in {SHIPPED}")
+    _check_names(file, file.content, thresholds.as_json(), "table")
     parts = {}
-    for table, values in tables.items():
+    for table, values in file.content.items():
         part = getattr(thresholds, table)
         if not isinstance(values, dict):
-            raise InputFileError(f"{path}: {table}: expected a table [{table}], got {values!r}")
-        _check_names(path, values, asdict(part), f"key of [{table}]")
-        for key, value in values.items():
-            _check_value(path, f"[{table}] {key}", value)
-        parts[table] = replace(part, **{key: float(value) for key, value in values.items()})
+            raise file.error(f"{table}: expected a table [{table}], got {values!r}", table)
+        _check_names(file, values, asdict(part), f"key of [{table}]")
+        parts[table] = replace(part, **{k: _value(file, table, k, v) for k, v in values.items()})
     return replace(thresholds, **parts)
 
 
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        reason = error.strerror or error
-        raise InputFileError(
-            f"{path}: cannot read the thresholds: {reason}; expected a TOML file like {SHIPPED}"
-        ) from None
-    except UnicodeDecodeError as error:
-        raise InputFileError(
-            f"{path}: expected TOML in UTF-8, got a byte that is none at offset {error.start}"
-        ) from None
-    except tomllib.TOMLDecodeError as error:
-        raise InputFileError(f"{path}: not TOML: {error}") from None
-
-
-def _check_names(path: Path, got: dict[str, Any], known: dict[str, Any], what: str) -> None:
+def _check_names(file: Toml, got: dict[str, Any], known: dict[str, Any], what: str) -> None:
     for name in got:
         if name not in known:
             near = difflib.get_close_matches(name, known, n=len(known), cutoff=0.0)
-            raise InputFileError(
-                f"{path}: {name!r} is no {what} of thresholds; expected {' or '.join(near)}"
+            raise file.error(
+                f"{name!r} is no {what} of thresholds; expected {' or '.join(near)}", name
             )
 
 
-def _check_value(path: Path, where: str, value: Any) -> None:
+def _value(file: Toml, table: str, key: str, value: Any) -> Any:
+    """A value as the dataclasses hold it, of the kind that its key asks for."""
+    expected, fits, hold = _KINDS.get(key, ("a positive number", _is_positive, float))
+    if not fits(value):
+        raise file.error(f"[{table}] {key}: expected {expected}, got {value!r}", key)
+    return hold(value)
+
+
+def _is_number(value: Any) -> bool:
     number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not number or not (value > 0 and math.isfinite(value)):
-        raise InputFileError(f"{path}: {where}: expected a positive number, got {value!r}")
+    return number and math.isfinite(value)
+
+
+def _is_positive(value: Any) -> bool:
+    return _is_number(value) and value > 0
+
+
+def _is_count(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and value >= 0
+
+
+def _is_share(value: Any) -> bool:
+    return _is_number(value) and 0 <= value <= 1
+
+
+def _are_names(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(name, str) for name in value)
+
+
+_KINDS: dict[str, tuple[str, Callable[[Any], bool], Callable[[Any], Any]]] = {
+    "branches": ("a whole number from 0 on", _is_count, int),
+    "free_to_move": ('a list of names "CASE POSE"', _are_names, tuple),
+    "free_elsewhere": ("a share from 0 to 1", _is_share, float),
+}

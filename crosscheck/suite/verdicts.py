@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from enum import Enum
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.settle.relax import SettleStatus
 from crosscheck.suite.agreement import Allowance, Differences, within
+from crosscheck.suite.gap import gap
 from seecr.equilibrium import Status
 from seecr.equilibrium import solve as seecr_solve
-from seecr.pose import Array, pose_difference
+from seecr.pose import Array
 
 if TYPE_CHECKING:
     from crosscheck.settle.settler import SettlingBatch
+    from crosscheck.suite.cases import Case
     from crosscheck.suite.mujoco_robot import MujocoRobot
+    from crosscheck.suite.thresholds import FindingLimits
     from seecr.equilibrium import Solution
 
 # Unbalanced force, relative to the load, below which a platform counts as free to move: what
@@ -37,14 +41,14 @@ class Verdict(Enum):
 
 
 FINDINGS = (Verdict.NEUTRAL, Verdict.BRANCH)
-"""Neither passes nor failures: counted and listed, the run still ends 0."""
+"""More than one answer is right: counted, listed, and held against the limits of a run."""
 
 UNSOLVED = (Verdict.SEECR_UNSOLVED, Verdict.MUJOCO_UNSOLVED)
 """Nothing to compare: the run ends 3."""
 
 
 @dataclass(frozen=True)
-class Finding:
+class PoseFinding:
     """A pose at which there is more to say than that both agree.
 
     Attributes:
@@ -59,6 +63,7 @@ class Finding:
         position_m: distance of the answers [m].
         orientation_rad: angle between them [rad].
         tension_N: largest difference of a tension [N].
+        beyond_limits: a finding that the run's limits do not allow.
     """
 
     pose: int
@@ -71,22 +76,29 @@ class Finding:
     position_m: float = np.nan
     orientation_rad: float = np.nan
     tension_N: float = np.nan
+    beyond_limits: bool = False
 
-    def __str__(self) -> str:
-        return f"pose {self.pose}: {self.text}"
+    @property
+    def fails(self) -> bool:
+        """Whether the case fails for it."""
+        return self.beyond_limits or self.verdict not in FINDINGS
+
+    def as_json(self) -> dict[str, Any]:
+        """As in ``results.json``."""
+        return asdict(self)
 
 
 class Answers(NamedTuple):
     """Everything a verdict rests on."""
 
-    side: MujocoRobot
+    mujoco: MujocoRobot
     solution: Solution
     settling: SettlingBatch
     difference: Differences
     allowance: Allowance
 
 
-def judge(answers: Answers) -> tuple[NDArray[np.object_], tuple[Finding, ...]]:
+def judge(answers: Answers) -> tuple[NDArray[np.object_], tuple[PoseFinding, ...]]:
     """Verdicts (n,) of all poses, and a finding for each that does not simply agree."""
     n = len(answers.solution)
     verdicts = np.full(n, Verdict.AGREES, dtype=object)
@@ -104,18 +116,18 @@ def judge(answers: Answers) -> tuple[NDArray[np.object_], tuple[Finding, ...]]:
     return verdicts, tuple(findings)
 
 
-def _look_closer(answers: Answers, i: int, close: bool) -> Finding | None:
+def _look_closer(answers: Answers, i: int, close: bool) -> PoseFinding | None:
     status, settled = answers.solution.status[i], answers.settling[i].status
     sentence = f"SEECR: {answers.solution.sentence(i)}; MuJoCo: {settled.value}"
     if status not in (Status.CONVERGED, Status.SINGULAR):
-        return Finding(i, Verdict.SEECR_UNSOLVED, sentence)
+        return PoseFinding(i, Verdict.SEECR_UNSOLVED, sentence)
     if settled is not SettleStatus.SETTLED:
-        return Finding(i, Verdict.MUJOCO_UNSOLVED, sentence)
+        return PoseFinding(i, Verdict.MUJOCO_UNSOLVED, sentence)
     pair = _Pair.of(answers, i)
     if pair.joined_by_a_free_motion:
         return pair.finding(Verdict.NEUTRAL)
     if close and status is Status.SINGULAR:
-        return Finding(i, Verdict.SEECR_UNSOLVED, f"{sentence}, held in every direction")
+        return PoseFinding(i, Verdict.SEECR_UNSOLVED, f"{sentence}, held in every direction")
     if close:
         return None
     return pair.finding(Verdict.BRANCH if pair.two_equilibria else Verdict.DIFFERS)
@@ -135,9 +147,9 @@ class _Pair:
 
     @classmethod
     def of(cls, answers: Answers, i: int) -> _Pair:
-        side, solution = answers.side, answers.solution
+        mujoco, solution = answers.mujoco, answers.solution
         command, ours, theirs = solution.command[i], solution.pose[i], answers.settling[i].pose
-        again = side.settle_from(ours, command)
+        again = mujoco.settle_from(ours, command)
         free = answers.settling[i].free_to_move or again.free_to_move
         return cls(
             answers,
@@ -145,8 +157,8 @@ class _Pair:
             mujoco_stays=again.settled and _near(answers, i, again.pose, ours),
             seecr_stays=(_seecr_balances if free else _seecr_stays)(answers, i, theirs),
             free=free,
-            energy_seecr=side.energy(ours, command),
-            energy_mujoco=side.energy(theirs, command),
+            energy_seecr=mujoco.energy(ours, command),
+            energy_mujoco=mujoco.energy(theirs, command),
         )
 
     @property
@@ -163,7 +175,7 @@ class _Pair:
         work = float(solution.tables.scale[i]) * solution.robot.length
         if not apart <= _BALANCED * work:
             return False
-        left = answers.side.imbalance_between(theirs, solution.pose[i], solution.command[i])
+        left = answers.mujoco.imbalance_between(theirs, solution.pose[i], solution.command[i])
         return left <= max(_BALANCED, 10.0 * answers.settling[i].rounding)
 
     @property
@@ -174,7 +186,7 @@ class _Pair:
             self.mujoco_stays and self.seecr_stays and not _near(self.answers, self.i, theirs, ours)
         )
 
-    def finding(self, verdict: Verdict) -> Finding:
+    def finding(self, verdict: Verdict) -> PoseFinding:
         """What to tell about the pair."""
         difference, i = self.answers.difference, self.i
         position = float(difference.position_m[i])
@@ -187,7 +199,7 @@ class _Pair:
             f"own; from SEECR's answer MuJoCo {_stays(self.mujoco_stays)}, from MuJoCo's SEECR "
             f"{_stays(self.seecr_stays)}"
         )
-        return Finding(
+        return PoseFinding(
             i, verdict, text, self.energy_seecr, self.energy_mujoco,
             self.mujoco_stays, self.seecr_stays, position, angle, tension,
         )  # fmt: skip
@@ -209,13 +221,32 @@ def _seecr_balances(answers: Answers, i: int, pose: Array) -> bool:
 
 def _near(answers: Answers, i: int, pose_a: Array, pose_b: Array) -> bool:
     """Whether two poses of row i are the same as far as the polished thresholds see."""
-    away = pose_difference(pose_a, pose_b)
+    distance, angle = gap(pose_a, pose_b)
     allowed = answers.allowance
-    return bool(
-        np.linalg.norm(away[:3]) <= allowed.position_m[i]
-        and np.linalg.norm(away[3:]) <= allowed.orientation_rad[i]
-    )
+    return bool(distance <= allowed.position_m[i] and angle <= allowed.orientation_rad[i])
 
 
 def _stays(it_does: bool) -> str:
     return "stays there" if it_does else "leaves"
+
+
+def held_to(
+    limits: FindingLimits, case: Case, findings: Sequence[PoseFinding]
+) -> tuple[PoseFinding, ...]:
+    """The findings of a case, those marked that it may not have.
+
+    Each physics is right at such a pose, but a solver that systematically took another
+    equilibrium, or stopped short of one, would be right at every pose. So branches are counted,
+    and a platform may be free to move only at poses that are named; where poses have no names,
+    at a share of them.
+    """
+    branches = [finding for finding in findings if finding.verdict is Verdict.BRANCH]
+    free = [finding for finding in findings if finding.verdict is Verdict.NEUTRAL]
+    beyond: list[PoseFinding] = []
+    if len(branches) > limits.branches:
+        beyond += branches
+    if case.has_names:
+        beyond += [one for one in free if not limits.names(case.name, one.pose)]
+    elif len(free) > limits.free_elsewhere * len(case.poses):
+        beyond += free
+    return tuple(replace(one, beyond_limits=one in beyond) for one in findings)

@@ -6,9 +6,12 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from crosscheck.suite.agreement import QUANTITIES
-from crosscheck.suite.verdicts import FINDINGS, Verdict
+from crosscheck.suite.effects import ORIENTATION_RAD, POSITION_M, TENSION_N, Against
+from crosscheck.suite.run import Outcome
+from crosscheck.suite.verdicts import FINDINGS, PoseFinding, Verdict
 
 if TYPE_CHECKING:
+    from crosscheck.suite.effects import EffectResult
     from crosscheck.suite.results import Run
     from crosscheck.suite.run import CaseResult, Worst
 
@@ -36,7 +39,6 @@ _SHORT = {
     Verdict.SEECR_UNSOLVED: "SEECR unsolved",
     Verdict.MUJOCO_UNSOLVED: "MuJoCo unsolved",
 }
-_RESULT = {0: "agree", 1: "DIFFER", 3: "NOT CONVERGED"}
 
 
 def difference(worst: Worst | None) -> str:
@@ -44,18 +46,19 @@ def difference(worst: Worst | None) -> str:
     return "–" if worst is None else f"{worst.value:.1e}"
 
 
-def outcome(result: CaseResult) -> str:
-    """What became of a case, one word or two."""
-    return _RESULT[result.exit_status]
-
-
 def remarks(result: CaseResult) -> str:
     """Counts of poses that do not simply agree, and of widened thresholds."""
-    parts = [f"{result.count(v)} {text}" for v, text in _SHORT.items() if result.count(v)]
+    parts = [_counted(result, verdict) for verdict in _SHORT if result.count(verdict)]
     widened = int(result.allowance.widened.sum())
     if widened:
         parts.append(f"{widened} widened")
     return ", ".join(parts)
+
+
+def _counted(result: CaseResult, verdict: Verdict) -> str:
+    beyond = sum(one.beyond_limits for one in result.findings if one.verdict is verdict)
+    too_many = f" ({beyond} beyond limits)" if beyond else ""
+    return f"{result.count(verdict)} {_SHORT[verdict]}{too_many}"
 
 
 def cells(result: CaseResult) -> list[str]:
@@ -67,7 +70,7 @@ def cells(result: CaseResult) -> list[str]:
         *(difference(worst.get(name)) for name in QUANTITIES),
         f"{result.seecr_us:.0f}",
         f"{result.mujoco_ms:.1f}",
-        outcome(result),
+        result.outcome.value,
         remarks(result),
     ]
 
@@ -93,24 +96,20 @@ def verdict_line(run: Run) -> str:
 
     Of effects only those that fail are named here; where nothing else was run, it is theirs.
     """
-    from crosscheck.suite import effect_words as effect_figures
-    from crosscheck.suite.run import worst_of
-
     if not run.results:
-        return effect_figures.line(run.effects)
+        return effects_line(run.effects)
     total = sum(len(result) for result in run.results)
     aside = sum(run.count(verdict) for verdict in FINDINGS)
     poses = f"{count(total, 'pose')} of {count(len(run.results), 'case')}"
     if aside:
         poses = f"{total - aside} of {poses} ({count(aside, 'finding')})"
-    bad = [result.case.name for result in run.results if result.exit_status]
-    bad += [result.task.name for result in run.effects if result.exit_status]
+    bad = [r.case.name for r in run.every if r.outcome is not Outcome.AGREE]
     start = {
-        0: f"SEECR and MuJoCo agree at {poses}",
-        1: f"SEECR and MuJoCo differ in {name_list(bad)}",
-        3: f"not every solve converged: see {name_list(bad)}",
-    }[run.exit_status]
-    return f"{start}; {worst_sentence(worst_of(run.results))}."
+        Outcome.AGREE: f"SEECR and MuJoCo agree at {poses}",
+        Outcome.DIFFER: f"SEECR and MuJoCo differ in {name_list(bad)}",
+        Outcome.NOT_CONVERGED: f"not every solve converged: see {name_list(bad)}",
+    }[run.outcome]
+    return f"{start}; {worst_sentence(run.worst)}."
 
 
 def worst_sentence(pair: tuple[CaseResult, Worst] | None) -> str:
@@ -126,21 +125,18 @@ def worst_sentence(pair: tuple[CaseResult, Worst] | None) -> str:
 
 
 def failures(result: CaseResult) -> list[str]:
-    """One line for each pose of a case that fails it."""
-    return [
-        f"pose {finding.pose}, commanded {command(result, finding.pose)}: {finding.text}"
-        for finding in result.findings
-        if finding.verdict not in FINDINGS
-    ]
+    """One line for each pose for which a case fails."""
+    return [_line(result, finding) for finding in result.findings if finding.fails]
 
 
 def findings(result: CaseResult) -> list[str]:
-    """One line for each finding of a case that does not fail it."""
-    return [
-        f"pose {finding.pose}, commanded {command(result, finding.pose)}: {finding.text}"
-        for finding in result.findings
-        if finding.verdict in FINDINGS
-    ]
+    """One line for each finding for which a case does not fail."""
+    return [_line(result, finding) for finding in result.findings if not finding.fails]
+
+
+def _line(result: CaseResult, finding: PoseFinding) -> str:
+    limits = " (beyond the limits in thresholds.toml)" if finding.beyond_limits else ""
+    return f"pose {finding.pose}, commanded {command(result, finding.pose)}: {finding.text}{limits}"
 
 
 def widened(result: CaseResult) -> list[str]:
@@ -179,3 +175,63 @@ def name_list(names: Sequence[str], most: int = 4) -> str:
     """The first few names, and how many more."""
     rest = f" and {len(names) - most} more" if len(names) > most else ""
     return ", ".join(names[:most]) + rest
+
+
+EFFECT_HEADS = [
+    "effect", "robot", "moves [m]", "position [m]", "orientation [rad]", "tension [N]", "result",
+    "against",
+]  # fmt: skip
+
+
+def effects_line(results: Sequence[EffectResult]) -> str:
+    """How many effects agree with MuJoCo, the worst differences, and those that do not agree."""
+    robots = {result.case.model for result in results}
+    effects = {result.case.effect for result in results}
+    bad = [result.case.name for result in results if result.outcome is not Outcome.AGREE]
+    verdict = "all agree with MuJoCo"
+    if bad:
+        verdict = f"{len(bad)} of {count(len(results), 'case')} not as MuJoCo: {name_list(bad)}"
+    worst = max(results, key=lambda result: result.worst[0])
+    orientation = max(result.worst[1] for result in results)
+    tension = max(result.worst[2] for result in results)
+    return (
+        f"{count(len(effects), 'effect')} on {count(len(robots), 'robot')}: {verdict}; worst "
+        f"{worst.worst[0]:.1e} m ({worst.case.name}), {orientation:.1e} rad, {tension:.1e} N."
+    )
+
+
+def against_line(results: Sequence[EffectResult]) -> str:
+    """What stood against seecr's mathematics: MuJoCo's own means, or ours a second time."""
+    kinds: dict[Against, list[str]] = {}
+    for result in results:
+        kinds.setdefault(result.case.against, []).append(result.case.effect)
+    return " ".join(
+        f"Held against {kind.value}: {', '.join(dict.fromkeys(names))}."
+        for kind, names in kinds.items()
+    )
+
+
+def effect_text(result: EffectResult) -> str:
+    """One effect's differences, what is allowed, and what the effect itself does."""
+    position, orientation, tension = result.worst
+    parts = [
+        f"position {position:.1e} m, orientation {orientation:.1e} rad, tension {tension:.1e} N",
+        f"allowed {POSITION_M:.0e} m, {ORIENTATION_RAD:.0e} rad, {TENSION_N:.0e} N",
+        f"the effect moves a reading by {result.moved_m:.1e} m",
+    ]
+    if result.unsolved:
+        parts.append(f"no rest at {result.unsolved} of {count(len(result.compared), 'pose')}")
+    return "; ".join(parts)
+
+
+def effect_failures(results: Sequence[EffectResult]) -> list[str]:
+    """One line for each effect that fails."""
+    bad = [result for result in results if result.outcome is not Outcome.AGREE]
+    return [f"{result.case.name}: {effect_text(result)}" for result in bad]
+
+
+def effect_cells(result: EffectResult) -> list[str]:
+    """An effect as a row: name, robot, how far it moves a reading, differences, result."""
+    values = (f"{value:.1e}" for value in (result.moved_m, *result.worst))
+    case = result.case
+    return [case.effect, case.model.stem, *values, result.outcome.value, case.against.value]

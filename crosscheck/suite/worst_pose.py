@@ -1,17 +1,53 @@
-"""An MJCF of one pose, to open in MuJoCo's viewer: springs as they were, a keyframe at rest."""
+"""The pose of a run that deserves a look in MuJoCo's viewer, as an MJCF with a keyframe at rest."""
 
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from crosscheck.errors import InputFileError
 from crosscheck.files import written
+from crosscheck.suite.run import CaseResult, worst_of
+from crosscheck.suite.verdicts import FINDINGS, UNSOLVED, Verdict
 from seecr.pose import Array
 
 KEYFRAME = "worst"
+FILE_NAME = "worst_pose.xml"
+
+
+def worst_pose(results: Sequence[CaseResult]) -> tuple[CaseResult, int]:
+    """The case and pose furthest over its thresholds; else unsolved; else nearest to them."""
+    worst = worst_of(results)
+    if worst is None or worst[1].ratio <= 1.0:
+        for kinds in ((Verdict.DIFFERS, *FINDINGS), UNSOLVED):
+            for result in results:
+                poses = [one.pose for one in result.findings if one.fails and one.verdict in kinds]
+                if poses:
+                    return result, poses[0]
+    if worst is None:
+        return results[0], 0
+    return worst[0], worst[1].pose
+
+
+def write_worst_pose(results: Sequence[CaseResult], folder: Path) -> str:
+    """Write its MJCF into a folder; returns a sentence that says what it shows."""
+    result, i = worst_pose(results)
+    mujoco, settling = result.mujoco_robot(), result.settling[i]
+    if settling.settled:
+        qpos, state = settling.qpos, "as MuJoCo found it at rest"
+    else:
+        qpos, state = mujoco.qpos(result.case.poses[i]), "as commanded, since MuJoCo did not settle"
+    lengths = result.mujoco_rest_lengths[i]
+    try:
+        write_worst_pose_mjcf(
+            result.case.mujoco_model, qpos, lengths, mujoco.settler.ea, folder / FILE_NAME
+        )
+    except InputFileError as error:  # a robot in several files can be run, but not rewritten
+        return f"There is no `{FILE_NAME}`: {error}."
+    return f"`{FILE_NAME}` opens in MuJoCo's viewer at pose {i} of {result.case.name}, {state}."
 
 
 def write_worst_pose_mjcf(

@@ -9,21 +9,25 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from crosscheck.suite import effect_words as effect_figures
-from crosscheck.suite import words as figures
+from crosscheck.suite import words
+from crosscheck.suite.run import Outcome
 from crosscheck.suite.verdicts import FINDINGS, Verdict
 
 if TYPE_CHECKING:
     from crosscheck.suite.results import Run
     from crosscheck.suite.run import CaseResult
 
-_STYLE = {0: "green", 1: "bold red", 3: "bold yellow"}
+_STYLE = {
+    Outcome.AGREE: "green",
+    Outcome.DIFFER: "bold red",
+    Outcome.NOT_CONVERGED: "bold yellow",
+}
 # Failures told on the terminal; summary.md and results.json have them all.
 _MOST = 5
 # Columns of words, of the case's result, and those shown on any terminal.
-_RESULT = figures.TABLE_HEADS.index("result")
+_RESULT = words.TABLE_HEADS.index("result")
 _WORDS = (0, _RESULT, _RESULT + 1)
-_ESSENTIAL = (0, *(figures.TABLE_HEADS.index(head) for head in figures.HEADS.values()), _RESULT)
+_ESSENTIAL = (0, *(words.TABLE_HEADS.index(head) for head in words.HEADS.values()), _RESULT)
 _ROOMY = 124
 # Where there is no terminal to ask, lines are not broken below this.
 _WIDE = 160
@@ -47,12 +51,12 @@ def print_run(run: Run, out: Path, console: Console | None = None) -> None:
     for verdict in FINDINGS:
         if run.count(verdict):
             _print(
-                console, f"Finding at {figures.count(run.count(verdict), 'pose')}: {verdict.value}."
+                console, f"Finding at {words.count(run.count(verdict), 'pose')}: {verdict.value}."
             )
-    _print_lines(console, effect_figures.failures(run.effects), "effects")
+    _print_lines(console, words.effect_failures(run.effects), "effects")
     if run.effects and run.results:
-        _print(console, effect_figures.line(run.effects))
-    _print(console, figures.verdict_line(run), _STYLE[run.exit_status])
+        _print(console, words.effects_line(run.effects))
+    _print(console, words.verdict_line(run), _STYLE[run.outcome])
     _print(console, f"{run.wall_s:.1f} s; results in {out}/")
 
 
@@ -63,26 +67,26 @@ def _print(console: Console, line: str, style: str = "") -> None:
 
 def _table(run: Run, width: int) -> Table:
     """The cases, without the columns that are left out where the terminal is narrow."""
-    shown = [i for i in range(len(figures.TABLE_HEADS)) if width >= _ROOMY or i in _ESSENTIAL]
+    shown = [i for i in range(len(words.TABLE_HEADS)) if width >= _ROOMY or i in _ESSENTIAL]
     table = Table(box=None, header_style="bold", pad_edge=False)
     for i in shown:
-        head = Text(figures.TABLE_HEADS[i].replace(" [", "\n["))
+        head = Text(words.TABLE_HEADS[i].replace(" [", "\n["))
         table.add_column(head, justify="left" if i in _WORDS else "right", no_wrap=True)
     for result in run.results:
-        cells = [Text(cell) for cell in figures.cells(result)]
-        cells[_RESULT].stylize(_STYLE[result.exit_status])
+        cells = [Text(cell) for cell in words.cells(result)]
+        cells[_RESULT].stylize(_STYLE[result.outcome])
         table.add_row(*(cells[i] for i in shown))
-    limits = figures.threshold_cells(run)
+    limits = words.threshold_cells(run)
     table.add_row(*(Text(limits[i], style="dim") for i in shown))
     return table
 
 
 def _print_notes(console: Console, result: CaseResult) -> None:
     """Failures, branches and widened thresholds of a case; its free motions are only counted."""
-    lines = figures.failures(result)
-    branches = [f for f in result.findings if f.verdict is Verdict.BRANCH]
+    lines = words.failures(result)
+    branches = [f for f in result.findings if f.verdict is Verdict.BRANCH and not f.fails]
     lines += [f"pose {f.pose}: {f.text}" for f in branches]
-    lines += figures.widened(result)
+    lines += words.widened(result)
     name = result.case.name
     _print_lines(console, [f"{name}, {line}" for line in lines], name)
 

@@ -16,7 +16,7 @@ from click.testing import CliRunner, Result
 
 from crosscheck import cli
 from crosscheck.cli import COMMANDS, main
-from crosscheck.suite import effect_cases
+from crosscheck.suite import effects as effect_suite
 from crosscheck.suite import run as suite
 from crosscheck.twin.robot import TRUE_EFFECTS
 from seecr.shipped import model_path
@@ -94,6 +94,20 @@ def test_one_stiffness_changed_by_a_thousandth_ends_1_and_names_the_case(tmp_pat
     assert run("--robot", other, *arguments).exit_code == 0
 
 
+def test_what_of_the_users_mjcf_plays_no_part_is_told_once(tmp_path):
+    rough = changed(PLANAR, tmp_path, '<joint name="x"', '<joint name="x" damping="2"')
+    arguments = ("--no-recordings", "--jobs", "1", "--out", tmp_path / "out")
+    result = run("--robot", rough, *arguments, "--json")
+    assert result.exit_code == 0
+    note = f"{rough}: switched off here: damping; the platform hangs on springs and gravity alone"
+    assert result.stderr.count("note: ") == 1 and note in result.stderr
+    document = json.loads(result.stdout)
+    assert len(document["notes"]) == 1 and document["notes"][0].startswith(note)
+    assert "Note: " + note in (tmp_path / "out" / "summary.md").read_text()
+    plain = run("--robot", PLANAR, *arguments, "--json")
+    assert plain.stderr == "" and json.loads(plain.stdout)["notes"] == []
+
+
 def test_thresholds_of_the_users_hold(tmp_path):
     strict = tmp_path / "strict.toml"
     strict.write_text("[polished]\ntension_N = 1e-18\n")
@@ -152,13 +166,13 @@ def test_effects_alone_run_in_several_processes(tmp_path):
 
 
 def test_an_effect_that_differs_ends_1_and_is_named(tmp_path, monkeypatch):
-    honest = effect_cases.measure
+    honest = effect_suite.measure
 
     def heavier(robot, commands, effects, **options):
         (effect,) = effects
         return honest(robot, commands, [replace(effect, added=1.01 * effect.added)], **options)
 
-    monkeypatch.setattr(effect_cases, "measure", heavier)
+    monkeypatch.setattr(effect_suite, "measure", heavier)
     result = run(*SMALL, "--case", EFFECT, "--out", tmp_path)
     assert result.exit_code == 1
     assert f"1 of 1 case not as MuJoCo: {EFFECT}; worst" in result.stdout
@@ -171,7 +185,7 @@ def test_an_effect_that_differs_ends_1_and_is_named(tmp_path, monkeypatch):
 
 
 def test_an_effect_without_rest_ends_3(tmp_path, monkeypatch):
-    honest = effect_cases.measure
+    honest = effect_suite.measure
 
     def restless(*arguments, **options):
         truth = honest(*arguments, **options)
@@ -179,7 +193,7 @@ def test_an_effect_without_rest_ends_3(tmp_path, monkeypatch):
         at_rest[2] = False
         return replace(truth, at_rest=at_rest)
 
-    monkeypatch.setattr(effect_cases, "measure", restless)
+    monkeypatch.setattr(effect_suite, "measure", restless)
     result = run("--case", EFFECT, "--jobs", "1", "--out", tmp_path)
     assert result.exit_code == 3
     assert "no rest at 1 of 16 poses" in result.stdout
@@ -208,7 +222,7 @@ def test_list_names_cases_and_runs_nothing(tmp_path, monkeypatch):
         (("--case", "paralel-vectran-z0.1"), "the nearest are parallel-vectran-z0.10"),
         (("--robot", "no.xml"), "no.xml: no such file"),
         (("--mujoco-robot", "x.xml"), "--mujoco-robot needs --robot"),
-        (("--thresholds", "no.toml"), "no.toml: cannot read the thresholds"),
+        (("--thresholds", "no.toml"), "no.toml: no such file; expected thresholds"),
         (("--jobs", "0"), "0 is not in the range"),
         (("--jobs", "two"), "'two' is not a valid integer"),
         (("--seed", "-1"), "-1 is not in the range"),
@@ -250,12 +264,12 @@ def test_an_output_folder_that_cannot_be_written(tmp_path):
 
 
 def test_an_error_half_way_leaves_nothing(tmp_path, monkeypatch):
-    from crosscheck.suite import worst
+    from crosscheck.suite import worst_pose
 
     def full(*arguments):
         raise OSError(28, "No space left on device", "results.json")
 
-    monkeypatch.setattr(worst, "write_worst_pose", full)
+    monkeypatch.setattr(worst_pose, "write_worst_pose", full)
     assert "results.json: No space left on device" in refused(*SMALL, "--out", tmp_path / "out")
     assert not (tmp_path / "out").exists()
 

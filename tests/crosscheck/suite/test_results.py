@@ -14,16 +14,16 @@ import pytest
 from rich.console import Console
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.files import staged
-from crosscheck.suite import words as figures
+from crosscheck.files import json_text, staged
+from crosscheck.suite import words
 from crosscheck.suite.cases import Case, demobot_sweep
 from crosscheck.suite.junit import junit_xml
 from crosscheck.suite.results import Run, results_json
 from crosscheck.suite.run import CaseResult, run_case
 from crosscheck.suite.summary import summary_md
 from crosscheck.suite.thresholds import load_thresholds
-from crosscheck.suite.verdicts import Finding, Verdict
-from crosscheck.suite.worst import worst_pose, write_worst_pose
+from crosscheck.suite.verdicts import PoseFinding, Verdict
+from crosscheck.suite.worst_pose import worst_pose, write_worst_pose
 from crosscheck.terminal.suite import print_run
 from seecr.shipped import model_path
 
@@ -41,7 +41,7 @@ def failed(result: CaseResult, name: str = "bad|<&>\x01") -> CaseResult:
     """The same case with pose 1 a millimetre off."""
     difference = replace(result.difference, position_m=np.array([0.0, 1e-3, 0.0]))
     verdict = np.array([Verdict.AGREES, Verdict.DIFFERS, Verdict.AGREES], dtype=object)
-    finding = Finding(1, Verdict.DIFFERS, "a <millimetre> apart", 1.0, 2.0, False, True, 1e-3)
+    finding = PoseFinding(1, Verdict.DIFFERS, "a <millimetre> apart", 1.0, 2.0, False, True, 1e-3)
     case = replace(result.case, name=name)
     return replace(result, case=case, difference=difference, verdict=verdict, findings=(finding,))
 
@@ -51,7 +51,7 @@ def unsolved(result: CaseResult) -> CaseResult:
     nan = np.full(3, np.nan)
     verdict = np.array([*[Verdict.AGREES] * 2, Verdict.SEECR_UNSOLVED], dtype=object)
     difference = replace(result.difference, position_m=np.array([0.0, 0.0, nan[0]]))
-    finding = Finding(2, Verdict.SEECR_UNSOLVED, "SEECR: not at rest")
+    finding = PoseFinding(2, Verdict.SEECR_UNSOLVED, "SEECR: not at rest")
     case = replace(result.case, name="open")
     return replace(result, case=case, difference=difference, verdict=verdict, findings=(finding,))
 
@@ -64,7 +64,7 @@ def test_json_holds_every_number_of_every_pose(good):
     document = json.loads(results_json(run_of(good)))
     assert document["verdict"] == "agree"
     assert document["exit_status"] == 0
-    assert document["thresholds"] == THRESHOLDS.as_dict()
+    assert document["thresholds"] == json.loads(json_text(THRESHOLDS.as_json()))
     assert set(document["packages"]) >= {"seecr", "mujoco", "numpy", "numba", "python"}
     assert document["poses"] == {
         "total": 3, "agrees": 3, "neutral": 0, "branch": 0, "differs": 0, "seecr_unsolved": 0,
@@ -104,7 +104,7 @@ def test_json_says_null_where_there_is_no_number(good):
     assert json.loads(results_json(run_of(unsolved(good))))["verdict"] == "not_converged"
 
 
-def test_junit_has_a_test_a_case_and_names_the_pose(good):
+def test_junit_has_a_test_per_case_and_names_the_pose(good):
     root = ET.fromstring(junit_xml(run_of(good, failed(good), unsolved(good))))
     (suite,) = root.findall("testsuite")
     assert {k: suite.get(k) for k in ("tests", "failures", "errors")} == {
@@ -138,11 +138,11 @@ def test_summary_is_a_table_with_failures_below(good):
 
 
 def test_verdict_line_names_the_worst_difference(good):
-    line = figures.verdict_line(run_of(good, failed(good)))
+    line = words.verdict_line(run_of(good, failed(good)))
     assert "worst difference 1.00e-03 m (position), 1e+05 times what is allowed" in line
     assert line.endswith("at pose 1.")
     everything = replace(good, verdict=np.full(3, Verdict.NEUTRAL, dtype=object))
-    line = figures.verdict_line(run_of(everything))
+    line = words.verdict_line(run_of(everything))
     assert "agree at 0 of 3 poses of 1 case (3 findings); no pose could be compared" in line
 
 
@@ -189,7 +189,7 @@ def test_widened_thresholds_are_told(good):
     run = run_of(replace(good, allowance=allowance))
     assert "allowed 1.0e-06 m (position after plain settling)" in summary_md(run, "")
     assert "3.0e-05 m (position)" in summary_md(run, "")
-    assert "1 widened" in figures.remarks(run.results[0])
+    assert "1 widened" in words.remarks(run.results[0])
 
 
 def test_worst_pose_opens_in_mujoco_at_rest(good, tmp_path):

@@ -12,7 +12,7 @@ import pytest
 import seecr
 from crosscheck.errors import CrosscheckError, InputFileError
 from crosscheck.settle.settler import Settling, SettlingBatch
-from crosscheck.suite import agreement, cases, verdicts
+from crosscheck.suite import agreement, cases, verdicts, words
 from crosscheck.suite import run as suite
 from crosscheck.suite.cases import (
     Case,
@@ -23,8 +23,8 @@ from crosscheck.suite.cases import (
     user_cases,
 )
 from crosscheck.suite.mujoco_robot import MujocoRobot, screw_motion
-from crosscheck.suite.run import CaseResult, run_case, run_suite, worst_of
-from crosscheck.suite.thresholds import SHIPPED, load_thresholds, thresholds_toml
+from crosscheck.suite.run import CaseResult, Outcome, run_case, run_suite, worst_of
+from crosscheck.suite.thresholds import SHIPPED, FindingLimits, load_thresholds, thresholds_toml
 from crosscheck.suite.verdicts import Verdict
 from seecr.pose import pose_add, pose_difference, quat_from_rotvec
 from seecr.shipped import CABLES, model_path
@@ -91,25 +91,45 @@ def test_shipped_cases_are_the_papers(shipped):
     assert by_name["cogiro-vectran-random"].poses.shape == (200, 7)
 
 
-def test_random_poses_lie_in_the_frame_and_only_cogiro_turns(shipped):
+def test_random_poses_lie_in_the_frame_and_crossed_cables_turn(shipped):
     for case in shipped:
-        if case.kind != "random":
+        if not case.name.endswith("-random"):
             continue
         assert np.all(case.poses[:, :3] > 0.0)
         assert np.all(case.poses[:, :3] < [0.8, 0.5, 0.45])
         turn = 2 * np.arccos(np.clip(case.poses[:, 3], -1, 1))
-        if case.name.startswith("cogiro"):
+        if case.name.startswith(("cogiro", "off-centre")):
             assert np.deg2rad(8) < turn.max() <= np.deg2rad(12)
         else:
             assert np.all(turn == 0.0)
+
+
+def test_turned_sweeps_turn_about_every_axis_and_planar_ones_about_theirs(shipped):
+    for case in shipped:
+        if not case.name.endswith("-turned"):
+            continue
+        turns = np.ptp(case.poses[:, 4:], axis=0)
+        axes = [1] if case.name.startswith("planar") else [0, 1, 2]
+        assert np.all(turns[axes] > np.sin(np.deg2rad(5.0)))
+        assert np.all(np.delete(turns, axes) == 0.0)
+
+
+def test_planar_robots_run_on_both_cables_at_more_heights(shipped):
+    by_name = {case.name: case for case in shipped}
+    for robot in ("two-cable", "vertical", "horizontal"):
+        for cable in CABLES:
+            case = by_name[f"planar-{robot}-{cable}-heights"]
+            assert case.cable == cable
+            heights = {*case.poses[:, 2], *by_name[f"planar-{robot}"].poses[:, 2]}
+            assert len(heights) == 5
 
 
 def test_the_seed_decides_the_random_poses():
     one, same, other = shipped_cases(3), shipped_cases(3), shipped_cases(4)
     for a, b, c in zip(one, same, other, strict=True):
         assert np.array_equal(a.poses, b.poses)
-        assert np.array_equal(a.poses, c.poses) == (a.kind == "sweep")
-    poses = {case.name: case.poses for case in one if case.kind == "random"}
+        assert np.array_equal(a.poses, c.poses) != a.name.endswith("-random")
+    poses = {case.name: case.poses for case in one}
     assert not np.array_equal(poses["cogiro-vectran-random"], poses["cogiro-fishing-random"])
 
 
@@ -153,10 +173,11 @@ def test_select_by_pattern_and_refuses_unknown_names(shipped):
 
 
 def test_shipped_thresholds_are_those_agreed():
-    assert load_thresholds().as_dict() == {
-        "settled": {"position_m": 1e-6, "orientation_rad": 1e-5},
-        "polished": {"position_m": 1e-8, "orientation_rad": 1e-7, "tension_N": 1e-6},
-    }
+    found = load_thresholds().as_json()
+    assert found["settled"] == {"position_m": 1e-6, "orientation_rad": 1e-5}
+    assert found["polished"] == {"position_m": 1e-8, "orientation_rad": 1e-7, "tension_N": 1e-6}
+    assert found["findings"]["branches"] == 0
+    assert len(found["findings"]["free_to_move"]) == 14
 
 
 def test_a_copy_may_change_one_value_and_is_written_back(tmp_path):
@@ -185,7 +206,11 @@ def test_a_copy_may_change_one_value_and_is_written_back(tmp_path):
         ("[settled]\nposition_m = true", r"expected a positive number, got True"),
         ("[settled]\nposition_m = '1e-6'", r"expected a positive number, got '1e-6'"),
         ("settled = 3", r"settled: expected a table \[settled\], got 3"),
-        ("[settled\n", r"not TOML: .*line 1"),
+        ("[settled\n", r"is not TOML: .*line 1"),
+        ("[findings]\nbranches = 0.5", r"\[findings\] branches: expected a whole number from 0"),
+        ("[findings]\nbranches = -1", r"branches: expected a whole number from 0 on, got -1"),
+        ("[findings]\nfree_to_move = 'x 1'", r"free_to_move: expected a list of names"),
+        ("[findings]\nfree_elsewhere = 2", r"free_elsewhere: expected a share from 0 to 1, got 2"),
     ],
 )
 def test_bad_thresholds(tmp_path, text, message):
@@ -198,10 +223,10 @@ def test_bad_thresholds(tmp_path, text, message):
 
 
 def test_thresholds_that_cannot_be_read(tmp_path):
-    with pytest.raises(InputFileError, match=r"none\.toml: cannot read .*No such file"):
+    with pytest.raises(InputFileError, match=r"none\.toml: no such file; expected thresh"):
         load_thresholds(tmp_path / "none.toml")
     (tmp_path / "latin.toml").write_bytes(b"# caf\xe9\n")
-    with pytest.raises(InputFileError, match=r"expected TOML in UTF-8.* offset 5"):
+    with pytest.raises(InputFileError, match=r"is not UTF-8 \(byte number 6\)"):
         load_thresholds(tmp_path / "latin.toml")
 
 
@@ -220,7 +245,7 @@ def test_parallel_tilts_with_four_slack_cables_in_both_physics(ends, cable, z):
     assert np.all(result.solution.slack.sum(axis=1) == 4)
     assert np.all(result.settling.slack.sum(axis=1) == 4)
     assert list(result.verdict) == [Verdict.AGREES] * 2
-    assert result.exit_status == 0
+    assert result.outcome is Outcome.AGREE
 
 
 def test_agreement_leaves_room(ends):
@@ -235,7 +260,7 @@ def test_a_stiffness_changed_by_a_thousandth_on_one_side_differs(tmp_path, model
     robot = seecr.load_robot(model)
     case = case_of(model, robot_sweep(robot, 3), mujoco_model=changed, cable=None)
     result = run_case(case, load_thresholds())
-    assert result.exit_status == 1
+    assert result.outcome is Outcome.DIFFER
     assert result.count(Verdict.DIFFERS) >= 2
     assert "further apart than allowed" in result.findings[0].text
     assert result.worst["position_m"].ratio > 1 or result.worst["tension_N"].ratio > 1
@@ -246,7 +271,7 @@ def test_another_mjcf_for_mujoco_keeps_its_own_stiffness(tmp_path):
     poses = cases.demobot_sweep(0.1, 1)
     case = case_of(COGIRO, poses, mujoco_model=changed, cable="vectran")
     np.testing.assert_allclose(MujocoRobot(changed, case.mujoco_ea).settler.ea[0], 3003.0)
-    assert run_case(case, load_thresholds()).exit_status == 1
+    assert run_case(case, load_thresholds()).outcome is Outcome.DIFFER
 
 
 def test_mujoco_measures_the_lengths_it_pays_out_itself(tmp_path):
@@ -270,7 +295,8 @@ def test_cable_counts_must_match():
 
 
 def test_a_platform_free_to_turn_is_a_finding():
-    result = run_case(case_of(PARALLEL, CORNER), load_thresholds())
+    limits = FindingLimits(free_to_move=("small 0",))
+    result = run_case(case_of(PARALLEL, CORNER), replace(load_thresholds(), findings=limits))
     assert result.solution.slack[0].sum() == 6
     assert result.difference.orientation_rad[0] > 1e-3  # each stops somewhere on the free turn
     assert list(result.verdict) == [Verdict.NEUTRAL]
@@ -280,7 +306,7 @@ def test_a_platform_free_to_turn_is_a_finding():
     assert math.isclose(finding.energy_seecr_J, finding.energy_mujoco_J, rel_tol=1e-12)
     assert finding.tension_N < 1e-9
     assert "free to move" in finding.text
-    assert result.exit_status == 0
+    assert result.outcome is Outcome.AGREE
     assert result.worst == {}  # nothing that is determined was compared: it is not a pass
 
 
@@ -372,7 +398,7 @@ def test_unsolved_poses_are_neither_passes_nor_differences(monkeypatch):
     result = run_case(case_of(PARALLEL, cases.demobot_sweep(0.1, 2)), load_thresholds())
     assert list(result.verdict) == [Verdict.SEECR_UNSOLVED] * 2
     assert "limit of iterations" in result.findings[0].text
-    assert result.exit_status == 3
+    assert result.outcome is Outcome.NOT_CONVERGED
     assert result.worst == {}
 
 
@@ -387,7 +413,7 @@ def test_mujoco_that_does_not_settle_is_unsolved(monkeypatch):
     result = run_case(case_of(COGIRO, cases.demobot_sweep(0.1, 2)), load_thresholds())
     assert list(result.verdict) == [Verdict.MUJOCO_UNSOLVED] * 2
     assert np.isnan(result.difference.position_m).all()
-    assert result.exit_status == 3
+    assert result.outcome is Outcome.NOT_CONVERGED
 
 
 # --- agreement -----------------------------------------------------------------------------
@@ -447,6 +473,64 @@ def test_a_screw_keeps_to_a_fixed_axis():
         assert np.abs(pose_difference(pose, turned(angle))).max() < 1e-14
     shift = screw_motion(start, pose_add(start, np.array([1.0, 2, 3, 0, 0, 0])), 3)
     np.testing.assert_allclose(shift[1, :3], start[:3] + np.array([0.5, 1, 1.5]), atol=1e-14)
+
+
+# --- limits of findings --------------------------------------------------------------------
+
+
+def finding(pose: int, verdict: Verdict) -> verdicts.PoseFinding:
+    return verdicts.PoseFinding(pose, verdict, "found")
+
+
+@pytest.fixture
+def wide() -> Case:
+    """A case of ten poses."""
+    return case_of(PARALLEL, np.tile(CORNER, (10, 1)))
+
+
+def beyond(limits: FindingLimits, case: Case, *found: verdicts.PoseFinding) -> list[int]:
+    return [one.pose for one in verdicts.held_to(limits, case, found) if one.beyond_limits]
+
+
+def test_branches_are_counted(wide):
+    two = finding(2, Verdict.BRANCH), finding(5, Verdict.BRANCH)
+    assert beyond(FindingLimits(branches=0), wide, *two) == [2, 5]
+    assert beyond(FindingLimits(branches=1), wide, *two) == [2, 5]
+    assert beyond(FindingLimits(branches=2), wide, *two) == []
+    # what fails by itself is no matter of limits
+    assert beyond(FindingLimits(), wide, finding(1, Verdict.DIFFERS)) == []
+
+
+def test_a_platform_may_be_free_to_move_where_that_is_named(wide):
+    free = finding(3, Verdict.NEUTRAL), finding(4, Verdict.NEUTRAL)
+    assert beyond(FindingLimits(free_to_move=("small 3",)), wide, *free) == [4]
+    assert beyond(FindingLimits(free_to_move=("small *",)), wide, *free) == []
+    assert beyond(FindingLimits(free_to_move=("other 3", "small 34")), wide, *free) == [3, 4]
+    # names are for poses that everybody has
+    assert beyond(FindingLimits(free_elsewhere=1.0), wide, *free) == [3, 4]
+
+
+def test_elsewhere_a_share_may_be_free_to_move(wide):
+    drawn = replace(wide, has_names=False)
+    free = [finding(i, Verdict.NEUTRAL) for i in range(3)]
+    assert beyond(FindingLimits(free_elsewhere=0.3), drawn, *free) == []
+    assert beyond(FindingLimits(free_elsewhere=0.2), drawn, *free) == [0, 1, 2]
+    assert all(case.has_names for case in shipped_cases(0))
+    drawn_too = {case.name for case in shipped_cases(1) if not case.has_names}
+    assert drawn_too == {case.name for case in shipped_cases() if case.name.endswith("-random")}
+
+
+def test_a_finding_beyond_the_limits_fails_its_case():
+    """Both physics are right here, and still the run is not: nobody said it may be free to move."""
+    allowed = replace(load_thresholds(), findings=FindingLimits(free_to_move=("small 0",)))
+    assert run_case(case_of(PARALLEL, CORNER), allowed).outcome is Outcome.AGREE
+    result = run_case(case_of(PARALLEL, CORNER), load_thresholds())
+    assert list(result.verdict) == [Verdict.NEUTRAL]
+    assert result.outcome is Outcome.DIFFER
+    assert words.remarks(result) == "1 free to move (1 beyond limits)"
+    (line,) = words.failures(result)
+    assert line.endswith("(beyond the limits in thresholds.toml)")
+    assert words.findings(result) == []
 
 
 # --- running -------------------------------------------------------------------------------

@@ -1,0 +1,255 @@
+"""Every effect held against a robot in MuJoCo that really has it, pose for pose.
+
+For each robot and effect a few commands are settled by :mod:`crosscheck.twin.measure`, where the
+effect is part of the robot, and solved by seecr with its own physics of the effect.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from enum import Enum
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.suite.gap import gap
+from crosscheck.suite.pool import Pool
+from crosscheck.suite.run import Outcome
+from crosscheck.twin.hidden import Hidden, choose
+from crosscheck.twin.measure import measure
+from crosscheck.twin.robot import TRUE_EFFECTS
+from crosscheck.twin.trajectory import trajectory
+from seecr.equilibrium import solve
+from seecr.experiment import Experiment
+from seecr.mjcf import load_robot
+from seecr.pose import Array
+from seecr.robot import Robot
+from seecr.setup import Commands
+from seecr.shipped import model_path
+
+GROUP, PREFIX = "effects", "effect-"
+ROBOTS = ("demobot_cogiro", "demobot_parallel")
+
+# Both are exact but for rounding, so they agree as plain robots do: [m], [rad], [N].
+POSITION_M, ORIENTATION_RAD, TENSION_N = 1e-8, 1e-7, 1e-6
+# Chains this fine, extrapolated, are that near to the catenary.
+_SEGMENTS = (16, 32)
+# What happens between two rows is asked for at the same points by both.
+_WAYPOINTS = (6, 2)
+# Rows of each sweep; half the way that the robot's own twin would go.
+_POINTS, _REACH = 4, 0.3
+# Slow creep: seecr takes the tension as constant between waypoints, the truth as linear in time.
+_CREEP_TIME_S = 2000.0
+# These take tens of times as long as any other: chains of many links.
+_LONG = ("cable_weight",)
+
+
+class Against(Enum):
+    """What stands against seecr's mathematics of an effect."""
+
+    MUJOCO = "MuJoCo's own means"
+    OURS = "our own mathematics, written a second time"
+
+
+# MuJoCo has no winches, no sensors of this kind and no cables with a memory: what these effects do
+# is written out in crosscheck.twin, from their definitions; MuJoCo settles the robot with it.
+_OURS = frozenset(
+    {
+        "cable_length_offset",
+        "drum_gain",
+        "drum_eccentricity",
+        "backlash",
+        "thermal_expansion",
+        "hysteresis",
+        "creep",
+        "exit_friction",
+        "tracker_frame",
+        "tracker_target",
+        "tracker_scale",
+        "tension_scale",
+    }
+)
+
+
+@dataclass(frozen=True)
+class EffectCase:
+    """One effect of one robot.
+
+    Attributes:
+        model: MJCF of the robot as described.
+        effect: one of ``TRUE_EFFECTS``.
+        seed: of the effect's size.
+    """
+
+    model: Path
+    effect: str
+    seed: int = 0
+
+    @property
+    def name(self) -> str:
+        """As on the terminal, in files and for ``--case``."""
+        return f"{PREFIX}{self.model.stem}-{self.effect}"
+
+    @property
+    def against(self) -> Against:
+        """What stands against seecr's mathematics of the effect."""
+        return Against.OURS if self.effect in _OURS else Against.MUJOCO
+
+    @property
+    def robot(self) -> Robot:
+        """As described."""
+        return _robot_and_commands(self.model)[0]
+
+    @property
+    def commands(self) -> Commands:
+        """Two sweeps to and fro about the reference pose, and a change of temperature."""
+        return _robot_and_commands(self.model)[1]
+
+    @property
+    def hidden(self) -> Hidden:
+        """The effect with its values."""
+        random = np.random.default_rng([self.seed, TRUE_EFFECTS.index(self.effect)])
+        return _slow(choose(self.robot, random, [self.effect])[0])
+
+
+@dataclass(frozen=True, eq=False)
+class EffectResult:
+    """How far seecr's effect and MuJoCo's are apart over n rows.
+
+    Attributes:
+        case: what was run.
+        position_m, orientation_rad, tension_N: (n,) largest differences of the readings.
+        compared: (n,) rows at which both came to rest.
+        moved_m: the largest distance by which the effect moves a reading [m].
+        wall_s: [s] it took.
+    """
+
+    case: EffectCase
+    position_m: Array
+    orientation_rad: Array
+    tension_N: Array
+    compared: NDArray[np.bool_]
+    moved_m: float
+    wall_s: float = np.nan
+
+    @property
+    def worst(self) -> tuple[float, float, float]:
+        """Largest differences [m], [rad], [N] of the rows compared."""
+        position, orientation, tension = (
+            float(np.max(part[self.compared], initial=0.0))
+            for part in (self.position_m, self.orientation_rad, self.tension_N)
+        )
+        return position, orientation, tension
+
+    @property
+    def unsolved(self) -> int:
+        """Rows at which seecr or MuJoCo did not come to rest."""
+        return int(np.sum(~self.compared))
+
+    @property
+    def outcome(self) -> Outcome:
+        """How it ended."""
+        position, orientation, tension = self.worst
+        near = position <= POSITION_M and orientation <= ORIENTATION_RAD and tension <= TENSION_N
+        if not near:
+            return Outcome.DIFFER
+        return Outcome.NOT_CONVERGED if self.unsolved else Outcome.AGREE
+
+    def as_json(self) -> dict[str, Any]:
+        """As in ``results.json``."""
+        position, orientation, tension = self.worst
+        return {
+            "name": self.case.name,
+            "robot": self.case.model.stem,
+            "effect": self.case.effect,
+            "against": self.case.against,
+            "agrees": self.outcome is Outcome.AGREE,
+            "exit_status": self.outcome.exit_status,
+            "position_m": position,
+            "orientation_rad": orientation,
+            "tension_N": tension,
+            "moved_m": self.moved_m,
+            "poses": {"total": len(self.compared), "unsolved": self.unsolved},
+            "wall_s": self.wall_s,
+        }
+
+
+def effect_cases(robots: Sequence[str | Path] = ROBOTS, seed: int = 0) -> list[EffectCase]:
+    """All effects on robots, their sizes drawn from a seed.
+
+    Args:
+        robots: names of shipped models, or MJCF files.
+        seed: of the sizes.
+    """
+    paths = [robot if isinstance(robot, Path) else model_path(robot) for robot in robots]
+    return [EffectCase(path, effect, seed) for path in paths for effect in TRUE_EFFECTS]
+
+
+def run_effect(case: EffectCase) -> EffectResult:
+    """Settle one effect in MuJoCo, solve it with seecr, compare the readings."""
+    began = time.perf_counter()
+    experiment = Experiment(case.robot, case.commands)
+    effects = [case.hidden.effect()]
+    ours, plain = experiment.predict(effects), experiment.predict()
+    truth = measure(case.robot, case.commands, effects, segments=_SEGMENTS, waypoints=_WAYPOINTS)
+    position_m, orientation_rad = gap(_seen(truth), _seen(ours.readings))
+    moved = np.linalg.norm(ours.readings.position - plain.readings.position, axis=1)
+    return EffectResult(
+        case,
+        position_m,
+        orientation_rad,
+        np.max(np.abs(truth.tension_readings - ours.readings.tensions), axis=1),
+        truth.at_rest & ours.solved,
+        float(np.max(moved)),
+        time.perf_counter() - began,
+    )
+
+
+def run_effects(
+    cases: Sequence[EffectCase], pool: Pool, tell: Callable[[EffectResult], None]
+) -> list[EffectResult]:
+    """Run effects, several at a time.
+
+    Args:
+        cases: what to run.
+        pool: where.
+        tell: called with each result as it comes.
+
+    Returns:
+        the results in the order of the cases.
+    """
+    if not cases:
+        return []
+    if pool.jobs > 1:
+        # Have the compiled loop on disk before several processes want it.
+        solve(cases[0].robot, cases[0].robot.reference_pose[None])
+    order = sorted(range(len(cases)), key=lambda i: cases[i].effect not in _LONG)
+    return pool.run(run_effect, cases, order, tell)
+
+
+def _seen(readings: Any) -> Array:
+    """Poses (n, 7) as the tracker reads them."""
+    return np.concatenate([readings.position, readings.quat_wxyz], axis=1)
+
+
+def _slow(hidden: Hidden) -> Hidden:
+    if hidden.name != "creep":
+        return hidden
+    times = np.array([name == "time_s" for name in hidden.layout.names])
+    return replace(hidden, vector=np.where(times, _CREEP_TIME_S, hidden.vector))
+
+
+@cache
+def _robot_and_commands(path: Path) -> tuple[Robot, Commands]:
+    robot = load_robot(path)
+    way = trajectory(robot, _POINTS, _REACH)
+    rows = np.isin(way.run, ("along_low_fwd", "along_low_back", "loop"))
+    run: Any = np.unique(way.run[rows], return_inverse=True)[1]
+    temperature = 20.0 + 4.0 * np.sin(np.arange(rows.sum()))
+    commands = Commands(pose=way.pose[rows], run=run, time=way.t_s[rows], temperature=temperature)
+    return robot, commands
