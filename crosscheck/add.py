@@ -9,13 +9,20 @@ from typing import Any
 import numpy as np
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.fit.candidates import layouts_for, null_fit, seen_directions, try_candidate
+from crosscheck.fit.candidates import (
+    Trials,
+    candidates_for,
+    null_fit,
+    seen_directions,
+    try_candidate,
+)
 from crosscheck.fit.evidence import FALSE_ALARM, p_value
 from crosscheck.fit.gauss_newton import Fit, fit
 from crosscheck.fit.held_out import hold_out, improves, pays, unfitted
 from crosscheck.fit.noise import Whiteness, whiteness
 from crosscheck.fit.prepare import Progress, outlying_rows, prepare
 from crosscheck.fit.problem import Problem, Rms, rms_by_kind
+from crosscheck.fit.reasons import Why
 from crosscheck.fit.state import evaluate
 from crosscheck.measurements.data import Measurements
 from crosscheck.model.write import Fitted
@@ -67,10 +74,42 @@ class Addition:
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
 
+    def as_json(self) -> dict[str, Any]:
+        """The content of ``add.json``, in SI."""
+        return {
+            "effect": self.name,
+            "effects": {f.term.name: _parameters(f) for f in self.fitted},
+            "before": dict(self.before),
+            "after": dict(self.after),
+            "held_out_before": dict(self.held_out_before),
+            "held_out": dict(self.held_out),
+            "improves_held_out": self.pays,
+            "p": self.p,
+            "chi2_fall_a_block": self.fall[0],
+            "chi2_fall_stderr": self.fall[1],
+            "is_noise": self.whiteness.is_noise,
+            "residual": vars(self.whiteness),
+            "warnings": list(self.warnings),
+            "notes": list(self.notes),
+        }
+
     @property
     def own(self) -> Fitted:
         """The effect itself."""
         return next(f for f in self.fitted if f.term.name == self.name)
+
+
+def _parameters(fitted: Fitted) -> dict[str, Any]:
+    layout = fitted.term.layout
+    return {
+        key: {
+            "value": float(fitted.term.vector[i]),
+            "stderr": float(fitted.stderr[i]),
+            "unit": layout.units[i],
+            "at_bound": bool(fitted.at_bound[i]),
+        }
+        for i, key in enumerate(layout.names)
+    }
 
 
 def add_effect(
@@ -95,10 +134,11 @@ def add_effect(
     """
     layout = layout_of(effect_named(name), robot)
     model = Terms(terms)
-    problem, notes, why = prepare(robot, data, model)
-    if why:
-        kind = UnsolvedError if not problem.n_readings or "equilibrium" in why else CrosscheckError
-        raise kind(f"{data.path}: {why}; {name} was not fitted")
+    ready = prepare(robot, data, model)
+    problem, notes = ready.problem, list(ready.all_notes)
+    if ready.refusal is not None:
+        kind = UnsolvedError if ready.refusal.unsolved else CrosscheckError
+        raise kind(f"{data.path}: {ready.refusal}; {name} was not fitted")
     _refuse(problem, layout)
     progress(f"fitting {name}", 0.0)
     plain = problem.experiment.predict(model.effects)
@@ -118,11 +158,9 @@ def add_effect(
 
 
 def _refuse(problem: Problem, layout: Layout) -> None:
-    why = next(c.why_not for c in layouts_for(problem) if c.name == layout.name)
-    if why:
-        raise CrosscheckError(
-            f"{problem.data.path} cannot carry {layout.name}: {why.removeprefix('no candidate: ')}"
-        )
+    reason = next(c.why_not for c in candidates_for(problem) if c.name == layout.name)
+    if reason is not None:
+        raise CrosscheckError(f"{problem.data.path} cannot carry {layout.name}: {reason.words}")
 
 
 def _base(problem: Problem, terms: Terms, layout: Layout, factor: Array) -> Fit:
@@ -130,24 +168,26 @@ def _base(problem: Problem, terms: Terms, layout: Layout, factor: Array) -> Fit:
     rest = terms.without(layout.name)
     base = null_fit(problem, rest, factor, refit=bool(rest))
     if not base.valid:
-        raise UnsolvedError(f"{problem.data.path}: the model without {layout.name}: {base.why}")
+        why = base.status.value
+        raise UnsolvedError(f"{problem.data.path}: the model without {layout.name}: {why}")
     return base
 
 
 def _fitted(problem: Problem, terms: Terms, layout: Layout, factor: Array) -> Fit:
     """The best joint fit, from where the effect stands and from its most promising starts."""
-    trials = []
-    if layout.name in terms:
-        trials.append(fit(problem, terms, factor))
-    tried = try_candidate(problem, _base(problem, terms, layout, factor), layout, factor)
+    fits = [fit(problem, terms, factor)] if layout.name in terms else []
+    base = _base(problem, terms, layout, factor)
+    tried = try_candidate(Trials(problem, factor), base, layout)
     if tried.fit is not None:
-        trials.append(fit(problem, tried.fit.terms, factor, tried.fit.state))
-    good = [t for t in trials if t.valid]
+        fits.append(fit(problem, tried.fit.terms, factor, tried.fit.state))
+    good = [found for found in fits if found.valid]
     if not good:
-        why = tried.why_not or trials[0].why
-        kind = UnsolvedError if "solved" in why else CrosscheckError
+        reason = tried.why_not
+        unsolved = reason is None or reason.why is Why.UNSOLVED
+        kind = UnsolvedError if unsolved else CrosscheckError
+        why = reason or fits[0].status.value
         raise kind(f"{problem.data.path} cannot carry {layout.name}: {why}")
-    return min(good, key=lambda f: f.chi2)
+    return min(good, key=lambda found: found.chi2)
 
 
 def _weigh(
@@ -160,7 +200,7 @@ def _weigh(
 ) -> Addition:
     base = _base(problem, terms, layout, factor)
     rest = terms.without(layout.name)
-    without = hold_out(problem, base, factor) if rest else unfitted(problem, Terms(), base)
+    without = hold_out(problem, base, factor) if rest else unfitted(problem, base)
     held = hold_out(problem, best, factor)
     white = whiteness(problem, best.state.white, int(np.sum(np.isfinite(best.stderr))))
     stood = evaluate(problem, terms, factor)

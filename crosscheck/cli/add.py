@@ -108,10 +108,10 @@ def _tell(
     found: Addition, old: Model, model: Path, written: bool, out: Path | None, as_json: bool
 ) -> None:
     from crosscheck.files import json_text, staged, write_text
-    from crosscheck.terminal.addition import as_json as document_of
     from crosscheck.terminal.addition import print_addition
 
-    text = json_text({**document_of(found, model, written), "model_notes": list(old.notes)})
+    document = {"written": written, "model": str(model), **found.as_json()}
+    text = json_text({**document, "model_notes": list(old.notes)})
     if out is not None:
         with staged(out) as folder:
             write_text(folder / "add.json", text + "\n")

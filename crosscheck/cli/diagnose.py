@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from crosscheck.cli.options import FILE, json_option, out_option, progress_share
-
-if TYPE_CHECKING:
-    from seecr.effects import Term
 
 
 @click.command(
@@ -33,22 +28,20 @@ def command(
     Writes diagnosis.json, diagnosis.html and diagnosis.rrd.
     """
     from crosscheck.diagnosis.verdict import diagnose
-    from crosscheck.files import staged, write_text
+    from crosscheck.files import json_text, staged, write_text
     from crosscheck.measurements.read import load_measurements
+    from crosscheck.model.read import load_model, new_model
     from crosscheck.report import write_report
     from seecr.mjcf import load_robot
 
     machine = load_robot(robot)
     measured = load_measurements(data, machine)
-    terms: Iterable[Term] = ()
-    if model is not None:
-        from crosscheck.model.read import load_model
-
-        terms = load_model(model, machine).terms
+    own = load_model(model, machine) if model is not None else new_model(machine)
     with staged(out) as folder:
         with progress_share("diagnosing") as progress:
-            found = diagnose(machine, measured, terms, progress)
-        text = json.dumps(found.as_json(), indent=1)
+            found = diagnose(machine, measured, own.terms, progress)
+        found = replace(found, notes=(*own.notes, *found.notes))
+        text = json_text(found.as_json())
         write_text(folder / "diagnosis.json", text + "\n")
         write_report(found, folder / "diagnosis.html")
         if not no_recording and found.search is not None:
@@ -61,4 +54,4 @@ def command(
         from crosscheck.terminal.diagnosis import print_diagnosis
 
         print_diagnosis(found, out)
-    return 3 if found.unsolved else 0
+    return 0 if found.converged else 3

@@ -10,7 +10,8 @@ hint where to look, not a proof.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from enum import Enum, auto
 from typing import Any
 
 import numpy as np
@@ -36,51 +37,106 @@ _BINS, _IN_A_BIN = 6, 4
 _CYCLES, _FREQUENCIES, _CLEARLY = 3.0, 20000, 0.15
 
 
+class Against(Enum):
+    """The sort of thing that residuals may go with."""
+
+    EVERYWHERE = auto()
+    PLACE = auto()
+    RUN = auto()
+    TRAVEL = auto()
+    TIME = auto()
+    TEMPERATURE = auto()
+    TENSION = auto()
+    CABLE = auto()
+
+
+@dataclass(frozen=True)
+class Bin:
+    """Rows that are alike in a quantity.
+
+    Attributes:
+        label: the quantity there. rows: how many.
+        mean: error of the strongest reading, in SI; None where it was not read.
+    """
+
+    label: str
+    rows: int
+    mean: float | None
+
+
+@dataclass(frozen=True)
+class Association:
+    """One thing that residuals go with.
+
+    Attributes:
+        kind: the sort of thing. against: the quantity, in words.
+        of: "readings" or "cable lengths".
+        share: of the variance.
+        p: chance of it, over all quantities tried.
+        strongest: the reading that goes with it most. unit: its.
+        bins: rows that are alike in the quantity.
+    """
+
+    kind: Against
+    against: str
+    of: str
+    share: float
+    p: float
+    strongest: str
+    unit: str
+    bins: tuple[Bin, ...]
+
+    @property
+    def significant(self) -> bool:
+        """Whether chance hardly explains it."""
+        return self.p < SIGNIFICANT
+
+    def as_json(self) -> dict[str, Any]:
+        """As in ``comparison.json`` and ``diagnosis.json``."""
+        kept = {key: value for key, value in vars(self).items() if key != "kind"}
+        return {**kept, "bins": [vars(part) for part in self.bins]}
+
+
 @dataclass(frozen=True, eq=False)
 class _Quantity:
     """What residuals may go with.
 
     Attributes:
-        name: for people. values: (k,) numbers or names of groups. unit: of the numbers.
+        kind: the sort of thing. name: for people.
+        values: (k,) numbers or names of groups. unit: of the numbers.
     """
 
+    kind: Against
     name: str
     values: NDArray[Any]
     unit: str = ""
 
 
-def associations(problem: Problem, white: Array, prediction: Prediction) -> list[dict[str, Any]]:
+def associations(problem: Problem, white: Array, prediction: Prediction) -> list[Association]:
     """What residuals go with, the strongest first.
 
     Args:
         problem: the data.
         white: (N,) whitened residuals.
         prediction: of the model they belong to.
-
-    Returns:
-        dicts with ``against`` (the quantity), ``of`` ("readings" or "cable lengths"), ``share``
-        of the variance, ``p`` over all quantities tried, ``strongest`` reading with its
-        ``unit``, and ``bins``: their ``label``, ``rows`` and the strongest reading's ``mean``
-        error.
     """
     raw = problem.residuals(prediction.readings)
     way = travel(problem, prediction)
     table = as_table(problem, white)
     names, units = channels(problem)
-    out = []
-    for quantity in _of_rows(problem, prediction, way):
-        out.append(_row(quantity, "readings", table, raw, names, units, 1.0))
-    out += _in_cables(problem, raw, prediction, way)
-    found = [row for row in out if row is not None]
-    found += _swinging(problem, table, raw, max((row["share"] for row in found), default=0.0))
-    for row in found:
-        row["p"] = min(1.0, row["p"] * len(found))
+    tried = [
+        _row(quantity, "readings", table, raw, names, units, 1.0)
+        for quantity in _of_rows(problem, prediction, way)
+    ]
+    tried += _in_cables(problem, raw, prediction, way)
+    found = [row for row in tried if row is not None]
+    found += _swinging(problem, table, raw, max((row.share for row in found), default=0.0))
+    found = [replace(row, p=min(1.0, row.p * len(found))) for row in found]
     return sorted(found, key=_order)
 
 
-def _order(row: dict[str, Any]) -> tuple[bool, float, float]:
-    significant = row["p"] < SIGNIFICANT
-    return (not significant, -row["share"] if significant else row["p"], row["p"])
+def _order(row: Association) -> tuple[bool, float, float]:
+    return (not row.significant, -row.share if row.significant else row.p, row.p)
 
 
 def channels(problem: Problem) -> tuple[list[str], list[str]]:
@@ -92,35 +148,35 @@ def channels(problem: Problem) -> tuple[list[str], list[str]]:
 
 def _of_rows(problem: Problem, prediction: Prediction, way: Travel) -> Iterator[_Quantity]:
     n, data = problem.data.n_rows, problem.data
-    yield _Quantity(EVERYWHERE, np.zeros(n))
+    yield _Quantity(Against.EVERYWHERE, EVERYWHERE, np.zeros(n))
     turn = rotvec_from_quat(way.pose[:, 3:])
     place = np.concatenate([way.pose[:, :3], turn], axis=1)
     for k, axis in enumerate(AXES):
-        yield _Quantity(f"commanded {axis}", place[:, k], "m" if k < 3 else "rad")
-    yield _Quantity("the run", data.run)
-    yield _Quantity("direction of travel", way.direction)
-    yield _Quantity("speed of travel", way.speed, "m/s")
+        yield _Quantity(Against.PLACE, f"commanded {axis}", place[:, k], "m" if k < 3 else "rad")
+    yield _Quantity(Against.RUN, "the run", data.run)
+    yield _Quantity(Against.TRAVEL, "direction of travel", way.direction)
+    yield _Quantity(Against.TRAVEL, "speed of travel", way.speed, "m/s")
     if data.t_s is not None:
-        yield _Quantity("time", data.t_s - data.t_s.min(), "s")
+        yield _Quantity(Against.TIME, "time", data.t_s - data.t_s.min(), "s")
         if len(data.runs) > 1:
             starts = {name: data.t_s[data.run == name].min() for name in data.runs}
             into = data.t_s - np.array([starts[name] for name in data.run.tolist()])
-            yield _Quantity("time since the start of the run", into, "s")
+            yield _Quantity(Against.TIME, "time since the start of the run", into, "s")
     if data.temperature_C is not None:
-        yield _Quantity("temperature", data.temperature_C, "C")
+        yield _Quantity(Against.TEMPERATURE, "temperature", data.temperature_C, "C")
     slack = prediction.slack
-    yield _Quantity("number of slack cables", slack.sum(axis=1).astype(float))
+    yield _Quantity(Against.TENSION, "number of slack cables", slack.sum(axis=1).astype(float))
     taut = np.where(slack, np.nan, prediction.tensions)
     some = np.isfinite(taut).any(axis=1)
     for name, pick in (("smallest", np.nanmin), ("mean", np.nanmean)):
         values = np.full(n, np.nan)
         values[some] = pick(taut[some], axis=1)
-        yield _Quantity(f"{name} tension of the taut cables", values, "N")
+        yield _Quantity(Against.TENSION, f"{name} tension of the taut cables", values, "N")
 
 
 def _in_cables(
     problem: Problem, raw: Array, prediction: Prediction, way: Travel
-) -> list[dict[str, Any] | None]:
+) -> list[Association | None]:
     """Errors of cable length against each cable's own length, tension and motion."""
     errors, noise = cable_errors(problem, raw, prediction)
     if not np.isfinite(errors).any() or not np.all(noise > 0):
@@ -134,10 +190,10 @@ def _in_cables(
     paid = nominal - before
     motion = np.where(paid > 0, "paid out", "reeled in")
     quantities = (
-        _Quantity("the cable", np.tile(np.array(problem.robot.cable_names), n)),
-        _Quantity("the cable's length", lengths.ravel(), "m"),
-        _Quantity("the cable's tension", prediction.tensions.ravel(), "N"),
-        _Quantity("whether the cable was paid out or reeled in", motion.ravel()),
+        _Quantity(Against.CABLE, "the cable", np.tile(np.array(problem.robot.cable_names), n)),
+        _Quantity(Against.CABLE, "the cable's length", lengths.ravel(), "m"),
+        _Quantity(Against.CABLE, "the cable's tension", prediction.tensions.ravel(), "N"),
+        _Quantity(Against.CABLE, "whether the cable was paid out or reeled in", motion.ravel()),
     )
     part = independent_part(problem, prediction)
     table = (errors / noise).reshape(-1, 1)
@@ -147,7 +203,7 @@ def _in_cables(
     ]
 
 
-def _swinging(problem: Problem, table: Array, raw: Array, least: float) -> list[dict[str, Any]]:
+def _swinging(problem: Problem, table: Array, raw: Array, least: float) -> list[Association]:
     """What comes again and again in time, by its phase; only if it explains clearly more.
 
     Commands that go to and fro make every error of place come again with them.
@@ -155,15 +211,13 @@ def _swinging(problem: Problem, table: Array, raw: Array, least: float) -> list[
     period, tried = _period(problem, table)
     if period is None or problem.data.t_s is None:
         return []
-    phase = _Quantity(
-        f"time, again every {period:.3g} s", 360.0 * (problem.data.t_s / period % 1.0), "deg"
-    )
+    phase = 360.0 * (problem.data.t_s / period % 1.0)
+    again = _Quantity(Against.TIME, f"time, again every {period:.3g} s", phase, "deg")
     names, units = channels(problem)
-    row = _row(phase, "readings", table, raw, names, units, 1.0)
-    if row is None or row["share"] < least + _CLEARLY:
+    row = _row(again, "readings", table, raw, names, units, 1.0)
+    if row is None or row.share < least + _CLEARLY:
         return []
-    row["p"] = min(1.0, row["p"] * tried)
-    return [row]
+    return [replace(row, p=min(1.0, row.p * tried))]
 
 
 def _period(problem: Problem, table: Array) -> tuple[float | None, int]:
@@ -196,10 +250,10 @@ def _row(
     names: list[str],
     units: list[str],
     part: float,
-) -> dict[str, Any] | None:
+) -> Association | None:
     """One association, or None where the quantity never changes."""
     index, labels = _binned(quantity, np.asarray(np.isfinite(table).any(axis=1)))
-    constant = quantity.name == EVERYWHERE
+    constant = quantity.kind is Against.EVERYWHERE
     if len(labels) < (1 if constant else 2):
         return None
     between, within, counts = _squares(table, index, len(labels), constant)
@@ -217,15 +271,16 @@ def _row(
     share = 1.0 - spread / max(total / (lost.sum() + won.sum()), 1e-300)
     k = int(np.argmax(np.where(counts > len(labels), between, -1.0)))
     tried = int(np.sum(won > 0))
-    return {
-        "against": quantity.name,
-        "of": of,
-        "share": float(np.clip(share, 0.0, 1.0)),
-        "p": float(min(1.0, 2.0 * min(whole, tried * float(np.min(each))))),
-        "strongest": names[k],
-        "unit": units[k],
-        "bins": _bins(index, labels, table[:, k], raw[:, k]),
-    }
+    return Association(
+        kind=quantity.kind,
+        against=quantity.name,
+        of=of,
+        share=float(np.clip(share, 0.0, 1.0)),
+        p=float(min(1.0, 2.0 * min(whole, tried * float(np.min(each))))),
+        strongest=names[k],
+        unit=units[k],
+        bins=_bins(index, labels, table[:, k], raw[:, k]),
+    )
 
 
 def _p(between: Array, won: Array, within: Array, lost: Array) -> Array:
@@ -280,10 +335,10 @@ def _labelled(low: float, high: float, unit: str) -> str:
     return f"{text} {unit}".strip()
 
 
-def _bins(index: Any, labels: list[str], white: Array, raw: Array) -> list[dict[str, Any]]:
+def _bins(index: Any, labels: list[str], white: Array, raw: Array) -> tuple[Bin, ...]:
     out = []
     for b, label in enumerate(labels):
         rows = (index == b) & np.isfinite(white) & np.isfinite(raw)
         mean = float(raw[rows].mean()) if rows.any() else None
-        out.append({"label": label, "rows": int(rows.sum()), "mean": mean})
-    return out
+        out.append(Bin(label, int(rows.sum()), mean))
+    return tuple(out)

@@ -13,10 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.comparison.associations import EVERYWHERE, SIGNIFICANT, associations, channels
+from crosscheck.comparison.associations import Against, Association, associations, channels
 from crosscheck.comparison.regions import regions_of
 from crosscheck.comparison.travel import Travel, travel
-from crosscheck.fit.held_out import blocks_of
 from crosscheck.fit.noise import Whiteness, as_table, whiteness
 from crosscheck.fit.prepare import noise_floor, outlying_rows, prepare
 from crosscheck.fit.problem import BY_NAME, Problem, Rms, rms_by_kind
@@ -57,7 +56,7 @@ class Comparison:
     runs: tuple[dict[str, Any], ...]
     directions: tuple[dict[str, Any], ...]
     regions: tuple[dict[str, Any], ...]
-    associations: tuple[dict[str, Any], ...]
+    associations: tuple[Association, ...]
     worst: tuple[dict[str, Any], ...]
     whiteness: Whiteness | None
     unsolved: tuple[dict[str, Any], ...]
@@ -100,9 +99,10 @@ def compare(robot: Robot, data: Measurements, terms: Iterable[Term] = ()) -> Com
         terms: the model's effects with their values.
     """
     model = Terms(terms)
-    problem, notes, why = prepare(robot, data, model)
+    ready = prepare(robot, data, model)
+    problem = ready.problem
     # nothing is fitted here, so nobody asks how cross-validation would cut the data
-    notes = [note for note in [*notes, why] if note and note != blocks_of(problem)[1]]
+    notes = [*ready.notes, *([str(ready.refusal)] if ready.refusal else [])]
     plain = problem.experiment.predict(model.effects)
     factor = problem.noise(plain)
     state = evaluate(problem, model, factor)
@@ -225,12 +225,12 @@ def _sentence(found: Comparison) -> str:
             f"What is left looks random, but {size}: the noise is stated too small, or many small "
             "effects are missing."
         )
-    strong = [a for a in found.associations if a["p"] < SIGNIFICANT]
+    strong = [a for a in found.associations if a.significant]
     goes = ""
     if strong:
-        share = 100 * strong[0]["share"]
-        goes = f"; {share:.0f} % of their variance goes with {strong[0]['against']}"
-        if strong[0]["against"] == EVERYWHERE:
+        share = 100 * strong[0].share
+        goes = f"; {share:.0f} % of their variance goes with {strong[0].against}"
+        if strong[0].kind is Against.EVERYWHERE:
             goes = f"; {share:.0f} % of their square is the same everywhere"
     return f"The model misses something: {size}, and neighbouring rows agree in them{goes}."
 

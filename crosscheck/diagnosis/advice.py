@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from crosscheck.diagnosis.result import Finding
+from crosscheck.comparison.associations import Against, Association
+from crosscheck.diagnosis.result import DiagnosisVerdict, MissingEffect
 from crosscheck.diagnosis.rivals import Rival
 from crosscheck.diagnosis.search import Search
 from crosscheck.planning.separation import measured_directly, proposals
@@ -37,29 +39,32 @@ def check_of(term: Term, robot: Robot) -> str:
 
 
 def measure_next(
-    found: Search, findings: list[Finding], verdict: str, where: tuple[dict[str, Any], ...]
+    found: Search,
+    missing: Sequence[MissingEffect],
+    verdict: DiagnosisVerdict,
+    where: Sequence[Association],
 ) -> list[str]:
     """What to measure to tell apart, confirm or find, a sentence each."""
     out = []
-    for finding in findings:
-        for rival in finding.rivals:
-            out += _to_separate(found, finding, rival)
-        if not finding.rivals:
-            out.append(f"to confirm {finding.effect}: {finding.check}")
-    if verdict == "unknown_effect":
+    for effect in missing:
+        for rival in effect.rivals:
+            out += _to_separate(found, effect, rival)
+        if not effect.rivals:
+            out.append(f"to confirm {effect.effect}: {effect.check}")
+    if verdict is DiagnosisVerdict.UNKNOWN_EFFECT:
         out.append(_to_find(where))
-    if verdict == "no_effect_missing":
+    if verdict is DiagnosisVerdict.NO_EFFECT_MISSING:
         out.append("nothing is missing; to see smaller effects, see crosscheck plan")
     return list(dict.fromkeys(out))
 
 
-def _to_separate(found: Search, finding: Finding, rival: Rival) -> list[str]:
+def _to_separate(found: Search, effect: MissingEffect, rival: Rival) -> list[str]:
     robot = found.problem.robot
-    names = f"{finding.effect} and {rival.name}"
-    direct = list(dict.fromkeys(measured_directly(n, robot) for n in (finding.effect, rival.name)))
+    names = f"{effect.effect} and {rival.name}"
+    direct = list(dict.fromkeys(measured_directly(n, robot) for n in (effect.effect, rival.name)))
     ways = [
         f"{p.words} (signal that separates them: now {p.now:.2g}, then {p.then:.2g}, needs 15)"
-        for p in proposals(found.problem, found.last.fit, finding.effect, rival.layout)
+        for p in proposals(found.problem, found.last.fit, effect.effect, rival.layout)
         if p.separates
     ]
     if ways:
@@ -72,20 +77,20 @@ def _to_separate(found: Search, finding: Finding, rival: Rival) -> list[str]:
     ]
 
 
-def _to_find(where: tuple[dict[str, Any], ...]) -> str:
+_PLACE = (
+    "measure more poses along it, closer together, and some of them again at the end; what stays "
+    "with the place is geometry or the tracker, what does not is time or motion"
+)
+_RUN = "zero the winches and check the tracker before each run, and repeat the runs"
+_TIME = "stay at one pose and read it for as long as the measurements took"
+_FIRST = {
+    Against.PLACE: _PLACE, Against.RUN: _RUN, Against.TIME: _TIME, Against.TEMPERATURE: _TIME,
+}  # fmt: skip
+
+
+def _to_find(where: Sequence[Association]) -> str:
     again = "repeat the same poses forward, back and an hour later"
     if not where:
         return f"{again}, to see what the error follows"
-    against = str(where[0]["against"])
-    end = f"the unexplained error goes with {against}: "
-    if against.startswith("commanded"):
-        return (
-            f"{end}measure more poses along it, closer together, and some of them again at the "
-            "end; what stays with the place is geometry or the tracker, what does not is time or "
-            "motion"
-        )
-    if against == "the run":
-        return f"{end}zero the winches and check the tracker before each run, and repeat the runs"
-    if "time" in against or "temperature" in against:
-        return f"{end}stay at one pose and read it for as long as the measurements took"
-    return f"{end}{again}, and look at it there"
+    advice = _FIRST.get(where[0].kind, f"{again}, and look at it there")
+    return f"the unexplained error goes with {where[0].against}: {advice}"

@@ -2,29 +2,54 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from crosscheck.comparison.associations import Association
 from crosscheck.diagnosis.rivals import Rival
 from crosscheck.diagnosis.search import Search
+from crosscheck.files import plain
 from crosscheck.fit.noise import Whiteness
 from crosscheck.fit.problem import Rms
+from crosscheck.fit.reasons import Reason, Refusal
 from seecr.effects import Term
 from seecr.effects.base import Layout
 from seecr.pose import Array
 
-VERDICTS = ("no_effect_missing", "effects_found", "unknown_effect", "no_verdict")
+
+class DiagnosisVerdict(StrEnum):
+    """What a diagnosis comes to, in the words of ``diagnosis.json``."""
+
+    NO_EFFECT_MISSING = "no_effect_missing", "model and data agree"
+    EFFECTS_FOUND = "effects_found", "what is left after them is noise"
+    UNKNOWN_EFFECT = "unknown_effect", "structure remains that no known effect explains"
+    NO_VERDICT = "no_verdict", "the data or the solves are not fit for one"
+
+    meaning: str
+
+    def __new__(cls, word: str, meaning: str) -> DiagnosisVerdict:
+        """A word with what it means."""
+        verdict = str.__new__(cls, word)
+        verdict._value_, verdict.meaning = word, meaning
+        return verdict
+
+    @property
+    def heading(self) -> str:
+        """The same as a heading."""
+        return self.value.replace("_", " ").capitalize()
 
 
 @dataclass(frozen=True, eq=False)
-class Finding:
+class MissingEffect:
     """An effect that the data warrant.
 
     Attributes:
-        effect: its name. title: in words.
-        layout: its parameters. values, stderr: (p,) in their units; stderr inf where unseen.
+        term: the effect with its values.
+        stderr: (p,) of the values in their units; inf where unseen.
         at_bound: (p,) bool.
         rivals: effects these data cannot tell from it.
         check: how to see it without the robot's poses, with what to expect.
@@ -33,12 +58,9 @@ class Finding:
         share: part of the unexplained chi2 (of runs left out) that it took away.
     """
 
-    effect: str
-    title: str
-    layout: Layout
-    values: Array
+    term: Term
     stderr: Array
-    at_bound: np.ndarray
+    at_bound: NDArray[np.bool_]
     rivals: tuple[Rival, ...]
     check: str
     rms: Rms
@@ -46,9 +68,60 @@ class Finding:
     share: float
 
     @property
-    def term(self) -> Term:
-        """The effect with its values."""
-        return Term(self.layout, self.values)
+    def effect(self) -> str:
+        """Its name."""
+        return self.term.name
+
+    @property
+    def title(self) -> str:
+        """The effect in words."""
+        return self.layout.effect.title
+
+    @property
+    def layout(self) -> Layout:
+        """Its parameters."""
+        return self.term.layout
+
+    @property
+    def values(self) -> Array:
+        """(p,) in their units."""
+        return self.term.vector
+
+    def as_json(self) -> dict[str, Any]:
+        """An item of ``missing``: SI, null where there is no number."""
+        rows = zip(self.layout.names, self.values, self.stderr, self.at_bound, strict=True)
+        return {
+            "effect": self.effect,
+            "indistinguishable": [rival.name for rival in self.rivals],
+            "parameters": {
+                name: {"value": value, "stderr": error, "at_bound": bool(bound)}
+                for name, value, error, bound in rows
+            },
+            "check": self.check,
+            **self.rms,
+            "held_out": self.held_out_rms,
+            "share_of_error_removed": self.share,
+        }
+
+
+@dataclass(frozen=True)
+class NotListed:
+    """An effect of the catalogue that is not listed.
+
+    Attributes:
+        effect: its name. title: in words.
+        score: gain in log evidence by itself; 0 where it was not fitted.
+        why_not: the reason.
+    """
+
+    effect: str
+    title: str
+    score: float
+    why_not: Reason
+
+    def as_json(self) -> dict[str, Any]:
+        """An item of ``candidates``."""
+        return {"effect": self.effect, "score": self.score, "why_not": str(self.why_not)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,77 +129,55 @@ class Diagnosis:
     """The whole answer.
 
     Attributes:
-        verdict: one of VERDICTS. sentence: the same for a person.
+        verdict: what it comes to. sentence: the same for a person.
         missing: effects, in the order of adding.
         before, after, held_out: rms errors by kind (``position_rms_m``, ...).
         floor: rms errors that noise alone would give.
-        candidates: per effect not listed: name, score (gain in log evidence), why not.
+        candidates: effects that are not listed, the nearest miss first.
         measure_next: what to measure, in words.
         notes: what was assumed, left out or estimated.
         search: the way, with every model on it; None without a verdict.
         whiteness: of what is left.
         where: what the unexplained part goes with, the strongest first.
-        unsolved: there is no verdict because rows could not be solved.
+        refusal: why there is no verdict; None where there is one.
     """
 
-    verdict: str
+    verdict: DiagnosisVerdict
     sentence: str
-    missing: tuple[Finding, ...]
+    missing: tuple[MissingEffect, ...]
     before: Rms
     after: Rms
     held_out: Rms
     floor: Rms
-    candidates: tuple[dict[str, Any], ...]
-    measure_next: tuple[str, ...]
+    candidates: tuple[NotListed, ...] = ()
+    measure_next: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     search: Search | None = None
     whiteness: Whiteness | None = None
-    where: tuple[dict[str, Any], ...] = field(default_factory=tuple)
-    unsolved: bool = False
+    where: tuple[Association, ...] = ()
+    refusal: Refusal | None = None
+
+    @property
+    def converged(self) -> bool:
+        """Whether nothing failed for want of solutions; for want of data is another matter."""
+        return self.refusal is None or not self.refusal.unsolved
 
     def as_json(self) -> dict[str, Any]:
-        """The contract's JSON: numbers in SI, null where there is none."""
-        return {
-            "verdict": self.verdict,
-            "sentence": self.sentence,
-            "missing": [_finding(f) for f in self.missing],
-            "before": _plain(self.before),
-            "after": _plain(self.after),
-            "held_out": _plain(self.held_out),
-            "noise_floor": _plain(self.floor),
-            "candidates": [_plain(c) for c in self.candidates],
-            "measure_next": list(self.measure_next),
-            "residual": None if self.whiteness is None else _plain(vars(self.whiteness)),
-            "where": [_plain(w) for w in self.where],
-            "notes": list(self.notes),
-        }
-
-
-def _finding(found: Finding) -> dict[str, Any]:
-    parameters = {
-        name: {"value": number(value), "stderr": number(error), "at_bound": bool(bound)}
-        for name, value, error, bound in zip(
-            found.layout.names, found.values, found.stderr, found.at_bound, strict=True
+        """The content of ``diagnosis.json``: numbers in SI, null where there is none."""
+        document: dict[str, Any] = plain(
+            {
+                "verdict": self.verdict.value,
+                "sentence": self.sentence,
+                "missing": [found.as_json() for found in self.missing],
+                "before": self.before,
+                "after": self.after,
+                "held_out": self.held_out,
+                "noise_floor": self.floor,
+                "candidates": [candidate.as_json() for candidate in self.candidates],
+                "measure_next": self.measure_next,
+                "residual": None if self.whiteness is None else asdict(self.whiteness),
+                "where": [found.as_json() for found in self.where],
+                "notes": self.notes,
+            }
         )
-    }
-    return {
-        "effect": found.effect,
-        "indistinguishable": [rival.name for rival in found.rivals],
-        "parameters": parameters,
-        "check": found.check,
-        **_plain(found.rms),
-        "held_out": _plain(found.held_out_rms),
-        "share_of_error_removed": number(found.share),
-    }
-
-
-def number(value: float | None) -> float | None:
-    """A number JSON can hold; None for what is not finite."""
-    return None if value is None or not np.isfinite(value) else float(value)
-
-
-def _plain(table: dict[str, Any]) -> dict[str, Any]:
-    return {
-        key: number(float(value)) if isinstance(value, float | np.floating) else value
-        for key, value in table.items()
-    }
+        return document

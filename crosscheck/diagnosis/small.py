@@ -6,24 +6,27 @@ happens, that takes away most of what runs left out leave unexplained is there a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from crosscheck.diagnosis.search import MOST_EFFECTS, Search, Step
-from crosscheck.fit.candidates import Candidate, layouts_for, try_candidate
-from crosscheck.fit.evidence import evidence
-from crosscheck.fit.gauss_newton import fit
-from crosscheck.fit.held_out import hold_out, surely_improves
-from crosscheck.fit.noise import whiteness
+from crosscheck.diagnosis.node import node_of
+from crosscheck.diagnosis.order import Step, step_of
+from crosscheck.diagnosis.search import MOST_EFFECTS, Search
+from crosscheck.fit.candidates import Candidate, try_candidate
+from crosscheck.fit.gauss_newton import Fit
+from crosscheck.fit.held_out import significantly_improves
 from seecr.effects import Term
 
 # Where structure is left over, an effect of more plausible sizes than this is not believed.
 PLAUSIBLE = 20.0
 
 
-def smallest_sure(found: Search, parameters: int, shares: tuple[float, float]) -> Search | None:
-    """The way by small effects alone, each of which explains much by itself.
+def small_effects_alone(
+    found: Search, parameters: int, shares: tuple[float, float]
+) -> Search | None:
+    """The way by small effects alone, each of which explains much by itself; None without one.
 
     For data that keep some structure whatever is added: large groups imitate anything, but an
     effect of a few parameters that takes away nearly all is there; and so may be the next one,
@@ -35,39 +38,45 @@ def smallest_sure(found: Search, parameters: int, shares: tuple[float, float]) -
         shares: least part of what runs left out leave unexplained that the first effect and
             each after it must take away.
     """
-    way = Search(
-        found.problem, found.factor, found.noise_scale, found.steps[:1], found.base, found.known
-    )
+    way = replace(found, steps=found.steps[:1])
     while len(way.found) < MOST_EFFECTS:
+        last = way.last
+        if way.found:
+            tried = tuple(_small_candidates(way, parameters))
+            last = replace(last, node=replace(last.node, candidates=tried))
+            way = replace(way, steps=(*way.steps[:-1], last))
         step = _small_step(way, parameters, shares[1] if way.found else shares[0])
         if step is None:
             break
-        way = replace(way, steps=[*way.steps, step])
+        way = replace(way, steps=(*way.steps, step))
     return way if way.found else None
 
 
 def _small_step(way: Search, parameters: int, share: float) -> Step | None:
-    problem, last = way.problem, way.last
-    if way.found:
-        last.candidates = _small_candidates(way, parameters)
-    small = [
-        c
-        for c in last.candidates
-        if c.fit is not None and c.evidence is not None and len(c.layout) <= parameters
-        and not np.any(c.fit.at_bound) and is_plausible(c.fit.terms[c.name])
-    ]  # fmt: skip
-    if not small:
+    """The small effect with the most evidence, if it explains such a share of what is left."""
+    best = _best_small(way.last.candidates, parameters)
+    if best is None or best.fit is None:
         return None
-    best = max(small, key=lambda c: c.evidence.log if c.evidence else -np.inf)
-    assert best.fit is not None
-    full = fit(problem, best.fit.terms, way.factor, best.fit.state)
+    full = way.trials.refit(best.fit.terms, best.fit.state)
     if not full.valid:
         return None
-    ev = evidence(full, way.noise_scale)
-    white = whiteness(problem, full.state.white / way.noise_scale, ev.parameters)
-    step = Step(best.name, full, ev, white, hold_out(problem, full, way.factor))
-    sure = surely_improves(last.held_out, step.held_out) and not np.any(full.at_bound)
-    return step if sure and share_of(last, step) > share else None
+    step = step_of(way.trials, best.name, node_of(way.trials, full))
+    significant = significantly_improves(way.last.held_out, step.held_out)
+    listed = significant and not np.any(full.at_bound)
+    return step if listed and share_of(way.last, step) > share else None
+
+
+def _best_small(candidates: Sequence[Candidate], parameters: int) -> Candidate | None:
+    def fits(c: Candidate, found: Fit | None) -> bool:
+        few = len(c.layout) <= parameters
+        return few and found is not None and not np.any(found.at_bound) and _happens(found, c)
+
+    small = [c for c in candidates if fits(c, c.fit)]
+    return max(small, key=lambda c: c.evidence.log if c.evidence else -np.inf, default=None)
+
+
+def _happens(found: Fit, candidate: Candidate) -> bool:
+    return is_plausible(found.terms[candidate.name])
 
 
 def is_plausible(term: Term) -> bool:
@@ -78,13 +87,12 @@ def is_plausible(term: Term) -> bool:
 
 def _small_candidates(way: Search, parameters: int) -> list[Candidate]:
     """The small effects that the last model does not have, fitted beside it."""
-    held = way.last.fit.terms.names
-    out = []
-    for c in layouts_for(way.problem):
-        if c.name in held or c.why_not or len(c.layout) > parameters:
-            continue
-        out.append(try_candidate(way.problem, way.last.fit, c.layout, way.factor, way.noise_scale))
-    return out
+    held, trials = way.last.fit.terms.names, way.trials
+    return [
+        try_candidate(trials, way.last.fit, c.layout)
+        for c in trials.candidates(trials.problem)
+        if c.name not in held and c.why_not is None and len(c.layout) <= parameters
+    ]
 
 
 def share_of(before: Step, step: Step) -> float:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from crosscheck.diagnosis.order import Step
 from crosscheck.diagnosis.result import Diagnosis
-from crosscheck.diagnosis.search import Step
 from crosscheck.fit.held_out import blocks_of
 from crosscheck.fit.problem import KINDS, Kind, Problem, rms_by_kind
 from crosscheck.fit.state import State
@@ -26,13 +26,13 @@ class Stage:
     Attributes:
         label: what was added, in words.
         added: the effect added last, "" for the model as it stood.
-        sure: whether the diagnosis lists it.
+        listed: whether the diagnosis lists it.
         step: of the search.
     """
 
     label: str
     added: str
-    sure: bool
+    listed: bool
     step: Step
 
     @property
@@ -45,7 +45,7 @@ def stages_of(found: Diagnosis) -> list[Stage]:
     """From the model as it stood to the last one; none where there was no search."""
     if found.search is None:
         return []
-    listed = {finding.effect: finding for finding in found.missing}
+    listed = {effect.effect for effect in found.missing}
     out = []
     for step in found.search.steps:
         if step.added:
@@ -61,7 +61,7 @@ def shown_stages(found: Diagnosis) -> tuple[Stage, Stage]:
     stages = stages_of(found)
     last = stages[0]
     for stage in stages[1:]:
-        if not stage.sure:
+        if not stage.listed:
             break
         last = stage
     return stages[0], last
@@ -69,9 +69,8 @@ def shown_stages(found: Diagnosis) -> tuple[Stage, Stage]:
 
 def by_block(problem: Problem, stage: Stage, kind: Kind) -> Array:
     """The rms error of each run (or block of time) left out, in SI; NaN where nothing was read."""
-    blocks, _note = blocks_of(problem)
     out = []
-    for rows in blocks:
+    for rows in blocks_of(problem):
         value = rms_by_kind(problem.only(rows), stage.step.held_out.raw)[kind.key]
         out.append(np.nan if value is None else value)
     return np.array(out)

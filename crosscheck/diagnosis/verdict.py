@@ -2,33 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import takewhile
-from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from crosscheck.comparison.associations import Association, associations
 from crosscheck.diagnosis.advice import check_of, measure_next
-from crosscheck.diagnosis.result import Diagnosis, Finding
+from crosscheck.diagnosis.result import Diagnosis, DiagnosisVerdict, MissingEffect, NotListed
 from crosscheck.diagnosis.rivals import rivals_of
 from crosscheck.diagnosis.search import Search, search
-from crosscheck.diagnosis.small import is_plausible, share_of, smallest_sure
-from crosscheck.fit.candidates import Candidate, null_fit
+from crosscheck.diagnosis.small import is_plausible, share_of, small_effects_alone
+from crosscheck.fit.candidates import Candidate, Trials, null_fit
 from crosscheck.fit.gauss_newton import Fit
 from crosscheck.fit.noise import whiteness
 from crosscheck.fit.prepare import Progress, noise_floor, outlying_rows, prepare
-from crosscheck.fit.problem import Problem, Rms, rms_by_kind
+from crosscheck.fit.problem import Problem, rms_by_kind
+from crosscheck.fit.reasons import Reason, Refusal, Unfit, Why
 from crosscheck.fit.state import derivatives
 from crosscheck.measurements.data import Measurements
 from seecr.effects import Term, Terms
 from seecr.pose import Array
 from seecr.robot import Robot
 
-# Where structure is left over, an effect is sure only if it has few parameters and took away
+# Where structure is left over, an effect is listed only if it has few parameters and took away
 # most of what was unexplained; by itself, two thirds of all and then a third of the rest.
-_SURE_PARAMETERS, _SURE_SHARE, _SURE_ALONE = 3, 0.5, (2.0 / 3.0, 1.0 / 3.0)
+_FEW_PARAMETERS, _LEAST_SHARE, _LEAST_ALONE = 3, 0.5, (2.0 / 3.0, 1.0 / 3.0)
+# The model's values are refitted before the search where that takes away so much chi2.
+_STALE_VALUES = 30.0
+# What the unexplained part goes with is said of so many quantities.
+_MOST_WHERE = 5
 # Noise up to this many times the stated one is noise that was stated too small.
 _UNDERSTATED = 3.0
 
@@ -51,103 +56,114 @@ def diagnose(
         progress: called with what is being done and the part of it that is done.
     """
     model = Terms(terms)
-    problem, notes, why = prepare(robot, data, model)
+    ready = prepare(robot, data, model)
+    problem = ready.problem
     factor = problem.noise(problem.experiment.predict(model.effects))
     base = null_fit(problem, model, factor, refit=False)
-    if why or not base.valid:
-        return no_verdict(problem, base, notes, why or base.why)
-    if model:
-        # the values of a model come from other fits: they may settle on these data first
-        settled = null_fit(problem, model, factor, refit=True)
-        if settled.valid and settled.chi2 < base.chi2 - 30.0:
-            notes.append("the model's values were refitted to these data before the search")
-            base = settled
-        else:
-            base = _with_derivatives(problem, base)
-    found = search(problem, base, factor, 1.0, progress)
-    found, more = _without_outliers(problem, found, base, factor, progress)
-    notes += more
-    found, more = _with_larger_noise(found, progress)
-    notes += more
-    return conclude(found, notes)
+    refusal = ready.refusal
+    if refusal is None and not base.valid:
+        refusal = Refusal(Unfit.UNSOLVED_MODEL, data.n_rows)
+    if refusal is not None:
+        return no_verdict(problem, base, ready.all_notes, refusal)
+    base, refitted = _at_its_best(problem, base, factor)
+    found = search(Trials(problem, factor), base, progress)
+    found, outliers = _without_outliers(found, base, progress)
+    found, larger = _with_larger_noise(found, progress)
+    return conclude(found, (*ready.all_notes, *refitted, *outliers, *larger))
+
+
+Notes = tuple[str, ...]
+
+
+def _at_its_best(problem: Problem, base: Fit, factor: Array) -> tuple[Fit, Notes]:
+    """The model to start from: its values come from other fits, and may settle on these data."""
+    if not base.terms:
+        return base, ()
+    refitted = null_fit(problem, base.terms, factor, refit=True)
+    if refitted.valid and refitted.chi2 < base.chi2 - _STALE_VALUES:
+        return refitted, ("the model's values were refitted to these data before the search",)
+    return _with_derivatives(problem, base), ()
 
 
 def _with_derivatives(problem: Problem, base: Fit) -> Fit:
-    jacobian = derivatives(problem, base.state) * base.terms.scale
-    return replace(base, jacobian=jacobian)
+    return replace(base, jacobian=derivatives(problem, base.state) * base.terms.scale)
 
 
-def no_verdict(problem: Problem, base: Fit, notes: list[str], why: str) -> Diagnosis:
+def no_verdict(problem: Problem, base: Fit, notes: Sequence[str], refusal: Refusal) -> Diagnosis:
     """Nothing can be said, and why."""
-    empty: Rms = rms_by_kind(problem, base.state.raw)
-    nothing: Rms = dict.fromkeys(empty)
+    before = rms_by_kind(problem, base.state.raw)
+    nothing = dict.fromkeys(before)
     return Diagnosis(
-        "no_verdict", f"No verdict: {why}.", (), empty, nothing, nothing, noise_floor(problem),
-        (), (), tuple(notes), unsolved="equilibrium" in why or "solved" in why,
-    )  # fmt: skip
+        verdict=DiagnosisVerdict.NO_VERDICT,
+        sentence=f"No verdict: {refusal}.",
+        missing=(),
+        before=before,
+        after=nothing,
+        held_out=nothing,
+        floor=noise_floor(problem),
+        notes=tuple(notes),
+        refusal=refusal,
+    )
 
 
-def _without_outliers(
-    problem: Problem, found: Search, base: Fit, factor: Array, progress: Progress
-) -> tuple[Search, list[str]]:
+def _without_outliers(found: Search, base: Fit, progress: Progress) -> tuple[Search, Notes]:
     """Search again without rows that stick out alone, if there are a few; name them."""
-    rows = outlying_rows(problem, found.last.fit.state)
+    problem, state = found.problem, found.last.fit.state
+    rows = outlying_rows(problem, state)
     if not rows.any():
-        return found, []
+        return found, ()
     lines = ", ".join(str(k) for k in problem.data.line[rows])
     word = "line" if rows.sum() == 1 else "lines"
-    cleaned = problem.without(rows, f"{word} {lines} left out: outliers, far from all the others")
-    state = found.last.fit.state
+    note = f"{word} {lines} left out: outliers, far from all the others"
+    cleaned = problem.without(rows, note)
     kept = ~rows[problem.row_of]
     if whiteness(cleaned, state.white[kept], found.last.evidence.parameters).structured:
         # nor are the others noise: rows that stick out are part of what is not explained
-        return found, []
-    again = null_fit(cleaned, base.terms, factor, refit=False)
+        return found, ()
+    again = null_fit(cleaned, base.terms, found.factor, refit=False)
     if base.terms:
         again = _with_derivatives(cleaned, again)
-    better = search(cleaned, again, factor, found.noise_scale, progress)
-    note = f"{word} {lines} left out: outliers, far from all the others"
+    better = search(replace(found.trials, problem=cleaned), again, progress)
     if better.found != found.found:
         with_all = ", ".join(found.found) or "nothing"
         note += f" (with them the search finds {with_all})"
-    return better, [note]
+    return better, (note,)
 
 
-def _with_larger_noise(found: Search, progress: Progress) -> tuple[Search, list[str]]:
+def _with_larger_noise(found: Search, progress: Progress) -> tuple[Search, Notes]:
     """Where what is left is white but too large, the noise was stated too small."""
     last = found.last.whiteness
     if last.is_noise or last.structured or last.scale > _UNDERSTATED or found.noise_scale != 1.0:
-        return found, []
+        return found, ()
     scale = last.scale
-    again = search(found.problem, found.steps[0].fit, found.factor, scale, progress, found)
-    return again, [
-        f"what is left is white but {scale:.2f} times the stated noise: taken as the noise"
-    ]
+    again = search(replace(found.trials, noise_scale=scale), found.steps[0].fit, progress, found)
+    note = f"what is left is white but {scale:.2f} times the stated noise: taken as the noise"
+    return again, (note,)
 
 
-def conclude(found: Search, notes: list[str]) -> Diagnosis:
+def conclude(found: Search, notes: Sequence[str]) -> Diagnosis:
     """The verdict of a search."""
     problem, clean = found.problem, found.last.whiteness.is_noise
     if clean:
-        findings, sure = [_finding(found, name) for name in found.found], found
+        missing, shown = [_missing(found, name) for name in found.found], found
     else:
-        findings, sure = _sure(found)
-        found = sure if findings else found
-    verdict = "unknown_effect"
+        missing, shown = _warranted(found)
+        found = shown if missing else found
+    verdict = DiagnosisVerdict.UNKNOWN_EFFECT
     if clean:
-        verdict = "effects_found" if findings else "no_effect_missing"
-    where = _where(sure) if verdict == "unknown_effect" else ()
-    shown = sure.last
+        some, none = DiagnosisVerdict.EFFECTS_FOUND, DiagnosisVerdict.NO_EFFECT_MISSING
+        verdict = some if missing else none
+    where = _where(shown) if verdict is DiagnosisVerdict.UNKNOWN_EFFECT else ()
     return Diagnosis(
         verdict=verdict,
-        sentence=_sentence(verdict, findings, found),
-        missing=tuple(findings),
+        sentence=_sentence(verdict, missing, found),
+        missing=tuple(missing),
         before=rms_by_kind(problem, found.steps[0].fit.state.raw),
-        after=rms_by_kind(problem, shown.fit.state.raw),
-        held_out=shown.held_out.rms,
+        after=rms_by_kind(problem, shown.last.fit.state.raw),
+        held_out=shown.last.held_out.rms,
         floor=noise_floor(problem, found.last.fit.state, found.noise_scale),
-        candidates=tuple(_candidates(found, [f.effect for f in findings])),
-        measure_next=tuple(measure_next(found, findings, verdict, where)),
+        candidates=tuple(_not_listed(found, [m.effect for m in missing])),
+        measure_next=tuple(measure_next(found, missing, verdict, where)),
         notes=tuple(dict.fromkeys(notes)),
         search=found,
         whiteness=found.last.whiteness,
@@ -155,73 +171,67 @@ def conclude(found: Search, notes: list[str]) -> Diagnosis:
     )
 
 
-def _sure(found: Search) -> tuple[list[Finding], Search]:
-    """What is sure where structure is left over, and the way that far."""
-    # what was found beside an effect that is not sure is not sure either
-    first = list(takewhile(_is_sure, (_finding(found, name) for name in found.found)))
-    way: Search | None = replace(found, steps=found.steps[: 1 + len(first)])
-    if not first:
-        way = smallest_sure(found, _SURE_PARAMETERS, _SURE_ALONE)
+def _warranted(found: Search) -> tuple[list[MissingEffect], Search]:
+    """What the data warrant where structure is left over, and the way that far."""
+    # what was found beside an effect that is not warranted is not warranted either
+    first = list(takewhile(_is_warranted, (_missing(found, name) for name in found.found)))
+    if first:
+        way: Search | None = replace(found, steps=found.steps[: 1 + len(first)])
+    else:
+        way = small_effects_alone(found, _FEW_PARAMETERS, _LEAST_ALONE)
     if way is None:
         return [], replace(found, steps=found.steps[:1])
-    return [_finding(way, name) for name in way.found], way
+    return [_missing(way, name) for name in way.found], way
 
 
-def _is_sure(finding: Finding) -> bool:
-    few = len(finding.layout) <= _SURE_PARAMETERS
-    stopped = bool(np.any(finding.at_bound))
-    return few and finding.share > _SURE_SHARE and not stopped and is_plausible(finding.term)
+def _is_warranted(effect: MissingEffect) -> bool:
+    few = len(effect.layout) <= _FEW_PARAMETERS
+    stopped = bool(np.any(effect.at_bound))
+    return few and effect.share > _LEAST_SHARE and not stopped and is_plausible(effect.term)
 
 
-def _finding(found: Search, name: str) -> Finding:
-    problem, last = found.problem, found.last
-    best = last.fit
+def _missing(found: Search, name: str) -> MissingEffect:
+    best = found.last.fit
     term, part = best.terms[name], best.terms.part(name)
-    stderr = best.stderr[part] * last.whiteness.inflation
-    index = next((k for k, s in enumerate(found.steps) if s.added == name), len(found.steps) - 1)
-    step, before = found.steps[index], found.steps[max(index - 1, 0)]
-    return Finding(
-        effect=name,
-        title=term.layout.effect.title,
-        layout=term.layout,
-        values=term.vector,
-        stderr=stderr,
+    index = 1 + found.found.index(name)
+    before, step = found.steps[index - 1], found.steps[index]
+    return MissingEffect(
+        term=term,
+        stderr=best.stderr[part] * found.last.whiteness.inflation,
         at_bound=best.at_bound[part],
         rivals=tuple(rivals_of(found, name)),
-        check=check_of(term, problem.robot),
-        rms=rms_by_kind(problem, step.fit.state.raw),
+        check=check_of(term, found.problem.robot),
+        rms=rms_by_kind(found.problem, step.fit.state.raw),
         held_out_rms=step.held_out.rms,
         share=share_of(before, step),
     )
 
 
-def _sentence(verdict: str, findings: list[Finding], found: Search) -> str:
+def _sentence(verdict: DiagnosisVerdict, missing: Sequence[MissingEffect], found: Search) -> str:
     tried = len([c for c in found.steps[0].candidates if c.fit is not None or c.drop])
-    runs = "runs it was not fitted to"
-    if verdict == "no_effect_missing":
+    if verdict is DiagnosisVerdict.NO_EFFECT_MISSING:
         return (
             f"Model and data agree: what is left is noise, and none of {tried} effects tried "
             "explains any of it."
         )
-    if not findings:
+    if not missing:
         return (
             f"Structure remains that none of {tried} effects tried explains: an effect that is "
             "not in the catalogue."
         )
-    parts = []
-    for f in findings:
-        alike = f" (or {', '.join(r.name for r in f.rivals)}, alike on these data)"
-        parts.append(
-            f"adding {f.effect}{alike if f.rivals else ''} removes {percent(f.share)} of the "
-            f"unexplained error on {runs}"
-        )
-    end = (
-        "; what is left is noise"
-        if verdict == "effects_found"
-        else "; structure remains that no known effect explains"
-    )
-    text = "; then ".join(parts) + end
+    clean = verdict is DiagnosisVerdict.EFFECTS_FOUND
+    end = "what is left is noise" if clean else "structure remains that no known effect explains"
+    text = "; then ".join(_words_of(effect) for effect in missing) + f"; {end}"
     return text[0].upper() + text[1:] + f". {tried} effects were tried."
+
+
+def _words_of(effect: MissingEffect) -> str:
+    names = ", ".join(rival.name for rival in effect.rivals)
+    alike = f" (or {names}, alike on these data)" if names else ""
+    return (
+        f"adding {effect.effect}{alike} removes {percent(effect.share)} of the unexplained error "
+        "on runs it was not fitted to"
+    )
 
 
 def percent(share: float) -> str:
@@ -229,45 +239,45 @@ def percent(share: float) -> str:
     return f"{min(100.0 * share, 99.9):.3g} %"
 
 
-def _candidates(found: Search, listed: list[str]) -> list[dict[str, Any]]:
+def _not_listed(found: Search, listed: Sequence[str]) -> list[NotListed]:
     """Every effect that was tried and is not listed, the nearest miss first."""
-    out = []
     start = found.steps[0]
-    for c in start.candidates:
-        if c.name in listed:
-            continue
-        score = c.evidence.log - start.evidence.log if c.evidence is not None else 0.0
-        why = c.why_not
-        if not why:
-            why = _later_reason(found, c.name) or _beaten_reason(found, c)
-        out.append({"effect": c.name, "score": float(score), "why_not": why})
-    return sorted(out, key=lambda row: -row["score"])
+    rows = [
+        NotListed(
+            effect=c.name,
+            title=c.layout.effect.title,
+            score=c.evidence.log - start.evidence.log if c.evidence is not None else 0.0,
+            why_not=c.why_not or _later_reason(found, c.name) or _beaten_reason(found, c),
+        )
+        for c in start.candidates
+        if c.name not in listed
+    ]
+    return sorted(rows, key=lambda row: -row.score)
 
 
-def _beaten_reason(found: Search, c: Candidate) -> str:
+def _beaten_reason(found: Search, c: Candidate) -> Reason:
     """Why a candidate that explains something by itself is not listed."""
     if found.last.whiteness.is_noise:
-        better = ", ".join(found.found)
-        return f"explained better by {better}" if better else "not needed"
-    if len(c.layout) > _SURE_PARAMETERS:
-        return f"not sure: {len(c.layout)} parameters imitate much of what no effect explains"
-    return "explains a part, but structure remains: not sure"
+        return Reason(Why.EXPLAINED_BETTER, by=found.found) if found.found else _NOT_NEEDED
+    if len(c.layout) > _FEW_PARAMETERS:
+        return Reason(Why.IMITATES, parameters=len(c.layout))
+    return Reason(Why.EXPLAINS_PART)
 
 
-def _later_reason(found: Search, name: str) -> str:
+_NOT_NEEDED = Reason(Why.NOT_NEEDED)
+
+
+def _later_reason(found: Search, name: str) -> Reason | None:
+    """Why it was not chosen later on, beside effects that were."""
     if name in found.found:
-        return "explains a part, but structure remains: not sure"
+        return Reason(Why.EXPLAINS_PART)
     for step in reversed(found.steps[1:]):
         for c in step.candidates:
-            if c.name == name and c.why_not:
-                return f"beside {', '.join(step.fit.terms.names)}: {c.why_not}"
-    return ""
+            if c.name == name and c.why_not is not None:
+                return replace(c.why_not, beside=step.fit.terms.names)
+    return None
 
 
-def _where(found: Search) -> tuple[dict[str, Any], ...]:
-    try:
-        from crosscheck.comparison.associations import associations
-    except ImportError:
-        return ()
+def _where(found: Search) -> tuple[Association, ...]:
     last = found.last.fit.state
-    return tuple(associations(found.problem, last.white, last.prediction)[:5])
+    return tuple(associations(found.problem, last.white, last.prediction)[:_MOST_WHERE])

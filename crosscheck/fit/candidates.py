@@ -1,4 +1,4 @@
-"""Which effects could be missing, where to start fitting each, and how it fits.
+"""Which effects could be missing, and how each fits beside a model.
 
 Ranking candidates by their derivative at null is confidently wrong where cables go slack, so
 every candidate is fitted for itself; the derivative only chooses its starts.
@@ -6,15 +6,20 @@ every candidate is fitted for itself; the derivative only chooses its starts.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from crosscheck.fit.evidence import Evidence, evidence, p_value
-from crosscheck.fit.gauss_newton import Fit, fit, projected
+from crosscheck.fit.gauss_newton import Fit, FitStatus, fit
+from crosscheck.fit.imitation import basis, beside
+from crosscheck.fit.noise import Whiteness, whiteness
 from crosscheck.fit.problem import Problem
+from crosscheck.fit.reasons import Reason, Why
 from crosscheck.fit.starts import Starts, starts_of
-from crosscheck.fit.state import evaluate
+from crosscheck.fit.state import State, evaluate
 from seecr.effects import Term, Terms, catalogue, layout_of
 from seecr.effects.base import Layout
 from seecr.errors import InputError
@@ -24,19 +29,21 @@ from seecr.pose import Array
 _TRIAL_ITERATIONS = 12
 # A chi2 of this many readings is noise, or nearly.
 _WHITE = 1.3
+# A direction that the data see: squared signal of a plausible size, in units of the noise.
+_SEEN = 1e-2
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class Candidate:
-    """An effect that might be missing, and what came of adding it.
+    """An effect that might be missing, and how the model with it fits.
 
     Attributes:
         layout: the effect for this robot.
-        fit: of the model with it added; None where it is no candidate.
+        fit: of the model with it added; None where it was not fitted.
         evidence: of that fit.
         drop: of chi2 against the model without it.
         p: chance of that drop where the effect is absent.
-        why_not: a sentence where it is no candidate or was not chosen.
+        why_not: the reason why it is no candidate or was not chosen; None where it may be.
         starts: where to start fitting it.
     """
 
@@ -45,7 +52,7 @@ class Candidate:
     evidence: Evidence | None = None
     drop: float = 0.0
     p: float = 1.0
-    why_not: str = ""
+    why_not: Reason | None = None
     starts: Starts | None = None
 
     @property
@@ -53,93 +60,103 @@ class Candidate:
         """Name of the effect."""
         return self.layout.name
 
+    def refused(self, reason: Reason) -> Candidate:
+        """The same with the reason why it is not chosen."""
+        return replace(self, why_not=reason)
 
-def layouts_for(problem: Problem) -> list[Candidate]:
+
+def candidates_for(problem: Problem) -> list[Candidate]:
     """All effects of the catalogue; those these data cannot show have a ``why_not``."""
-    out = []
-    for effect in catalogue().values():
-        layout = layout_of(effect, problem.robot)
-        out.append(Candidate(layout, why_not=_unfit(problem, layout)))
-    return out
+    layouts = [layout_of(effect, problem.robot) for effect in catalogue().values()]
+    return [Candidate(layout, why_not=_lacking(problem, layout)) for layout in layouts]
 
 
-def _unfit(problem: Problem, layout: Layout) -> str:
-    data, effect = problem.data, layout.effect
+def _lacking(problem: Problem, layout: Layout) -> Reason | None:
+    """What the data lack that the effect needs."""
+    data, needs = problem.data, layout.effect.needs
     rows = int(problem.use.sum())
-    if len(layout) > problem.n_readings or len(layout) > 6 * rows or rows < 2:
-        return f"no candidate: {len(layout)} parameters, but the data have {rows} rows"
-    if rows < len(layout):
-        return f"no candidate: {len(layout)} parameters, but the data have {rows} rows"
-    if "poses" in effect.needs and data.command_pose is None:
-        return "no candidate: needs commanded poses; these data command lengths"
-    if "time" in effect.needs and (data.t_s is None or np.ptp(data.t_s) == 0):
-        return "no candidate: needs the time of each row (t_s)"
-    if "temperature" in effect.needs:
-        if data.temperature_C is None:
-            return "no candidate: needs temperature_C"
-        if np.ptp(data.temperature_C) == 0:
-            return "no candidate: the temperature never changed"
-    if "tensions" in effect.needs and not data.has_tension:
-        return "no candidate: needs measured tensions"
-    return ""
+    if len(layout) > min(problem.n_readings, rows) or rows < 2:
+        return Reason(Why.TOO_MANY_PARAMETERS, parameters=len(layout), rows=rows)
+    still = data.temperature_C is not None and np.ptp(data.temperature_C) == 0
+    timeless = data.t_s is None or np.ptp(data.t_s) == 0
+    lacks = (
+        ("poses", data.command_pose is None, Why.NEEDS_POSES),
+        ("time", timeless, Why.NEEDS_TIME),
+        ("temperature", data.temperature_C is None, Why.NEEDS_TEMPERATURE),
+        ("temperature", still, Why.CONSTANT_TEMPERATURE),
+        ("tensions", not data.has_tension, Why.NEEDS_TENSIONS),
+    )
+    return next((Reason(why) for need, lacking, why in lacks if need in needs and lacking), None)
 
 
-def try_candidate(
-    problem: Problem,
-    base: Fit,
-    layout: Layout,
-    factor: Array,
-    noise_scale: float = 1.0,
-    hopeless: float = np.inf,
-) -> Candidate:
+@dataclass(frozen=True, eq=False)
+class Trials:
+    """How effects are tried on a problem.
+
+    Attributes:
+        problem: the data. factor: noise factors, :meth:`Problem.noise`.
+        noise_scale: noise in units of the stated one.
+        fit, starts, candidates: the functions :func:`crosscheck.fit.gauss_newton.fit`,
+            :func:`crosscheck.fit.starts.starts_of` and :func:`candidates_for`, or others of
+            their kind: the search takes no other way to the robot.
+    """
+
+    problem: Problem
+    factor: Array
+    noise_scale: float = 1.0
+    fit: Callable[..., Fit] = fit
+    starts: Callable[..., Starts] = starts_of
+    candidates: Callable[[Problem], list[Candidate]] = candidates_for
+
+    def refit(self, terms: Terms, near: State | None, **options: Any) -> Fit:
+        """Fit terms from their values, from a state near them."""
+        return self.fit(self.problem, terms, self.factor, near, **options)
+
+    def evidence(self, found: Fit) -> Evidence:
+        """Of a fit, with the noise as it is taken to be."""
+        return evidence(found, self.noise_scale)
+
+    def whiteness(self, found: Fit, parameters: int) -> Whiteness:
+        """Test of what a fit of so many directions leaves."""
+        return whiteness(self.problem, found.state.white / self.noise_scale, parameters)
+
+
+def try_candidate(trials: Trials, base: Fit, layout: Layout, hopeless: float = np.inf) -> Candidate:
     """Fit the base model with one effect added, from its most promising starts."""
-    out = screen(problem, base, layout, factor, noise_scale)
-    return out if out.why_not else fit_candidate(problem, base, out, factor, noise_scale, hopeless)
+    out = screen(trials, base, layout)
+    return out if out.why_not is not None else fit_candidate(trials, base, out, hopeless)
 
 
-def screen(
-    problem: Problem, base: Fit, layout: Layout, factor: Array, noise_scale: float = 1.0
-) -> Candidate:
+def screen(trials: Trials, base: Fit, layout: Layout) -> Candidate:
     """What the effect's derivative promises beside the base model; nothing is fitted."""
-    out = Candidate(layout)
-    out.starts = starts_of(problem, base, layout, factor)
-    if not out.starts.seen:
-        out.why_not = "these data do not show it: no reading moves by its plausible size"
-        return out
-    out.drop = out.starts.gain / noise_scale**2
-    out.p = p_value(out.drop, out.starts.directions, False) * out.starts.shapes
-    return out
+    starts = trials.starts(trials.problem, base, layout, trials.factor)
+    out = Candidate(layout, starts=starts)
+    if not starts.seen:
+        return out.refused(Reason(Why.UNSEEN))
+    drop = starts.gain / trials.noise_scale**2
+    return replace(out, drop=drop, p=p_value(drop, starts.directions, False) * starts.shapes)
 
 
 def fit_candidate(
-    problem: Problem,
-    base: Fit,
-    screened: Candidate,
-    factor: Array,
-    noise_scale: float = 1.0,
-    hopeless: float = np.inf,
+    trials: Trials, base: Fit, screened: Candidate, hopeless: float = np.inf
 ) -> Candidate:
     """Fit the base model with a screened effect added.
 
     Args:
-        problem: the data.
+        trials: the problem and its noise.
         base: the model without the effect.
         screened: from :func:`screen`.
-        factor: noise factors.
-        noise_scale: noise in units of the stated one.
         hopeless: chi2 above which a trial is given up after a few steps.
     """
-    layout, first = screened.layout, screened.starts
-    assert first is not None
-    out = Candidate(layout, starts=first)
+    layout, starts = screened.layout, screened.starts
+    assert starts is not None
     best: Fit | None = None
-    for vector in first.vectors:
-        if best is not None and best.chi2 < _WHITE * noise_scale**2 * len(best.state.white):
+    for vector in starts.vectors:
+        if best is not None and best.chi2 < _WHITE * trials.noise_scale**2 * len(best.state.white):
             break  # it leaves noise: no other start does better
-        terms = base.terms.with_term(Term(layout, vector))
         try:
-            found = fit(
-                problem, terms, factor, base.state,
+            found = trials.refit(
+                base.terms.with_term(Term(layout, vector)), base.state,
                 iterations=_TRIAL_ITERATIONS, hopeless=hopeless, quick=True,
             )  # fmt: skip
         except (InputError, np.linalg.LinAlgError):
@@ -148,28 +165,25 @@ def fit_candidate(
             best = found
             hopeless = min(hopeless, 2.0 * best.chi2)
     if best is None:
-        out.why_not = "no fit: rows could not be solved with it"
-        return out
-    return judged(best, base, screened, noise_scale)
+        return Candidate(layout, starts=starts, why_not=Reason(Why.UNSOLVED))
+    return judged(trials, best, base, screened)
 
 
-def judged(found: Fit, base: Fit, screened: Candidate, noise_scale: float) -> Candidate:
+def judged(trials: Trials, found: Fit, base: Fit, screened: Candidate) -> Candidate:
     """A candidate with its fit: how much better than without it, and by what chance."""
-    layout, first = screened.layout, screened.starts
-    assert first is not None
-    columns = seen_directions(found, layout.name)
+    layout, starts = screened.layout, screened.starts
+    assert starts is not None
     one_sided = bool(np.isfinite(layout.lower[0])) and layout.lower[0] == layout.null[0]
-    drop = (base.chi2 - found.chi2) / noise_scale**2
-    p = p_value(drop, columns, one_sided) * first.shapes
-    return Candidate(layout, found, evidence(found, noise_scale), drop, p, starts=first)
+    drop = (base.chi2 - found.chi2) / trials.noise_scale**2
+    p = p_value(drop, seen_directions(found, layout.name), one_sided) * starts.shapes
+    return Candidate(layout, found, trials.evidence(found), drop, p, starts=starts)
 
 
 def seen_directions(found: Fit, name: str) -> int:
     """How many directions of an effect's parameters the data see beside the other terms."""
     own = found.terms.own(name)
-    others = projected(found.jacobian[:, own], found.jacobian[:, ~own])
-    power = np.linalg.eigvalsh(others.T @ others)
-    return max(1, int(np.sum(power > 1e-2)))
+    columns = beside(found.jacobian[:, own], basis(found.jacobian[:, ~own]))
+    return max(1, int(np.sum(np.linalg.eigvalsh(columns.T @ columns) > _SEEN)))
 
 
 def null_fit(problem: Problem, terms: Terms, factor: Array, refit: bool) -> Fit:
@@ -178,5 +192,6 @@ def null_fit(problem: Problem, terms: Terms, factor: Array, refit: bool) -> Fit:
         return fit(problem, terms, factor)
     state = evaluate(problem, terms, factor)
     p = len(terms)
-    jacobian = np.zeros((len(state.white), p))
-    return Fit(state, jacobian, np.zeros((p, p)), np.zeros(p, dtype=bool), state.valid, "", 0)
+    status = FitStatus.SOLVED if state.valid else FitStatus.UNSOLVED_AT_VALUES
+    blank = np.zeros((len(state.white), p))
+    return Fit(state, blank, np.zeros((p, p)), np.zeros(p, dtype=bool), status, 0)

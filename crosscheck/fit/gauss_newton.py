@@ -8,12 +8,13 @@ with a row that cannot be solved is no trial; a fit that ends on one is invalid,
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
 
+from crosscheck.fit.imitation import basis
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.state import State, derivatives, evaluate
 from seecr.effects import Terms
@@ -27,11 +28,19 @@ _ITERATIONS = 40
 _GAIN = 1e-3
 # A trial is given up after a few steps, or fewer where it is that much further off.
 _FEW, _FEW_FAR, _FAR = 4, 2, 10.0
-# Steps that derivatives serve at most beyond their own.
+# Derivatives are computed afresh after this many more steps at the latest.
 _STALE = 2
 
 
-@dataclass(eq=False)
+class FitStatus(Enum):
+    """How a fit ended; the values are what people read."""
+
+    SOLVED = "every row that counts was solved"
+    UNSOLVED_AT_START = "rows could not be solved at the start of the fit"
+    UNSOLVED_AT_VALUES = "rows could not be solved with the model's values"
+
+
+@dataclass(frozen=True, eq=False)
 class Fit:
     """Fitted terms and what the data say of their parameters.
 
@@ -40,8 +49,7 @@ class Fit:
         jacobian: (N, p) whitened derivatives by z.
         covariance: (p, p) of the values in their units; inf on the diagonal where unseen.
         at_bound: (p,) bool parameters that ended on a bound.
-        valid: the fit settled and every counted row was solved.
-        why: a sentence where it is not valid.
+        status: whether the rows were solved.
         iterations: Gauss-Newton steps.
     """
 
@@ -49,9 +57,13 @@ class Fit:
     jacobian: Array
     covariance: Array
     at_bound: NDArray[np.bool_]
-    valid: bool
-    why: str
+    status: FitStatus
     iterations: int
+
+    @property
+    def valid(self) -> bool:
+        """Whether every counted row was solved, so that the numbers are of a fit."""
+        return self.status is FitStatus.SOLVED
 
     @property
     def terms(self) -> Terms:
@@ -110,7 +122,7 @@ def fit(
     p = len(terms)
     free = np.ones(p, dtype=bool) if free is None else free
     if not state.valid:
-        return _invalid(state, p, "rows could not be solved at the start of the fit")
+        return _invalid(state, p, FitStatus.UNSOLVED_AT_START)
     scale, lower, upper = terms.scale, terms.lower, terms.upper
     damping, count = 1e-3, 0
     stale = 0
@@ -143,13 +155,13 @@ def fit(
     values = state.terms.vector
     at_bound = (values <= lower) | (values >= upper)
     covariance = _covariance(jacobian, scale, free & ~at_bound)
-    return Fit(state, jacobian, covariance, at_bound, True, "", count)
+    return Fit(state, jacobian, covariance, at_bound, FitStatus.SOLVED, count)
 
 
-def _invalid(state: State, p: int, why: str) -> Fit:
+def _invalid(state: State, p: int, status: FitStatus) -> Fit:
     empty = np.zeros((len(state.white), p))
     unknown = np.full((p, p), np.inf)
-    return Fit(state, empty, unknown, np.zeros(p, dtype=bool), False, why, 0)
+    return Fit(state, empty, unknown, np.zeros(p, dtype=bool), status, 0)
 
 
 def _corrected(jacobian: Array, before: State, after: State) -> Array:
@@ -229,24 +241,3 @@ def _covariance(jacobian: Array, scale: Array, moved: NDArray[np.bool_]) -> Arra
         norm = float(np.linalg.norm(jacobian[:, k])) if len(jacobian) else 0.0
         out[k, k] = (scale[k] / norm) ** 2 if norm * UNSEEN_SIZES > 1.0 else np.inf
     return out
-
-
-def projected(columns: Array, base: Array) -> Array:
-    """What is left of ``columns`` beside those of ``base``."""
-    u = basis(base)
-    return columns - u @ (u.T @ columns)
-
-
-def basis(columns: Array) -> Array:
-    """Orthonormal basis of what columns span.
-
-    By pivoted QR of columns of unit length: a singular value decomposition takes half as long
-    again, and this is done thousands of times.
-    """
-    norm = np.linalg.norm(columns, axis=0)
-    some = columns[:, norm > 0.0] / norm[norm > 0.0]
-    if some.shape[1] == 0:
-        return np.zeros((len(columns), 0))
-    q, r, _order = linalg.qr(some, mode="economic", pivoting=True, check_finite=False)
-    rank = int(np.sum(np.abs(np.diag(r)) > 1e-9))
-    return np.asarray(q[:, :rank], float)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,16 +10,19 @@ from numpy.typing import NDArray
 
 from crosscheck.fit.gauss_newton import Fit, fit
 from crosscheck.fit.problem import Problem, rms_by_kind
-from seecr.effects import Terms
 from seecr.pose import Array
 
+# Fewer runs than this are cut into blocks of time.
+_LEAST_RUNS = 3
 # One run alone is cut into this many blocks of time.
 _BLOCKS = 5
-# Standard errors by which blocks left out must be predicted better to be sure.
-_SURE_ERRORS = 2.0
+# Standard errors by which blocks left out must be predicted better to be significant.
+_SIGNIFICANT = 2.0
+# Steps of Gauss-Newton without a block, from the fit to all of them.
+_ITERATIONS = 6
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class HeldOut:
     """Cross-validation of a model.
 
@@ -39,32 +43,58 @@ class HeldOut:
     valid: bool
 
 
-def blocks_of(problem: Problem) -> tuple[list[NDArray[np.bool_]], str]:
-    """Rows of each block to leave out: runs, or blocks of time where there is one run only."""
+def blocks_of(problem: Problem) -> list[NDArray[np.bool_]]:
+    """Rows (n,) of each block to leave out: runs, or blocks of time where runs are too few."""
     run = problem.data.run_index
-    names = np.unique(run[problem.use])
-    if len(names) >= 3:
-        return [(run == k) & problem.use for k in names], ""
+    if _enough_runs(problem):
+        return [(run == k) & problem.use for k in _runs(problem)]
     rows = np.flatnonzero(problem.use)
-    count = min(_BLOCKS, max(2, len(rows) // 2))
-    blocks = []
-    for part in np.array_split(rows, count):
-        chosen = np.zeros(len(run), dtype=bool)
-        chosen[part] = True
-        blocks.append(chosen)
-    word = "a single run" if len(names) == 1 else f"only {len(names)} runs"
-    return blocks, f"{word}: cross-validation leaves out {count} blocks of time instead of runs"
+    index = np.arange(len(run))
+    return [np.isin(index, part) for part in np.array_split(rows, _count(problem))]
 
 
-def hold_out(problem: Problem, best: Fit, factor: Array) -> HeldOut:
-    """Refit without each block, from the full fit, and predict the block."""
-    blocks, _note = blocks_of(problem)
+def blocks_note(problem: Problem) -> str:
+    """That blocks of time are left out instead of runs, where it is so; "" elsewhere."""
+    if _enough_runs(problem):
+        return ""
+    runs = len(_runs(problem))
+    word = "a single run" if runs == 1 else f"only {runs} runs"
+    count = _count(problem)
+    return f"{word}: cross-validation leaves out {count} blocks of time instead of runs"
+
+
+def _runs(problem: Problem) -> NDArray[np.int64]:
+    return np.unique(problem.data.run_index[problem.use])
+
+
+def _enough_runs(problem: Problem) -> bool:
+    return len(_runs(problem)) >= _LEAST_RUNS
+
+
+def _count(problem: Problem) -> int:
+    """Blocks of time."""
+    return min(_BLOCKS, max(2, int(problem.use.sum()) // 2))
+
+
+def hold_out(problem: Problem, best: Fit, factor: Array, fit: Callable[..., Fit] = fit) -> HeldOut:
+    """Refit without each block, from the full fit, and predict the block.
+
+    Args:
+        problem: the data.
+        best: the model fitted to all of them.
+        factor: noise factors.
+        fit: :func:`crosscheck.fit.gauss_newton.fit`, or another of its kind.
+    """
+    blocks = blocks_of(problem)
     raw = np.full(problem.measured.shape, np.nan)
     chi2, readings = np.zeros(len(blocks)), np.zeros(len(blocks))
     values = np.zeros((len(blocks), len(best.terms)))
     valid = best.valid
     for b, rows in enumerate(blocks):
-        fold = fit(problem.only(~rows), best.terms, factor, best.state, iterations=6, quick=True)
+        fold = fit(
+            problem.only(~rows), best.terms, factor, best.state,
+            iterations=_ITERATIONS, quick=True,
+        )  # fmt: skip
         valid = valid and fold.valid
         values[b] = fold.terms.vector
         raw[rows] = fold.state.raw[rows]
@@ -88,8 +118,8 @@ def pays(without: HeldOut, with_effect: HeldOut) -> bool:
     return with_effect.valid and mean > 0.0 and mean >= 0.5 * error
 
 
-def surely_improves(without: HeldOut, with_effect: HeldOut) -> bool:
-    """Whether blocks left out are predicted better beyond doubt.
+def significantly_improves(without: HeldOut, with_effect: HeldOut) -> bool:
+    """Whether blocks left out are predicted better by more than they scatter.
 
     By two standard errors of the mean fall, or every one of at least five blocks: one block that
     falls much more than the others makes the mean uncertain, not the sign.
@@ -97,17 +127,17 @@ def surely_improves(without: HeldOut, with_effect: HeldOut) -> bool:
     mean, error = improves(without, with_effect)
     delta = without.chi2 - with_effect.chi2
     every = len(delta) >= _BLOCKS and bool(np.all(delta > 0.0))
-    return with_effect.valid and (mean > _SURE_ERRORS * error or every)
+    return with_effect.valid and (mean > _SIGNIFICANT * error or every)
 
 
-def unfitted(problem: Problem, terms: Terms, base: Fit) -> HeldOut:
-    """The model as it stands, without a parameter to fit: every row is left out of nothing."""
-    blocks, _note = blocks_of(problem)
+def unfitted(problem: Problem, base: Fit) -> HeldOut:
+    """The model as it stands: nothing is fitted to any row, so it predicts every row left out."""
+    blocks = blocks_of(problem)
     table = np.zeros(problem.measured.shape)
     table[problem.row_of, problem.column_of] = base.state.white
     chi2 = np.array([float((table[rows] ** 2).sum()) for rows in blocks])
     readings = np.array([float(problem.counted[rows].sum()) for rows in blocks])
-    values = np.tile(terms.vector, (len(blocks), 1))
+    values = np.tile(base.terms.vector, (len(blocks), 1))
     return HeldOut(
         base.state.raw, chi2, readings, values, rms_by_kind(problem, base.state.raw), base.valid
     )

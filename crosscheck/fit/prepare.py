@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
-from crosscheck.fit.held_out import blocks_of
+from crosscheck.fit.held_out import blocks_note
 from crosscheck.fit.noise import estimate_sigma
 from crosscheck.fit.problem import Problem, Rms, rms_by_kind
+from crosscheck.fit.reasons import Refusal, Unfit
 from crosscheck.fit.state import State
 from crosscheck.measurements.data import Measurements
 from seecr.effects import Terms
+from seecr.experiment import Prediction
 from seecr.robot import Robot
 
 Progress = Callable[[str, float], None]
@@ -19,41 +22,73 @@ Progress = Callable[[str, float], None]
 
 # More rows than this part without an answer, and the data are not fit for a verdict.
 _LOST = 0.05
+# Fewer readings than this say nothing.
+_LEAST_READINGS = 6
+# Lines named in a note.
+_MOST_LINES = 8
 # Rows that stick out by this many robust deviations, alone, are outliers.
 _OUTLIER = 6.0
 _MOST_OUTLIERS = 0.05
 
 
-def prepare(robot: Robot, data: Measurements, terms: Terms) -> tuple[Problem, list[str], str]:
-    """The problem without rows that have no answer; notes; why there can be no verdict."""
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """Measurements made ready.
+
+    Attributes:
+        problem: without the rows that have no equilibrium, with all noise filled in.
+        notes: what was assumed, estimated or left out.
+        blocks_note: how cross-validation would cut the data, where that is to be said.
+        refusal: why nothing can be said of these data; None where something can.
+    """
+
+    problem: Problem
+    notes: tuple[str, ...]
+    blocks_note: str
+    refusal: Refusal | None
+
+    @property
+    def all_notes(self) -> tuple[str, ...]:
+        """The notes for whoever cross-validates."""
+        return (*self.notes, self.blocks_note) if self.blocks_note else self.notes
+
+
+def prepare(robot: Robot, data: Measurements, terms: Terms) -> Prepared:
+    """Leave out the rows that have no equilibrium, estimate noise that nobody stated."""
     problem = Problem(robot, data, data.sigma, np.ones(data.n_rows, dtype=bool))
-    notes = list(data.notes)
     if not problem.measured.any():
-        return problem, notes, "the data hold no readings"
+        return Prepared(problem, tuple(data.notes), "", Refusal(Unfit.NO_READINGS, data.n_rows))
     plain = problem.experiment.predict(terms.effects)
-    n = data.n_rows
+    problem = _solved_rows(problem, plain)
+    problem, estimates = estimate_sigma(problem, problem.residuals(plain.readings))
+    notes = (*data.notes, *problem.left_out, *estimates)
+    return Prepared(problem, notes, blocks_note(problem), _refusal(problem))
+
+
+def _solved_rows(problem: Problem, plain: Prediction) -> Problem:
+    """The problem without the rows that have no equilibrium."""
+    lines = problem.data.line
     for rows, words in (
         (plain.singular, "the platform is free to move there"),
         (~plain.solved & ~plain.singular, "no equilibrium was found there"),
     ):
         if rows.any():
-            lines = ", ".join(str(k) for k in data.line[rows][:8])
-            more = f" and {int(rows.sum()) - 8} more" if rows.sum() > 8 else ""
-            problem = problem.without(rows, f"lines {lines}{more} left out: {words}")
-    notes += problem.left_out
+            some = ", ".join(str(k) for k in lines[rows][:_MOST_LINES])
+            rest = int(rows.sum()) - _MOST_LINES
+            more = f" and {rest} more" if rest > 0 else ""
+            problem = problem.without(rows, f"lines {some}{more} left out: {words}")
+    return problem
+
+
+def _refusal(problem: Problem) -> Refusal | None:
+    n, readings = problem.data.n_rows, problem.n_readings
     lost = n - int(problem.use.sum())
-    why = ""
-    if lost > max(_LOST * n, 1) and lost > 1:
-        why = f"{lost} of {n} rows have no equilibrium to compare with; see the notes"
-    raw = problem.residuals(plain.readings)
-    problem, more_notes = estimate_sigma(problem, raw)
-    notes += more_notes
-    if not why and problem.n_readings < 6:
-        why = f"only {problem.n_readings} readings are left"
-    if not why and _constant_commands(problem):
-        why = "all commands are the same: nothing tells effects apart"
-    _blocks, note = blocks_of(problem)
-    return problem, [*notes, note] if note else notes, why
+    checks = (
+        (lost > max(_LOST * n, 1), Unfit.NO_EQUILIBRIUM),
+        (readings < _LEAST_READINGS, Unfit.FEW_READINGS),
+        (_constant_commands(problem), Unfit.CONSTANT_COMMANDS),
+    )
+    return next((Refusal(unfit, n, lost, readings) for bad, unfit in checks if bad), None)
 
 
 def _constant_commands(problem: Problem) -> bool:

@@ -52,7 +52,7 @@ class Starts:
         seen: whether any reading moves by more than a trace of its noise.
     """
 
-    vectors: list[Array]
+    vectors: tuple[Array, ...]
     gain: float
     directions: int
     shapes: float
@@ -76,7 +76,7 @@ def starts_of(problem: Problem, base: Fit, layout: Layout, factor: Array) -> Sta
         vector = np.clip(null + z * scale, layout.lower, layout.upper)
         scored.append((gain, directions, vector, shape))
     if not scored:
-        return Starts([], 0.0, 1, 1.0, False)
+        return Starts((), 0.0, 1, 1.0, False)
     scored.sort(key=lambda item: -item[0])
     vectors = [vector for _g, _d, vector, _s in scored[:2]]
     if np.any((layout.lower == layout.null) & ~layout.shape):
@@ -89,7 +89,8 @@ def starts_of(problem: Problem, base: Fit, layout: Layout, factor: Array) -> Sta
         balanced = equation_start(problem, base.state, layout, layout.start(scored[0][3]), factor)
         vectors += [] if balanced is None else [balanced]
     # neighbouring shapes are alike: about every third is one more chance of its own
-    return Starts(vectors, scored[0][0], scored[0][1], max(1.0, len(shapes) / 3.0), seen)
+    gain, directions = scored[0][:2]
+    return Starts(tuple(vectors), gain, directions, max(1.0, len(shapes) / 3.0), seen)
 
 
 def _some_slack(base: Fit) -> bool:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from crosscheck.fit.prepare import Progress
+from crosscheck.fit.reasons import Reason
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.planning.extensions import Extension, extensions, more_poses
 from crosscheck.planning.greedy import chosen_poses
@@ -127,7 +128,7 @@ class Plan:
 
     planned: Planned
     effects: tuple[Visible, ...]
-    missing: Mapping[str, str]
+    missing: Mapping[str, Reason]
     confusion: tuple[tuple[str, ...], Array]
     suggestions: tuple[Suggestion, ...]
     slack: tuple[tuple[int, str], ...]

@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from crosscheck.fit.gauss_newton import Fit, projected
+from crosscheck.fit.gauss_newton import Fit
+from crosscheck.fit.imitation import basis, left_over
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.state import State, derivatives, evaluate
 from crosscheck.measurements.data import Measurements
@@ -84,8 +85,7 @@ def _first_shape(layout: Layout, final: Fit) -> dict[str, float]:
 
 
 def _signal(signal: Array, imitators: Array) -> float:
-    left = projected(signal[:, None], imitators)[:, 0]
-    return float(left @ left)
+    return left_over(signal, basis(imitators))
 
 
 def _options(problem: Problem, final: Fit) -> list[tuple[str, Problem]]:

@@ -15,7 +15,9 @@ from functools import cached_property, lru_cache
 import numpy as np
 from scipy import optimize, stats
 
-from crosscheck.fit.candidates import layouts_for
+from crosscheck.fit.candidates import candidates_for
+from crosscheck.fit.imitation import left_over as left_over_of
+from crosscheck.fit.reasons import Reason, Why
 from crosscheck.fit.starts import amplitude_columns
 from crosscheck.planning.planned import Planned
 from seecr.effects.base import Layout
@@ -77,18 +79,18 @@ def needed(directions: int, tried: int) -> float:
     )
 
 
-def signals(plan: Planned) -> tuple[dict[str, Signal], dict[str, str]]:
+def signals(plan: Planned) -> tuple[dict[str, Signal], dict[str, Reason]]:
     """Signals of all effects of the catalogue, and why some have none."""
     found: dict[str, Signal] = {}
-    missing: dict[str, str] = {}
-    for candidate in layouts_for(plan.problem):
+    missing: dict[str, Reason] = {}
+    for candidate in candidates_for(plan.problem):
         layout = candidate.layout
-        if candidate.why_not:
-            missing[layout.name] = candidate.why_not.removeprefix("no candidate: ")
+        if candidate.why_not is not None:
+            missing[layout.name] = candidate.why_not
             continue
         shape = _middle_shape(plan, layout)
         if shape is None:
-            missing[layout.name] = "these commands do not move what it goes with"
+            missing[layout.name] = Reason(Why.NOT_MOVED)
             continue
         found[layout.name] = Signal(layout, shape, _columns(plan, layout, shape))
     return found, missing
@@ -118,7 +120,7 @@ def _columns(plan: Planned, layout: Layout, shape: dict[str, float]) -> Array:
 
 def left_over(g: Signal, h: Signal) -> float:
     """lam_gh: squared signal of g that h cannot imitate."""
-    return float(np.sum((g.columns - h.basis @ (h.basis.T @ g.columns)) ** 2))
+    return left_over_of(g.columns, h.basis)
 
 
 def joined(a: Mapping[str, Signal], b: Mapping[str, Signal]) -> dict[str, Signal]:

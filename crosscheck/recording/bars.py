@@ -98,7 +98,7 @@ def _places(values: np.ndarray, every: np.ndarray, floor: float) -> np.ndarray:
 def _lit(stage: Stage) -> Rgba:
     if not stage.added:
         return colours.VERMILION
-    return colours.SKY if stage.sure else colours.SILVER
+    return colours.SKY if stage.listed else colours.SILVER
 
 
 def _words(

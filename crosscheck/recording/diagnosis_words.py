@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from crosscheck.diagnosis.result import Diagnosis, Finding
+from crosscheck.diagnosis.result import Diagnosis, MissingEffect
 from crosscheck.diagnosis.steps import Stage, floor_of
 from crosscheck.diagnosis.verdict import percent
 from crosscheck.fit.problem import rms_by_kind
@@ -14,12 +14,6 @@ from crosscheck.units import in_unit, parameter_name, short, with_error
 
 _MOST_PARAMETERS, _MOST_CANDIDATES, _MOST_LISTED = 9, 6, 6
 
-_NAMES = {
-    "effects_found": "Effects found",
-    "no_effect_missing": "No effect missing",
-    "unknown_effect": "Unknown effect",
-    "no_verdict": "No verdict",
-}
 _PLAY = """
 **Scene.** {arrows} Blue box and cables: the model at the worst pose; orange edges: what was \
 measured there.
@@ -32,7 +26,7 @@ model, pink edges the first.
 
 def verdict_words(found: Diagnosis, shown: Misfit | None) -> str:
     """The verdict, what to measure next, what was assumed, and how to read the views."""
-    parts = [f"# {_NAMES[found.verdict]}\n{plain(found.sentence)}\n"]
+    parts = [f"# {found.verdict.heading}\n{plain(found.sentence)}\n"]
     if shown is not None:
         parts.append(_PLAY.format(arrows=misfit.words_of(shown)))
     parts += _listed("What to measure next", list(found.measure_next))
@@ -81,7 +75,7 @@ def _errors(found: Diagnosis, stage: Stage, shown: Misfit) -> str:
     return words.table(rows, ("rms error", "runs left out", "fitted to", "noise"))
 
 
-def _finding(finding: Finding) -> str:
+def _finding(finding: MissingEffect) -> str:
     rows = []
     layout = finding.layout
     for name, unit, value, error in zip(
@@ -107,8 +101,7 @@ def _finding(finding: Finding) -> str:
 
 def _candidates(found: Diagnosis) -> str:
     rows = [
-        (plain(str(row["effect"])), plain(str(row["why_not"])))
-        for row in found.candidates[:_MOST_CANDIDATES]
+        (plain(row.effect), plain(str(row.why_not))) for row in found.candidates[:_MOST_CANDIDATES]
     ]
     return "\n" + words.table(rows, ("tried", "why not"))
 

@@ -9,7 +9,9 @@ from matplotlib.patches import Rectangle
 
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.search import Search
-from crosscheck.fit.gauss_newton import Fit, basis, projected
+from crosscheck.fit.gauss_newton import Fit
+from crosscheck.fit.imitation import basis, beside, imitated
+from crosscheck.fit.reasons import Why
 from crosscheck.fit.starts import amplitude_columns
 from crosscheck.report.drawing import BEFORE, INK, WIDTH, blank, styled, svg
 from seecr.effects.base import Layout
@@ -60,14 +62,9 @@ def confusion_of(found: Diagnosis) -> Confusion | None:
     if len(kept) < 2:
         return None
     bases = {name: basis(own) for name, own in columns.items()}
-    part = np.array([[_contained(columns[a], bases[b]) for b in kept] for a in kept])
+    part = np.array([[imitated(columns[a], bases[b]) for b in kept] for a in kept])
     listed = sum(1 for f in found.missing if f.effect in columns)
-    return Confusion(kept, listed, np.clip(part, 0.0, 1.0))
-
-
-def _contained(columns: Array, basis: Array) -> float:
-    """Part of an effect's signal in a space: :func:`crosscheck.diagnosis.rivals.containment`."""
-    return float(np.sum((basis.T @ columns) ** 2) / np.sum(columns**2))
+    return Confusion(kept, listed, part)
 
 
 def _names(found: Diagnosis) -> list[str]:
@@ -75,9 +72,9 @@ def _names(found: Diagnosis) -> list[str]:
     names = [f.effect for f in found.missing]
     names += [rival.name for f in found.missing for rival in f.rivals]
     names += [
-        str(row["effect"])
+        row.effect
         for row in found.candidates
-        if not str(row["why_not"]).startswith(("no candidate", "these data do not show it"))
+        if not row.why_not.lacking and row.why_not.why is not Why.UNSEEN
     ]
     return list(dict.fromkeys(names))[: _FEW if found.missing else _MANY]
 
@@ -95,7 +92,7 @@ def _columns(found: Search, name: str) -> Array | None:
         shapes = layout.effect.shapes(final.state.prediction.setup)
         null = layout.start(shapes[0] if shapes else {})
         own = amplitude_columns(found.problem, final, layout, null) * layout.scale
-    return projected(own, base)
+    return beside(own, basis(base))
 
 
 def _base_columns(final: Fit, held: tuple[str, ...]) -> Array:

@@ -8,6 +8,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from crosscheck.comparison.associations import Association
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import shown_stages, stages_of
 from crosscheck.files import write_text
@@ -19,13 +20,6 @@ from crosscheck.report.waterfall import waterfall
 from crosscheck.report.where import caption, failure_map
 from crosscheck.units import in_unit, short
 from seecr import __version__
-
-_VERDICTS = {
-    "effects_found": ("Effects found", "what is left after them is noise"),
-    "no_effect_missing": ("No effect missing", "model and data agree"),
-    "unknown_effect": ("Unknown effect", "structure remains that no known effect explains"),
-    "no_verdict": ("No verdict", "the data or the solves are not fit for one"),
-}
 
 _NO_SEARCH: dict[str, Any] = {
     "title": "", "facts": [], "figures": dict.fromkeys(("waterfall", "map", "confusion"), ""),
@@ -59,12 +53,11 @@ def render(found: Diagnosis) -> str:
 
 
 def _context(found: Diagnosis) -> dict[str, Any]:
-    name, meaning = _VERDICTS[found.verdict]
     return {
         "version": __version__,
-        "verdict": found.verdict,
-        "verdict_name": name,
-        "verdict_meaning": meaning,
+        "verdict": found.verdict.value,
+        "verdict_name": found.verdict.heading,
+        "verdict_meaning": found.verdict.meaning,
         "sentence": found.sentence,
         "before": errors_of(found.before),
         "floor": errors_of(found.floor),
@@ -101,7 +94,7 @@ def _of_search(found: Diagnosis) -> dict[str, Any]:
         "twins": confusion.twins if confusion is not None else [],
         "caption": caption(problem, before),
         "together": bool(problem.sigma.length_m),
-        "unsure": not all(stage.sure for stage in stages_of(found)),
+        "unsure": not all(stage.listed for stage in stages_of(found)),
         "added": [n for n in last.state.terms.names if n not in found.search.base],
     }
 
@@ -131,25 +124,25 @@ def facts(problem: Problem) -> list[tuple[str, str]]:
     ]
 
 
-def _association(row: dict[str, Any]) -> dict[str, Any]:
+def _association(row: Association) -> dict[str, Any]:
     """One thing that the unexplained part goes with, its bins in units for people."""
-    factor, unit = in_unit(str(row["unit"]))
-    means = [bin_["mean"] for bin_ in row["bins"]]
+    factor, unit = in_unit(row.unit)
+    means = [part.mean for part in row.bins]
     top = max((abs(m) for m in means if m is not None), default=0.0)
     return {
-        "against": row["against"],
-        "of": row["of"],
-        "strongest": row["strongest"],
-        "share": f"{100 * row['share']:.0f} %",
-        "p": "< 1e−12" if row["p"] < 1e-12 else short(row["p"], 2),
+        "against": row.against,
+        "of": row.of,
+        "strongest": row.strongest,
+        "share": f"{100 * row.share:.0f} %",
+        "p": "< 1e−12" if row.p < 1e-12 else short(row.p, 2),
         "unit": unit,
         "bins": [
             {
-                "label": bin_["label"] if len(means) > 1 else "all",
-                "rows": bin_["rows"],
-                "mean": short(None if bin_["mean"] is None else factor * bin_["mean"]),
-                "part": 0.0 if not top or bin_["mean"] is None else 50.0 * bin_["mean"] / top,
+                "label": part.label if len(means) > 1 else "all",
+                "rows": part.rows,
+                "mean": short(None if part.mean is None else factor * part.mean),
+                "part": 0.0 if not top or part.mean is None else 50.0 * part.mean / top,
             }
-            for bin_ in row["bins"]
+            for part in row.bins
         ],
     }

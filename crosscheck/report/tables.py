@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.diagnosis.result import Diagnosis, Finding
-from crosscheck.diagnosis.search import Step
+from crosscheck.diagnosis.order import Step
+from crosscheck.diagnosis.result import Diagnosis, DiagnosisVerdict, MissingEffect
 from crosscheck.diagnosis.steps import stages_of
 from crosscheck.diagnosis.verdict import percent
 from crosscheck.fit.candidates import Candidate
@@ -59,13 +59,13 @@ def checks(found: Diagnosis) -> list[Check]:
 def _of_effects(found: Diagnosis) -> list[Check]:
     assert found.search is not None
     tried = _tried(found.search.steps[0])
-    steps = [stage.step for stage in itertools.takewhile(lambda s: s.sure, stages_of(found))]
+    steps = [stage.step for stage in itertools.takewhile(lambda s: s.listed, stages_of(found))]
     if len(steps) == 1:
         smallest = min((c.p for c in steps[0].candidates if c.drop > 0), default=1.0)
         return [
             Check("effects tried", None, f"{tried}; chance explains each of them "
                   f"(smallest p over all {chance(min(1.0, tried * smallest))})")
-            if found.verdict == "no_effect_missing"
+            if found.verdict is DiagnosisVerdict.NO_EFFECT_MISSING
             else Check("effects tried", None, str(tried))
         ]  # fmt: skip
     better, blocks = _better_runs(steps)
@@ -105,7 +105,7 @@ def _chance(before: Step, after: Step) -> float:
     return min(1.0, p * max(_tried(before), 1))
 
 
-def finding_context(found: Diagnosis, finding: Finding) -> dict[str, Any]:
+def finding_context(found: Diagnosis, finding: MissingEffect) -> dict[str, Any]:
     """A finding as the page shows it."""
     rows = [
         _parameter(*item)
@@ -148,7 +148,7 @@ def _parameter(
     }  # fmt: skip
 
 
-def _correlations(found: Diagnosis, finding: Finding) -> list[str]:
+def _correlations(found: Diagnosis, finding: MissingEffect) -> list[str]:
     """Parameters that the data hold together, the strongest first."""
     assert found.search is not None
     best = found.search.last.fit
@@ -190,16 +190,15 @@ def candidate_rows(found: Diagnosis) -> list[dict[str, Any]]:
         by_name = {c.name: c for c in found.search.steps[0].candidates}
     out = []
     for row in found.candidates:
-        name = str(row["effect"])
-        candidate = by_name.get(name)
+        candidate = by_name.get(row.effect)
         out.append(
             {
-                "effect": name,
-                "title": "" if candidate is None else candidate.layout.effect.title,
-                "score": short(float(row["score"])) if row["score"] else "",
+                "effect": row.effect,
+                "title": row.title,
+                "score": short(row.score) if row.score else "",
                 "alone": _alone(found, candidate),
                 "needs": "" if candidate is None else _largest_parameter(candidate),
-                "why_not": str(row["why_not"]),
+                "why_not": str(row.why_not),
             }
         )
     return out

@@ -51,7 +51,7 @@ def _label(stage: Stage, found: Diagnosis) -> str:
     if rivals and rivals[0]:
         more = f" or {len(rivals[0])} more" if len(rivals[0]) > 1 else f"\nor {rivals[0][0].name}"
         return stage.label + more
-    return stage.label if stage.sure else f"{stage.label}\n(not sure)"
+    return stage.label if stage.listed else f"{stage.label}\n(not sure)"
 
 
 def _panel(axes: Axes, found: Diagnosis, stages: list[Stage], kind: Kind) -> None:
@@ -108,11 +108,11 @@ def _in_sample(found: Diagnosis, stage: Stage, kind: Kind) -> float | None:
 
 
 def _bar(axes: Axes, row: int, stage: Stage, value: float, left: float) -> None:
-    colour = BEFORE if not stage.added else AFTER if stage.sure else UNSURE
+    colour = BEFORE if not stage.added else AFTER if stage.listed else UNSURE
     axes.barh(
         row, value - left, left=left, height=0.52, zorder=2,
-        color=colour if stage.sure else "white", edgecolor=colour,
-        hatch="" if stage.sure else "////", linewidth=0.8,
+        color=colour if stage.listed else "white", edgecolor=colour,
+        hatch="" if stage.listed else "////", linewidth=0.8,
     )  # fmt: skip
 
 

@@ -9,7 +9,6 @@ from rich.console import Console
 from rich.table import Table
 
 from crosscheck.add import Addition
-from crosscheck.diagnosis.result import number
 from crosscheck.fit.evidence import FALSE_ALARM
 from crosscheck.terminal.lines import console_for, print_parameters, rms_table, say
 
@@ -69,38 +68,3 @@ def _table(found: Addition) -> Table:
         (f"with {found.name}, on runs left out", found.held_out, ""),
     )
     return rms_table("rms error", rows)
-
-
-def as_json(found: Addition, model: Path, written: bool) -> dict[str, Any]:
-    """The same as a document, in SI."""
-    return {
-        "effect": found.name,
-        "written": written,
-        "model": str(model),
-        "effects": {f.term.name: _parameters(f) for f in found.fitted},
-        "before": dict(found.before),
-        "after": dict(found.after),
-        "held_out_before": dict(found.held_out_before),
-        "held_out": dict(found.held_out),
-        "improves_held_out": found.pays,
-        "p": found.p,
-        "chi2_fall_a_block": found.fall[0],
-        "chi2_fall_stderr": found.fall[1],
-        "is_noise": found.whiteness.is_noise,
-        "residual": vars(found.whiteness),
-        "warnings": list(found.warnings),
-        "notes": list(found.notes),
-    }
-
-
-def _parameters(fitted: Any) -> dict[str, Any]:
-    layout = fitted.term.layout
-    return {
-        key: {
-            "value": float(fitted.term.vector[i]),
-            "stderr": number(fitted.stderr[i]),
-            "unit": layout.units[i],
-            "at_bound": bool(fitted.at_bound[i]),
-        }
-        for i, key in enumerate(layout.names)
-    }

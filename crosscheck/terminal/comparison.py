@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from crosscheck.comparison.associations import EVERYWHERE, SIGNIFICANT
+from crosscheck.comparison.associations import Against
 from crosscheck.comparison.limits import Exceeded, place
 from crosscheck.comparison.residuals import Comparison
 from crosscheck.fit.problem import KINDS, Kind, Rms
@@ -92,20 +92,20 @@ def _add(
 
 
 def _print_associations(console: Console, found: Comparison) -> None:
-    strong = [a for a in found.associations if a["p"] < SIGNIFICANT]
+    strong = [a for a in found.associations if a.significant]
     if not strong:
         say(console, "The errors go with nothing that was tried: place, time, tension, travel ...")
         return
     for row in strong[:4]:
-        factor, unit = in_unit(row["unit"])
-        steps = [b for b in row["bins"] if b["mean"] is not None]
-        means = ", ".join(f"{factor * b['mean']:.3g} at {b['label']}" for b in steps[:6])
-        share = f"{100 * row['share']:.0f} %"
-        text = f"The errors go with {row['against']} ({share} of their variance)"
-        if row["against"] == EVERYWHERE:
+        factor, unit = in_unit(row.unit)
+        steps = [(b.label, factor * b.mean) for b in row.bins if b.mean is not None]
+        means = ", ".join(f"{mean:.3g} at {label}" for label, mean in steps[:6])
+        share = f"{100 * row.share:.0f} %"
+        text = f"The errors go with {row.against} ({share} of their variance)"
+        if row.kind is Against.EVERYWHERE:
             text = f"The errors are the same everywhere ({share} of their square)"
-            means = f"{factor * steps[0]['mean']:.3g}"
-        say(console, f"{text}: {row['strongest']} [{unit}] {means}")
+            means = f"{steps[0][1]:.3g}"
+        say(console, f"{text}: {row.strongest} [{unit}] {means}")
 
 
 def _print_worst(console: Console, found: Comparison) -> None:

@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
-from crosscheck.diagnosis.result import Finding
+from crosscheck.diagnosis.result import DiagnosisVerdict, MissingEffect
 from crosscheck.terminal.lines import console_for, print_parameters, rms_table, say
 
 if TYPE_CHECKING:
     from crosscheck.diagnosis.result import Diagnosis
 
 _STYLE = {
-    "no_effect_missing": "green",
-    "effects_found": "bold cyan",
-    "unknown_effect": "bold yellow",
-    "no_verdict": "bold red",
+    DiagnosisVerdict.NO_EFFECT_MISSING: "green",
+    DiagnosisVerdict.EFFECTS_FOUND: "bold cyan",
+    DiagnosisVerdict.UNKNOWN_EFFECT: "bold yellow",
+    DiagnosisVerdict.NO_VERDICT: "bold red",
 }
 _MOST_CANDIDATES, _MOST_PARAMETERS = 6, 9
 
@@ -29,7 +29,7 @@ def print_diagnosis(found: Diagnosis, out: Path, console: Console | None = None)
     say(console, f"{found.verdict}: {found.sentence}", _STYLE[found.verdict])
     for note in found.notes:
         say(console, f"note: {note}", "dim")
-    if found.verdict != "no_verdict":
+    if found.verdict is not DiagnosisVerdict.NO_VERDICT:
         console.print(_way(found))
         for finding in found.missing:
             _print_finding(console, finding)
@@ -47,7 +47,7 @@ def _way(found: Diagnosis) -> Table:
     return rms_table("rms error", [*rows, ("noise alone", found.floor, "dim")])
 
 
-def _print_finding(console: Console, finding: Finding) -> None:
+def _print_finding(console: Console, finding: MissingEffect) -> None:
     say(console, f"{finding.effect}: {finding.title}", "bold")
     print_parameters(
         console, finding.layout, finding.values, finding.stderr, finding.at_bound,
@@ -61,4 +61,4 @@ def _print_finding(console: Console, finding: Finding) -> None:
 
 def _print_candidates(console: Console, found: Diagnosis) -> None:
     for row in found.candidates[:_MOST_CANDIDATES]:
-        say(console, f"not {row['effect']}: {row['why_not']}", "dim")
+        say(console, f"not {row.effect}: {row.why_not}", "dim")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -48,8 +49,8 @@ def shown(value: float, unit: str) -> str:
 
 
 def print_parameters(
-    console: Console, layout: Layout, values: Array, stderr: Array, stopped: Array, most: int,
-    file: str,
+    console: Console, layout: Layout, values: Array, stderr: Array,
+    stopped: NDArray[np.bool_], most: int, file: str,
 ) -> None:  # fmt: skip
     """A line for each of an effect's parameters, ``most`` of them; the rest are in ``file``."""
     rows = list(zip(layout.names, layout.units, values, stderr, stopped, strict=True))

@@ -49,7 +49,7 @@ def print_plan(plan: Plan, out: Path, console: Console | None = None) -> None:
     if plan.effects:
         console.print(_table(plan))
     for name, why in plan.missing.items():
-        say(console, f"{name}: not with these data: {why}", "dim")
+        say(console, f"{name}: not with these data: {why.words}", "dim")
     _print_slack(console, plan)
     say(console, sentence(plan), "bold")
     for suggestion in plan.suggestions:
@@ -143,7 +143,7 @@ def as_json(plan: Plan) -> dict[str, Any]:
         "level": LEVEL,
         "power": POWER,
         "effects": [_effect(v) for v in plan.effects],
-        "not_with_these_data": dict(plan.missing),
+        "not_with_these_data": {name: why.words for name, why in plan.missing.items()},
         "confusion": {"effects": list(names), "containment": table},
         "add": [_suggestion(s) for s in plan.suggestions],
         "near_slack": [{"line": line, "cable": cable} for line, cable in plan.slack],

@@ -41,7 +41,7 @@ def test_the_true_model_leaves_noise(robot, data):
     assert found.is_noise and found.converged
     assert found.sentence.startswith("Model and data agree: what is left is noise")
     assert found.rms["position_rms_m"] == pytest.approx(SIGMA.position_m, rel=0.15)
-    assert all(a["p"] > SIGNIFICANT for a in found.associations)
+    assert all(a.p > SIGNIFICANT for a in found.associations)
 
 
 def test_coordinates_are_measured_less_predicted(robot, data, off):
@@ -116,17 +116,17 @@ def test_errors_are_traced_to_what_they_follow(robot, against):
     else:
         error = FOLLOWS[against](plain)
     found = compare(robot, replace(plain, position=plain.position + error))
-    first = next(a for a in found.associations if a["against"] == against)
+    first = next(a for a in found.associations if a.against == against)
     # runs follow each other in time: which run it is can be as good an answer as the time
-    assert first["share"] > 0.9 * found.associations[0]["share"]
-    assert first["p"] < 1e-6 and first["share"] > 0.15
+    assert first.share > 0.9 * found.associations[0].share
+    assert first["p"] < 1e-6 and first.share > 0.15
     means = [b["mean"] for b in first["bins"]]
     assert max(np.abs(means)) == pytest.approx(np.abs(error).max(), rel=0.5)
     assert sum(b["rows"] for b in first["bins"]) == plain.n_rows
 
 
 def test_noise_goes_with_nothing(robot):
-    firsts = [compare(robot, measured(robot, seed=s)).associations[0]["p"] for s in range(20)]
+    firsts = [compare(robot, measured(robot, seed=s)).associations[0].p for s in range(20)]
     assert np.sum(np.array(firsts) < 0.05) <= 3
     assert min(firsts) > 1e-4
 
@@ -138,7 +138,7 @@ def test_a_longer_cable_shows_as_that_cable(robot):
     errors, noise = cable_errors(found.problem, found.state.raw, found.state.prediction)
     mean = errors.mean(axis=0)
     assert int(np.argmax(mean)) == 2 and mean[2] > 5 * noise[:, 2].mean()
-    assert any(a["against"] == "the cable" and a["p"] < 1e-6 for a in found.associations)
+    assert any(a.against == "the cable" and a.p < 1e-6 for a in found.associations)
     assert 0.1 < independent_part(plain.problem, plain.state.prediction) < 0.8
 
 

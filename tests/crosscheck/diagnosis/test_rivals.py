@@ -24,6 +24,7 @@ def test_equals_of_a_second_effect_are_looked_for_beside_the_first() -> None:
     second = search.found[1]
     equal = {"stiffness": "platform_mass", "platform_mass": "stiffness"}[second]
     first, *others = search.steps
-    unsolved = [replace(c, fit=None) if c.name == equal else c for c in first.candidates]
-    spoiled = replace(search, steps=[replace(first, candidates=unsolved), *others])
+    unsolved = tuple(replace(c, fit=None) if c.name == equal else c for c in first.candidates)
+    node = replace(first.node, candidates=unsolved)
+    spoiled = replace(search, steps=(replace(first, node=node), *others))
     assert equal in [rival.name for rival in rivals_of(spoiled, second)]

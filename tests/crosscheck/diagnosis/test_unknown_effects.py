@@ -97,7 +97,7 @@ def test_a_bumped_tracker_is_traced_to_its_run() -> None:
     data = measured(robot, points=18, seed=3)
     bumped_tracker(data)
     where = diagnose(robot, data).where
-    assert where[0]["against"] == "the run"
+    assert where[0].against == "the run"
 
 
 def test_a_swaying_floor_is_traced_to_its_period() -> None:
@@ -105,14 +105,14 @@ def test_a_swaying_floor_is_traced_to_its_period() -> None:
     data = measured(robot, points=18, seed=3)
     swaying_floor(data)
     where = diagnose(robot, data).where
-    found = re.fullmatch(r"time, again every (.*) s", where[0]["against"])
+    found = re.fullmatch(r"time, again every (.*) s", where[0].against)
     assert found is not None
     assert float(found.group(1)) == pytest.approx(37.0, rel=0.02)
-    assert where[0]["p"] < 1e-10
+    assert where[0].p < 1e-10
 
 
 def test_an_error_of_place_is_not_called_a_period_though_the_commands_go_to_and_fro() -> None:
     robot = robot_named("cogiro")
     data = measured(robot, points=18, seed=3)
     rubbing(data)
-    assert not any("again every" in row["against"] for row in diagnose(robot, data).where)
+    assert not any("again every" in row.against for row in diagnose(robot, data).where)

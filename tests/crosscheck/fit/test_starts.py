@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from made_data import SIGMA, measured, term
 
-from crosscheck.fit.candidates import fit_candidate, layouts_for, null_fit, screen
+from crosscheck.fit.candidates import Trials, candidates_for, fit_candidate, null_fit, screen
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.starts import equation_start
 from seecr.effects import Terms
@@ -30,19 +32,20 @@ def case():
 
 
 def layout_named(problem, name):
-    return next(c.layout for c in layouts_for(problem) if c.name == name)
+    return next(c.layout for c in candidates_for(problem) if c.name == name)
 
 
 def test_it_leads_where_the_derivative_at_null_does_not(case) -> None:
     problem, factor, base = case
     layout = layout_named(problem, "cable_length_offset")
-    screened = screen(problem, base, layout, factor)
+    trials = Trials(problem, factor)
+    screened = screen(trials, base, layout)
     assert screened.starts is not None and len(screened.starts.vectors) == 2
     derivative, balanced = screened.starts.vectors
     reached = []
     for start in (derivative, balanced):
-        screened.starts.vectors[:] = [start]
-        reached.append(fit_candidate(problem, base, screened, factor).fit)
+        one = replace(screened, starts=replace(screened.starts, vectors=(start,)))
+        reached.append(fit_candidate(trials, base, one).fit)
     assert all(found is not None for found in reached)
     noise = len(base.state.white)
     assert reached[1].chi2 < 1.2 * noise

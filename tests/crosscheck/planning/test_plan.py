@@ -10,7 +10,7 @@ from made_data import SIGMA, measured, soft_cogiro, term
 from scipy import stats
 
 from crosscheck.files import json_text
-from crosscheck.fit.candidates import null_fit, try_candidate
+from crosscheck.fit.candidates import Trials, null_fit, try_candidate
 from crosscheck.fit.problem import Problem
 from crosscheck.measurements.data import Sigma
 from crosscheck.planning.design import MORE_POSES, make_plan
@@ -90,7 +90,9 @@ def _found(robot, layout, vector, seed):
     data = measured(robot, [hidden], seed=seed)
     problem = Problem(robot, data, SIGMA, np.ones(data.n_rows, dtype=bool))
     factor = problem.noise(problem.experiment.predict())
-    tried = try_candidate(problem, null_fit(problem, Terms(), factor, refit=False), layout, factor)
+    tried = try_candidate(
+        Trials(problem, factor), null_fit(problem, Terms(), factor, refit=False), layout
+    )
     return tried.fit is not None and tried.p < 0.05 / 24
 
 
@@ -132,9 +134,9 @@ def test_what_nobody_stated_is_assumed_and_said(robot, few):
 
 def test_what_the_commands_lack_is_said(robot, few):
     found = make_plan(robot, replace(few, t_s=None).rows(slice(0, 10)))
-    assert found.missing["creep"] == "needs the time of each row (t_s)"
-    assert found.missing["thermal_expansion"] == "needs temperature_C"
-    assert found.missing["exit_point_error"] == "24 parameters, but the data have 10 rows"
+    assert found.missing["creep"].words == "needs the time of each row (t_s)"
+    assert found.missing["thermal_expansion"].words == "needs temperature_C"
+    assert found.missing["exit_point_error"].words == "24 parameters, but the data have 10 rows"
 
 
 def test_a_payload_and_tensions_tell_mass_from_stiffness(plan):

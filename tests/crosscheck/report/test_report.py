@@ -17,8 +17,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from crosscheck.diagnosis.result import Diagnosis
-from crosscheck.diagnosis.rivals import containment
+from crosscheck.diagnosis.result import Diagnosis, DiagnosisVerdict, NotListed
 from crosscheck.diagnosis.steps import (
     by_block,
     drawn,
@@ -28,7 +27,9 @@ from crosscheck.diagnosis.steps import (
     views_of,
 )
 from crosscheck.errors import CrosscheckError
+from crosscheck.fit.imitation import imitated
 from crosscheck.fit.problem import KINDS
+from crosscheck.fit.reasons import Reason, Why
 from crosscheck.report import write_report
 from crosscheck.report.cables import Wall, draw_wall, paid_out, walls_of
 from crosscheck.report.confusion import confusion_of
@@ -79,8 +80,8 @@ def test_each_verdict_has_its_page(name: str, verdict: str, heading: str) -> Non
     for line in (*found.notes, *found.measure_next):
         assert line in seen
     for row in found.candidates:
-        assert f"{row['effect']} " in seen
-        assert str(row["why_not"]) in seen
+        assert f"{row.effect} " in seen
+        assert str(row.why_not) in seen
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -143,15 +144,15 @@ def test_unknown_shows_where_structure_is_left() -> None:
     assert found.where
     assert "What the unexplained part goes with" in seen
     for row in found.where:
-        assert str(row["against"]) in seen
-        assert str(row["bins"][0]["label"]) in seen or len(row["bins"]) == 1
+        assert str(row.against) in seen
+        assert row.bins[0].label in seen or len(row.bins) == 1
     assert "not explained" in seen
     assert "not explained" not in text_of(page("pulleys"))
 
 
 def test_what_was_found_but_is_not_sure_is_hatched() -> None:
     found = diagnosis("pulleys")
-    unsure = replace(found, missing=(), verdict="unknown_effect")
+    unsure = replace(found, missing=(), verdict=DiagnosisVerdict.UNKNOWN_EFFECT)
     assert "(not sure)" in waterfall(unsure)
     assert "(not sure)" not in page("pulleys")
     assert shown_stages(unsure)[1].added == ""
@@ -165,8 +166,8 @@ def test_text_from_users_stays_text() -> None:
     robot = replace(old.robot, name=EVIL, cable_names=tuple(f"{EVIL}{k}" for k in range(4)))
     data = replace(old.data, path=Path(EVIL.replace("/", "")))
     problem = replace(old, robot=robot, data=data)
-    search = replace(found.search, problem=problem)
-    bad = {"effect": EVIL, "score": 0.0, "why_not": EVIL}
+    search = replace(found.search, trials=replace(found.search.trials, problem=problem))
+    bad = NotListed(EVIL, EVIL, 0.0, Reason(Why.EXPLAINED_BETTER, by=(EVIL,)))
     text = render(
         replace(
             found,
@@ -175,7 +176,7 @@ def test_text_from_users_stays_text() -> None:
             notes=(EVIL,),
             measure_next=(EVIL,),
             candidates=(bad, *found.candidates),
-            missing=tuple(replace(f, check=EVIL, title=EVIL) for f in found.missing),
+            missing=tuple(replace(f, check=EVIL) for f in found.missing),
         )
     )
     assert "<script" not in text
@@ -235,7 +236,7 @@ def test_the_confusion_map_holds_containments() -> None:
     assert confusion.part[a, b] > 0.9  # 12 points move cables as a sheave does
     assert confusion.part[b, a] < 0.9
     columns = found.search.last.fit.jacobian
-    assert confusion.part[a, a] == pytest.approx(containment(columns, columns))
+    assert confusion.part[a, a] == pytest.approx(imitated(columns, found.search.last.fit.span))
     assert len(found.search.last.fit.terms) == 1
 
 

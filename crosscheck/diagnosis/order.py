@@ -1,0 +1,145 @@
+"""Looking back on a search: what is needless goes, the rest in the order in which adding pays."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from crosscheck.diagnosis.node import LEAST_GAIN, Names, Node, node_of
+from crosscheck.fit.candidates import Candidate, Trials
+from crosscheck.fit.evidence import Evidence
+from crosscheck.fit.gauss_newton import Fit
+from crosscheck.fit.held_out import HeldOut, hold_out, pays, unfitted
+from crosscheck.fit.noise import Whiteness
+from crosscheck.fit.reasons import Reason, Why
+from seecr.effects import Terms
+
+# Steps of Gauss-Newton for a model on the way that the search did not meet.
+_ITERATIONS = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A model on the way: what was added and how well it does.
+
+    Attributes:
+        added: name of the effect added last, "" for the start.
+        node: the model, with what was tried to go on from it.
+        held_out: its errors on runs it was not fitted to.
+    """
+
+    added: str
+    node: Node
+    held_out: HeldOut
+
+    @property
+    def fit(self) -> Fit:
+        """The model fitted to all rows."""
+        return self.node.fit
+
+    @property
+    def evidence(self) -> Evidence:
+        """Of the fit."""
+        return self.node.evidence
+
+    @property
+    def whiteness(self) -> Whiteness:
+        """Of what is left."""
+        return self.node.whiteness
+
+    @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """What was tried to go on from here."""
+        return self.node.candidates
+
+
+def step_of(trials: Trials, added: str, node: Node) -> Step:
+    """A node with its errors on runs left out."""
+    if added:
+        held = hold_out(trials.problem, node.fit, trials.factor, trials.fit)
+    else:
+        held = unfitted(trials.problem, node.fit)
+    return Step(added, node, held)
+
+
+def fitted_to_the_end(trials: Trials, node: Node) -> Node:
+    """The node's model fitted until nothing is left to gain: trials stop early."""
+    if not node.fit.terms:
+        return node
+    full = trials.refit(node.fit.terms, node.fit.state)
+    return node_of(trials, full) if full.valid else node
+
+
+def without_needless(trials: Trials, node: Node, held: Collection[str]) -> Node:
+    """The node without effects whose absence costs no evidence; those ``held`` stay."""
+    own = [name for name in node.fit.terms.names if name not in held]
+    if len(own) < 2:
+        return node
+    for name in own:
+        shorter = trials.refit(node.fit.terms.without(name), node.fit.state)
+        if not shorter.valid:
+            continue
+        other = node_of(trials, shorter)
+        if other.evidence.log > node.evidence.log - LEAST_GAIN:
+            return without_needless(trials, other, held)
+    return node
+
+
+def in_order(
+    trials: Trials, root: Node, last: Node, seen: Mapping[Names, Node]
+) -> tuple[Step, ...]:
+    """Steps from the start to the last model, at each the effect that pays most.
+
+    Each is to predict runs left out better than the one before. One that only pays together with
+    the next (alone it extrapolates wildly, say) waits for that.
+    """
+    steps, waiting = [step_of(trials, "", root)], list[Step]()
+    terms = root.fit.terms
+    todo = [name for name in last.fit.terms.names if name not in terms]
+    while todo:
+        tried = []
+        for name, node in _options(trials, terms, todo, last, seen):
+            tried.append(step_of(trials, name, node))
+            if pays(steps[-1].held_out, tried[-1].held_out):
+                chosen = tried[-1]
+                steps, waiting = [*steps, *waiting, chosen], []
+                break
+        else:
+            if not tried:
+                break
+            chosen = tried[0]
+            waiting.append(chosen)
+        terms = chosen.fit.terms
+        todo = [name for name in todo if name != chosen.added]
+    return (_blamed(steps[0], [step.added for step in waiting]), *steps[1:])
+
+
+def _options(
+    trials: Trials, terms: Terms, todo: Sequence[str], last: Node, seen: Mapping[Names, Node]
+) -> list[tuple[str, Node]]:
+    """The model with each of the effects that are still to come, the best first."""
+    out = []
+    for name in todo:
+        names = frozenset((*terms.names, name))
+        met = seen.get(names)
+        if len(todo) == 1:
+            node = last
+        elif met is not None:
+            node = met
+        else:
+            some = last.fit.terms.only(names)
+            found = trials.refit(some, last.fit.state, iterations=_ITERATIONS)
+            if not found.valid:
+                continue
+            node = node_of(trials, found)
+        out.append((name, node if met is None else replace(node, candidates=met.candidates)))
+    return sorted(out, key=lambda option: option[1].fit.chi2)
+
+
+def _blamed(first: Step, names: Collection[str]) -> Step:
+    """The first step, with the reason why effects that were found all the same are not listed."""
+    reason = Reason(Why.NOT_PREDICTIVE)
+    candidates = tuple(
+        c.refused(reason) if c.name in names and c.why_not is None else c for c in first.candidates
+    )
+    return replace(first, node=replace(first.node, candidates=candidates))

@@ -1,0 +1,113 @@
+"""Reasons: what happened is an enum, its value the sentence that people read, numbers beside it.
+
+Nothing is decided by the text: whoever asks why looks at the enum, as with :class:`seecr.Status`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Why(Enum):
+    """Why an effect is no candidate or was not chosen; the values are what people read."""
+
+    TOO_MANY_PARAMETERS = "{parameters} parameters, but the data have {rows} rows"
+    NEEDS_POSES = "needs commanded poses; these data command lengths"
+    NEEDS_TIME = "needs the time of each row (t_s)"
+    NEEDS_TEMPERATURE = "needs temperature_C"
+    CONSTANT_TEMPERATURE = "the temperature never changed"
+    NEEDS_TENSIONS = "needs measured tensions"
+    NOT_MOVED = "these commands do not move what it goes with"
+    UNSEEN = "these data do not show it: no reading moves by its plausible size"
+    UNSOLVED = "no fit: rows could not be solved with it"
+    CHANCE = "chance explains it (p {p:.2g})"
+    CHANCE_OVER_ALL = "chance explains it (p {p:.2g} over all tried)"
+    PROMISES_LESS = "promises less than others beside it"
+    EXPLAINS_LITTLE = "explains too little for its {parameters} parameters"
+    NOT_PREDICTIVE = "does not predict runs left out any better"
+    EXPLAINED_BETTER = "explained better by {by}"
+    NOT_NEEDED = "not needed"
+    IMITATES = "not sure: {parameters} parameters imitate much of what no effect explains"
+    EXPLAINS_PART = "explains a part, but structure remains: not sure"
+
+
+_LACKING = {
+    Why.TOO_MANY_PARAMETERS,
+    Why.NEEDS_POSES,
+    Why.NEEDS_TIME,
+    Why.NEEDS_TEMPERATURE,
+    Why.CONSTANT_TEMPERATURE,
+    Why.NEEDS_TENSIONS,
+}
+
+
+@dataclass(frozen=True)
+class Reason:
+    """Why an effect is not listed.
+
+    Attributes:
+        why: what is the matter.
+        parameters: of the effect. rows: of the data.
+        p: chance of what it explains where it is absent.
+        by: effects that explain it better.
+        beside: effects of the model that it was tried beside; none for the model as it stood.
+    """
+
+    why: Why
+    parameters: int = 0
+    rows: int = 0
+    p: float = 1.0
+    by: tuple[str, ...] = ()
+    beside: tuple[str, ...] = ()
+
+    @property
+    def lacking(self) -> bool:
+        """Whether the data lack what the effect needs, so that it is no candidate at all."""
+        return self.why in _LACKING
+
+    @property
+    def words(self) -> str:
+        """The reason alone."""
+        return self.why.value.format(
+            parameters=self.parameters, rows=self.rows, p=min(1.0, self.p), by=", ".join(self.by)
+        )
+
+    def __str__(self) -> str:
+        text = f"no candidate: {self.words}" if self.lacking else self.words
+        return f"beside {', '.join(self.beside)}: {text}" if self.beside else text
+
+
+class Unfit(Enum):
+    """Why measurements are not fit for a verdict; the values are what people read."""
+
+    NO_READINGS = "the data hold no readings"
+    NO_EQUILIBRIUM = "{lost} of {rows} rows have no equilibrium to compare with; see the notes"
+    FEW_READINGS = "only {readings} readings are left"
+    CONSTANT_COMMANDS = "all commands are the same: nothing tells effects apart"
+    UNSOLVED_MODEL = "rows could not be solved with the model's values"
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Why nothing can be said of measurements.
+
+    Attributes:
+        unfit: what is the matter.
+        rows: of the data. lost: those without an equilibrium. readings: that are left.
+    """
+
+    unfit: Unfit
+    rows: int = 0
+    lost: int = 0
+    readings: int = 0
+
+    @property
+    def unsolved(self) -> bool:
+        """Whether solutions are wanting, not data."""
+        if self.unfit is Unfit.FEW_READINGS:
+            return self.readings == 0
+        return self.unfit in (Unfit.NO_EQUILIBRIUM, Unfit.UNSOLVED_MODEL)
+
+    def __str__(self) -> str:
+        return self.unfit.value.format(rows=self.rows, lost=self.lost, readings=self.readings)
