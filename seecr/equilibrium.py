@@ -10,13 +10,25 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seecr import statics
-from seecr.compiled import descent as kernel
-from seecr.compiled import law as cable_law
+from seecr.commands import Commands
+from seecr.compiled.columns import REST, TENSION
+from seecr.compiled.outcomes import (
+    CABLE_LAW,
+    CONVERGED,
+    FALLING,
+    ITERATIONS,
+    SINGULAR,
+    SPINNING,
+    STALLED,
+    TOLERANCE,
+    UNSTABLE,
+)
 from seecr.errors import InputError
 from seecr.joints import values_of_pose
 from seecr.pose import Array, rotvec_from_quat
 from seecr.robot import Robot
-from seecr.setup import Commands, Setup, plain_setup
+from seecr.setup import Setup, plain_setup
+from seecr.tables import Tables, assemble, take
 
 METHODS = ("newton", "fsolve", "least_squares")
 
@@ -36,14 +48,14 @@ class Status(Enum):
 
 
 _OF_OUTCOME = {
-    kernel.CONVERGED: Status.CONVERGED,
-    kernel.UNSTABLE: Status.UNSTABLE,
-    kernel.SINGULAR: Status.SINGULAR,
-    kernel.STALLED: Status.STALLED,
-    kernel.FALLING: Status.FALLING,
-    kernel.CABLE_LAW: Status.CABLE_LAW,
-    kernel.ITERATIONS: Status.ITERATIONS,
-    kernel.SPINNING: Status.SPINNING,
+    CONVERGED: Status.CONVERGED,
+    UNSTABLE: Status.UNSTABLE,
+    SINGULAR: Status.SINGULAR,
+    STALLED: Status.STALLED,
+    FALLING: Status.FALLING,
+    CABLE_LAW: Status.CABLE_LAW,
+    ITERATIONS: Status.ITERATIONS,
+    SPINNING: Status.SPINNING,
 }
 
 
@@ -70,7 +82,7 @@ class Solution:
     """
 
     robot: Robot
-    tables: statics.Tables
+    tables: Tables
     evaluation: statics.Evaluation
     command: Array
     pose: Array
@@ -109,7 +121,7 @@ class Solution:
         if len(rows):
             # a cable that is just as long as its rest length resists on one side only
             there = statics.take_evaluation(self.evaluation, rows)
-            hessian[rows] = statics.without_idle(statics.take(self.tables, rows), there).hessian
+            hessian[rows] = statics.without_idle(take(self.tables, rows), there).hessian
         finite = np.isfinite(hessian)
         values, vectors = np.linalg.eigh(np.where(finite, hessian, 0.0))
         values[~finite.all(axis=(1, 2))] = np.nan
@@ -202,7 +214,7 @@ def solve_setup(
     threads: int | None = None,
 ) -> Solution:
     """Like :func:`solve`, for a setup that effects may have edited; history is not followed."""
-    tables = statics.assemble(setup)
+    tables = assemble(setup)
     first, values = start_of(setup.robot, tables, start)
     if method == "newton":
         found = statics.descend(tables, first, max_iterations, threads, values)
@@ -214,7 +226,7 @@ def solve_setup(
 
 
 def start_of(
-    robot: Robot, tables: statics.Tables, start: Array | None
+    robot: Robot, tables: Tables, start: Array | None
 ) -> tuple[Array | None, Array | None]:
     """Deviations and joint values of start poses (n, 7)."""
     if start is None:
@@ -225,17 +237,17 @@ def start_of(
     return statics.deviations(tables, start), change * np.where(robot.hinges, robot.length, 1.0)
 
 
-def certify(robot: Robot, tables: statics.Tables, found: statics.Evaluation) -> Solution:
+def certify(robot: Robot, tables: Tables, found: statics.Evaluation) -> Solution:
     """Recompute wrench, stiffness and energy at the answer, and say what it is worth."""
     check = statics.evaluate(tables, found, threads=None)
     check.count = found.count
     status = np.array([_OF_OUTCOME.get(o, Status.GAVE_UP) for o in found.outcome], dtype=object)
-    balanced = check.residual < kernel.TOLERANCE
+    balanced = check.residual < TOLERANCE
     status[(status == Status.CONVERGED) & ~balanced] = Status.STALLED
     # not found's own: a search in joint values alone leaves its deviations unplaced
     moved = check.deviation
     turn = np.where(moved[:, 3:4] < 0, -1.0, 1.0) * moved[:, 3:]
-    lost = np.isin(found.outcome, (kernel.FALLING, kernel.CABLE_LAW, kernel.SPINNING))
+    lost = np.isin(found.outcome, (FALLING, CABLE_LAW, SPINNING))
     return Solution(
         robot=robot,
         tables=tables,
@@ -243,9 +255,9 @@ def certify(robot: Robot, tables: statics.Tables, found: statics.Evaluation) -> 
         command=tables.poses,
         pose=_blank(statics.platform_poses(tables, moved), lost),
         deviation=_blank(np.concatenate([moved[:, :3], rotvec_from_quat(turn)], axis=1), lost),
-        tensions=_blank(check.states[..., cable_law.TENSION], lost),
+        tensions=_blank(check.states[..., TENSION], lost),
         slack=statics.is_slack(tables, check),
-        rest_lengths=tables.cables[..., cable_law.REST],
+        rest_lengths=tables.cables[..., REST],
         iterations=found.count,
         residual=np.where(lost, np.inf, check.residual),
         energy=check.energy,

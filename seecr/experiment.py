@@ -9,16 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr import statics
-from seecr.compiled import descent as kernel
-from seecr.compiled import law as cable_law
+from seecr.commands import Commands
+from seecr.compiled.columns import STRAIN, TENSION
+from seecr.compiled.outcomes import CONVERGED, SINGULAR, STALLED, TOLERANCE
 from seecr.effects.base import Effect, Readings
 from seecr.effects.checked import edit_readings, edit_setup
 from seecr.equilibrium import Solution, certify, start_of
-from seecr.history import walk
 from seecr.path import Path, path_of
 from seecr.pose import Array
 from seecr.robot import Robot
-from seecr.setup import Commands, Setup, plain_setup
+from seecr.setup import Setup, plain_setup
+from seecr.tables import Tables, assemble, take
 
 # Rounds of linearising users' laws about the strains found with them.
 _LAW_ROUNDS = 30
@@ -38,7 +39,7 @@ class Prediction:
     """
 
     setup: Setup
-    tables: statics.Tables
+    tables: Tables
     found: statics.Evaluation
     readings: Readings
     has_history: bool
@@ -46,13 +47,13 @@ class Prediction:
 
     @property
     def solved(self) -> NDArray[np.bool_]:
-        fine = (self.found.outcome == kernel.CONVERGED) & (self.found.residual < kernel.TOLERANCE)
+        fine = (self.found.outcome == CONVERGED) & (self.found.residual < TOLERANCE)
         return np.asarray(fine)
 
     @property
     def singular(self) -> NDArray[np.bool_]:
         """(n,) rows at rest that are free to move along some direction."""
-        return np.asarray(self.found.outcome == kernel.SINGULAR)
+        return np.asarray(self.found.outcome == SINGULAR)
 
     @property
     def pose(self) -> Array:
@@ -67,7 +68,7 @@ class Prediction:
     @property
     def tensions(self) -> Array:
         """(n, m) [N]."""
-        return self.found.states[..., cable_law.TENSION]
+        return self.found.states[..., TENSION]
 
     def solution(self) -> Solution:
         """The rows as a certified :class:`seecr.Solution`."""
@@ -137,7 +138,7 @@ class Experiment:
 
         Where a robot has several stable equilibria, the start decides which one is found.
         """
-        tables = statics.take(at.tables, rows)
+        tables = take(at.tables, rows)
         start, values = start_of(self.robot, tables, poses)
         again = statics.descend(tables, start, _LIMIT, start_values=values, staged=False)
         found = statics.take_evaluation(at.found, np.arange(len(at.found.outcome)))
@@ -147,8 +148,8 @@ class Experiment:
 
     def _solve(
         self, setup: Setup, start: statics.Evaluation | None
-    ) -> tuple[statics.Tables, statics.Evaluation]:
-        def run(tables: statics.Tables, start: statics.Evaluation | None) -> statics.Evaluation:
+    ) -> tuple[Tables, statics.Evaluation]:
+        def run(tables: Tables, start: statics.Evaluation | None) -> statics.Evaluation:
             if start is None:
                 return statics.descend(tables, limit=_LIMIT)
             found = statics.descend(
@@ -163,17 +164,17 @@ class Experiment:
         path = self.path
         setup = self.setup(effects, path.commands)
         tables, whole = _with_laws(
-            setup, lambda tables, _start: walk(setup, tables, path, _LIMIT), None
+            setup, lambda tables, _start: statics.walk(tables, path, _LIMIT), None
         )
-        rows = statics.take(tables, path.rows)
+        rows = take(tables, path.rows)
         found = statics.take_evaluation(whole, path.rows)
         # a waypoint that was not solved spoils the rows of its run from there on
-        failed = (whole.outcome != kernel.CONVERGED) & (whole.outcome != kernel.SINGULAR)
+        failed = (whole.outcome != CONVERGED) & (whole.outcome != SINGULAR)
         for k in path.source[failed]:
             run = path.commands.run
             assert run is not None
             later = (np.arange(len(found.outcome)) >= k) & (run[path.rows] == run[path.rows[k]])
-            found.outcome[later & (found.outcome == kernel.CONVERGED)] = kernel.STALLED
+            found.outcome[later & (found.outcome == CONVERGED)] = STALLED
         own = self.setup(effects)
         return Prediction(own, rows, found, self._read(effects, own, rows, found), True)
 
@@ -181,11 +182,11 @@ class Experiment:
     def _read(
         effects: Sequence[Effect],
         setup: Setup,
-        tables: statics.Tables,
+        tables: Tables,
         found: statics.Evaluation,
     ) -> Readings:
         pose = statics.platform_poses(tables, found.deviation)
-        return read(effects, setup, pose, found.states[..., cable_law.TENSION])
+        return read(effects, setup, pose, found.states[..., TENSION])
 
 
 def read(effects: Sequence[Effect], setup: Setup, poses: Array, tensions: Array) -> Readings:
@@ -196,34 +197,34 @@ def read(effects: Sequence[Effect], setup: Setup, poses: Array, tensions: Array)
     return readings
 
 
-def _mend(tables: statics.Tables, found: statics.Evaluation) -> statics.Evaluation:
+def _mend(tables: Tables, found: statics.Evaluation) -> statics.Evaluation:
     """Solve afresh what a warm start did not lead to."""
-    lost = np.flatnonzero(found.outcome != kernel.CONVERGED)
+    lost = np.flatnonzero(found.outcome != CONVERGED)
     if len(lost):
-        again = statics.descend(statics.take(tables, lost), limit=_LIMIT)
+        again = statics.descend(take(tables, lost), limit=_LIMIT)
         statics.put_evaluation(found, lost, again)
     return found
 
 
 def _with_laws(
     setup: Setup,
-    run: Callable[[statics.Tables, statics.Evaluation | None], statics.Evaluation],
+    run: Callable[[Tables, statics.Evaluation | None], statics.Evaluation],
     start: statics.Evaluation | None,
-) -> tuple[statics.Tables, statics.Evaluation]:
+) -> tuple[Tables, statics.Evaluation]:
     """Solve, and where users' laws are in play linearise them at the strains found, again."""
     strains = None
     if setup.laws and start is not None:
-        strains = start.states[..., cable_law.STRAIN]
-    tables = statics.assemble(setup, strains)
+        strains = start.states[..., STRAIN]
+    tables = assemble(setup, strains)
     found = run(tables, start)
     if not setup.laws:
         return tables, found
     for _ in range(_LAW_ROUNDS):
         before = strains
-        strains = np.maximum(found.states[..., cable_law.STRAIN], 0.0)
-        tables = statics.assemble(setup, strains)
+        strains = np.maximum(found.states[..., STRAIN], 0.0)
+        tables = assemble(setup, strains)
         found = run(tables, found)
         if before is not None and np.allclose(strains, before, rtol=1e-12, atol=1e-15):
             return tables, found
-    found.outcome[found.outcome == kernel.CONVERGED] = kernel.STALLED
+    found.outcome[found.outcome == CONVERGED] = STALLED
     return tables, found

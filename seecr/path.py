@@ -2,7 +2,7 @@
 
 A run starts at the robot's reference pose, goes straight to its first row and straight from row
 to row, in what the platform may do. What depends on the rows before (see
-:mod:`seecr.history`, and backlash in :mod:`seecr.setup`) depends on this way.
+:mod:`seecr.compiled.walk`, and :func:`seecr.commands.play`) depends on this way.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from seecr.commands import Commands
 from seecr.joints import motion_columns, pose_of_values, values_of_pose
 from seecr.pose import Array, cross, pose_add, pose_difference, quat_rotate
 from seecr.robot import Robot
-from seecr.setup import Commands
 
 # Waypoints on the way to the first row of a run, and from row to row.
 _APPROACH, _BETWEEN = 6, 2

@@ -8,10 +8,11 @@ import numpy as np
 from scipy import optimize
 
 from seecr import statics
-from seecr.compiled import descent as kernel
-from seecr.compiled import law as cable_law
-from seecr.pose import Array, quat_from_rotvec, quat_multiply
+from seecr.compiled.columns import ANCHOR
+from seecr.compiled.outcomes import CONVERGED, SINGULAR, SINGULAR_PART, STALLED, TOLERANCE, UNSTABLE
+from seecr.pose import Array, quat_from_rotvec, quat_multiply, transform_points
 from seecr.setup import Setup
+from seecr.tables import Tables, assemble, take
 
 # Not an outcome of the compiled loop: SciPy said that it failed.
 GAVE_UP = 100
@@ -25,10 +26,8 @@ def first_guess(setup: Setup) -> Array:
     """
     up = setup.robot.up
     poses = setup.commands.pose
-    tables = statics.assemble(setup)
-    anchors = tables.cables[0, :, cable_law.ANCHOR : cable_law.ANCHOR + 3]
-    from seecr.pose import transform_points
-
+    tables = assemble(setup)
+    anchors = tables.cables[0, :, ANCHOR : ANCHOR + 3]
     vertical = (setup.exit_points - transform_points(poses, anchors)) @ up
     weight = setup.mass * np.linalg.norm(setup.gravity)
     return weight * vertical.mean(axis=1) / float(np.mean(setup.ea))
@@ -36,7 +35,7 @@ def first_guess(setup: Setup) -> Array:
 
 def solve_with_scipy(
     setup: Setup,
-    tables: statics.Tables,
+    tables: Tables,
     method: str,
     start: Array | None,
     limit: int,
@@ -57,7 +56,7 @@ def solve_with_scipy(
     fall = first_guess(setup)
     down = -setup.robot.up
     for i in range(n):
-        one = statics.take(tables, np.array([i]))
+        one = take(tables, np.array([i]))
         point = statics.Evaluation.empty(1, m, tables.n_dof)
         base = np.array([0.0, 0, 0, 1, 0, 0, 0]) if start is None else start[i]
         counter = [0]
@@ -95,7 +94,7 @@ def _search(method: str, residual, x0: Array, limit: int) -> tuple[bool, Array]:
         return bool(result.success), result.x
 
 
-def _falling(tables: statics.Tables, i: int, fall: Array) -> Array:
+def _falling(tables: Tables, i: int, fall: Array) -> Array:
     """The fall as a change of the unknowns: of the joints that can follow it."""
     x = np.zeros(tables.n_dof)
     if tables.screws.shape[1] == 0:
@@ -107,7 +106,7 @@ def _falling(tables: statics.Tables, i: int, fall: Array) -> Array:
     return x
 
 
-def _place(tables: statics.Tables, point: statics.Evaluation, base: Array, x: Array) -> None:
+def _place(tables: Tables, point: statics.Evaluation, base: Array, x: Array) -> None:
     if tables.screws.shape[1] > 0:
         point.values[0] = x
         return
@@ -116,14 +115,14 @@ def _place(tables: statics.Tables, point: statics.Evaluation, base: Array, x: Ar
     point.deviation[0, 3:] = quat_multiply(turn, base[3:])
 
 
-def _judge(one: statics.Tables, point: statics.Evaluation) -> int:
+def _judge(one: Tables, point: statics.Evaluation) -> int:
     """What the point that SciPy calls a solution is, from its residual and stiffness."""
     at = statics.evaluate(one, point)
     point.deviation[0] = at.deviation[0]
-    if not at.residual[0] < kernel.TOLERANCE:
-        return kernel.STALLED
+    if not at.residual[0] < TOLERANCE:
+        return STALLED
     eigenvalues = np.linalg.eigvalsh(at.hessian[0])
-    floor = kernel.SINGULAR_PART * np.abs(np.diag(at.hessian[0])).max()
+    floor = SINGULAR_PART * np.abs(np.diag(at.hessian[0])).max()
     if eigenvalues[0] < -floor:
-        return kernel.UNSTABLE
-    return kernel.CONVERGED if eigenvalues[0] > floor else kernel.SINGULAR
+        return UNSTABLE
+    return CONVERGED if eigenvalues[0] > floor else SINGULAR

@@ -9,23 +9,25 @@ Rows with history are the exception: their walk is repeated with each parameter 
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr import response, statics
-from seecr.compiled import law as cable_law
+from seecr import statics
+from seecr.compiled.columns import (
+    STRAIN,
+)
 from seecr.effects.base import Effect, Layout, Readings
 from seecr.effects.checked import is_built_in
 from seecr.effects.terms import Term, Terms
 from seecr.experiment import Experiment, Prediction, read
 from seecr.joints import motion_columns
 from seecr.pose import Array, pose_add, quat_conjugate, quat_multiply, rotvec_from_quat
-from seecr.setup import Setup
-from seecr.statics import Tables
+from seecr.setup import QUANTITIES, History, Setup
+from seecr.tables import Tables, assemble
 
 # Differencing steps, in plausible sizes of a parameter.
 _CENTRAL, _ONE_SIDED, _WALK = 1e-4, 1e-5, 1e-4
@@ -86,15 +88,8 @@ def length_sensitivities(at: Prediction) -> Array:
     """Derivative of pose and tensions by each cable's rest length, (n, 6 + m, m)."""
     step = 1e-6 * at.tables.length
     return _response_by_cable(
-        at, _lengthened(at.tables, step), _lengthened(at.tables, -step), 2.0 * step
+        at, at.tables.lengthened(step), at.tables.lengthened(-step), 2.0 * step
     )
-
-
-def _lengthened(tables: Tables, by: float) -> Tables:
-    cables = tables.cables.copy()
-    cables[..., cable_law.REST] += by
-    cables[..., cable_law.GAP] -= by
-    return replace(tables, cables=cables)
 
 
 def _shape(at: Prediction) -> tuple[int, int]:
@@ -153,21 +148,10 @@ def _shifted(terms: Terms, term: Term, k: Any, part: float | None = None) -> _Sh
     return _Shift(with_value(up), with_value(down), up - down, layout)
 
 
-# Fields of a setup that reach the statics through the rest lengths alone.
-_LENGTH_FIELDS = {"extra_length", "length_gain", "length_factor", "zero_pose"}
-_OTHER_FIELDS = tuple(
-    item.name
-    for item in fields(Setup)
-    if item.name not in _LENGTH_FIELDS and item.name not in ("robot", "commands", "laws")
-)
-# Fields that make rows depend on the rows before, and the columns that hold what came of it.
-_HISTORY_FIELDS = (
-    "hysteresis", "hysteresis_stretch", "friction", "creep", "creep_time", "backlash",
-)  # fmt: skip
-_STATE_COLUMNS = (
-    cable_law.CREEP, cable_law.CREEP_RATE, cable_law.STRETCH_BEFORE, cable_law.HYSTERESIS_BEFORE,
-    cable_law.STUCK,
-)  # fmt: skip
+# Quantities that do not reach the statics through the rest lengths alone.
+_OTHER_THAN_LENGTHS = [name for name, item in QUANTITIES.items() if not item.paid_out]
+# Quantities whose change asks for the whole way to be solved again.
+_OF_HISTORY = [name for name, item in QUANTITIES.items() if item.history is not History.NONE]
 
 
 @dataclass(eq=False)
@@ -217,7 +201,7 @@ class _ByWrench:
         if shift.physical:
             plus = self.experiment.setup(shift.plus.effects)
             minus = self.experiment.setup(shift.minus.effects)
-            if _differ(plus, minus, _HISTORY_FIELDS):
+            if _differ(plus, minus, _OF_HISTORY):
                 return _difference(self.experiment, shift, self.at)
             change = self._physical(plus, minus, shift.apart)
         if shift.sensing:
@@ -230,7 +214,7 @@ class _ByWrench:
             return None
         plus = self.experiment.setup(shift.plus.effects)
         minus = self.experiment.setup(shift.minus.effects)
-        if _differ(plus, minus, _HISTORY_FIELDS):
+        if _differ(plus, minus, _OF_HISTORY):
             return None
         if _differ_by_length_only(plus, minus):
             longer = (plus.rest_lengths() - minus.rest_lengths()) / shift.apart
@@ -247,12 +231,10 @@ class _ByWrench:
         return _response(self.at, *self._tables(plus, minus), apart, self.inverse)
 
     def _tables(self, plus: Setup, minus: Setup) -> tuple[Tables, Tables]:
-        strains = self.at.found.states[..., cable_law.STRAIN]
-        ahead, behind = statics.assemble(plus, strains), statics.assemble(minus, strains)
+        strains = self.at.found.states[..., STRAIN]
+        ahead, behind = assemble(plus, strains), assemble(minus, strains)
         if self.at.has_history:
-            for column in _STATE_COLUMNS:
-                ahead.cables[..., column] = self.at.tables.cables[..., column]
-                behind.cables[..., column] = self.at.tables.cables[..., column]
+            ahead, behind = (tables.with_past(self.at.tables) for tables in (ahead, behind))
         return ahead, behind
 
     def _read(self, shift: _Shift, change: Array, apart: float) -> Array:
@@ -283,12 +265,12 @@ def _differ(a: Setup, b: Setup, names: Iterable[str]) -> bool:
 def _differ_by_length_only(a: Setup, b: Setup) -> bool:
     if a.laws or b.laws:
         return False
-    return not _differ(a, b, _OTHER_FIELDS)
+    return not _differ(a, b, _OTHER_THAN_LENGTHS)
 
 
 def _response(at: Prediction, plus: Tables, minus: Tables, apart: float, inverse: Array) -> Array:
     """Change of pose and tensions (n, 6 + m) between two tables, per unit of ``apart``."""
-    force, tension = response.difference(plus, minus, at.found)
+    force, tension = statics.change(plus, minus, at.found)
     step = -inverse @ (force / apart)[..., None]
     move = (motion_of(at) @ step)[..., 0]
     return np.concatenate([move, tension / apart + (at.found.slopes @ step)[..., 0]], axis=1)
@@ -296,7 +278,7 @@ def _response(at: Prediction, plus: Tables, minus: Tables, apart: float, inverse
 
 def _response_by_cable(at: Prediction, plus: Tables, minus: Tables, apart: Any) -> Array:
     """The same (n, 6 + m, m) where each cable was changed, by the change of each."""
-    force, own = response.by_cable(plus, minus, at.found)
+    force, own = statics.change_by_cable(plus, minus, at.found)
     step = -_kept(at, "inverse", _inverse_stiffness) @ (force / apart)
     out = np.concatenate([motion_of(at) @ step, at.found.slopes @ step], axis=1)
     cable = np.arange(own.shape[1])

@@ -1,42 +1,34 @@
-"""From a setup to the tables of the compiled loop, and what that loop says at given poses."""
+"""What the compiled loop says of tables: where platforms rest, and what holds at given poses."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
-from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr.compiled import descent as kernel
-from seecr.compiled import law as cable_law
-from seecr.joints import values_of_pose
+from seecr.compiled.change import change_at_rest, change_of_each_cable
+from seecr.compiled.columns import (
+    CREEP_PART,
+    EA,
+    EXTERNAL_MOMENT,
+    GAP,
+    N_STATE,
+    RADIUS,
+    REST,
+    SLACK,
+    TENSION,
+)
+from seecr.compiled.descent import STIFF, solve_batch
+from seecr.compiled.joints import place_joints
+from seecr.compiled.outcomes import CABLE_LAW, CONVERGED, IDLE, ITERATIONS, STALLED
+from seecr.compiled.platform import add_skew, evaluate_batch
+from seecr.compiled.walk import walk_in_order
+from seecr.path import Path
 from seecr.pose import Array, quat_conjugate, quat_multiply
-from seecr.robot import Robot
-from seecr.setup import Setup
-
-# Fewer poses than this are not worth a second thread.
-_CHUNK = 128
-
-
-@dataclass(eq=False)
-class Tables:
-    """The problem of n poses as the compiled loop reads it."""
-
-    cables: Array  # (n, m, N_COLUMNS)
-    load: Array  # (n, N_LOAD)
-    poses: Array  # (n, 7) commanded
-    screws: Array  # (n, d, 7) joints at the commanded pose; (n, 0, 7) for a free platform
-    length: float
-    scale: Array  # (n,) [N] that residuals are measured against
-    reach: Array  # (n,) [m] deviations beyond this are a fall
-    n_dof: int
-
-    def __len__(self) -> int:
-        return len(self.poses)
+from seecr.tables import Tables, take
+from seecr.threads import in_parts, run_parts
 
 
 @dataclass(eq=False)
@@ -65,124 +57,13 @@ class Evaluation:
             residual=np.zeros(n),
             gradient=np.zeros((n, d)),
             hessian=np.zeros((n, d, d)),
-            states=np.zeros((n, m, cable_law.N_STATE)),
+            states=np.zeros((n, m, N_STATE)),
             slopes=np.zeros((n, m, d)),
             deviation=deviation,
             values=np.zeros((n, d)),
             guess=np.zeros((n, m, 3)),
             energy=np.zeros(n),
         )
-
-
-@lru_cache(maxsize=8)
-def _screws_of(robot: Robot, poses_bytes: bytes, n: int) -> Array:
-    if not robot.joints:
-        return np.zeros((n, 0, 7))
-    poses = np.frombuffer(poses_bytes).reshape(n, 7)
-    return values_of_pose(robot, poses)[1]
-
-
-def assemble(setup: Setup, strains: Array | None = None) -> Tables:
-    """The tables of a setup. History columns are left at their null.
-
-    Args:
-        setup: n rows.
-        strains: (n, m) about which users' laws are linearised; zero by default.
-    """
-    robot, commands = setup.robot, setup.commands
-    poses = np.ascontiguousarray(commands.pose)
-    n, m = len(poses), robot.n_cables
-    rest = setup.rest_lengths()
-    gap = setup.geometric_lengths(poses) - rest
-    cables = np.empty((n, m, cable_law.N_COLUMNS))
-    cables[:] = _same_in_all_rows(setup)
-    cables[..., cable_law.REST] = rest
-    cables[..., cable_law.GAP] = gap
-    if setup.laws:
-        _linearise(setup, np.zeros((n, m)) if strains is None else strains, cables)
-    load = np.zeros((n, kernel.N_LOAD))
-    load[:, kernel.FORCE_OF_WEIGHT : kernel.FORCE_OF_WEIGHT + 3] = setup.mass * setup.gravity
-    load[:, kernel.CENTRE_OF_MASS : kernel.CENTRE_OF_MASS + 3] = setup.centre_of_mass
-    load[:, kernel.EXTERNAL_FORCE : kernel.EXTERNAL_FORCE + 6] = setup.wrench
-    load[:, kernel.UP : kernel.UP + 3] = _hanging(setup)
-    return Tables(
-        cables=cables,
-        load=load,
-        poses=poses,
-        screws=_screws_of(robot, poses.tobytes(), n),
-        length=robot.length,
-        scale=_load_scale(setup),
-        reach=3.0 * (rest.max(axis=1) + np.abs(gap).max(axis=1)),
-        n_dof=robot.n_dof,
-    )
-
-
-def _same_in_all_rows(setup: Setup) -> Array:
-    """The cables' columns that no row changes, (m, N_COLUMNS)."""
-    cables = np.zeros((setup.robot.n_cables, cable_law.N_COLUMNS))
-    cables[:, cable_law.EXIT : cable_law.EXIT + 3] = setup.exit_points
-    cables[:, cable_law.ANCHOR : cable_law.ANCHOR + 3] = setup.anchor_points
-    for column, values in (
-        (cable_law.EA, setup.ea),
-        (cable_law.QUADRATIC, setup.quadratic),
-        (cable_law.CUBIC, setup.cubic),
-        (cable_law.RADIUS, setup.pulley_radius),
-        (cable_law.COMPLIANCE, setup.compliance),
-        (cable_law.WINCH_SIDE, setup.winch_side),
-        (cable_law.WEIGHT, setup.cable_weight),
-        (cable_law.HYSTERESIS, setup.hysteresis),
-        (cable_law.HYSTERESIS_STRETCH, setup.hysteresis_stretch),
-        (cable_law.FRICTION, setup.friction),
-    ):
-        cables[:, column] = values
-    return cables
-
-
-def _linearise(setup: Setup, strains: Array, cables: Array) -> None:
-    """Tangents of the users' laws at the given strains (Newton's method does the rest)."""
-    step = 1e-6 * (1e-3 + np.abs(strains))
-    for law in setup.laws:
-        slope = (law(strains + step) - law(strains - step)) / (2.0 * step)
-        cables[..., cable_law.EXTRA] += law(strains) - slope * strains
-        cables[..., cable_law.EXTRA_SLOPE] += slope
-
-
-def _hanging(setup: Setup) -> Array:
-    """Vertical of the planes in which cables hang: gravity's, or the pulleys' own."""
-    g = np.linalg.norm(setup.gravity)
-    if g == 0.0 or np.any(setup.pulley_radius):
-        return setup.robot.up
-    return -setup.gravity / g
-
-
-def _load_scale(setup: Setup) -> Array:
-    """Load [N] of each pose: weight, external force and moment over the robot's length."""
-    weight = setup.mass * np.linalg.norm(setup.gravity)
-    force = np.linalg.norm(setup.wrench[:, :3], axis=1)
-    moment = np.linalg.norm(setup.wrench[:, 3:], axis=1) / setup.robot.length
-    scale = weight + force + moment
-    # nothing loads the platform: measure against what a strain of 1e-3 would pull
-    return np.where(scale > 0.0, scale, 1e-3 * float(np.max(setup.ea)))
-
-
-def _chunks(n: int, threads: int) -> list[slice]:
-    parts = max(1, min(threads, n // _CHUNK))
-    edges = np.linspace(0, n, parts + 1).astype(int)
-    return [slice(a, b) for a, b in pairwise(edges)]
-
-
-@lru_cache(maxsize=1)
-def _pool() -> ThreadPoolExecutor:
-    import os
-
-    return ThreadPoolExecutor(max_workers=os.cpu_count() or 1)
-
-
-def default_threads() -> int:
-    """As many threads as there are processors."""
-    import os
-
-    return os.cpu_count() or 1
 
 
 def descend(
@@ -204,8 +85,8 @@ def descend(
     """
     if staged is None:
         out = descend(tables, start, limit, threads, start_values, False, guess)
-        unsettled = (out.outcome == kernel.ITERATIONS) | (out.outcome == kernel.STALLED)
-        stiff = tables.cables[..., cable_law.EA].max(axis=1) > kernel.STIFF * tables.scale
+        unsettled = (out.outcome == ITERATIONS) | (out.outcome == STALLED)
+        stiff = tables.cables[..., EA].max(axis=1) > STIFF * tables.scale
         again = np.flatnonzero(unsettled & stiff)
         if len(again):
             first, values = (None if s is None else s[again] for s in (start, start_values))
@@ -222,7 +103,7 @@ def descend(
     out.energy = np.full(n, np.nan)
 
     def run(part: slice) -> None:
-        kernel.solve_batch(
+        solve_batch(
             tables.cables[part], tables.load[part], tables.poses[part], tables.screws[part],
             starts[part], first[part], tables.length, tables.scale[part], 0.5 * tables.length,
             tables.reach[part], limit, out.outcome[part], out.count[part], out.residual[part],
@@ -243,7 +124,7 @@ def evaluate(tables: Tables, at: Evaluation, threads: int | None = 1) -> Evaluat
     out.guess[:] = at.guess
 
     def run(part: slice) -> None:
-        kernel.evaluate_batch(
+        evaluate_batch(
             tables.cables[part], tables.load[part], tables.poses[part], tables.screws[part],
             out.deviation[part], out.values[part], tables.length, out.gradient[part],
             out.hessian[part], out.states[part], out.slopes[part], out.energy[part],
@@ -251,33 +132,91 @@ def evaluate(tables: Tables, at: Evaluation, threads: int | None = 1) -> Evaluat
         )  # fmt: skip
 
     in_parts(run, n, threads)
-    out.outcome = np.where(np.isinf(out.energy), kernel.CABLE_LAW, kernel.CONVERGED)
+    out.outcome = np.where(np.isinf(out.energy), CABLE_LAW, CONVERGED)
     out.residual = residual_size(out.gradient) / tables.scale
     return out
 
 
-def in_parts(run: Callable[[slice], None], n: int, threads: int | None = None) -> None:
-    """Run a job on n rows, in as many parts as there are threads and rows enough for them."""
-    run_parts(run, _chunks(n, default_threads() if threads is None else threads))
+def walk(tables: Tables, path: Path, limit: int) -> Evaluation:
+    """Solve the waypoints of a path in order, each from the one before.
+
+    Fills the columns of the past in ``tables``. Runs are independent, but for creep, which goes
+    by the clock through all of them.
+    """
+    n, m = tables.cables.shape[:2]
+    out = Evaluation.empty(n, m, tables.n_dof)
+    out.energy = np.full(n, np.nan)
+    creeps = bool(np.any(tables.cables[..., CREEP_PART]))
+    edges = [0, n] if creeps else [*np.flatnonzero(path.fresh).tolist(), n]
+
+    def run(part: slice) -> None:
+        walk_in_order(
+            tables.cables[part], tables.load[part], tables.poses[part], tables.screws[part],
+            tables.length, tables.scale[part], 0.5 * tables.length, tables.reach[part], limit,
+            path.fresh[part], path.elapsed[part], out.outcome[part], out.count[part],
+            out.residual[part], out.gradient[part], out.hessian[part], out.states[part],
+            out.slopes[part], out.deviation[part], out.values[part], out.guess[part],
+        )  # fmt: skip
+
+    run_parts(run, [slice(a, b) for a, b in pairwise(edges)])
+    return out
 
 
-def run_parts(run: Callable[[slice], None], parts: list[slice]) -> None:
-    """Run a job on every part of a batch, in threads: the compiled loop frees the lock."""
-    others = [_pool().submit(run, part) for part in parts[1:]]
-    run(parts[0])
-    for other in others:
-        other.result()
+def change(plus: Tables, minus: Tables, at: Evaluation) -> tuple[Array, Array]:
+    """Gradient (n, d) [N] and tensions (n, m) [N] of ``plus`` less those of ``minus``.
+
+    Args:
+        plus, minus: tables of the same poses.
+        at: where the platform is; nothing is solved.
+    """
+    n, m = plus.cables.shape[:2]
+    gradient, tension = np.zeros((n, plus.n_dof)), np.zeros((n, m))
+
+    def run(part: slice) -> None:
+        change_at_rest(
+            plus.cables[part], minus.cables[part], plus.load[part], minus.load[part],
+            plus.poses[part], plus.screws[part], at.deviation[part], at.values[part],
+            plus.length, at.guess[part], gradient[part], tension[part],
+        )  # fmt: skip
+
+    in_parts(run, n)
+    return _solved(gradient, tension, gradient)
+
+
+def change_by_cable(plus: Tables, minus: Tables, at: Evaluation) -> tuple[Array, Array]:
+    """The same cable by cable: gradient (n, d, m) [N] and each cable's own tension (n, m).
+
+    For tables in which every cable was changed, to have the derivatives by what each cable has
+    of its own at once. The load is taken to be the same in both.
+    """
+    n, m = plus.cables.shape[:2]
+    gradient, tension = np.zeros((n, m, plus.n_dof)), np.zeros((n, m))
+
+    def run(part: slice) -> None:
+        change_of_each_cable(
+            plus.cables[part], minus.cables[part], plus.load[part], plus.poses[part],
+            plus.screws[part], at.deviation[part], at.values[part], plus.length, at.guess[part],
+            gradient[part], tension[part],
+        )  # fmt: skip
+
+    in_parts(run, n)
+    return _solved(np.swapaxes(gradient, 1, 2), tension, gradient.reshape(n, -1))
+
+
+def _solved(gradient: Array, tension: Array, failed: Array) -> tuple[Array, Array]:
+    """Nothing changes where a cable's own equations could not be solved beside the pose."""
+    lost = np.isnan(failed).any(axis=1)
+    gradient[lost], tension[lost] = 0.0, 0.0
+    return gradient, tension
 
 
 def without_idle(tables: Tables, at: Evaluation) -> Evaluation:
     """Evaluate again, without the taut cables whose tension is mere rounding."""
-    tension = at.states[..., cable_law.TENSION]
-    idle = (at.states[..., cable_law.SLACK] == 0.0) & (
-        tension < kernel.IDLE * tables.scale[:, None]
-    )
+    tension = at.states[..., TENSION]
+    idle = (at.states[..., SLACK] == 0.0) & (tension < IDLE * tables.scale[:, None])
     rest = take(tables, np.arange(len(tables)))
-    rest.cables[idle, cable_law.GAP] = -rest.cables[idle, cable_law.REST]
-    rest.cables[idle, cable_law.RADIUS] = 0.0
+    rest.cables[idle, GAP] = -rest.cables[idle, REST]
+    rest.cables[idle, RADIUS] = 0.0
     return evaluate(rest, at)
 
 
@@ -287,8 +226,8 @@ def is_slack(tables: Tables, at: Evaluation) -> NDArray[np.bool_]:
     A heavy cable that is longer than its way hangs through and pulls by its weight alone. A
     tension below what rounding leaves of the load is none.
     """
-    nothing = at.states[..., cable_law.TENSION] < kernel.IDLE * tables.scale[:, None]
-    return np.asarray((at.states[..., cable_law.SLACK] > 0.5) | nothing)
+    nothing = at.states[..., TENSION] < IDLE * tables.scale[:, None]
+    return np.asarray((at.states[..., SLACK] > 0.5) | nothing)
 
 
 def joints_at_rest(tables: Tables, at: Evaluation) -> Array:
@@ -297,9 +236,7 @@ def joints_at_rest(tables: Tables, at: Evaluation) -> Array:
     if tables.screws.shape[1] == 0:
         return out
     for i in range(len(tables)):
-        kernel.place_joints(
-            tables.screws[i], at.values[i], tables.length, tables.poses[i], place, out[i]
-        )
+        place_joints(tables.screws[i], at.values[i], tables.length, tables.poses[i], place, out[i])
     return out
 
 
@@ -308,13 +245,13 @@ def stiffness(tables: Tables, at: Evaluation) -> Array:
 
     A constant moment, which has no potential, skews it; ``at.hessian`` is its symmetric part.
     """
-    first = kernel.EXTERNAL_MOMENT
+    first = EXTERNAL_MOMENT
     rows = np.flatnonzero(np.any(tables.load[:, first : first + 3], axis=1))
     if len(rows) == 0:
         return at.hessian
     joints, out = joints_at_rest(tables, at), at.hessian.copy()
     for i in rows:
-        kernel.add_skew(tables.load[i], joints[i], tables.length, out[i])
+        add_skew(tables.load[i], joints[i], tables.length, out[i])
     return out
 
 
@@ -324,14 +261,6 @@ def residual_size(gradient: Array) -> Array:
         halves = np.linalg.norm(gradient.reshape(-1, 2, 3), axis=2)
         return halves.max(axis=1)
     return np.linalg.norm(gradient, axis=1)
-
-
-def take(tables: Tables, rows: NDArray[np.integer]) -> Tables:
-    """Some rows of the tables."""
-    return Tables(
-        tables.cables[rows], tables.load[rows], tables.poses[rows], tables.screws[rows],
-        tables.length, tables.scale[rows], tables.reach[rows], tables.n_dof,
-    )  # fmt: skip
 
 
 def take_evaluation(whole: Evaluation, rows: NDArray[np.integer]) -> Evaluation:

@@ -18,12 +18,12 @@ ROOT = Path(__file__).resolve().parents[1]
 
 # A folder or file on its floor. crosscheck stands on seecr: a lower floor of the two is seecr's.
 FLOORS = {
-    "seecr.errors": 0, "seecr.compiled": 0, "seecr.shipped": 1, "seecr.pose": 1,
-    "seecr.robot": 2, "seecr.joints": 3, "seecr.mjcf": 3,
-    "seecr.setup": 4, "seecr.effects": 5, "seecr.path": 5, "seecr.statics": 6,
-    "seecr.scipy_search": 7, "seecr.response": 7, "seecr.equilibrium": 8,
-    "seecr.history": 9, "seecr.planar": 9, "seecr.workspace": 9,
-    "seecr.experiment": 10, "seecr.sensitivity": 11,
+    "seecr.errors": 0, "seecr.compiled": 0, "seecr.threads": 0,
+    "seecr.shipped": 1, "seecr.pose": 1,
+    "seecr.robot": 2, "seecr.commands": 3, "seecr.joints": 3, "seecr.mjcf": 3,
+    "seecr.path": 4, "seecr.setup": 4, "seecr.effects": 5, "seecr.tables": 5,
+    "seecr.statics": 6, "seecr.scipy_search": 7, "seecr.equilibrium": 8,
+    "seecr.planar": 9, "seecr.workspace": 9, "seecr.experiment": 9, "seecr.sensitivity": 10,
     "crosscheck.errors": 20,
     "crosscheck.files": 21, "crosscheck.units": 21,
     "crosscheck.settle": 22, "crosscheck.measurements": 22, "crosscheck.model": 22,
@@ -128,7 +128,7 @@ def test_mujocos_side_takes_the_description_of_seecr_alone(folder: str) -> None:
     # a trajectory is poses that the robot's joints can reach: what is commanded, no physics
     files = [p for p in (ROOT / "crosscheck" / folder).glob("*.py") if p.stem != "trajectory"]
     taken = {t for path in files for t in imports(path) if t.startswith("seecr.")}
-    commands = {"seecr.setup", "seecr.setup.Commands"}
+    commands = {"seecr.commands", "seecr.commands.Commands"}
     assert {t for t in taken if place(t) not in DESCRIPTION} <= commands
     text = "".join(path.read_text(encoding="utf-8") for path in files)
     assert "edit_setup" not in text and "edit_readings" not in text
@@ -144,10 +144,14 @@ def test_rerun_is_imported_by_recordings_alone() -> None:
 
 
 def test_compiled_modules_import_numba_and_nobody_else_does() -> None:
-    users = {name_of(p) for p in modules("seecr") + modules("crosscheck") if uses(p, "numba")}
-    extra = {"seecr.history", "seecr.response"}
-    assert {name for name in users if not name.startswith("seecr.compiled.")} <= extra
-    assert "seecr.compiled.law" in users
+    users = [name_of(p) for p in modules("seecr") + modules("crosscheck") if uses(p, "numba")]
+    assert users == ["seecr.compiled.jit"]
+
+
+def test_what_is_compiled_takes_arrays_alone() -> None:
+    taken = {t for path in modules("seecr/compiled") for t in imports(path)}
+    assert {t.split(".")[0] for t in taken} == {"__future__", "math", "numba", "numpy", "seecr"}
+    assert {place(t) for t in taken if t.startswith("seecr")} == {"seecr.compiled"}
 
 
 @pytest.mark.parametrize("module", ["seecr", "crosscheck", "crosscheck.cli", "seecr.robot"])

@@ -6,7 +6,9 @@ import os
 from pathlib import Path
 
 import pytest
-from stale import COMPILED, forget_stale
+from stale import forget_stale
+
+COMPILED = ("law", "descent", "walk")
 
 
 def package(folder: Path, compiled_at: float) -> list[Path]:
@@ -17,9 +19,9 @@ def package(folder: Path, compiled_at: float) -> list[Path]:
     for path in kept:
         path.touch()
         os.utime(path, (compiled_at, compiled_at))
+    (folder / "compiled").mkdir()
     for name in COMPILED:
-        source = folder / f"{name}.py"
-        source.parent.mkdir(exist_ok=True)
+        source = folder / "compiled" / f"{name}.py"
         source.touch()
         os.utime(source, (1000.0, 1000.0))
     return kept
@@ -33,6 +35,6 @@ def test_what_is_newer_than_its_sources_is_kept(tmp_path: Path) -> None:
 @pytest.mark.parametrize("edited", COMPILED)
 def test_an_edit_of_any_compiled_file_forgets_all(tmp_path: Path, edited: str) -> None:
     kept = package(tmp_path, 2000.0)
-    os.utime(tmp_path / f"{edited}.py", (3000.0, 3000.0))
+    os.utime(tmp_path / "compiled" / f"{edited}.py", (3000.0, 3000.0))
     assert sorted(forget_stale(tmp_path)) == sorted(kept)
     assert not any(path.exists() for path in kept)

@@ -43,7 +43,7 @@ jobs_option = click.option(
     metavar="N",
     help="How many at a time.  [default: one a processor]",
 )
-"""``--jobs N``, given to the command as ``jobs``; None means :func:`processors`."""
+"""``--jobs N``, given to the command as ``jobs``; None means :func:`seecr.threads.processors`."""
 
 seed_option = click.option(
     "--seed",
@@ -54,15 +54,6 @@ seed_option = click.option(
     help="Of the random numbers.",
 )
 """``--seed N``, given to the command as ``seed``."""
-
-
-def processors() -> int:
-    """Processors that this process may use."""
-    import os
-
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 @contextmanager

@@ -15,10 +15,10 @@ from crosscheck.cli.options import (
     jobs_option,
     json_option,
     out_option,
-    processors,
     progress_bar,
     seed_option,
 )
+from seecr.threads import processors
 
 if TYPE_CHECKING:
     from crosscheck.suite.cases import Case

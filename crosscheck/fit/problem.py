@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.units import in_unit
+from seecr.commands import Commands
 from seecr.effects.base import Readings
 from seecr.experiment import Experiment, Prediction
 from seecr.pose import (
@@ -31,7 +32,6 @@ from seecr.pose import (
 )
 from seecr.robot import Robot
 from seecr.sensitivity import length_sensitivities
-from seecr.setup import Commands
 
 # Columns of a residual row: position, orientation, then tensions.
 POSITION, ORIENTATION, TENSION = slice(0, 3), slice(3, 6), slice(6, None)

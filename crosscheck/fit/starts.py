@@ -18,12 +18,13 @@ from crosscheck.fit.gauss_newton import Fit
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.state import State, derivatives
 from seecr import statics
-from seecr.compiled import descent as kernel
+from seecr.compiled.outcomes import CONVERGED
 from seecr.effects import Term, Terms
 from seecr.effects.base import Effect, Layout
 from seecr.experiment import Prediction
 from seecr.pose import Array, pose_add, pose_difference
 from seecr.sensitivity import motion_of, sensitivities
+from seecr.tables import assemble
 
 # Steps of Gauss-Newton; halvings of a step that does not pay.
 _STEPS, _HALVINGS = 12, 5
@@ -204,7 +205,7 @@ class _Forces:
         setup = experiment.setup(effects)
         if setup.has_history:
             return np.inf, np.zeros(0), None
-        tables = statics.assemble(setup)
+        tables = assemble(setup)
         n, m = tables.cables.shape[:2]
         start = statics.Evaluation.empty(n, m, tables.n_dof)
         start.deviation[:] = statics.deviations(tables, self.poses)
@@ -212,7 +213,7 @@ class _Forces:
         found.deviation[:] = start.deviation
         # where a law has no answer the numbers are what was left of trying
         size = np.where(np.isfinite(found.hessian), np.abs(found.hessian), np.inf)
-        broken = (found.outcome != kernel.CONVERGED) | (size.max(axis=(1, 2)) > _ABSURD)
+        broken = (found.outcome != CONVERGED) | (size.max(axis=(1, 2)) > _ABSURD)
         if np.any(broken & self.rows):
             return np.inf, np.zeros(0), None
         found.hessian[broken], found.gradient[broken] = 0.0, 0.0

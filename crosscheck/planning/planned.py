@@ -11,7 +11,7 @@ from crosscheck.fit.candidates import null_fit
 from crosscheck.fit.gauss_newton import Fit
 from crosscheck.fit.problem import Problem
 from crosscheck.measurements.data import Measurements, Sigma
-from seecr.compiled import law as cable_law
+from seecr.compiled.columns import REST, STRAIN, TENSION
 from seecr.effects import Terms
 from seecr.pose import Array
 from seecr.robot import Robot
@@ -103,9 +103,9 @@ def _with_readings(
 def near_slack(plan: Planned) -> list[tuple[int, int]]:
     """Rows and cables about to go slack or taut: there small errors change what pulls."""
     states = plan.base.state.prediction.found.states
-    rest = plan.base.state.prediction.tables.cables[..., cable_law.REST]
-    stretch = states[..., cable_law.STRAIN] * rest
-    taut = states[..., cable_law.TENSION] > 0
+    rest = plan.base.state.prediction.tables.cables[..., REST]
+    stretch = states[..., STRAIN] * rest
+    taut = states[..., TENSION] > 0
     if not taut.any():
         return []
     usual = float(np.mean(stretch[taut]))

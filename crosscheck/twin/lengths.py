@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from crosscheck.errors import CrosscheckError
 from crosscheck.twin.robot import TrueRobot
 from crosscheck.twin.world import World
+from seecr.commands import Commands
 from seecr.pose import Array, pose_add, pose_difference, transform_points
-from seecr.setup import Commands
 
 WAYPOINTS = (12, 4)
 """Points looked at on the way to the first row of a run, and from row to row."""

@@ -23,10 +23,10 @@ from crosscheck.twin.hidden import Hidden, choose
 from crosscheck.twin.measure import Truth, measure
 from crosscheck.twin.sealed import NAME, seal
 from crosscheck.twin.trajectory import Trajectory, trajectory
+from seecr.commands import Commands
 from seecr.mjcf import load_robot
 from seecr.pose import Array, pose_difference, quat_from_rotvec, quat_multiply
 from seecr.robot import Robot
-from seecr.setup import Commands
 
 # Noise of a tracker, over the mean cable length (30 micrometres on a DemoBot), and of its angles.
 _POSITION, _ORIENTATION_RAD = 6e-5, 3.5e-4

@@ -1,1 +1,1 @@
-"""All that numba compiles: arrays in, arrays out."""
+"""All that is compiled by numba: arrays in, arrays out, and nothing of the rest of seecr."""

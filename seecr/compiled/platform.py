@@ -1,13 +1,12 @@
-"""Wrench, stiffness and energy of a platform on its cables, compiled: one pose at a time.
+"""Wrench, stiffness and energy of a platform on its cables, one pose at a time.
 
 A pose is kept as the deviation from its commanded pose: a displacement of the platform origin
 [m] and a rotation from the left, as a quaternion whose small vector part keeps its digits.
 Rotations enter the equations multiplied by the robot's length, so that all components of a
 gradient are newtons and all steps are metres.
 
-A free platform steps in (translation, rotation vector), both in the base frame. A platform on
-slide and hinge joints steps in its joint values, times the length for hinges: the first joint
-is the outermost, as in MJCF.
+A free platform steps in (translation, rotation vector), both in the base frame; one on joints as
+:mod:`seecr.compiled.joints` says.
 """
 
 from __future__ import annotations
@@ -15,16 +14,20 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
-from seecr.compiled.law import (
+from seecr.compiled.cable import cable_pull
+from seecr.compiled.columns import (
     ANCHOR,
+    CENTRE_OF_MASS,
     COMPLIANCE,
     CREEP,
     CREEP_RATE,
     EA,
     ENERGY,
     EXIT,
+    EXTERNAL_FORCE,
+    EXTERNAL_MOMENT,
+    FORCE_OF_WEIGHT,
     GAP,
     HYSTERESIS_NOW,
     RADIUS,
@@ -32,17 +35,17 @@ from seecr.compiled.law import (
     SLACK,
     STRAIN,
     TENSION,
+    UP,
     WEIGHT,
     WINCH_SIDE,
     WINCH_TENSION,
-    cable_pull,
-    is_linear,
 )
+from seecr.compiled.jit import jit
+from seecr.compiled.joints import joint_columns, onto_joints, place_joints
+from seecr.compiled.law import is_linear
+from seecr.compiled.rotation import rotated_less
 
-# Entries of the load of a pose.
-FORCE_OF_WEIGHT, CENTRE_OF_MASS, EXTERNAL_FORCE, EXTERNAL_MOMENT, UP = 0, 3, 6, 9, 12
-N_LOAD = 15
-# Columns of what stays as the platform moves (see prepare), a row a cable and one for the load:
+# Columns of what stays as the platform moves (see prepare), one row per cable and one for the load:
 # arm of the anchor point and the point itself at the commanded pose, its distance to the exit
 # point, and where the law is a linear spring its strain per stretch [1/m] and stiffness [N/m],
 # else 0.
@@ -51,93 +54,15 @@ N_READY = 9
 # Rows of scratch that evaluate needs.
 N_WORK = 32
 
-_jit = njit(cache=True, nogil=True, error_model="numpy")
 
-
-@_jit
-def _rotated_less(w, x, y, z, a, b, c):
-    cx, cy, cz = y * c - z * b, z * a - x * c, x * b - y * a
-    return (
-        2.0 * (w * cx + y * cz - z * cy),
-        2.0 * (w * cy + z * cx - x * cz),
-        2.0 * (w * cz + x * cy - y * cx),
-    )
-
-
-@_jit
-def rotate_less(q, v, out):
-    """(R(q) - I) v for a unit quaternion: exact for small rotations."""
-    out[0], out[1], out[2] = _rotated_less(q[0], q[1], q[2], q[3], v[0], v[1], v[2])
-
-
-@_jit
-def _product(a, b, c, d, w, x, y, z):
-    return (
-        a * w - b * x - c * y - d * z,
-        a * x + b * w + c * z - d * y,
-        a * y - b * z + c * w + d * x,
-        a * z + b * y - c * x + d * w,
-    )
-
-
-@_jit
-def turned(x, y, z, a, b, c, d):
-    """exp(rotation vector) times a quaternion, of unit length."""
-    angle = math.sqrt(x * x + y * y + z * z)
-    half = 0.5 * angle
-    s = 0.5 if half < 1e-8 else math.sin(half) / angle
-    a, b, c, d = _product(math.cos(half), s * x, s * y, s * z, a, b, c, d)
-    inverse = 1.0 / math.sqrt(a * a + b * b + c * c + d * d)
-    return a * inverse, b * inverse, c * inverse, d * inverse
-
-
-@_jit
-def turn(rotvec, q, out):
-    """out = exp(rotvec) q, of unit length."""
-    out[0], out[1], out[2], out[3] = turned(rotvec[0], rotvec[1], rotvec[2], q[0], q[1], q[2], q[3])
-
-
-@_jit
-def place_joints(screws, values, length, origin, deviation, current):
-    """Deviation (7,) of a jointed platform, and its joints as they stand there.
-
-    The platform moves by E_1 E_2 ... E_n, E_j along or about joint j as it stands at the
-    commanded pose (product of exponentials); ``screws`` and ``current`` are (n, 7): kind (0
-    slide, 1 hinge), axis, point.
-    """
-    w, x, y, z = 1.0, 0.0, 0.0, 0.0
-    mx = my = mz = 0.0
-    ox, oy, oz = origin[0], origin[1], origin[2]
-    for j in range(screws.shape[0]):
-        ax, ay, az = screws[j, 1], screws[j, 2], screws[j, 3]
-        px, py, pz = screws[j, 4], screws[j, 5], screws[j, 6]
-        sx, sy, sz = _rotated_less(w, x, y, z, ax, ay, az)
-        nx, ny, nz = ax + sx, ay + sy, az + sz
-        current[j, 0], current[j, 1], current[j, 2], current[j, 3] = screws[j, 0], nx, ny, nz
-        sx, sy, sz = _rotated_less(w, x, y, z, px - ox, py - oy, pz - oz)
-        current[j, 4], current[j, 5], current[j, 6] = px + sx + mx, py + sy + my, pz + sz + mz
-        if screws[j, 0] == 0.0:
-            mx, my, mz = mx + nx * values[j], my + ny * values[j], mz + nz * values[j]
-            continue
-        angle = values[j] / length
-        a, b, c, d = turned(ax * angle, ay * angle, az * angle, 1.0, 0.0, 0.0, 0.0)
-        # the platform's origin goes round the hinge, as the joints before have turned that
-        sx, sy, sz = _rotated_less(a, b, c, d, ox - px, oy - py, oz - pz)
-        tx, ty, tz = _rotated_less(w, x, y, z, sx, sy, sz)
-        mx, my, mz = mx + sx + tx, my + sy + ty, mz + sz + tz
-        w, x, y, z = _product(w, x, y, z, a, b, c, d)
-    deviation[0], deviation[1], deviation[2] = mx, my, mz
-    deviation[3], deviation[4], deviation[5], deviation[6] = w, x, y, z
-
-
-@_jit
+@jit
 def prepare(cables, load, pose, ready):
     """Fill ``ready`` (m + 1, N_READY) with what stays as the platform moves from a command."""
     m = cables.shape[0]
     w, x, y, z = pose[3], pose[4], pose[5], pose[6]
     for i in range(m):
         a, b, c = cables[i, ANCHOR], cables[i, ANCHOR + 1], cables[i, ANCHOR + 2]
-        dx, dy, dz = _rotated_less(w, x, y, z, a, b, c)
+        dx, dy, dz = rotated_less(w, x, y, z, a, b, c)
         ready[i, ARM], ready[i, ARM + 1], ready[i, ARM + 2] = a + dx, b + dy, c + dz
         before = 0.0
         for k in range(3):
@@ -151,12 +76,12 @@ def prepare(cables, load, pose, ready):
             ready[i, YIELD] = 1.0 / (rest + ea * yields + cables[i, WINCH_SIDE])
             ready[i, RATE] = ea * ready[i, YIELD]
     a, b, c = load[CENTRE_OF_MASS], load[CENTRE_OF_MASS + 1], load[CENTRE_OF_MASS + 2]
-    dx, dy, dz = _rotated_less(w, x, y, z, a, b, c)
+    dx, dy, dz = rotated_less(w, x, y, z, a, b, c)
     ready[m, ARM], ready[m, ARM + 1], ready[m, ARM + 2] = a + dx, b + dy, c + dz
     ready[m, START], ready[m, START + 1], ready[m, START + 2] = pose[0], pose[1], pose[2]
 
 
-@_jit
+@jit
 def _linear_pull(cables, ready, i, stretch, states):
     """Tension [N] of a linear spring; fills its state."""
     elastic = stretch - cables[i, REST] * cables[i, CREEP]
@@ -168,7 +93,7 @@ def _linear_pull(cables, ready, i, stretch, states):
     return tension
 
 
-@_jit
+@jit
 def _add_point(ax, ay, az, fx, fy, fz, per, gradient, hessian):
     """Add a force on a platform point: to the gradient, and what bending its path adds.
 
@@ -190,49 +115,7 @@ def _add_point(ax, ay, az, fx, fy, fz, per, gradient, hessian):
     hessian[5, 4] -= 0.5 * (fy * az + fz * ay)
 
 
-@_jit
-def _joint_columns(current, x, y, z, per, columns):
-    """Motion (n, 6) of the platform origin, now at x, y, z, by the joints in scaled steps."""
-    for j in range(current.shape[0]):
-        a, b, c = current[j, 1], current[j, 2], current[j, 3]
-        if current[j, 0] == 0.0:
-            columns[j, 0], columns[j, 1], columns[j, 2] = a, b, c
-            columns[j, 3] = columns[j, 4] = columns[j, 5] = 0.0
-            continue
-        dx, dy, dz = x - current[j, 4], y - current[j, 5], z - current[j, 6]
-        columns[j, 0] = (b * dz - c * dy) * per
-        columns[j, 1] = (c * dx - a * dz) * per
-        columns[j, 2] = (a * dy - b * dx) * per
-        columns[j, 3], columns[j, 4], columns[j, 5] = a, b, c
-
-
-@_jit
-def _onto_joints(g, h, columns, per, gradient, hessian):
-    """From the platform's own gradient and stiffness to those of its joints.
-
-    Joint j moves on with each hinge i further out: the origin's motion v_j turns by a_i x v_j,
-    and the rotation vector of both has half of a_i x a_j to second order.
-    """
-    for j in range(gradient.shape[0]):
-        total = 0.0
-        for k in range(6):
-            total += g[k] * columns[j, k]
-        gradient[j] = total
-        vx, vy, vz = columns[j, 0], columns[j, 1], columns[j, 2]
-        ux, uy, uz = 0.5 * columns[j, 3], 0.5 * columns[j, 4], 0.5 * columns[j, 5]
-        for i in range(j + 1):
-            a, b, c = per * columns[i, 3], per * columns[i, 4], per * columns[i, 5]
-            total = g[0] * (b * vz - c * vy) + g[1] * (c * vx - a * vz) + g[2] * (a * vy - b * vx)
-            total += g[3] * (b * uz - c * uy) + g[4] * (c * ux - a * uz) + g[5] * (a * uy - b * ux)
-            for k in range(6):
-                part = 0.0
-                for r in range(6):
-                    part += h[k, r] * columns[i, r]
-                total += part * columns[j, k]
-            hessian[i, j] = hessian[j, i] = total
-
-
-@_jit
+@jit
 def _other_pull(cables, ready, load, i, dx, dy, dz, guess, work, states):
     """What a cable that is no linear spring does; see cable_pull. Fills work[12:19]."""
     start, move = work[14], work[15]
@@ -245,7 +128,7 @@ def _other_pull(cables, ready, load, i, dx, dy, dz, guess, work, states):
     )  # fmt: skip
 
 
-@_jit
+@jit
 def _evaluate(
     cables, ready, load, deviation, length, guess, gradient, hessian, states, slopes, work
 ):
@@ -261,7 +144,7 @@ def _evaluate(
     mxx = mxy = mxz = myx = myy = myz = mzx = mzy = mzz = 0.0
     for i in range(m):
         ax, ay, az = ready[i, ARM], ready[i, ARM + 1], ready[i, ARM + 2]
-        dx, dy, dz = _rotated_less(w, x, y, z, ax, ay, az)
+        dx, dy, dz = rotated_less(w, x, y, z, ax, ay, az)
         ax, ay, az = (ax + dx) * per, (ay + dy) * per, (az + dz) * per
         dx, dy, dz = dx + px, dy + py, dz + pz
         if ready[i, YIELD] > 0.0:
@@ -328,7 +211,7 @@ def _evaluate(
     h[3, 3], h[4, 3], h[4, 4], h[5, 3], h[5, 4], h[5, 5] = rxx, rxy, ryy, rxz, ryz, rzz
     # the weight acts at the centre of mass, the external force at the platform origin
     ax, ay, az = ready[m, ARM], ready[m, ARM + 1], ready[m, ARM + 2]
-    dx, dy, dz = _rotated_less(w, x, y, z, ax, ay, az)
+    dx, dy, dz = rotated_less(w, x, y, z, ax, ay, az)
     fx, fy, fz = load[FORCE_OF_WEIGHT], load[FORCE_OF_WEIGHT + 1], load[FORCE_OF_WEIGHT + 2]
     ax, ay, az = (ax + dx) * per, (ay + dy) * per, (az + dz) * per
     _add_point(ax, ay, az, fx, fy, fz, per, gradient, hessian)
@@ -344,7 +227,7 @@ def _evaluate(
     return np.nan if has_moment(load) else energy
 
 
-@_jit
+@jit
 def evaluate(
     cables, ready, load, deviation, current, length, guess, gradient, hessian, states, slopes, work
 ):
@@ -377,8 +260,8 @@ def evaluate(
     x = ready[m, START] + deviation[0]
     y, z = ready[m, START + 1] + deviation[1], ready[m, START + 2] + deviation[2]
     energy = _evaluate(cables, ready, load, deviation, length, guess, g, h, states, own, work)
-    _joint_columns(current, x, y, z, 1.0 / length, columns)
-    _onto_joints(g, h, columns, 1.0 / length, gradient, hessian)
+    joint_columns(current, x, y, z, 1.0 / length, columns)
+    onto_joints(g, h, columns, 1.0 / length, gradient, hessian)
     for i in range(m):
         for j in range(n):
             slopes[i, j] = 0.0
@@ -387,14 +270,33 @@ def evaluate(
     return energy
 
 
-@_jit
+@jit
+def evaluate_batch(
+    cables, load, poses, screws, deviation, values, length,
+    gradient, hessian, states, slopes, energy, guess,
+):  # fmt: skip
+    """Wrench and stiffness at given deviations; all outputs are filled."""
+    work = np.empty((N_WORK, 6))
+    ready = np.zeros((cables.shape[1] + 1, N_READY))
+    current = np.zeros((screws.shape[1], 7))
+    for i in range(poses.shape[0]):
+        prepare(cables[i], load[i], poses[i], ready)
+        if screws.shape[1] > 0:
+            place_joints(screws[i], values[i], length, poses[i], deviation[i], current)
+        energy[i] = evaluate(
+            cables[i], ready, load[i], deviation[i], current, length, guess[i],
+            gradient[i], hessian[i], states[i], slopes[i], work,
+        )  # fmt: skip
+
+
+@jit
 def has_moment(load):
     """Whether an external moment acts: it has no potential."""
     k = EXTERNAL_MOMENT
     return load[k] != 0.0 or load[k + 1] != 0.0 or load[k + 2] != 0.0
 
 
-@_jit
+@jit
 def add_skew(load, current, length, matrix):
     """Add to the symmetric part of the stiffness what a constant moment skews it by.
 

@@ -13,14 +13,7 @@ import numpy as np
 from seecr.effects.base import PLACES, Effect, Readings
 from seecr.errors import InputError
 from seecr.pose import Array
-from seecr.setup import Setup
-
-_NUMBERS_OF_A_SETUP = (
-    "exit_points", "anchor_points", "zero_pose", "pulley_radius", "length_gain", "extra_length",
-    "length_factor", "backlash", "ea", "quadratic", "cubic", "winch_side", "compliance",
-    "cable_weight", "friction", "hysteresis", "hysteresis_stretch", "creep", "creep_time", "mass",
-    "centre_of_mass", "gravity", "wrench",
-)  # fmt: skip
+from seecr.setup import QUANTITIES, Setup
 
 
 def check_class(effect: type[Effect], where: str) -> None:
@@ -58,13 +51,11 @@ def edit_setup(effect: Effect, setup: Setup) -> None:
     if is_built_in(type(effect)):
         effect.edit_setup(setup)
         return
-    shapes = {name: np.shape(getattr(setup, name)) for name in _NUMBERS_OF_A_SETUP}
     effect.edit_setup(setup)
-    for name, shape in shapes.items():
+    for name, item in QUANTITIES.items():
         value = _finite(getattr(setup, name), f"effect {effect.name} leaves setup.{name}")
-        if value.shape != shape and not (
-            name == "length_factor" and value.shape == setup.extra_length.shape
-        ):
+        shape = item.shape_of(setup.robot, len(setup.commands))
+        if value.shape != shape:
             raise InputError(
                 f"effect {effect.name} leaves setup.{name} of shape {value.shape}; expected {shape}"
             )

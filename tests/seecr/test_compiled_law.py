@@ -10,7 +10,27 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq, root
 
-from seecr.compiled import law
+from seecr.compiled import columns
+from seecr.compiled.cable import cable_pull
+from seecr.compiled.catenary import catenary_span
+from seecr.compiled.columns import (
+    CREEP,
+    EA,
+    ENERGY,
+    GAP,
+    HYSTERESIS_BEFORE,
+    HYSTERESIS_STRETCH,
+    N_COLUMNS,
+    N_STATE,
+    REST,
+    SLACK,
+    STRAIN,
+    STRETCH_BEFORE,
+    TENSION,
+    WINCH_TENSION,
+)
+from seecr.compiled.law import dahl, winch_tension
+from seecr.compiled.pulley import geometric_length, pulley_geometry
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -28,26 +48,26 @@ class Pull:
 
     @property
     def tension(self) -> float:
-        return float(self.state[law.TENSION])
+        return float(self.state[TENSION])
 
 
-def cable(**columns: Any) -> np.ndarray:
+def cable(**values: Any) -> np.ndarray:
     """A row of the table: E S = 1000 N, 2 m, from the origin of the base frame."""
-    row = np.zeros(law.N_COLUMNS)
-    row[law.EA], row[law.REST] = 1000.0, 2.0
-    row[law.HYSTERESIS_STRETCH] = 1.0
-    for name, value in columns.items():
-        row[getattr(law, name)] = value
+    row = np.zeros(N_COLUMNS)
+    row[EA], row[REST] = 1000.0, 2.0
+    row[HYSTERESIS_STRETCH] = 1.0
+    for name, value in values.items():
+        row[getattr(columns, name)] = value
     return row
 
 
 def pull(row: np.ndarray, anchor: Any, move: Any = (0.0, 0.0, 0.0)) -> Pull:
     """The law with the anchor at ``anchor`` + ``move``, the former being the command."""
     row, start = row.copy(), np.array(anchor, float)
-    row[law.GAP] = law.geometric_length(row, start, UP) - row[law.REST]
+    row[GAP] = geometric_length(row, start, UP) - row[REST]
     force, slope, guess = np.zeros(3), np.zeros(3), np.zeros(3)
-    stiffness, state, work = np.zeros((3, 3)), np.zeros(law.N_STATE), np.zeros((28, 3))
-    ok = law.cable_pull(
+    stiffness, state, work = np.zeros((3, 3)), np.zeros(N_STATE), np.zeros((28, 3))
+    ok = cable_pull(
         row, start, np.array(move, float), UP, guess, work, force, stiffness, slope, state
     )
     return Pull(force, stiffness, slope, state, guess, ok)
@@ -81,7 +101,7 @@ KINDS: dict[str, dict[str, float]] = {
 def test_stiffness_and_slope_against_differences(kind: str, below: float) -> None:
     row = cable(**KINDS[kind])
     for stretch in (0.01, 1e-5, -0.05):  # taut, barely, slack
-        anchor = in_direction(below, row[law.REST] * (1 + row[law.CREEP]) + stretch)
+        anchor = in_direction(below, row[REST] * (1 + row[CREEP]) + stretch)
         here = pull(row, anchor)
         assert here.ok
         size = 1e-7
@@ -102,7 +122,7 @@ def test_force_is_the_gradient_of_the_energy(kind: str) -> None:
     here = pull(row, anchor)
     for k in range(3):
         step = 1e-5 * np.eye(3)[k]
-        energies = [pull(row, anchor, s).state[law.ENERGY] for s in (step, -step)]
+        energies = [pull(row, anchor, s).state[ENERGY] for s in (step, -step)]
         assert -(energies[0] - energies[1]) / 2e-5 == pytest.approx(here.force[k], rel=1e-7)
 
 
@@ -115,7 +135,7 @@ def test_tension_is_equation_10_and_never_pushes() -> None:
     assert taut.force == pytest.approx([0, 0, 10.0], rel=1e-13)
     assert taut.stiffness == pytest.approx(np.diag([10 / 2.02, 10 / 2.02, 500.0]), rel=1e-12)
     assert slack.tension == 0.0 and not np.any(slack.force) and not np.any(slack.stiffness)
-    assert (taut.state[law.SLACK], slack.state[law.SLACK]) == (0.0, 1.0)
+    assert (taut.state[SLACK], slack.state[SLACK]) == (0.0, 1.0)
 
 
 def test_a_stiff_cable_keeps_the_digits_of_a_tiny_stretch() -> None:
@@ -143,7 +163,7 @@ def test_a_curved_law_is_met_at_its_strain() -> None:
             tension = 1000 * (strain + 3 * sign * strain**2 + 40 * strain**3)
             found = pull(row, [2.0 * (1 + strain) + 2e-4 * tension, 0, 0])
             assert found.tension == pytest.approx(tension, rel=1e-9)
-            assert found.state[law.STRAIN] == pytest.approx(strain, rel=1e-9)
+            assert found.state[STRAIN] == pytest.approx(strain, rel=1e-9)
 
 
 # --- pulley (contracts: a swivelling pulley) ---------------------------------------------------
@@ -178,7 +198,7 @@ def brute_pulley(across: float, rise: float, r: float) -> tuple[float, np.ndarra
 @pytest.mark.parametrize("place", [(1.0, -0.5), (0.9, 0.3), (0.5, -2.0), (2.0, 0.0), (0.41, -1.0)])
 def test_pulley_by_search(place: tuple[float, float], r: float) -> None:
     length, direction = brute_pulley(*place, r)
-    whole, free, tx, tz = law.pulley_geometry(*place, r)
+    whole, free, tx, tz = pulley_geometry(*place, r)
     assert whole == pytest.approx(length, rel=1e-12)
     assert [tx, tz] == pytest.approx(direction, abs=1e-12)
     assert free == pytest.approx(np.sqrt((place[0] - r) ** 2 + place[1] ** 2 - r**2), rel=1e-12)
@@ -186,8 +206,8 @@ def test_pulley_by_search(place: tuple[float, float], r: float) -> None:
 
 def test_pulley_of_no_radius_is_no_pulley() -> None:
     for place in ((1.0, -0.5), (0.5, 0.7)):
-        assert law.pulley_geometry(*place, 0.0)[0] == pytest.approx(np.hypot(*place), rel=1e-15)
-    differences = [law.pulley_geometry(1.0, -0.5, r)[0] - np.hypot(1, 0.5) for r in (1e-3, 1e-5)]
+        assert pulley_geometry(*place, 0.0)[0] == pytest.approx(np.hypot(*place), rel=1e-15)
+    differences = [pulley_geometry(1.0, -0.5, r)[0] - np.hypot(1, 0.5) for r in (1e-3, 1e-5)]
     assert differences[0] / differences[1] == pytest.approx(100, rel=0.01)
 
 
@@ -225,12 +245,12 @@ HANGING = [(50.0, 3.0), (5.0, 0.2), (5.0, -0.9), (0.5, -0.3), (0.05, -0.4), (2.0
 
 @pytest.mark.parametrize(("h", "v"), HANGING)
 def test_span_of_a_catenary_by_quadrature(h: float, v: float) -> None:
-    x, z, xh, xv, zv, xl, zl = law.catenary_span(h, v, 0.4, 2.0, 1000.0)
+    x, z, xh, xv, zv, xl, zl = catenary_span(h, v, 0.4, 2.0, 1000.0)
     assert (x, z) == pytest.approx(irvine(h, v, 0.4, 2.0, 1000.0), rel=1e-10, abs=1e-11)
     at = np.array([h, v, 0.4, 2.0])
     for k, column in ((0, (xh, xv)), (1, (xv, zv)), (3, (xl, zl))):
         step = 1e-6 * np.eye(4)[k]
-        ahead, behind = (law.catenary_span(*there, 1000.0) for there in (at + step, at - step))
+        ahead, behind = (catenary_span(*there, 1000.0) for there in (at + step, at - step))
         slope = (np.array(ahead[:2]) - behind[:2]) / 2e-6
         assert slope == pytest.approx(column, rel=1e-6, abs=1e-8 * max(1.0, abs(xh)))
 
@@ -256,7 +276,7 @@ def test_catenary_between_two_points_by_quadrature(below: float, chord: float) -
     assert np.hypot(*found.force[:2]) == pytest.approx(h, rel=1e-6)
     assert found.force[2] == pytest.approx(v, rel=1e-6, abs=1e-8)
     assert found.tension == pytest.approx(np.hypot(h, v + 0.4 * 2.0), rel=1e-6)
-    assert found.state[law.SLACK] == float(chord < 2.0)
+    assert found.state[SLACK] == float(chord < 2.0)
 
 
 def test_the_weight_of_a_hanging_cable_is_shared_by_its_ends() -> None:
@@ -304,8 +324,8 @@ def follow(strains: np.ndarray, amplitude: float, turning: float) -> np.ndarray:
     row = cable(HYSTERESIS=amplitude, HYSTERESIS_STRETCH=turning)
     z = []
     for strain in strains:
-        z.append(law.dahl(row, strain)[0])
-        row[law.STRETCH_BEFORE], row[law.HYSTERESIS_BEFORE] = strain * row[law.REST], z[-1]
+        z.append(dahl(row, strain)[0])
+        row[STRETCH_BEFORE], row[HYSTERESIS_BEFORE] = strain * row[REST], z[-1]
     return np.array(z)
 
 
@@ -338,7 +358,7 @@ def test_dahl_loop_area_in_closed_form() -> None:
 
 
 def test_no_amplitude_no_hysteresis() -> None:
-    assert law.dahl(cable(STRETCH_BEFORE=0.1, HYSTERESIS_BEFORE=3.0), 0.01) == (0.0, 0.0)
+    assert dahl(cable(STRETCH_BEFORE=0.1, HYSTERESIS_BEFORE=3.0), 0.01) == (0.0, 0.0)
 
 
 def test_capstan_band() -> None:
@@ -353,8 +373,8 @@ def test_capstan_band() -> None:
         (5.0, 5.0 * grip, grip),
         (0.0, 0.0, grip),
     ):
-        assert law.winch_tension(row, tension) == pytest.approx((behind, slope), rel=1e-14)
-    assert law.winch_tension(cable(STUCK=10.0), 3.0) == (3.0, 1.0)
+        assert winch_tension(row, tension) == pytest.approx((behind, slope), rel=1e-14)
+    assert winch_tension(cable(STUCK=10.0), 3.0) == (3.0, 1.0)
 
 
 def test_friction_holds_the_stretch_behind_the_exit_point() -> None:
@@ -364,8 +384,8 @@ def test_friction_holds_the_stretch_behind_the_exit_point() -> None:
     for tension in (9.0, 11.0):
         found = pull(row, [2.0 * (1 + tension / 1000) + behind, 0, 0])
         assert found.tension == pytest.approx(tension, rel=1e-9)
-        assert found.state[law.WINCH_TENSION] == 10.0
+        assert found.state[WINCH_TENSION] == 10.0
         assert found.slope[0] == pytest.approx(1000 / 2.0, rel=1e-6)
     slipping = pull(row, [2.0 * 1.03 + 1.5 * 30 * np.exp(-0.2) / 1000, 0, 0])
     assert slipping.tension == pytest.approx(30.0, rel=1e-9)
-    assert slipping.state[law.WINCH_TENSION] == pytest.approx(30 * np.exp(-0.2), rel=1e-9)
+    assert slipping.state[WINCH_TENSION] == pytest.approx(30 * np.exp(-0.2), rel=1e-9)

@@ -9,20 +9,25 @@ import pytest
 from random_robots import KINDS, random_poses, random_robot
 
 from seecr import statics
-from seecr.compiled import descent as kernel
-from seecr.compiled import law as cable_law
+from seecr.commands import Commands
+from seecr.compiled.algebra import cholesky
+from seecr.compiled.columns import GAP, REST, STRAIN, TENSION
+from seecr.compiled.joints import place_joints
+from seecr.compiled.rotation import rotated_less, turned
+from seecr.compiled.steps import residual_size
 from seecr.joints import pose_of_values
 from seecr.pose import pose_add, pose_difference, quat_from_rotvec, quat_multiply
 from seecr.robot import Robot
-from seecr.setup import Commands, plain_setup
+from seecr.setup import plain_setup
 from seecr.statics import Evaluation, Tables
+from seecr.tables import assemble
 
 
 def tables_of(robot: Robot, poses: np.ndarray, **changes: object) -> Tables:
     setup = plain_setup(robot, Commands(poses))
     for name, value in changes.items():
         setattr(setup, name, value)
-    return statics.assemble(setup)
+    return assemble(setup)
 
 
 def at(tables: Tables, steps: np.ndarray) -> Evaluation:
@@ -56,8 +61,7 @@ def after(tables: Tables, first: np.ndarray, then: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("angle", [1e-300, 1e-17, 1e-9, 1e-3, 1.0, 3.0])
 def test_a_small_rotation_keeps_all_its_digits(angle: float) -> None:
-    out, vector = np.empty(3), np.array([3.0, -2.0, 5.0])
-    kernel.rotate_less(quat_from_rotvec(np.array([0, 0, angle])), vector, out)
+    out = rotated_less(*quat_from_rotvec(np.array([0, 0, angle])), 3.0, -2.0, 5.0)
     less, sine = -2.0 * np.sin(angle / 2) ** 2, np.sin(angle)
     expected = [3 * less + 2 * sine, 3 * sine - 2 * less, 0.0]
     assert out == pytest.approx(expected, rel=1e-14, abs=0)
@@ -65,10 +69,9 @@ def test_a_small_rotation_keeps_all_its_digits(angle: float) -> None:
 
 def test_turning_multiplies_from_the_left() -> None:
     q = quat_from_rotvec(np.array([0.3, -0.5, 0.2]))
-    out = np.empty(4)
     for rotvec in (np.array([1e-10, 2e-10, 0]), np.array([0.4, 1.0, -2.0]), np.zeros(3)):
-        kernel.turn(rotvec, q, out)
-        assert out == pytest.approx(quat_multiply(quat_from_rotvec(rotvec), q), abs=1e-15)
+        expected = quat_multiply(quat_from_rotvec(rotvec), q)
+        assert turned(*rotvec, *q) == pytest.approx(expected, abs=1e-15)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -80,7 +83,7 @@ def test_joints_move_the_platform_as_the_product_of_exponentials(seed: int) -> N
     expected, now = pose_of_values(robot, first + step)
     unit = np.array([robot.length if j.kind == "hinge" else 1.0 for j in robot.joints])
     deviation, current = np.empty(7), np.empty_like(screws[0])
-    kernel.place_joints(screws[0], step * unit, robot.length, pose[0, :3], deviation, current)
+    place_joints(screws[0], step * unit, robot.length, pose[0, :3], deviation, current)
     moved = np.concatenate([pose[0, :3] + deviation[:3],
                             quat_multiply(deviation[3:], pose[0, 3:])])  # fmt: skip
     assert pose_difference(moved, expected[0]) == pytest.approx(np.zeros(6), abs=1e-13)
@@ -95,19 +98,19 @@ def test_cholesky_notices_what_is_not_positive_definite() -> None:
     root = rng.normal(size=(6, 6))
     definite = root @ root.T
     factor = np.zeros((6, 6))
-    assert kernel.cholesky(definite, 0.0, factor)
+    assert cholesky(definite, 0.0, factor)
     assert factor == pytest.approx(np.linalg.cholesky(definite), rel=1e-10)
     smallest = np.linalg.eigvalsh(definite)[0]
-    assert not kernel.cholesky(definite, -1.001 * smallest, factor)
-    assert kernel.cholesky(definite, -0.999 * smallest, factor)
-    assert not kernel.cholesky(np.full((2, 2), np.nan), 0.0, np.zeros((2, 2)))
+    assert not cholesky(definite, -1.001 * smallest, factor)
+    assert cholesky(definite, -0.999 * smallest, factor)
+    assert not cholesky(np.full((2, 2), np.nan), 0.0, np.zeros((2, 2)))
 
 
 def test_residual_is_the_larger_of_force_and_torque() -> None:
     gradient = np.array([3.0, 4, 0, 0, 0, 12])
-    assert kernel.residual_size(gradient) == 12.0
-    assert kernel.residual_size(gradient[::-1].copy()) == 12.0
-    assert kernel.residual_size(gradient[:3].copy()) == 5.0
+    assert residual_size(gradient) == 12.0
+    assert residual_size(gradient[::-1].copy()) == 12.0
+    assert residual_size(gradient[:3].copy()) == 5.0
     assert statics.residual_size(gradient[None])[0] == 12.0
     assert statics.residual_size(gradient[None, :3])[0] == 5.0
 
@@ -117,11 +120,11 @@ def test_residual_is_the_larger_of_force_and_torque() -> None:
 
 def near_slack(rng: np.random.Generator, tables: Tables, steps: np.ndarray) -> Tables:
     """The same, with the cables' stretch at ``steps`` a few hundred thousandths of nothing."""
-    stretch = at(tables, steps).states[..., cable_law.STRAIN] * tables.cables[..., cable_law.REST]
+    stretch = at(tables, steps).states[..., STRAIN] * tables.cables[..., REST]
     aim = 1e-5 * tables.length * rng.uniform(0.5, 1, stretch.shape)
     aim *= rng.choice([-1, 1], stretch.shape)
     cables = tables.cables.copy()
-    cables[..., cable_law.GAP] += aim - stretch
+    cables[..., GAP] += aim - stretch
     return replace(tables, cables=cables)
 
 
@@ -140,7 +143,7 @@ def test_gradient_and_stiffness_against_differences(kind: str, seed: int, slack:
         tables = near_slack(rng, tables, steps)
     here = at(tables, steps)
     if slack:
-        taut = here.states[..., cable_law.TENSION] > 0
+        taut = here.states[..., TENSION] > 0
         assert np.any(taut) and np.any(~taut)
     gradient, hessian = np.empty_like(here.gradient), np.empty_like(here.hessian)
     slopes = np.empty_like(here.slopes)
@@ -151,7 +154,7 @@ def test_gradient_and_stiffness_against_differences(kind: str, seed: int, slack:
         ahead, behind = (at(tables, after(tables, steps, s)) for s in (step, -step))
         gradient[:, k] = (ahead.energy - behind.energy) / (2 * size)
         hessian[:, :, k] = (ahead.gradient - behind.gradient) / (2 * size)
-        slopes[..., k] = (ahead.states - behind.states)[..., cable_law.TENSION] / (2 * size)
+        slopes[..., k] = (ahead.states - behind.states)[..., TENSION] / (2 * size)
     if not robot.joints:
         # a step from the left turns the frame in which torques are counted: half of it is not
         # the symmetric stiffness but the torque that is there

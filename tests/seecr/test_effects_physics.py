@@ -9,7 +9,8 @@ import pytest
 from effect_cases import experiment_of, moved, robot_of
 from random_robots import random_poses, random_robot
 
-from seecr.compiled.law import pulley_geometry
+from seecr.commands import Commands
+from seecr.compiled.pulley import pulley_geometry
 from seecr.effects import Effect, effect_named
 from seecr.equilibrium import solve
 from seecr.experiment import Experiment, Prediction
@@ -23,7 +24,7 @@ from seecr.pose import (
 )
 from seecr.robot import Robot
 from seecr.sensitivity import readings_difference
-from seecr.setup import Commands, plain_setup
+from seecr.setup import plain_setup
 
 STIFF = 1e7
 

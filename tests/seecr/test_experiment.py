@@ -6,17 +6,16 @@ import numpy as np
 import pytest
 from effect_cases import KINDS, experiment_of, random_effect
 
-from seecr import experiment as experiment_module
 from seecr import statics
-from seecr.compiled import descent as kernel
+from seecr.commands import Commands
+from seecr.compiled.outcomes import STALLED
 from seecr.effects import effect_named
 from seecr.equilibrium import Status, solve
 from seecr.errors import InputError
 from seecr.experiment import Experiment
-from seecr.history import walk
 from seecr.robot import Joint, Robot
 from seecr.sensitivity import readings_difference
-from seecr.setup import Commands, plain_setup
+from seecr.setup import plain_setup
 
 FAMILIES = [
     ("stiffness", "pulley_radius"),
@@ -93,14 +92,14 @@ def test_a_lost_waypoint_spoils_the_rows_after_it_in_its_run_alone(
 ) -> None:
     """What a row remembers is worth nothing if the way to it is not known."""
     experiment = experiment_of("demobot_cogiro")
-    path = experiment.path
+    path, walk = experiment.path, statics.walk
 
     def lose_one(*args: object) -> statics.Evaluation:
         found = walk(*args)  # type: ignore[arg-type]
-        found.outcome[path.rows[1] - 1] = kernel.STALLED  # on the way to the second row
+        found.outcome[path.rows[1] - 1] = STALLED  # on the way to the second row
         return found
 
-    monkeypatch.setattr(experiment_module, "walk", lose_one)
+    monkeypatch.setattr(statics, "walk", lose_one)
     found = experiment.predict([effect_named("backlash")(gap=1e-3)])
     assert found.solved.tolist() == [True, False, False, True, True, True]
 

@@ -8,13 +8,27 @@ import numpy as np
 import pytest
 from effect_cases import experiment_of, robot_of
 
+from seecr.commands import Commands, play
+from seecr.compiled.columns import (
+    EA,
+    FRICTION,
+    HYSTERESIS,
+    HYSTERESIS_BEFORE,
+    HYSTERESIS_STRETCH,
+    N_COLUMNS,
+    REST,
+    STRETCH_BEFORE,
+    STUCK,
+    TENSION,
+    WINCH_TENSION,
+)
+from seecr.compiled.law import dahl, winch_tension
 from seecr.effects import Effect, effect_named
 from seecr.experiment import Experiment, Prediction
 from seecr.joints import pose_of_values, values_of_pose
 from seecr.path import path_of
 from seecr.pose import pose_add, pose_difference
 from seecr.robot import Joint, Robot
-from seecr.setup import Commands, play
 from seecr.shipped import CABLES
 
 WEIGHT = 2 * 9.81
@@ -92,26 +106,26 @@ def test_lengths_move_evenly_too() -> None:
 
 def test_the_play_operator_lags_by_half_its_width_and_starts_centred() -> None:
     told = np.array([0.0, 1, 2, 3, 2.5, 2, 1, 0, 0.5, 5])[:, None]
-    run = np.array([0] * 9 + [1])
-    found = play(told, run, np.array([0.5]))[:, 0]
+    starts = np.array([True] + [False] * 8 + [True])
+    found = play(told, starts, np.array([0.5]))[:, 0]
     assert found.tolist() == [0.0, 0.5, 1.5, 2.5, 2.5, 2.5, 1.5, 0.5, 0.5, 5.0]
-    assert np.array_equal(play(told, run, np.zeros(1)), told)
+    assert np.array_equal(play(told, starts, np.zeros(1)), told)
 
 
 def test_the_play_operator_is_the_one_that_goes_row_by_row() -> None:
     rng = np.random.default_rng(0)
-    told, run = np.cumsum(rng.normal(size=(300, 3)), axis=0), np.repeat([4, 2, 7], 100)
+    told, starts = np.cumsum(rng.normal(size=(300, 3)), axis=0), np.arange(300) % 100 == 0
     half = np.array([0.0, 0.7, 20.0])
     expected = told.copy()
     for k in range(1, 300):
-        if run[k] == run[k - 1]:
+        if not starts[k]:
             near = np.maximum(expected[k - 1], told[k] - half)
             expected[k] = np.minimum(near, told[k] + half)
-    assert np.array_equal(play(told, run, half), expected)
+    assert np.array_equal(play(told, starts, half), expected)
     # every other row as what is passed between the others
     passed = np.stack([np.roll(told[1::2], 1, axis=0), told[::2]])
     passed[0, ::50] = told[::100]
-    assert np.array_equal(play(told[1::2], run[1::2], half, passed), expected[1::2])
+    assert np.array_equal(play(told[1::2], starts[::2], half, passed), expected[1::2])
 
 
 def paid_out(robot: Robot, commands: Commands, gap: float) -> np.ndarray:
@@ -235,24 +249,23 @@ def test_hysteresis_parts_the_sweeps_by_twice_its_amplitude_at_most() -> None:
 
 def test_dahls_law_is_followed_in_closed_form() -> None:
     """One hanging cable, told to pay out: z follows from the stretch alone."""
-    from seecr.compiled import law as cable_law
 
-    row = np.zeros(cable_law.N_COLUMNS)
-    row[cable_law.REST], row[cable_law.EA] = 1.0, 1000.0
-    row[cable_law.HYSTERESIS], row[cable_law.HYSTERESIS_STRETCH] = 2.0, 1e-3
-    up = cable_law.dahl(row, 5e-3)[0]
+    row = np.zeros(N_COLUMNS)
+    row[REST], row[EA] = 1.0, 1000.0
+    row[HYSTERESIS], row[HYSTERESIS_STRETCH] = 2.0, 1e-3
+    up = dahl(row, 5e-3)[0]
     assert up == pytest.approx(2.0 * (1 - np.exp(-5.0)), rel=1e-12)
-    row[cable_law.STRETCH_BEFORE], row[cable_law.HYSTERESIS_BEFORE] = 5e-3, up
-    down, slope = cable_law.dahl(row, 4e-3)
+    row[STRETCH_BEFORE], row[HYSTERESIS_BEFORE] = 5e-3, up
+    down, slope = dahl(row, 4e-3)
     assert down == pytest.approx(-2.0 + (up + 2.0) * np.exp(-1.0), rel=1e-12)
     assert slope == pytest.approx((2.0 + down) / 1e-3, rel=1e-12)  # dz/de = (A - s z)/stretch
-    far = cable_law.dahl(row, -1.0)[0]
+    far = dahl(row, -1.0)[0]
     assert far == pytest.approx(-2.0, abs=1e-12)  # it saturates
     # in two steps as in one, while the stretch goes one way
-    row[cable_law.STRETCH_BEFORE], row[cable_law.HYSTERESIS_BEFORE] = 4e-3, down
-    twice = cable_law.dahl(row, 2e-3)[0]
-    row[cable_law.STRETCH_BEFORE], row[cable_law.HYSTERESIS_BEFORE] = 5e-3, up
-    assert cable_law.dahl(row, 2e-3)[0] == pytest.approx(twice, rel=1e-12)
+    row[STRETCH_BEFORE], row[HYSTERESIS_BEFORE] = 4e-3, down
+    twice = dahl(row, 2e-3)[0]
+    row[STRETCH_BEFORE], row[HYSTERESIS_BEFORE] = 5e-3, up
+    assert dahl(row, 2e-3)[0] == pytest.approx(twice, rel=1e-12)
 
 
 @pytest.mark.parametrize("name, values", [
@@ -284,7 +297,6 @@ def test_forward_and_back_part_and_each_run_starts_anew(
 
 
 def test_the_tensions_about_an_exit_point_differ_by_the_capstans_factor_at_most() -> None:
-    from seecr.compiled import law as cable_law
 
     robot = robot_of("demobot_parallel")
     # far away, then to and fro by less and less: first all cables slip, in the end none
@@ -295,8 +307,8 @@ def test_the_tensions_about_an_exit_point_differ_by_the_capstans_factor_at_most(
         [effect("exit_friction", friction=0.15, length=0.4)]
     )
     assert np.all(found.solved)
-    front = found.found.states[..., cable_law.TENSION]
-    behind = found.found.states[..., cable_law.WINCH_TENSION]
+    front = found.found.states[..., TENSION]
+    behind = found.found.states[..., WINCH_TENSION]
     taut = (front > 1e-3).all(axis=0)
     assert taut.sum() >= 4
     every = np.abs(np.log(behind[:, taut] / front[:, taut]))
@@ -308,14 +320,13 @@ def test_the_tensions_about_an_exit_point_differ_by_the_capstans_factor_at_most(
 
 
 def test_a_cable_sticks_inside_the_capstans_band() -> None:
-    from seecr.compiled import law as cable_law
 
-    row = np.zeros(cable_law.N_COLUMNS)
-    row[cable_law.FRICTION], row[cable_law.STUCK] = 0.2, 10.0
+    row = np.zeros(N_COLUMNS)
+    row[FRICTION], row[STUCK] = 0.2, 10.0
     grip = np.exp(0.2)
-    assert cable_law.winch_tension(row, 9.0) == (10.0, 0.0)
-    assert cable_law.winch_tension(row, 8.0) == pytest.approx((8 * grip, grip))
-    assert cable_law.winch_tension(row, 13.0) == pytest.approx((13 / grip, 1 / grip))
+    assert winch_tension(row, 9.0) == (10.0, 0.0)
+    assert winch_tension(row, 8.0) == pytest.approx((8 * grip, grip))
+    assert winch_tension(row, 13.0) == pytest.approx((13 / grip, 1 / grip))
 
 
 def test_endless_friction_shuts_the_cable_behind_the_exit_point_off() -> None:

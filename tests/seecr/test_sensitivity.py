@@ -9,6 +9,7 @@ import pytest
 from effect_cases import KINDS, experiment_of, random_term, robot_of, worst_mismatch
 from random_robots import random_poses
 
+from seecr.commands import Commands
 from seecr.effects import Term, Terms, effect_named, layout_of
 from seecr.equilibrium import solve
 from seecr.experiment import Experiment
@@ -18,7 +19,6 @@ from seecr.sensitivity import (
     readings_difference,
     sensitivities,
 )
-from seecr.setup import Commands
 
 
 @pytest.mark.parametrize("kind", [*KINDS, "free", "planar", "jointed"])

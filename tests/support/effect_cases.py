@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from random_robots import random_poses, random_robot
 
+from seecr.commands import Commands
 from seecr.effects import Effect, Term, Terms, effect_named, layout_of
 from seecr.experiment import Experiment, Prediction
 from seecr.mjcf import load_robot
 from seecr.robot import Robot
 from seecr.sensitivity import readings_difference
-from seecr.setup import Commands
 from seecr.shipped import model_path
 
 # The last is commanded in lengths.

@@ -14,12 +14,12 @@ from crosscheck.cli import main
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.write import write_measurements
 from crosscheck.twin.trajectory import trajectory
+from seecr.commands import Commands
 from seecr.effects import Term, Terms, effect_named, layout_of
 from seecr.experiment import Experiment
 from seecr.mjcf import load_robot
 from seecr.pose import quat_from_rotvec, quat_multiply
 from seecr.robot import Robot
-from seecr.setup import Commands
 from seecr.shipped import model_path
 
 COGIRO = model_path("demobot_cogiro")

@@ -86,9 +86,9 @@ def one_angle() -> Diagnosis:
     rng = np.random.default_rng(4)
     angles = np.full((data.n_rows, 3), np.nan)
     angles[:, 1] = SIGMA.orientation_rad * rng.standard_normal(data.n_rows)
+    from seecr.commands import Commands
     from seecr.experiment import Experiment
     from seecr.pose import rxyz_from_quat
-    from seecr.setup import Commands
 
     exact = Experiment(robot(), Commands(data.command_pose)).predict().readings
     angles[:, 1] += rxyz_from_quat(exact.quat_wxyz)[:, 1]

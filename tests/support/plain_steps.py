@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
 
-from seecr.compiled.law import GAP
+from seecr.compiled.columns import GAP
 from seecr.equilibrium import Solution
 from seecr.robot import Robot
 

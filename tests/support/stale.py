@@ -7,14 +7,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-COMPILED = ("compiled/law", "compiled/platform", "compiled/descent", "history", "response")
-
 
 def forget_stale(package: Path) -> list[Path]:
     """Delete a package's compiled functions if one is older than a source; says which."""
     kept = [p for ending in ("nbi", "nbc") for p in package.rglob(f"__pycache__/*.{ending}")]
-    sources = [package / f"{name}.py" for name in COMPILED]
-    newest = max((p.stat().st_mtime for p in sources if p.exists()), default=0.0)
+    newest = max((p.stat().st_mtime for p in package.rglob("compiled/*.py")), default=0.0)
     if all(p.stat().st_mtime >= newest for p in kept):
         return []
     for path in kept:

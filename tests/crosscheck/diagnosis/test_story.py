@@ -12,11 +12,11 @@ import pytest
 from crosscheck.cli import main
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.write import write_measurements
+from seecr.commands import Commands
 from seecr.effects.geometry import PulleyRadius
 from seecr.experiment import Experiment
 from seecr.mjcf import load_robot
 from seecr.pose import Array, quat_from_rotvec, quat_multiply
-from seecr.setup import Commands
 from seecr.shipped import model_path
 
 POSITION, ORIENTATION = 3e-5, 3.5e-4

@@ -20,12 +20,12 @@ from crosscheck.twin.make import make_twin
 from crosscheck.twin.robot import TRUE_EFFECTS
 from crosscheck.twin.sealed import NAME, seal, unseal
 from crosscheck.twin.trajectory import trajectory
+from seecr.commands import Commands
 from seecr.effects import effect_named, layout_of
 from seecr.errors import InputError
 from seecr.experiment import Experiment
 from seecr.mjcf import load_robot
 from seecr.pose import pose_difference
-from seecr.setup import Commands
 from seecr.shipped import model_path
 
 COGIRO = model_path("demobot_cogiro")

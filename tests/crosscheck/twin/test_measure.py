@@ -20,11 +20,11 @@ from crosscheck.twin.measure import measure
 from crosscheck.twin.robot import TRUE_EFFECTS, true_robot
 from crosscheck.twin.springs import Springs
 from crosscheck.twin.world import World
+from seecr.commands import Commands
 from seecr.effects import BUILT_IN, Effect, effect_named, parameter
 from seecr.experiment import Experiment
 from seecr.mjcf import load_robot
 from seecr.pose import pose_difference, quat_from_rotvec
-from seecr.setup import Commands
 from seecr.shipped import model_path
 
 ROBOTS = ("demobot_cogiro", "demobot_parallel", "planar_vertical")

@@ -1,4 +1,4 @@
-"""What a change of the tables does at fixed poses: compiled, and of the changed cables alone.
+"""What a change of the tables does at fixed poses, evaluated for the changed cables alone.
 
 A parameter mostly changes a few cables. The others pull the same before and after, so only
 those whose rows differ are evaluated: both times, and subtracted.
@@ -7,66 +7,14 @@ those whose rows differ are evaluated: both times, and subtracted.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from seecr.compiled import law as cable_law
-from seecr.compiled.law import TENSION
-from seecr.compiled.platform import N_LOAD, N_READY, N_WORK, UP, evaluate, place_joints, prepare
-from seecr.pose import Array
-from seecr.statics import Evaluation, Tables, in_parts
-
-_jit = njit(cache=True, nogil=True, error_model="numpy")
+from seecr.compiled.columns import N_LOAD, N_STATE, TENSION, UP
+from seecr.compiled.jit import jit
+from seecr.compiled.joints import place_joints
+from seecr.compiled.platform import N_READY, N_WORK, evaluate, prepare
 
 
-def difference(plus: Tables, minus: Tables, at: Evaluation) -> tuple[Array, Array]:
-    """Gradient (n, d) [N] and tensions (n, m) [N] of ``plus`` less those of ``minus``.
-
-    Args:
-        plus, minus: tables of the same poses.
-        at: where the platform is; nothing is solved.
-    """
-    n, m = plus.cables.shape[:2]
-    gradient, tension = np.zeros((n, plus.n_dof)), np.zeros((n, m))
-
-    def run(part: slice) -> None:
-        _difference(
-            plus.cables[part], minus.cables[part], plus.load[part], minus.load[part],
-            plus.poses[part], plus.screws[part], at.deviation[part], at.values[part],
-            plus.length, at.guess[part], gradient[part], tension[part],
-        )  # fmt: skip
-
-    in_parts(run, n)
-    return _solved(gradient, tension, gradient)
-
-
-def by_cable(plus: Tables, minus: Tables, at: Evaluation) -> tuple[Array, Array]:
-    """The same cable by cable: gradient (n, d, m) [N] and each cable's own tension (n, m).
-
-    For tables in which every cable was changed, to have the derivatives by what each cable has
-    of its own at once. The load is taken to be the same in both.
-    """
-    n, m = plus.cables.shape[:2]
-    gradient, tension = np.zeros((n, m, plus.n_dof)), np.zeros((n, m))
-
-    def run(part: slice) -> None:
-        _by_cable(
-            plus.cables[part], minus.cables[part], plus.load[part], plus.poses[part],
-            plus.screws[part], at.deviation[part], at.values[part], plus.length, at.guess[part],
-            gradient[part], tension[part],
-        )  # fmt: skip
-
-    in_parts(run, n)
-    return _solved(np.swapaxes(gradient, 1, 2), tension, gradient.reshape(n, -1))
-
-
-def _solved(gradient: Array, tension: Array, failed: Array) -> tuple[Array, Array]:
-    """Nothing changes where a cable's own equations could not be solved beside the pose."""
-    lost = np.isnan(failed).any(axis=1)
-    gradient[lost], tension[lost] = 0.0, 0.0
-    return gradient, tension
-
-
-@_jit
+@jit
 def _pull(cables, ready, load, pose, deviation, current, length, guess, out, spare):
     """Gradient and states of a few cables, into ``out``; False where a law has no solution."""
     hessian, slopes, work, keep = spare
@@ -83,15 +31,16 @@ def _pull(cables, ready, load, pose, deviation, current, length, guess, out, spa
     return energy != np.inf
 
 
-@_jit
-def _difference(
+@jit
+def change_at_rest(
     plus, minus, plus_load, minus_load, poses, screws, deviation, values, length, guess,
     gradient, tension,
 ):  # fmt: skip
+    """Gradient (n, d) and tensions (n, m) of ``plus`` less ``minus``; NaN where unsolved."""
     n, m, width = plus.shape
     d = gradient.shape[1]
     ready, current = np.zeros((m + 1, N_READY)), np.zeros((screws.shape[1], 7))
-    out = (np.zeros(d), np.zeros((m, cable_law.N_STATE)))
+    out = (np.zeros(d), np.zeros((m, N_STATE)))
     spare = (np.zeros((d, d)), np.zeros((m, d)), np.empty((N_WORK, 6)), np.zeros((m, 3)))
     some, starts = np.empty((m, width)), np.empty((m, 3))
     which, place, load = np.empty(m, np.int64), np.empty(7), np.zeros(N_LOAD)
@@ -131,14 +80,15 @@ def _difference(
                 tension[r, which[k]] += sign * out[1][k, TENSION]
 
 
-@_jit
-def _by_cable(
+@jit
+def change_of_each_cable(
     plus, minus, load, poses, screws, deviation, values, length, guess, gradient, tension
 ):
+    """The same cable by cable: gradient (n, m, d), each cable's own tension (n, m)."""
     n, m = plus.shape[:2]
     d = gradient.shape[2]
     ready, current = np.zeros((2, N_READY)), np.zeros((screws.shape[1], 7))
-    out = (np.zeros(d), np.zeros((1, cable_law.N_STATE)))
+    out = (np.zeros(d), np.zeros((1, N_STATE)))
     spare = (np.zeros((d, d)), np.zeros((1, d)), np.empty((N_WORK, 6)), np.zeros((1, 3)))
     place, none = np.empty(7), np.zeros(N_LOAD)
     for r in range(n):

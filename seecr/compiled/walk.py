@@ -1,22 +1,17 @@
-"""Rows that depend on the rows before them: a compiled walk along their path.
+"""Rows that depend on the rows before them: waypoints solved in order, the cables' state carried.
 
-Hysteresis, friction and backlash start anew with each run: the platform rests at its reference
-pose, moves straight to the first row and from row to row. Creep alone goes by the clock through
-everything; between runs the robot waits at its reference pose.
+Hysteresis and friction start anew with each run. Creep alone goes by the clock.
 """
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
-from numba import njit
 
-from seecr import statics
-from seecr.compiled import descent as kernel
-from seecr.compiled.law import (
+from seecr.compiled.columns import (
     CREEP,
+    CREEP_PART,
     CREEP_RATE,
+    CREEP_TIME,
     EA,
     FRICTION,
     HYSTERESIS,
@@ -31,37 +26,12 @@ from seecr.compiled.law import (
     WINCH_SIDE,
     WINCH_TENSION,
 )
-from seecr.path import Path
-from seecr.setup import Setup
+from seecr.compiled.descent import make_space, solve_in_stages
+from seecr.compiled.jit import jit
 
 
-def walk(setup: Setup, tables: statics.Tables, path: Path, limit: int) -> statics.Evaluation:
-    """Solve the waypoints in order, each from the one before, and carry the cables' state."""
-    n, m = tables.cables.shape[:2]
-    out = statics.Evaluation.empty(n, m, tables.n_dof)
-    out.energy = np.full(n, np.nan)
-    with_clock = bool(np.any(setup.creep))
-    starts = np.flatnonzero(path.fresh)
-    # runs are independent, but for creep, which goes through all of them
-    edges = [0, n] if with_clock else [*starts.tolist(), n]
-    parts = [slice(a, b) for a, b in pairwise(edges)]
-
-    def run(part: slice) -> None:
-        _walk(
-            tables.cables[part], tables.load[part], tables.poses[part], tables.screws[part],
-            tables.length, tables.scale[part], 0.5 * tables.length, tables.reach[part], limit,
-            path.fresh[part], path.elapsed[part], setup.creep, setup.creep_time,
-            out.outcome[part], out.count[part], out.residual[part], out.gradient[part],
-            out.hessian[part], out.states[part], out.slopes[part], out.deviation[part],
-            out.values[part], out.guess[part],
-        )  # fmt: skip
-
-    statics.run_parts(run, parts)
-    return out
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _shares(span):  # type: ignore[no-untyped-def]
+@jit
+def _shares(span):
     """What a load linear in time leaves of itself after ``span`` time constants.
 
     Of its value before and now: the convolution of a ramp with exp(-t); the rest, exp(-span),
@@ -74,18 +44,24 @@ def _shares(span):  # type: ignore[no-untyped-def]
     return mean - np.exp(-span), 1.0 - mean
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _walk(  # type: ignore[no-untyped-def]
-    cables, load, poses, screws, length, scale, radius, reach, limit, fresh, elapsed, creep,
-    creep_time, outcome, count, residual, gradient, hessian, states, slopes, deviation, values,
-    guess,
+@jit
+def walk_in_order(
+    cables, load, poses, screws, length, scale, radius, reach, limit, fresh, elapsed, outcome,
+    count, residual, gradient, hessian, states, slopes, deviation, values, guess,
 ):  # fmt: skip
+    """Solve waypoints in order, each from the one before; all outputs are filled.
+
+    Args:
+        cables: (N, m, N_COLUMNS); the columns OF_THE_PAST are filled.
+        fresh: (N,) waypoints that start a run. elapsed: (N,) [s] since the one before.
+        The others are those of solve_batch.
+    """
     n, m = cables.shape[0], cables.shape[1]
     softened = np.empty_like(cables[0])
     start, first = np.zeros(7), np.zeros(gradient.shape[1])
     crept, amplitude = np.zeros(m), np.empty(m)
     friction = np.empty(m)
-    space = kernel.make_space(m, gradient.shape[1], screws.shape[1])
+    space = make_space(m, gradient.shape[1], screws.shape[1])
     for k in range(n):
         if fresh[k]:
             start[:] = 0.0
@@ -98,8 +74,8 @@ def _walk(  # type: ignore[no-untyped-def]
         for i in range(m):
             row = cables[k, i]
             amplitude[i], friction[i] = row[HYSTERESIS], row[FRICTION]
-            before, now = _shares(elapsed[k] / creep_time[i])
-            share = creep[i] / row[EA]
+            before, now = _shares(elapsed[k] / row[CREEP_TIME])
+            share = row[CREEP_PART] / row[EA]
             row[CREEP] = crept[i] * (1.0 - before - now)
             if fresh[k]:
                 # waits at the reference pose, history cleared
@@ -113,7 +89,7 @@ def _walk(  # type: ignore[no-untyped-def]
             if row[WINCH_SIDE] > 0.0:
                 paid = row[REST] - cables[k - 1, i, REST]
                 row[STUCK] = states[k - 1, i, WINCH_TENSION] - paid * row[EA] / row[WINCH_SIDE]
-        outcome[k], count[k], residual[k] = kernel.solve_in_stages(
+        outcome[k], count[k], residual[k] = solve_in_stages(
             cables[k], load[k], poses[k], screws[k], start, first, length, scale[k], radius,
             reach[k], limit, guess[k], gradient[k], hessian[k], states[k], slopes[k],
             deviation[k], values[k], softened, fresh[k], space,

@@ -1,0 +1,83 @@
+"""What the winches were told, row by row, and play between what they were told and what they do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seecr.pose import Array
+from seecr.robot import Robot
+
+
+@dataclass(frozen=True, eq=False)
+class Commands:
+    """What the robot was told, row by row, in time order within a run.
+
+    Attributes:
+        pose: (n, 7) commanded poses; for lengths, where the solver starts from.
+        lengths: (n, m) [m] commanded rest lengths, or None.
+        run: (n,) int, number of the continuous motion a row belongs to.
+        time: (n,) [s] or None.
+        temperature: (n,) [deg C] or None.
+        passed: (k, n, m) [m] commanded changes of length (or lengths) that the way to each row
+            passes, in order: where it starts and where cables turn round; None where nobody asks.
+    """
+
+    pose: Array
+    lengths: Array | None = None
+    run: NDArray[np.int64] | None = None
+    time: Array | None = None
+    temperature: Array | None = None
+    passed: Array | None = None
+
+    def __len__(self) -> int:
+        return len(self.pose)
+
+    @property
+    def starts(self) -> NDArray[np.bool_]:
+        """(n,) rows that start a run: the first, and those whose run is another than before."""
+        fresh = np.zeros(len(self), dtype=bool)
+        fresh[:1] = True
+        if self.run is not None:
+            fresh[1:] = self.run[1:] != self.run[:-1]
+        return fresh
+
+    def nominal_change(self, robot: Robot) -> Array:
+        """Straight lengths at the commanded poses less those at the reference, (n, m) [m]."""
+        if not self._kept or self._kept[0][0] is not robot:
+            change = robot.nominal_lengths(self.pose) - robot.reference_lengths
+            self._kept[:] = [(robot, change)]
+        return self._kept[0][1]
+
+    # of the last robot asked for: every trial of a fit asks again
+    _kept: list[tuple[Robot, Array]] = field(default_factory=list, repr=False)
+
+
+def play(
+    told: Array, starts: NDArray[np.bool_], half_width: Array, passed: Array | None = None
+) -> Array:
+    """The play operator: an output that lags its input (n, m) by up to the half-width (m,).
+
+    It starts centred where each run starts: on the rows of ``starts`` (n,), or on ``passed[0]``
+    there. Between rows the input goes through ``passed`` (k, n, m), if given, and one way in
+    between.
+    """
+    way = told[None] if passed is None else np.concatenate([passed, told[None]])
+    low, high = way[0] - half_width, way[0] + half_width
+    low[starts] = high[starts] = way[0, starts]
+    # an input moves the output to the nearest point of a band about it, and so do many inputs
+    # in turn, with one band for all: that of each row first, then of 2, 4, 8, ... rows
+    for at in way[1:]:
+        low, high = _band_of_both(low, high, at - half_width, at + half_width)
+    rows = 1
+    while np.any(low < high):
+        low[rows:], high[rows:] = _band_of_both(low[:-rows], high[:-rows], low[rows:], high[rows:])
+        rows *= 2
+    return low
+
+
+def _band_of_both(low: Array, high: Array, least: Array, most: Array) -> tuple[Array, Array]:
+    """The band that limits to ``low`` and ``high`` and then to ``least`` and ``most``."""
+    return np.clip(low, least, most), np.clip(high, least, most)

@@ -1,0 +1,176 @@
+"""One cable in space: the force on its anchor point, and how stiff it is there.
+
+A cable is a row of a table (:mod:`seecr.compiled.columns`). It runs from its exit point A, over a
+swivelling pulley of radius r where there is one, to its anchor point B.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from seecr.compiled.algebra import solve_3x3
+from seecr.compiled.catenary import solve_catenary
+from seecr.compiled.columns import (
+    ENERGY,
+    GAP,
+    HYSTERESIS_NOW,
+    RADIUS,
+    REST,
+    SLACK,
+    STRAIN,
+    TENSION,
+    WEIGHT,
+    WINCH_TENSION,
+)
+from seecr.compiled.jit import jit
+from seecr.compiled.law import straight_law, strain_of_tension, winch_tension
+from seecr.compiled.pulley import length_in_plane, pulley_geometry
+
+
+@jit
+def cable_pull(row, start, move, up, guess, work, force, stiffness, gradient, state):
+    """Force of a cable on its anchor point, its stiffness, and the gradient of its tension.
+
+    Args:
+        row: the cable (N_COLUMNS,).
+        start: (3,) [m] its anchor point at the commanded pose, base frame.
+        move: (3,) [m] how far the anchor point has moved from there. Kept apart, since the
+            stretch of a stiff cable is lost in the rounding of absolute coordinates.
+        up: (3,) unit vector against gravity.
+        guess: (3,) where the catenary starts and ends up.
+        work: (8, 3) scratch.
+        force: (3,) [N], filled.
+        stiffness: (3, 3) [N/m], minus the derivative of the force by ``move``, filled.
+        gradient: (3,) [N/m], derivative of the reported tension by ``move``, filled.
+        state: (N_STATE,), filled.
+
+    Returns:
+        False when the cable's own equations could not be solved.
+    """
+    if row[WEIGHT] > 0.0:
+        return _catenary_pull(row, start, move, up, guess, work, force, stiffness, gradient, state)
+    if row[RADIUS] > 0.0:
+        return _pulley_pull(row, start, move, up, work, force, stiffness, gradient, state)
+    return _straight_pull(row, start, move, force, stiffness, gradient, state)
+
+
+@jit
+def _straight_pull(row, start, move, force, stiffness, gradient, state):
+    before2, growth, now2 = 0.0, 0.0, 0.0
+    for k in range(3):
+        d0 = start[k] - row[k]
+        growth += move[k] * (2.0 * d0 + move[k])
+        before2 += d0 * d0
+        now2 += (d0 + move[k]) ** 2
+    now = math.sqrt(now2)
+    stretch = growth / (now + math.sqrt(before2)) + row[GAP]
+    tension, rate = straight_law(row, stretch, state)
+    for i in range(3):
+        ui = (start[i] - row[i] + move[i]) / now
+        force[i] = -tension * ui
+        gradient[i] = rate * ui
+        for j in range(3):
+            uj = (start[j] - row[j] + move[j]) / now
+            stiffness[i, j] = (rate - tension / now) * ui * uj
+        stiffness[i, i] += tension / now
+    return True
+
+
+@jit
+def _plane(row, start, move, up, out):
+    """Plane of a cable: out = horizontal direction (3,) away from A; returns across, rise."""
+    rise = 0.0
+    for k in range(3):
+        out[k] = start[k] - row[k] + move[k]
+        rise += out[k] * up[k]
+    across = 0.0
+    for k in range(3):
+        out[k] -= rise * up[k]
+        across += out[k] * out[k]
+    across = math.sqrt(across)
+    if across > 0.0:
+        for k in range(3):
+            out[k] /= across
+        return across, rise
+    # straight below the exit point every plane is as good: take one
+    pick = 0 if abs(up[0]) < 0.9 else 1
+    for k in range(3):
+        out[k] = (1.0 if k == pick else 0.0) - up[pick] * up[k]
+    return across, rise
+
+
+@jit
+def _lift(row, across, rise, e, up, f, k2, g2, force, stiffness, gradient):
+    """From the cable's plane to the base frame: f = force, k2 = stiffness, g2 = gradient."""
+    # turning the plane about the vertical through A: stiffness -f_across/across, sideways
+    side = -f[0] / max(across, 1e-9 * row[REST])
+    for i in range(3):
+        force[i] = f[0] * e[i] + f[1] * up[i]
+        gradient[i] = g2[0] * e[i] + g2[1] * up[i]
+        for j in range(3):
+            sideways = -e[i] * e[j] - up[i] * up[j]
+            if i == j:
+                sideways += 1.0
+            stiffness[i, j] = (
+                k2[0] * e[i] * e[j]
+                + k2[1] * (e[i] * up[j] + up[i] * e[j])
+                + k2[2] * up[i] * up[j]
+                + side * sideways
+            )
+
+
+@jit
+def _pulley_pull(row, start, move, up, work, force, stiffness, gradient, state):
+    e, f, k2, g2 = work[0], work[1], work[2], work[3]
+    across, rise = _plane(row, start, move, up, e)
+    length, free, tx, tz = pulley_geometry(across, rise, row[RADIUS])
+    tension, rate = straight_law(row, length - row[REST], state)
+    f[0], f[1] = -tension * tx, -tension * tz
+    g2[0], g2[1] = rate * tx, rate * tz
+    # moving across the tangent turns it by 1/free
+    turn = tension / max(free, 1e-9 * row[REST])
+    k2[0] = rate * tx * tx + turn * tz * tz
+    k2[1] = (rate - turn) * tx * tz
+    k2[2] = rate * tz * tz + turn * tx * tx
+    _lift(row, across, rise, e, up, f, k2, g2, force, stiffness, gradient)
+    return True
+
+
+@jit
+def _catenary_pull(row, start, move, up, guess, work, force, stiffness, gradient, state):
+    e, f, k2, g2 = work[0], work[1], work[2], work[3]
+    across, rise = _plane(row, start, move, up, e)
+    flat = max(across, 1e-9 * row[REST])
+    jacobian = work[4:7]
+    error, scratch = work[7], work[8:10]
+    if not solve_catenary(row, flat, -rise, guess, error, jacobian, scratch):
+        guess[2] = 0.0  # once more from a first guess of its own
+        if not solve_catenary(row, flat, -rise, guess, error, jacobian, scratch):
+            return False
+    h, v, length = guess[0], guess[1], guess[2]
+    top = v + row[WEIGHT] * length
+    tension = math.sqrt(h * h + top * top)
+    f[0], f[1] = -h, v
+    # columns of the inverse Jacobian: change of the unknowns by across and by -rise
+    by_across, by_drop = work[10], work[11]
+    error[0], error[1], error[2] = 1.0, 0.0, 0.0
+    solve_3x3(jacobian, error, by_across)
+    error[0], error[1] = 0.0, 1.0
+    solve_3x3(jacobian, error, by_drop)
+    k2[0] = by_across[0]
+    k2[1] = 0.5 * (-by_drop[0] - by_across[1])
+    k2[2] = by_drop[1]
+    w = row[WEIGHT]
+    for k in range(2):
+        column = by_across if k == 0 else by_drop
+        change = (h * column[0] + top * (column[1] + w * column[2])) / tension
+        g2[k] = change if k == 0 else -change
+    _lift(row, flat, rise, e, up, f, k2, g2, force, stiffness, gradient)
+    state[TENSION], state[ENERGY] = tension, np.nan
+    state[WINCH_TENSION] = winch_tension(row, tension)[0]
+    stretch = length_in_plane(row, across, rise) - row[REST]
+    state[STRAIN], _slope, state[HYSTERESIS_NOW] = strain_of_tension(row, tension)
+    state[SLACK] = 1.0 if stretch < 0.0 else 0.0
+    return True

@@ -1,0 +1,189 @@
+"""A cable with weight: an elastic catenary (Irvine, Cable Structures, 1981, section 1.2).
+
+Its unknowns are the components of its pull and the length of its free part; solved to rounding,
+with exact derivatives.
+"""
+
+from __future__ import annotations
+
+import math
+
+from seecr.compiled.algebra import solve_3x3
+from seecr.compiled.columns import (
+    COMPLIANCE,
+    CREEP,
+    CREEP_RATE,
+    EA,
+    RADIUS,
+    REST,
+    WEIGHT,
+    WINCH_SIDE,
+)
+from seecr.compiled.jit import jit
+from seecr.compiled.law import strain_of_tension, winch_tension
+from seecr.compiled.pulley import pulley_geometry
+
+
+@jit
+def catenary_span(h, v, w, length, ea):
+    """Span of an elastic catenary whose lower end is pulled by (h, v) towards the upper one.
+
+    Returns horizontal and vertical span and their derivatives xh, xv, zv, xl, zl by h, v and
+    unstretched length. Written so that nothing cancels as w goes to zero (Irvine 1981, 1.2).
+    """
+    top = v + w * length
+    t_low, t_top = math.sqrt(h * h + v * v), math.sqrt(h * h + top * top)
+    rise = length * (v + top) / (t_top + t_low)  # (t_top - t_low)/w
+    # asinh(top/h) - asinh(v/h) as a logarithm, each form where its terms do not cancel
+    # the first two hold for either sign of their end, and cancel only where it is steep
+    if v >= -h:
+        grow = math.log1p(w * (length + rise) / (v + t_low)) / w
+    elif top <= h:
+        grow = math.log1p(w * (length - rise) / (t_top - top)) / w
+    else:
+        grow = math.log((top + t_top) * (t_low - v) / (h * h)) / w
+    turn = _change_of_sine(v, top, h, w, length)
+    stretch = length / ea
+    x = h * (grow + stretch)
+    z = rise + 0.5 * (v + top) * stretch
+    xh = grow - turn + stretch
+    xv = -h * rise / (t_top * t_low)
+    zv = turn + stretch
+    xl = h / t_top + h / ea
+    zl = top / t_top + top / ea
+    return x, z, xh, xv, zv, xl, zl
+
+
+@jit
+def _change_of_sine(v, top, h, w, length):
+    """(top/T_top - v/T_low)/w, from (a T_b - b T_a) = h^2 (a^2 - b^2)/(a T_b + b T_a)."""
+    t_low, t_top = math.sqrt(h * h + v * v), math.sqrt(h * h + top * top)
+    if (v >= 0.0 and top > 0.0) or (v < 0.0 and top < 0.0):
+        both = (top * t_low + v * t_top) * t_top * t_low
+        return h * h * (top + v) * length / both
+    return (top / t_top - v / t_low) / w
+
+
+@jit
+def _other_stretch(row, tension):
+    """Unstretched length [m] that all but the catenary's own T/EA would add, and its slope.
+
+    At the tension of the upper end. A cable that stretches by it as the straight one does
+    is one that is longer by stretch/(1 + T/EA) before the catenary stretches it again.
+    """
+    ea, rest = row[EA], row[REST]
+    behind, behind_slope = winch_tension(row, tension)
+    stretch = rest * (row[CREEP] + row[CREEP_RATE] * tension) + row[COMPLIANCE] * tension
+    stretch += row[WINCH_SIDE] / ea * behind
+    rate = rest * row[CREEP_RATE] + row[COMPLIANCE] + row[WINCH_SIDE] / ea * behind_slope
+    strain, slope, _z = strain_of_tension(row, tension)
+    stretch += rest * (strain - tension / ea)
+    rate += rest * (1.0 / slope - 1.0 / ea)
+    grown = 1.0 + tension / ea
+    return stretch / grown, (rate - stretch / (grown * ea)) / grown
+
+
+@jit
+def _catenary_equations(row, unknown, across, rise, error, jacobian):
+    """Where the catenary over its pulley ends, against where it should, with derivatives.
+
+    Unknowns: horizontal and vertical pull at the anchor, unstretched length of the free part.
+    """
+    h, v, length = unknown[0], unknown[1], unknown[2]
+    w, ea, r = row[WEIGHT], row[EA], row[RADIUS]
+    x, z, xh, xv, zv, xl, zl = catenary_span(h, v, w, length, ea)
+    top = v + w * length
+    t = math.sqrt(h * h + top * top)
+    sine, cosine = h / t, top / t
+    psi = math.atan2(h, top)
+    psi_h, psi_v, psi_l = top / t**2, -h / t**2, -w * h / t**2
+    t_h, t_v, t_l = sine, cosine, w * cosine
+    other, other_rate = _other_stretch(row, t)
+    arc, squeeze = r * (math.pi - psi), 1.0 / (1.0 + t / ea)
+    error[0] = x + r + r * cosine - across
+    error[1] = z - r * sine - rise
+    error[2] = length - row[REST] - other + arc * squeeze
+    by_t = -other_rate - arc * squeeze**2 / ea
+    by_psi = -r * squeeze
+    jacobian[0, 0], jacobian[0, 1] = xh - r * sine * psi_h, xv - r * sine * psi_v
+    jacobian[0, 2] = xl - r * sine * psi_l
+    jacobian[1, 0], jacobian[1, 1] = xv - r * cosine * psi_h, zv - r * cosine * psi_v
+    jacobian[1, 2] = zl - r * cosine * psi_l
+    jacobian[2, 0] = by_t * t_h + by_psi * psi_h
+    jacobian[2, 1] = by_t * t_v + by_psi * psi_v
+    jacobian[2, 2] = 1.0 + by_t * t_l + by_psi * psi_l
+    return t
+
+
+@jit
+def _first_guess(row, across, rise, unknown):
+    """Jonkman's start for a catenary (NREL/CP-500-45891, 2009, eqs 2-46, 2-47)."""
+    w = row[WEIGHT]
+    length = row[REST] * (1.0 + row[CREEP])
+    if row[RADIUS] > 0.0:
+        whole, free, tx, tz = pulley_geometry(across, -rise, row[RADIUS])
+        length = max(length - (whole - free), 0.1 * length)
+        across, rise = free * tx, -free * tz
+    chord2 = across * across + rise * rise
+    if length * length <= chord2:
+        # taut: pull along the chord with the elastic stretch, or the nearly taut catenary
+        chord = math.sqrt(chord2)
+        soft = length + row[WINCH_SIDE] + row[EA] * (row[COMPLIANCE] + row[REST] * row[CREEP_RATE])
+        pull = row[EA] * (chord - length) / soft
+        pull = max(pull, 0.5 * w * length / math.sqrt(24.0 * 0.05))
+        unknown[0] = pull * across / chord
+        if abs(unknown[0]) < 1e-9 * w * length:
+            unknown[0] = 1e-9 * w * length
+        unknown[1] = pull * rise / chord - 0.5 * w * length
+    else:
+        flat = max(abs(across), 1e-9 * length)
+        lam = math.sqrt(max(3.0 * ((length * length - rise * rise) / (flat * flat) - 1.0), 0.04))
+        unknown[0] = 0.5 * w * flat / lam * (1.0 if across >= 0.0 else -1.0)
+        unknown[1] = 0.5 * w * (rise / math.tanh(lam) - length)
+    unknown[2] = length
+
+
+@jit
+def _size(error, length):
+    return max(abs(error[0]), abs(error[1]), abs(error[2])) / length
+
+
+@jit
+def solve_catenary(row, across, rise, unknown, error, jacobian, work):
+    """Find the pull of a catenary with the given span; True when found to rounding.
+
+    ``unknown`` is the start where its third entry is positive (a warm start), else a first
+    guess is made. On return ``jacobian`` is that of the equations at the solution.
+    """
+    scale = row[REST]
+    if not unknown[2] > 0.0:
+        _first_guess(row, across, rise, unknown)
+    trial = work[0]
+    step = work[1]
+    _catenary_equations(row, unknown, across, rise, error, jacobian)
+    size = _size(error, scale)
+    for _ in range(200):
+        if size < 1e-15:
+            return True
+        solve_3x3(jacobian, error, step)
+        damping = 1.0
+        better = False
+        for _ in range(40):
+            for k in range(3):
+                trial[k] = unknown[k] - damping * step[k]
+            # without a pulley the pull is towards the exit point; the length is positive
+            if row[RADIUS] == 0.0:
+                trial[0] = max(trial[0], 0.1 * unknown[0])
+            trial[2] = max(trial[2], 0.5 * unknown[2])
+            _catenary_equations(row, trial, across, rise, error, jacobian)
+            following = _size(error, scale)
+            if following < size:
+                better = True
+                break
+            damping *= 0.5
+        if not better:
+            _catenary_equations(row, unknown, across, rise, error, jacobian)
+            return size < 1e-12
+        unknown[0], unknown[1], unknown[2] = trial[0], trial[1], trial[2]
+        size = following
+    return size < 1e-12

@@ -1,0 +1,35 @@
+"""What the numbers of the compiled tables mean: columns of a cable, of its state, of a load."""
+
+from __future__ import annotations
+
+# Of a cable.
+N_COLUMNS = 27
+(
+    EXIT, _, _,  # A in the base frame [m]
+    ANCHOR, _, _,  # B in the platform frame [m]
+    REST,  # paid-out rest length l0 from A on, wrap included [m]
+    GAP,  # geometric length at the commanded pose less the rest length [m], kept exact
+    EA,  # E S [N]
+    QUADRATIC, CUBIC,  # T = EA (eps + quadratic eps^2 + cubic eps^3)
+    RADIUS,  # of the pulley [m]
+    COMPLIANCE,  # of the exit point along the cable [m/N]
+    WINCH_SIDE,  # length of elastic cable behind the exit point [m]
+    WEIGHT,  # per metre of cable [N/m]
+    CREEP, CREEP_RATE,  # creep strain = creep + creep_rate T
+    CREEP_PART, CREEP_TIME,  # part of the elastic strain that creeps, time constant [s]
+    HYSTERESIS, HYSTERESIS_STRETCH,  # Dahl: amplitude [N], stretch over which it turns [m]
+    STRETCH_BEFORE, HYSTERESIS_BEFORE,  # state the Dahl law starts from [m, N]
+    FRICTION,  # exponent of the capstan at the exit point
+    STUCK,  # tension behind the exit point if the cable does not slip [N]
+    EXTRA, EXTRA_SLOPE,  # a user's law, linearised: T += extra + extra_slope eps [N]
+) = range(N_COLUMNS)  # fmt: skip
+# Those that a walk fills with what is left of the rows before.
+OF_THE_PAST = (CREEP, CREEP_RATE, STRETCH_BEFORE, HYSTERESIS_BEFORE, STUCK)
+
+# Of what a law returns beside force and stiffness (see straight_law).
+N_STATE = 6
+TENSION, STRAIN, HYSTERESIS_NOW, WINCH_TENSION, ENERGY, SLACK = range(N_STATE)
+
+# Entries of the load of a pose.
+FORCE_OF_WEIGHT, CENTRE_OF_MASS, EXTERNAL_FORCE, EXTERNAL_MOMENT, UP = 0, 3, 6, 9, 12
+N_LOAD = 15

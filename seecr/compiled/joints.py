@@ -1,0 +1,85 @@
+"""A platform on slide and hinge joints: where they put it, and forces as its joints feel them.
+
+A platform on joints steps in its joint values, times the robot's length for hinges: the first
+joint is the outermost, as in MJCF.
+"""
+
+from __future__ import annotations
+
+from seecr.compiled.jit import jit
+from seecr.compiled.rotation import quaternion_product, rotated_less, turned
+
+
+@jit
+def place_joints(screws, values, length, origin, deviation, current):
+    """Deviation (7,) of a jointed platform, and its joints as they stand there.
+
+    The platform moves by E_1 E_2 ... E_n, E_j along or about joint j as it stands at the
+    commanded pose (product of exponentials); ``screws`` and ``current`` are (n, 7): kind (0
+    slide, 1 hinge), axis, point.
+    """
+    w, x, y, z = 1.0, 0.0, 0.0, 0.0
+    mx = my = mz = 0.0
+    ox, oy, oz = origin[0], origin[1], origin[2]
+    for j in range(screws.shape[0]):
+        ax, ay, az = screws[j, 1], screws[j, 2], screws[j, 3]
+        px, py, pz = screws[j, 4], screws[j, 5], screws[j, 6]
+        sx, sy, sz = rotated_less(w, x, y, z, ax, ay, az)
+        nx, ny, nz = ax + sx, ay + sy, az + sz
+        current[j, 0], current[j, 1], current[j, 2], current[j, 3] = screws[j, 0], nx, ny, nz
+        sx, sy, sz = rotated_less(w, x, y, z, px - ox, py - oy, pz - oz)
+        current[j, 4], current[j, 5], current[j, 6] = px + sx + mx, py + sy + my, pz + sz + mz
+        if screws[j, 0] == 0.0:
+            mx, my, mz = mx + nx * values[j], my + ny * values[j], mz + nz * values[j]
+            continue
+        angle = values[j] / length
+        a, b, c, d = turned(ax * angle, ay * angle, az * angle, 1.0, 0.0, 0.0, 0.0)
+        # the platform's origin goes round the hinge, as the joints before have turned that
+        sx, sy, sz = rotated_less(a, b, c, d, ox - px, oy - py, oz - pz)
+        tx, ty, tz = rotated_less(w, x, y, z, sx, sy, sz)
+        mx, my, mz = mx + sx + tx, my + sy + ty, mz + sz + tz
+        w, x, y, z = quaternion_product(w, x, y, z, a, b, c, d)
+    deviation[0], deviation[1], deviation[2] = mx, my, mz
+    deviation[3], deviation[4], deviation[5], deviation[6] = w, x, y, z
+
+
+@jit
+def joint_columns(current, x, y, z, per, columns):
+    """Motion (n, 6) of the platform origin, now at x, y, z, by the joints in scaled steps."""
+    for j in range(current.shape[0]):
+        a, b, c = current[j, 1], current[j, 2], current[j, 3]
+        if current[j, 0] == 0.0:
+            columns[j, 0], columns[j, 1], columns[j, 2] = a, b, c
+            columns[j, 3] = columns[j, 4] = columns[j, 5] = 0.0
+            continue
+        dx, dy, dz = x - current[j, 4], y - current[j, 5], z - current[j, 6]
+        columns[j, 0] = (b * dz - c * dy) * per
+        columns[j, 1] = (c * dx - a * dz) * per
+        columns[j, 2] = (a * dy - b * dx) * per
+        columns[j, 3], columns[j, 4], columns[j, 5] = a, b, c
+
+
+@jit
+def onto_joints(g, h, columns, per, gradient, hessian):
+    """From the platform's own gradient and stiffness to those of its joints.
+
+    Joint j moves on with each hinge i further out: the origin's motion v_j turns by a_i x v_j,
+    and the rotation vector of both has half of a_i x a_j to second order.
+    """
+    for j in range(gradient.shape[0]):
+        total = 0.0
+        for k in range(6):
+            total += g[k] * columns[j, k]
+        gradient[j] = total
+        vx, vy, vz = columns[j, 0], columns[j, 1], columns[j, 2]
+        ux, uy, uz = 0.5 * columns[j, 3], 0.5 * columns[j, 4], 0.5 * columns[j, 5]
+        for i in range(j + 1):
+            a, b, c = per * columns[i, 3], per * columns[i, 4], per * columns[i, 5]
+            total = g[0] * (b * vz - c * vy) + g[1] * (c * vx - a * vz) + g[2] * (a * vy - b * vx)
+            total += g[3] * (b * uz - c * uy) + g[4] * (c * ux - a * uz) + g[5] * (a * uy - b * ux)
+            for k in range(6):
+                part = 0.0
+                for r in range(6):
+                    part += h[k, r] * columns[i, r]
+                total += part * columns[j, k]
+            hessian[i, j] = hessian[j, i] = total

@@ -1,0 +1,13 @@
+"""How a descent ends, and the limits that decide it."""
+
+from __future__ import annotations
+
+# equilibrium.py turns them into sentences.
+CONVERGED, UNSTABLE, SINGULAR, STALLED, FALLING, CABLE_LAW, ITERATIONS, SPINNING = range(8)
+
+# A stiffness below this part of the largest diagonal entry is none.
+SINGULAR_PART = 1e-11
+# A tension below this part of the load is rounding.
+IDLE = 1e-11
+# An equilibrium leaves at most this part of the load.
+TOLERANCE = 1e-9

@@ -1,0 +1,140 @@
+"""From a setup to the tables of the compiled loop."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seecr.compiled.columns import (
+    EXTRA,
+    EXTRA_SLOPE,
+    FORCE_OF_WEIGHT,
+    GAP,
+    N_COLUMNS,
+    N_LOAD,
+    OF_THE_PAST,
+    REST,
+    UP,
+)
+from seecr.joints import values_of_pose
+from seecr.pose import Array
+from seecr.robot import Robot
+from seecr.setup import QUANTITIES, Setup
+
+
+@dataclass(eq=False)
+class Tables:
+    """The problem of n poses as the compiled loop reads it."""
+
+    cables: Array  # (n, m, N_COLUMNS)
+    load: Array  # (n, N_LOAD)
+    poses: Array  # (n, 7) commanded
+    screws: Array  # (n, d, 7) joints at the commanded pose; (n, 0, 7) for a free platform
+    length: float
+    scale: Array  # (n,) [N] that residuals are measured against
+    reach: Array  # (n,) [m] deviations beyond this are a fall
+    n_dof: int
+
+    def __len__(self) -> int:
+        return len(self.poses)
+
+    def lengthened(self, by: float) -> Tables:
+        """The same with every cable longer by a length [m]."""
+        cables = self.cables.copy()
+        cables[..., REST] += by
+        cables[..., GAP] -= by
+        return replace(self, cables=cables)
+
+    def with_past(self, other: Tables) -> Tables:
+        """The same with what is left of the rows before as other tables have it."""
+        cables, past = self.cables.copy(), list(OF_THE_PAST)
+        cables[..., past] = other.cables[..., past]
+        return replace(self, cables=cables)
+
+
+@lru_cache(maxsize=8)
+def _screws_of(robot: Robot, poses_bytes: bytes, n: int) -> Array:
+    if not robot.joints:
+        return np.zeros((n, 0, 7))
+    poses = np.frombuffer(poses_bytes).reshape(n, 7)
+    return values_of_pose(robot, poses)[1]
+
+
+def assemble(setup: Setup, strains: Array | None = None) -> Tables:
+    """The tables of a setup. Columns of the past are left at their null.
+
+    Args:
+        setup: n rows.
+        strains: (n, m) about which users' laws are linearised; zero by default.
+    """
+    robot = setup.robot
+    poses = np.ascontiguousarray(setup.commands.pose)
+    n, m = len(poses), robot.n_cables
+    rest = setup.rest_lengths()
+    gap = setup.geometric_lengths(poses) - rest
+    cables, load = np.zeros((n, m, N_COLUMNS)), np.zeros((n, N_LOAD))
+    cables[..., REST], cables[..., GAP] = rest, gap
+    load[:, FORCE_OF_WEIGHT : FORCE_OF_WEIGHT + 3] = setup.mass * setup.gravity
+    load[:, UP : UP + 3] = _hanging(setup)
+    _write_quantities(setup, cables, load)
+    if setup.laws:
+        _linearise(setup, np.zeros((n, m)) if strains is None else strains, cables)
+    return Tables(
+        cables=cables,
+        load=load,
+        poses=poses,
+        screws=_screws_of(robot, poses.tobytes(), n),
+        length=robot.length,
+        scale=_load_scale(setup),
+        reach=3.0 * (rest.max(axis=1) + np.abs(gap).max(axis=1)),
+        n_dof=robot.n_dof,
+    )
+
+
+def _write_quantities(setup: Setup, cables: Array, load: Array) -> None:
+    """The quantities that the compiled loop uses as they are, where their fields say."""
+    for name, item in QUANTITIES.items():
+        value = np.asarray(getattr(setup, name))
+        if item.column is not None:
+            per_cable = value if item.shape[-1] == 3 else value[..., None]
+            cables[..., item.column : item.column + per_cable.shape[-1]] = per_cable
+        if item.entry is not None:
+            load[:, item.entry : item.entry + value.shape[-1]] = value
+
+
+def _linearise(setup: Setup, strains: Array, cables: Array) -> None:
+    """Tangents of the users' laws at the given strains (Newton's method does the rest)."""
+    step = 1e-6 * (1e-3 + np.abs(strains))
+    for law in setup.laws:
+        slope = (law(strains + step) - law(strains - step)) / (2.0 * step)
+        cables[..., EXTRA] += law(strains) - slope * strains
+        cables[..., EXTRA_SLOPE] += slope
+
+
+def _hanging(setup: Setup) -> Array:
+    """Vertical of the planes in which cables hang: gravity's, or the pulleys' own."""
+    g = np.linalg.norm(setup.gravity)
+    if g == 0.0 or np.any(setup.pulley_radius):
+        return setup.robot.up
+    return -setup.gravity / g
+
+
+def _load_scale(setup: Setup) -> Array:
+    """Load [N] of each pose: weight, external force and moment over the robot's length."""
+    weight = setup.mass * np.linalg.norm(setup.gravity)
+    force = np.linalg.norm(setup.wrench[:, :3], axis=1)
+    moment = np.linalg.norm(setup.wrench[:, 3:], axis=1) / setup.robot.length
+    scale = weight + force + moment
+    # nothing loads the platform: measure against what a strain of 1e-3 would pull
+    return np.where(scale > 0.0, scale, 1e-3 * float(np.max(setup.ea)))
+
+
+def take(tables: Tables, rows: NDArray[np.integer]) -> Tables:
+    """Some rows of the tables."""
+    return Tables(
+        tables.cables[rows], tables.load[rows], tables.poses[rows], tables.screws[rows],
+        tables.length, tables.scale[rows], tables.reach[rows], tables.n_dof,
+    )  # fmt: skip
