@@ -26,11 +26,10 @@ from crosscheck.fit.reasons import Why
 from crosscheck.fit.state import evaluate
 from crosscheck.measurements.data import Measurements
 from crosscheck.model.write import Fitted
-from seecr.effects import Terms, effect_named, layout_of
+from seecr.effects import Term, Terms, effect_named, layout_of
 from seecr.effects.base import Layout
 from seecr.pose import Array
 from seecr.robot import Robot
-from seecr.sensitivity import Term
 
 # A value this many plausible sizes from null deserves a second look.
 _IMPLAUSIBLE = 5.0

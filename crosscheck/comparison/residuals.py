@@ -21,10 +21,9 @@ from crosscheck.fit.prepare import noise_floor, outlying_rows, prepare
 from crosscheck.fit.problem import BY_NAME, Problem, Rms, rms_by_kind
 from crosscheck.fit.state import State, evaluate
 from crosscheck.measurements.data import Measurements
-from seecr.effects import Terms
+from seecr.effects import Term, Terms
 from seecr.pose import Array
 from seecr.robot import Robot
-from seecr.sensitivity import Term
 
 _MOST_WORST = 10
 

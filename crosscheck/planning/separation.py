@@ -17,10 +17,10 @@ from crosscheck.fit.imitation import basis, left_over
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.state import State, derivatives, evaluate
 from crosscheck.measurements.data import Measurements
+from seecr.effects import Term
 from seecr.effects.base import Layout, layout_of
 from seecr.pose import Array, quat_from_rotvec, quat_multiply
 from seecr.robot import Robot
-from seecr.sensitivity import Term
 
 # Squared signal, in units of the noise, that tells two effects apart (diagnosis: about 15).
 NEEDED = 15.0

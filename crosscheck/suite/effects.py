@@ -24,12 +24,12 @@ from crosscheck.twin.hidden import Hidden, choose
 from crosscheck.twin.measure import measure
 from crosscheck.twin.robot import TRUE_EFFECTS
 from crosscheck.twin.trajectory import trajectory
+from seecr.commands import Commands
 from seecr.equilibrium import solve
 from seecr.experiment import Experiment
 from seecr.mjcf import load_robot
 from seecr.pose import Array
 from seecr.robot import Robot
-from seecr.setup import Commands
 from seecr.shipped import model_path
 
 GROUP, PREFIX = "effects", "effect-"
