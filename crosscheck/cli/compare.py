@@ -59,7 +59,6 @@ def command(
     Exit status: 0 all well, 1 a limit exceeded, 2 bad input, 3 rows without an equilibrium.
     """
     from crosscheck.comparison.limits import Limits, check, load_limits, with_options
-    from crosscheck.comparison.residuals import as_json as document_of
     from crosscheck.comparison.residuals import compare
     from crosscheck.files import json_text, staged, write_text
     from crosscheck.measurements.read import load_measurements
@@ -77,8 +76,8 @@ def command(
         document = {
             "exit_status": status,
             "limits": {k: v for k, v in vars(limits).items() if v is not None},
-            "exceeded": [vars(item) for item in exceeded],
-            **document_of(found),
+            "exceeded": exceeded,
+            **found.as_json(),
             "model_notes": list(own.notes) if own else [],
         }
         text = json_text(document)

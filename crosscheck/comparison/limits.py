@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import difflib
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from crosscheck.comparison.residuals import Comparison
+from crosscheck.comparison.result import Comparison
 from crosscheck.errors import CrosscheckError
 from crosscheck.files import read_toml
-from crosscheck.fit.problem import BY_NAME
+from crosscheck.fit.problem import KINDS, Kind
 from crosscheck.units import EXAMPLE, parse_quantity
 
 
@@ -35,7 +35,25 @@ class Limits:
     max_tension_worst: float | None = None
 
 
-NAMES = tuple(field.name for field in fields(Limits))
+@dataclass(frozen=True)
+class Rule:
+    """What one limit is on: a kind of reading, over all rows or in the worst row."""
+
+    kind: Kind
+    worst: bool
+
+    @property
+    def words(self) -> str:
+        """What is limited, for a person."""
+        return f"worst {self.kind.name} error" if self.worst else f"{self.kind.name} error (rms)"
+
+
+RULES = {
+    f"max_{kind.name}{end}": Rule(kind, worst)
+    for end, worst in (("", False), ("_worst", True))
+    for kind in KINDS
+}
+"""What each field of :class:`Limits` is on."""
 
 
 @dataclass(frozen=True)
@@ -51,19 +69,18 @@ class Exceeded:
     value: float
     words: str
 
-
-def kind_of(name: str) -> str:
-    """position, orientation or tension."""
-    return name.split("_")[1]
+    def as_json(self) -> dict[str, Any]:
+        """As in ``comparison.json``."""
+        return vars(self)
 
 
 def parse_limit(name: str, text: str) -> float:
-    """A limit, one of NAMES, with its unit, in SI.
+    """A limit, one of RULES, with its unit, in SI.
 
     Raises:
         CrosscheckError: no number above zero with a unit of that kind.
     """
-    return parse_quantity(option(name), kind_of(name), text)
+    return parse_quantity(option(name), RULES[name].kind.name, text)
 
 
 def option(name: str) -> str:
@@ -82,11 +99,11 @@ def load_limits(path: str | Path) -> Limits:
     values: dict[str, float] = {}
     for key, value in toml.content.items():
         name = key.replace("-", "_")
-        if name not in NAMES:
-            near = difflib.get_close_matches(name, NAMES, n=len(NAMES), cutoff=0.0)
+        if name not in RULES:
+            near = difflib.get_close_matches(name, RULES, n=len(RULES), cutoff=0.0)
             raise toml.error(f"{key} is no limit; known, nearest first: {', '.join(near)}", key)
         if not isinstance(value, str):
-            example = EXAMPLE[kind_of(name)]
+            example = EXAMPLE[RULES[name].kind.name]
             text = f'{key}: expected a text such as "{example}", got {value!r}'
             raise toml.error(text, key)
         try:
@@ -109,48 +126,41 @@ def check(limits: Limits, found: Comparison) -> list[Exceeded]:
         CrosscheckError: a limit on what was not measured.
     """
     out = []
-    for name in NAMES:
+    for name, rule in RULES.items():
         limit = getattr(limits, name)
         if limit is None:
             continue
-        kind = kind_of(name)
-        if not _measured(found, kind):
-            raise CrosscheckError(
-                f"{option(name)}: {found.problem.data.path} holds no {kind} readings; expected "
-                "limits on what was measured"
-            )
-        sizes = found.errors_of(kind)
+        _check_measured(found, name, rule.kind)
+        sizes = found.errors_of(rule.kind.name)
         if not np.isfinite(sizes).any():
             continue
-        value = found.rms[BY_NAME[kind].key]
-        if name.endswith("_worst"):
-            value = float(np.nanmax(sizes))
+        value = float(np.nanmax(sizes)) if rule.worst else found.rms[rule.kind.key]
         if value is not None and value > limit:
-            out.append(Exceeded(name, limit, value, _words(found, name, limit, value)))
+            out.append(Exceeded(name, limit, value, _words(found, rule, limit, value)))
     return out
 
 
-def _measured(found: Comparison, kind: str) -> bool:
+def _check_measured(found: Comparison, name: str, kind: Kind) -> None:
     data = found.problem.data
-    return bool(getattr(data, f"has_{kind}"))
+    read = {
+        "position": data.has_position,
+        "orientation": data.has_orientation,
+        "tension": data.has_tension,
+    }
+    if not read[kind.name]:
+        raise CrosscheckError(
+            f"{option(name)}: {data.path} holds no {kind.name} readings; expected limits on what "
+            "was measured"
+        )
 
 
-def _words(found: Comparison, name: str, limit: float, value: float) -> str:
-    kind = kind_of(name)
-    factor, unit = BY_NAME[kind].factor, BY_NAME[kind].unit
-    sizes = found.errors_of(kind)
+def _words(found: Comparison, rule: Rule, limit: float, value: float) -> str:
+    factor, unit = rule.kind.factor, rule.kind.unit
+    sizes = found.errors_of(rule.kind.name)
     k = int(np.nanargmax(sizes))
     data = found.problem.data
-    what = f"worst {kind} error" if name.endswith("_worst") else f"{kind} error (rms)"
     return (
-        f"{what} {factor * value:.4g} {unit} exceeds {factor * limit:.4g} {unit} by "
+        f"{rule.words} {factor * value:.4g} {unit} exceeds {factor * limit:.4g} {unit} by "
         f"{factor * (value - limit):.4g} {unit}; worst at line {data.line[k]}, run "
-        f"{data.run[k]}, {place(found, k)}: {factor * float(sizes[k]):.4g} {unit}"
+        f"{data.run[k]}, {found.place(k)}: {factor * float(sizes[k]):.4g} {unit}"
     )
-
-
-def place(found: Comparison, row: int) -> str:
-    """The commanded position of a row for people; of lengths, where the model rests."""
-    x, y, z = found.way.pose[row, :3]
-    word = "commanded" if found.problem.data.command_lengths is None else "predicted"
-    return f"{word} ({x:.4g} {y:.4g} {z:.4g}) m"

@@ -1,4 +1,4 @@
-"""How the platform was told to move to each row: direction and speed."""
+"""How the platform was told to move to each row, and into which region of the workspace."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from seecr.pose import Array, pose_difference
 
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 STILL = "still"
+# An axis along which the commands spread by less than this part of the longest is not cut.
+_FLAT = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,3 +56,25 @@ def travel(problem: Problem, prediction: Prediction) -> Travel:
         known = ~commands.starts & (apart > 0)
         speed[known] = np.linalg.norm(weighed[known], axis=1) / apart[known]
     return Travel(pose, step, direction, speed)
+
+
+def regions_of(problem: Problem, pose: Array) -> Names:
+    """The region of each row, (n,): halves along each axis that is used, such as
+    "x below 0.4 m, z above 0.15 m".
+
+    Args:
+        problem: the data.
+        pose: (n, 7) commanded.
+    """
+    place = pose[:, :3]
+    used = place[problem.use] if problem.use.any() else place
+    low, high = used.min(axis=0), used.max(axis=0)
+    spread = high - low
+    words: list[list[str]] = [[] for _ in place]
+    for k, axis in enumerate("xyz"):
+        if spread[k] <= _FLAT * spread.max() or spread[k] == 0:
+            continue
+        middle = 0.5 * (low[k] + high[k])
+        for row, value in zip(words, place[:, k], strict=True):
+            row.append(f"{axis} {'below' if value < middle else 'above'} {middle:.3g} m")
+    return np.array([", ".join(row) or "everywhere" for row in words], dtype=np.str_)

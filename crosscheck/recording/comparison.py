@@ -19,7 +19,7 @@ from crosscheck.recording.stream import Recording, pose_index, recording_file
 from crosscheck.units import in_unit, short
 
 if TYPE_CHECKING:
-    from crosscheck.comparison.residuals import Comparison
+    from crosscheck.comparison.result import Comparison
 
 _MARKDOWN = rr.MediaType.MARKDOWN
 _MOST_LISTED, _MOST_WORST = 5, 6
@@ -137,7 +137,7 @@ def _errors(found: Comparison, shown: Misfit) -> str:
 
 def _worst(found: Comparison) -> str:
     rows = [
-        (str(row["row"] + 1), str(row["line"]), plain(row["run"]), short(row["times_noise"]))
+        (str(row.row + 1), str(row.line), plain(row.run), short(row.times_noise))
         for row in found.worst[:_MOST_WORST]
     ]
     return "## Worst poses\n" + words.table(rows, ("pose", "line", "run", "times the noise"))
@@ -146,7 +146,7 @@ def _worst(found: Comparison) -> str:
 def _pose(found: Comparison, k: int) -> str:
     data = found.problem.data
     head = f"## Pose {k + 1} of {data.n_rows}\nline {int(data.line[k])}, run {plain(data.run[k])}\n"
-    missing = [row["why"] for row in found.unsolved if row["row"] == k]
+    missing = [row.why for row in found.unsolved if row.row == k]
     if missing:
         return head + f"\nNo equilibrium to compare with: {plain(missing[0])}."
     if not found.problem.use[k]:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -12,8 +11,8 @@ from rich.table import Table
 from rich.text import Text
 
 from crosscheck.comparison.associations import Against
-from crosscheck.comparison.limits import Exceeded, place
-from crosscheck.comparison.residuals import Comparison
+from crosscheck.comparison.limits import Exceeded
+from crosscheck.comparison.result import Comparison, Group
 from crosscheck.fit.problem import KINDS, Kind, Rms
 from crosscheck.terminal.lines import cell, console_for, heading, say, table_of
 from crosscheck.units import in_unit
@@ -38,7 +37,7 @@ def print_comparison(
         _print_associations(console, found)
         _print_worst(console, found)
     for row in found.unsolved[:_MOST_UNSOLVED]:
-        say(console, f"line {row['line']}, run {row['run']}: {row['why']}", "bold yellow")
+        say(console, f"line {row.line}, run {row.run}: {row.why}", "bold yellow")
     if len(found.unsolved) > _MOST_UNSOLVED:
         say(console, f"{len(found.unsolved) - _MOST_UNSOLVED} more rows without an equilibrium")
     say(console, found.sentence, "green" if found.is_noise else "bold yellow")
@@ -52,9 +51,9 @@ def print_comparison(
 def _coordinates(found: Comparison) -> Table:
     table = table_of(["measured less predicted", "bias", "rms", "max", "unit", "at line", "rows"])
     for row in found.coordinates:
-        factor, unit = in_unit(row["unit"])
-        numbers = [f"{factor * row[key]:.4g}" for key in ("bias", "rms", "max")]
-        table.add_row(row["name"], *numbers, unit, str(row["line"]), str(row["rows"]))
+        factor, unit = in_unit(row.unit)
+        numbers = [f"{factor * value:.4g}" for value in (row.bias, row.rms, row.max)]
+        table.add_row(row.name, *numbers, unit, str(row.line), str(row.rows))
     return table
 
 
@@ -71,18 +70,17 @@ def _errors(found: Comparison) -> Table:
     ):
         if len(groups) > 1:
             for row in _biggest(groups):
-                _add(table, kinds, f"{title} {row['name']}", row, row["rows"])
+                _add(table, kinds, f"{title} {row.name}", row.rms, row.rows)
             if len(groups) > _MOST:
                 table.add_row(f"{len(groups) - _MOST} more, with smaller errors", style="dim")
     return table
 
 
-def _biggest(groups: Sequence[dict[str, Any]]) -> Iterable[dict[str, Any]]:
+def _biggest(groups: Sequence[Group]) -> Sequence[Group]:
+    """Those with the largest errors of the first kind that was read, where they are too many."""
     if len(groups) <= _MOST:
         return groups
-    return sorted(groups, key=lambda g: -(g["position_rms_m"] or g["orientation_rms_rad"] or 0.0))[
-        :_MOST
-    ]
+    return sorted(groups, key=lambda g: -next((v for v in g.rms.values() if v), 0.0))[:_MOST]
 
 
 def _add(
@@ -110,14 +108,13 @@ def _print_associations(console: Console, found: Comparison) -> None:
 
 def _print_worst(console: Console, found: Comparison) -> None:
     for row in found.worst[:_MOST_WORST]:
-        k = row["row"]
         parts = []
         for kind in KINDS:
-            size = found.errors_of(kind.name)[k]
+            size = found.errors_of(kind.name)[row.row]
             if np.isfinite(size):
                 parts.append(f"{kind.factor * size:.4g} {kind.unit}")
         say(
             console,
-            f"worst: line {row['line']}, run {row['run']}, {place(found, k)}: {', '.join(parts)} "
-            f"({row['times_noise']:.3g} times the noise)",
+            f"worst: line {row.line}, run {row.run}, {found.place(row.row)}: {', '.join(parts)} "
+            f"({row.times_noise:.3g} times the noise)",
         )

@@ -11,7 +11,7 @@ from made_data import SIGMA, measured, soft_cogiro, term
 from crosscheck.comparison.associations import EVERYWHERE, SIGNIFICANT
 from crosscheck.comparison.cable_space import cable_errors, independent_part
 from crosscheck.comparison.limits import Limits, check, load_limits, parse_limit, with_options
-from crosscheck.comparison.residuals import as_json, compare
+from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.travel import STILL
 from crosscheck.errors import CrosscheckError, InputFileError
 from crosscheck.files import json_text
@@ -48,30 +48,30 @@ def test_coordinates_are_measured_less_predicted(robot, data, off):
     rest = off.state.prediction.pose
     reading = np.concatenate([data.position, data.quat_wxyz], axis=1)
     error = pose_difference(reading, rest)
-    z = next(c for c in off.coordinates if c["name"] == "z")
-    assert z["bias"] == pytest.approx(error[:, 2].mean(), rel=1e-9)
-    assert z["rms"] == pytest.approx(np.sqrt((error[:, 2] ** 2).mean()), rel=1e-9)
+    z = next(c for c in off.coordinates if c.name == "z")
+    assert z.bias == pytest.approx(error[:, 2].mean(), rel=1e-9)
+    assert z.rms == pytest.approx(np.sqrt((error[:, 2] ** 2).mean()), rel=1e-9)
     worst = int(np.argmax(np.abs(error[:, 2])))
-    assert z["max"] == pytest.approx(error[worst, 2]) and z["line"] == data.line[worst]
-    turn = next(c for c in off.coordinates if c["name"] == "rotation about y")
-    assert turn["rms"] == pytest.approx(np.sqrt((error[:, 4] ** 2).mean()), rel=1e-9)
+    assert z.max == pytest.approx(error[worst, 2]) and z.line == data.line[worst]
+    turn = next(c for c in off.coordinates if c.name == "rotation about y")
+    assert turn.rms == pytest.approx(np.sqrt((error[:, 4] ** 2).mean()), rel=1e-9)
 
 
 def test_stiffer_cables_hold_the_platform_higher(off):
     assert not off.is_noise
     assert off.sentence.startswith("The model misses something")
-    z = next(c for c in off.coordinates if c["name"] == "z")
-    assert z["bias"] > 3e-4
-    assert {r["name"] for r in off.runs} == set(off.problem.data.runs)
+    z = next(c for c in off.coordinates if c.name == "z")
+    assert z.bias > 3e-4
+    assert {r.name for r in off.runs} == set(off.problem.data.runs)
 
 
 def test_groups_hold_every_row_once(off):
     n = off.problem.data.n_rows
     for groups in (off.runs, off.directions, off.regions):
-        assert sum(g["rows"] for g in groups) == n
-    power = sum(g["rows"] * g["position_rms_m"] ** 2 for g in off.runs)
+        assert sum(g.rows for g in groups) == n
+    power = sum(g.rows * g.rms["position_rms_m"] ** 2 for g in off.runs)
     assert np.sqrt(power / n) == pytest.approx(off.rms["position_rms_m"], rel=1e-9)
-    assert len(off.regions) > 2 and all("x " in g["name"] for g in off.regions)
+    assert len(off.regions) > 2 and all("x " in g.name for g in off.regions)
 
 
 def test_direction_of_travel_is_the_commanded_one(robot, off):
@@ -91,9 +91,9 @@ def test_the_worst_row_is_named(robot, data):
     position = data.position.copy()
     position[20, 1] += 0.01
     found = compare(robot, replace(data, position=position))
-    assert found.worst[0]["row"] == 20 and found.worst[0]["line"] == data.line[20]
-    assert found.worst[0]["errors"]["y [m]"] == pytest.approx(0.01, rel=0.1)
-    assert found.worst[0]["run"] == data.run[20]
+    assert found.worst[0].row == 20 and found.worst[0].line == data.line[20]
+    assert found.worst[0].errors["y [m]"] == pytest.approx(0.01, rel=0.1)
+    assert found.worst[0].run == data.run[20]
     assert any(f"line {data.line[20]}: far off" in note for note in found.notes)
 
 
@@ -119,10 +119,10 @@ def test_errors_are_traced_to_what_they_follow(robot, against):
     first = next(a for a in found.associations if a.against == against)
     # runs follow each other in time: which run it is can be as good an answer as the time
     assert first.share > 0.9 * found.associations[0].share
-    assert first["p"] < 1e-6 and first.share > 0.15
-    means = [b["mean"] for b in first["bins"]]
+    assert first.p < 1e-6 and first.share > 0.15
+    means = [b.mean for b in first.bins]
     assert max(np.abs(means)) == pytest.approx(np.abs(error).max(), rel=0.5)
-    assert sum(b["rows"] for b in first["bins"]) == plain.n_rows
+    assert sum(b.rows for b in first.bins) == plain.n_rows
 
 
 def test_noise_goes_with_nothing(robot):
@@ -148,12 +148,12 @@ def test_half_of_the_readings_will_do(robot, data):
     found = compare(robot, angles)
     assert found.rms["position_rms_m"] is None
     assert found.rms["orientation_rms_rad"] > 0
-    assert [c["name"] for c in found.coordinates] == [f"rotation about {a}" for a in "xyz"]
+    assert [c.name for c in found.coordinates] == [f"rotation about {a}" for a in "xyz"]
     assert np.isnan(found.errors_of("position")).all()
     only_z = data.position.copy()
     only_z[:, :2] = np.nan
     found = compare(robot, replace(data, position=only_z, quat_wxyz=None))
-    assert [c["name"] for c in found.coordinates] == ["z"]
+    assert [c.name for c in found.coordinates] == ["z"]
 
 
 def test_tensions_are_compared(robot):
@@ -161,7 +161,7 @@ def test_tensions_are_compared(robot):
     data = measured(robot, [term(robot, "tension_scale", factor=1.1)], sigma=noisy, tensions=True)
     found = compare(robot, data)
     assert found.rms["tension_rms_N"] > 0.05
-    assert sum(c["unit"] == "N" for c in found.coordinates) == robot.n_cables
+    assert sum(c.unit == "N" for c in found.coordinates) == robot.n_cables
     assert found.errors_of("tension").max() > 0.1
 
 
@@ -176,7 +176,7 @@ def test_a_planar_robot_is_compared(tmp_path):
     data = measured(robot, [term(robot, "platform_mass", added_kg=0.2 * robot.mass)])
     found = compare(robot, data)
     assert not found.is_noise and found.converged
-    json_text(as_json(found))
+    json_text(found.as_json())
 
 
 def slack_robot(robot):
@@ -187,15 +187,15 @@ def slack_robot(robot):
 def test_rows_with_every_cable_slack_are_named_and_nothing_is_made_up(robot, data):
     found = compare(slack_robot(robot), data)
     assert not found.converged and len(found.unsolved) == data.n_rows
-    assert "every cable is slack" in found.unsolved[0]["why"]
+    assert "every cable is slack" in found.unsolved[0].why
     assert found.sentence.startswith("Nothing could be compared: ")
     assert found.rms["position_rms_m"] is None and found.worst == ()
     assert not found.is_noise
-    json_text(as_json(found))
+    json_text(found.as_json())
 
 
 def test_everything_is_json(off):
-    text = json_text(as_json(off))
+    text = json_text(off.as_json())
     assert "NaN" not in text and '"structured": true' in text
 
 

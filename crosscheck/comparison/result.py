@@ -1,0 +1,236 @@
+"""What a model held against measurements comes to: the errors by reading, group and row.
+
+Errors are measured less predicted: position [m] and rotation vector [rad] in the base frame
+(differences of rx, ry, rz where only some of these were read), tensions [N].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from crosscheck.comparison.associations import Against, Association, channels
+from crosscheck.comparison.travel import Travel
+from crosscheck.fit.noise import Whiteness
+from crosscheck.fit.problem import BY_NAME, Problem, Rms
+from crosscheck.fit.state import State
+from seecr.effects import Terms
+from seecr.equilibrium import Status
+from seecr.pose import Array
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """The errors of one reading.
+
+    Attributes:
+        name: of the reading. unit: of its numbers. rows: how many were compared.
+        bias, rms, max: mean, root mean square, and the error that is largest in size.
+        line: of the largest.
+    """
+
+    name: str
+    unit: str
+    rows: int
+    bias: float
+    rms: float
+    max: float
+    line: int
+
+    def as_json(self) -> dict[str, Any]:
+        """As in ``comparison.json``."""
+        return vars(self)
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """The errors of rows that have a run, a direction of travel or a region in common.
+
+    Attributes:
+        name: what they have in common. rows: how many were compared. rms: errors by kind.
+    """
+
+    name: str
+    rows: int
+    rms: Rms
+
+    def as_json(self) -> dict[str, Any]:
+        """As in ``comparison.json``."""
+        return {"name": self.name, "rows": self.rows, **self.rms}
+
+
+@dataclass(frozen=True, eq=False)
+class WorstRow:
+    """A row with large errors.
+
+    Attributes:
+        row: from 0. line, run: where it is in the file. command: (7,) commanded pose.
+        errors: by reading with its unit. times_noise: rms of the errors over their noise.
+    """
+
+    row: int
+    line: int
+    run: str
+    command: Array
+    errors: dict[str, float]
+    times_noise: float
+
+    def as_json(self) -> dict[str, Any]:
+        """As in ``comparison.json``."""
+        return vars(self)
+
+
+@dataclass(frozen=True)
+class UnsolvedRow:
+    """A row for which the model has no equilibrium.
+
+    Attributes:
+        row: from 0. line, run: where it is in the file. status: what became of the solve.
+        all_slack: whether no cable pulls.
+    """
+
+    row: int
+    line: int
+    run: str
+    status: Status
+    all_slack: bool
+
+    @property
+    def why(self) -> str:
+        """What became of it, for a person."""
+        return self.status.value + ("; every cable is slack" if self.all_slack else "")
+
+    def as_json(self) -> dict[str, Any]:
+        """As in ``comparison.json``."""
+        return {"row": self.row, "line": self.line, "run": self.run, "why": self.why}
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A model held against measurements.
+
+    Attributes:
+        problem: the data; its ``use`` (n,) says which rows were compared.
+        state: the model's prediction and the residuals, ``state.raw`` (n, 6 + m).
+        way: commanded motion to each row.
+        rms: errors by kind (``position_rms_m``, ...). floor: what noise alone would give.
+        coordinates: errors of each reading. runs, directions, regions: of groups of rows.
+        associations: what the errors go with, the strongest first.
+        worst: rows, the worst first.
+        whiteness: is what is left noise; None where nothing could be compared.
+        unsolved: rows that the model has no equilibrium for.
+        notes: what was assumed, estimated or left out.
+    """
+
+    problem: Problem
+    state: State
+    way: Travel
+    rms: Rms
+    floor: Rms
+    coordinates: tuple[Coordinate, ...]
+    runs: tuple[Group, ...]
+    directions: tuple[Group, ...]
+    regions: tuple[Group, ...]
+    associations: tuple[Association, ...]
+    worst: tuple[WorstRow, ...]
+    whiteness: Whiteness | None
+    unsolved: tuple[UnsolvedRow, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def terms(self) -> Terms:
+        """The model's effects."""
+        return self.state.terms
+
+    @property
+    def is_noise(self) -> bool:
+        """Whether nothing speaks against what is left being noise of the stated size."""
+        return self.whiteness is not None and self.whiteness.is_noise
+
+    @property
+    def converged(self) -> bool:
+        """Whether the model has an equilibrium at every row."""
+        return not self.unsolved
+
+    def errors_of(self, kind: str) -> Array:
+        """(n,) size of the error of "position" [m], "orientation" [rad], largest "tension" [N].
+
+        NaN in rows that were not compared.
+        """
+        return BY_NAME[kind].sizes(self.problem, self.state.raw)
+
+    def place(self, row: int) -> str:
+        """The commanded position of a row for people; of lengths, where the model rests."""
+        x, y, z = self.way.pose[row, :3]
+        word = "commanded" if self.problem.data.command_lengths is None else "predicted"
+        return f"{word} ({x:.4g} {y:.4g} {z:.4g}) m"
+
+    @property
+    def sentence(self) -> str:
+        """The verdict for a person."""
+        w = self.whiteness
+        if w is None:
+            why = f": {self.unsolved[0].why}" if self.unsolved else ""
+            return f"Nothing could be compared{why}."
+        if w.is_noise:
+            times = f"{w.scale:.2f} times the stated one"
+            return f"Model and data agree: what is left is noise ({times})."
+        size = f"the errors are {w.scale:.3g} times the noise"
+        if not w.structured:
+            return (
+                f"What is left looks random, but {size}: the noise is stated too small, or many "
+                "small effects are missing."
+            )
+        goes = self._goes_with()
+        return f"The model misses something: {size}, and neighbouring rows agree in them{goes}."
+
+    def _goes_with(self) -> str:
+        strongest = next((a for a in self.associations if a.significant), None)
+        if strongest is None:
+            return ""
+        share = f"{100 * strongest.share:.0f} %"
+        if strongest.kind is Against.EVERYWHERE:
+            return f"; {share} of their square is the same everywhere"
+        return f"; {share} of their variance goes with {strongest.against}"
+
+    def as_json(self) -> dict[str, Any]:
+        """The content of ``comparison.json``: SI, null where there is no number."""
+        problem, w = self.problem, self.whiteness
+        return {
+            "sentence": self.sentence,
+            "is_noise": self.is_noise,
+            "robot": problem.robot.name,
+            "data": str(problem.data.path),
+            "model": {t.name: dict(zip(t.layout.names, t.vector, strict=True)) for t in self.terms},
+            "rows": {"all": problem.data.n_rows, "compared": int(problem.use.sum())},
+            "rms": self.rms,
+            "noise_floor": self.floor,
+            "sigma": vars(problem.sigma),
+            "residual": None if w is None else {**vars(w), "structured": w.structured},
+            "coordinates": self.coordinates,
+            "runs": self.runs,
+            "directions": self.directions,
+            "regions": self.regions,
+            "associations": self.associations,
+            "worst": self.worst,
+            "unsolved": self.unsolved,
+            "poses": self._rows(),
+            "notes": self.notes,
+        }
+
+    def _rows(self) -> dict[str, Any]:
+        """Every row: errors by reading, in the order of ``channels``; null where not compared."""
+        data = self.problem.data
+        names, units = channels(self.problem)
+        return {
+            "line": data.line,
+            "run": data.run,
+            "command": self.way.pose,
+            "direction": self.way.direction,
+            "speed_m_per_s": self.way.speed,
+            "slack_cables": self.state.prediction.slack.sum(axis=1),
+            "channels": [f"{n} [{u}]" for n, u in zip(names, units, strict=True)],
+            "error": np.where(self.problem.counted, self.state.raw, np.nan),
+        }

@@ -1,0 +1,60 @@
+"""Where the platform was told to go, cable errors of a known shift: by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from made_data import measured, soft_cogiro
+
+from crosscheck.comparison.cable_space import cable_errors, cable_lengths, independent_part
+from crosscheck.comparison.travel import STILL, regions_of, travel
+from crosscheck.fit.problem import Problem
+from seecr.effects import Terms
+from seecr.experiment import Prediction
+
+
+@pytest.fixture(scope="module")
+def case() -> tuple[Problem, Prediction]:
+    robot = soft_cogiro()
+    data = measured(robot)
+    problem = Problem(robot, data, data.sigma, np.ones(data.n_rows, dtype=bool))
+    return problem, problem.experiment.predict(Terms().effects)
+
+
+def test_direction_and_speed_are_those_of_the_commands(case: tuple[Problem, Prediction]) -> None:
+    problem, prediction = case
+    way = travel(problem, prediction)
+    data, starts = problem.data, problem.experiment.commands.starts
+    assert data.command_pose is not None
+    step = np.diff(data.command_pose[:, :3], axis=0)
+    k = next(i for i in range(1, data.n_rows) if not starts[i] and np.any(step[i - 1]))
+    assert way.step[k, :3] == pytest.approx(step[k - 1], abs=1e-15)
+    assert np.isnan(way.speed[starts]).all()
+    assert way.direction[k] == STILL or way.direction[k][0] in "+-"
+
+
+def test_regions_are_halves_of_what_was_used(case: tuple[Problem, Prediction]) -> None:
+    problem, prediction = case
+    pose = travel(problem, prediction).pose.copy()
+    pose[:, :3] = [0.0, 0.0, 0.5]
+    assert set(regions_of(problem, pose)) == {"everywhere"}
+    pose[::2, 0] = 1.0
+    names = regions_of(problem, pose)
+    assert set(names[::2]) == {"x above 0.5 m"} and set(names[1::2]) == {"x below 0.5 m"}
+
+
+def test_a_shift_of_the_platform_is_an_error_of_each_cable(
+    case: tuple[Problem, Prediction],
+) -> None:
+    problem, prediction = case
+    shift = np.array([1e-6, -2e-6, 3e-6])
+    raw = np.zeros((problem.data.n_rows, 6 + problem.robot.n_cables))
+    raw[:, :3] = shift
+    errors, noise = cable_errors(problem, raw, prediction)
+    moved = prediction.pose.copy()
+    moved[:, :3] += shift
+    apart = problem.robot.nominal_lengths(moved) - cable_lengths(problem, prediction)
+    # to the second order: the square of the shift over a cable of 0.1 m
+    assert errors[problem.use] == pytest.approx(apart[problem.use], rel=0, abs=1e-10)
+    assert np.all(noise >= problem.sigma.position_m)
+    assert 0.0 < independent_part(problem, prediction) <= 1.0
