@@ -2,45 +2,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from seecr.errors import SeecrError
 
 
-class CrosscheckError(Exception):
-    """Base of every error raised on purpose by crosscheck.
-
-    Attributes:
-        exit_status: what the command line ends with (2: bad input or usage).
-    """
-
-    exit_status = 2
-
-
-class InputFileError(CrosscheckError):
-    """A file of the user's that is missing, of another kind, or wrong at some place."""
-
-    @classmethod
-    def at(
-        cls,
-        path: str | Path,
-        text: str,
-        *,
-        line: int | None = None,
-        column: str | None = None,
-        line_word: str = "line",
-    ) -> InputFileError:
-        """Error whose message starts with the place: ``FILE: line 3, column t_s: text``.
-
-        Args:
-            path: the file.
-            text: what was expected, what was found, what to do.
-            line: counted from 1.
-            column: name of the column.
-            line_word: ``"row"`` for files that have no lines.
-        """
-        place = []
-        if line is not None:
-            place.append(f"{line_word} {line}")
-        if column is not None:
-            place.append(f"column {column}")
-        start = f"{path}: {', '.join(place)}: " if place else f"{path}: "
-        return cls(" ".join((start + text).split()))
+class CrosscheckError(SeecrError):
+    """Arguments, options or data that crosscheck cannot work with."""

@@ -24,40 +24,9 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.errors import CrosscheckError, InputFileError
-
-
-def read_bytes(path: Path, expected: str) -> bytes:
-    """The bytes of a file.
-
-    Args:
-        path: the file.
-        expected: what it should be, for the error.
-
-    Raises:
-        InputFileError: the file is missing or unreadable.
-    """
-    try:
-        return path.read_bytes()
-    except FileNotFoundError:
-        raise InputFileError.at(path, f"no such file; {expected}") from None
-    except OSError as error:
-        raise InputFileError.at(path, f"cannot be read: {_reason(error)}; {expected}") from None
-
-
-def read_text(path: Path, expected: str) -> str:
-    """The text of a UTF-8 file, with or without a byte order mark; every line ends in ``\\n``.
-
-    Raises:
-        InputFileError: the file is missing, unreadable or not UTF-8.
-    """
-    data = read_bytes(path, expected)
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        found = f"is not UTF-8 (byte number {error.start + 1}); {expected}"
-        raise InputFileError.at(path, found) from None
-    return text.replace("\r\n", "\n").replace("\r", "\n")
+from crosscheck.errors import CrosscheckError
+from seecr.errors import InputFileError
+from seecr.files import read_text, reason_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +87,7 @@ def written(*paths: Path, failure: str = "cannot be written") -> Iterator[tuple[
         for part, path in zip(temporary, paths, strict=True):
             part.replace(path)
     except OSError as error:
-        raise InputFileError.at(paths[-1], f"{failure}: {_reason(error)}") from None
+        raise InputFileError.at(paths[-1], f"{failure}: {reason_of(error)}") from None
     finally:
         for part in temporary:
             with contextlib.suppress(OSError):
@@ -157,7 +126,7 @@ def staged(out: str | Path) -> Iterator[Path]:
     except OSError as error:
         _remove_empty(made)
         raise CrosscheckError(
-            f"--out {out}: cannot write there: {_reason(error)}; expected a folder that can be "
+            f"--out {out}: cannot write there: {reason_of(error)}; expected a folder that can be "
             "made or written to"
         ) from None
     done = False
@@ -206,7 +175,3 @@ def plain(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
-
-
-def _reason(error: OSError) -> str:
-    return error.strerror or str(error)

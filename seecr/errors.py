@@ -1,10 +1,18 @@
-"""Exceptions of seecr: each message is one line, for the person who made the mistake."""
+"""Exceptions: each message is one line, for the person who can mend the cause."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 
 class SeecrError(ValueError):
-    """Base of every error raised on purpose by seecr."""
+    """Base of every error raised on purpose, by seecr and by crosscheck.
+
+    Attributes:
+        exit_status: what a command line ends with (2: bad input or usage).
+    """
+
+    exit_status = 2
 
 
 class RobotError(SeecrError):
@@ -13,3 +21,38 @@ class RobotError(SeecrError):
 
 class InputError(SeecrError):
     """Arguments of a wrong shape, unit or value."""
+
+
+class MissingPackageError(SeecrError):
+    """Something asked for that needs a package which is not installed."""
+
+
+class InputFileError(SeecrError):
+    """A file of the user's that is missing, of another kind, or wrong at some place."""
+
+    @classmethod
+    def at(
+        cls,
+        path: str | Path,
+        text: str,
+        *,
+        line: int | None = None,
+        column: str | None = None,
+        line_word: str = "line",
+    ) -> InputFileError:
+        """Error whose message starts with the place: ``FILE: line 3, column t_s: text``.
+
+        Args:
+            path: the file.
+            text: what was expected, what was found, what to do.
+            line: counted from 1.
+            column: name of the column.
+            line_word: ``"row"`` for files that have no lines.
+        """
+        place = []
+        if line is not None:
+            place.append(f"{line_word} {line}")
+        if column is not None:
+            place.append(f"column {column}")
+        start = f"{path}: {', '.join(place)}: " if place else f"{path}: "
+        return cls(" ".join((start + text).split()))

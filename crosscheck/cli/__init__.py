@@ -8,7 +8,6 @@ from typing import Any
 
 import click
 
-from crosscheck.errors import CrosscheckError
 from seecr import __version__
 from seecr.errors import SeecrError
 
@@ -55,8 +54,8 @@ class LazyGroup(click.Group):
             status = self._run(*args, **extra)
         except click.ClickException as error:
             sys.exit(_refuse(_usage_text(error)))
-        except (SeecrError, CrosscheckError) as error:
-            sys.exit(_refuse(str(error), getattr(error, "exit_status", BAD_INPUT)))
+        except SeecrError as error:
+            sys.exit(_refuse(str(error), error.exit_status))
         except SystemExit as done:
             # click ends 1 when whoever read our output has left; here 1 means something else
             sys.exit(_CUT_OFF if done.code == 1 else done.code)

@@ -11,7 +11,7 @@ from crosscheck.cli.options import FILE, json_option, progress_share
 
 if TYPE_CHECKING:
     from crosscheck.add import Addition
-    from crosscheck.model.read import Model
+    from seecr.model import Model
     from seecr.robot import Robot
 
 
@@ -58,9 +58,9 @@ def command(
     """
     from crosscheck.add import add_effect
     from crosscheck.measurements.read import load_measurements
-    from crosscheck.model.read import load_model, new_model
     from seecr.effects import effect_named
     from seecr.mjcf import load_robot
+    from seecr.model import load_model, new_model
 
     effect_named(effect)
     machine = load_robot(robot)

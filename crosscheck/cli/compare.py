@@ -62,8 +62,8 @@ def command(
     from crosscheck.comparison.residuals import compare
     from crosscheck.files import json_text, staged, write_text
     from crosscheck.measurements.read import load_measurements
-    from crosscheck.model.read import load_model
     from seecr.mjcf import load_robot
+    from seecr.model import load_model
 
     limits = with_options(load_limits(limits_file) if limits_file else Limits(), options)
     machine = load_robot(robot)

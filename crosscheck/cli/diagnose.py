@@ -30,9 +30,9 @@ def command(
     from crosscheck.diagnosis.verdict import diagnose
     from crosscheck.files import json_text, staged, write_text
     from crosscheck.measurements.read import load_measurements
-    from crosscheck.model.read import load_model, new_model
     from crosscheck.report import write_report
     from seecr.mjcf import load_robot
+    from seecr.model import load_model, new_model
 
     machine = load_robot(robot)
     measured = load_measurements(data, machine)

@@ -13,10 +13,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from crosscheck.errors import InputFileError
 from crosscheck.measurements.data import Mask
 from crosscheck.measurements.table import Table, show
 from crosscheck.units import Unit, of_columns
+from seecr.errors import InputFileError
 from seecr.pose import Array
 
 POSITION = ("x", "y", "z")

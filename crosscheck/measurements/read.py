@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from crosscheck.errors import InputFileError
 from crosscheck.files import Toml, read_toml
 from crosscheck.measurements.columns import POSITION, Columns, know_columns
 from crosscheck.measurements.data import Measurements, Names, Sigma
 from crosscheck.measurements.poses import command_lengths, command_poses, measured_orientation
 from crosscheck.measurements.table import read_table, show
+from seecr.errors import InputFileError
 from seecr.pose import Array
 
 if TYPE_CHECKING:

@@ -17,8 +17,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.errors import CrosscheckError, InputFileError
-from crosscheck.files import read_bytes
+from crosscheck.errors import CrosscheckError
+from seecr.errors import InputFileError
+from seecr.files import read_bytes
 from seecr.pose import Array
 
 EXPECTED_FILE = "expected a CSV file in UTF-8 with a header row and one row per resting pose"

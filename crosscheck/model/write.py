@@ -13,10 +13,10 @@ import numpy as np
 import tomlkit
 
 from crosscheck.files import written
-from crosscheck.model.fingerprint import fingerprint
-from crosscheck.model.read import UNSEEN, Model
 from seecr.effects import Term, Terms
 from seecr.effects.base import Layout
+from seecr.fingerprint import fingerprint
+from seecr.model import UNSEEN, Model
 from seecr.pose import Array
 from seecr.robot import Robot
 

@@ -16,7 +16,7 @@ from threading import Lock
 import mujoco
 import numpy as np
 
-from crosscheck.errors import InputFileError
+from seecr.errors import InputFileError
 
 _DISABLE = (
     mujoco.mjtDisableBit.mjDSBL_AUTORESET,  # else a diverging run restarts as if nothing happened

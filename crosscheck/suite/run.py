@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.errors import InputFileError
 from crosscheck.suite.agreement import (
     QUANTITIES,
     Allowance,
@@ -28,6 +27,7 @@ from crosscheck.suite.thresholds import Thresholds
 from crosscheck.suite.verdicts import UNSOLVED, Answers, PoseFinding, Verdict, held_to, judge
 from seecr.equilibrium import Solution
 from seecr.equilibrium import solve as seecr_solve
+from seecr.errors import InputFileError
 from seecr.mjcf import load_robot
 from seecr.pose import Array
 from seecr.robot import Robot

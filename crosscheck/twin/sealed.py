@@ -14,7 +14,7 @@ import zlib
 from pathlib import Path
 from typing import Any
 
-from crosscheck.errors import InputFileError
+from seecr.errors import InputFileError
 
 NAME = "answer.sealed"
 _FIRST_LINE = "# What this twin hides. To see it: crosscheck twin --open"

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from crosscheck.errors import InputFileError
 from crosscheck.files import (
     json_text,
     plain,
@@ -19,6 +18,7 @@ from crosscheck.files import (
     write_texts,
     written,
 )
+from seecr.errors import InputFileError
 
 
 def test_text_is_read_without_its_mark_and_with_plain_line_ends(tmp_path: Path) -> None:

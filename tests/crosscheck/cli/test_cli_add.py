@@ -14,8 +14,8 @@ from crosscheck.add import add_effect
 from crosscheck.errors import CrosscheckError
 from crosscheck.measurements.read import load_measurements
 from crosscheck.measurements.write import write_measurements
-from crosscheck.model.read import load_model
 from seecr.mjcf import load_robot
+from seecr.model import load_model
 
 HIDDEN = {"pulley_radius": {"radius_m": 0.01}, "centre_of_mass": {"shift_x_m": 0.004}}
 

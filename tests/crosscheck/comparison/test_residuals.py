@@ -13,9 +13,10 @@ from crosscheck.comparison.cable_space import cable_errors, independent_part
 from crosscheck.comparison.limits import Limits, check, load_limits, parse_limit, with_options
 from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.travel import STILL
-from crosscheck.errors import CrosscheckError, InputFileError
+from crosscheck.errors import CrosscheckError
 from crosscheck.files import json_text
 from crosscheck.measurements.data import Sigma
+from seecr.errors import InputFileError
 from seecr.mjcf import load_robot
 from seecr.pose import pose_add, pose_difference
 from seecr.shipped import model_path

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from random_robots import random_robot
 
-from crosscheck.errors import InputFileError
 from crosscheck.measurements.columns import Columns, know_columns
 from crosscheck.measurements.poses import command_lengths, command_poses, measured_orientation
 from crosscheck.measurements.table import Table, read_table
+from seecr.errors import InputFileError
 from seecr.pose import quat_from_rxyz
 from seecr.robot import Joint, Robot
 

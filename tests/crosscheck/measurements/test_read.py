@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from crosscheck.errors import CrosscheckError, InputFileError
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import load_commands, load_measurements
 from crosscheck.measurements.write import write_measurements
+from seecr.errors import InputFileError
 from seecr.mjcf import load_robot
 from seecr.pose import pose_difference, quat_from_rxyz, quat_rotate, quat_to_matrix
 from seecr.robot import Robot
@@ -673,10 +673,10 @@ def test_writing_again_leaves_no_old_sigma(tmp_path, robot):
 
 def test_unwritable_folder_leaves_nothing(tmp_path):
     made = everything(tmp_path / "nowhere" / "measured.csv")
-    with pytest.raises(CrosscheckError, match=r"measured.csv: cannot be written: No such file"):
+    with pytest.raises(InputFileError, match=r"measured.csv: cannot be written: No such file"):
         write_measurements(made.path, made)
     (tmp_path / "measured.csv").mkdir()
-    with pytest.raises(CrosscheckError, match="cannot be written: Is a directory"):
+    with pytest.raises(InputFileError, match="cannot be written: Is a directory"):
         write_measurements(tmp_path / "measured.csv", made)
     assert [p.name for p in tmp_path.iterdir()] == ["measured.csv"]
 

@@ -10,10 +10,10 @@ import pytest
 import tomlkit
 from made_data import COGIRO, term
 
-from crosscheck.errors import CrosscheckError, InputFileError
-from crosscheck.model.read import load_model, new_model
 from crosscheck.model.write import Fitted, Provenance, renewed, save_model, with_fit
+from seecr.errors import InputFileError
 from seecr.mjcf import load_robot
+from seecr.model import load_model, new_model
 from seecr.shipped import model_path
 
 SOURCE = Provenance("measured.csv", "2024-05-13", "seecr 0.1.0", "crosscheck add pulley_radius")
@@ -215,6 +215,6 @@ def test_a_file_that_is_not_there_or_no_text(robot, tmp_path):
 def test_an_unwritable_place_leaves_the_old_model(robot, saved, tmp_path):
     blocked = tmp_path / "file"
     blocked.write_text("")
-    with pytest.raises(CrosscheckError, match="the model cannot be written"):
+    with pytest.raises(InputFileError, match="the model cannot be written"):
         save_model(blocked / "m.toml", new_model(robot))
     assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "model.toml"]

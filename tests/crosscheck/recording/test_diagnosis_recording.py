@@ -15,13 +15,13 @@ from recordings import Readback, headless_viewer
 from crosscheck.comparison.residuals import Comparison, compare
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import Stage, stages_of
-from crosscheck.errors import CrosscheckError
 from crosscheck.fit.problem import KINDS, POSITION
 from crosscheck.recording import write_comparison_recording, write_diagnosis_recording
 from crosscheck.recording.diagnosis_words import plain
 from crosscheck.recording.misfit import Misfit, read_poses, states_of, worst_row
 from crosscheck.recording.words import short_names
 from crosscheck.units import short
+from seecr.errors import InputFileError
 
 STEP = "model_step"
 
@@ -242,9 +242,9 @@ def test_comparison_names_the_worst_and_the_verdict(compared: Path, comparison: 
 def test_written_whole_or_not_at_all(
     found: Diagnosis, comparison: Comparison, tmp_path: Path
 ) -> None:
-    with pytest.raises(CrosscheckError, match="cannot write the recording"):
+    with pytest.raises(InputFileError, match="cannot write the recording"):
         write_diagnosis_recording(found, tmp_path / "gone" / "d.rrd")
-    with pytest.raises(CrosscheckError, match="cannot write the recording"):
+    with pytest.raises(InputFileError, match="cannot write the recording"):
         write_comparison_recording(comparison, tmp_path / "gone" / "c.rrd")
     assert list(tmp_path.iterdir()) == []
 

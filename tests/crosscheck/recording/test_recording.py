@@ -13,7 +13,6 @@ import pytest
 from recordings import Readback, headless_viewer
 from rerun.chunk import RrdReader
 
-from crosscheck.errors import CrosscheckError
 from crosscheck.recording import shapes, write_case_recording
 from crosscheck.recording.colours import cable_colours, round_up, scale_colours
 from crosscheck.recording.series import Series
@@ -25,6 +24,7 @@ from crosscheck.suite.run import CaseResult, run_case
 from crosscheck.suite.thresholds import load_thresholds
 from crosscheck.suite.verdicts import Verdict
 from seecr.equilibrium import Status
+from seecr.errors import InputFileError
 from seecr.mjcf import load_robot
 from seecr.pose import quat_conjugate, quat_multiply
 from seecr.shipped import model_path
@@ -225,7 +225,7 @@ def test_nothing_half_written(
 
 def test_a_folder_that_is_none_is_named(result: CaseResult, tmp_path: Path) -> None:
     path = tmp_path / "missing" / "case.rrd"
-    with pytest.raises(CrosscheckError) as error:
+    with pytest.raises(InputFileError) as error:
         write_case_recording(result, path)
     assert str(error.value) == f"{path}: cannot write the recording: No such file or directory"
     assert error.value.exit_status == 2

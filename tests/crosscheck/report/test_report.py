@@ -26,7 +26,6 @@ from crosscheck.diagnosis.steps import (
     stages_of,
     views_of,
 )
-from crosscheck.errors import CrosscheckError
 from crosscheck.fit.imitation import imitated
 from crosscheck.fit.problem import KINDS
 from crosscheck.fit.reasons import Reason, Why
@@ -37,6 +36,7 @@ from crosscheck.report.page import render
 from crosscheck.report.tables import candidate_rows, checks, finding_context
 from crosscheck.report.waterfall import waterfall
 from crosscheck.units import short, with_error
+from seecr.errors import InputFileError
 
 ALL = ("pulleys", "nothing", "unknown", "none", "position_only", "tensions_only", "one_angle")
 EVIL = '<script>alert("1")</script>&$x$'
@@ -391,10 +391,10 @@ def test_written_whole_or_not_at_all(tmp_path: Path) -> None:
     write_report(diagnosis("nothing"), path)
     assert path.read_text(encoding="utf-8") == page("nothing")
     assert list(tmp_path.iterdir()) == [path]
-    with pytest.raises(CrosscheckError, match=r"gone/d.html: cannot write the report: No such"):
+    with pytest.raises(InputFileError, match=r"gone/d.html: cannot write the report: No such"):
         write_report(diagnosis("none"), tmp_path / "gone" / "d.html")
     (tmp_path / "folder").mkdir()
-    with pytest.raises(CrosscheckError, match="folder: cannot write the report"):
+    with pytest.raises(InputFileError, match="folder: cannot write the report"):
         write_report(diagnosis("none"), tmp_path / "folder")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["diagnosis.html", "folder"]
 

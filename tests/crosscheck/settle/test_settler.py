@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from crosscheck.errors import CrosscheckError, InputFileError
+from crosscheck.errors import CrosscheckError
 from crosscheck.recording.motion import record_motion
 from crosscheck.settle import polish, relax
 from crosscheck.settle import settler as settle
@@ -17,6 +17,7 @@ from crosscheck.settle.physics import Physics
 from crosscheck.settle.relax import SettleStatus
 from crosscheck.settle.settler import Settler, settle_batch
 from crosscheck.suite.worst_pose import write_worst_pose_mjcf
+from seecr.errors import InputFileError
 from seecr.pose import pose_difference, quat_from_rotvec, quat_rotate, transform_points
 
 G = 9.81

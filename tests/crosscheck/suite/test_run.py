@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import seecr
-from crosscheck.errors import CrosscheckError, InputFileError
+from crosscheck.errors import CrosscheckError
 from crosscheck.settle.settler import Settling, SettlingBatch
 from crosscheck.suite import agreement, cases, verdicts, words
 from crosscheck.suite import run as suite
@@ -26,6 +26,7 @@ from crosscheck.suite.mujoco_robot import MujocoRobot, screw_motion
 from crosscheck.suite.run import CaseResult, Outcome, run_case, run_suite, worst_of
 from crosscheck.suite.thresholds import SHIPPED, FindingLimits, load_thresholds, thresholds_toml
 from crosscheck.suite.verdicts import Verdict
+from seecr.errors import InputFileError
 from seecr.pose import pose_add, pose_difference, quat_from_rotvec
 from seecr.shipped import CABLES, model_path
 

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from scipy.stats import chi2
 
 from crosscheck.cli import main
-from crosscheck.errors import CrosscheckError, InputFileError
+from crosscheck.errors import CrosscheckError
 from crosscheck.measurements.read import load_measurements
 from crosscheck.twin.hidden import Hidden, choose
 from crosscheck.twin.make import make_twin
@@ -22,7 +22,7 @@ from crosscheck.twin.sealed import NAME, seal, unseal
 from crosscheck.twin.trajectory import trajectory
 from seecr.commands import Commands
 from seecr.effects import effect_named, layout_of
-from seecr.errors import InputError
+from seecr.errors import InputError, InputFileError
 from seecr.experiment import Experiment
 from seecr.mjcf import load_robot
 from seecr.pose import pose_difference

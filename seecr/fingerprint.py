@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import tomlkit
 
-from crosscheck.errors import InputFileError
+from seecr.errors import InputFileError
 
 if TYPE_CHECKING:
     from seecr.robot import Robot
@@ -42,7 +42,7 @@ def fingerprint(robot: Robot) -> tomlkit.items.Table:
 
 
 def _toml(value: Any) -> Any:
-    """Points one a line, other numbers as they are."""
+    """Points one per line, other numbers as they are."""
     if not (isinstance(value, list) and isinstance(value[0], list)):
         return value
     rows = tomlkit.array()

@@ -29,12 +29,11 @@ import tomlkit
 from tomlkit import TOMLDocument
 from tomlkit.exceptions import TOMLKitError
 
-from crosscheck.errors import InputFileError
-from crosscheck.files import read_text
-from crosscheck.model.fingerprint import check_robot, fingerprint
 from seecr.effects import Term, Terms, effect_named, layout_of
 from seecr.effects.base import Layout
-from seecr.errors import InputError
+from seecr.errors import InputError, InputFileError
+from seecr.files import read_text
+from seecr.fingerprint import check_robot, fingerprint
 from seecr.pose import Array
 
 if TYPE_CHECKING:
@@ -166,7 +165,7 @@ def _check_tables(where: _Where, document: Mapping[str, Any]) -> None:
 def _effect_tables(where: _Where, document: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
     tables = document.get("effect", [])
     if not isinstance(tables, list) or not all(isinstance(t, Mapping) for t in tables):
-        raise where.error("effect: expected tables [[effect]], one an effect", key="effect")
+        raise where.error("effect: expected tables [[effect]], one per effect", key="effect")
     return tables
 
 

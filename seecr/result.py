@@ -1,0 +1,83 @@
+"""What results have in common: a few lines in print, a page in a notebook, a data frame."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from html import escape
+from itertools import islice
+from typing import Any
+
+from seecr.errors import MissingPackageError
+
+# Rows of the table in a notebook; all of them are in the data frame.
+_MOST_ROWS = 20
+
+Record = dict[str, Any]
+"""One row of a data frame: numbers in SI, names that end in their unit."""
+
+
+class Result(ABC):
+    """A result that shows itself; its class says what there is to read, see and tabulate."""
+
+    @abstractmethod
+    def lines(self) -> Sequence[str]:
+        """The result in a few lines for people."""
+
+    @abstractmethod
+    def records(self) -> Sequence[Record]:
+        """The result's rows, all with the same names."""
+
+    def __str__(self) -> str:
+        return "\n".join(self.lines())
+
+    def __repr__(self) -> str:
+        return str(self)
+
+    def _repr_html_(self) -> str:
+        """The lines, and the first rows as a table, for a notebook."""
+        words = "".join(f"<div>{escape(line)}</div>" for line in self.lines())
+        return words + _table(self.records())
+
+    def to_frame(self) -> Any:
+        """All rows as a ``pyarrow.Table``; without pyarrow as a ``pandas.DataFrame``.
+
+        Raises:
+            MissingPackageError: neither is installed.
+        """
+        records = list(self.records())
+        try:
+            from pyarrow import Table
+
+            return Table.from_pylist(records)
+        except ModuleNotFoundError:
+            pass
+        try:
+            from pandas import DataFrame
+
+            return DataFrame.from_records(records)
+        except ModuleNotFoundError:
+            raise MissingPackageError(
+                "a data frame needs pyarrow or pandas, and neither is installed; "
+                "install one: pip install pyarrow"
+            ) from None
+
+
+def _table(records: Sequence[Record]) -> str:
+    if not records:
+        return ""
+    heads = "".join(f"<th>{escape(name)}</th>" for name in records[0])
+    rows = "".join(f"<tr>{_cells(record)}</tr>" for record in islice(records, _MOST_ROWS))
+    more = len(records) - _MOST_ROWS
+    rest = f"<div>and {more} more rows: to_frame() has them all</div>" if more > 0 else ""
+    return f"<table><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table>{rest}"
+
+
+def _cells(record: Mapping[str, Any]) -> str:
+    return "".join(f"<td>{escape(_shown(value))}</td>" for value in record.values())
+
+
+def _shown(value: Any) -> str:
+    if value is None:
+        return ""
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
