@@ -152,6 +152,7 @@ def test_an_effect_is_a_case_like_any_other(tmp_path):
     assert "| platform_mass | demobot_parallel |" in (tmp_path / "summary.md").read_text()
 
 
+@pytest.mark.slow
 def test_effects_alone_run_in_several_processes(tmp_path):
     result = run("--case", "effect-*-platform_mass", "--jobs", "2", "--out", tmp_path)
     assert result.exit_code == 0

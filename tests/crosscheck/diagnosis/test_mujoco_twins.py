@@ -16,6 +16,8 @@ from crosscheck.twin.sealed import unseal
 from seecr.mjcf import load_robot
 from seecr.shipped import model_path
 
+pytestmark = pytest.mark.slow
+
 CASES = [
     ("demobot_parallel", 1, ("cable_length_offset",)),  # several equilibria, slack cables
     ("demobot_cogiro", 2, ("pulley_radius",)),

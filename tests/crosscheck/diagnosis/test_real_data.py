@@ -10,6 +10,8 @@ from typing import Any
 import pytest
 from made_data import run
 
+pytestmark = pytest.mark.slow
+
 
 def diagnosed(folder: Path, out: Path) -> dict[str, Any]:
     result = run(
@@ -20,65 +22,60 @@ def diagnosed(folder: Path, out: Path) -> dict[str, Any]:
     return found
 
 
-@pytest.fixture(scope="module")
-def irma(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """An under-actuated robot: angles and tensions, no positions; sheaves left out of its XML."""
-    return diagnosed(shared_data / "real" / "irma4u", tmp_path_factory.mktemp("irma"))
-
-
-@pytest.fixture(scope="module")
-def hangprinter(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """Four lines whose lengths were commanded; anchors roughly known, one row wrong."""
-    return diagnosed(shared_data / "real" / "hangprinter", tmp_path_factory.mktemp("hangprinter"))
-
-
 def named(found: dict[str, Any]) -> list[str]:
     return [m["effect"] for m in found["missing"]]
 
 
-def test_irma_tension_mismatch_is_mass_or_scale_and_the_advice_is_to_weigh(
-    irma: dict[str, Any],
-) -> None:
-    first = irma["missing"][0]
+# One test per robot: a diagnosis that several tests share would be made again by every worker.
+
+
+def test_irma(shared_data: Path, tmp_path: Path) -> None:
+    """An under-actuated robot: angles and tensions, no positions; sheaves left out of its XML."""
+    found = diagnosed(shared_data / "real" / "irma4u", tmp_path)
+    the_tension_mismatch_is_mass_or_scale_and_the_advice_is_to_weigh(found)
+    the_sheaves_are_found(found)
+    # the platform's yaw drifts by 5 degrees, which no effect does: no clean bill
+    assert found["verdict"] == "unknown_effect"
+
+
+def the_tension_mismatch_is_mass_or_scale_and_the_advice_is_to_weigh(found: dict[str, Any]) -> None:
+    first = found["missing"][0]
     assert {first["effect"], *first["indistinguishable"]} >= {"tension_scale", "platform_mass"}
-    assert any("weigh" in line for line in irma["measure_next"])
+    assert any("weigh" in line for line in found["measure_next"])
 
 
-def test_irma_sheaves_are_found(irma: dict[str, Any]) -> None:
+def the_sheaves_are_found(found: dict[str, Any]) -> None:
     """0.03 m by the caliper; what the model lacks pulls at the value, and its error says so."""
-    assert "pulley_radius" in named(irma)
-    radius = next(m for m in irma["missing"] if m["effect"] == "pulley_radius")
-    found = radius["parameters"]["radius_m"]
-    assert abs(found["value"] - 0.03) < 3 * found["stderr"]
-    assert found["stderr"] < 0.02
+    assert "pulley_radius" in named(found)
+    radius = next(m for m in found["missing"] if m["effect"] == "pulley_radius")
+    value = radius["parameters"]["radius_m"]
+    assert abs(value["value"] - 0.03) < 3 * value["stderr"]
+    assert value["stderr"] < 0.02
 
 
-def test_irma_keeps_structure_and_the_diagnosis_says_so(irma: dict[str, Any]) -> None:
-    """The platform's yaw drifts by 5 degrees, which no effect does: no clean bill."""
-    assert irma["verdict"] == "unknown_effect"
+def test_hangprinter(shared_data: Path, tmp_path: Path) -> None:
+    """Four lines whose lengths were commanded; anchors roughly known, one row wrong."""
+    found = diagnosed(shared_data / "real" / "hangprinter", tmp_path)
+    it_is_explained_to_under_3_mm_on_rows_left_out(found)
+    anchors_and_spools_are_named(found)
+    notes = " ".join(found["notes"])
+    assert re.search(r"line 19 left out: outlier", notes), notes
 
 
-def test_hangprinter_is_explained_to_under_3_mm_on_rows_left_out(
-    hangprinter: dict[str, Any],
-) -> None:
-    assert hangprinter["verdict"] == "effects_found"
-    assert hangprinter["held_out"]["position_rms_m"] < 3e-3
-    assert hangprinter["before"]["position_rms_m"] > 2e-2
+def it_is_explained_to_under_3_mm_on_rows_left_out(found: dict[str, Any]) -> None:
+    assert found["verdict"] == "effects_found"
+    assert found["held_out"]["position_rms_m"] < 3e-3
+    assert found["before"]["position_rms_m"] > 2e-2
 
 
-def test_hangprinter_anchors_and_spools_are_named(hangprinter: dict[str, Any]) -> None:
-    first = hangprinter["missing"][0]
+def anchors_and_spools_are_named(found: dict[str, Any]) -> None:
+    first = found["missing"][0]
     assert "exit_point_error" in [first["effect"], *first["indistinguishable"]]
     # a calibration by others found spools 1.2 % larger than nominal: each spool's own gain, or
     # the one scale that all of them share
-    values = {m["effect"]: m["parameters"] for m in hangprinter["missing"]}
+    values = {m["effect"]: m["parameters"] for m in found["missing"]}
     if "drum_gain" in values:
         larger = [p["value"] for p in values["drum_gain"].values()]
     else:
         larger = [values["tracker_scale"]["factor"]["value"] - 1.0]
     assert sum(larger) / len(larger) == pytest.approx(0.012, abs=2e-3)
-
-
-def test_hangprinter_outlier_is_named_by_its_line(hangprinter: dict[str, Any]) -> None:
-    notes = " ".join(hangprinter["notes"])
-    assert re.search(r"line 19 left out: outlier", notes), notes

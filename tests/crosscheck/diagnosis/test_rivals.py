@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
 from made_data import COGIRO, measured, term
 
 from crosscheck.diagnosis.rivals import rivals_of
 from crosscheck.diagnosis.verdict import diagnose
 from seecr.mjcf import load_robot
+
+pytestmark = pytest.mark.slow
 
 
 def test_equals_of_a_second_effect_are_looked_for_beside_the_first() -> None:

@@ -6,7 +6,9 @@ They were made by a simulator that shares nothing with this project.
 from __future__ import annotations
 
 import json
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -31,6 +33,15 @@ VALUES = {
 }
 
 
+pytestmark = pytest.mark.slow
+
+
+@cache
+def diagnosis_of(folder: Path) -> dict:
+    with TemporaryDirectory() as out:
+        return diagnose(folder, Path(out))
+
+
 def diagnose(folder: Path, out: Path) -> dict:
     with pytest.raises(SystemExit) as end:
         main(
@@ -42,9 +53,9 @@ def diagnose(folder: Path, out: Path) -> dict:
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_twin(case: str, shared_data: Path, tmp_path: Path) -> None:
+def test_twin(case: str, shared_data: Path) -> None:
     answer = json.loads((shared_data / "twins" / "answers.json").read_text())[case]
-    found = diagnose(shared_data / "twins" / case, tmp_path)
+    found = diagnosis_of(shared_data / "twins" / case)
     named = [m["effect"] for m in found["missing"]]
     if answer["hidden"] == ["null"]:
         assert found["verdict"] == "no_effect_missing"
@@ -77,8 +88,8 @@ def check_values(found: dict, answer: dict) -> None:
             assert abs(got[key]["value"] - number) < 4.0 * got[key]["stderr"], key
 
 
-def test_what_moves_a_robot_alike_is_named_together(shared_data: Path, tmp_path: Path) -> None:
-    found = diagnose(shared_data / "twins" / "L02", tmp_path)
+def test_what_moves_a_robot_alike_is_named_together(shared_data: Path) -> None:
+    found = diagnosis_of(shared_data / "twins" / "L02")
     assert found["missing"][0]["indistinguishable"] == ["platform_mass"]
     advice = " ".join(found["measure_next"])
     assert "weigh the platform" in advice

@@ -19,6 +19,8 @@ from seecr.mjcf import load_robot
 from seecr.pose import Array, quat_from_rotvec, quat_multiply
 from seecr.shipped import model_path
 
+pytestmark = pytest.mark.slow
+
 POSITION, ORIENTATION = 3e-5, 3.5e-4
 
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 import pytest
 from made_data import COGIRO, measured, term
 
+from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.measurements.data import Measurements
 from seecr.mjcf import load_robot
@@ -18,6 +20,9 @@ from seecr.shipped import model_path
 
 Change = Callable[[Measurements], None]
 PULLEY = {"radius_m": 0.01}
+POINTS = 12  # on each sweep: 96 rows
+
+pytestmark = pytest.mark.slow
 
 
 def _centred(data: Measurements) -> Array:
@@ -68,51 +73,48 @@ def robot_named(name: str) -> Robot:
     return load_robot(COGIRO if name == "cogiro" else model_path("demobot_parallel"))
 
 
+@cache
+def diagnosed(change: Change, name: str) -> Diagnosis:
+    """Of a robot that lacks no known effect, with something changed in its readings."""
+    robot = robot_named(name)
+    data = measured(robot, points=POINTS, seed=3)
+    change(data)
+    return diagnose(robot, data)
+
+
 @pytest.mark.parametrize("name", ["cogiro", "parallel"])
 @pytest.mark.parametrize("change", CHANGES, ids=lambda c: c.__name__)
 def test_an_unknown_effect_is_called_unknown(name: str, change: Change) -> None:
-    robot = robot_named(name)
-    data = measured(robot, points=18, seed=3)
-    change(data)
-    found = diagnose(robot, data)
+    found = diagnosed(change, name)
     assert found.verdict == "unknown_effect"
     assert [f.effect for f in found.missing] == []
     assert found.where  # and shows where it lives
 
 
+def test_a_bumped_tracker_is_traced_to_its_run() -> None:
+    assert diagnosed(bumped_tracker, "cogiro").where[0].against == "the run"
+
+
+def test_a_swaying_floor_is_traced_to_its_period() -> None:
+    strongest = diagnosed(swaying_floor, "cogiro").where[0]
+    found = re.fullmatch(r"time, again every (.*) s", strongest.against)
+    assert found is not None
+    assert float(found.group(1)) == pytest.approx(37.0, rel=0.02)
+    assert strongest.p < 1e-10
+
+
+def test_an_error_of_place_is_not_called_a_period_though_the_commands_go_to_and_fro() -> None:
+    where = diagnosed(rubbing, "cogiro").where
+    assert not any("again every" in row.against for row in where)
+
+
 @pytest.mark.parametrize("change", CHANGES, ids=lambda c: c.__name__)
 def test_beside_a_known_effect_the_known_one_alone_is_named(change: Change) -> None:
     robot = robot_named("cogiro")
-    data = measured(robot, [term(robot, "pulley_radius", **PULLEY)], points=18, seed=4)
+    data = measured(robot, [term(robot, "pulley_radius", **PULLEY)], points=POINTS, seed=4)
     change(data)
     found = diagnose(robot, data)
     assert found.verdict == "unknown_effect"
     assert [f.effect for f in found.missing] == ["pulley_radius"]
     # what is not modelled pulls at it, by more than noise would
     assert found.missing[0].values[0] == pytest.approx(0.01, rel=0.1)
-
-
-def test_a_bumped_tracker_is_traced_to_its_run() -> None:
-    robot = robot_named("cogiro")
-    data = measured(robot, points=18, seed=3)
-    bumped_tracker(data)
-    where = diagnose(robot, data).where
-    assert where[0].against == "the run"
-
-
-def test_a_swaying_floor_is_traced_to_its_period() -> None:
-    robot = robot_named("cogiro")
-    data = measured(robot, points=18, seed=3)
-    swaying_floor(data)
-    where = diagnose(robot, data).where
-    found = re.fullmatch(r"time, again every (.*) s", where[0].against)
-    assert found is not None
-    assert float(found.group(1)) == pytest.approx(37.0, rel=0.02)
-    assert where[0].p < 1e-10
-
-
-def test_an_error_of_place_is_not_called_a_period_though_the_commands_go_to_and_fro() -> None:
-    robot = robot_named("cogiro")
-    data = measured(robot, points=18, seed=3)
-    rubbing(data)
-    assert not any("again every" in row.against for row in diagnose(robot, data).where)

@@ -280,6 +280,7 @@ def test_commands_need_no_readings(csv_file, robot):
         load_measurements(path, robot)
 
 
+@pytest.mark.slow
 def test_hundred_thousand_rows_load_in_seconds(tmp_path, robot):
     n = 100_000
     rng = np.random.default_rng(1)

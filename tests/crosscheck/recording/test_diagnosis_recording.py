@@ -169,6 +169,7 @@ def test_cables_are_those_of_the_last_model(
     assert [len(strips) for strips in taut] == pulls.tolist()
 
 
+@pytest.mark.slow
 def test_unknown_is_said_and_drawn(tmp_path: Path) -> None:
     found = made.unknown()
     path = tmp_path / "unknown.rrd"

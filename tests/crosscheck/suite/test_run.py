@@ -537,6 +537,7 @@ def test_a_finding_beyond_the_limits_fails_its_case():
 # --- running -------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_processes_give_the_same_results_in_the_same_order():
     few = [
         replace(case, poses=case.poses[:3])

@@ -162,6 +162,7 @@ def test_null_twins_leave_white_noise(robot, seed):
     assert np.all(np.abs(left.mean(axis=0)) * np.sqrt(len(left)) < 4.5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ["demobot_cogiro", "demobot_parallel"])
 @pytest.mark.parametrize("name", FAST)
 def test_what_is_hidden_explains_the_readings(robot, name):
@@ -169,6 +170,7 @@ def test_what_is_hidden_explains_the_readings(robot, name):
     assert is_noise(residuals(twin))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("robot", "name"),
     [

@@ -55,6 +55,7 @@ def test_every_built_in_effect_has_a_truth():
     assert {one.name for one in BUILT_IN} == set(TRUE_EFFECTS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_seecr_and_mujoco_agree_on_an_effect(name):
     found = run_effect(CASES[name])
