@@ -20,11 +20,12 @@ from numpy.typing import NDArray
 from crosscheck.suite.gap import gap
 from crosscheck.suite.pool import Pool
 from crosscheck.suite.run import Outcome
-from crosscheck.twin.hidden import Hidden, choose
+from crosscheck.twin.hidden import choose
 from crosscheck.twin.measure import measure
 from crosscheck.twin.robot import TRUE_EFFECTS
 from crosscheck.twin.trajectory import trajectory
 from seecr.commands import Commands
+from seecr.effects import Term
 from seecr.equilibrium import solve
 from seecr.experiment import Experiment
 from seecr.mjcf import load_robot
@@ -111,7 +112,7 @@ class EffectCase:
         return _robot_and_commands(self.model)[1]
 
     @property
-    def hidden(self) -> Hidden:
+    def term(self) -> Term:
         """The effect with its values."""
         random = np.random.default_rng([self.seed, TRUE_EFFECTS.index(self.effect)])
         return _slow(choose(self.robot, random, [self.effect])[0])
@@ -194,7 +195,7 @@ def run_effect(case: EffectCase) -> EffectResult:
     """Settle one effect in MuJoCo, solve it with seecr, compare the readings."""
     began = time.perf_counter()
     experiment = Experiment(case.robot, case.commands)
-    effects = [case.hidden.effect()]
+    effects = [case.term.effect()]
     ours, plain = experiment.predict(effects), experiment.predict()
     truth = measure(case.robot, case.commands, effects, segments=_SEGMENTS, waypoints=_WAYPOINTS)
     position_m, orientation_rad = gap(_seen(truth), _seen(ours.readings))
@@ -237,11 +238,11 @@ def _seen(readings: Any) -> Array:
     return np.concatenate([readings.position, readings.quat_wxyz], axis=1)
 
 
-def _slow(hidden: Hidden) -> Hidden:
-    if hidden.name != "creep":
-        return hidden
-    times = np.array([name == "time_s" for name in hidden.layout.names])
-    return replace(hidden, vector=np.where(times, _CREEP_TIME_S, hidden.vector))
+def _slow(term: Term) -> Term:
+    if term.name != "creep":
+        return term
+    times = np.array([name == "time_s" for name in term.layout.names])
+    return replace(term, vector=np.where(times, _CREEP_TIME_S, term.vector))
 
 
 @cache

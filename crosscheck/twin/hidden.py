@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.twin.robot import TRUE_EFFECTS
-from seecr.effects import Effect, Layout, effect_named, layout_of
-from seecr.pose import Array, transform_points
+from seecr.effects import Layout, Term, effect_named, layout_of
+from seecr.pose import transform_points
 from seecr.robot import Robot
 
 # How often a seed hides none, one and two.
@@ -25,38 +24,17 @@ _ASIDE = 0.15
 Generator = np.random.Generator
 
 
-@dataclass(frozen=True, eq=False)
-class Hidden:
-    """An effect with the numbers that a twin hides.
+def values_of(term: Term) -> dict[str, float]:
+    """Values by the parameters' names."""
+    return dict(zip(term.layout.names, map(float, term.vector), strict=True))
 
-    Attributes:
-        layout: its parameters for the robot.
-        vector: (p,) their values.
-    """
 
-    layout: Layout
-    vector: Array
-
-    @property
-    def name(self) -> str:
-        """Name of the effect."""
-        return self.layout.name
-
-    @property
-    def values(self) -> dict[str, float]:
-        """Values by the parameters' names."""
-        return dict(zip(self.layout.names, map(float, self.vector), strict=True))
-
-    def effect(self) -> Effect:
-        """The effect itself."""
-        return self.layout.build(self.vector)
-
-    def times(self, factor: float) -> Hidden:
-        """The effect ``factor`` times as large, inside its bounds; shapes stay as they are."""
-        layout = self.layout
-        grown = layout.null + factor * (self.vector - layout.null)
-        vector = np.where(layout.shape, self.vector, np.clip(grown, layout.lower, layout.upper))
-        return Hidden(layout, vector)
+def times(term: Term, factor: float) -> Term:
+    """An effect ``factor`` times as large, inside its bounds; shapes stay as they are."""
+    layout = term.layout
+    grown = layout.null + factor * (term.vector - layout.null)
+    vector = np.where(layout.shape, term.vector, np.clip(grown, layout.lower, layout.upper))
+    return Term(layout, vector)
 
 
 def choose(
@@ -65,7 +43,7 @@ def choose(
     names: Sequence[str] | None = None,
     count: int | None = None,
     tensions: bool = False,
-) -> list[Hidden]:
+) -> list[Term]:
     """Draw the effects of a twin.
 
     Args:
@@ -102,15 +80,14 @@ def _drawn(robot: Robot, random: Generator, count: int | None, tensions: bool) -
 
 def _room_for_sheaves(robot: Robot) -> bool:
     """Whether all anchor points are well aside of their exit points, seen from above."""
-    size = float(np.linalg.norm(robot.gravity))
-    up = -robot.gravity / size if size > 0 else np.array([0.0, 0.0, 1.0])
+    up = robot.up
     anchors = transform_points(robot.reference_pose[None], robot.anchor_points)[0]
     reach = anchors - robot.exit_points
     across = np.linalg.norm(reach - np.outer(reach @ up, up), axis=1)
     return bool(np.all(across > _ASIDE * np.linalg.norm(reach, axis=1)))
 
 
-def _with_numbers(layout: Layout, robot: Robot, random: Generator) -> Hidden:
+def _with_numbers(layout: Layout, robot: Robot, random: Generator) -> Term:
     many = int(np.sum(~layout.shape)) > 1
     size = random.uniform(*(_SEVERAL if many else _ONE), len(layout)) * layout.scale
     sign = random.choice([-1.0, 1.0], len(layout))
@@ -122,7 +99,7 @@ def _with_numbers(layout: Layout, robot: Robot, random: Generator) -> Hidden:
     vector = np.minimum(vector, layout.upper)
     for k in np.flatnonzero(layout.shape):
         vector[k] = _shape(layout, int(k), robot, random)
-    return Hidden(layout, vector)
+    return Term(layout, vector)
 
 
 def _shape(layout: Layout, k: int, robot: Robot, random: Generator) -> float:

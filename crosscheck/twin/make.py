@@ -19,11 +19,12 @@ from crosscheck.errors import CrosscheckError
 from crosscheck.files import staged, write_text
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.write import write_measurements
-from crosscheck.twin.hidden import Hidden, choose
+from crosscheck.twin.hidden import choose, times, values_of
 from crosscheck.twin.measure import Truth, measure
 from crosscheck.twin.sealed import NAME, seal
 from crosscheck.twin.trajectory import Trajectory, trajectory
 from seecr.commands import Commands
+from seecr.effects import Term
 from seecr.mjcf import load_robot
 from seecr.pose import Array, pose_difference, quat_from_rotvec, quat_multiply
 from seecr.robot import Robot
@@ -59,7 +60,7 @@ class Twin:
     measured: Measurements
     truth: Truth
     kept: NDArray[np.bool_]
-    hidden: tuple[Hidden, ...]
+    hidden: tuple[Term, ...]
     answer: dict[str, Any]
 
 
@@ -125,7 +126,7 @@ class _Measured:
     plain: Truth
     truth: Truth
     sigma: Sigma
-    alone: list[tuple[Hidden, Truth]]
+    alone: list[tuple[Term, Truth]]
     at_rest: NDArray[np.bool_]
 
 
@@ -135,7 +136,7 @@ def _random(seed: int, stream: int) -> np.random.Generator:
 
 
 def _at_rest(
-    robot: Robot, hidden: list[Hidden], points: int, seed: int, tensions: bool, tell: Progress
+    robot: Robot, hidden: list[Term], points: int, seed: int, tensions: bool, tell: Progress
 ) -> _Measured:
     """Commands and sizes of effects at which MuJoCo rests, and the effects show."""
     for extent in _EXTENTS:
@@ -164,7 +165,7 @@ def _mostly(at_rest: NDArray[np.bool_]) -> bool:
 
 
 def _together(
-    robot: Robot, case: _Case, alone: list[tuple[Hidden, Truth]], plain: Truth, tell: Progress
+    robot: Robot, case: _Case, alone: list[tuple[Term, Truth]], plain: Truth, tell: Progress
 ) -> Truth:
     """The truth with all effects."""
     if len(alone) < 2:
@@ -184,12 +185,12 @@ def _case(robot: Robot, points: int, extent: float, seed: int) -> _Case:
 
 
 def _made_visible(
-    robot: Robot, case: _Case, hidden: Hidden, plain: Truth, sigma: Sigma, tell: Progress
-) -> tuple[Hidden, Truth] | None:
+    robot: Robot, case: _Case, hidden: Term, plain: Truth, sigma: Sigma, tell: Progress
+) -> tuple[Term, Truth] | None:
     """The effect, larger where it would drown in the noise; None where MuJoCo finds no rest."""
     best = None
     for factor in _ENLARGED:
-        one = hidden.times(factor)
+        one = times(hidden, factor)
         effects, commands = [one.effect()], case.commands()
         truth = measure(robot, commands, effects, progress=lambda n: tell(n, "with effects"))
         if not _mostly(truth.at_rest & plain.at_rest):
@@ -261,7 +262,7 @@ def _answer(made: _Measured, robot: Robot, seed: int) -> dict[str, Any]:
         "robot": robot.name,
         "seed": seed,
         "hidden": [one.name for one, _ in made.alone] or ["null"],
-        "values": {one.name: one.values for one, _ in made.alone},
+        "values": {one.name: values_of(one) for one, _ in made.alone},
         "moves_over_noise": {
             one.name: moves_over_noise(truth, made.plain, made.sigma) for one, truth in made.alone
         },

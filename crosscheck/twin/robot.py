@@ -78,8 +78,7 @@ class TrueRobot:
     @property
     def up(self) -> Array:
         """Unit vector (3,) on which pulleys swivel: the frame's own vertical."""
-        size = float(np.linalg.norm(self.robot.gravity))
-        return -self.robot.gravity / size if size > 0 else np.array([0.0, 0.0, 1.0])
+        return self.robot.up
 
     @property
     def has_history(self) -> bool:

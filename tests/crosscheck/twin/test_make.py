@@ -15,13 +15,13 @@ from scipy.stats import chi2
 from crosscheck.cli import main
 from crosscheck.errors import CrosscheckError
 from crosscheck.measurements.read import load_measurements
-from crosscheck.twin.hidden import Hidden, choose
+from crosscheck.twin.hidden import choose, times
 from crosscheck.twin.make import make_twin
 from crosscheck.twin.robot import TRUE_EFFECTS
 from crosscheck.twin.sealed import NAME, seal, unseal
 from crosscheck.twin.trajectory import trajectory
 from seecr.commands import Commands
-from seecr.effects import effect_named, layout_of
+from seecr.effects import Term, effect_named, layout_of
 from seecr.errors import InputError, InputFileError
 from seecr.experiment import Experiment
 from seecr.mjcf import load_robot
@@ -146,8 +146,8 @@ def test_sizes_lie_inside_their_bounds_and_away_from_nothing(name):
 def test_an_effect_grows_inside_its_bounds():
     robot = load_robot(COGIRO)
     layout = layout_of(effect_named("exit_friction"), robot)
-    hidden = Hidden(layout, np.array([2.0, 0.1]))
-    np.testing.assert_allclose(hidden.times(3.0).vector, [5.0, 0.3])
+    hidden = Term(layout, np.array([2.0, 0.1]))
+    np.testing.assert_allclose(times(hidden, 3.0).vector, [5.0, 0.3])
 
 
 @pytest.mark.parametrize("robot", ["demobot_cogiro", "demobot_parallel"])
@@ -190,7 +190,7 @@ def test_two_hidden_effects_act_together():
     twin = make_twin(COGIRO, 2, effects=names, points=POINTS)
     assert is_noise(residuals(twin))
     assert set(twin.answer["moves_over_noise"]) == set(names)
-    absent = Hidden(twin.hidden[0].layout, twin.hidden[0].layout.null)
+    absent = Term(twin.hidden[0].layout, twin.hidden[0].layout.null)
     without = dataclasses.replace(twin, hidden=(absent, twin.hidden[1]))
     assert not is_noise(residuals(without))
 

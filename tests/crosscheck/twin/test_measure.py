@@ -15,6 +15,7 @@ from crosscheck.settle.relax import SettleStatus, come_to_rest
 from crosscheck.suite.effects import effect_cases, run_effect
 from crosscheck.twin.chain import hang
 from crosscheck.twin.descent import descend
+from crosscheck.twin.hidden import times
 from crosscheck.twin.lengths import paid_out, way_of
 from crosscheck.twin.measure import measure
 from crosscheck.twin.robot import TRUE_EFFECTS, true_robot
@@ -70,8 +71,8 @@ def test_seecr_and_mujoco_agree_on_an_effect(name):
 
 def test_an_effect_a_hundredth_off_does_not_agree():
     case = CASES["effect-demobot_cogiro-pulley_radius"]
-    truth = measure(case.robot, case.commands, [case.hidden.times(1.01).effect()])
-    ours = Experiment(case.robot, case.commands).predict([case.hidden.effect()])
+    truth = measure(case.robot, case.commands, [times(case.term, 1.01).effect()])
+    ours = Experiment(case.robot, case.commands).predict([case.term.effect()])
     assert np.max(distance(truth.pose, ours.pose)) > 1e-6
 
 
