@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import spatial, stats
+from numpy.typing import NDArray
+from scipy import spatial, special, stats
 
 from crosscheck.fit.problem import Problem, kinds_read
 from seecr.pose import Array, rotvec_from_quat
@@ -14,6 +15,10 @@ from seecr.pose import Array, rotvec_from_quat
 STRUCTURED = 4.0
 # A goodness of fit below this is not noise of the stated size.
 POOR_FIT = 1e-3
+# Fewer pairs than this say nothing of how rows go together.
+_LEAST_PAIRS = 8
+# From so many standard errors on chances add up, and P is too close to one for doubles.
+_TAIL = 5.0
 # Residuals are not taken to go together more than this.
 _MOST_ALIKE = 0.98
 
@@ -27,10 +32,9 @@ class Whiteness:
         p: chance of a chi2 this large from noise of the stated size.
         scale: sqrt(chi2/dof), the noise in units of the stated one.
         lag: correlation of a residual with the next one of its run.
-        lag_errors: the same in standard errors.
+        lag_errors: the same in standard errors, those of a single test.
         neighbour: correlation with the residual at the nearest commanded pose.
         neighbour_errors: the same in standard errors.
-        runs_p: smallest p of the runs tests of the signs, a run and reading, times their number.
     """
 
     chi2: float
@@ -41,7 +45,6 @@ class Whiteness:
     lag_errors: float
     neighbour: float
     neighbour_errors: float
-    runs_p: float
 
     @property
     def structured(self) -> bool:
@@ -72,8 +75,8 @@ def whiteness(problem: Problem, white: Array, parameters: int) -> Whiteness:
     table = as_table(problem, white)
     dof = max(len(white) - parameters, 1)
     chi2 = float(white @ white)
-    lag = _pairs(table, _next_rows(problem))
-    near = _pairs(table, _nearest_rows(problem))
+    lag = agreement(table, _next_rows(problem))
+    near = agreement(table, _nearest_rows(problem))
     return Whiteness(
         chi2=chi2,
         dof=dof,
@@ -83,7 +86,6 @@ def whiteness(problem: Problem, white: Array, parameters: int) -> Whiteness:
         lag_errors=lag[1],
         neighbour=near[0],
         neighbour_errors=near[1],
-        runs_p=_runs_test(problem, table),
     )
 
 
@@ -94,40 +96,56 @@ def as_table(problem: Problem, white: Array) -> Array:
     return table
 
 
-def _pairs(table: Array, pairs: Array) -> tuple[float, float]:
-    """Correlation of residual rows in pairs (k, 2), and its size in standard errors."""
-    if len(pairs) == 0:
-        return 0.0, 0.0
+def agreement(table: Array, pairs: NDArray[np.integer]) -> tuple[float, float]:
+    """Correlation of residual rows in pairs (k, 2), and its size in standard errors; 0 if none.
+
+    A structure in one channel is not to drown in the noise of the others: all channels together
+    and each by itself are tried, and the strongest counts. The best of many is large by chance:
+    its standard errors are those that a single test of the same chance would show.
+    """
     product = table[pairs[:, 0]] * table[pairs[:, 1]]
-    # a structure in one channel is not to drown in the noise of the others: the best channel
-    # counts, against the number of channels
-    best, best_errors = 0.0, 0.0
-    channels = [c for c in range(table.shape[1]) if np.isfinite(product[:, c]).any()]
-    for chosen in [channels, *[[c] for c in channels]]:
-        part = product[:, chosen]
-        both = np.isfinite(part)
-        if both.sum() < 8:
-            continue
-        power = float(np.nanmean(table[:, chosen] ** 2))
-        correlation = float(part[both].mean() / max(power, 1e-300))
-        errors = correlation * np.sqrt(both.sum())
-        if errors > best_errors:
-            best, best_errors = correlation, errors
-    return best, best_errors
+    channels = np.flatnonzero(np.isfinite(product).sum(axis=0))
+    groups = [channels, *(np.array([c]) for c in channels if len(channels) > 1)]
+    tried = [
+        _correlation(table[:, group], product[:, group])
+        for group in groups
+        if np.isfinite(product[:, group]).sum() >= _LEAST_PAIRS
+    ]
+    correlation, errors = max(tried, key=lambda found: found[1], default=(0.0, 0.0))
+    errors = best_of(errors, len(tried)) if tried else 0.0
+    return (correlation, errors) if errors > 0.0 else (0.0, 0.0)
 
 
-def _next_rows(problem: Problem) -> Array:
+def _correlation(table: Array, product: Array) -> tuple[float, float]:
+    """Correlation of pairs from their products (k, c), and its size in standard errors."""
+    both = product[np.isfinite(product)]
+    power = float(np.nanmean(table**2))
+    correlation = float(both.mean() / max(power, 1e-300))
+    return correlation, correlation * float(np.sqrt(len(both)))
+
+
+def best_of(errors: float, tests: int) -> float:
+    """Standard errors of one test that chance exceeds as often as the best of ``tests`` those.
+
+    With P the chance of fewer errors, that of the best is P^tests (Sidak).
+    """
+    if errors < _TAIL:
+        return float(special.ndtri_exp(tests * stats.norm.logcdf(errors)))
+    return -float(special.ndtri_exp(stats.norm.logsf(errors) + np.log(tests)))
+
+
+def _next_rows(problem: Problem) -> NDArray[np.int64]:
     run, use = problem.data.run_index, problem.use
     rows = np.flatnonzero(use)
     together = run[rows[1:]] == run[rows[:-1]]
     return np.stack([rows[:-1][together], rows[1:][together]], axis=1)
 
 
-def _nearest_rows(problem: Problem) -> Array:
+def _nearest_rows(problem: Problem) -> NDArray[np.int64]:
     """Each row with the row of nearest command that is not its neighbour in time."""
     commands = problem.experiment.commands
     rows = np.flatnonzero(problem.use)
-    if len(rows) < 8:
+    if len(rows) < _LEAST_PAIRS:
         return np.zeros((0, 2), dtype=int)
     if commands.lengths is not None:
         place = commands.lengths[rows]
@@ -142,27 +160,8 @@ def _nearest_rows(problem: Problem) -> Array:
             if b != a and abs(int(rows[b]) - int(rows[a])) > 1:
                 pairs.add((min(a, int(b)), max(a, int(b))))
                 break
-    return np.array([(rows[a], rows[b]) for a, b in sorted(pairs)]).reshape(-1, 2)
-
-
-def _runs_test(problem: Problem, table: Array) -> float:
-    """Wald-Wolfowitz runs test of the signs, worst channel of all runs, Bonferroni."""
-    smallest, tests = 1.0, 0
-    index = problem.data.run_index
-    for name in np.unique(index):
-        part = table[(index == name) & problem.use]
-        for column in part.T:
-            signs = np.sign(column[np.isfinite(column)])
-            up, down = int((signs > 0).sum()), int((signs < 0).sum())
-            if up < 4 or down < 4:
-                continue
-            tests += 1
-            count = 1 + int((signs[1:] != signs[:-1]).sum())
-            n = up + down
-            mean = 1 + 2 * up * down / n
-            variance = (mean - 1) * (mean - 2) / (n - 1)
-            smallest = min(smallest, float(stats.norm.cdf((count - mean) / np.sqrt(variance))))
-    return min(1.0, smallest * max(tests, 1))
+    some = [(rows[a], rows[b]) for a, b in sorted(pairs)]
+    return np.array(some, dtype=np.int64).reshape(-1, 2)
 
 
 def estimate_sigma(problem: Problem, raw: Array) -> tuple[Problem, tuple[str, ...]]:

@@ -1,0 +1,194 @@
+"""The search on linear residuals of known rank: what is there is found, and nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from linear_toy import LinearToy, toy
+
+from crosscheck.diagnosis.node import LEAST_GAIN, explored, node_of
+from crosscheck.diagnosis.order import fitted_to_the_end, in_order, without_needless
+from crosscheck.diagnosis.rivals import rivals_of
+from crosscheck.diagnosis.search import Search, search
+from crosscheck.diagnosis.small import is_plausible, share_of, small_effects_alone
+from crosscheck.fit.evidence import FALSE_ALARM
+from crosscheck.fit.reasons import Why
+
+NAMES = (
+    "cable_length_offset", "drum_gain", "stiffness", "centre_of_mass", "gravity_tilt",
+    "tracker_frame", "tracker_scale",
+)  # fmt: skip
+
+
+def quiet(_text: str, _part: float) -> None:
+    """No progress."""
+
+
+def searched(made: LinearToy) -> Search:
+    return search(made.trials, made.base)
+
+
+def why(found: Search, name: str) -> Why | None:
+    reason = next(c for c in found.steps[0].candidates if c.name == name).why_not
+    return None if reason is None else reason.why
+
+
+@pytest.mark.parametrize(
+    "hidden",
+    [
+        {"tracker_scale": 0.7},
+        {"drum_gain": 0.4},
+        {"tracker_scale": 0.5, "centre_of_mass": 0.3},
+        {"drum_gain": 0.3, "cable_length_offset": 0.4},
+        {"drum_gain": 0.4, "stiffness": 0.5, "gravity_tilt": 0.8},
+    ],
+    ids=lambda hidden: "+".join(hidden),
+)
+def test_what_is_there_is_found_and_what_is_left_is_noise(hidden: dict[str, float]) -> None:
+    found = searched(toy(hidden, NAMES))
+    assert set(found.found) == set(hidden)
+    assert found.last.whiteness.is_noise
+    assert not found.steps[0].whiteness.is_noise
+    logs = [step.evidence.log for step in found.steps]
+    assert np.all(np.diff(logs) > LEAST_GAIN)
+    for name, size in hidden.items():
+        term = found.last.fit.terms[name]
+        error = found.last.fit.stderr[found.last.fit.terms.part(name)] / term.layout.scale
+        assert np.all(np.abs(term.sizes - size) < 4.5 * error)
+
+
+def test_they_come_in_the_order_in_which_adding_them_pays() -> None:
+    found = searched(toy({"tracker_scale": 0.3, "centre_of_mass": 1.0}, NAMES))
+    assert found.found == ("centre_of_mass", "tracker_scale")
+    falls = -np.diff([step.held_out.chi2.sum() for step in found.steps])
+    assert falls[0] > falls[1] > 0
+
+
+def test_of_noise_alone_nothing_is_found() -> None:
+    alarms = [seed for seed in range(40) if searched(toy({}, NAMES, seed=seed)).found]
+    assert len(alarms) <= 1, "more than one false alarm in a hundred searches"
+    assert FALSE_ALARM == 0.01
+    found = searched(toy({}, NAMES))
+    assert {why(found, name) for name in NAMES} <= {Why.CHANCE, Why.CHANCE_OVER_ALL}
+
+
+def test_a_small_effect_is_not_taken_for_the_group_that_can_imitate_it() -> None:
+    made = toy({"tracker_scale": 0.5}, NAMES)
+    group = made.columns["cable_length_offset"].copy()
+    group[..., 0] = made.columns["tracker_scale"][..., 0]
+    made = toy({"tracker_scale": 0.5}, NAMES, columns={"cable_length_offset": group})
+    assert searched(made).found == ("tracker_scale",)
+
+
+def test_exact_equals_are_named_beside_the_one_that_is_listed() -> None:
+    hidden, twin = "tracker_scale", "stiffness"
+    made = toy({hidden: 0.5}, NAMES)
+    made = toy({hidden: 0.5}, NAMES, columns={twin: 2.0 * made.columns[hidden]})
+    found = searched(made)
+    assert len(found.found) == 1
+    rivals = rivals_of(found, found.found[0])
+    assert [rival.name for rival in rivals] == [({hidden, twin} - set(found.found)).pop()]
+    assert rivals[0].fit.chi2 == pytest.approx(found.last.fit.chi2, abs=0.1)
+    assert rivals_of(searched(toy({hidden: 0.5}, NAMES)), hidden) == []
+
+
+def test_what_no_effect_explains_is_not_explained() -> None:
+    """A wave through all readings: large groups take a part of it, and nobody is accused."""
+    made = toy({}, NAMES)
+    made.table[:] += 3.0 * np.sin(np.arange(len(made.table)) / 3.0)[:, None]
+    found = searched(made)
+    assert not found.last.whiteness.is_noise
+    assert small_effects_alone(found, 3, (2.0 / 3.0, 1.0 / 3.0)) is None
+
+
+def test_a_small_effect_beside_what_nobody_explains_is_seen_by_itself() -> None:
+    made = toy({"tracker_scale": 3.0}, NAMES)
+    made.table[:] += 0.8 * np.sin(np.arange(len(made.table)) / 3.0)[:, None]
+    found = searched(made)
+    assert not found.last.whiteness.is_noise
+    way = small_effects_alone(found, 3, (2.0 / 3.0, 1.0 / 3.0))
+    assert way is not None and way.found == ("tracker_scale",)
+    assert share_of(way.steps[0], way.steps[1]) > 2.0 / 3.0
+    assert is_plausible(way.last.fit.terms["tracker_scale"])
+    # the search itself is as it was
+    assert way.steps[0] is found.steps[0]
+
+
+def test_what_is_needless_goes_and_what_the_model_had_stays() -> None:
+    made = toy({"tracker_scale": 0.5, "centre_of_mass": 0.5}, NAMES)
+    all_three = made.fit(made.problem, made.terms("tracker_scale", "centre_of_mass", "drum_gain"))
+    node = node_of(made.trials, all_three)
+    kept = without_needless(made.trials, node, ())
+    assert kept.names == {"tracker_scale", "centre_of_mass"}
+    assert without_needless(made.trials, node, ("drum_gain",)).names == node.names
+    assert kept.evidence.log > node.evidence.log
+
+
+def test_one_that_does_not_predict_runs_left_out_is_blamed() -> None:
+    """Something in one run alone: fitted to the others it is not there."""
+    made = toy({}, NAMES)
+    only = made.problem.data.run_index == 2
+    made.table[only] += 2.0 * made.columns["gravity_tilt"][only].sum(axis=-1)
+    root = explored(made.trials, node_of(made.trials, made.base), True, {}, quiet)
+    best = fitted_to_the_end(
+        made.trials, node_of(made.trials, made.fit(made.problem, made.terms("gravity_tilt")))
+    )
+    steps = in_order(made.trials, root, best, {root.names: root, best.names: best})
+    assert [step.added for step in steps] == [""]
+    reason = next(c.why_not for c in steps[0].candidates if c.name == "gravity_tilt")
+    assert reason is not None and reason.why is Why.NOT_PREDICTIVE
+    assert next(c.why_not for c in root.candidates if c.name == "gravity_tilt") is None
+
+
+def test_exploring_leaves_the_node_as_it_was_and_gives_every_effect_a_place() -> None:
+    made = toy({"drum_gain": 0.4}, NAMES)
+    node = node_of(made.trials, made.base)
+    after = explored(made.trials, node, True, {}, quiet)
+    assert node.candidates == ()
+    assert {c.name for c in after.candidates} == set(NAMES)
+    assert after.fit is node.fit
+    chosen = [c.name for c in after.candidates if c.why_not is None]
+    assert chosen == ["drum_gain"]
+
+
+def test_beside_a_model_only_the_most_promising_are_fitted() -> None:
+    names = (*NAMES, "platform_mass", "external_wrench", "exit_point_error", "anchor_point_error")
+    made = toy({name: 0.3 for name in names}, names)
+    node = node_of(made.trials, made.base)
+    after = explored(made.trials, node, False, {}, quiet)
+    assert sum(c.fit is not None for c in after.candidates) == 7
+    refused = [c.why_not for c in after.candidates if c.fit is None]
+    assert {reason.why for reason in refused if reason is not None} == {Why.PROMISES_LESS}
+    small = [c for c in after.candidates if c.fit is not None and len(c.layout) <= 3]
+    assert len(small) >= 2
+
+
+def test_a_search_of_the_same_data_again_fits_no_candidate_twice() -> None:
+    made = toy({"drum_gain": 0.4}, NAMES)
+    first = searched(made)
+    trials = replace(made.trials, noise_scale=1.001)
+    count = len(made.fits)
+    again = search(trials, first.steps[0].fit, quiet, first)
+    assert again.found == first.found
+    fresh = len(made.fits) - count
+    made.fits.clear()
+    search(trials, first.steps[0].fit)
+    assert fresh < len(made.fits)
+    assert set(again.known) >= set(first.known)
+
+
+def test_more_noise_than_stated_asks_for_more_evidence() -> None:
+    made = toy({"tracker_scale": 0.13}, NAMES)
+    assert searched(made).found == ("tracker_scale",)
+    assert search(replace(made.trials, noise_scale=3.0), made.base).found == ()
+
+
+def test_progress_goes_from_nothing_to_the_whole() -> None:
+    made = toy({"tracker_scale": 0.5, "drum_gain": 0.4}, NAMES)
+    told: list[tuple[str, float]] = []
+    search(made.trials, made.base, lambda text, part: told.append((text, part)))
+    assert told[0] == (f"round 1: looking at {NAMES[0]}", 0.0)
+    assert all(0.0 <= part <= 1.0 for _text, part in told)
+    assert any(text.startswith("round 2: fitting") for text, _part in told)

@@ -1,0 +1,104 @@
+"""The evidence against a numerical integral over the parameters."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from linear_toy import LinearToy, toy
+from scipy import integrate, stats
+
+from crosscheck.fit.evidence import evidence, p_value
+from crosscheck.fit.gauss_newton import Fit
+
+# Standard deviations of the prior, in plausible sizes, that the evidence is averaged over.
+LAMBDAS = (0.1, 0.3, 1.0, 3.0, 10.0)
+
+
+def small(name: str, z: float, scale: float = 0.1) -> tuple[LinearToy, Fit]:
+    """A toy of one effect, each plausible size of which moves readings by a tenth of sigma."""
+    made = toy({name: z / scale}, (name,), seed=3)
+    made.columns[name][:] *= scale
+    made = LinearToy(made.problem, made.columns, made.table)
+    return made, made.fit(made.problem, made.terms(name))
+
+
+def log_integral(found: Fit, noise_scale: float = 1.0) -> float:
+    """ln of the mean over lambda of the likelihood integrated over the prior, by quadrature."""
+    x = found.jacobian / noise_scale
+    y = found.state.white / noise_scale + x @ found.terms.sizes
+    best = np.linalg.lstsq(x, y, rcond=None)[0]
+    floor = float(np.sum((y - x @ best) ** 2))
+    spread = np.sqrt(np.diag(np.linalg.inv(x.T @ x)))
+
+    def value(*z: float) -> float:
+        # over the largest likelihood, which is put back below
+        off = y - x @ np.array(z)
+        prior = np.prod(stats.norm.pdf(z, scale=width))
+        return float(np.exp(-0.5 * (off @ off - floor)) * prior)
+
+    total = 0.0
+    for width in LAMBDAS:
+        ranges = []
+        for k in range(len(best)):
+            # the product of likelihood and prior is narrow about where either is
+            middle = best[k] / (1.0 + (spread[k] / width) ** 2)
+            ranges.append((middle - 12.0 * spread[k], middle + 12.0 * spread[k]))
+        total += integrate.nquad(value, ranges, opts={"epsrel": 1e-9, "epsabs": 0.0})[0]
+    return float(np.log(total / len(LAMBDAS)) - 0.5 * floor)
+
+
+@pytest.mark.parametrize("size", [0.0, 0.5, 3.0])
+@pytest.mark.parametrize("noise_scale", [1.0, 1.7])
+def test_of_one_parameter(size: float, noise_scale: float) -> None:
+    _made, found = small("tracker_scale", size)
+    expected = log_integral(found, noise_scale)
+    assert evidence(found, noise_scale).log == pytest.approx(expected, abs=1e-4)
+
+
+def test_of_two_parameters_that_go_together() -> None:
+    made, _ = small("gravity_tilt", 0.8)
+    columns = made.columns["gravity_tilt"]
+    columns[..., 1] = 0.8 * columns[..., 0] + 0.6 * columns[..., 1]
+    found = made.fit(made.problem, made.terms("gravity_tilt"))
+    assert found.jacobian.shape[1] == 2
+    assert evidence(found).log == pytest.approx(log_integral(found), abs=1e-4)
+
+
+def test_it_does_not_depend_on_where_the_fit_stopped() -> None:
+    """Residuals and values belong together: y = r + X z is the same."""
+    made, found = small("tracker_scale", 2.0)
+    short = found.terms.with_vector(0.5 * found.terms.vector + 0.5 * found.terms.null)
+    early = replace(found, state=made.state(made.problem, short))
+    assert evidence(early).log == pytest.approx(evidence(found).log, abs=1e-8)
+
+
+def test_what_the_data_do_not_see_costs_and_gains_nothing() -> None:
+    made, plain = small("tracker_scale", 1.0)
+    blind = replace(plain, jacobian=np.zeros_like(plain.jacobian))
+    assert evidence(blind).log == pytest.approx(-0.5 * plain.chi2)
+    assert evidence(blind).parameters == 0
+    assert evidence(plain).parameters == 1
+    assert evidence(made.base).log == pytest.approx(-0.5 * made.base.chi2)
+
+
+def test_a_parameter_on_its_bound_is_left_out_of_the_formula() -> None:
+    _made, plain = small("tracker_scale", 1.0)
+    stopped = replace(plain, at_bound=np.ones(1, dtype=bool))
+    assert evidence(stopped).log == pytest.approx(-0.5 * plain.chi2)
+
+
+def test_chances_of_a_fall_of_chi2_are_uniform_under_noise() -> None:
+    """Linear fits of as many directions to noise alone."""
+    rng = np.random.default_rng(1)
+    x = np.linalg.qr(rng.standard_normal((60, 3)))[0]
+    falls = np.sum((rng.standard_normal((3000, 60)) @ x) ** 2, axis=1)
+    chances = [p_value(float(fall), 3, False) for fall in falls]
+    assert stats.kstest(chances, "uniform").pvalue > 0.01
+    # one that cannot be negative explains nothing in every other case
+    signed = rng.standard_normal(3000)
+    one_sided = [p_value(float(s * max(s, 0.0)), 1, True) for s in signed]
+    low = np.array([p for p in one_sided if p < 0.5])
+    assert stats.kstest(2.0 * low, "uniform").pvalue > 0.01
+    assert one_sided.count(1.0) / 3000 == pytest.approx(0.5, abs=0.04)
