@@ -1,8 +1,14 @@
 """Static equilibrium of cable-driven parallel robots with elastic cables (SEECR).
 
-import seecr
-robot = seecr.load_robot("models/demobot_cogiro/demobot_cogiro.xml")
-solution = seecr.solve(robot, [[0.4, 0.25, 0.1, 1, 0, 0, 0]])
+    import seecr
+
+    robot = seecr.load_robot(seecr.model_path("demobot_cogiro"))
+    solution = seecr.solve(robot, [[0.4, 0.25, 0.1, 1, 0, 0, 0]])
+    print(solution)
+
+``seecr.predict`` adds what a real robot has beyond that: effects, such as pulleys with a radius,
+and what sensors would report. ``seecr.catalogue()`` lists them; docs/effects.md says how to write
+one of your own.
 """
 
 from __future__ import annotations
@@ -11,35 +17,90 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from seecr.equilibrium import Solution, Status, solve
-    from seecr.errors import InputError, RobotError, SeecrError
+    from seecr.commands import Commands
+    from seecr.effects import (
+        Effect,
+        Readings,
+        Term,
+        Terms,
+        catalogue,
+        effect_named,
+        layout_of,
+        parameter,
+    )
+    from seecr.equilibrium import solve
+    from seecr.errors import (
+        InputError,
+        InputFileError,
+        MissingPackageError,
+        RobotError,
+        SeecrError,
+    )
+    from seecr.experiment import Experiment, Prediction, predict
     from seecr.mjcf import load_robot
+    from seecr.model import Model, load_model
     from seecr.robot import Joint, Robot
+    from seecr.sensitivity import sensitivities
+    from seecr.setup import Setup
+    from seecr.shipped import model_names, model_path
+    from seecr.solution import Solution, Status
+    from seecr.workspace import Zone, feasible, slack_zones
 
 __version__ = "0.1.0"
 
 # Imported when first used: the compiled loop and MuJoCo take a while to load.
-_WHERE = {
-    "InputError": "errors",
-    "Joint": "robot",
-    "Robot": "robot",
-    "RobotError": "errors",
-    "SeecrError": "errors",
-    "Solution": "equilibrium",
-    "Status": "equilibrium",
-    "load_robot": "mjcf",
-    "solve": "equilibrium",
-}
+_MODULES = {
+    "commands": ("Commands",),
+    "effects": (
+        "Effect", "Readings", "Term", "Terms", "catalogue", "effect_named", "layout_of",
+        "parameter",
+    ),
+    "equilibrium": ("solve",),
+    "errors": ("InputError", "InputFileError", "MissingPackageError", "RobotError", "SeecrError"),
+    "experiment": ("Experiment", "Prediction", "predict"),
+    "mjcf": ("load_robot",),
+    "model": ("Model", "load_model"),
+    "robot": ("Joint", "Robot"),
+    "sensitivity": ("sensitivities",),
+    "setup": ("Setup",),
+    "solution": ("Solution", "Status"),
+    "shipped": ("model_names", "model_path"),
+    "workspace": ("Zone", "feasible", "slack_zones"),
+}  # fmt: skip
+_WHERE = {name: module for module, names in _MODULES.items() for name in names}
 
 __all__ = [
+    "Commands",
+    "Effect",
+    "Experiment",
     "InputError",
+    "InputFileError",
     "Joint",
+    "MissingPackageError",
+    "Model",
+    "Prediction",
+    "Readings",
     "Robot",
     "RobotError",
     "SeecrError",
+    "Setup",
     "Solution",
     "Status",
+    "Term",
+    "Terms",
+    "Zone",
+    "catalogue",
+    "effect_named",
+    "feasible",
+    "layout_of",
+    "load_model",
     "load_robot",
+    "model_names",
+    "model_path",
+    "parameter",
+    "predict",
+    "sensitivities",
+    "slack_zones",
     "solve",
 ]
 
@@ -48,3 +109,7 @@ def __getattr__(name: str) -> Any:
     if name not in _WHERE:
         raise AttributeError(f"module 'seecr' has no attribute {name!r}")
     return getattr(import_module(f"seecr.{_WHERE[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

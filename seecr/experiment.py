@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from seecr import statics
 from seecr.commands import Commands
@@ -14,21 +15,29 @@ from seecr.compiled.columns import STRAIN, TENSION
 from seecr.compiled.outcomes import CONVERGED, SINGULAR, STALLED, TOLERANCE
 from seecr.effects.base import Effect, Readings
 from seecr.effects.checked import edit_readings, edit_setup
-from seecr.equilibrium import Solution, certify, start_of
+from seecr.effects.terms import Term, Terms
+from seecr.equilibrium import commanded_poses, start_of
 from seecr.path import Path, path_of
 from seecr.pose import Array
+from seecr.result import COORDINATES, Record, Result, named
 from seecr.robot import Robot
 from seecr.setup import Setup, plain_setup
+from seecr.solution import Solution, certify
 from seecr.tables import Tables, assemble, take
+
+if TYPE_CHECKING:
+    from seecr.model import Model
 
 # Rounds of linearising users' laws about the strains found with them.
 _LAW_ROUNDS = 30
 _LIMIT = 400
 
 
-@dataclass(eq=False)
-class Prediction:
+@dataclass(eq=False, repr=False)
+class Prediction(Result):
     """Solved rows and what the sensors would report of them.
+
+    It prints as a few lines, and ``to_frame`` gives one row per command: what would be read.
 
     Attributes:
         setup: as the effects left it, of the rows asked for.
@@ -69,6 +78,23 @@ class Prediction:
     def tensions(self) -> Array:
         """(n, m) [N]."""
         return self.found.states[..., TENSION]
+
+    def lines(self) -> list[str]:
+        """As a solution's: how many rows came to rest, and where."""
+        return self.solution().lines()
+
+    def records(self) -> list[Record]:
+        """What would be read, one row per command."""
+        cables, read = self.setup.robot.cable_names, self.readings
+        poses = np.concatenate([read.position, read.quat_wxyz], axis=1)
+        return [
+            {
+                "solved": bool(self.solved[i]),
+                **named("{}", COORDINATES, poses[i]),
+                **named("tension_{}_N", cables, read.tensions[i]),
+            }
+            for i in range(len(read.position))
+        ]
 
     def solution(self) -> Solution:
         """The rows as a certified :class:`seecr.Solution`."""
@@ -187,6 +213,33 @@ class Experiment:
     ) -> Readings:
         pose = statics.platform_poses(tables, found.deviation)
         return read(effects, setup, pose, found.states[..., TENSION])
+
+
+def predict(
+    robot: Robot,
+    commands: Commands | ArrayLike,
+    model: Model | Terms | Iterable[Term | Effect] = (),
+) -> Prediction:
+    """Where a robot with effects comes to rest, and what its sensors would report.
+
+    Args:
+        robot: as described.
+        commands: commanded poses (n, 7), or :class:`seecr.Commands` with runs, times, lengths.
+        model: from :func:`seecr.load_model`, or effects with values; none by default.
+
+    Returns:
+        a :class:`Prediction`; look at ``solved`` before using a row.
+
+    Example:
+        ``seecr.predict(robot, poses, [seecr.Term.of(robot, "pulley_radius", radius_m=0.01)])``
+    """
+    if not isinstance(commands, Commands):
+        commands = Commands(commanded_poses(commands))
+    from seecr.model import Model  # takes a while to import
+
+    terms: Iterable[Term | Effect] = model.terms if isinstance(model, Model) else model
+    effects = [one.effect() if isinstance(one, Term) else one for one in terms]
+    return Experiment(robot, commands).predict(effects)
 
 
 def read(effects: Sequence[Effect], setup: Setup, poses: Array, tensions: Array) -> Readings:

@@ -35,6 +35,7 @@ from seecr.errors import InputError, InputFileError
 from seecr.files import read_text
 from seecr.fingerprint import check_robot, fingerprint
 from seecr.pose import Array
+from seecr.result import Record, Result
 
 if TYPE_CHECKING:
     from seecr.robot import Robot
@@ -48,9 +49,11 @@ UNSEEN = "unseen"
 _TABLES = ("format", "robot", "effect")
 
 
-@dataclass(frozen=True, eq=False)
-class Model:
+@dataclass(frozen=True, eq=False, repr=False)
+class Model(Result):
     """A robot's effects, as read from a file.
+
+    It prints as one line per effect, and ``to_frame`` gives one row per parameter.
 
     Attributes:
         terms: the effects with their values.
@@ -71,6 +74,45 @@ class Model:
     def names(self) -> tuple[str, ...]:
         """Names of the effects, in the order of adding."""
         return tuple(self.stderr)
+
+    def lines(self) -> list[str]:
+        """Whose model it is, and the effects with their first few values."""
+        table = self.document.get("robot")
+        robot = table.get("name", "a robot") if isinstance(table, Mapping) else "a robot"
+        count = f"{len(self.names)} effect{'' if len(self.names) == 1 else 's'}"
+        return [
+            f"model of {robot}: plain SEECR and {count}" if self.names else
+            f"model of {robot}: plain SEECR, no effects",
+            *(f"{name}: {_values(self.terms[name], self.stderr[name])}" for name in self.names),
+            *self.notes,
+        ]  # fmt: skip
+
+    def records(self) -> list[Record]:
+        """One row per parameter: its value and standard error, None where there is none."""
+        return [
+            {
+                "effect": name,
+                "parameter": key,
+                "value": float(term.vector[i]),
+                "stderr": float(error) if math.isfinite(error) else None,
+                "unit": term.layout.units[i],
+            }
+            for name in self.names
+            for term in [self.terms[name]]
+            for i, (key, error) in enumerate(
+                zip(term.layout.names, self.stderr[name], strict=True)
+            )
+        ]  # fmt: skip
+
+
+def _values(term: Term, stderr: Array, most: int = 3) -> str:
+    """Values of an effect for people, the first few."""
+    parts = [
+        f"{key} = {value:.6g}" + (f" +- {error:.2g}" if math.isfinite(error) else "")
+        for key, value, error in zip(term.layout.names, term.vector, stderr, strict=True)
+    ]
+    more = [f"{len(parts) - most} more"] if len(parts) > most else []
+    return ", ".join([*parts[:most], *more])
 
 
 def new_model(robot: Robot) -> Model:

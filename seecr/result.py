@@ -8,6 +8,8 @@ from html import escape
 from itertools import islice
 from typing import Any
 
+from numpy.typing import NDArray
+
 from seecr.errors import MissingPackageError
 
 # Rows of the table in a notebook; all of them are in the data frame.
@@ -15,6 +17,15 @@ _MOST_ROWS = 20
 
 Record = dict[str, Any]
 """One row of a data frame: numbers in SI, names that end in their unit."""
+
+
+COORDINATES = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
+"""Of a pose, as columns of a data frame."""
+
+
+def named(pattern: str, names: Sequence[str], values: NDArray[Any]) -> Record:
+    """A part of a record: values (k,) under the pattern's name of each."""
+    return {pattern.format(name): value for name, value in zip(names, values.tolist(), strict=True)}
 
 
 class Result(ABC):

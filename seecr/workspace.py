@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 
-from seecr.equilibrium import Solution
 from seecr.errors import InputError
 from seecr.joints import motion_columns, values_of_pose
 from seecr.pose import Array, quat_rotate, transform_points
 from seecr.robot import Robot
+from seecr.solution import Solution
 
 # Part of the load that may stay unbalanced: rounding of the tensions found.
 _BALANCED = 1e-9

@@ -23,7 +23,7 @@ FLOORS = {
     "seecr.robot": 2, "seecr.commands": 3, "seecr.joints": 3, "seecr.mjcf": 3,
     "seecr.path": 4, "seecr.setup": 4, "seecr.fingerprint": 4,
     "seecr.effects": 5, "seecr.tables": 5, "seecr.model": 6, "seecr.statics": 6,
-    "seecr.scipy_search": 7, "seecr.equilibrium": 8,
+    "seecr.scipy_search": 7, "seecr.solution": 7, "seecr.equilibrium": 8,
     "seecr.planar": 9, "seecr.workspace": 9, "seecr.experiment": 9, "seecr.sensitivity": 10,
     "crosscheck.errors": 20,
     "crosscheck.files": 21, "crosscheck.units": 21,

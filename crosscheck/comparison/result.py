@@ -17,8 +17,8 @@ from crosscheck.fit.noise import Whiteness
 from crosscheck.fit.problem import BY_NAME, Problem, Rms
 from crosscheck.fit.state import State
 from seecr.effects import Terms
-from seecr.equilibrium import Status
 from seecr.pose import Array
+from seecr.solution import Status
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,9 @@ from crosscheck.recording.motion import Motion, record_motion
 from crosscheck.recording.states import States
 from crosscheck.suite.agreement import Differences
 from crosscheck.suite.verdicts import Verdict
-from seecr.equilibrium import Status
 from seecr.pose import Array, pose_difference
 from seecr.robot import Robot
+from seecr.solution import Status
 
 if TYPE_CHECKING:
     from crosscheck.suite.run import CaseResult

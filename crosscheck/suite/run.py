@@ -25,12 +25,12 @@ from crosscheck.suite.mujoco_robot import MujocoRobot
 from crosscheck.suite.pool import Pool
 from crosscheck.suite.thresholds import Thresholds
 from crosscheck.suite.verdicts import UNSOLVED, Answers, PoseFinding, Verdict, held_to, judge
-from seecr.equilibrium import Solution
 from seecr.equilibrium import solve as seecr_solve
 from seecr.errors import InputFileError
 from seecr.mjcf import load_robot
 from seecr.pose import Array
 from seecr.robot import Robot
+from seecr.solution import Solution
 
 if TYPE_CHECKING:
     from crosscheck.settle.settler import SettlingBatch

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,10 +10,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seecr.effects.base import Effect, Layout
-from seecr.effects.registry import catalogue
+from seecr.effects.base import Effect, Layout, layout_of
+from seecr.effects.registry import catalogue, effect_named
 from seecr.errors import InputError
 from seecr.pose import Array
+from seecr.robot import Robot
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,6 +23,29 @@ class Term:
 
     layout: Layout
     vector: Array
+
+    @classmethod
+    def of(cls, robot: Robot, name: str, **values: float) -> Term:
+        """An effect by its name, with some parameters; the others are at null.
+
+        Args:
+            robot: that it is for.
+            name: of the effect, such as ``"pulley_radius"``.
+            values: by the parameters' names, such as ``radius_m=0.01`` or ``gain_3=0.002``.
+
+        Raises:
+            InputError: no such effect, or no such parameter.
+        """
+        layout = layout_of(effect_named(name), robot)
+        vector = layout.null.copy()
+        for key, value in values.items():
+            if key not in layout.names:
+                near = difflib.get_close_matches(key, layout.names, n=3, cutoff=0.0)
+                raise InputError(
+                    f"effect {name}: no parameter {key}; the nearest are {', '.join(near)}"
+                )
+            vector[layout.names.index(key)] = value
+        return cls(layout, vector)
 
     @property
     def name(self) -> str:

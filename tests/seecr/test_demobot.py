@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 from plain_steps import Plain, plain_fsolve
 
-from seecr.equilibrium import Status, solve
+from seecr.equilibrium import solve
 from seecr.mjcf import load_robot
 from seecr.robot import Robot
 from seecr.shipped import CABLES, model_path
+from seecr.solution import Status
 
 HEIGHTS = (0.1, 0.2)
 ENDS = {0.1: (26.4, 26.6, 34.0, 34.5, -11.0, -7.5), 0.2: (21.7, 22.1, 22.6, 22.9, -9.0, -5.8)}

@@ -11,7 +11,7 @@ from plain_steps import exact_residual
 from random_robots import KINDS, random_poses, random_robot
 
 from seecr import statics
-from seecr.equilibrium import METHODS, Solution, Status, certify, solve
+from seecr.equilibrium import METHODS, solve
 from seecr.errors import InputError
 from seecr.mjcf import load_robot
 from seecr.pose import (
@@ -23,6 +23,7 @@ from seecr.pose import (
 )
 from seecr.robot import Joint, Robot
 from seecr.shipped import model_path
+from seecr.solution import Solution, Status, certify
 
 UP = np.array([0.0, 0.0, 1.0])
 HERE = [0.0, 0, 0, 1, 0, 0, 0]

@@ -10,12 +10,13 @@ from seecr import statics
 from seecr.commands import Commands
 from seecr.compiled.outcomes import STALLED
 from seecr.effects import effect_named
-from seecr.equilibrium import Status, solve
+from seecr.equilibrium import solve
 from seecr.errors import InputError
 from seecr.experiment import Experiment
 from seecr.robot import Joint, Robot
 from seecr.sensitivity import readings_difference
 from seecr.setup import plain_setup
+from seecr.solution import Status
 
 FAMILIES = [
     ("stiffness", "pulley_radius"),

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from seecr.equilibrium import Solution, Status, solve
+from seecr.equilibrium import solve
 from seecr.errors import InputError
 from seecr.mjcf import load_robot
 from seecr.planar import bar_equation, bar_tilt, midline_point, solution_manifold
 from seecr.pose import transform_points
 from seecr.robot import Robot
 from seecr.shipped import model_path
+from seecr.solution import Solution, Status
 from seecr.workspace import feasible, slack_zones
 
 EXITS = np.array([[0.0, 0.5], [1.0, 0.5]])

@@ -13,8 +13,8 @@ from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
 
 from seecr.compiled.columns import GAP
-from seecr.equilibrium import Solution
 from seecr.robot import Robot
+from seecr.solution import Solution
 
 
 @dataclass

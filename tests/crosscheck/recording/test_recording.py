@@ -23,11 +23,11 @@ from crosscheck.suite.results import Run, results_json
 from crosscheck.suite.run import CaseResult, run_case
 from crosscheck.suite.thresholds import load_thresholds
 from crosscheck.suite.verdicts import Verdict
-from seecr.equilibrium import Status
 from seecr.errors import InputFileError
 from seecr.mjcf import load_robot
 from seecr.pose import quat_conjugate, quat_multiply
 from seecr.shipped import model_path
+from seecr.solution import Status
 
 PARALLEL = model_path("demobot_parallel")
 POSES = 6

@@ -1,0 +1,237 @@
+"""What became of a batch of poses: the answers, with what they are worth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seecr import statics
+from seecr.compiled.columns import REST, TENSION
+from seecr.compiled.outcomes import (
+    CABLE_LAW,
+    CONVERGED,
+    FALLING,
+    ITERATIONS,
+    SINGULAR,
+    SPINNING,
+    STALLED,
+    TOLERANCE,
+    UNSTABLE,
+)
+from seecr.pose import Array, rotvec_from_quat
+from seecr.result import COORDINATES, Record, Result, named
+from seecr.robot import Robot
+from seecr.tables import Tables, take
+
+
+class Status(Enum):
+    """What became of a pose; the value is the sentence a user reads."""
+
+    CONVERGED = "at rest: forces balance to 1e-9 of the load and the equilibrium is stable"
+    UNSTABLE = "balanced but unstable: the platform would leave this pose at the slightest touch"
+    SINGULAR = "balanced, but free to move along at least one direction without resistance"
+    STALLED = "not at rest: steps no longer reduce the forces, though they do not balance"
+    FALLING = "no equilibrium found: the platform fell beyond the reach of its cables"
+    SPINNING = "no equilibrium found: the external moment turned the platform round and round"
+    CABLE_LAW = "no answer: a cable's own equations have no solution at this pose"
+    ITERATIONS = "not at rest: the limit of iterations was reached before the forces balanced"
+    GAVE_UP = "not at rest: SciPy's solver gave up before the forces balanced"
+
+
+_OF_OUTCOME = {
+    CONVERGED: Status.CONVERGED,
+    UNSTABLE: Status.UNSTABLE,
+    SINGULAR: Status.SINGULAR,
+    STALLED: Status.STALLED,
+    FALLING: Status.FALLING,
+    CABLE_LAW: Status.CABLE_LAW,
+    ITERATIONS: Status.ITERATIONS,
+    SPINNING: Status.SPINNING,
+}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Solution(Result):
+    """Answers of n poses, each with the certificate recomputed from the answer itself.
+
+    It prints as a few lines, and ``to_frame`` gives one row per pose.
+
+    Attributes:
+        robot: that was solved.
+        tables: the problem, from which everything can be recomputed.
+        command: (n, 7) commanded poses.
+        pose: (n, 7) where the platform rests.
+        deviation: (n, 6) [m, rad] pose less command: displacement and rotation vector, base
+            frame. It carries more digits than the difference of the two poses.
+        tensions: (n, m) [N] at the exit point.
+        slack: (n, m) bool, as :func:`seecr.statics.is_slack` has it.
+        rest_lengths: (n, m) [m].
+        iterations: (n,) evaluations of the wrench.
+        residual: (n,) unbalanced force, and torque over the robot's length, relative to the
+            load; recomputed at the returned deviation.
+        energy: (n,) [J] elastic energy less the work of the load since the commanded pose;
+            nan where a law has none in closed form.
+        status: (n,) of :class:`Status`.
+    """
+
+    robot: Robot
+    tables: Tables
+    evaluation: statics.Evaluation
+    command: Array
+    pose: Array
+    deviation: Array
+    tensions: Array
+    slack: NDArray[np.bool_]
+    rest_lengths: Array
+    iterations: NDArray[np.int64]
+    residual: Array
+    energy: Array
+    status: NDArray[np.object_]
+
+    def __len__(self) -> int:
+        return len(self.pose)
+
+    @property
+    def converged(self) -> NDArray[np.bool_]:
+        """Where the answer is a stable equilibrium, (n,)."""
+        return np.array([s is Status.CONVERGED for s in self.status], dtype=bool)
+
+    @cached_property
+    def stiffness(self) -> Array:
+        """Minus the derivative of the wrench by the pose, (n, d, d).
+
+        For a free platform [N/m, N/rad; N m/m, N m/rad], by translation and rotation vector
+        in the base frame; else by the joints. An external moment, which has no potential,
+        takes its symmetry.
+        """
+        unit = self._units()
+        return statics.stiffness(self.tables, self.evaluation) * unit[:, None] * unit[None, :]
+
+    @cached_property
+    def _spectrum(self) -> tuple[Array, Array]:
+        hessian = self.evaluation.hessian.copy()
+        rows = np.flatnonzero(self.status == Status.SINGULAR)
+        if len(rows):
+            # a cable that is just as long as its rest length resists on one side only
+            there = statics.take_evaluation(self.evaluation, rows)
+            hessian[rows] = statics.without_idle(take(self.tables, rows), there).hessian
+        finite = np.isfinite(hessian)
+        values, vectors = np.linalg.eigh(np.where(finite, hessian, 0.0))
+        values[~finite.all(axis=(1, 2))] = np.nan
+        return values, vectors
+
+    @property
+    def smallest_eigenvalue(self) -> Array:
+        """Of the stiffness, (n,) [N/m], rotations scaled by the robot's length."""
+        return self._spectrum[0][:, 0]
+
+    @property
+    def softest_direction(self) -> Array:
+        """Eigenvector of the smallest eigenvalue, (n, d) [m, rad], a unit step of it."""
+        return self._spectrum[1][:, :, 0] / self._units()
+
+    def _units(self) -> Array:
+        """Robot's length for rotations, 1 for translations, (d,)."""
+        return np.where(self.robot.hinges, self.robot.length, 1.0)
+
+    def lines(self) -> list[str]:
+        """How many poses came to rest, how far from their commands, and the cables' tensions."""
+        out = [f"{self.robot.name}: {int(self.converged.sum())} of {len(self)} poses at rest"]
+        for status in dict.fromkeys(self.status):
+            if status is not Status.CONVERGED:
+                rows = np.flatnonzero(self.status == status)
+                out.append(f"{_some_rows(rows)}: {self.sentence(int(rows[0]))}")
+        known = np.flatnonzero(np.isfinite(self.pose).all(axis=1))
+        if len(known) == 0:
+            return out
+        away = np.linalg.norm(self.deviation[:, :3], axis=1)
+        turned = np.degrees(np.linalg.norm(self.deviation[:, 3:], axis=1))
+        k = int(known[np.argmax(away[known])])
+        out.append(
+            f"furthest from its command: pose {k}, by {1e3 * away[k]:.4g} mm "
+            f"and {turned[k]:.4g} deg"
+        )
+        pulls, slack = self.tensions[known], self.slack[known].sum(axis=1)
+        out.append(
+            f"tensions from {pulls.min():.4g} to {pulls.max():.4g} N; slack cables: "
+            f"{slack.min()} to {slack.max()} of {self.robot.n_cables}"
+        )
+        worst = float(np.max(self.residual[known]))
+        return [*out, f"forces balance to {worst:.1g} of the load or better"]
+
+    def records(self) -> list[Record]:
+        """One row per pose: command, pose, status, tensions and slack cables by name."""
+        cables, stiffness = self.robot.cable_names, self.smallest_eigenvalue
+        return [
+            {
+                "status": self.status[i].name,
+                **named("command_{}", COORDINATES, self.command[i]),
+                **named("{}", COORDINATES, self.pose[i]),
+                "residual": float(self.residual[i]),
+                "energy_J": float(self.energy[i]),
+                "smallest_eigenvalue_N_per_m": float(stiffness[i]),
+                **named("tension_{}_N", cables, self.tensions[i]),
+                **named("slack_{}", cables, self.slack[i]),
+            }
+            for i in range(len(self))
+        ]
+
+    def sentence(self, i: int) -> str:
+        """What became of pose i, with the direction where it is singular or unstable."""
+        status = self.status[i]
+        if status not in (Status.SINGULAR, Status.UNSTABLE):
+            return str(status.value)
+        names = [joint.name for joint in self.robot.joints] or ["x", "y", "z", "rx", "ry", "rz"]
+        vector = self._spectrum[1][i, :, 0]
+        parts = [
+            f"{value:+.2f} {name}"
+            for value, name in zip(vector, names, strict=True)
+            if abs(value) > 0.05
+        ]
+        return f"{status.value} (direction {' '.join(parts)})"
+
+
+def _some_rows(rows: NDArray[np.intp], most: int = 8) -> str:
+    """Numbers of poses for people."""
+    named = ", ".join(str(k) for k in rows[:most])
+    more = f" and {len(rows) - most} more" if len(rows) > most else ""
+    return f"{'pose' if len(rows) == 1 else 'poses'} {named}{more}"
+
+
+def certify(robot: Robot, tables: Tables, found: statics.Evaluation) -> Solution:
+    """Recompute wrench, stiffness and energy at the answer, and say what it is worth."""
+    check = statics.evaluate(tables, found, threads=None)
+    check.count = found.count
+    status = np.array([_OF_OUTCOME.get(o, Status.GAVE_UP) for o in found.outcome], dtype=object)
+    balanced = check.residual < TOLERANCE
+    status[(status == Status.CONVERGED) & ~balanced] = Status.STALLED
+    # not found's own: a search in joint values alone leaves its deviations unplaced
+    moved = check.deviation
+    turn = np.where(moved[:, 3:4] < 0, -1.0, 1.0) * moved[:, 3:]
+    lost = np.isin(found.outcome, (FALLING, CABLE_LAW, SPINNING))
+    return Solution(
+        robot=robot,
+        tables=tables,
+        evaluation=check,
+        command=tables.poses,
+        pose=_blank(statics.platform_poses(tables, moved), lost),
+        deviation=_blank(np.concatenate([moved[:, :3], rotvec_from_quat(turn)], axis=1), lost),
+        tensions=_blank(check.states[..., TENSION], lost),
+        slack=statics.is_slack(tables, check),
+        rest_lengths=tables.cables[..., REST],
+        iterations=found.count,
+        residual=np.where(lost, np.inf, check.residual),
+        energy=check.energy,
+        status=status,
+    )
+
+
+def _blank(values: Array, rows: NDArray[np.bool_]) -> Array:
+    """No number where there is no answer."""
+    values = values.copy()
+    values[rows] = np.nan
+    return values

@@ -1,0 +1,120 @@
+"""Results in print, in a notebook and as data frames."""
+
+from __future__ import annotations
+
+import builtins
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow
+import pytest
+
+import seecr
+
+HOME = [0.4, 0.25, 0.1, 1, 0, 0, 0]
+
+
+@pytest.fixture(scope="module")
+def solution() -> seecr.Solution:
+    robot = seecr.load_robot(seecr.model_path("demobot_cogiro"))
+    return seecr.solve(robot, [HOME, [0.4, 0.25, 0.1, 1, 0, 0, 0], [0.5, 0.3, 0.1, 1, 0, 0, 0]])
+
+
+@pytest.fixture(scope="module")
+def fallen() -> seecr.Solution:
+    robot = seecr.load_robot(seecr.model_path("demobot_cogiro"))
+    return seecr.solve(robot, [HOME] * 11, wrench=[0, 0, -1e9, 0, 0, 0])
+
+
+def test_a_solution_prints_as_a_few_lines(solution: seecr.Solution) -> None:
+    lines = str(solution).splitlines()
+    assert repr(solution) == str(solution) and len(lines) == 4
+    assert lines[0] == "demobot_cogiro: 3 of 3 poses at rest"
+    worst = int(np.argmax(np.linalg.norm(solution.deviation[:, :3], axis=1)))
+    assert lines[1].startswith(f"furthest from its command: pose {worst}, by ")
+    size = 1e3 * np.linalg.norm(solution.deviation[worst, :3])
+    assert float(lines[1].split(" by ")[1].split()[0]) == pytest.approx(size, rel=1e-3)
+    assert f"{solution.tensions.max():.4g} N" in lines[2]
+    assert f"{solution.slack.sum(axis=1).max()} of 8" in lines[2]
+
+
+def test_what_did_not_come_to_rest_is_said_with_its_poses(fallen: seecr.Solution) -> None:
+    lines = str(fallen).splitlines()
+    assert lines[0] == "demobot_cogiro: 0 of 11 poses at rest"
+    assert lines[1].startswith("poses 0, 1, 2, 3, 4, 5, 6, 7 and 3 more: ")
+    assert fallen.status[0].value in lines[1]
+
+
+def test_a_frame_has_one_row_per_pose_in_the_numbers_of_the_solution(
+    solution: seecr.Solution,
+) -> None:
+    frame = solution.to_frame()
+    assert isinstance(frame, pyarrow.Table) and frame.num_rows == 3
+    table = frame.to_pydict()
+    assert table["status"] == ["CONVERGED"] * 3
+    assert np.array_equal(table["z_m"], solution.pose[:, 2])
+    assert np.array_equal(table["command_qw"], solution.command[:, 3])
+    name = solution.robot.cable_names[4]
+    assert np.array_equal(table[f"tension_{name}_N"], solution.tensions[:, 4])
+    assert np.array_equal(table[f"slack_{name}"], solution.slack[:, 4])
+
+
+def without(monkeypatch: pytest.MonkeyPatch, *packages: str) -> None:
+    real = builtins.__import__
+
+    def refuse(name: str, *args: Any, **more: Any) -> Any:
+        if name.split(".")[0] in packages:
+            raise ModuleNotFoundError(name)
+        return real(name, *args, **more)
+
+    monkeypatch.setattr(builtins, "__import__", refuse)
+
+
+def test_without_pyarrow_and_pandas_a_frame_is_a_typed_error(
+    solution: seecr.Solution, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    without(monkeypatch, "pyarrow", "pandas")
+    with pytest.raises(seecr.MissingPackageError, match="needs pyarrow or pandas"):
+        solution.to_frame()
+
+
+def test_in_a_notebook_it_is_its_lines_and_its_first_rows(fallen: seecr.Solution) -> None:
+    page = fallen._repr_html_()
+    assert page.count("<tr>") == 12 and "0 of 11 poses at rest" in page
+    many = seecr.solve(fallen.robot, [HOME] * 25)._repr_html_()
+    assert many.count("<tr>") == 21 and "and 5 more rows: to_frame() has them all" in many
+
+
+def test_names_of_a_users_robot_are_escaped(solution: seecr.Solution) -> None:
+    from dataclasses import replace
+
+    odd = replace(solution, robot=replace(solution.robot, name="<b>bot</b>"))
+    assert "<b>bot" not in odd._repr_html_() and "&lt;b&gt;bot" in odd._repr_html_()
+
+
+def test_a_prediction_shows_what_would_be_read() -> None:
+    robot = seecr.load_robot(seecr.model_path("demobot_cogiro"))
+    found = seecr.predict(robot, [HOME], [seecr.Term.of(robot, "tracker_scale", factor=2.0)])
+    assert str(found).startswith("demobot_cogiro: 1 of 1 poses at rest")
+    assert found.to_frame().to_pydict()["x_m"] == pytest.approx([2.0 * found.pose[0, 0]])
+
+
+def test_a_model_prints_its_effects(tmp_path: Path) -> None:
+    robot = seecr.load_robot(seecr.model_path("demobot_cogiro"))
+    path = tmp_path / "m.toml"
+    path.write_text(
+        '[[effect]]\nname = "pulley_radius"\n'
+        'parameters.radius_m = { value = 0.0099, stderr = 1e-4, unit = "m" }\n'
+        '[[effect]]\nname = "centre_of_mass"\n[effect.parameters]\n'
+        'shift_x_m = 0.001\nshift_y_m = 0\nshift_z_m = { value = 0, stderr = "unseen" }\n'
+    )
+    model = seecr.load_model(path, robot)
+    lines = str(model).splitlines()
+    assert lines[0] == "model of a robot: plain SEECR and 2 effects"
+    assert lines[1] == "pulley_radius: radius_m = 0.0099 +- 0.0001"
+    assert lines[2] == "centre_of_mass: shift_x_m = 0.001, shift_y_m = 0, shift_z_m = 0"
+    assert lines[3] == model.notes[0]
+    table = model.to_frame().to_pydict()
+    assert table["parameter"] == ["radius_m", "shift_x_m", "shift_y_m", "shift_z_m"]
+    assert table["stderr"] == [1e-4, None, None, None]
