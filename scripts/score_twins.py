@@ -25,8 +25,8 @@ import numpy as np
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.measurements.read import load_measurements
+from crosscheck.twin.answer import unseal
 from crosscheck.twin.make import make_twin
-from crosscheck.twin.sealed import unseal
 from seecr.effects import BUILT_IN
 from seecr.mjcf import load_robot
 from seecr.shipped import model_path
@@ -99,14 +99,14 @@ def score(kind: str, robot: str, seed: int, effects: tuple[str, ...] | None) -> 
         start = time.perf_counter()
         found = diagnose(machine, data)
         seconds = time.perf_counter() - start
-    hidden = list(answer["values"])
-    moves = [m["max"] for m in answer.get("moves_over_noise", {}).values()]
+    hidden = answer.hidden
+    moves = [one.max for one in answer.moves_over_noise.values()]
     good = right(found, hidden)
     return Score(
         kind, robot, seed, hidden, found.verdict,
         [[f.effect, *(r.name for r in f.rivals)] for f in found.missing],
         not hidden or min(moves, default=0.0) > 2.0, good,
-        distances(found, answer.get("values", {})) if good else [], over_noise(found), seconds,
+        distances(found, answer.values) if good else [], over_noise(found), seconds,
     )  # fmt: skip
 
 

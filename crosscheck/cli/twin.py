@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -98,51 +97,44 @@ def command(
             progress=lambda rows, now: advance(0, "measuring"),
         )
         advance(1, "measured")
-    _tell(twin, seed, out, as_json)
+    _tell(twin, out, as_json)
     return 0
 
 
-def _tell(twin: Twin, seed: int, out: Path, as_json: bool) -> None:
-    result = _summary(twin, seed, out)
+def _tell(twin: Twin, out: Path, as_json: bool) -> None:
+    from crosscheck.files import json_text
+    from crosscheck.twin.answer import NAME
+
+    files = ["robot.xml", "measured.csv", "measured.toml", NAME]
+    for note in twin.notes:
+        click.echo(f"note: {note}", err=True)
     if as_json:
-        click.echo(json.dumps(result, indent=2))
+        click.echo(json_text({**twin.as_json(), "folder": str(out), "files": files}, indent=2))
         return
-    sigma = result["sigma"]
+    sigma = twin.answer.sigma
     click.echo(
-        f"{result['rows']} rows of {result['robot']} in {result['runs']} runs; noise "
-        f"{1e3 * sigma['position_m']:.3g} mm, {57.29577951 * sigma['orientation_rad']:.2g} deg"
+        f"{twin.measured.n_rows} rows of {twin.robot.name} in {len(twin.measured.runs)} runs; "
+        f"noise {1e3 * sigma['position_m']:.3g} mm, "
+        f"{57.29577951 * sigma['orientation_rad']:.2g} deg"
     )
-    click.echo(f"written to {out}: {', '.join(result['files'])}")
+    click.echo(f"written to {out}: {', '.join(files)}")
     click.echo(f"next: crosscheck diagnose {out / 'robot.xml'} {out / 'measured.csv'}")
     click.echo(f"what was hidden: crosscheck twin --open {out}")
 
 
-def _summary(twin: Twin, seed: int, out: Path) -> dict[str, Any]:
-    from crosscheck.twin.sealed import NAME
-
-    return {
-        "robot": twin.robot.name,
-        "seed": seed,
-        "rows": twin.measured.n_rows,
-        "runs": len(twin.measured.runs),
-        "sigma": twin.answer["sigma"],
-        "folder": str(out),
-        "files": ["robot.xml", "measured.csv", "measured.toml", NAME],
-    }
-
-
 def _open(path: Path, as_json: bool) -> int:
-    from crosscheck.twin.sealed import unseal
+    from crosscheck.files import json_text
+    from crosscheck.twin.answer import unseal
 
     answer = unseal(path)
     if as_json:
-        click.echo(json.dumps(answer, indent=2))
+        click.echo(json_text(answer.as_json(), indent=2))
         return 0
-    if answer["hidden"] == ["null"]:
+    if not answer.hidden:
         click.echo("nothing was hidden")
-    for name in answer["values"]:
-        moves = answer["moves_over_noise"][name]
-        click.echo(f"{name}: moves readings by up to {moves['max']:.3g} times their noise")
-        for parameter, value in answer["values"][name].items():
+    for name, values in answer.values.items():
+        moves = answer.moves_over_noise[name]
+        click.echo(f"{name}: moves readings by up to {moves.max:.3g} times their noise")
+        for parameter, value in values.items():
             click.echo(f"  {parameter} = {value:.6g}")
     return 0

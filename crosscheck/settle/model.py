@@ -97,13 +97,8 @@ def check_cables(model: mujoco.MjModel, body: int, where: str) -> None:
             )
 
 
-def switch_off(model: mujoco.MjModel) -> tuple[str, ...]:
-    """Leave springs, gravity and inertia; return names of what was there besides."""
-    model.opt.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
-    model.opt.disableflags |= sum(int(flag) for flag in _DISABLE)
-    model.opt.tolerance = 1e-8  # relative, of the solve for the implicit step
-    model.opt.iterations = 100
-    model.opt.enableflags = int(mujoco.mjtEnableBit.mjENBL_ENERGY)
+def hindrances(model: mujoco.MjModel) -> tuple[str, ...]:
+    """Names of what would hide or shift the rest state of springs and gravity, if it is there."""
     found = {
         "joint limits": model.jnt_limited.any(),
         "tendon limits": model.tendon_limited.any(),
@@ -114,8 +109,17 @@ def switch_off(model: mujoco.MjModel) -> tuple[str, ...]:
     return tuple(what for what, there in found.items() if there)
 
 
+def switch_off(model: mujoco.MjModel) -> None:
+    """Leave springs, gravity and inertia."""
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
+    model.opt.disableflags |= sum(int(flag) for flag in _DISABLE)
+    model.opt.tolerance = 1e-8  # relative, of the solve for the implicit step
+    model.opt.iterations = 100
+    model.opt.enableflags = int(mujoco.mjtEnableBit.mjENBL_ENERGY)
+
+
 def ignored_note(name: str | Path, ignored: Sequence[str]) -> str:
-    """One sentence about what :func:`switch_off` found in a file."""
+    """One sentence about the :func:`hindrances` of a file."""
     return (
         f"{name}: switched off here: {', '.join(ignored)}; the platform hangs on springs and "
         "gravity alone, as statics has it"

@@ -20,6 +20,7 @@ from crosscheck.settle.model import (
     change_mass_unit,
     check_cables,
     compile_model,
+    hindrances,
     platform_of,
     switch_off,
 )
@@ -89,7 +90,8 @@ class Physics:
         """
         self.model, self.parts, self.body = model, parts, parts.platform
         self.is_free = int(model.jnt_type[model.body_jntadr[parts.platform]]) == _FREE
-        self.ignored = switch_off(model)
+        self.ignored = hindrances(model)
+        switch_off(model)
         self.mass = float(model.body_mass[parts.platform])
         self.mass_unit = 2.0 ** round(float(np.log2(self.mass / _MASS_IN_MUJOCO)))
         change_mass_unit(model, self.mass_unit)

@@ -19,14 +19,15 @@ from crosscheck.errors import CrosscheckError
 from crosscheck.files import staged, write_text
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.write import write_measurements
+from crosscheck.settle.model import compile_model, hindrances, ignored_note
+from crosscheck.twin.answer import NAME, Answer, Moves, seal
 from crosscheck.twin.hidden import choose, times, values_of
 from crosscheck.twin.measure import Truth, measure
-from crosscheck.twin.sealed import NAME, seal
 from crosscheck.twin.trajectory import Trajectory, trajectory
 from seecr.commands import Commands
 from seecr.effects import Term
 from seecr.mjcf import load_robot
-from seecr.pose import Array, pose_difference, quat_from_rotvec, quat_multiply
+from seecr.pose import Array, quat_from_rotvec, quat_multiply
 from seecr.robot import Robot
 
 # Noise of a tracker, over the mean cable length (30 micrometres on a DemoBot), and of its angles.
@@ -54,6 +55,7 @@ class Twin:
         kept: (n,) bool, commands that were measured: those at which MuJoCo came to rest.
         hidden: the effects.
         answer: what the sealed file holds.
+        notes: what of the MJCF plays no part in the truth, a sentence or none.
     """
 
     robot: Robot
@@ -61,7 +63,19 @@ class Twin:
     truth: Truth
     kept: NDArray[np.bool_]
     hidden: tuple[Term, ...]
-    answer: dict[str, Any]
+    answer: Answer
+    notes: tuple[str, ...] = ()
+
+    def as_json(self) -> dict[str, Any]:
+        """What may be told of it: nothing of what it hides."""
+        return {
+            "robot": self.robot.name,
+            "seed": self.answer.seed,
+            "rows": self.measured.n_rows,
+            "runs": len(self.measured.runs),
+            "sigma": self.answer.sigma,
+            "notes": self.notes,
+        }
 
 
 def make_twin(
@@ -97,8 +111,15 @@ def make_twin(
     made = _at_rest(robot, hidden, points, seed, tensions, tell)
     measured = _read(made, _random(seed, 2), robot).rows(made.at_rest)
     hidden = [one for one, _ in made.alone]
-    answer = _answer(made, robot, seed)
-    twin = Twin(robot, measured, made.truth, made.at_rest, tuple(hidden), answer)
+    twin = Twin(
+        robot=robot,
+        measured=measured,
+        truth=made.truth,
+        kept=made.at_rest,
+        hidden=tuple(hidden),
+        answer=_answer(made, robot, seed),
+        notes=_notes(robot_path),
+    )
     if out is not None:
         _write(twin, robot_path, Path(out))
     return twin
@@ -196,25 +217,9 @@ def _made_visible(
         if not _mostly(truth.at_rest & plain.at_rest):
             break
         best = one, truth
-        if moves_over_noise(truth, plain, sigma)["max"] > _VISIBLE:
+        if Moves.of(truth, plain, sigma).max > _VISIBLE:
             break
     return best
-
-
-def moves_over_noise(truth: Truth, plain: Truth, sigma: Sigma) -> dict[str, float]:
-    """Largest and rms change of the readings over their noise."""
-    rows = truth.at_rest & plain.at_rest
-    a = np.concatenate([truth.position, truth.quat_wxyz], axis=1)[rows]
-    b = np.concatenate([plain.position, plain.quat_wxyz], axis=1)[rows]
-    assert sigma.position_m is not None and sigma.orientation_rad is not None
-    change = pose_difference(a, b) / np.repeat([sigma.position_m, sigma.orientation_rad], 3)
-    if sigma.tension_N is not None:
-        pull = (truth.tension_readings - plain.tension_readings)[rows] / sigma.tension_N
-        change = np.concatenate([change, pull], axis=1)
-    return {
-        "max": float(np.max(np.abs(change))),
-        "rms": float(np.sqrt(np.mean(change**2))),
-    }
 
 
 def _sigma(robot: Robot, plain: Truth, tensions: bool) -> Sigma:
@@ -254,23 +259,21 @@ def _read(made: _Measured, random: np.random.Generator, robot: Robot) -> Measure
     )
 
 
-def _answer(made: _Measured, robot: Robot, seed: int) -> dict[str, Any]:
+def _answer(made: _Measured, robot: Robot, seed: int) -> Answer:
     import mujoco
 
-    sigma = {k: v for k, v in asdict(made.sigma).items() if v is not None}
-    return {
-        "robot": robot.name,
-        "seed": seed,
-        "hidden": [one.name for one, _ in made.alone] or ["null"],
-        "values": {one.name: values_of(one) for one, _ in made.alone},
-        "moves_over_noise": {
-            one.name: moves_over_noise(truth, made.plain, made.sigma) for one, truth in made.alone
+    return Answer(
+        robot=robot.name,
+        seed=seed,
+        values={one.name: values_of(one) for one, _ in made.alone},
+        moves_over_noise={
+            one.name: Moves.of(truth, made.plain, made.sigma) for one, truth in made.alone
         },
-        "all_move_over_noise": moves_over_noise(made.truth, made.plain, made.sigma),
-        "sigma": sigma,
-        "poses": int(np.sum(made.at_rest)),
-        "truth": f"MuJoCo {mujoco.__version__}",
-    }
+        all_move_over_noise=Moves.of(made.truth, made.plain, made.sigma),
+        sigma={kind: value for kind, value in asdict(made.sigma).items() if value is not None},
+        poses=int(np.sum(made.at_rest)),
+        truth=f"MuJoCo {mujoco.__version__}",
+    )
 
 
 def _write(twin: Twin, robot_path: Path, out: Path) -> None:
@@ -279,6 +282,12 @@ def _write(twin: Twin, robot_path: Path, out: Path) -> None:
         shutil.copyfile(robot_path, folder / "robot.xml")
         _check_alone(folder / "robot.xml", robot_path)
         write_text(folder / NAME, seal(twin.answer))
+
+
+def _notes(path: Path) -> tuple[str, ...]:
+    """What of the MJCF the truth leaves out: it is built anew from the robot's numbers."""
+    found = hindrances(compile_model(path))
+    return (ignored_note(path, found),) if found else ()
 
 
 def _check_alone(copy: Path, source: Path) -> None:

@@ -11,8 +11,8 @@ import pytest
 
 from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.measurements.read import load_measurements
+from crosscheck.twin.answer import unseal
 from crosscheck.twin.make import make_twin
-from crosscheck.twin.sealed import unseal
 from seecr.mjcf import load_robot
 from seecr.shipped import model_path
 
@@ -57,7 +57,7 @@ def check(hidden: tuple[str, ...], case: Path) -> None:
     assert found.verdict == ("effects_found" if hidden else "no_effect_missing")
     named = [{f.effect, *(r.name for r in f.rivals)} for f in found.missing]
     assert len(named) == len(hidden)
-    values = unseal(case).get("values", {})
+    values = unseal(case).values
     for effect in hidden:
         assert any(effect in names for names in named)
     for finding in found.missing:

@@ -14,11 +14,12 @@ from scipy.stats import chi2
 
 from crosscheck.cli import main
 from crosscheck.errors import CrosscheckError
+from crosscheck.files import json_text
 from crosscheck.measurements.read import load_measurements
+from crosscheck.twin.answer import NAME, Answer, Moves, seal, unseal
 from crosscheck.twin.hidden import choose, times
 from crosscheck.twin.make import make_twin
 from crosscheck.twin.robot import TRUE_EFFECTS
-from crosscheck.twin.sealed import NAME, seal, unseal
 from crosscheck.twin.trajectory import trajectory
 from seecr.commands import Commands
 from seecr.effects import Term, effect_named, layout_of
@@ -98,9 +99,9 @@ def test_the_answer_is_sealed_and_says_all(tmp_path):
         assert "centre_of_mass" not in text and "shift_x" not in text, file.name
     answer = unseal(tmp_path)
     assert answer == unseal(tmp_path / NAME)
-    assert answer["hidden"] == ["centre_of_mass"]
-    assert set(answer["values"]["centre_of_mass"]) == {"shift_x_m", "shift_y_m", "shift_z_m"}
-    assert answer["moves_over_noise"]["centre_of_mass"]["max"] > 2.0
+    assert answer.hidden == ["centre_of_mass"]
+    assert set(answer.values["centre_of_mass"]) == {"shift_x_m", "shift_y_m", "shift_z_m"}
+    assert answer.moves_over_noise["centre_of_mass"].max > 2.0
 
 
 def test_a_seed_makes_the_same_twin_again():
@@ -189,7 +190,7 @@ def test_two_hidden_effects_act_together():
     names = ("pulley_radius", "frame_compliance")
     twin = make_twin(COGIRO, 2, effects=names, points=POINTS)
     assert is_noise(residuals(twin))
-    assert set(twin.answer["moves_over_noise"]) == set(names)
+    assert set(twin.answer.moves_over_noise) == set(names)
     absent = Term(twin.hidden[0].layout, twin.hidden[0].layout.null)
     without = dataclasses.replace(twin, hidden=(absent, twin.hidden[1]))
     assert not is_noise(residuals(without))
@@ -235,7 +236,7 @@ def test_the_command_s_json_is_all_it_prints(tmp_path):
     assert run.exit_code == 0
     result = json.loads(run.output)
     assert result["rows"] == 144 and "hidden" not in result and "values" not in result
-    assert unseal(tmp_path)["hidden"] == ["null"]
+    assert unseal(tmp_path).hidden == []
 
 
 @pytest.mark.parametrize(
@@ -247,7 +248,7 @@ def test_the_command_s_json_is_all_it_prints(tmp_path):
         (["ROBOT", "--hide", "1", "--effect", "stiffness", "--effects", "1"], "leave out --effect"),
         (["missing.xml", "--hide", "1"], "missing.xml"),
         (["--open", "ROBOT"], "is no sealed answer; expected a file answer.sealed"),
-        (["--open", "nowhere"], "cannot be read"),
+        (["--open", "nowhere"], "nowhere: no such file; expected a file answer.sealed"),
     ],
 )
 def test_bad_usage_is_one_line_and_status_2(tmp_path, args, text):
@@ -258,13 +259,46 @@ def test_bad_usage_is_one_line_and_status_2(tmp_path, args, text):
     assert not (tmp_path / "out").exists()
 
 
-def test_a_seal_comes_off_again_and_only_a_seal_does(tmp_path):
+@pytest.fixture
+def answer() -> Answer:
+    moves = {"stiffness": Moves(3.0, 1.5)}
+    values = {"stiffness": {"factor": 1.1}}
+    return Answer("r", 4, values, moves, Moves(3.0, 1.5), {"position_m": 1e-5}, 144, "MuJoCo")
+
+
+def test_a_seal_comes_off_again_and_only_a_seal_does(tmp_path, answer):
     file = tmp_path / NAME
-    file.write_text(seal({"hidden": ["null"]}), encoding="ascii")
-    assert unseal(file) == {"hidden": ["null"]}
-    file.write_text(seal({"hidden": ["null"]})[:-9], encoding="ascii")
+    file.write_text(seal(answer), encoding="ascii")
+    assert unseal(file) == answer
+    nothing = dataclasses.replace(answer, values={}, moves_over_noise={})
+    file.write_text(seal(nothing), encoding="ascii")
+    assert unseal(file) == nothing
+    assert nothing.hidden == [] and nothing.as_json()["hidden"] == ["null"]
+    file.write_text(seal(answer)[:-9], encoding="ascii")
     with pytest.raises(InputFileError, match="is no sealed answer"):
         unseal(file)
+
+
+def test_an_answer_that_says_something_else_is_none(answer):
+    document = json.loads(json_text(answer.as_json()))
+    assert Answer.of_json(document) == answer
+    for key in ("values", "moves_over_noise", "all_move_over_noise", "seed"):
+        with pytest.raises(KeyError):
+            Answer.of_json({name: part for name, part in document.items() if name != key})
+    with pytest.raises(TypeError):
+        Answer.of_json({**document, "all_move_over_noise": {"most": 1.0}})
+
+
+def test_what_of_the_mjcf_plays_no_part_is_told_once(tmp_path):
+    rough = tmp_path / "rough.xml"
+    text = model_path("planar_vertical").read_text(encoding="utf-8")
+    rough.write_text(text.replace('<joint name="x"', '<joint name="x" damping="2"'))
+    args = ["twin", str(rough), "--hide", "1", "--effects", "0", "--out", str(tmp_path / "case")]
+    run = CliRunner().invoke(main, [*args, "--json"])
+    assert run.exit_code == 0
+    (note,) = json.loads(run.stdout)["notes"]
+    assert note.startswith(f"{rough}: switched off here: damping;")
+    assert run.stderr == f"note: {note}\n"
 
 
 def test_effects_that_cannot_be_hidden_are_refused():
