@@ -41,7 +41,7 @@ jobs_option = click.option(
     type=click.IntRange(min=1),
     default=None,
     metavar="N",
-    help="How many at a time.  [default: one a processor]",
+    help="How many at a time.  [default: one per processor]",
 )
 """``--jobs N``, given to the command as ``jobs``; None means :func:`seecr.threads.processors`."""
 

@@ -15,7 +15,7 @@ from crosscheck.recording.stream import Recording
 from crosscheck.units import short
 
 ROOT = "bars"
-# The drawing is 100 wide; y points down, a row a model.
+# The drawing is 100 wide; y points down, one row per model.
 _LEFT, _RIGHT, _ROW, _HEAD = 27.0, 80.0, 4.2, 5.0
 _DIM, _LABEL = 0.45, 2.2
 
@@ -23,7 +23,7 @@ _DIM, _LABEL = 0.45, 2.2
 def write_bars(
     recording: Recording, index: rr.TimeColumn, found: Diagnosis, stages: list[Stage]
 ) -> None:
-    """A block a kind of reading: bars from half the noise to the error on runs left out."""
+    """One block per kind of reading: bars from half the noise to the error on runs left out."""
     assert found.search is not None
     for block, kind in enumerate(kinds_read(found.search.problem)):
         _block(recording, index, found, stages, kind, block * _block_height(len(stages)))

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import rerun.blueprint as rrb
 
-from crosscheck.recording import layout, legend, shapes
+from crosscheck.recording import layout, shapes
 from crosscheck.recording.colours import COMMAND, MUJOCO, SEECR
 from crosscheck.recording.material import Material, gather
 from crosscheck.recording.panels import Panels
-from crosscheck.recording.scene import Scene
+from crosscheck.recording.scene import LEGEND, Scene, write_legend
 from crosscheck.recording.series import LANES, Series
 from crosscheck.recording.stream import (
     Recording,
@@ -38,7 +38,7 @@ def write_case_recording(result: CaseResult, path: str | Path) -> None:
     material = gather(result)
     with recording_file(path, material.name, blueprint(material)) as recording:
         _draw_scene(recording, material)
-        legend.write_legend(recording, material.top)
+        write_legend(recording, material.top)
         series = Series(recording, material)
         series.over_poses(pose_index(material.count))
         panels = Panels(recording, material)
@@ -60,9 +60,7 @@ def blueprint(material: Material) -> rrb.Blueprint:
     )
     return layout.blueprint(
         rrb.Horizontal(
-            rrb.Vertical(
-                scene, layout.legend(legend.ROOT), lanes, row_shares=[high_part, 0.1, share]
-            ),
+            rrb.Vertical(scene, layout.legend(LEGEND), lanes, row_shares=[high_part, 0.1, share]),
             rrb.Vertical(*Series.views(material), row_shares=[3, 2.6, 4, 3.6]),
             rrb.Vertical(
                 layout.text("Read me", "text/read_me"),

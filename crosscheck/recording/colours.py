@@ -52,7 +52,7 @@ def scale_colours(values: Array, top: float) -> Colours:
 
 
 def cable_colours(count: int) -> Colours:
-    """A colour a cable, (count, 4): as few as eight come from Okabe and Ito."""
+    """One colour per cable, (count, 4): as few as eight come from Okabe and Ito."""
     if count <= len(SERIES):
         return np.array(SERIES[:count], dtype=np.uint8)
     return scale_colours(np.arange(count, dtype=float), max(count - 1.0, 1.0))

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.recording import colours, words
-from crosscheck.recording.motion import Motion, record_motion
-from crosscheck.recording.states import States
+from crosscheck.recording.shapes import States
+from crosscheck.settle.physics import Physics
+from crosscheck.settle.settler import Settler, Settling
 from crosscheck.suite.agreement import Differences
 from crosscheck.suite.verdicts import Verdict
 from seecr.pose import Array, pose_difference
@@ -25,6 +26,25 @@ _EQUILIBRIA = (Status.CONVERGED, Status.SINGULAR)
 _FRAMES = 240
 # How long the settling plays [s].
 _WATCH_S = 12.0
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A platform on its way to rest.
+
+    Attributes:
+        t_s: (k,) simulated time [s], increasing; the first is 0, the commanded pose.
+        pose: (k, 7).
+        kinetic_energy: (k,) [J].
+        tensions: (k, m) [N].
+        settling: where it ended; the motion is stage 1, without the polish.
+    """
+
+    t_s: Array
+    pose: Array
+    kinetic_energy: Array
+    tensions: Array
+    settling: Settling
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +127,7 @@ class Material:
 
     @property
     def playback_speed(self) -> float:
-        """Simulated seconds a second, so that the settling takes a while to watch."""
+        """Simulated seconds per second, so that the settling takes a while to watch."""
         if self.motion is None:
             return 1.0
         speed = float(self.motion.t_s[-1]) / _WATCH_S
@@ -132,7 +152,7 @@ def gather(result: CaseResult) -> Material:
         return Material(result, 0, None)
     lengths = result.mujoco_rest_lengths[watched]
     settler = result.mujoco_robot().settler
-    motion = record_motion(settler, result.case.poses[watched], lengths, max_frames=_FRAMES)
+    motion = record_motion(settler, result.case.poses[watched], lengths)
     return Material(result, watched, motion)
 
 
@@ -148,3 +168,29 @@ def _worth_watching(result: CaseResult) -> int | None:
     change = pose_difference(result.settling.pose, result.case.poses)
     change[:, 3:] *= result.robot.length
     return int(np.argmax(np.where(settled, np.linalg.norm(change, axis=1), -1.0)))
+
+
+def record_motion(
+    settler: Settler, pose: Array, rest_lengths: Array, *, max_frames: int = _FRAMES
+) -> Motion:
+    """Settle from a pose (7,) and keep what happened, the last state always included.
+
+    Args:
+        settler: the robot.
+        pose: (7,) commanded.
+        rest_lengths: (m,) [m].
+        max_frames: frames kept, spread evenly over the steps.
+    """
+    frames: list[tuple[float, Array, float, Array]] = []
+    clock = 0.0
+
+    def observe(physics: Physics) -> None:
+        # Pose, kinetic energy and tensions after a step of MuJoCo are those before it moved on.
+        nonlocal clock
+        frames.append((clock, physics.pose(), physics.kinetic_energy, physics.tensions()))
+        clock += float(physics.model.opt.timestep)
+
+    settling = settler.settle(pose, rest_lengths, observe=observe)
+    kept = np.unique(np.linspace(0, len(frames) - 1, max_frames).round().astype(int))
+    times, poses, kinetic, tensions = zip(*(frames[i] for i in kept), strict=True)
+    return Motion(np.array(times), np.array(poses), np.array(kinetic), np.array(tensions), settling)

@@ -13,7 +13,7 @@ from crosscheck.diagnosis.steps import drawn, magnification, views_of
 from crosscheck.fit.problem import POSITION, Kind, Problem, kinds_read
 from crosscheck.fit.state import State
 from crosscheck.recording import colours, layout
-from crosscheck.recording.states import States
+from crosscheck.recording.shapes import States
 from crosscheck.recording.stream import Recording
 from seecr.pose import Array, quat_from_rxyz, rxyz_from_quat
 

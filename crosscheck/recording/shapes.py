@@ -1,4 +1,4 @@
-"""Where things are in the 3D view: cables that hang or pull, the platform's box, the frame."""
+"""What one physics says the robot does, and where things are then in the 3D view."""
 
 from __future__ import annotations
 
@@ -16,6 +16,28 @@ _DASHES, _DASH_POINTS = 12, 3
 _DEEPEST = 0.35
 # Thickness of what has none, over the platform's largest side.
 _FLAT = 0.12
+
+
+@dataclass(frozen=True, eq=False)
+class States:
+    """Poses and cables at k commands, or at k instants.
+
+    Attributes:
+        pose: (k, 7); rows with NaN are not drawn.
+        tensions: (k, m) [N].
+        rest_lengths: (k, m) [m].
+        slack: (k, m).
+    """
+
+    pose: Array
+    tensions: Array
+    rest_lengths: Array
+    slack: NDArray[np.bool_]
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """Which rows have an answer, (k,)."""
+        return np.asarray(np.isfinite(self.pose).all(axis=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +105,7 @@ def taut_strips(robot: Robot, poses: Array, slack: NDArray[np.bool_]) -> list[Ar
 def slack_strips(
     robot: Robot, poses: Array, slack: NDArray[np.bool_], rest_lengths: Array
 ) -> list[Array]:
-    """Dashes of the cables that hang loose, pose by pose; a fixed number a cable.
+    """Dashes of the cables that hang loose, pose by pose; a fixed number per cable.
 
     A loose cable has no weight in the statics, hence no shape of its own: drawn is the shallow
     parabola of its length, whose sag s over a span d is l0 = d + 8 s^2 / (3 d).

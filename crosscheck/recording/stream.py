@@ -80,6 +80,6 @@ def recording_file(path: str | Path, name: str, blueprint: rrb.Blueprint) -> Ite
 def _application(name: str) -> str:
     """An application of its own for each recording, in letters that Rerun takes as they are.
 
-    The viewer keeps one layout an application, and several recordings may be open together.
+    The viewer keeps one layout per application, and several recordings may be open together.
     """
     return "crosscheck-" + re.sub(r"[^A-Za-z0-9_-]", "-", name)

@@ -25,8 +25,8 @@ from crosscheck.report.drawing import (
     blank,
     dots,
     grid,
+    image,
     styled,
-    svg,
 )
 from seecr.experiment import Prediction
 from seecr.pose import Array
@@ -132,10 +132,10 @@ def paid_out(problem: Problem, prediction: Prediction) -> Array:
     return np.asarray(np.where(first[:, None], np.nan, lengths - before))
 
 
-def draw_wall(wall: Wall, salt: str) -> str:
-    """One row of panels a cable (or reading), one column an abscissa."""
+def draw_wall(wall: Wall) -> str:
+    """One row of panels per cable (or reading), one column per abscissa."""
     rows = _worth_showing(wall)
-    with styled(salt):
+    with styled():
         height = _ROW_HEIGHT * len(rows) + 0.75
         figure = blank(height, constrained=False)
         panels = figure.subplots(
@@ -154,7 +154,7 @@ def draw_wall(wall: Wall, salt: str) -> str:
             axes.set_xlabel(name)
         unit = f" [{wall.unit}]" if wall.unit else ""
         panels[0, 0].set_title(f"{wall.title}{unit}", loc="left", fontsize=8.5)
-        return svg(figure, f"{wall.title} against what they may follow")
+        return image(figure, f"{wall.title} against what they may follow")
 
 
 def _worth_showing(wall: Wall) -> list[int]:
@@ -175,7 +175,7 @@ def _panel(axes: Axes, x: Array, wall: Wall, k: int) -> None:
         dots(axes, x, model, 1.0 if many else 2.0, AFTER, 0.7)
     axes.axhline(0.0, color=INK, linewidth=0.5, zorder=1)
     if many:
-        axes.set_rasterization_zorder(0.8)  # both kinds of dots as one image a panel
+        axes.set_rasterization_zorder(0.8)  # both kinds of dots as one image per panel
     grid(axes, "x")
     axes.margins(x=0.04)
     axes.locator_params(axis="y", nbins=3)

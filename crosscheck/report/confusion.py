@@ -13,7 +13,7 @@ from crosscheck.fit.gauss_newton import Fit
 from crosscheck.fit.imitation import basis, beside, imitated
 from crosscheck.fit.reasons import Why
 from crosscheck.fit.starts import amplitude_columns
-from crosscheck.report.drawing import BEFORE, INK, WIDTH, blank, styled, svg
+from crosscheck.report.drawing import BEFORE, INK, WIDTH, blank, image, styled
 from seecr.effects.base import Layout
 from seecr.pose import Array
 
@@ -115,7 +115,7 @@ def draw_confusion(confusion: Confusion) -> str:
     names, part = confusion.names, confusion.part
     k = len(names)
     side = min(0.5, 7.2 / k)
-    with styled("confusion"):
+    with styled():
         figure = blank(side * k + 1.75, min(WIDTH, side * k + 3.4))
         axes = figure.subplots()
         axes.imshow(part, cmap="Blues", vmin=0.0, vmax=1.25, aspect="equal")
@@ -143,7 +143,7 @@ def draw_confusion(confusion: Confusion) -> str:
         axes.tick_params(length=0)
         for spine in axes.spines.values():
             spine.set_visible(False)
-        return svg(figure, "What part of each effect another could imitate")
+        return image(figure, "What part of each effect another could imitate")
 
 
 def _words(part: float, count: int) -> str:

@@ -1,10 +1,10 @@
-"""How figures are drawn and put into the page: SVG with text as text, in one set of colours."""
+"""How figures are drawn and put into the page: SVG images, in one set of colours."""
 
 from __future__ import annotations
 
+import base64
 import html
 import io
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -29,8 +29,11 @@ WIDTH = 10.4
 MANY = 400
 """More marks than this are drawn as an image: the page is to stay small."""
 
-_STYLE: dict[str, Any] = {
+_STYLE: Any = {
     "svg.fonttype": "none",
+    "svg.hashsalt": "crosscheck",  # the same figure has the same text
+    # text is measured in the first and shown in whatever of these the reader has
+    "font.sans-serif": ["DejaVu Sans", "Segoe UI", "Helvetica Neue", "Arial", "sans-serif"],
     "text.parse_math": False,  # names of cables and runs are a user's
     "font.size": 8.5,
     "axes.titlesize": 9.0,
@@ -58,10 +61,9 @@ _STYLE: dict[str, Any] = {
 
 
 @contextmanager
-def styled(salt: str) -> Iterator[None]:
-    """The style of all figures; ``salt`` keeps the names inside one apart from the others'."""
-    style: Any = {**_STYLE, "svg.hashsalt": salt}
-    with matplotlib.rc_context(style):
+def styled() -> Iterator[None]:
+    """The style of all figures."""
+    with matplotlib.rc_context(_STYLE):
         yield
 
 
@@ -82,32 +84,19 @@ def grid(axes: Axes, axis: str = "both") -> None:
     axes.grid(True, axis=axis, color=FAINT, linewidth=0.7)  # type: ignore[arg-type]
 
 
-def svg(figure: Figure, words: str) -> str:
-    """The figure as an element of the page.
+def image(figure: Figure, words: str) -> str:
+    """The figure as an element of the page, with nothing outside of it.
 
     Args:
         figure: drawn.
         words: what it shows, for those who cannot see it.
     """
-    buffer = io.StringIO()
+    buffer = io.BytesIO()
     nothing = dict.fromkeys(("Date", "Creator", "Format", "Type"))
     figure.savefig(buffer, format="svg", metadata=nothing)
-    text = buffer.getvalue()
-    text = text[text.index("<svg") :]
-    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
-    # in a page no namespaces are declared, and a style sheet inside would be the whole page's
-    text = re.sub(r'\sxmlns(:\w+)?="[^"]*"', "", text)
-    text = re.sub(r"<style[^>]*>.*?</style>", "", text, flags=re.DOTALL)
-    text = re.sub(r"<!--.*?-->\n?", "", text, flags=re.DOTALL)
-    head = f'<svg role="img" aria-label="{html.escape(words, quote=True)}"'
-    text = re.sub(r'<svg width="[^"]*" height="[^"]*"', lambda _m: head, text, count=1)
-    return re.sub(r'\s(?:d|x|y)="[^"]*"', _rounded, text).strip()
-
-
-def _rounded(found: re.Match[str]) -> str:
-    """Coordinates to a hundredth of a point, which is finer than any screen."""
-    short = re.sub(r"(\d+\.\d\d)\d+", r"\1", found.group())
-    return re.sub(r"\s*\n", "", short)
+    text = base64.b64encode(buffer.getvalue()).decode("ascii")
+    alt = html.escape(words, quote=True)
+    return f'<img alt="{alt}" src="data:image/svg+xml;base64,{text}">'
 
 
 def dots(axes: Axes, x: Array, y: Array, size: float, colour: str, order: float) -> None:

@@ -85,7 +85,7 @@ def _of_search(found: Diagnosis) -> dict[str, Any]:
         "map": failure_map(problem, before, after),
         "confusion": draw_confusion(confusion) if confusion is not None else "",
     }
-    walls = [draw_wall(w, f"wall{k}") for k, w in enumerate(walls_of(problem, before, last))]
+    walls = [draw_wall(wall) for wall in walls_of(problem, before, last)]
     return {
         "title": f"{problem.robot.name} · {problem.data.path.name}",
         "facts": facts(problem),

@@ -17,9 +17,9 @@ from crosscheck.report.drawing import (
     UNSURE,
     blank,
     grid,
+    image,
     plain_log,
     styled,
-    svg,
 )
 from crosscheck.units import short
 
@@ -32,18 +32,18 @@ _ABOVE = 1.15
 
 
 def waterfall(found: Diagnosis) -> str:
-    """One row a model, one panel a kind of reading."""
+    """One row per model, one panel per kind of reading."""
     stages = stages_of(found)
     assert found.search is not None
     kinds = kinds_read(found.search.problem)
-    with styled("waterfall"):
+    with styled():
         figure = blank(0.42 * len(stages) + 1.05)
         panels = figure.subplots(1, len(kinds), sharey=True, squeeze=False)[0]
         for axes, kind in zip(panels, kinds, strict=True):
             _panel(axes, found, stages, kind)
         panels[0].set_yticks(range(len(stages)), [_label(stage, found) for stage in stages])
         panels[0].set_ylim(len(stages) - 0.45, -0.75)
-        return svg(figure, "Errors on runs left out, model by model, against the noise")
+        return image(figure, "Errors on runs left out, model by model, against the noise")
 
 
 def _label(stage: Stage, found: Diagnosis) -> str:
@@ -117,7 +117,7 @@ def _bar(axes: Axes, row: int, stage: Stage, value: float, left: float) -> None:
 
 
 def _runs(axes: Axes, row: int, runs: np.ndarray) -> None:
-    """The range over the runs left out, and a tick a run."""
+    """The range over the runs left out, and one tick per run."""
     runs = runs[np.isfinite(runs)]
     if len(runs) < 2:
         return

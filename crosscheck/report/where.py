@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from crosscheck.diagnosis.steps import Stage, drawn, magnification, views_of
 from crosscheck.fit.problem import POSITION, Kind, Problem, kinds_read
-from crosscheck.report.drawing import GREY, INK, MANY, blank, grid, styled, svg
+from crosscheck.report.drawing import GREY, INK, MANY, blank, grid, image, styled
 from seecr.pose import Array
 
 # Colours end at this percentile of the errors.
@@ -31,7 +31,7 @@ def failure_map(problem: Problem, before: Stage, after: Stage) -> str:
     stages = [before] if after is before else [before, after]
     # a model alone has its views side by side, two have them one below the other
     across = len(views) if len(stages) == 1 else len(stages)
-    with styled("where"):
+    with styled():
         heights = [_height(place[problem.use], view, across) for view in views]
         rows = [max(heights)] if len(stages) == 1 else heights
         figure = blank(sum(rows) + 0.62 * len(rows) + 0.35)
@@ -40,7 +40,7 @@ def failure_map(problem: Problem, before: Stage, after: Stage) -> str:
         )
         columns = panels.T if len(stages) == 1 else panels
         _draw(figure, columns, problem, stages, place, views)
-        return svg(figure, "Where the model fails, before and after")
+        return image(figure, "Where the model fails, before and after")
 
 
 def _height(place: Array, view: tuple[int, int], columns: int) -> float:

@@ -81,19 +81,22 @@ def test_a_unit_of_another_kind_is_refused() -> None:
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [
-        (None, "–"), (math.nan, "–"), (0.0, "0"), (-0.012345, "−0.0123"), (1234.5, "1234"),
-        (1.5e-7, "1.50e−7"), (12345678.0, "1.23e7"),
-    ],
+    [(0.0, "0"), (0.0296, "0.0296"), (-4.274, "−4.27"), (123456.0, "123456"),
+     (1.234e-7, "1.23e−7"), (9.9e9, "9.90e9"), (np.nan, "–"), (None, "–")],
 )  # fmt: skip
 def test_short_numbers(value: float | None, text: str) -> None:
     assert short(value) == text
 
 
-def test_no_more_digits_than_are_known() -> None:
-    assert with_error(0.0123456, 0.00012) == ("0.01235", "0.00012")
-    assert with_error(1.5, math.inf) == ("1.50", "not seen")
-    assert with_error(-2.0, 0.0) == ("−2.00000", "0")
+@pytest.mark.parametrize(
+    ("value", "error", "texts"),
+    [(10.00238, 0.005576, ("10.0024", "0.0056")), (1.3988, np.inf, ("1.40", "not seen")),
+     (-1437.0, 210.0, ("−1437", "210")), (1.5, 0.0, ("1.50000", "0"))],
+)  # fmt: skip
+def test_values_show_two_digits_of_their_error(
+    value: float, error: float, texts: tuple[str, str]
+) -> None:
+    assert with_error(value, error) == texts
 
 
 def test_names_and_chances() -> None:

@@ -13,7 +13,7 @@ import pytest
 from recordings import Readback, headless_viewer
 
 from crosscheck.comparison.residuals import Comparison, compare
-from crosscheck.diagnosis.result import Diagnosis
+from crosscheck.diagnosis.result import Diagnosis, DiagnosisVerdict
 from crosscheck.diagnosis.steps import Stage, stages_of
 from crosscheck.fit.problem import KINDS, POSITION
 from crosscheck.recording import write_comparison_recording, write_diagnosis_recording
@@ -181,7 +181,9 @@ def test_unknown_is_said_and_drawn(tmp_path: Path) -> None:
 
 def test_what_is_not_sure_is_said_so(found: Diagnosis, tmp_path: Path) -> None:
     path = tmp_path / "unsure.rrd"
-    write_diagnosis_recording(replace(found, missing=(), verdict="unknown_effect"), path)
+    write_diagnosis_recording(
+        replace(found, missing=(), verdict=DiagnosisVerdict.UNKNOWN_EFFECT), path
+    )
     assert "not sure" in _steps(Readback(path))[1]
 
 

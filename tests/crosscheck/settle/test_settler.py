@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.recording.motion import record_motion
+from crosscheck.recording.material import record_motion
 from crosscheck.settle import polish, relax
 from crosscheck.settle import settler as settle
 from crosscheck.settle.physics import Physics
