@@ -1,8 +1,8 @@
-"""Write the table of built-in effects into docs/effects.md, from the effects themselves.
+"""Write the tables of docs/effects.md from the sources: effects, and what they can edit.
 
     python scripts/make_effects.py
 
-A test runs :func:`with_table` and goes red where the table is out of date.
+A test runs :func:`with_tables` and goes red where a table is out of date.
 """
 
 from __future__ import annotations
@@ -15,13 +15,27 @@ from pathlib import Path
 import numpy as np
 
 from seecr.effects import BUILT_IN, PLACES, Effect
+from seecr.setup import QUANTITIES, History
 
-BEGIN, END = "<!-- effects: begin -->", "<!-- effects: end -->"
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "effects.md"
 _SIZES = {"one": "", "cable": ", one per cable", "vector": ", x y z", "point": ", x y z per cable"}
 
 
-def table() -> str:
+def quantities() -> str:
+    """One Markdown table: what each quantity of a setup is, its shape and its plain value."""
+    lines = ["| quantity | shape | unit | plain | what it is |", "|---|---|---|---|---|"]
+    for name, item in QUANTITIES.items():
+        shape = ", ".join({"rows": "n", "cables": "m"}.get(str(s), str(s)) for s in item.shape)
+        plain = f"the robot's `{item.plain}`" if isinstance(item.plain, str) else f"{item.plain:g}"
+        history = "" if item.history is History.NONE else f"; history: {item.history.value}"
+        lines.append(
+            f"| `{name}` | {f'({shape})' if shape else 'one'} | {item.unit} | {plain} | "
+            f"{item.what}{history} |"
+        )
+    return "\n".join([*lines, ""])
+
+
+def effects() -> str:
     """One Markdown table per place: name, parameters, and the effect's own docstring."""
     lines = []
     for place in PLACES:
@@ -33,11 +47,13 @@ def table() -> str:
     return "\n".join(lines)
 
 
-def with_table(page: str) -> str:
-    """The page with a fresh table between its marks."""
-    before, rest = page.split(BEGIN)
-    after = rest.split(END)[1]
-    return f"{before}{BEGIN}\n\n{table()}\n{END}{after}"
+def with_tables(page: str) -> str:
+    """The page with fresh tables between their marks."""
+    for name, table in (("quantities", quantities()), ("effects", effects())):
+        begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
+        before, rest = page.split(begin)
+        page = f"{before}{begin}\n\n{table}\n{end}{rest.split(end)[1]}"
+    return page
 
 
 def _parameters(effect: type[Effect]) -> str:
@@ -63,7 +79,7 @@ def _words(effect: type[Effect]) -> str:
 
 
 if __name__ == "__main__":
-    fresh = with_table(PAGE.read_text(encoding="utf-8"))
+    fresh = with_tables(PAGE.read_text(encoding="utf-8"))
     part = PAGE.with_suffix(".md.part")
     part.write_text(fresh, encoding="utf-8")
     part.replace(PAGE)

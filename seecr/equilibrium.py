@@ -45,8 +45,8 @@ def solve(
         wrench: (6,) or (n, 6) external force [N] at the platform origin and moment [N m].
         gravity: (3,) [m/s^2] instead of the robot's.
         start: (n, 7) poses to start from instead of the commanded ones.
-        max_iterations: most evaluations of the wrench, a pose and stage of stiffness.
-        threads: by default one a processor.
+        max_iterations: most evaluations of the wrench, per pose and stage of stiffness.
+        threads: one per processor by default.
 
     Returns:
         a :class:`Solution`; look at ``status`` or ``converged`` before using a pose.

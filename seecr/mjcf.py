@@ -37,7 +37,7 @@ def load_robot(path: str | Path) -> Robot:
     cables = [_read_cable(model, body, i, path) for i in range(model.ntendon)]
     if not cables:
         raise RobotError(
-            f"{path}: no cables; expected one <spatial> tendon a cable through two sites"
+            f"{path}: no cables; expected one <spatial> tendon per cable, through two sites"
         )
     exit_points, anchor_points, ea, rest_lengths, names = zip(*cables, strict=True)
     reference_pose = np.concatenate([model.body_pos[body], model.body_quat[body]])
@@ -69,10 +69,24 @@ def _compile(path: Path) -> mujoco.MjModel:
     import mujoco
 
     try:
-        return mujoco.MjModel.from_xml_path(str(path))
+        model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
         reason = " ".join(str(error).split())
         raise RobotError(f"{path}: MuJoCo cannot read this as MJCF: {reason}") from None
+    _check_names(model, path)
+    return model
+
+
+def _check_names(model: mujoco.MjModel, path: Path) -> None:
+    """That every name is text: MuJoCo keeps bytes, and reads names from them only when asked."""
+    for name in model.names.split(b"\0"):
+        try:
+            name.decode("utf-8")
+        except UnicodeDecodeError:
+            raise RobotError(
+                f"{path}: the name {name.decode('utf-8', 'replace')!r} is not UTF-8; expected a "
+                "file in UTF-8: save it again as that"
+            ) from None
 
 
 def _model_name(model: mujoco.MjModel, path: Path) -> str:

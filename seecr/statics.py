@@ -33,7 +33,7 @@ from seecr.threads import in_parts, run_parts
 
 @dataclass(eq=False)
 class Evaluation:
-    """What the loop fills: one row a pose."""
+    """What the loop fills: one row per pose."""
 
     outcome: NDArray[np.int64]
     count: NDArray[np.int64]

@@ -11,6 +11,7 @@ import pytest
 
 from seecr import __version__
 from seecr.effects import BUILT_IN
+from seecr.setup import QUANTITIES
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), ROOT / "models" / "README.md"]
@@ -35,8 +36,9 @@ def test_links_lead_somewhere(page: Path) -> None:
 
 def test_the_page_about_effects_is_current() -> None:
     page = make_effects.PAGE.read_text(encoding="utf-8")
-    assert make_effects.with_table(page) == page, AGAIN
+    assert make_effects.with_tables(page) == page, AGAIN
     assert all(f"| `{effect.name}` |" in page for effect in BUILT_IN)
+    assert all(f"| `{name}` |" in page for name in QUANTITIES)
 
 
 def test_the_picture_of_the_floors_is_current() -> None:

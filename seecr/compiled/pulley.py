@@ -17,7 +17,7 @@ def pulley_geometry(across, rise, radius):
     In the pulley's own vertical plane, seen from the exit point A: the anchor is ``across``
     [m] away horizontally and ``rise`` [m] above (negative: below). The cable enters at A from
     below, runs over the top, and leaves along the tangent at the angle psi, measured at the
-    centre from the horizontal direction upwards (contracts: pulley).
+    centre from the horizontal direction upwards.
 
     Returns:
         total length (arc and free part), free length, and the direction from the pulley to the

@@ -1,8 +1,8 @@
-"""What an effect is: a few numbers, and one verb that brings them into the model.
+"""What an effect is: a few numbers, and one method that brings them into the model.
 
 An effect is a small frozen dataclass. Its fields are its parameters, made with
-:func:`parameter`; at their null values the effect is absent, exactly. It overrides one (or
-more) of three verbs:
+:func:`parameter`; at their null values the effect is absent, exactly. It overrides one of two
+methods, or both:
 
 - ``edit_setup`` changes numbers the statics uses: lengths, points, masses ... (see
   :class:`seecr.setup.Setup`, whose ``laws`` also take a cable's extra tension by its strain);
@@ -63,13 +63,13 @@ def parameter(
     """A field of an effect.
 
     Args:
-        unit: as in the contract's suffixes, "" for none.
+        unit: as in the suffixes of CSV columns, such as "m" or "rad"; "" for none.
         scale: plausible size, one standard deviation from tolerances or data sheets; a number
             or a function of the robot.
         null: value at which the effect is absent.
         bounds: lowest and highest value, numbers or functions of the robot.
-        size: "one" number, one a "cable", a "vector" of 3, or a "point" (3 a cable); what a
-            cable has of its own acts on that cable alone.
+        size: "one" number, one per "cable", a "vector" of 3, or a "point" (3 per cable); what
+            a cable has of its own acts on that cable alone.
         shape: the number only shapes the effect (a time constant, a period): it means nothing
             while the others are null, and the effect says with ``shapes`` where to look.
     """

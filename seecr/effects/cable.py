@@ -109,7 +109,7 @@ class WinchSideLength(Effect):
 class CableWeight(Effect):
     """Cables have a weight per metre and sag: an elastic catenary between A_i and B_i.
 
-    With H, V the pulls at the anchor point and w the weight a metre, the span is
+    With H, V the pulls at the anchor point and w the weight per metre, the span is
     x = H (asinh((V + w L)/H) - asinh(V/H))/w + H L/(E S) and likewise the rise (Irvine, Cable
     Structures, 1981, section 1.2). The tension reported is that at the exit point.
     """

@@ -26,7 +26,7 @@ class FrameCompliance(Effect):
     title: ClassVar[str] = "a frame that yields under load"
     advice: ClassVar[str] = (
         "pull an exit point with a spring balance beside a dial gauge: expect {compliance:.4g} mm "
-        "a newton"
+        "per newton"
     )
 
     compliance: float = parameter(

@@ -166,7 +166,7 @@ def test_a_curved_law_is_met_at_its_strain() -> None:
             assert found.state[STRAIN] == pytest.approx(strain, rel=1e-9)
 
 
-# --- pulley (contracts: a swivelling pulley) ---------------------------------------------------
+# --- pulley -------------------------------------------------------------------------------------
 
 
 def brute_pulley(across: float, rise: float, r: float) -> tuple[float, np.ndarray]:

@@ -33,8 +33,8 @@ from seecr.errors import InputError
 from seecr.robot import Robot
 from seecr.sensitivity import sensitivities
 
-# the contract's table of effects
-CONTRACT = {
+# what users' model files and other people's scripts name
+PROMISED = {
     "actuation": "cable_length_offset initial_pose_error drum_gain drum_eccentricity backlash "
     "thermal_expansion",
     "geometry": "pulley_radius exit_point_error anchor_point_error",
@@ -44,7 +44,7 @@ CONTRACT = {
     "load": "platform_mass centre_of_mass external_wrench gravity_tilt",
     "sensing": "tracker_frame tracker_target tracker_scale tension_scale",
 }
-NAMES = [name for names in CONTRACT.values() for name in names.split()]
+NAMES = [name for names in PROMISED.values() for name in names.split()]
 UNITS = {"", "m", "rad", "N", "Nm", "s", "C", "kg", "1_per_K", "N_per_m", "m_per_N"}
 
 
@@ -55,8 +55,8 @@ def layouts(robot: Robot) -> list[Layout]:
 # --- what there is, and how it is described ------------------------------------------------------
 
 
-def test_the_contracts_effects_are_there_in_their_places() -> None:
-    places = {place: sorted(names.split()) for place, names in CONTRACT.items()}
+def test_the_promised_effects_are_there_in_their_places() -> None:
+    places = {place: sorted(names.split()) for place, names in PROMISED.items()}
     found: dict[str, list[str]] = {place: [] for place in PLACES}
     for effect in BUILT_IN:
         found[effect.place].append(effect.name)
@@ -215,7 +215,7 @@ SHAPES = ("free", "planar", "jointed")
 def test_the_order_of_effects_on_the_robot_does_not_matter(seed: int) -> None:
     experiment = experiment_of("demobot_cogiro", seed=seed)
     rng = np.random.default_rng(seed)
-    robot_side = [n for n in NAMES if n not in CONTRACT["sensing"].split()]
+    robot_side = [n for n in NAMES if n not in PROMISED["sensing"].split()]
     names = rng.permutation(robot_side)[:3]
     effects = [random_effect(experiment, name, seed) for name in names]
     first = moved(experiment, effects)

@@ -125,7 +125,7 @@ def brute_force_pulley(across: float, rise: float, r: float) -> tuple[float, flo
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_the_pulley_is_the_contracts(seed: int) -> None:
+def test_the_pulley_is_the_one_described(seed: int) -> None:
     rng = np.random.default_rng(seed)
     r, across, rise = rng.uniform(0.01, 0.2), rng.uniform(0.5, 2.0), rng.uniform(-2.0, 0.3)
     length, psi = brute_force_pulley(across, rise, r)

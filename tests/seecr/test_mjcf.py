@@ -235,7 +235,7 @@ CURVED = 'stiffness="200 30"'
             "has an actuator; expected passive cables and one platform only",
         ),
         ({"rest": '<equality><weld body1="platform"/></equality>'}, "has an equality constraint"),
-        ({"tendons": ""}, "no cables; expected one <spatial> tendon a cable through two sites"),
+        ({"tendons": ""}, "no cables; expected one <spatial> tendon per cable, through two sites"),
         (
             changed("0 1.1", "1.1"),
             'tendon left has springlength "1.1 1.1"; expected two values, "0 l0" with the rest len',
@@ -271,6 +271,15 @@ CURVED = 'stiffness="200 30"'
 )
 def test_files_that_are_no_cable_robot(parts: dict[str, str], text: str, tmp_path: Path) -> None:
     assert refusal(mjcf(tmp_path, **parts)).startswith(text)
+
+
+@pytest.mark.parametrize("old", ["left", "platform", "two ropes"])
+def test_a_name_that_is_not_utf_8_is_told_with_the_file(old: str, tmp_path: Path) -> None:
+    """From an editor that saves in Latin-1: MuJoCo takes the bytes as they are."""
+    path = mjcf(tmp_path)
+    text = path.read_bytes().replace(f'name="{old}"'.encode(), b'name="c\xe2ble"')
+    path.write_bytes(text.replace(f'model="{old}"'.encode(), b'model="c\xe2ble"'))
+    assert refusal(path).startswith("the name 'c\ufffdble' is not UTF-8; expected a file in UTF-8")
 
 
 def test_gravity_switched_off_in_the_file_is_off(tmp_path: Path) -> None:
