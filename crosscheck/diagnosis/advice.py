@@ -11,10 +11,16 @@ from crosscheck.comparison.associations import Against, Association
 from crosscheck.diagnosis.result import DiagnosisVerdict, MissingEffect
 from crosscheck.diagnosis.rivals import Rival
 from crosscheck.diagnosis.search import Search
-from crosscheck.planning.separation import measured_directly, proposals
+from crosscheck.planning.extensions import Extension, extensions
+from crosscheck.planning.planned import Planned, Reads
+from crosscheck.planning.proposer import Suggestion, telling_apart
 from crosscheck.units import in_unit, parameter_name
-from seecr.effects import Term
+from seecr.effects import Term, catalogue
+from seecr.pose import Array, rotvec_from_quat
 from seecr.robot import Robot
+
+# Ways to tell two effects apart that are named.
+_MOST_WAYS = 2
 
 
 def check_of(term: Term, robot: Robot) -> str:
@@ -46,9 +52,11 @@ def measure_next(
 ) -> list[str]:
     """What to measure to tell apart, confirm or find, a sentence each."""
     out = []
+    plan = Planned(found.problem, found.last.fit, found.factor, Reads.of(found.problem.data))
+    options = list(extensions(plan)) if any(effect.rivals for effect in missing) else []
     for effect in missing:
         for rival in effect.rivals:
-            out += _to_separate(found, effect, rival)
+            out += _to_separate(plan, options, effect, rival)
         if not effect.rivals:
             out.append(f"to confirm {effect.effect}: {effect.check}")
     if verdict is DiagnosisVerdict.UNKNOWN_EFFECT:
@@ -58,23 +66,43 @@ def measure_next(
     return list(dict.fromkeys(out))
 
 
-def _to_separate(found: Search, effect: MissingEffect, rival: Rival) -> list[str]:
-    robot = found.problem.robot
-    names = f"{effect.effect} and {rival.name}"
-    direct = list(dict.fromkeys(measured_directly(n, robot) for n in (effect.effect, rival.name)))
-    ways = [
-        f"{p.words} (signal that separates them: now {p.now:.2g}, then {p.then:.2g}, needs 15)"
-        for p in proposals(found.problem, found.last.fit, effect.effect, rival.layout)
-        if p.separates
-    ]
-    if ways:
-        return [f"to tell {names} apart: {direct[-1]}, or {ways[0]}"] + [
-            f"to tell {names} apart: {way}" for way in ways[1:2]
+def measured_directly(effect: str) -> str:
+    """How to settle an effect without the robot's poses, in a few words."""
+    return catalogue()[effect].advice.split(":")[0]
+
+
+def _to_separate(
+    plan: Planned, options: Sequence[Extension], effect: MissingEffect, rival: Rival
+) -> list[str]:
+    start = f"to tell {effect.effect} and {rival.name} apart:"
+    direct = list(dict.fromkeys(measured_directly(n) for n in (effect.effect, rival.name)))
+    ways = telling_apart(plan, options, effect.effect, rival.layout)[:_MOST_WAYS]
+    if not ways:
+        return [
+            f"{start} {' or '.join(direct)}; no further pose, payload or tension that was tried "
+            "here separates them"
         ]
-    return [
-        f"to tell {names} apart: {' or '.join(direct)}; no further pose, payload or tension that "
-        "was tried here separates them"
-    ]
+    first, *others = (_words_of(way) for way in ways)
+    return [f"{start} {direct[-1]}, or {first}", *(f"{start} {way}" for way in others)]
+
+
+def _words_of(way: Suggestion) -> str:
+    gain = way.gains[0]
+    words = way.words
+    if way.poses is not None:
+        places = ", ".join(_place(pose) for pose in way.poses)
+        words = f"add poses at {places}"
+    return (
+        f"{words} (signal that separates them: now {gain.now:.2g}, then {gain.then:.2g}, needs "
+        f"{gain.needed:g})"
+    )
+
+
+def _place(pose: Array) -> str:
+    x, y, z = pose[:3]
+    turn = np.degrees(rotvec_from_quat(pose[3:]))
+    turned = f" turned by ({turn[0]:.3g} {turn[1]:.3g} {turn[2]:.3g}) deg"
+    return f"({x:.3g} {y:.3g} {z:.3g}) m" + (turned if np.any(np.abs(turn) > 0.05) else "")
 
 
 _PLACE = (

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from crosscheck.fit.imitation import imitated
 from crosscheck.fit.prepare import Progress
 from crosscheck.fit.reasons import Reason
 from crosscheck.measurements.data import Measurements, Sigma
-from crosscheck.planning.extensions import Extension, extensions, more_poses
-from crosscheck.planning.greedy import chosen_poses
-from crosscheck.planning.planned import Planned, expected_sigma, near_slack, planned
+from crosscheck.planning.extensions import extensions
+from crosscheck.planning.greedy import Wanted
+from crosscheck.planning.planned import Planned, Reads, expected_sigma, near_slack, planned
+from crosscheck.planning.proposer import Suggestion, propose
 from crosscheck.planning.visibility import (
     EXACT,
-    LEVEL,
-    POWER,
     Signal,
-    joined,
     left_over,
     needed,
     signals,
@@ -26,11 +25,6 @@ from crosscheck.planning.visibility import (
 )
 from seecr.pose import Array
 from seecr.robot import Robot
-
-# Poses added at most.
-MORE_POSES = 6
-# Repeating everything doubles each signal: a suggestion must do more than that.
-_GAINS = 2.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,43 +67,6 @@ class Visible:
         own = np.any(self.signal.columns != 0.0, axis=0)
         own = own if own.any() else ~layout.shape
         return {k: factor * float(layout.scale[i]) for i, k in enumerate(layout.names) if own[i]}
-
-
-@dataclass(frozen=True, eq=False)
-class Gain:
-    """What an added measurement would show or tell apart.
-
-    Attributes:
-        effect: that gains. other: what it is told from; "" where it becomes visible.
-        now, then: squared signal. needed: for a test to find it.
-    """
-
-    effect: str
-    other: str
-    now: float
-    then: float
-    needed: float
-
-
-@dataclass(frozen=True, eq=False)
-class Suggestion:
-    """Something to add to the plan.
-
-    Attributes:
-        kind: as in :class:`crosscheck.planning.extensions.Extension`. words: what to do.
-        gains: what crosses what is needed, then what only comes nearer.
-        poses: (k, 7) to add, for poses.
-    """
-
-    kind: str
-    words: str
-    gains: tuple[Gain, ...]
-    poses: Array | None = None
-
-    @property
-    def reached(self) -> tuple[Gain, ...]:
-        """Those that a test finds then."""
-        return tuple(g for g in self.gains if g.then >= g.needed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,15 +113,19 @@ def make_plan(
         progress: called with what is being done and the part of it that is done.
     """
     full, assumed = expected_sigma(robot, sigma or commands.sigma)
-    kinds = ("pose", "tension") if full.tension_N is not None else ("pose",)
-    plan = planned(robot, commands, full, kinds)
+    reads = Reads.whole(robot.n_cables, tensions=full.tension_N is not None)
+    plan = planned(robot, commands, full, reads)
     notes = [*commands.notes, *assumed, *_unsolved(plan)]
     if not plan.problem.use.any():
         return Plan(plan, (), {}, ((), np.zeros((0, 0))), (), (), tuple(notes))
     progress("sensitivities", 0.1)
     own, missing = signals(plan)
     effects = _all_visible(own)
-    suggestions = _suggest(plan, own, effects, kinds, progress)
+    progress("what could be added", 0.4)
+    suggestions = propose(
+        list(extensions(plan)), own, _wanted(own, effects), lambda there: signals_like(there, own),
+        lambda text, part: progress(text, 0.5 + 0.5 * part),
+    )  # fmt: skip
     names = robot.cable_names
     return Plan(
         planned=plan,
@@ -219,92 +180,20 @@ def _confusion(own: Mapping[str, Signal]) -> tuple[tuple[str, ...], Array]:
     for i, a in enumerate(names):
         for j, b in enumerate(names):
             if i != j:
-                power = own[a].power
-                table[i, j] = 1.0 - left_over(own[a], own[b]) / power if power > 0 else 0.0
+                table[i, j] = imitated(own[a].columns, own[b].basis)
     return names, table
 
 
-def _suggest(
-    plan: Planned,
-    own: Mapping[str, Signal],
-    effects: Mapping[str, Visible],
-    kinds: Sequence[str],
-    progress: Progress,
-) -> tuple[Suggestion, ...]:
-    """What to add, each tried by itself."""
-    open_pairs = _open_pairs(own, effects)
-    out = []
-    options: list[Extension] = list(extensions(plan, kinds))
-    progress("more poses", 0.4)
-    grid = more_poses(plan, kinds)
-    for k, option in enumerate(options):
-        progress(option.words, 0.5 + 0.4 * k / len(options))
-        if option.plan.problem.use.any():
-            there = signals_like(option.plan, own)
-            out.append(_suggestion(option, own, there, open_pairs))
-    if grid is not None and grid.plan.problem.use.any():
-        progress("choosing poses", 0.9)
-        out.append(_poses(grid, own, effects, open_pairs))
-    useful = [s for s in out if s.gains]
-    return tuple(sorted(useful, key=lambda s: (-len(s.reached), -len(s.gains))))
-
-
-def _open_pairs(
-    own: Mapping[str, Signal], effects: Mapping[str, Visible]
-) -> list[tuple[str, str, float, float]]:
-    """(effect, other, signal now, needed) of what these poses do not show or tell apart.
+def _wanted(own: Mapping[str, Signal], effects: Mapping[str, Visible]) -> list[Wanted]:
+    """What these poses do not show or tell apart.
 
     Exact twins count: poses never part them, but a payload or a sensor may.
     """
     out = []
     for name, v in effects.items():
         if not v.visible:
-            out.append((name, "", own[name].power, v.needed))
+            out.append(Wanted(name, "", own[name].power, v.needed))
             continue
-        out += [(name, other, value, v.needed) for other, value in v.confused]
-        out += [(name, twin, 0.0, v.needed) for twin in v.twins]
+        out += [Wanted(name, other, value, v.needed) for other, value in v.confused]
+        out += [Wanted(name, twin, 0.0, v.needed) for twin in v.twins]
     return out
-
-
-def _suggestion(
-    option: Extension,
-    own: Mapping[str, Signal],
-    there: Mapping[str, Signal],
-    open_pairs: Sequence[tuple[str, str, float, float]],
-    poses: Array | None = None,
-) -> Suggestion:
-    both = joined(own, there)
-    gains = []
-    for name, other, now, need in open_pairs:
-        g = both[name]
-        then = left_over(g, both[other]) if other else g.power
-        if then > _GAINS * now and then > 0.1 * need:
-            gains.append(Gain(name, other, now, then, need))
-    gains.sort(key=lambda gain: (gain.then < gain.needed, -gain.then / gain.needed))
-    return Suggestion(option.kind, option.words, tuple(gains), poses)
-
-
-def _poses(
-    grid: Extension,
-    own: Mapping[str, Signal],
-    effects: Mapping[str, Visible],
-    open_pairs: Sequence[tuple[str, str, float, float]],
-) -> Suggestion:
-    """The few poses that do most."""
-    there = signals_like(grid.plan, own)
-    problem = grid.plan.problem
-    # twins stay twins at any pose
-    pairs = [p for p in open_pairs if not p[1] or p[1] not in effects[p[0]].twins]
-    rows = chosen_poses(own, there, problem.row_of, pairs, MORE_POSES)
-    if not rows:
-        return Suggestion("poses", "", ())
-    some = np.isin(problem.row_of, rows)
-    few = {n: Signal(s.layout, s.shape, s.columns[some]) for n, s in there.items()}
-    assert grid.poses is not None
-    poses = grid.poses[rows]
-    count = f"{len(rows)} poses" if len(rows) > 1 else "one pose"
-    option = Extension("poses", f"add the {count} listed below", grid.plan)
-    return _suggestion(option, own, few, pairs, poses)
-
-
-__all__ = ["LEVEL", "POWER", "Plan", "Suggestion", "Visible", "make_plan"]

@@ -2,22 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from enum import StrEnum
 
 import numpy as np
 
 from crosscheck.fit.candidates import null_fit
 from crosscheck.fit.problem import Problem
-from crosscheck.measurements.data import Measurements
-from crosscheck.planning.planned import LOAD_CELL, Planned, near_slack, planned
-from seecr.effects import Terms
+from crosscheck.measurements.data import Measurements, Sigma
+from crosscheck.planning.planned import (
+    LOAD_CELL,
+    Planned,
+    Reads,
+    expected_sigma,
+    near_slack,
+    planned,
+)
 from seecr.joints import pose_of_values, values_of_pose
 from seecr.pose import Array, quat_from_rotvec, quat_multiply
 from seecr.robot import Robot
 from seecr.workspace import feasible
 
+# A known load, over the platform's mass.
 PAYLOAD = 0.25
+# No load cell is better than this [N].
+_LEAST_CELL = 1e-9
 # Candidate poses: steps along x, y, z, and how far out of the planned region they go.
 _GRID, _BEYOND = (4, 3, 3), 0.25
 _TILT_RAD = np.radians(10.0)
@@ -30,56 +40,99 @@ _SOFT = 0.05
 _AN_HOUR = 3600.0
 
 
+class Adding(StrEnum):
+    """What can be added to measurements, in the words of ``plan.json``."""
+
+    TENSIONS = "tensions"
+    POSE = "pose"
+    PAYLOAD = "payload"
+    WAY_BACK = "way_back"
+    LATER = "later"
+    POSES = "poses"
+
+
 @dataclass(frozen=True, eq=False)
 class Extension:
     """Readings that could be added.
 
     Attributes:
-        kind: "tensions", "payload", "way_back", "later" or "poses".
-        words: what to do. plan: the added readings.
+        kind: what is added. words: what to do. plan: the added readings.
         poses: (k, 7) commanded, for added poses.
     """
 
-    kind: str
+    kind: Adding
     words: str
     plan: Planned
     poses: Array | None = None
 
 
-def extensions(plan: Planned, kinds: Sequence[str]) -> Iterator[Extension]:
-    """All that can be added but poses, one after the other.
+def extensions(plan: Planned) -> Iterator[Extension]:
+    """All that can be added to measurements made or planned, one after the other.
 
     Args:
-        plan: what is planned so far.
-        kinds: what is read already.
+        plan: what is read so far, about the model that predicts it.
     """
-    problem = plan.problem
-    data = problem.data.rows(problem.use)
-    robot, sigma = problem.robot, problem.sigma
-    if "tension" not in kinds:
+    data = plan.problem.data.rows(plan.problem.use)
+    for make in (_sensors, _payload, _way_back, _later, _more_poses):
+        yield from make(plan, data)
+
+
+def _like(
+    plan: Planned, data: Measurements, robot: Robot | None = None, reads: Reads | None = None,
+    sigma: Sigma | None = None,
+) -> Planned:  # fmt: skip
+    """Other rows, another robot, other sensors; all else as in the plan."""
+    return planned(
+        robot or plan.problem.robot, data, sigma or plan.problem.sigma, reads or plan.reads,
+        plan.base.terms,
+    )  # fmt: skip
+
+
+def _sensors(plan: Planned, data: Measurements) -> Iterator[Extension]:
+    problem, m = plan.problem, plan.problem.robot.n_cables
+    if not plan.reads.tensions.any():
         mean = float(np.mean(plan.base.state.prediction.tensions[problem.use]))
-        noise = float(f"{LOAD_CELL * mean:.1g}")
+        noise = problem.sigma.tension_N or float(f"{max(LOAD_CELL * mean, _LEAST_CELL):.1g}")
         yield Extension(
-            "tensions",
+            Adding.TENSIONS,
             f"record the cable tensions (to {noise:g} N)",
-            planned(robot, data, replace(sigma, tension_N=noise), ("tension",)),
-        )
-    if robot.mass > 0:
-        heavy = replace(robot, mass=(1.0 + PAYLOAD) * robot.mass)
+            _like(
+                plan, data, reads=Reads.whole(m, pose=False, tensions=True),
+                sigma=replace(problem.sigma, tension_N=noise),
+            ),
+        )  # fmt: skip
+    if not plan.reads.whole_pose:
+        sigma, _assumed = expected_sigma(problem.robot, problem.sigma)
         yield Extension(
-            "payload",
+            Adding.POSE,
+            "record the whole pose of the platform",
+            _like(plan, data, reads=Reads.whole(m), sigma=sigma),
+        )
+
+
+def _payload(plan: Planned, data: Measurements) -> Iterator[Extension]:
+    robot = plan.problem.robot
+    if robot.mass > 0:
+        yield Extension(
+            Adding.PAYLOAD,
             f"repeat the poses with a known {PAYLOAD * robot.mass:.2g} kg more at the centre of "
             "mass",
-            planned(heavy, data, sigma, kinds),
+            _like(plan, data, replace(robot, mass=(1.0 + PAYLOAD) * robot.mass)),
         )
+
+
+def _way_back(plan: Planned, data: Measurements) -> Iterator[Extension]:
     yield Extension(
-        "way_back",
+        Adding.WAY_BACK,
         "repeat each run in the opposite order, so that poses are reached from the other side",
-        planned(robot, _backwards(data), sigma, kinds),
+        _like(plan, _backwards(data)),
     )
+
+
+def _later(plan: Planned, data: Measurements) -> Iterator[Extension]:
     if data.t_s is not None:
         later = replace(data, t_s=data.t_s + float(np.ptp(data.t_s)) + _AN_HOUR, run=_named(data))
-        yield Extension("later", "repeat the poses an hour later", _after(problem, later, kinds))
+        yield Extension(Adding.LATER, "repeat the poses an hour later", _after(plan, data, later))
 
 
 def _named(data: Measurements) -> np.ndarray:
@@ -93,9 +146,8 @@ def _backwards(data: Measurements) -> Measurements:
     return replace(turned, run=_named(turned), t_s=data.t_s)
 
 
-def _after(problem: Problem, later: Measurements, kinds: Sequence[str]) -> Planned:
+def _after(plan: Planned, first: Measurements, later: Measurements) -> Planned:
     """Rows that come after the planned ones: what creeps goes by the clock through all."""
-    first = problem.data.rows(problem.use)
     both = Measurements(
         path=first.path,
         n_cables=first.n_cables,
@@ -106,30 +158,34 @@ def _after(problem: Problem, later: Measurements, kinds: Sequence[str]) -> Plann
         command_lengths=_stack(first.command_lengths, later.command_lengths),
         temperature_C=_stack(first.temperature_C, later.temperature_C),
     )
-    whole = planned(problem.robot, both, problem.sigma, kinds)
-    added = np.arange(both.n_rows) >= first.n_rows
-    rest = whole.problem.only(added)
-    return Planned(rest, null_fit(rest, Terms(), whole.factor, refit=False), whole.factor)
+    whole = _like(plan, both)
+    rest = whole.problem.only(np.arange(both.n_rows) >= first.n_rows)
+    base = null_fit(rest, plan.base.terms, whole.factor, refit=False)
+    return replace(whole, problem=rest, base=base)
 
 
 def _stack(a: Array | None, b: Array | None) -> Array | None:
     return None if a is None or b is None else np.concatenate([a, b])
 
 
-def more_poses(plan: Planned, kinds: Sequence[str]) -> Extension | None:
+def _more_poses(plan: Planned, _data: Measurements) -> Iterator[Extension]:
+    found = more_poses(plan)
+    if found is not None:
+        yield found
+
+
+def more_poses(plan: Planned) -> Extension | None:
     """Poses in and around the planned region, some tilted, at which the robot can hold still."""
-    problem = plan.problem
-    robot = problem.robot
+    robot = plan.problem.robot
     poses = _jointed(plan) if robot.joints else _grid(plan)
     poses = poses[feasible(robot, poses)]
     if len(poses) == 0:
         return None
-    found = planned(robot, _commands(problem, poses), problem.sigma, kinds)
-    poses = poses[_trustworthy(found, plan)]
+    poses = poses[_trustworthy(_like(plan, _commands(plan.problem, poses)), plan)]
     if len(poses) == 0:
         return None
-    found = planned(robot, _commands(problem, poses), problem.sigma, kinds)
-    return Extension("poses", "add poses", found, poses)
+    found = _like(plan, _commands(plan.problem, poses))
+    return Extension(Adding.POSES, "add poses", found, poses)
 
 
 def _trustworthy(candidates: Planned, plan: Planned) -> np.ndarray:

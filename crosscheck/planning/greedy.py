@@ -7,6 +7,7 @@ sum of J^T J over all readings (diagnosis: T-criterion), so a pose is tried by a
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,14 +17,28 @@ from seecr.pose import Array
 
 # Directions of M_hh this much weaker than the strongest are none (squares of columns).
 _RANK = 1e-10
-Pair = tuple[str, str, float, float]
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Something that readings do not show yet, or two effects that they do not tell apart.
+
+    Attributes:
+        effect: that is to show. other: what it is to be told from, "" where it is to be seen.
+        now: squared signal so far. needed: for a test to find it.
+    """
+
+    effect: str
+    other: str
+    now: float
+    needed: float
 
 
 def chosen_poses(
     own: Mapping[str, Signal],
     there: Mapping[str, Signal],
     row_of: NDArray[np.integer],
-    pairs: Sequence[Pair],
+    pairs: Sequence[Wanted],
     most: int,
 ) -> list[int]:
     """Rows of the candidate poses to add, the best first.
@@ -32,7 +47,7 @@ def chosen_poses(
         own: signals in the readings planned so far.
         there: the same effects' signals in the readings of all candidates.
         row_of: (N,) candidate that each of those readings belongs to.
-        pairs: (effect, other or "", signal now, signal needed).
+        pairs: what is not shown or told apart so far.
         most: poses to choose.
     """
     if not pairs:
@@ -70,12 +85,12 @@ def _gram(columns: Array) -> Array:
     return np.asarray(columns.T @ columns)
 
 
-def _scores(grams: Array, part: Mapping[str, slice], pairs: Sequence[Pair]) -> Array:
+def _scores(grams: Array, part: Mapping[str, slice], pairs: Sequence[Wanted]) -> Array:
     """How far each candidate (k,) brings all pairs: mostly by what is needed, a little beyond."""
     score = np.zeros(len(grams))
     inverse: dict[str, Array] = {}
-    for name, other, _now, need in pairs:
-        g = part[name]
+    for want in pairs:
+        g, other = part[want.effect], want.other
         signal = np.trace(grams[:, g, g], axis1=1, axis2=2)
         if other:
             h = part[other]
@@ -86,6 +101,6 @@ def _scores(grams: Array, part: Mapping[str, slice], pairs: Sequence[Pair]) -> A
             cross = grams[:, g, h]
             imitated = np.einsum("kgh,khi,kgi->k", cross, inverse[other], cross, optimize=True)
             signal = signal - imitated
-        ratio = np.maximum(signal, 0.0) / need
+        ratio = np.maximum(signal, 0.0) / want.needed
         score += np.minimum(ratio, 1.0) + 0.01 * np.log1p(ratio)
     return score

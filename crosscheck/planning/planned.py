@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crosscheck.fit.candidates import null_fit
 from crosscheck.fit.gauss_newton import Fit
-from crosscheck.fit.problem import Problem
+from crosscheck.fit.problem import Problem, commands_of
 from crosscheck.measurements.data import Measurements, Sigma
 from seecr.compiled.columns import REST, STRAIN, TENSION
 from seecr.effects import Terms
-from seecr.pose import Array
+from seecr.effects.base import Readings
+from seecr.experiment import Experiment
+from seecr.pose import Array, rxyz_from_quat
 from seecr.robot import Robot
 
 # Noise of a good tracker over the mean cable length (30 micrometres on a DemoBot), of its angles,
@@ -24,17 +26,50 @@ _NEAR_SLACK = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class Planned:
-    """A problem whose readings are the plain model's own.
+class Reads:
+    """What is read of a pose.
 
     Attributes:
-        problem: rows that have an equilibrium count. base: the plain model on it.
-        factor: noise factors.
+        position: (3,) bool coordinates. orientation: whether as a whole.
+        angles: (3,) bool angles read by themselves. tensions: (m,) bool cables.
+    """
+
+    position: NDArray[np.bool_]
+    orientation: bool
+    angles: NDArray[np.bool_]
+    tensions: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, data: Measurements) -> Reads:
+        """What measurements hold."""
+        whole = data.quat_wxyz is not None
+        return cls(data.position_mask, whole, data.angle_mask, data.tension_mask)
+
+    @classmethod
+    def whole(cls, n_cables: int, pose: bool = True, tensions: bool = False) -> Reads:
+        """The whole pose, all tensions, or both."""
+        every = np.full(3, pose)
+        return cls(every, pose, np.zeros(3, dtype=bool), np.full(n_cables, tensions))
+
+    @property
+    def whole_pose(self) -> bool:
+        """Whether nothing of the pose is left to read."""
+        return self.orientation and bool(self.position.all())
+
+
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """A problem whose readings are a model's own.
+
+    Attributes:
+        problem: rows that have an equilibrium count. base: the model on it.
+        factor: noise factors. reads: what is read of each row.
     """
 
     problem: Problem
     base: Fit
     factor: Array
+    reads: Reads
 
     @property
     def unsolved(self) -> np.ndarray:
@@ -57,46 +92,40 @@ def expected_sigma(robot: Robot, stated: Sigma) -> tuple[Sigma, tuple[str, ...]]
     return sigma, tuple(notes)
 
 
-def planned(robot: Robot, commands: Measurements, sigma: Sigma, kinds: Sequence[str]) -> Planned:
+def planned(
+    robot: Robot, commands: Measurements, sigma: Sigma, reads: Reads, terms: Terms | None = None
+) -> Planned:
     """The problem of commands as they would be measured.
 
     Args:
         robot: as described.
         commands: planned; readings in it are ignored.
         sigma: noise of every kind wanted.
-        kinds: what will be read: any of "pose" and "tension".
+        reads: what will be read.
+        terms: effects of the model; plain without.
     """
-    blank = _with_readings(commands, None, kinds)
-    problem = Problem(robot, blank, sigma, np.ones(commands.n_rows, dtype=bool))
-    prediction = problem.experiment.predict()
-    full = _with_readings(commands, prediction, kinds)
+    model = Terms() if terms is None else terms
+    prediction = Experiment(robot, commands_of(robot, commands)).predict(model.effects)
+    full = _as_read(commands, prediction.readings, reads)
     problem = Problem(robot, full, sigma, np.asarray(prediction.solved))
     factor = problem.noise(prediction)
-    return Planned(problem, null_fit(problem, Terms(), factor, refit=False), factor)
+    return Planned(problem, null_fit(problem, model, factor, refit=False), factor, reads)
 
 
-def _with_readings(
-    commands: Measurements, prediction: object, kinds: Sequence[str]
-) -> Measurements:
-    n, m = commands.n_rows, commands.n_cables
-    readings = getattr(prediction, "readings", None)
-    position, quat = np.full((n, 3), np.nan), None
-    tensions = np.full((n, m), np.nan)
-    if "pose" in kinds:
-        position = np.zeros((n, 3)) if readings is None else readings.position.copy()
-        quat = np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
-        quat = quat if readings is None else readings.quat_wxyz.copy()
-    if "tension" in kinds:
-        tensions = np.zeros((n, m)) if readings is None else readings.tensions.copy()
+def _as_read(commands: Measurements, readings: Readings, reads: Reads) -> Measurements:
+    """Commands with the readings that would be made of them."""
+    angles = np.zeros((commands.n_rows, 3))
+    if reads.angles.any():
+        angles = rxyz_from_quat(readings.quat_wxyz)
     return replace(
         commands,
-        position=position,
-        quat_wxyz=quat,
-        angles_rad=np.full((n, 3), np.nan),
-        tensions=tensions,
-        position_mask=np.isfinite(position).any(axis=0),
-        angle_mask=np.zeros(3, dtype=bool),
-        tension_mask=np.isfinite(tensions).any(axis=0),
+        position=np.where(reads.position, readings.position, np.nan),
+        quat_wxyz=readings.quat_wxyz.copy() if reads.orientation else None,
+        angles_rad=np.where(reads.angles, angles, np.nan),
+        tensions=np.where(reads.tensions, readings.tensions, np.nan),
+        position_mask=reads.position,
+        angle_mask=reads.angles,
+        tension_mask=reads.tensions,
     )
 
 

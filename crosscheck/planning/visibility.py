@@ -15,8 +15,9 @@ from functools import cached_property, lru_cache
 import numpy as np
 from scipy import optimize, stats
 
+from crosscheck.fit import imitation
 from crosscheck.fit.candidates import candidates_for
-from crosscheck.fit.imitation import left_over as left_over_of
+from crosscheck.fit.imitation import basis
 from crosscheck.fit.reasons import Reason, Why
 from crosscheck.fit.starts import amplitude_columns
 from crosscheck.planning.planned import Planned
@@ -28,8 +29,6 @@ LEVEL, POWER = 0.05, 0.8
 
 # A direction this much weaker than the strongest is no direction.
 _RANK = 1e-5
-# ... as the rounding of differences leaves behind.
-_BASIS = 1e-9
 # What an exact twin leaves, of the signal.
 EXACT = 1e-6
 
@@ -48,15 +47,9 @@ class Signal:
     columns: Array
 
     @cached_property
-    def _decomposed(self) -> tuple[Array, Array]:
-        u, s, _vt = np.linalg.svd(self.columns, full_matrices=False)
-        return u, s
-
-    @cached_property
     def basis(self) -> Array:
         """Orthonormal basis (N, d) of all that the effect can do to the readings."""
-        u, s = self._decomposed
-        return np.asarray(u[:, s > _BASIS * s[0]] if len(s) and s[0] > 0 else u[:, :0])
+        return basis(self.columns)
 
     @property
     def power(self) -> float:
@@ -66,7 +59,7 @@ class Signal:
     @property
     def directions(self) -> int:
         """How many directions of its parameters show."""
-        s = self._decomposed[1]
+        s = np.linalg.svd(self.columns, compute_uv=False)
         return max(1, int(np.sum(s > _RANK * s[0]))) if len(s) and s[0] > 0 else 1
 
 
@@ -120,7 +113,7 @@ def _columns(plan: Planned, layout: Layout, shape: dict[str, float]) -> Array:
 
 def left_over(g: Signal, h: Signal) -> float:
     """lam_gh: squared signal of g that h cannot imitate."""
-    return left_over_of(g.columns, h.basis)
+    return imitation.left_over(g.columns, h.basis)
 
 
 def joined(a: Mapping[str, Signal], b: Mapping[str, Signal]) -> dict[str, Signal]:

@@ -10,7 +10,9 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from crosscheck.planning.design import LEVEL, POWER, Gain, Plan, Suggestion, Visible
+from crosscheck.planning.design import Plan, Visible
+from crosscheck.planning.proposer import Gain, Suggestion
+from crosscheck.planning.visibility import LEVEL, POWER
 from crosscheck.terminal.lines import console_for, say, shown
 from seecr.pose import rotvec_from_quat
 

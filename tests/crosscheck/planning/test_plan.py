@@ -13,10 +13,11 @@ from crosscheck.files import json_text
 from crosscheck.fit.candidates import Trials, null_fit, try_candidate
 from crosscheck.fit.problem import Problem
 from crosscheck.measurements.data import Sigma
-from crosscheck.planning.design import MORE_POSES, make_plan
+from crosscheck.planning.design import make_plan
 from crosscheck.planning.extensions import more_poses
-from crosscheck.planning.greedy import chosen_poses
+from crosscheck.planning.greedy import Wanted, chosen_poses
 from crosscheck.planning.planned import near_slack
+from crosscheck.planning.proposer import MORE_POSES
 from crosscheck.planning.visibility import joined, left_over, needed, signals, signals_like
 from crosscheck.terminal.plan import as_json, size_words
 from seecr.effects import Terms
@@ -165,9 +166,9 @@ def test_poses_to_add_are_few_feasible_and_help(robot, plan):
 def test_chosen_poses_beat_the_first_ones(plan):
     """The greedy choice against as many candidates in the order they come."""
     own, _ = signals(plan.planned)
-    grid = more_poses(plan.planned, ("pose",))
+    grid = more_poses(plan.planned)
     there, row_of = signals_like(grid.plan, own), grid.plan.problem.row_of
-    pairs = [("centre_of_mass", "external_wrench", 0.0, 19.0)]
+    pairs = [Wanted("centre_of_mass", "external_wrench", 1e-3, 19.0)]
     rows = chosen_poses(own, there, row_of, pairs, 4)
     assert len(rows) == 4
 

@@ -1,0 +1,181 @@
+"""What to measure next: each measurement that could be added, tried by its sensitivities.
+
+The same for poses that are only planned and for data that leave two effects alike: a measurement
+is worth proposing where it brings a signal that does not show now near what a test finds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from crosscheck.fit.prepare import Progress
+from crosscheck.fit.state import derivatives
+from crosscheck.planning.extensions import Adding, Extension
+from crosscheck.planning.greedy import Wanted, chosen_poses
+from crosscheck.planning.planned import Planned
+from crosscheck.planning.visibility import EXACT, Signal, joined, left_over
+from seecr.effects import Term
+from seecr.effects.base import Layout
+from seecr.pose import Array
+
+# Squared signal, in units of the noise, that tells two effects apart (docs/diagnosis.md).
+NEEDED = 15.0
+# Poses added at most.
+MORE_POSES = 6
+# Repeating everything doubles each signal: a proposal must do more than that, and bring it to
+# this part of what is needed.
+_GAINS, _NEAR = 2.5, 0.1
+
+Signals = Mapping[str, Signal]
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What an added measurement would show or tell apart.
+
+    Attributes:
+        effect: that gains. other: what it is told from; "" where it becomes visible.
+        now, then: squared signal. needed: for a test to find it.
+    """
+
+    effect: str
+    other: str
+    now: float
+    then: float
+    needed: float
+
+    @property
+    def enough(self) -> bool:
+        """Whether a test finds it then."""
+        return self.then >= self.needed
+
+    def as_json(self) -> dict[str, Any]:
+        """As in ``plan.json``."""
+        return {**vars(self), "enough": self.enough}
+
+
+@dataclass(frozen=True, eq=False)
+class Suggestion:
+    """Something to measure.
+
+    Attributes:
+        kind: what is added. words: what to do.
+        gains: what crosses what is needed, then what only comes nearer.
+        poses: (k, 7) to add, for poses.
+    """
+
+    kind: Adding
+    words: str
+    gains: tuple[Gain, ...]
+    poses: Array | None = None
+
+    @property
+    def reached(self) -> tuple[Gain, ...]:
+        """Those that a test finds then."""
+        return tuple(g for g in self.gains if g.enough)
+
+    def as_json(self) -> dict[str, Any]:
+        """As in ``plan.json``."""
+        return {
+            "kind": self.kind.value,
+            "words": self.words,
+            "poses": self.poses,
+            "gains": [gain.as_json() for gain in self.gains],
+        }
+
+
+def propose(
+    options: Sequence[Extension],
+    own: Signals,
+    wanted: Sequence[Wanted],
+    signals: Callable[[Planned], Signals],
+    progress: Progress = lambda _text, _part: None,
+) -> tuple[Suggestion, ...]:
+    """What to add, each tried by itself, the most useful first.
+
+    Args:
+        options: :func:`crosscheck.planning.extensions.extensions`.
+        own: signals of effects in what is read so far.
+        wanted: what these do not show or tell apart.
+        signals: of the same effects in added readings.
+        progress: called with what is being done and the part of it that is done.
+    """
+    out = []
+    for k, option in enumerate(options):
+        progress(option.words, k / len(options))
+        if not option.plan.problem.use.any():
+            continue
+        there = signals(option.plan)
+        if option.kind is Adding.POSES:
+            out.append(_few_poses(option, own, there, wanted))
+        else:
+            out.append(Suggestion(option.kind, option.words, _gains(own, there, wanted)))
+    useful = [s for s in out if s.gains]
+    return tuple(sorted(useful, key=lambda s: (-len(s.reached), -len(s.gains))))
+
+
+def _gains(own: Signals, there: Signals, wanted: Sequence[Wanted]) -> tuple[Gain, ...]:
+    both = joined(own, there)
+    gains = []
+    for want in wanted:
+        g = both[want.effect]
+        then = left_over(g, both[want.other]) if want.other else g.power
+        if then > _GAINS * want.now and then > _NEAR * want.needed:
+            gains.append(Gain(want.effect, want.other, want.now, then, want.needed))
+    return tuple(sorted(gains, key=lambda g: (not g.enough, -g.then / g.needed)))
+
+
+def _few_poses(
+    grid: Extension, own: Signals, there: Signals, wanted: Sequence[Wanted]
+) -> Suggestion:
+    """The few poses that do most."""
+    row_of = grid.plan.problem.row_of
+    # twins stay twins at any pose
+    open_ = [want for want in wanted if not want.other or want.now > 0.0]
+    rows = chosen_poses(own, there, row_of, open_, MORE_POSES)
+    if not rows or grid.poses is None:
+        return Suggestion(Adding.POSES, "", ())
+    some = np.isin(row_of, rows)
+    few = {n: Signal(s.layout, s.shape, s.columns[some]) for n, s in there.items()}
+    count = f"{len(rows)} poses" if len(rows) > 1 else "one pose"
+    words = f"add the {count} listed below"
+    return Suggestion(Adding.POSES, words, _gains(own, few, open_), grid.poses[rows])
+
+
+def telling_apart(
+    plan: Planned, options: Sequence[Extension], name: str, rival: Layout
+) -> tuple[Suggestion, ...]:
+    """What would tell an effect of the plan's model from another that could stand in for it.
+
+    Args:
+        plan: the data, about the model with the effect.
+        options: :func:`crosscheck.planning.extensions.extensions`.
+        name: of the effect.
+        rival: the other.
+    """
+    own = _pair(plan, name, rival)
+    now = left_over(own[name], own[rival.name])
+    if now <= EXACT * own[name].power:
+        now = 0.0
+    want = Wanted(name, rival.name, now, NEEDED)
+    found = propose(options, own, [want], lambda there: _pair(there, name, rival))
+    enough = [suggestion for suggestion in found if suggestion.reached]
+    return tuple(sorted(enough, key=lambda suggestion: -suggestion.gains[0].then))
+
+
+def _pair(plan: Planned, name: str, rival: Layout) -> dict[str, Signal]:
+    """What the effect does at its values, and all that could imitate it: the rival and the rest."""
+    shapes = rival.effect.shapes(plan.base.state.prediction.setup)
+    shape = shapes[0] if shapes else {}
+    terms = plan.base.terms.with_term(Term(rival, rival.start(shape)))
+    columns = derivatives(plan.problem, plan.base.state.of(terms), frozen=True) * terms.scale
+    own = terms.own(name)
+    signal = columns[:, own] @ terms.sizes[own]
+    return {
+        name: Signal(terms[name].layout, {}, signal[:, None]),
+        rival.name: Signal(rival, shape, columns[:, ~own]),
+    }
