@@ -14,10 +14,12 @@ import numpy as np
 from crosscheck.comparison.associations import Against, Association, channels
 from crosscheck.comparison.travel import Travel
 from crosscheck.fit.noise import Whiteness
-from crosscheck.fit.problem import BY_NAME, Problem, Rms
+from crosscheck.fit.problem import BY_NAME, KINDS, Problem, Rms
 from crosscheck.fit.state import State
+from crosscheck.units import short
 from seecr.effects import Terms
 from seecr.pose import Array
+from seecr.result import Record, Result
 from seecr.solution import Status
 
 
@@ -107,8 +109,8 @@ class UnsolvedRow:
         return {"row": self.row, "line": self.line, "run": self.run, "why": self.why}
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison:
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Result):
     """A model held against measurements.
 
     Attributes:
@@ -194,6 +196,35 @@ class Comparison:
         if strongest.kind is Against.EVERYWHERE:
             return f"; {share} of their square is the same everywhere"
         return f"; {share} of their variance goes with {strongest.against}"
+
+    def lines(self) -> list[str]:
+        """The errors by kind beside the noise, and the verdict."""
+        data = self.problem.data
+        sizes = [
+            f"{kind.name} {short(kind.factor * value)} {kind.unit} rms "
+            f"(noise {short(kind.factor * (self.floor[kind.key] or 0.0))})"
+            for kind in KINDS
+            if (value := self.rms[kind.key]) is not None
+        ]
+        head = f"{data.path.name}: {int(self.problem.use.sum())} of {data.n_rows} rows compared"
+        return [head, *sizes, self.sentence]
+
+    def records(self) -> list[Record]:
+        """The errors of every row; None where a reading was not compared."""
+        data = self.problem.data
+        names, units = channels(self.problem)
+        heads = [f"{n.replace(' ', '_')}_{u}" for n, u in zip(names, units, strict=True)]
+        errors = np.where(self.problem.counted, self.state.raw, np.nan)
+        return [
+            {
+                "line": int(data.line[k]),
+                "run": str(data.run[k]),
+                **{
+                    h: float(v) if np.isfinite(v) else None for h, v in zip(heads, row, strict=True)
+                },
+            }
+            for k, row in enumerate(errors)
+        ]
 
     def as_json(self) -> dict[str, Any]:
         """The content of ``comparison.json``: SI, null where there is no number."""

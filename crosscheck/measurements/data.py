@@ -7,6 +7,7 @@ was not read is NaN. :mod:`crosscheck.measurements.read` reads them from files.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seecr.pose import Array
+from seecr.result import COORDINATES, Record, Result
 
 Mask = NDArray[np.bool_]
 Names = NDArray[np.str_]
@@ -52,8 +54,8 @@ class Sigma:
     length_m: float | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Measurements:
+@dataclass(frozen=True, eq=False, repr=False)
+class Measurements(Result):
     """Commands and readings of n resting poses of a robot with m cables.
 
     Exactly one of ``command_pose`` and ``command_lengths`` is given. Orientation is in one of
@@ -165,6 +167,44 @@ class Measurements:
         """Whether any tension was read."""
         return bool(np.any(self.tension_mask))
 
+    def lines(self) -> list[str]:
+        """What there is of it, and what was assumed, filled in or left out."""
+        read = [
+            word
+            for word, there in (
+                ("positions", self.has_position),
+                ("orientations", self.has_orientation),
+                ("tensions", self.has_tension),
+            )
+            if there
+        ]
+        what = ", ".join(read) or "commands alone"
+        return [
+            f"{self.path.name}: {self.n_rows} rows in {len(self.runs)} runs, {what}",
+            *self.notes,
+        ]
+
+    def records(self) -> list[Record]:
+        """Commands and readings row by row, named as in the file; None where not read."""
+        columns = dict(self.columns())
+        return [
+            dict(zip(columns, values, strict=True))
+            for values in zip(*columns.values(), strict=True)
+        ]
+
+    def columns(self) -> Iterator[tuple[str, list[Any]]]:
+        """The columns of the file, in SI, by name; None where nothing was read."""
+        yield "run", self.run.tolist()
+        cables = range(1, self.n_cables + 1)
+        yield from _columns(["t_s"], self.t_s)
+        yield from _columns([f"cmd_{c}" for c in COORDINATES], self.command_pose)
+        yield from _columns([f"length_{i}_m" for i in cables], self.command_lengths)
+        yield from _columns([f"meas_{c}_m" for c in "xyz"], self.position, self.position_mask)
+        yield from _columns([f"meas_q{c}" for c in "wxyz"], self.quat_wxyz)
+        yield from _columns([f"meas_r{c}_rad" for c in "xyz"], self.angles_rad, self.angle_mask)
+        yield from _columns([f"tension_{i}_N" for i in cables], self.tensions, self.tension_mask)
+        yield from _columns(["temperature_C"], self.temperature_C)
+
     def rows(self, index: ArrayLike | slice) -> Measurements:
         """Some rows: numbers, a mask (n,) or a slice. Masks of what was read stay as they are."""
         chosen = np.arange(self.n_rows)[index if isinstance(index, slice) else np.asarray(index)]
@@ -173,3 +213,15 @@ class Measurements:
             value = getattr(self, name)
             values[name] = None if value is None else value[chosen]
         return dataclasses.replace(self, **values)
+
+
+def _columns(
+    names: list[str], values: Array | None, mask: Mask | None = None
+) -> Iterator[tuple[str, list[Any]]]:
+    """Columns (n,) or (n, k) under their names; none of what the mask (k,) says was not read."""
+    if values is None:
+        return
+    for k, name in enumerate(names):
+        if mask is None or mask[k]:
+            column = values if values.ndim == 1 else values[:, k]
+            yield name, [None if v != v else v for v in column.tolist()]

@@ -303,3 +303,16 @@ def test_tables_name_their_units() -> None:
     heads, row = out.getvalue().splitlines()[1:]
     assert heads.split() == ["rms", "error", "[mm]", "[deg]", "[N]"]
     assert row.split() == ["[all]", "rows", "1", "0.0573", "2"]
+
+
+def test_a_comparison_shows_itself(off):
+    lines = str(off).splitlines()
+    assert (
+        lines[0]
+        == f"measured.csv: {off.problem.data.n_rows} of {off.problem.data.n_rows} rows compared"
+    )
+    assert lines[1].startswith("position ") and lines[-1] == off.sentence
+    rows = off.records()
+    assert [row["line"] for row in rows] == off.problem.data.line.tolist()
+    assert [row["z_m"] for row in rows] == off.state.raw[:, 2].tolist()
+    assert off.to_frame().num_rows == len(rows) and "<table>" in off._repr_html_()
