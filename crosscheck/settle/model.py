@@ -79,7 +79,7 @@ def platform_of(model: mujoco.MjModel, name: str) -> int:
 def check_cables(model: mujoco.MjModel, body: int, where: str) -> None:
     """Hold the tendons to the contract: straight cables from the world to the platform."""
     if model.ntendon == 0:
-        raise InputFileError(f"{where}: no cables; expected one <spatial> tendon a cable")
+        raise InputFileError(f"{where}: no cables; expected one <spatial> tendon per cable")
     for i in range(model.ntendon):
         name = model.tendon(i).name or f"cable{i + 1}"
         first = model.tendon_adr[i]

@@ -286,6 +286,26 @@ class Physics:
         """Move by a generalised displacement (d,), rotations of a free joint in body axes."""
         mujoco.mj_integratePos(self.model, self.data.qpos, change, 1.0)
 
+    def solve(self, stiffness: Array, force: Array, damping: float, neutral: float) -> Array | None:
+        """Displacement (d,) [m] that balances a force (d,) [N], rotations as metres at the length.
+
+        Directions whose stiffness is at most ``neutral`` are left alone.
+
+        Args:
+            stiffness: (d, d) [N/m]; force: in the same coordinates.
+            damping: [N/m] added to the stiffness of all other directions.
+            neutral: [N/m].
+
+        Returns:
+            None where the damped stiffness is not positive definite: no way leads downhill.
+        """
+        values, vectors = np.linalg.eigh(stiffness)
+        stiff = np.abs(values) > neutral
+        damped = values[stiff] + damping
+        if np.any(damped <= 0.0):
+            return None
+        return np.asarray(vectors[:, stiff] @ ((vectors[:, stiff].T @ force) / damped))
+
     @contextmanager
     def frozen_slack(self, taut: NDArray[np.bool_]) -> Iterator[None]:
         """Let some cables (m,) pull and push, the others vanish: smooth, for Newton's method."""

@@ -182,6 +182,27 @@ class World(Physics):
         if self.true.pulley_radius:
             self._turn_sheaves()
 
+    def solve(
+        self, stiffness: Array, force: Array, damping: float, neutral: float = 0.0
+    ) -> Array | None:
+        """As for any robot, cable by cable; directions that are nearly free are not left alone."""
+        d, own = self.n_platform, self.cable_dofs
+        h = own.shape[1]
+        try:
+            blocks = stiffness[own[:, :, None], own[:, None, :]] + damping * np.eye(h)
+            np.linalg.cholesky(blocks)
+            right = np.concatenate([stiffness[own, :d], force[own][..., None]], axis=2)
+            solved = np.linalg.solve(blocks, right)
+            joint = np.einsum("khd,khe->de", stiffness[own, :d], solved)
+            schur = stiffness[:d, :d] + damping * np.eye(d) - joint[:, :d]
+            np.linalg.cholesky(schur)
+        except np.linalg.LinAlgError:
+            return None
+        step = np.zeros(len(force))
+        step[:d] = np.linalg.solve(schur, force[:d] - joint[:, d])
+        step[own] = solved[..., d] - solved[..., :d] @ step[:d]
+        return step
+
     def tensions(self) -> Array:
         """Tensions of all tendons (m N,) [N] as of the last update; 0 where slack."""
         x = np.maximum(self.data.ten_length - self.model.tendon_lengthspring[:, 1], 0.0)

@@ -1,0 +1,114 @@
+"""The one Newton of settling and of twins: on MuJoCo's forces, downhill in MuJoCo's energy."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.settle.physics import Physics
+from seecr.pose import Array, pose_difference
+
+# Differences across this much of the robot's length: central, so the truncation is its square.
+_DIFFERENCE = 2e-5
+# Longest step, in the robot's own lengths.
+_REACH = 0.5
+# A step is tried at this many lengths, each so much shorter than the last.
+_TRIES, _SHORTER = 6, 0.3
+# Of what the energy may rise by rounding.
+_ROUNDING = 1e-12
+
+
+def minimise(physics: Physics, goal: float, limit: int) -> tuple[float, int]:
+    """Go from the present state to where the forces balance, as near as rounding lets it.
+
+    Args:
+        physics: left in the last state.
+        goal: unbalanced force relative to the load from which on it stops as soon as a step does
+            not halve it.
+        limit: steps to take at most.
+
+    Returns:
+        the unbalanced force relative to the load, and the steps taken.
+    """
+    force = physics.residual() / physics.metre
+    size = float(np.linalg.norm(force)) / physics.force_scale
+    before, damping = np.inf, 0.0
+    for iteration in range(limit):
+        if size == 0.0 or (size <= goal and size > 0.5 * before):
+            return size, iteration
+        physics.update()
+        matrix = stiffness(physics, physics.tensions() > 0.0)
+        # with all cables slack there is no stiffness to compare with, only the load
+        largest = float(np.max(np.abs(matrix))) + physics.force_scale / physics.length
+        better = None
+        while better is None and damping < 1e6 * largest:
+            step = physics.solve(matrix, force, damping, neutral_stiffness(physics))
+            better = None if step is None else _try(physics, step, size)
+            if better is None:
+                if size <= goal:
+                    return size, iteration
+                damping = max(10.0 * damping, 1e-8 * largest)
+        if better is None:
+            return size, iteration
+        force, before, size = better, size, float(np.linalg.norm(better)) / physics.force_scale
+        damping = 0.1 * damping if damping > 1e-12 * largest else 0.0
+    return size, limit
+
+
+def stiffness(physics: Physics, taut: NDArray[np.bool_]) -> Array:
+    """Stiffness (d, d) [N/m] at the present qpos, rotations as metres at the robot's length.
+
+    Central differences of MuJoCo's unbalanced force with the set of taut tendons held: a stiff
+    cable is stretched by less than any useful difference, so plain differences would straddle
+    taut and slack.
+
+    Args:
+        physics: in the state asked about.
+        taut: (k,) tendons that pull; the others are left out.
+    """
+    step, data, n = _DIFFERENCE * physics.length, physics.data, physics.n_dof
+    start = data.qpos.copy()
+    matrix = np.zeros((n, n))
+    with physics.frozen_slack(taut):
+        for dofs, rows, columns in physics.coupling:
+            change = np.zeros(n)
+            change[dofs] = step / physics.metre[dofs]
+            forces = []
+            for sign in (1.0, -1.0):
+                data.qpos[:] = start
+                physics.move(sign * change)
+                forces.append(physics.residual() / physics.metre)
+            matrix[rows, columns] = ((forces[1] - forces[0]) / (2.0 * step))[rows]
+    data.qpos[:] = start
+    physics.update()
+    # what cables with parts of their own do to the platform is what the platform does to them
+    d = physics.n_platform
+    matrix[:d, d:] = matrix[d:, :d].T
+    return np.asarray(0.5 * (matrix + matrix.T))
+
+
+def neutral_stiffness(physics: Physics) -> float:
+    """Stiffness [N/m] that rounding of the forces can pretend in a difference."""
+    return 10.0 * physics.rounding() * physics.force_scale / (_DIFFERENCE * physics.length)
+
+
+def _try(physics: Physics, step: Array, size: float) -> Array | None:
+    """Force after the longest of the shortened steps that goes downhill; None if none does."""
+    start, pose = physics.data.qpos.copy(), physics.pose()
+    energy = physics.energy()
+    longest = float(np.max(np.abs(step[: physics.n_platform])))
+    part = min(1.0, _REACH * physics.length / longest) if longest > 0 else 1.0
+    rounding = _ROUNDING * (abs(energy) + physics.force_scale * physics.length)
+    for _ in range(_TRIES):
+        physics.move(part * step / physics.metre)
+        now = physics.energy()
+        moved = pose_difference(physics.pose(), pose)
+        gain = now - energy - float(physics.wrench[3:] @ moved[3:])
+        force = physics.residual() / physics.metre
+        smaller = float(np.linalg.norm(force)) / physics.force_scale < size
+        if (gain < 0.0 and (smaller or gain < -rounding)) or (gain <= rounding and smaller):
+            return np.asarray(force)
+        physics.data.qpos[:] = start
+        part *= _SHORTER
+    physics.update()
+    return None
