@@ -215,15 +215,10 @@ class Comparison(Result):
         names, units = channels(self.problem)
         heads = [f"{n.replace(' ', '_')}_{u}" for n, u in zip(names, units, strict=True)]
         errors = np.where(self.problem.counted, self.state.raw, np.nan)
+        values = [[None if e != e else e for e in row] for row in errors.tolist()]
         return [
-            {
-                "line": int(data.line[k]),
-                "run": str(data.run[k]),
-                **{
-                    h: float(v) if np.isfinite(v) else None for h, v in zip(heads, row, strict=True)
-                },
-            }
-            for k, row in enumerate(errors)
+            {"line": line, "run": run, **dict(zip(heads, row, strict=True))}
+            for line, run, row in zip(data.line.tolist(), data.run.tolist(), values, strict=True)
         ]
 
     def as_json(self) -> dict[str, Any]:

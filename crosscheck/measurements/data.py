@@ -179,10 +179,8 @@ class Measurements(Result):
             if there
         ]
         what = ", ".join(read) or "commands alone"
-        return [
-            f"{self.path.name}: {self.n_rows} rows in {len(self.runs)} runs, {what}",
-            *self.notes,
-        ]
+        runs = "1 run" if len(self.runs) == 1 else f"{len(self.runs)} runs"
+        return [f"{self.path.name}: {self.n_rows} rows in {runs}, {what}", *self.notes]
 
     def records(self) -> list[Record]:
         """Commands and readings row by row, named as in the file; None where not read."""

@@ -8,17 +8,17 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from crosscheck.comparison.associations import Association
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import shown_stages, stages_of
 from crosscheck.files import write_text
 from crosscheck.fit.problem import Problem, kinds_read
 from crosscheck.report.cables import draw_wall, walls_of
 from crosscheck.report.confusion import confusion_of, draw_confusion
-from crosscheck.report.tables import candidate_rows, checks, errors_of, finding_context
+from crosscheck.report.findings import errors_of, finding_card
+from crosscheck.report.tables import association_block, candidate_rows, checks
 from crosscheck.report.waterfall import waterfall
 from crosscheck.report.where import caption, failure_map
-from crosscheck.units import in_unit, short
+from crosscheck.units import short
 from seecr import __version__
 
 _NO_SEARCH: dict[str, Any] = {
@@ -63,10 +63,10 @@ def _context(found: Diagnosis) -> dict[str, Any]:
         "floor": errors_of(found.floor),
         "notes": list(found.notes),
         "measure_next": list(found.measure_next),
-        "findings": [finding_context(found, finding) for finding in found.missing],
+        "findings": [finding_card(found, finding) for finding in found.missing],
         "candidates": candidate_rows(found),
         "checks": checks(found),
-        "where": [_association(row) for row in found.where],
+        "where": [association_block(row) for row in found.where],
         **_of_search(found),
     }
 
@@ -122,27 +122,3 @@ def facts(problem: Problem) -> list[tuple[str, str]]:
         ("readings", str(problem.n_readings)),
         ("noise", ", ".join(noise)),
     ]
-
-
-def _association(row: Association) -> dict[str, Any]:
-    """One thing that the unexplained part goes with, its bins in units for people."""
-    factor, unit = in_unit(row.unit)
-    means = [part.mean for part in row.bins]
-    top = max((abs(m) for m in means if m is not None), default=0.0)
-    return {
-        "against": row.against,
-        "of": row.of,
-        "strongest": row.strongest,
-        "share": f"{100 * row.share:.0f} %",
-        "p": "< 1e−12" if row.p < 1e-12 else short(row.p, 2),
-        "unit": unit,
-        "bins": [
-            {
-                "label": part.label if len(means) > 1 else "all",
-                "rows": part.rows,
-                "mean": short(None if part.mean is None else factor * part.mean),
-                "part": 0.0 if not top or part.mean is None else 50.0 * part.mean / top,
-            }
-            for part in row.bins
-        ],
-    }

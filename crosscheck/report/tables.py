@@ -1,26 +1,21 @@
-"""The page's tables: findings with their parameters, what was tested, candidates with reasons."""
+"""The page's tables: what was tested, candidates with reasons, what the error goes with."""
 
 from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from crosscheck.comparison.associations import Association
 from crosscheck.diagnosis.order import Step
-from crosscheck.diagnosis.result import Diagnosis, DiagnosisVerdict, MissingEffect
+from crosscheck.diagnosis.result import Diagnosis, DiagnosisVerdict
 from crosscheck.diagnosis.steps import stages_of
-from crosscheck.diagnosis.verdict import percent
 from crosscheck.fit.candidates import Candidate
 from crosscheck.fit.evidence import FALSE_ALARM, p_value
 from crosscheck.fit.noise import POOR_FIT, STRUCTURED
-from crosscheck.fit.problem import KINDS, Rms
-from crosscheck.units import chance, in_unit, parameter_name, short, with_error
-
-# Correlations above this are named; parameters beyond this many plausible sizes are doubtful.
-_CORRELATED, _PLAUSIBLE = 0.9, 5.0
-_MOST_CORRELATIONS = 8
+from crosscheck.report.findings import PLAUSIBLE
+from crosscheck.units import chance, in_unit, parameter_name, short
 
 
 @dataclass(frozen=True)
@@ -78,7 +73,7 @@ def _of_effects(found: Diagnosis) -> list[Check]:
               "effects tried"),
         Check("runs left out", better == blocks, f"{better} of {blocks} predicted better with "
               "each effect added"),
-        Check("sizes", worst < _PLAUSIBLE and not bound, f"at most {short(worst, 2)} plausible "
+        Check("sizes", worst < PLAUSIBLE and not bound, f"at most {short(worst, 2)} plausible "
               "sizes" + (", and a parameter at its bound" if bound else "")),
     ]  # fmt: skip
 
@@ -105,85 +100,25 @@ def _chance(before: Step, after: Step) -> float:
     return min(1.0, p * max(_tried(before), 1))
 
 
-def finding_context(found: Diagnosis, finding: MissingEffect) -> dict[str, Any]:
-    """A finding as the page shows it."""
-    rows = [
-        _parameter(*item)
-        for item in zip(
-            finding.layout.names, finding.layout.units, finding.values, finding.stderr,
-            finding.at_bound, (finding.values - finding.layout.null) / finding.layout.scale,
-            strict=True,
-        )
-    ]  # fmt: skip
-    return {
-        "effect": finding.effect,
-        "title": finding.title,
-        "place": finding.layout.effect.place,
-        "share": percent(finding.share),
-        "rivals": [{"name": r.name, "loss": short(max(r.loss, 0.0), 2)} for r in finding.rivals],
-        "check": finding.check,
-        "parameters": rows,
-        "columns": 1 if len(rows) <= 8 else 2,
-        "doubts": sum(1 for row in rows if row["flags"]),
-        "correlations": _correlations(found, finding),
-        "errors": errors_of(finding.held_out_rms),
-    }
+@dataclass(frozen=True)
+class CandidateRow:
+    """An effect that is not listed, as the page shows it.
+
+    Attributes:
+        effect, title: its name, and in words. score: of the search.
+        alone: part of the excess chi2 that it takes away by itself, 0 to 1; None if not tried.
+        needs: what it would take. why_not: the reason.
+    """
+
+    effect: str
+    title: str
+    score: str
+    alone: float | None
+    needs: str
+    why_not: str
 
 
-def _parameter(
-    name: str, unit: str, value: float, error: float, bound: bool, size: float
-) -> dict[str, Any]:
-    factor, words = in_unit(unit)
-    shown, spread = with_error(factor * float(value), factor * float(error))
-    flags = []
-    if bound:
-        flags.append("at its bound")
-    if not np.isfinite(error):
-        flags.append("not seen by these data")
-    if abs(size) > _PLAUSIBLE:
-        flags.append(f"{short(float(abs(size)), 2)} plausible sizes")
-    return {
-        "name": parameter_name(name, unit), "value": shown, "stderr": spread, "unit": words,
-        "flags": ", ".join(flags), "seen": bool(np.isfinite(error)),
-    }  # fmt: skip
-
-
-def _correlations(found: Diagnosis, finding: MissingEffect) -> list[str]:
-    """Parameters that the data hold together, the strongest first."""
-    assert found.search is not None
-    best = found.search.last.fit
-    every = best.terms.labels
-    own = np.flatnonzero(best.terms.own(finding.effect))
-    correlation = best.correlation
-    pairs = {
-        (min(i, j), max(i, j)): float(correlation[i, j])
-        for i in own.tolist()
-        for j in range(len(every))
-        if i != j and abs(correlation[i, j]) > _CORRELATED
-    }
-    ranked = sorted(pairs.items(), key=lambda item: -abs(item[1]))
-    out = []
-    for (i, j), value in ranked[:_MOST_CORRELATIONS]:
-        names = [
-            every[k][1] if every[k][0] == finding.effect else ".".join(every[k]) for k in (i, j)
-        ]
-        out.append(f"{names[0]} with {names[1]} ({short(value)})")
-    if len(ranked) > _MOST_CORRELATIONS:
-        out.append(f"and {len(ranked) - _MOST_CORRELATIONS} more pairs")
-    return out
-
-
-def errors_of(rms: Rms) -> str:
-    """The rms errors in a few words."""
-    parts = [
-        f"{short(value * kind.factor)} {kind.unit}"
-        for kind in KINDS
-        if (value := rms.get(kind.key)) is not None
-    ]
-    return ", ".join(parts)
-
-
-def candidate_rows(found: Diagnosis) -> list[dict[str, Any]]:
+def candidate_rows(found: Diagnosis) -> list[CandidateRow]:
     """Effects that were tried and are not listed, with the reason, the nearest miss first."""
     by_name = {}
     if found.search is not None:
@@ -192,14 +127,14 @@ def candidate_rows(found: Diagnosis) -> list[dict[str, Any]]:
     for row in found.candidates:
         candidate = by_name.get(row.effect)
         out.append(
-            {
-                "effect": row.effect,
-                "title": row.title,
-                "score": short(row.score) if row.score else "",
-                "alone": _alone(found, candidate),
-                "needs": "" if candidate is None else _largest_parameter(candidate),
-                "why_not": str(row.why_not),
-            }
+            CandidateRow(
+                effect=row.effect,
+                title=row.title,
+                score=short(row.score) if row.score else "",
+                alone=_alone(found, candidate),
+                needs="" if candidate is None else _largest_parameter(candidate),
+                why_not=str(row.why_not),
+            )
         )
     return out
 
@@ -230,3 +165,43 @@ def _largest_parameter(candidate: Candidate) -> str:
     # a factor near one is told from one by its later digits
     digits = 5 if layout.null[k] else 3
     return f"{name} = {short(factor * float(term.vector[k]), digits)} {unit}".strip() + doubt
+
+
+@dataclass(frozen=True)
+class BinBar:
+    """Rows alike in a quantity: how many, their mean error, and its bar from -50 to 50."""
+
+    label: str
+    rows: int
+    mean: str
+    part: float
+
+
+@dataclass(frozen=True)
+class AssociationBlock:
+    """One thing that the unexplained part goes with, in units for people."""
+
+    against: str
+    of: str
+    strongest: str
+    share: str
+    p: str
+    unit: str
+    bins: list[BinBar]
+
+
+def association_block(row: Association) -> AssociationBlock:
+    """An association as the page shows it."""
+    factor, unit = in_unit(row.unit)
+    top = max((abs(part.mean) for part in row.bins if part.mean is not None), default=0.0)
+    bins = [
+        BinBar(
+            label=part.label if len(row.bins) > 1 else "all",
+            rows=part.rows,
+            mean=short(None if part.mean is None else factor * part.mean),
+            part=0.0 if not top or part.mean is None else 50.0 * part.mean / top,
+        )
+        for part in row.bins
+    ]
+    share = f"{100 * row.share:.0f} %"
+    return AssociationBlock(row.against, row.of, row.strongest, share, chance(row.p), unit, bins)

@@ -781,7 +781,7 @@ def test_measurements_show_themselves(csv_file, robot):
     data = load_measurements(
         csv_file(CMD + ",meas_x_mm,tension_2_N", "0,0,0,500,", "1,0,0,,3"), robot
     )
-    assert str(data).splitlines()[0] == "measured.csv: 2 rows in 1 runs, positions, tensions"
+    assert str(data).splitlines()[0] == "measured.csv: 2 rows in 1 run, positions, tensions"
     assert [row["meas_x_m"] for row in data.records()] == [0.5, None]
     assert [row["tension_2_N"] for row in data.records()] == [None, 3.0]
     assert "meas_y_m" not in data.records()[0] and data.records()[1]["cmd_x_m"] == 1.0

@@ -30,8 +30,9 @@ from crosscheck.fit.reasons import Reason, Why
 from crosscheck.report import write_report
 from crosscheck.report.cables import Wall, draw_wall, paid_out, walls_of
 from crosscheck.report.confusion import confusion_of
+from crosscheck.report.findings import finding_card
 from crosscheck.report.page import render
-from crosscheck.report.tables import candidate_rows, checks, finding_context
+from crosscheck.report.tables import candidate_rows, checks
 from crosscheck.report.waterfall import waterfall
 from crosscheck.units import short, with_error
 from seecr.errors import InputFileError
@@ -259,9 +260,9 @@ def test_rivals_are_named_and_framed() -> None:
 def test_a_bound_and_a_blind_parameter_are_flagged() -> None:
     found = diagnosis("pulleys")
     finding = replace(found.missing[0], at_bound=np.array([True]), stderr=np.array([np.inf]))
-    (row,) = finding_context(found, finding)["parameters"]
-    assert row["flags"] == "at its bound, not seen by these data"
-    assert row["stderr"] == "not seen"
+    (row,) = finding_card(found, finding).parameters
+    assert row.flags == "at its bound, not seen by these data"
+    assert row.stderr == "not seen"
     assert "at its bound" not in text_of(page("pulleys"))
 
 
@@ -276,11 +277,11 @@ def test_checks_tell_noise_from_structure() -> None:
 
 
 def test_candidates_say_what_they_would_need() -> None:
-    rows = {row["effect"]: row for row in candidate_rows(diagnosis("pulleys"))}
+    rows = {row.effect: row for row in candidate_rows(diagnosis("pulleys"))}
     exit_points = rows["exit_point_error"]
-    assert exit_points["alone"] > 0.5
-    assert "mm" in exit_points["needs"]
-    assert rows["thermal_expansion"]["alone"] is None
+    assert exit_points.alone > 0.5
+    assert "mm" in exit_points.needs
+    assert rows["thermal_expansion"].alone is None
     assert "alone it explains" not in text_of(page("nothing"))
 
 

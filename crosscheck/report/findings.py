@@ -1,0 +1,138 @@
+"""The page's cards: each missing effect with its parameters, and what is doubtful about them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from crosscheck.diagnosis.result import Diagnosis, MissingEffect
+from crosscheck.diagnosis.verdict import percent
+from crosscheck.fit.problem import KINDS, Rms
+from crosscheck.units import in_unit, parameter_name, short, with_error
+
+# Correlations above this are named; parameters beyond this many plausible sizes are doubtful.
+_CORRELATED, PLAUSIBLE = 0.9, 5.0
+_MOST_CORRELATIONS = 8
+# More parameters than this stand in two columns.
+_ONE_COLUMN = 8
+
+
+@dataclass(frozen=True)
+class ParameterRow:
+    """A parameter as the page shows it; ``flags`` say what is doubtful about its value."""
+
+    name: str
+    value: str
+    stderr: str
+    unit: str
+    flags: str
+    seen: bool
+
+
+@dataclass(frozen=True)
+class RivalWords:
+    """What cannot be told from an effect, and how much worse it explains the data."""
+
+    name: str
+    loss: str
+
+
+@dataclass(frozen=True)
+class FindingCard:
+    """A missing effect as the page shows it."""
+
+    effect: str
+    title: str
+    place: str
+    share: str
+    rivals: list[RivalWords]
+    check: str
+    parameters: list[ParameterRow]
+    correlations: list[str]
+    errors: str
+
+    @property
+    def columns(self) -> int:
+        """Of its table of parameters."""
+        return 1 if len(self.parameters) <= _ONE_COLUMN else 2
+
+    @property
+    def doubts(self) -> int:
+        """How many parameters have flags."""
+        return sum(1 for row in self.parameters if row.flags)
+
+
+def finding_card(found: Diagnosis, finding: MissingEffect) -> FindingCard:
+    """A finding as the page shows it."""
+    rows = [
+        _parameter(*item)
+        for item in zip(
+            finding.layout.names, finding.layout.units, finding.values, finding.stderr,
+            finding.at_bound, (finding.values - finding.layout.null) / finding.layout.scale,
+            strict=True,
+        )
+    ]  # fmt: skip
+    return FindingCard(
+        effect=finding.effect,
+        title=finding.title,
+        place=finding.layout.effect.place,
+        share=percent(finding.share),
+        rivals=[RivalWords(r.name, short(max(r.loss, 0.0), 2)) for r in finding.rivals],
+        check=finding.check,
+        parameters=rows,
+        correlations=_correlations(found, finding),
+        errors=errors_of(finding.held_out_rms),
+    )
+
+
+def _parameter(
+    name: str, unit: str, value: float, error: float, bound: bool, size: float
+) -> ParameterRow:
+    factor, words = in_unit(unit)
+    shown, spread = with_error(factor * float(value), factor * float(error))
+    flags = []
+    if bound:
+        flags.append("at its bound")
+    if not np.isfinite(error):
+        flags.append("not seen by these data")
+    if abs(size) > PLAUSIBLE:
+        flags.append(f"{short(float(abs(size)), 2)} plausible sizes")
+    return ParameterRow(
+        parameter_name(name, unit), shown, spread, words, ", ".join(flags), bool(np.isfinite(error))
+    )
+
+
+def _correlations(found: Diagnosis, finding: MissingEffect) -> list[str]:
+    """Parameters that the data hold together, the strongest first."""
+    assert found.search is not None
+    best = found.search.last.fit
+    every = best.terms.labels
+    own = np.flatnonzero(best.terms.own(finding.effect))
+    correlation = best.correlation
+    pairs = {
+        (min(i, j), max(i, j)): float(correlation[i, j])
+        for i in own.tolist()
+        for j in range(len(every))
+        if i != j and abs(correlation[i, j]) > _CORRELATED
+    }
+    ranked = sorted(pairs.items(), key=lambda item: -abs(item[1]))
+    out = []
+    for (i, j), value in ranked[:_MOST_CORRELATIONS]:
+        names = [
+            every[k][1] if every[k][0] == finding.effect else ".".join(every[k]) for k in (i, j)
+        ]
+        out.append(f"{names[0]} with {names[1]} ({short(value)})")
+    if len(ranked) > _MOST_CORRELATIONS:
+        out.append(f"and {len(ranked) - _MOST_CORRELATIONS} more pairs")
+    return out
+
+
+def errors_of(rms: Rms) -> str:
+    """The rms errors in a few words."""
+    parts = [
+        f"{short(value * kind.factor)} {kind.unit}"
+        for kind in KINDS
+        if (value := rms.get(kind.key)) is not None
+    ]
+    return ", ".join(parts)

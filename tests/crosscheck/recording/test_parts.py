@@ -1,0 +1,97 @@
+"""The recordings' parts, each drawn by itself and read back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rerun.blueprint as rrb
+from made_data import soft_cogiro
+from recordings import Readback
+
+from crosscheck.errors import CrosscheckError
+from crosscheck.recording import bars, layout, plots
+from crosscheck.recording.scene import Scene, write_legend
+from crosscheck.recording.shapes import States
+from crosscheck.recording.stream import pose_index, recording_file, settling_index
+from seecr.errors import InputFileError
+
+
+def blueprint() -> rrb.Blueprint:
+    return layout.blueprint(layout.text("Now", "text/now"))
+
+
+def test_rows_stand_over_their_timelines(tmp_path: Path) -> None:
+    path = tmp_path / "a.rrd"
+    with recording_file(path, "a name: with signs", blueprint()) as recording:
+        recording.scalars("plot/a", pose_index(3), [1.0, 2.5, -1.0])
+        recording.scalars("plot/b", settling_index(np.array([0.0, 0.25])), [4.0, 5.0])
+    back = Readback(path)
+    assert back.scalars("/plot/a").tolist() == [1.0, 2.5, -1.0]
+    assert back.scalars("/plot/b", "settling_time").tolist() == [4.0, 5.0]
+    assert back.seconds("/plot/b").tolist() == [0.0, 0.25]
+
+
+def test_a_recording_that_fails_leaves_nothing(tmp_path: Path) -> None:
+    with (
+        pytest.raises(CrosscheckError, match="half way"),
+        recording_file(tmp_path / "a.rrd", "a", blueprint()) as recording,
+    ):
+        recording.scalars("plot/a", pose_index(1), [1.0])
+        raise CrosscheckError("half way")
+    assert list(tmp_path.iterdir()) == []
+    with (
+        pytest.raises(InputFileError, match="cannot write the recording: No such file"),
+        recording_file(tmp_path / "gone" / "a.rrd", "a", blueprint()),
+    ):
+        raise AssertionError("nothing may be drawn into a folder that is not there")
+
+
+def test_taut_cables_are_lines_and_slack_ones_dashes(tmp_path: Path) -> None:
+    robot, path = soft_cogiro(), tmp_path / "a.rrd"
+    pose = np.stack([robot.reference_pose, robot.reference_pose])
+    m = robot.n_cables
+    slack = np.zeros((2, m), dtype=bool)
+    slack[1, :2] = True
+    lengths = np.tile(robot.reference_lengths, (2, 1))
+    with recording_file(path, "a", blueprint()) as recording:
+        scene = Scene(recording, robot, pose, 10.0)
+        scene.cables("model", pose_index(2), States(pose, np.ones((2, m)), lengths, slack))
+        write_legend(recording, 20.0)
+    back = Readback(path)
+    taut = back.column("/scene/model/cables/taut", "LineStrips3D:strips")
+    assert [len(strips) for strips in taut] == [m, m - 2]
+    assert np.array(taut[0][0]) == pytest.approx(
+        np.stack([robot.exit_points[0], robot.reference_pose[:3] + robot.anchor_points[0]]),
+        abs=1e-6,
+    )
+    loose = back.column("/scene/model/cables/slack", "LineStrips3D:strips")
+    assert len(loose[0] or []) == 0 and len(loose[1]) > 2
+    assert back.static("/legend/ticks", "Points2D:labels") == ["0 N", "10 N", "20 N"]
+
+
+def test_lanes_tell_apart_slack_differing_and_unknown() -> None:
+    slack = np.array([[True, False], [True, False], [True, True]])
+    differs = np.array([[False, False], [True, False], [True, True]])
+    words = plots.lane_states(slack, differs, np.array([True, True, False]))
+    assert words.tolist() == [
+        [plots.SLACK, plots.TAUT], [plots.DIFFER, plots.TAUT], [plots.NONE, plots.NONE],
+    ]  # fmt: skip
+
+
+def test_deviations_are_in_millimetres_and_degrees() -> None:
+    command = np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+    turned = np.array([[0.001, 0.0, 1.0, np.cos(np.pi / 12), 0.0, np.sin(np.pi / 12), 0.0]])
+    parts = plots.deviation(turned, command)
+    assert parts["dx"] == pytest.approx(1.0) and parts["dz"] == pytest.approx(0.0)
+    assert parts["about y"] == pytest.approx(30.0) and parts["tilt"] == pytest.approx(30.0)
+    assert plots.log10(np.array([-1e-3, 0.0])).tolist() == pytest.approx([-3.0, -18.0])
+
+
+def test_bars_end_by_the_logarithm_of_the_error() -> None:
+    values = np.array([1.0, 10.0, 100.0])
+    ends = bars._places(values, values, 0.5)
+    assert np.all(np.diff(ends) > 0) and np.ptp(np.diff(ends)) == pytest.approx(0.0, abs=1e-9)
+    linear = bars._places(values, values, 0.0)
+    assert linear[2] - linear[0] == pytest.approx(11.0 * (linear[1] - linear[0]))

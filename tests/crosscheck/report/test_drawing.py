@@ -1,0 +1,63 @@
+"""Figures by themselves: an image with words, dots, and the map's caption."""
+
+from __future__ import annotations
+
+import base64
+import re
+from types import SimpleNamespace
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from crosscheck.report.drawing import MANY, blank, dots, image, plain_log, styled
+from crosscheck.report.where import thinned
+
+
+def drawn(points: int) -> str:
+    """The SVG of so many dots."""
+    with styled():
+        figure = blank(1.0)
+        axes = figure.subplots()
+        x = np.linspace(0.1, 1.0, points)
+        x[0] = np.nan
+        dots(axes, x, x, 2.0, "#123456", 1.0)
+        markup = image(figure, 'what "it" <shows>')
+    assert markup.startswith('<img alt="what &quot;it&quot; &lt;shows&gt;" src="data:image/svg')
+    found = re.search(r'base64,([^"]*)">$', markup)
+    assert found is not None
+    return base64.b64decode(found[1]).decode()
+
+
+def test_a_figure_is_an_image_with_words_and_the_same_twice() -> None:
+    text = drawn(5)
+    assert ElementTree.fromstring(text).tag.endswith("svg")
+    assert drawn(5) == text
+
+
+@pytest.mark.parametrize("points", [5, MANY + 2])
+def test_dots_that_were_not_read_are_not_drawn(points: int) -> None:
+    text = drawn(points)
+    if points <= MANY:
+        (path,) = re.findall(r'd="(M[^"]*)"[^>]*stroke: #123456', text)
+        assert path.count("M") == points - 1
+    else:
+        assert text.count("<use") >= points - 1
+
+
+def test_logarithmic_axes_have_plain_numbers() -> None:
+    with styled():
+        figure = blank(1.0)
+        axes = figure.subplots()
+        plain_log(axes)
+        axes.set_xlim(0.01, 30.0)
+        figure.canvas.draw()
+        labels = [label.get_text() for label in axes.get_xticklabels()]
+    assert {"0.01", "0.1", "1", "10"} <= set(labels) and not any("10^" in t for t in labels)
+
+
+@pytest.mark.parametrize(("rows", "every"), [(1, 1), (250, 1), (251, 2), (1000, 4)])
+def test_arrows_are_thinned_out(rows: int, every: int) -> None:
+    problem: Any = SimpleNamespace(use=np.ones(rows, dtype=bool))
+    assert thinned(problem) == every

@@ -1,0 +1,79 @@
+"""Results on the terminal: one line per fact, none broken, units in the headings."""
+
+from __future__ import annotations
+
+from io import StringIO
+from pathlib import Path
+
+import made_diagnoses as made
+import pytest
+from made_data import measured, soft_cogiro, term
+from rich.console import Console
+
+from crosscheck.add import add_effect
+from crosscheck.comparison.limits import Limits, check
+from crosscheck.comparison.residuals import compare
+from crosscheck.comparison.result import Comparison
+from crosscheck.terminal.addition import print_addition, why_not
+from crosscheck.terminal.comparison import print_comparison
+from crosscheck.terminal.diagnosis import print_diagnosis
+from crosscheck.terminal.lines import shown
+
+
+def console() -> tuple[Console, StringIO]:
+    out = StringIO()
+    return Console(file=out, highlight=False), out
+
+
+@pytest.fixture(scope="module")
+def found() -> Comparison:
+    robot = soft_cogiro()
+    return compare(robot, measured(robot, [term(robot, "stiffness", factor=1.4)]))
+
+
+def test_a_comparison_ends_with_verdict_limits_and_files(found: Comparison) -> None:
+    screen, out = console()
+    print_comparison(found, [], True, Path("here"), screen)
+    lines = out.getvalue().splitlines()
+    assert lines[-3:] == [found.sentence, "All limits hold.", "Results in here/"]
+    assert sum(line.startswith("worst: line ") for line in lines) == 5
+    head = next(line for line in lines if line.startswith("measured less predicted"))
+    assert head.split()[-4:] == ["unit", "at", "line", "rows"]
+    z = next(c for c in found.coordinates if c.name == "z")
+    row = next(line.split() for line in lines if line.startswith("z "))
+    assert row == ["z", *(f"{1e3 * v:.4g}" for v in (z.bias, z.rms, z.max)), "mm",
+                   str(z.line), str(z.rows)]  # fmt: skip
+
+
+def test_a_limit_that_is_exceeded_is_said(found: Comparison) -> None:
+    screen, out = console()
+    exceeded = check(Limits(max_position=1e-6), found)
+    print_comparison(found, exceeded, True, Path("here"), screen)
+    assert exceeded[0].words in out.getvalue() and "All limits hold" not in out.getvalue()
+
+
+def test_an_addition_tells_values_errors_and_what_was_written() -> None:
+    robot = soft_cogiro()
+    data = measured(robot, [term(robot, "stiffness", factor=1.4)])
+    added = add_effect(robot, data, (), "stiffness")
+    screen, out = console()
+    print_addition(added, Path("m.toml"), True, screen)
+    text = out.getvalue()
+    assert "  factor = 1.4 +- " in text or "  factor = 1.39" in text or "  factor = 1.40" in text
+    assert "With stiffness, what is left is noise." in text
+    assert text.endswith("Written to m.toml: stiffness\n")
+    assert why_not(added).endswith("it does not pay; --force adds it all the same")
+
+
+def test_a_diagnosis_begins_with_its_verdict() -> None:
+    screen, out = console()
+    found = made.pulleys()
+    print_diagnosis(found, Path("here"), screen)
+    lines = out.getvalue().splitlines()
+    assert lines[0] == f"effects_found: {found.sentence}"
+    assert any(line.startswith("pulley_radius: ") for line in lines)
+    assert any(line.startswith("not ") for line in lines) and lines[-1].startswith("Results in")
+
+
+def test_numbers_are_shown_with_the_unit_that_people_read() -> None:
+    assert shown(0.0105, "m") == "10.5 mm" and shown(1.4, "") == "1.4"
