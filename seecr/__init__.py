@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from seecr.experiment import Experiment, Prediction, predict
     from seecr.mjcf import load_robot
     from seecr.model import Model, load_model
+    from seecr.planar import bar_tilt, midline_point, solution_manifold
     from seecr.robot import Joint, Robot
     from seecr.sensitivity import sensitivities
     from seecr.setup import Setup
@@ -60,6 +61,7 @@ _MODULES = {
     "experiment": ("Experiment", "Prediction", "predict"),
     "mjcf": ("load_robot",),
     "model": ("Model", "load_model"),
+    "planar": ("bar_tilt", "midline_point", "solution_manifold"),
     "robot": ("Joint", "Robot"),
     "sensitivity": ("sensitivities",),
     "setup": ("Setup",),
@@ -89,18 +91,21 @@ __all__ = [
     "Term",
     "Terms",
     "Zone",
+    "bar_tilt",
     "catalogue",
     "effect_named",
     "feasible",
     "layout_of",
     "load_model",
     "load_robot",
+    "midline_point",
     "model_names",
     "model_path",
     "parameter",
     "predict",
     "sensitivities",
     "slack_zones",
+    "solution_manifold",
     "solve",
 ]
 

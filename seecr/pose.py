@@ -57,15 +57,6 @@ def quat_to_matrix(quat_wxyz: Array) -> Array:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def matrix_to_quat(rotation: Array) -> Array:
-    """Unit quaternions (..., 4), scalar first and not negative, of rotation matrices."""
-    from scipy.spatial.transform import Rotation
-
-    matrix = np.asarray(rotation, float)
-    xyzw = Rotation.from_matrix(matrix.reshape(-1, 3, 3)).as_quat(canonical=True)
-    return np.roll(xyzw, 1, axis=-1).reshape((*matrix.shape[:-2], 4))
-
-
 def quat_from_rotvec(rotvec: Array) -> Array:
     """Unit quaternions (..., 4) of rotation vectors (..., 3) [rad], exact also near zero."""
     v = np.asarray(rotvec, float)

@@ -11,6 +11,7 @@ import pyarrow
 import pytest
 
 import seecr
+from seecr.result import Result
 
 HOME = [0.4, 0.25, 0.1, 1, 0, 0, 0]
 
@@ -118,3 +119,21 @@ def test_a_model_prints_its_effects(tmp_path: Path) -> None:
     table = model.to_frame().to_pydict()
     assert table["parameter"] == ["radius_m", "shift_x_m", "shift_y_m", "shift_z_m"]
     assert table["stderr"] == [1e-4, None, None, None]
+
+
+class Two(Result):
+    """Two rows, one without a number."""
+
+    def lines(self) -> list[str]:
+        return ["two & two"]
+
+    def records(self) -> list[dict[str, Any]]:
+        return [{"a_m": 1.23456789, "b": None}, {"a_m": 2.0, "b": "x"}]
+
+
+def test_a_class_says_its_lines_and_its_records_and_has_the_rest() -> None:
+    two = Two()
+    assert str(two) == repr(two) == "two & two"
+    assert two.to_frame().to_pydict() == {"a_m": [1.23456789, 2.0], "b": [None, "x"]}
+    page = two._repr_html_()
+    assert "two &amp; two" in page and "<td>1.23457</td><td></td>" in page
