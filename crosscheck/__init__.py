@@ -1,1 +1,78 @@
-"""Hold the statics of a cable robot against MuJoCo and against measurements."""
+"""Hold the statics of a cable robot against MuJoCo and against measurements.
+
+import crosscheck
+found = crosscheck.diagnose("robot.xml", "measured.csv")
+print(found)
+
+Robots, measurements and models are given as paths or as what was read from them. Every result
+prints as a few lines, shows itself in a notebook, and gives a data frame with ``to_frame()``.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from crosscheck.lazy import lazily
+
+if TYPE_CHECKING:
+    from crosscheck.add import Addition, add_effect
+    from crosscheck.comparison.residuals import compare
+    from crosscheck.comparison.result import Comparison
+    from crosscheck.diagnosis.result import Diagnosis, DiagnosisVerdict, MissingEffect
+    from crosscheck.diagnosis.verdict import diagnose
+    from crosscheck.errors import CrosscheckError
+    from crosscheck.measurements.data import Measurements, Sigma
+    from crosscheck.measurements.read import load_commands, load_measurements
+    from crosscheck.measurements.write import write_measurements
+    from crosscheck.planning.design import Plan, make_plan
+    from crosscheck.suite.run import CaseResult, run_suite
+    from crosscheck.twin.make import Twin, make_twin
+
+# Imported when first used: SciPy, MuJoCo and the compiled loop take a while to load.
+_WHERE = {
+    "Addition": "add",
+    "CaseResult": "suite.run",
+    "Comparison": "comparison.result",
+    "CrosscheckError": "errors",
+    "Diagnosis": "diagnosis.result",
+    "DiagnosisVerdict": "diagnosis.result",
+    "Measurements": "measurements.data",
+    "MissingEffect": "diagnosis.result",
+    "Plan": "planning.design",
+    "Sigma": "measurements.data",
+    "Twin": "twin.make",
+    "add_effect": "add",
+    "compare": "comparison.residuals",
+    "diagnose": "diagnosis.verdict",
+    "load_commands": "measurements.read",
+    "load_measurements": "measurements.read",
+    "make_plan": "planning.design",
+    "make_twin": "twin.make",
+    "run_suite": "suite.run",
+    "write_measurements": "measurements.write",
+}
+
+__all__ = [
+    "Addition",
+    "CaseResult",
+    "Comparison",
+    "CrosscheckError",
+    "Diagnosis",
+    "DiagnosisVerdict",
+    "Measurements",
+    "MissingEffect",
+    "Plan",
+    "Sigma",
+    "Twin",
+    "add_effect",
+    "compare",
+    "diagnose",
+    "load_commands",
+    "load_measurements",
+    "make_plan",
+    "make_twin",
+    "run_suite",
+    "write_measurements",
+]
+
+__getattr__ = lazily(__name__, _WHERE)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,12 +25,15 @@ from crosscheck.fit.prepare import Progress, outlying_rows, prepare
 from crosscheck.fit.problem import Problem, Rms, rms_by_kind
 from crosscheck.fit.reasons import Why
 from crosscheck.fit.state import evaluate
+from crosscheck.fit.words import rms_words, value_lines, value_records
+from crosscheck.given import GivenModel, GivenRobot, model_of, robot_of
 from crosscheck.measurements.data import Measurements
+from crosscheck.measurements.read import measurements_of
 from crosscheck.model.write import Fitted
-from seecr.effects import Term, Terms, effect_named, layout_of
+from seecr.effects import Terms, effect_named, layout_of
 from seecr.effects.base import Layout
 from seecr.pose import Array
-from seecr.robot import Robot
+from seecr.result import Record, Result
 
 # A value this many plausible sizes from null deserves a second look.
 _IMPLAUSIBLE = 5.0
@@ -44,8 +48,8 @@ class UnsolvedError(CrosscheckError):
     exit_status = 3
 
 
-@dataclass(frozen=True, eq=False)
-class Addition:
+@dataclass(frozen=True, eq=False, repr=False)
+class Addition(Result):
     """An effect fitted to data, with the rest of the model.
 
     Attributes:
@@ -72,6 +76,33 @@ class Addition:
     whiteness: Whiteness
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
+
+    @property
+    def terms(self) -> Terms:
+        """All effects of the new model with their values, as a model for the next call."""
+        return Terms(one.term for one in self.fitted)
+
+    def lines(self) -> list[str]:
+        """Errors without and with the effect, the values, and what speaks against them."""
+        worth = "pays" if self.pays else "does not pay"
+        left = rms_words(self.held_out_before), rms_words(self.held_out)
+        out = [
+            f"{self.name} {worth} on runs left out: {left[0]} before, {left[1]} with it",
+            f"on all rows: {rms_words(self.before)} before, {rms_words(self.after)} with it",
+        ]
+        for one in self.fitted:
+            values = value_lines(one.term.layout, one.term.vector, one.stderr, one.at_bound)
+            out += [f"{one.term.name}: {line}" for line in values]
+        out += [f"warning: {warning}" for warning in self.warnings]
+        return [*out, *(f"note: {note}" for note in self.notes)]
+
+    def records(self) -> list[Record]:
+        """A record for each parameter of the new model: value and standard error, SI."""
+        return [
+            record
+            for one in self.fitted
+            for record in value_records(one.term.layout, one.term.vector, one.stderr, one.at_bound)
+        ]
 
     def as_json(self) -> dict[str, Any]:
         """The content of ``add.json``, in SI."""
@@ -112,37 +143,40 @@ def _parameters(fitted: Fitted) -> dict[str, Any]:
 
 
 def add_effect(
-    robot: Robot,
-    data: Measurements,
-    terms: Iterable[Term],
+    robot: GivenRobot,
+    data: Measurements | str | Path,
     name: str,
+    model: GivenModel = (),
     progress: Progress = lambda _text, _part: None,
 ) -> Addition:
     """Fit an effect to data, jointly with those the model has.
 
     Args:
-        robot: as described.
-        data: measurements.
-        terms: effects of the model; where the named one is among them it is fitted again.
+        robot: as described, or its MJCF.
+        data: measurements, or their file.
         name: of the effect.
+        model: effects of the model, or their file; where the named one is among them it is
+            fitted again. The plain model without.
         progress: called with what is being done and the part of it that is done.
 
     Raises:
         InputError: no effect of that name.
         CrosscheckError: the data cannot carry it.
     """
+    robot = robot_of(robot)
     layout = layout_of(effect_named(name), robot)
-    model = Terms(terms)
-    ready = prepare(robot, data, model)
-    problem, notes = ready.problem, list(ready.all_notes)
+    data = measurements_of(data, robot)
+    terms, said = model_of(model, robot)
+    ready = prepare(robot, data, terms)
+    problem, notes = ready.problem, [*said, *ready.all_notes]
     if ready.refusal is not None:
         kind = UnsolvedError if ready.refusal.unsolved else CrosscheckError
         raise kind(f"{data.path}: {ready.refusal}; {name} was not fitted")
     _refuse(problem, layout)
     progress(f"fitting {name}", 0.0)
-    plain = problem.experiment.predict(model.effects)
+    plain = problem.experiment.predict(terms.effects)
     factor = problem.noise(plain)
-    best = _fitted(problem, model, layout, factor)
+    best = _fitted(problem, terms, layout, factor)
     progress("looking for outliers", 0.4)
     outliers = outlying_rows(problem, best.state)
     if outliers.any():
@@ -151,9 +185,9 @@ def add_effect(
         words = f"{word} {lines} left out: outliers, far off the others"
         notes.append(words)
         problem = problem.without(outliers, words)
-        best = _fitted(problem, model, layout, factor)
+        best = _fitted(problem, terms, layout, factor)
     progress("predicting runs left out", 0.6)
-    return _weigh(problem, model, layout, factor, best, notes)
+    return _weigh(problem, terms, layout, factor, best, notes)
 
 
 def _refuse(problem: Problem, layout: Layout) -> None:

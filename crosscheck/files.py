@@ -28,6 +28,17 @@ from crosscheck.errors import CrosscheckError
 from seecr.errors import InputFileError
 from seecr.files import read_text, reason_of
 
+__all__ = [
+    "Toml",
+    "json_text",
+    "plain",
+    "read_toml",
+    "staged",
+    "write_text",
+    "write_texts",
+    "written",
+]
+
 
 @dataclass(frozen=True, eq=False)
 class Toml:

@@ -16,6 +16,20 @@ import numpy as np
 from crosscheck.errors import CrosscheckError
 from seecr.pose import Array
 
+__all__ = [
+    "EXAMPLE",
+    "SI",
+    "UNITS",
+    "Unit",
+    "chance",
+    "in_unit",
+    "of_columns",
+    "parameter_name",
+    "parse_quantity",
+    "short",
+    "with_error",
+]
+
 Numbers = TypeVar("Numbers", float, Array)
 
 

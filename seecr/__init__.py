@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     )
     from seecr.experiment import Experiment, Prediction, predict
     from seecr.mjcf import load_robot
-    from seecr.model import Model, load_model
+    from seecr.model import Model, load_model, new_model
     from seecr.planar import bar_tilt, midline_point, solution_manifold
     from seecr.robot import Joint, Robot
     from seecr.sensitivity import sensitivities
@@ -60,7 +60,7 @@ _MODULES = {
     "errors": ("InputError", "InputFileError", "MissingPackageError", "RobotError", "SeecrError"),
     "experiment": ("Experiment", "Prediction", "predict"),
     "mjcf": ("load_robot",),
-    "model": ("Model", "load_model"),
+    "model": ("Model", "load_model", "new_model"),
     "planar": ("bar_tilt", "midline_point", "solution_manifold"),
     "robot": ("Joint", "Robot"),
     "sensitivity": ("sensitivities",),
@@ -101,6 +101,7 @@ __all__ = [
     "midline_point",
     "model_names",
     "model_path",
+    "new_model",
     "parameter",
     "predict",
     "sensitivities",

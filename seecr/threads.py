@@ -8,6 +8,12 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from itertools import pairwise
 
+__all__ = [
+    "in_parts",
+    "processors",
+    "run_parts",
+]
+
 # Fewer poses than this are not worth a second thread.
 _CHUNK = 128
 

@@ -8,8 +8,7 @@ from typing import Any
 
 import click
 
-from seecr import __version__
-from seecr.errors import SeecrError
+from seecr import SeecrError, __version__
 
 # Command, module in crosscheck.cli that holds it as `command`, and its line in --help.
 COMMANDS: dict[str, tuple[str, str]] = {

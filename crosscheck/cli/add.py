@@ -10,9 +10,8 @@ import click
 from crosscheck.cli.options import FILE, json_option, progress_share
 
 if TYPE_CHECKING:
-    from crosscheck.add import Addition
-    from seecr.model import Model
-    from seecr.robot import Robot
+    from crosscheck import Addition
+    from seecr import Model, Robot
 
 
 @click.command(
@@ -56,11 +55,9 @@ def command(
     Exit status: 0 added, 1 not added since it does not pay, 2 bad input, 3 rows without an
     equilibrium.
     """
-    from crosscheck.add import add_effect
-    from crosscheck.measurements.read import load_measurements
+    from crosscheck import add_effect, load_measurements
+    from seecr import load_model, load_robot, new_model
     from seecr.effects import effect_named
-    from seecr.mjcf import load_robot
-    from seecr.model import load_model, new_model
 
     effect_named(effect)
     machine = load_robot(robot)
@@ -68,7 +65,7 @@ def command(
     _check_names(old, effect, refit, model)
     measured = load_measurements(data, machine)
     with progress_share(f"adding {effect}") as progress:
-        found = add_effect(machine, measured, old.terms, effect, progress)
+        found = add_effect(machine, measured, effect, old.terms, progress)
     written = found.pays or force
     if written:
         _write(found, old, machine, data, model)
@@ -77,7 +74,7 @@ def command(
 
 
 def _check_names(old: Model, effect: str, refit: bool, path: Path) -> None:
-    from crosscheck.errors import CrosscheckError
+    from crosscheck import CrosscheckError
 
     if effect in old.names and not refit:
         raise CrosscheckError(f"{path} has {effect} already; --refit fits it again")
@@ -91,7 +88,7 @@ def _check_names(old: Model, effect: str, refit: bool, path: Path) -> None:
 def _write(found: Addition, old: Model, robot: Robot, data: Path, path: Path) -> None:
     from datetime import date
 
-    from crosscheck.model.write import Provenance, renewed, save_model, with_fit
+    from crosscheck.model import Provenance, renewed, save_model, with_fit
     from seecr import __version__
 
     source = Provenance(
@@ -108,7 +105,7 @@ def _tell(
     found: Addition, old: Model, model: Path, written: bool, out: Path | None, as_json: bool
 ) -> None:
     from crosscheck.files import json_text, staged, write_text
-    from crosscheck.terminal.addition import print_addition
+    from crosscheck.terminal import print_addition
 
     document = {"written": written, "model": str(model), **found.as_json()}
     text = json_text({**document, "model_notes": list(old.notes)})

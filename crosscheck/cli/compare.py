@@ -58,12 +58,10 @@ def command(
     as in the tables, or on the worst row (the length of its error vector).
     Exit status: 0 all well, 1 a limit exceeded, 2 bad input, 3 rows without an equilibrium.
     """
-    from crosscheck.comparison.limits import Limits, check, load_limits, with_options
-    from crosscheck.comparison.residuals import compare
+    from crosscheck import compare, load_measurements
+    from crosscheck.comparison import Limits, check, load_limits, with_options
     from crosscheck.files import json_text, staged, write_text
-    from crosscheck.measurements.read import load_measurements
-    from seecr.mjcf import load_robot
-    from seecr.model import load_model
+    from seecr import load_model, load_robot
 
     limits = with_options(load_limits(limits_file) if limits_file else Limits(), options)
     machine = load_robot(robot)
@@ -90,7 +88,7 @@ def command(
     if as_json:
         click.echo(text)
         return status
-    from crosscheck.terminal.comparison import print_comparison
+    from crosscheck.terminal import print_comparison
 
     for note in own.notes if own else ():
         click.echo(f"note: {note}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -27,20 +26,17 @@ def command(
     ROBOT.xml is the robot's MJCF, DATA.csv its measurements, with sigma in a TOML beside it.
     Writes diagnosis.json, diagnosis.html and diagnosis.rrd.
     """
-    from crosscheck.diagnosis.verdict import diagnose
+    from crosscheck import diagnose, load_measurements
     from crosscheck.files import json_text, staged, write_text
-    from crosscheck.measurements.read import load_measurements
     from crosscheck.report import write_report
-    from seecr.mjcf import load_robot
-    from seecr.model import load_model, new_model
+    from seecr import load_model, load_robot
 
     machine = load_robot(robot)
     measured = load_measurements(data, machine)
-    own = load_model(model, machine) if model is not None else new_model(machine)
+    own = load_model(model, machine) if model is not None else ()
     with staged(out) as folder:
         with progress_share("diagnosing") as progress:
-            found = diagnose(machine, measured, own.terms, progress)
-        found = replace(found, notes=(*own.notes, *found.notes))
+            found = diagnose(machine, measured, own, progress)
         text = json_text(found.as_json())
         write_text(folder / "diagnosis.json", text + "\n")
         write_report(found, folder / "diagnosis.html")
@@ -51,7 +47,7 @@ def command(
     if as_json:
         click.echo(text)
     else:
-        from crosscheck.terminal.diagnosis import print_diagnosis
+        from crosscheck.terminal import print_diagnosis
 
         print_diagnosis(found, out)
     return 0 if found.converged else 3

@@ -48,13 +48,11 @@ def command(
     \b
     Exit status: 0 all well, 2 bad input, 3 poses without an equilibrium.
     """
+    from crosscheck import load_commands, make_plan
     from crosscheck.files import json_text, staged, write_text
-    from crosscheck.measurements.read import load_commands
-    from crosscheck.planning.design import make_plan
-    from crosscheck.terminal.plan import as_json as document_of
-    from crosscheck.terminal.plan import print_plan
+    from crosscheck.terminal import plan_json, print_plan
     from crosscheck.units import parse_quantity
-    from seecr.mjcf import load_robot
+    from seecr import load_robot
 
     texts = {
         "position_m": ("--position-sigma", "position", position_sigma),
@@ -71,7 +69,7 @@ def command(
     with staged(out) as folder:
         with progress_share("planning") as progress:
             plan = make_plan(machine, commands, replace(commands.sigma, **given), progress)
-        text = json_text({"exit_status": 0 if plan.converged else 3, **document_of(plan)})
+        text = json_text({"exit_status": 0 if plan.converged else 3, **plan_json(plan)})
         write_text(folder / "plan.json", text + "\n")
     if as_json:
         click.echo(text)

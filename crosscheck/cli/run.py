@@ -21,11 +21,7 @@ from crosscheck.cli.options import (
 from seecr.threads import processors
 
 if TYPE_CHECKING:
-    from crosscheck.suite.cases import Case
-    from crosscheck.suite.effects import EffectCase, EffectResult
-    from crosscheck.suite.results import Run
-    from crosscheck.suite.run import CaseResult
-    from crosscheck.suite.thresholds import Thresholds
+    from crosscheck.suite import Case, CaseResult, EffectCase, EffectResult, Run, Thresholds
 
 
 @click.command(
@@ -109,8 +105,7 @@ def command(
     Exit status: 0 all agree, 1 a threshold exceeded, 2 bad input, 3 a solve did not converge
     (and nothing exceeded a threshold).
     """
-    from crosscheck.suite.cases import select, user_cases
-    from crosscheck.suite.thresholds import load_thresholds
+    from crosscheck.suite import load_thresholds, select, user_cases
 
     if mujoco_robot is not None and robot is None:
         raise click.UsageError("--mujoco-robot needs --robot: the MJCF that SEECR reads")
@@ -118,7 +113,7 @@ def command(
     if robot is None:
         chosen = _shipped(seed, patterns)
     else:
-        from seecr.mjcf import load_robot
+        from seecr import load_robot
 
         robots = load_robot(robot), robot, mujoco_robot
         chosen = list(select(user_cases(*robots, seed), patterns))
@@ -130,15 +125,14 @@ def command(
 
 def _shipped(seed: int, patterns: Sequence[str]) -> list[Case | EffectCase]:
     """The selected pose cases and effects; the group's name stands for all its effects."""
-    from crosscheck.suite.cases import select, shipped_cases
-    from crosscheck.suite.effects import GROUP, PREFIX, effect_cases
+    from crosscheck.suite import GROUP, PREFIX, effect_cases, select, shipped_cases
 
     every: list[Case | EffectCase] = [*shipped_cases(seed), *effect_cases(seed=seed)]
     return select(every, [f"{PREFIX}*" if name == GROUP else name for name in patterns])
 
 
 def _list(chosen: list[Case | EffectCase]) -> None:
-    from crosscheck.suite.cases import Case
+    from crosscheck.suite import Case
 
     width = max(len(case.name) for case in chosen)
     for case in chosen:
@@ -160,16 +154,16 @@ def _run(
     began = time.perf_counter()
     with staged(out) as folder:
         results, effects = _results(chosen, thresholds, jobs, folder if recordings else None)
-        from crosscheck.suite.results import Run
+        from crosscheck.suite import Run
 
         run = Run(results, thresholds, seed, jobs, time.perf_counter() - began, effects)
         _write(run, folder)
     if as_json:
-        from crosscheck.suite.results import results_json
+        from crosscheck.suite import results_json
 
         click.echo(results_json(run), nl=False)
     else:
-        from crosscheck.terminal.suite import print_run
+        from crosscheck.terminal import print_run
 
         print_run(run, out)
     for note in run.notes:
@@ -181,16 +175,14 @@ def _results(
     chosen: list[Case | EffectCase], thresholds: Thresholds, jobs: int, folder: Path | None
 ) -> tuple[list[CaseResult], list[EffectResult]]:
     """The poses' cases, then the effects, in the same processes and under one bar."""
-    from crosscheck.suite.cases import Case
+    from crosscheck.suite import Case
 
     cases = [case for case in chosen if isinstance(case, Case)]
     effects = [case for case in chosen if not isinstance(case, Case)]
     total = sum(len(case.poses) for case in cases)
     total += sum(len(case.commands) for case in effects)
     with progress_bar("compiling", total) as advance:
-        from crosscheck.suite.effects import run_effects
-        from crosscheck.suite.pool import Pool
-        from crosscheck.suite.run import run_suite
+        from crosscheck.suite import Pool, run_effects, run_suite
 
         with Pool(min(jobs, len(chosen))) as pool:
             results = run_suite(
@@ -217,11 +209,13 @@ def _record(result: CaseResult, folder: Path) -> str:
 
 def _write(run: Run, folder: Path) -> None:
     from crosscheck.files import write_text
-    from crosscheck.suite.junit import junit_xml
-    from crosscheck.suite.results import results_json
-    from crosscheck.suite.summary import summary_md
-    from crosscheck.suite.thresholds import thresholds_toml
-    from crosscheck.suite.worst_pose import write_worst_pose
+    from crosscheck.suite import (
+        junit_xml,
+        results_json,
+        summary_md,
+        thresholds_toml,
+        write_worst_pose,
+    )
 
     sentence = write_worst_pose(run.results, folder) if run.results else ""
     texts = {

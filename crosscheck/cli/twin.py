@@ -10,7 +10,7 @@ import click
 from crosscheck.cli.options import FILE, json_option, out_option, progress_bar
 
 if TYPE_CHECKING:
-    from crosscheck.twin.make import Twin
+    from crosscheck import Twin
 
 
 @click.command(
@@ -83,7 +83,7 @@ def command(
         raise click.UsageError("expected ROBOT.xml and --hide SEED, or --open FILE")
     if names and count is not None:
         raise click.UsageError("--effect says how many there are: leave out --effects")
-    from crosscheck.twin.make import make_twin
+    from crosscheck import make_twin
 
     # whatever is hidden, the bar shows the same: rows of one kind, done or not
     with progress_bar("measuring", 1) as advance:
@@ -103,9 +103,9 @@ def command(
 
 def _tell(twin: Twin, out: Path, as_json: bool) -> None:
     from crosscheck.files import json_text
-    from crosscheck.twin.answer import NAME
+    from crosscheck.twin import FILES
 
-    files = ["robot.xml", "measured.csv", "measured.toml", NAME]
+    files = list(FILES)
     for note in twin.notes:
         click.echo(f"note: {note}", err=True)
     if as_json:
@@ -124,7 +124,7 @@ def _tell(twin: Twin, out: Path, as_json: bool) -> None:
 
 def _open(path: Path, as_json: bool) -> int:
     from crosscheck.files import json_text
-    from crosscheck.twin.answer import unseal
+    from crosscheck.twin import unseal
 
     answer = unseal(path)
     if as_json:

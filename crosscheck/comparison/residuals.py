@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from pathlib import Path
 
 import numpy as np
 
@@ -13,29 +14,36 @@ from crosscheck.fit.noise import as_table, whiteness
 from crosscheck.fit.prepare import noise_floor, outlying_rows, prepare
 from crosscheck.fit.problem import Problem, rms_by_kind
 from crosscheck.fit.state import State, evaluate
+from crosscheck.given import GivenModel, GivenRobot, model_of, robot_of
 from crosscheck.measurements.data import Measurements, Names
-from seecr.effects import Term, Terms
-from seecr.robot import Robot
+from crosscheck.measurements.read import measurements_of
 
 _MOST_WORST = 10
 
 
-def compare(robot: Robot, data: Measurements, terms: Iterable[Term] = ()) -> Comparison:
+def compare(
+    robot: GivenRobot, data: Measurements | str | Path, model: GivenModel = ()
+) -> Comparison:
     """Hold a model against measurements; nothing is fitted.
 
     Args:
-        robot: as described.
-        data: its measurements.
-        terms: the model's effects with their values.
+        robot: as described, or its MJCF.
+        data: its measurements, or their file.
+        model: the effects with their values, or their file; the plain model without.
+
+    Raises:
+        SeecrError: a file that cannot be read, or is of another robot.
     """
-    model = Terms(terms)
-    ready = prepare(robot, data, model)
+    robot = robot_of(robot)
+    data = measurements_of(data, robot)
+    terms, said = model_of(model, robot)
+    ready = prepare(robot, data, terms)
     problem = ready.problem
     # nothing is fitted here, so nobody asks how cross-validation would cut the data
-    notes = [*ready.notes, *([str(ready.refusal)] if ready.refusal else [])]
-    plain = problem.experiment.predict(model.effects)
+    notes = [*said, *ready.notes, *([str(ready.refusal)] if ready.refusal else [])]
+    plain = problem.experiment.predict(terms.effects)
     factor = problem.noise(plain)
-    state = evaluate(problem, model, factor)
+    state = evaluate(problem, terms, factor)
     way = travel(problem, state.prediction)
     some = problem.n_readings > 0
     if some:

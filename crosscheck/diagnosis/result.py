@@ -16,9 +16,11 @@ from crosscheck.files import plain
 from crosscheck.fit.noise import Whiteness
 from crosscheck.fit.problem import Rms
 from crosscheck.fit.reasons import Reason, Refusal
-from seecr.effects import Term
+from crosscheck.fit.words import rms_words, value_lines, value_records
+from seecr.effects import Term, Terms
 from seecr.effects.base import Layout
 from seecr.pose import Array
+from seecr.result import Record, Result
 
 
 class DiagnosisVerdict(StrEnum):
@@ -87,6 +89,17 @@ class MissingEffect:
         """(p,) in their units."""
         return self.term.vector
 
+    def lines(self) -> list[str]:
+        """Errors with it, values, what it cannot be told from, and how to check it."""
+        left_out = rms_words(self.held_out_rms)
+        out = [f"+ {self.effect}: {rms_words(self.rms)} (on runs left out {left_out})"]
+        values = value_lines(self.layout, self.values, self.stderr, self.at_bound)
+        out += [f"    {line}" for line in values]
+        if self.rivals:
+            names = ", ".join(rival.name for rival in self.rivals)
+            out.append(f"    cannot be told from: {names}")
+        return [*out, f"    check: {self.check}"]
+
     def as_json(self) -> dict[str, Any]:
         """An item of ``missing``: SI, null where there is no number."""
         rows = zip(self.layout.names, self.values, self.stderr, self.at_bound, strict=True)
@@ -124,8 +137,8 @@ class NotListed:
         return {"effect": self.effect, "score": self.score, "why_not": str(self.why_not)}
 
 
-@dataclass(frozen=True, eq=False)
-class Diagnosis:
+@dataclass(frozen=True, eq=False, repr=False)
+class Diagnosis(Result):
     """The whole answer.
 
     Attributes:
@@ -161,6 +174,29 @@ class Diagnosis:
     def converged(self) -> bool:
         """Whether nothing failed for want of solutions; for want of data is another matter."""
         return self.refusal is None or not self.refusal.unsolved
+
+    @property
+    def terms(self) -> Terms:
+        """The missing effects with their values, as a model for the next call."""
+        return Terms(found.term for found in self.missing)
+
+    def lines(self) -> list[str]:
+        """The verdict, the error on its way down, and what to measure next."""
+        out = [f"{self.verdict.value}: {self.sentence}"]
+        if self.refusal is None:
+            out.append(f"as it stands: {rms_words(self.before)}")
+            out += [line for found in self.missing for line in found.lines()]
+            out.append(f"noise alone: {rms_words(self.floor)}")
+        out += [f"note: {note}" for note in self.notes]
+        return [*out, *(f"next: {line}" for line in self.measure_next)]
+
+    def records(self) -> list[Record]:
+        """A record for each parameter of a missing effect: value and standard error, SI."""
+        return [
+            {"step": step, **record, "cannot_be_told_from": ", ".join(r.name for r in found.rivals)}
+            for step, found in enumerate(self.missing, 1)
+            for record in value_records(found.layout, found.values, found.stderr, found.at_bound)
+        ]
 
     def as_json(self) -> dict[str, Any]:
         """The content of ``diagnosis.json``: numbers in SI, null where there is none."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import takewhile
+from pathlib import Path
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -22,10 +23,10 @@ from crosscheck.fit.prepare import Progress, noise_floor, outlying_rows, prepare
 from crosscheck.fit.problem import Problem, rms_by_kind
 from crosscheck.fit.reasons import Reason, Refusal, Unfit, Why
 from crosscheck.fit.state import derivatives
+from crosscheck.given import GivenModel, GivenRobot, model_of, robot_of
 from crosscheck.measurements.data import Measurements
-from seecr.effects import Term, Terms
+from crosscheck.measurements.read import measurements_of
 from seecr.pose import Array
-from seecr.robot import Robot
 
 # Where structure is left over, an effect is listed only if it has few parameters and took away
 # most of what was unexplained; by itself, two thirds of all and then a third of the rest.
@@ -42,34 +43,39 @@ _UNDERSTATED = 3.0
 # from the compiled loop.
 @threadpool_limits.wrap(limits=1, user_api="blas")
 def diagnose(
-    robot: Robot,
-    data: Measurements,
-    terms: Iterable[Term] = (),
+    robot: GivenRobot,
+    data: Measurements | str | Path,
+    model: GivenModel = (),
     progress: Progress = lambda _text, _part: None,
 ) -> Diagnosis:
     """Find the effects that a model misses.
 
     Args:
-        robot: as described.
-        data: its measurements.
-        terms: effects the model has already.
+        robot: as described, or its MJCF.
+        data: its measurements, or their file.
+        model: effects the model has already, or their file; the plain model without.
         progress: called with what is being done and the part of it that is done.
+
+    Raises:
+        SeecrError: a file that cannot be read, or is of another robot.
     """
-    model = Terms(terms)
-    ready = prepare(robot, data, model)
+    robot = robot_of(robot)
+    data = measurements_of(data, robot)
+    terms, said = model_of(model, robot)
+    ready = prepare(robot, data, terms)
     problem = ready.problem
-    factor = problem.noise(problem.experiment.predict(model.effects))
-    base = null_fit(problem, model, factor, refit=False)
+    factor = problem.noise(problem.experiment.predict(terms.effects))
+    base = null_fit(problem, terms, factor, refit=False)
     refusal = ready.refusal
     if refusal is None and not base.valid:
         refusal = Refusal(Unfit.UNSOLVED_MODEL, data.n_rows)
     if refusal is not None:
-        return no_verdict(problem, base, ready.all_notes, refusal)
+        return no_verdict(problem, base, (*said, *ready.all_notes), refusal)
     base, refitted = _at_its_best(problem, base, factor)
     found = search(Trials(problem, factor), base, progress)
     found, outliers = _without_outliers(found, base, progress)
     found, larger = _with_larger_noise(found, progress)
-    return conclude(found, (*ready.all_notes, *refitted, *outliers, *larger))
+    return conclude(found, (*said, *ready.all_notes, *refitted, *outliers, *larger))
 
 
 Notes = tuple[str, ...]

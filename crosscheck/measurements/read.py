@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from crosscheck.files import Toml, read_toml
+from crosscheck.given import GivenRobot, robot_of
 from crosscheck.measurements.columns import POSITION, Columns, know_columns
 from crosscheck.measurements.data import Measurements, Names, Sigma
 from crosscheck.measurements.poses import command_lengths, command_poses, measured_orientation
@@ -30,18 +31,19 @@ _SIGMAS = tuple(field.name for field in fields(Sigma))
 
 
 def load_measurements(
-    path: str | Path, robot: Robot, *, sigma_path: str | Path | None = None
+    path: str | Path, robot: GivenRobot, *, sigma_path: str | Path | None = None
 ) -> Measurements:
     """Read measurements, and the noise from the TOML beside them where there is one.
 
     Args:
         path: CSV or Parquet.
-        robot: whose measurements these are (number of cables, joints, reference pose).
+        robot: whose measurements these are, or its MJCF.
         sigma_path: the TOML, where it is not the data file's name with ``.toml``.
 
     Raises:
         InputFileError: anything wrong with either file.
     """
+    robot = robot_of(robot)
     columns = _open(path, robot)
     data = _load(columns, robot, sigma_path)
     if not (data.has_position or data.has_orientation or data.has_tension):
@@ -53,10 +55,30 @@ def load_measurements(
 
 
 def load_commands(
-    path: str | Path, robot: Robot, *, sigma_path: str | Path | None = None
+    path: str | Path, robot: GivenRobot, *, sigma_path: str | Path | None = None
 ) -> Measurements:
-    """Like :func:`load_measurements`, for poses that nobody has measured yet."""
+    """Like :func:`load_measurements`, for poses that nobody has measured yet.
+
+    Args:
+        path: CSV or Parquet.
+        robot: that is to be commanded so, or its MJCF.
+        sigma_path: the TOML, where it is not the data file's name with ``.toml``.
+
+    Raises:
+        InputFileError: anything wrong with either file.
+    """
+    robot = robot_of(robot)
     return _load(_open(path, robot), robot, sigma_path)
+
+
+def measurements_of(given: Measurements | str | Path, robot: Robot) -> Measurements:
+    """The measurements, read if need be."""
+    return load_measurements(given, robot) if isinstance(given, str | Path) else given
+
+
+def commands_of(given: Measurements | str | Path, robot: Robot) -> Measurements:
+    """The commands, read if need be."""
+    return load_commands(given, robot) if isinstance(given, str | Path) else given
 
 
 def _open(path: str | Path, robot: Robot) -> Columns:

@@ -4,19 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from crosscheck.fit.imitation import imitated
 from crosscheck.fit.prepare import Progress
 from crosscheck.fit.reasons import Reason
+from crosscheck.given import GivenRobot, robot_of
 from crosscheck.measurements.data import Measurements, Sigma
+from crosscheck.measurements.read import commands_of
 from crosscheck.planning.extensions import extensions
 from crosscheck.planning.greedy import Wanted
 from crosscheck.planning.planned import Planned, Reads, expected_sigma, near_slack, planned
 from crosscheck.planning.proposer import Suggestion, propose
 from crosscheck.planning.visibility import (
     EXACT,
+    LEVEL,
+    POWER,
     Signal,
     left_over,
     needed,
@@ -24,7 +29,7 @@ from crosscheck.planning.visibility import (
     signals_like,
 )
 from seecr.pose import Array
-from seecr.robot import Robot
+from seecr.result import Record, Result
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +74,8 @@ class Visible:
         return {k: factor * float(layout.scale[i]) for i, k in enumerate(layout.names) if own[i]}
 
 
-@dataclass(frozen=True, eq=False)
-class Plan:
+@dataclass(frozen=True, eq=False, repr=False)
+class Plan(Result):
     """What planned commands will show.
 
     Attributes:
@@ -92,26 +97,61 @@ class Plan:
     notes: tuple[str, ...]
 
     @property
+    def sentence(self) -> str:
+        """The plan in a sentence."""
+        if not self.effects:
+            return "Nothing can be planned: the model has no equilibrium at any of the rows."
+        seen = [v for v in self.effects if v.visible]
+        alone = [v for v in seen if not v.confused and not v.twins]
+        return (
+            f"Of {len(self.effects)} effects, {len(seen)} would show at a plausible size and "
+            f"{len(alone)} of these could be named; {100 * POWER:.0f} % of such are found, "
+            f"with {100 * LEVEL:.0f} % false alarms over all."
+        )
+
+    def lines(self) -> list[str]:
+        """The sentence, what to add, and the notes."""
+        add = [f"add: {item.words}" for item in self.suggestions if item.reached]
+        return [self.sentence, *add, *(f"note: {note}" for note in self.notes)]
+
+    def records(self) -> list[Record]:
+        """A record for each effect: how large it must be to show and to be named."""
+        return [
+            {
+                "effect": found.name,
+                "visible": found.visible,
+                "smallest_visible_in_plausible_sizes": found.factor,
+                "smallest_named_in_plausible_sizes": found.identifiable,
+                "cannot_be_told_from": ", ".join(
+                    [*found.twins, *(name for name, _left in found.confused)]
+                ),
+            }
+            for found in self.effects
+        ]
+
+    @property
     def converged(self) -> bool:
         """Whether the model rests at every planned row."""
         return not bool(self.planned.unsolved.any())
 
 
 def make_plan(
-    robot: Robot,
-    commands: Measurements,
+    robot: GivenRobot,
+    commands: Measurements | str | Path,
     sigma: Sigma | None = None,
     progress: Progress = lambda _text, _part: None,
 ) -> Plan:
     """What planned commands will show of each effect.
 
     Args:
-        robot: as described.
-        commands: planned poses or lengths.
+        robot: as described, or its MJCF.
+        commands: planned poses or lengths, or their file; readings in it are ignored.
         sigma: noise to expect; the commands' own by default. With a tension noise, tensions
             count as recorded.
         progress: called with what is being done and the part of it that is done.
     """
+    robot = robot_of(robot)
+    commands = commands_of(commands, robot)
     full, assumed = expected_sigma(robot, sigma or commands.sigma)
     reads = Reads.whole(robot.n_cables, tensions=full.tension_N is not None)
     plan = planned(robot, commands, full, reads)

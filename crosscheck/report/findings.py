@@ -8,7 +8,7 @@ import numpy as np
 
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
 from crosscheck.diagnosis.verdict import percent
-from crosscheck.fit.problem import KINDS, Rms
+from crosscheck.fit.words import rms_words
 from crosscheck.units import in_unit, parameter_name, short, with_error
 
 # Correlations above this are named; parameters beyond this many plausible sizes are doubtful.
@@ -82,7 +82,7 @@ def finding_card(found: Diagnosis, finding: MissingEffect) -> FindingCard:
         check=finding.check,
         parameters=rows,
         correlations=_correlations(found, finding),
-        errors=errors_of(finding.held_out_rms),
+        errors=rms_words(finding.held_out_rms),
     )
 
 
@@ -126,13 +126,3 @@ def _correlations(found: Diagnosis, finding: MissingEffect) -> list[str]:
     if len(ranked) > _MOST_CORRELATIONS:
         out.append(f"and {len(ranked) - _MOST_CORRELATIONS} more pairs")
     return out
-
-
-def errors_of(rms: Rms) -> str:
-    """The rms errors in a few words."""
-    parts = [
-        f"{short(value * kind.factor)} {kind.unit}"
-        for kind in KINDS
-        if (value := rms.get(kind.key)) is not None
-    ]
-    return ", ".join(parts)

@@ -12,9 +12,10 @@ from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import shown_stages, stages_of
 from crosscheck.files import write_text
 from crosscheck.fit.problem import Problem, kinds_read
+from crosscheck.fit.words import rms_words
 from crosscheck.report.cables import draw_wall, walls_of
 from crosscheck.report.confusion import confusion_of, draw_confusion
-from crosscheck.report.findings import errors_of, finding_card
+from crosscheck.report.findings import finding_card
 from crosscheck.report.tables import association_block, candidate_rows, checks
 from crosscheck.report.waterfall import waterfall
 from crosscheck.report.where import caption, failure_map
@@ -59,8 +60,8 @@ def _context(found: Diagnosis) -> dict[str, Any]:
         "verdict_name": found.verdict.heading,
         "verdict_meaning": found.verdict.meaning,
         "sentence": found.sentence,
-        "before": errors_of(found.before),
-        "floor": errors_of(found.floor),
+        "before": rms_words(found.before),
+        "floor": rms_words(found.floor),
         "notes": list(found.notes),
         "measure_next": list(found.measure_next),
         "findings": [finding_card(found, finding) for finding in found.missing],

@@ -1,1 +1,44 @@
 """SEECR held against MuJoCo, pose by pose: what `crosscheck run` does."""
+
+from __future__ import annotations
+
+from crosscheck.suite.cases import Case, select, shipped_cases, user_cases
+from crosscheck.suite.effects import (
+    GROUP,
+    PREFIX,
+    EffectCase,
+    EffectResult,
+    effect_cases,
+    run_effects,
+)
+from crosscheck.suite.junit import junit_xml
+from crosscheck.suite.pool import Pool
+from crosscheck.suite.results import Run, results_json
+from crosscheck.suite.run import CaseResult, run_suite
+from crosscheck.suite.summary import summary_md
+from crosscheck.suite.thresholds import Thresholds, load_thresholds, thresholds_toml
+from crosscheck.suite.worst_pose import write_worst_pose
+
+__all__ = [
+    "GROUP",
+    "PREFIX",
+    "Case",
+    "CaseResult",
+    "EffectCase",
+    "EffectResult",
+    "Pool",
+    "Run",
+    "Thresholds",
+    "effect_cases",
+    "junit_xml",
+    "load_thresholds",
+    "results_json",
+    "run_effects",
+    "run_suite",
+    "select",
+    "shipped_cases",
+    "summary_md",
+    "thresholds_toml",
+    "user_cases",
+    "write_worst_pose",
+]

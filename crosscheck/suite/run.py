@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from enum import Enum
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,21 +21,25 @@ from crosscheck.suite.agreement import (
     compare,
     ratios,
 )
-from crosscheck.suite.cases import Case
+from crosscheck.suite.cases import Case, shipped_cases
 from crosscheck.suite.mujoco_robot import MujocoRobot
 from crosscheck.suite.pool import Pool
-from crosscheck.suite.thresholds import Thresholds
+from crosscheck.suite.thresholds import Thresholds, load_thresholds
 from crosscheck.suite.verdicts import UNSOLVED, Answers, PoseFinding, Verdict, held_to, judge
 from seecr.equilibrium import solve as seecr_solve
 from seecr.errors import InputFileError
 from seecr.mjcf import load_robot
 from seecr.pose import Array
+from seecr.result import Record as Row
+from seecr.result import Result
 from seecr.robot import Robot
 from seecr.solution import Solution
 
 if TYPE_CHECKING:
     from crosscheck.settle.settler import SettlingBatch
 
+# Columns of poses in a data frame.
+_POSE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
 # SEECR takes microseconds: the best of this many runs is what it needs, the rest is the machine.
 _REPEATS = 3
 
@@ -84,8 +89,8 @@ class Worst:
         return {**asdict(self), "ratio": self.ratio}
 
 
-@dataclass(frozen=True, eq=False)
-class CaseResult:
+@dataclass(frozen=True, eq=False, repr=False)
+class CaseResult(Result):
     """One case as both physics answered it. All arrays have the n poses of the case in order.
 
     Attributes:
@@ -124,6 +129,35 @@ class CaseResult:
 
     def __len__(self) -> int:
         return len(self.verdict)
+
+    def lines(self) -> list[str]:
+        """How it ended, the worst difference, and each pose that does not simply agree."""
+        from crosscheck.suite import words
+
+        pair = worst_of([self])
+        remarks = words.remarks(self)
+        return [
+            f"{self.case.name}: {self.outcome.value}, {len(self)} poses"
+            + (f" ({remarks})" if remarks else ""),
+            words.worst_sentence(pair),
+            *words.failures(self),
+            *words.findings(self),
+        ]
+
+    def records(self) -> list[Row]:
+        """A record for each pose: what was commanded, what both say of it, how far apart [SI]."""
+        differences = {name: getattr(self.difference, name) for name in QUANTITIES}
+        columns = {
+            **{f"cmd_{c}": self.case.poses[:, k] for k, c in enumerate(_POSE)},
+            **{f"seecr_{c}": self.solution.pose[:, k] for k, c in enumerate(_POSE)},
+            **{f"mujoco_{c}": self.settling.pose[:, k] for k, c in enumerate(_POSE)},
+            **{f"difference_{name}": values for name, values in differences.items()},
+        }
+        return [
+            {"pose": i, "verdict": self.verdict[i].name.lower()}
+            | {name: float(values[i]) for name, values in columns.items()}
+            for i in range(len(self))
+        ]
 
     def count(self, verdict: Verdict) -> int:
         """Number of poses with a verdict."""
@@ -212,8 +246,8 @@ def run_case(case: Case, thresholds: Thresholds, record: Record | None = None) -
 
 
 def run_suite(
-    cases: Sequence[Case],
-    thresholds: Thresholds,
+    cases: Sequence[Case] | None = None,
+    thresholds: Thresholds | str | Path | None = None,
     *,
     jobs: int = 1,
     record: Record | None = None,
@@ -223,8 +257,8 @@ def run_suite(
     """Run cases, several at a time.
 
     Args:
-        cases: what to run.
-        thresholds: what counts as agreement.
+        cases: what to run; all shipped ones if not given.
+        thresholds: what counts as agreement, or a file of it; the shipped ones if not given.
         jobs: how many at a time.
         record: see :func:`run_case`; of a module, so that other processes find it.
         progress: called with each result as it comes.
@@ -233,8 +267,12 @@ def run_suite(
     Returns:
         the results in the order of the cases.
     """
+    if cases is None:
+        cases = shipped_cases()
     if not cases:
         return []
+    if not isinstance(thresholds, Thresholds):
+        thresholds = load_thresholds(thresholds)
     if pool is None:
         with Pool(min(jobs, len(cases))) as own:
             return run_suite(cases, thresholds, record=record, progress=progress, pool=own)

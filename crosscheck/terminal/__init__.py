@@ -1,1 +1,35 @@
 """Results as text for people; nothing is computed here."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from crosscheck.lazy import lazily
+
+if TYPE_CHECKING:
+    from crosscheck.terminal.addition import print_addition
+    from crosscheck.terminal.comparison import print_comparison
+    from crosscheck.terminal.diagnosis import print_diagnosis
+    from crosscheck.terminal.plan import plan_json, print_plan
+    from crosscheck.terminal.suite import print_run
+
+# Each imports what it prints: a command loads its own alone.
+_WHERE = {
+    "plan_json": "plan",
+    "print_addition": "addition",
+    "print_comparison": "comparison",
+    "print_diagnosis": "diagnosis",
+    "print_plan": "plan",
+    "print_run": "suite",
+}
+
+__all__ = [
+    "plan_json",
+    "print_addition",
+    "print_comparison",
+    "print_diagnosis",
+    "print_plan",
+    "print_run",
+]
+
+__getattr__ = lazily(__name__, _WHERE)

@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from crosscheck.fit.problem import KINDS, Kind, Rms
-from crosscheck.units import in_unit, parameter_name
+from crosscheck.fit.words import value_lines
 from seecr.effects.base import Layout
 from seecr.pose import Array
 
@@ -42,24 +42,16 @@ def say(console: Console, line: str, style: str = "") -> None:
     console.print(Text(line, style=style), soft_wrap=True)
 
 
-def shown(value: float, unit: str) -> str:
-    """A number with its unit as people read it."""
-    factor, word = in_unit(unit)
-    return f"{factor * value:.4g} {word}".strip()
-
-
 def print_parameters(
     console: Console, layout: Layout, values: Array, stderr: Array,
     stopped: NDArray[np.bool_], most: int, file: str,
 ) -> None:  # fmt: skip
     """A line for each of an effect's parameters, ``most`` of them; the rest are in ``file``."""
-    rows = list(zip(layout.names, layout.units, values, stderr, stopped, strict=True))
-    for name, unit, value, error, bound in rows[:most]:
-        spread = f"+- {shown(error, unit)}" if np.isfinite(error) else "not seen by these data"
-        stop = " (at its bound)" if bound else ""
-        say(console, f"  {parameter_name(name, unit)} = {shown(value, unit)} {spread}{stop}")
-    if len(rows) > most:
-        say(console, f"  and {len(rows) - most} more in {file}")
+    lines = list(value_lines(layout, values, stderr, stopped))
+    for line in lines[:most]:
+        say(console, f"  {line}")
+    if len(lines) > most:
+        say(console, f"  and {len(lines) - most} more in {file}")
 
 
 def rms_table(title: str, rows: Sequence[tuple[str, Rms, str]]) -> Table:

@@ -10,10 +10,11 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from crosscheck.fit.words import shown
 from crosscheck.planning.design import Plan, Visible
 from crosscheck.planning.proposer import Gain, Suggestion
 from crosscheck.planning.visibility import LEVEL, POWER
-from crosscheck.terminal.lines import console_for, say, shown
+from crosscheck.terminal.lines import console_for, say
 from seecr.pose import rotvec_from_quat
 
 _MOST_GAINS, _MOST_NAMES, _MOST_SLACK = 3, 4, 5
@@ -53,7 +54,7 @@ def print_plan(plan: Plan, out: Path, console: Console | None = None) -> None:
     for name, why in plan.missing.items():
         say(console, f"{name}: not with these data: {why.words}", "dim")
     _print_slack(console, plan)
-    say(console, sentence(plan), "bold")
+    say(console, plan.sentence, "bold")
     for suggestion in plan.suggestions:
         _print_suggestion(console, suggestion)
     say(console, f"Results in {out}/", "dim")
@@ -78,19 +79,6 @@ def alike(found: Visible) -> str:
         return "(a plausible size does not show)"
     rest = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
     return ", ".join(names[:_MOST_NAMES]) + rest
-
-
-def sentence(plan: Plan) -> str:
-    """The plan in a sentence."""
-    if not plan.effects:
-        return "Nothing can be planned: the model has no equilibrium at any of the rows."
-    seen = [v for v in plan.effects if v.visible]
-    alone = [v for v in seen if not v.confused and not v.twins]
-    return (
-        f"Of {len(plan.effects)} effects, {len(seen)} would show at a plausible size and "
-        f"{len(alone)} of these could be named; {100 * POWER:.0f} % of such are found, "
-        f"with {100 * LEVEL:.0f} % false alarms over all."
-    )
 
 
 def _print_slack(console: Console, plan: Plan) -> None:
@@ -132,12 +120,12 @@ def gain_words(gain: Gain) -> str:
     return f"shows {gain.effect} {numbers}"
 
 
-def as_json(plan: Plan) -> dict[str, Any]:
+def plan_json(plan: Plan) -> dict[str, Any]:
     """The content of ``plan.json``, SI."""
     problem = plan.planned.problem
     names, table = plan.confusion
     return {
-        "sentence": sentence(plan),
+        "sentence": plan.sentence,
         "robot": problem.robot.name,
         "poses": str(problem.data.path),
         "rows": {"all": problem.data.n_rows, "used": int(problem.use.sum())},

@@ -8,3 +8,10 @@ Shared with seecr are the effects' names and parameters and the robot's numbers,
 What MuJoCo has no law for is added cable by cable, between settlings, until MuJoCo's own
 equilibrium holds with it: hysteresis, creep and friction (see :mod:`crosscheck.twin.springs`).
 """
+
+from __future__ import annotations
+
+from crosscheck.twin.answer import unseal
+from crosscheck.twin.make import FILES, Twin, make_twin
+
+__all__ = ["FILES", "Twin", "make_twin", "unseal"]

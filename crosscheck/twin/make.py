@@ -28,6 +28,7 @@ from seecr.commands import Commands
 from seecr.effects import Term
 from seecr.mjcf import load_robot
 from seecr.pose import Array, quat_from_rotvec, quat_multiply
+from seecr.result import Record, Result
 from seecr.robot import Robot
 
 # Noise of a tracker, over the mean cable length (30 micrometres on a DemoBot), and of its angles.
@@ -43,9 +44,12 @@ _AT_REST = 0.95
 
 Progress = Callable[[int, str], None]
 
+FILES = ("robot.xml", "measured.csv", "measured.toml", NAME)
+"""What a case's folder holds."""
 
-@dataclass(frozen=True, eq=False)
-class Twin:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Twin(Result):
     """A twin as made; what it hides is in ``hidden`` and, on disk, sealed.
 
     Attributes:
@@ -76,6 +80,15 @@ class Twin:
             "sigma": self.answer.sigma,
             "notes": self.notes,
         }
+
+    def lines(self) -> list[str]:
+        """What was measured; not what is hidden."""
+        head = f"twin of {self.robot.name}, what it hides is in .hidden"
+        return [head, *self.measured.lines(), *(f"note: {note}" for note in self.notes)]
+
+    def records(self) -> Sequence[Record]:
+        """A record for each row of the measurements."""
+        return self.measured.records()
 
 
 def make_twin(

@@ -143,7 +143,7 @@ def test_all_slack_rows_end_3(tmp_path):
     robot = soft_cogiro()
     loose = replace(robot, gravity=np.zeros(3), rest_lengths=robot.rest_lengths + 1.0)
     with pytest.raises(CrosscheckError, match="equilibrium") as error:
-        add_effect(loose, measured(robot), (), "stiffness")
+        add_effect(loose, measured(robot), "stiffness")
     assert error.value.exit_status == 3
 
 
@@ -153,7 +153,7 @@ def test_values_on_a_bound_are_warned_of():
     plain = measured(robot)
     bent = measured(robot, [term(robot, "pulley_radius", radius_m=0.002)])
     mirrored = replace(plain, position=2 * plain.position - bent.position)
-    found = add_effect(robot, mirrored, (), "pulley_radius")
+    found = add_effect(robot, mirrored, "pulley_radius")
     assert found.own.at_bound[0] and not found.pays
     assert any("radius_m ended on a bound" in w for w in found.warnings)
 
@@ -163,7 +163,7 @@ def test_an_outlying_row_is_left_out_and_named():
     data = measured(robot, [term(robot, "stiffness", factor=1.4)])
     position = data.position.copy()
     position[20, 1] += 0.01
-    found = add_effect(robot, replace(data, position=position), (), "stiffness")
+    found = add_effect(robot, replace(data, position=position), "stiffness")
     assert any(f"line {data.line[20]} left out: outliers" in note for note in found.notes)
     value, error = found.own.term.vector[0], found.own.stderr[0]
     assert abs(value - 1.4) < 4 * error and error < 0.05
@@ -172,6 +172,6 @@ def test_an_outlying_row_is_left_out_and_named():
 def test_effects_that_go_together_are_named():
     robot = soft_cogiro()
     data = measured(robot, [term(robot, "stiffness", factor=1.4)])
-    found = add_effect(robot, data, [term(robot, "stiffness", factor=1.4)], "platform_mass")
+    found = add_effect(robot, data, "platform_mass", [term(robot, "stiffness", factor=1.4)])
     assert not found.pays  # mass and stiffness move a robot alike
     assert any("hardly determined apart" in w or "not seen" in w for w in found.warnings)

@@ -265,12 +265,12 @@ def test_an_output_folder_that_cannot_be_written(tmp_path):
 
 
 def test_an_error_half_way_leaves_nothing(tmp_path, monkeypatch):
-    from crosscheck.suite import worst_pose
+    from crosscheck import suite
 
     def full(*arguments):
         raise OSError(28, "No space left on device", "results.json")
 
-    monkeypatch.setattr(worst_pose, "write_worst_pose", full)
+    monkeypatch.setattr(suite, "write_worst_pose", full)
     assert "results.json: No space left on device" in refused(*SMALL, "--out", tmp_path / "out")
     assert not (tmp_path / "out").exists()
 

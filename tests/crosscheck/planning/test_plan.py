@@ -19,7 +19,7 @@ from crosscheck.planning.greedy import Wanted, chosen_poses
 from crosscheck.planning.planned import near_slack
 from crosscheck.planning.proposer import MORE_POSES
 from crosscheck.planning.visibility import joined, left_over, needed, signals, signals_like
-from crosscheck.terminal.plan import as_json, size_words
+from crosscheck.terminal.plan import plan_json, size_words
 from seecr.effects import Terms
 from seecr.mjcf import load_robot
 from seecr.pose import rotvec_from_quat
@@ -225,9 +225,9 @@ def test_a_planar_robot_and_commanded_lengths(robot, few):
 
 def test_constant_commands_and_slack_rows(robot, commands):
     still = make_plan(robot, commands.rows(np.zeros(12, dtype=int)))
-    json_text(as_json(still))
+    json_text(plan_json(still))
     loose = replace(robot, gravity=np.zeros(3), rest_lengths=robot.rest_lengths + 1.0)
     found = make_plan(loose, commands)
     assert not found.converged and found.effects == ()
     assert "left out" in found.notes[0]
-    json_text(as_json(found))
+    json_text(plan_json(found))

@@ -14,10 +14,10 @@ from crosscheck.add import add_effect
 from crosscheck.comparison.limits import Limits, check
 from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.result import Comparison
+from crosscheck.fit.words import shown
 from crosscheck.terminal.addition import print_addition, why_not
 from crosscheck.terminal.comparison import print_comparison
 from crosscheck.terminal.diagnosis import print_diagnosis
-from crosscheck.terminal.lines import shown
 
 
 def console() -> tuple[Console, StringIO]:

@@ -1,0 +1,61 @@
+"""Errors and fitted values as people read them, and as rows of a data frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.fit.problem import KINDS, Rms
+from crosscheck.units import in_unit, parameter_name, short
+from seecr.effects.base import Layout
+from seecr.pose import Array
+from seecr.result import Record
+
+
+def rms_words(rms: Rms) -> str:
+    """The rms errors in a few words, such as "0.0309 mm, 0.0202 deg"."""
+    parts = [
+        f"{short(value * kind.factor)} {kind.unit}"
+        for kind in KINDS
+        if (value := rms.get(kind.key)) is not None
+    ]
+    return ", ".join(parts)
+
+
+def shown(value: float, unit: str) -> str:
+    """A number with its unit as people read it."""
+    factor, word = in_unit(unit)
+    return f"{factor * value:.4g} {word}".strip()
+
+
+def value_lines(
+    layout: Layout, values: Array, stderr: Array, at_bound: NDArray[np.bool_]
+) -> Iterator[str]:
+    """A line for each parameter (p,) of an effect: its name, value and standard error."""
+    for name, unit, value, error, bound in zip(
+        layout.names, layout.units, values, stderr, at_bound, strict=True
+    ):
+        spread = f"+- {shown(error, unit)}" if np.isfinite(error) else "not seen by these data"
+        stop = " (at its bound)" if bound else ""
+        yield f"{parameter_name(name, unit)} = {shown(value, unit)} {spread}{stop}"
+
+
+def value_records(
+    layout: Layout, values: Array, stderr: Array, at_bound: NDArray[np.bool_]
+) -> Iterator[Record]:
+    """A record for each parameter (p,) of an effect, in SI; None where the data see nothing."""
+    for name, unit, value, error, bound in zip(
+        layout.names, layout.units, values, stderr, at_bound, strict=True
+    ):
+        seen: Any = float(error) if np.isfinite(error) else None
+        yield {
+            "effect": layout.name,
+            "parameter": name,
+            "value": float(value),
+            "stderr": seen,
+            "unit": unit,
+            "at_bound": bool(bound),
+        }

@@ -1,0 +1,132 @@
+"""Paths and loaded objects give the same; results print, show themselves, and give data frames."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from tempfile import mkdtemp
+
+import numpy as np
+import pytest
+from made_data import measured, term
+from made_diagnoses import SIGMA
+
+import crosscheck
+import seecr
+from crosscheck.suite.cases import Case, select, shipped_cases
+from seecr.result import Result
+
+ROBOT = seecr.model_path("planar_vertical")
+
+
+@cache
+def data_file() -> Path:
+    """Poses and tensions of a planar robot with pulleys of 10 mm, as a CSV."""
+    robot = seecr.load_robot(ROBOT)
+    terms = [term(robot, "pulley_radius", radius_m=0.01)]
+    path = Path(mkdtemp()) / "measured.csv"
+    data = measured(robot, terms, points=6, sigma=SIGMA, tensions=True)
+    crosscheck.write_measurements(path, data)
+    return path
+
+
+@cache
+def found() -> crosscheck.Diagnosis:
+    return crosscheck.diagnose(ROBOT, data_file())
+
+
+@cache
+def case() -> Case:
+    return select(shipped_cases(), ["planar-horizontal-*"])[0]
+
+
+@cache
+def result_of(name: str) -> Result:
+    """One result of each function."""
+    functions = {
+        "Measurements": lambda: crosscheck.load_measurements(data_file(), ROBOT),
+        "Comparison": lambda: crosscheck.compare(str(ROBOT), str(data_file())),
+        "Diagnosis": found,
+        "Addition": lambda: crosscheck.add_effect(ROBOT, data_file(), "pulley_radius"),
+        "Plan": lambda: crosscheck.make_plan(ROBOT, data_file()),
+        "Twin": lambda: crosscheck.make_twin(ROBOT, 1, points=4),
+        "CaseResult": lambda: crosscheck.run_suite([case()])[0],
+    }
+    made: Result = functions[name]()
+    return made
+
+
+NAMES = ["Measurements", "Comparison", "Diagnosis", "Addition", "Plan", "Twin", "CaseResult"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_result_shows_itself(name: str) -> None:
+    result = result_of(name)
+    assert type(result) is getattr(crosscheck, name)
+    lines = str(result).split("\n")
+    assert 1 <= len(lines) <= 60 and all(0 < len(line) < 400 for line in lines)
+    assert repr(result) == str(result)
+    page = result._repr_html_()
+    frame = result.to_frame()
+    assert frame.num_rows == len(result.records()) > 0
+    assert all(f"<th>{head}</th>" in page for head in frame.column_names)
+
+
+def test_objects_give_what_paths_give() -> None:
+    robot = seecr.load_robot(ROBOT)
+    data = crosscheck.load_measurements(data_file(), robot)
+    assert data.to_frame().equals(result_of("Measurements").to_frame())
+    again = crosscheck.compare(robot, data)
+    assert again.to_frame().equals(result_of("Comparison").to_frame())
+    plan = crosscheck.make_plan(robot, crosscheck.load_commands(data_file(), robot))
+    assert plan.to_frame().equals(result_of("Plan").to_frame())
+
+
+def test_what_was_found_is_the_next_model() -> None:
+    """As terms, as a model and as a file; what is left is noise in each."""
+    robot = seecr.load_robot(ROBOT)
+    assert [t.name for t in found().terms] == ["pulley_radius"]
+    left = crosscheck.compare(ROBOT, data_file(), found().terms)
+    assert left.is_noise and not crosscheck.compare(ROBOT, data_file()).is_noise
+    value = float(found().terms["pulley_radius"].vector[0])
+    path = data_file().with_name("model.toml")
+    path.write_text(
+        f'format = 1\n[[effect]]\nname = "pulley_radius"\nparameters = {{radius_m = {value!r}}}\n'
+    )
+    for model in (path, str(path), seecr.load_model(path, robot)):
+        assert crosscheck.compare(ROBOT, data_file(), model).rms == left.rms
+    assert crosscheck.diagnose(ROBOT, data_file(), path).missing == ()
+
+
+def test_a_diagnosis_reads_like_one() -> None:
+    text = str(found())
+    assert text.startswith("effects_found: ")
+    assert "\n+ pulley_radius: " in text and "(on runs left out " in text
+    assert "\nnoise alone: " in text and "    check: " in text
+    (row,) = found().to_frame().to_pylist()
+    assert row["effect"] == "pulley_radius" and row["parameter"] == "radius_m"
+    assert row["value"] == pytest.approx(0.01, abs=4 * row["stderr"])
+
+
+def test_frames_hold_what_the_csv_holds() -> None:
+    data = crosscheck.load_measurements(data_file(), ROBOT)
+    frame = data.to_frame()
+    header = data_file().read_text().split("\n", 1)[0].split(",")
+    assert set(header) <= set(frame.column_names)
+    assert np.array_equal(frame["meas_x_m"].to_numpy(), data.position[:, 0])
+    assert np.array_equal(frame["tension_2_N"].to_numpy(), data.tensions[:, 1])
+
+
+def test_a_twin_does_not_tell() -> None:
+    twin = crosscheck.make_twin(ROBOT, 1, effects=("platform_mass",), points=4)
+    assert "platform_mass" not in str(twin) + twin._repr_html_()
+
+
+def test_bad_input_is_told_as_by_the_commands(tmp_path: Path) -> None:
+    gone = tmp_path / "gone.csv"
+    with pytest.raises(seecr.InputFileError, match=r"gone\.csv: no such file"):
+        crosscheck.diagnose(ROBOT, gone)
+    with pytest.raises(seecr.SeecrError, match=r"gone\.xml"):
+        crosscheck.compare(tmp_path / "gone.xml", gone)
+    with pytest.raises(seecr.InputFileError, match=r"gone\.toml"):
+        crosscheck.add_effect(ROBOT, data_file(), "stiffness", tmp_path / "gone.toml")

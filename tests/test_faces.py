@@ -1,0 +1,107 @@
+"""What `import seecr` and `import crosscheck` give: documented names that nothing hides.
+
+Commands are built of those names, and of the names that folders and files declare in `__all__`.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from test_imports import modules, name_of
+
+import crosscheck
+import seecr
+from seecr.result import Result
+
+ROOT = Path(__file__).resolve().parents[1]
+FACES = [seecr, crosscheck]
+COMMANDS = [path for path in modules("crosscheck") if path.parent.name == "cli"]
+RESULTS = [
+    crosscheck.Addition,
+    crosscheck.CaseResult,
+    crosscheck.Comparison,
+    crosscheck.Diagnosis,
+    crosscheck.Measurements,
+    crosscheck.Plan,
+    crosscheck.Twin,
+]
+
+
+@pytest.mark.parametrize("face", FACES, ids=lambda face: face.__name__)
+def test_every_public_name_is_there_and_documented(face: ModuleType) -> None:
+    assert face.__all__ == sorted(face.__all__)
+    for name in face.__all__:
+        found = getattr(face, name)
+        assert inspect.getdoc(found), name
+        if inspect.isfunction(found) and len(inspect.signature(found).parameters) > 2:
+            assert "Args:" in str(found.__doc__), name
+    with pytest.raises(AttributeError, match=r"has no attribute 'nothing'"):
+        face.nothing  # noqa: B018
+
+
+def test_no_module_hides_a_public_name() -> None:
+    """Importing a module makes it an attribute of its package: of another name than a function."""
+    every = [name_of(path) for package in ("seecr", "crosscheck") for path in modules(package)]
+    code = f"""
+import importlib, types
+for name in {every!r}:
+    importlib.import_module(name)
+for name in {[f.__name__ for f in FACES]!r}:
+    face = importlib.import_module(name)
+    hidden = [n for n in face.__all__ if isinstance(getattr(face, n), types.ModuleType)]
+    print(*hidden)
+"""
+    run = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True
+    )
+    assert run.stdout.split() == []
+
+
+def taken(path: Path) -> set[tuple[str, str]]:
+    """(module, name) of everything that a source imports of the two packages."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {(alias.name, "") for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            found |= {(str(node.module), alias.name) for alias in node.names}
+    return {(m, n) for m, n in found if m.split(".")[0] in ("seecr", "crosscheck")}
+
+
+def is_public(module: str, name: str) -> bool:
+    """Whether a package, folder or file declares the name."""
+    own = module.startswith("crosscheck.cli")
+    return own or name in {*getattr(import_module(module), "__all__", ()), "__version__"}
+
+
+@pytest.mark.parametrize("path", COMMANDS, ids=lambda path: path.stem)
+def test_commands_use_public_names_alone(path: Path) -> None:
+    private = {f"{module}.{name}" for module, name in taken(path) if not is_public(module, name)}
+    assert private == set()
+
+
+def test_a_private_name_is_seen() -> None:
+    assert not is_public("crosscheck.fit.state", "evaluate")
+    assert not is_public("crosscheck.files", "_missing")
+    assert is_public("crosscheck.files", "staged") and is_public("crosscheck", "diagnose")
+
+
+def test_only_commands_use_the_faces() -> None:
+    """They stand on all floors: through them anything could import anything."""
+    public = {(face.__name__, name) for face in FACES for name in face.__all__}
+    for path in modules("seecr") + modules("crosscheck"):
+        if path not in COMMANDS:
+            assert taken(path) & public == set(), path
+
+
+@pytest.mark.parametrize("result", RESULTS, ids=lambda result: result.__name__)
+def test_results_show_themselves(result: type) -> None:
+    assert issubclass(result, Result)
+    assert result.__repr__ is Result.__repr__ and result.__str__ is Result.__str__
