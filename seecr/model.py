@@ -17,9 +17,10 @@ by hand: name, parameters and values are all that is needed.
 
 from __future__ import annotations
 
+import copy
 import difflib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, MutableMapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,7 +30,7 @@ import tomlkit
 from tomlkit import TOMLDocument
 from tomlkit.exceptions import TOMLKitError
 
-from seecr.effects import Term, Terms, effect_named, layout_of
+from seecr.effects import Term, Terms, catalogue, effect_named, layout_of
 from seecr.effects.base import Layout
 from seecr.errors import InputError, InputFileError
 from seecr.files import read_text
@@ -144,6 +145,7 @@ def load_model(path: str | Path, robot: Robot) -> Model:
     notes = check_robot(path, document.get("robot"), robot)
     terms: list[Term] = []
     errors: dict[str, Array] = {}
+    notes = (*notes, *_migrate(where, document))
     for k, table in enumerate(_effect_tables(where, document)):
         term, stderr = _term(where, k, table, robot)
         if term.name in errors:
@@ -209,6 +211,22 @@ def _effect_tables(where: _Where, document: Mapping[str, Any]) -> Sequence[Mappi
     if not isinstance(tables, list) or not all(isinstance(t, Mapping) for t in tables):
         raise where.error("effect: expected tables [[effect]], one per effect", key="effect")
     return tables
+
+
+def _migrate(where: _Where, document: Mapping[str, Any]) -> list[str]:
+    """Put parameters that had another name when the model was written under those of today."""
+    notes = []
+    for table in _effect_tables(where, document):
+        given, name = table.get("parameters"), table.get("name")
+        if not isinstance(given, MutableMapping) or name not in catalogue():
+            continue
+        for old, now in catalogue()[str(name)].renamed.items():
+            if old in given:
+                cell = given.pop(old)
+                for key in now:
+                    given.setdefault(key, copy.deepcopy(cell))
+                notes.append(f"effect {name}: {old} is read as {' and '.join(now)}, as it is now")
+    return notes
 
 
 def _term(where: _Where, k: int, table: Mapping[str, Any], robot: Robot) -> tuple[Term, Array]:

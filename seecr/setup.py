@@ -137,8 +137,12 @@ class Setup:
         column=columns.WINCH_SIDE,
     )  # fmt: skip
     compliance: Array = quantity(
-        "of the exit points along their cables", "m/N", ("cables",), column=columns.COMPLIANCE
+        "of the exit points, sideways", "m/N", ("cables",), column=columns.COMPLIANCE
     )
+    lift: Array = quantity(
+        "compliance of the exit points upwards less that sideways", "m/N", ("cables",),
+        column=columns.LIFT,
+    )  # fmt: skip
     cable_weight: Array = quantity(
         "weight per metre of cable", "N/m", ("cables",), column=columns.WEIGHT
     )

@@ -115,9 +115,9 @@ def _linearise(setup: Setup, strains: Array, cables: Array) -> None:
 
 
 def _hanging(setup: Setup) -> Array:
-    """Vertical of the planes in which cables hang: gravity's, or the pulleys' own."""
+    """Vertical of the planes in which cables hang: gravity's, or that of pulleys and frame."""
     g = np.linalg.norm(setup.gravity)
-    if g == 0.0 or np.any(setup.pulley_radius):
+    if g == 0.0 or np.any(setup.pulley_radius) or np.any(setup.lift):
         return setup.robot.up
     return -setup.gravity / g
 

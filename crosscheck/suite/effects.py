@@ -62,6 +62,7 @@ class Against(Enum):
 _OURS = frozenset(
     {
         "cable_length_offset",
+        "length_scale",
         "drum_gain",
         "drum_eccentricity",
         "backlash",

@@ -10,9 +10,10 @@ Each part is there only where an effect asks for it:
   from outside: MuJoCo wraps geodesics of the cylinder, on which a free swivel turns away from
   its cable, because nothing keeps the cable in its groove.
 - winch site: on a slider below A whose spring is the elastic cable behind the exit point.
-- exit site: on three slides whose springs are the frame's compliance. With a sheave, whose own
-  load is not along the cable, the compliance sits in the winch's slider instead, where it acts
-  along the cable as the effect says.
+- exit site: on slides whose springs are the frame's compliance, sideways and upwards. With a
+  sheave, whose own load is not along the cable, the compliance sits in the winch's slider
+  instead, where it acts along the cable as the effect says: there it has to be alike in all
+  directions.
 - point masses: one between two segments, half a one on the platform.
 """
 
@@ -94,7 +95,7 @@ def tail_of(true: TrueRobot) -> float:
 
 def _yields(true: TrueRobot) -> bool:
     """Whether exit points are on springs of their own."""
-    return true.compliance > 0 and true.pulley_radius == 0
+    return max(true.compliance, true.compliance_up) > 0 and true.pulley_radius == 0
 
 
 def _slides(true: TrueRobot) -> bool:
@@ -141,9 +142,9 @@ def _add_exit(spec: mujoco.MjSpec, true: TrueRobot, i: int) -> None:
         carrier = spec.worldbody.add_body(name=f"x{i}", pos=origin)
         origin = np.zeros(3)
         _give_mass(carrier, _SMALL_MASS * true.mass, true.robot.length)
-        for axis in np.eye(3):
+        for axis, soft in _soft_axes(true):
             joint = carrier.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
-            joint.stiffness = [1.0 / true.compliance, 0.0, 0.0]
+            joint.stiffness = [1.0 / soft, 0.0, 0.0]
     carrier.add_site(name=f"a{i}", pos=origin)
     winch = origin - tail_of(true) * true.up
     if _slides(true):
@@ -152,6 +153,13 @@ def _add_exit(spec: mujoco.MjSpec, true: TrueRobot, i: int) -> None:
         carrier.add_site(name=f"p{i}", pos=winch)
     if true.pulley_radius:
         _add_sheave(spec, true, i)
+
+
+def _soft_axes(true: TrueRobot) -> list[tuple[Array, float]]:
+    """Directions in which exit points yield, with their compliance [m/N]."""
+    across = np.linalg.svd(true.up[None])[2][1:]
+    soft = [(axis, true.compliance) for axis in across] + [(true.up, true.compliance_up)]
+    return [(axis, by) for axis, by in soft if by > 0.0]
 
 
 def _add_winch(carrier: mujoco.MjsBody, true: TrueRobot, i: int, place: Array) -> None:

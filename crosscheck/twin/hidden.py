@@ -18,6 +18,8 @@ _SHARES = (0.2, 0.6, 0.2)
 _ONE, _SEVERAL = (1.0, 2.0), (0.5, 2.0)
 # A cable that loses stiffness as it stretches breaks in the end: these only stiffen.
 _UPWARDS = ("nonlinear_elasticity",)
+# Never drawn, since another contains it: all drums alike is a case of the drums' gains.
+_CONTAINED = {"length_scale"}
 # Sheaves need anchor points this far aside of exit points, in cable lengths.
 _ASIDE = 0.15
 
@@ -64,12 +66,20 @@ def choose(
             raise CrosscheckError(f"effect {name}: no truth with MuJoCo, so no twin can hide it")
     if len(set(names)) != len(names):
         raise CrosscheckError(f"effects {', '.join(names)}: expected each at most once")
-    return [_with_numbers(layout_of(effect_named(name), robot), robot, random) for name in names]
+    drawn = [_with_numbers(layout_of(effect_named(name), robot), robot, random) for name in names]
+    return [_alike_both_ways(one) if "pulley_radius" in names else one for one in drawn]
+
+
+def _alike_both_ways(hidden: Term) -> Term:
+    """Beside sheaves MuJoCo's truth has frames that yield the same sideways and upwards only."""
+    if hidden.name != "frame_compliance":
+        return hidden
+    return Term(hidden.layout, np.full(2, hidden.vector[0]))
 
 
 def _drawn(robot: Robot, random: Generator, count: int | None, tensions: bool) -> list[str]:
     without = set() if tensions else {"tension_scale"}
-    without |= set() if _room_for_sheaves(robot) else {"pulley_radius"}
+    without |= _CONTAINED | (set() if _room_for_sheaves(robot) else {"pulley_radius"})
     known = [name for name in TRUE_EFFECTS if name not in without]
     if count is None:
         count = int(random.choice(len(_SHARES), p=_SHARES))

@@ -189,4 +189,5 @@ def _zero(true: TrueRobot) -> Array:
 
 def _bare(true: TrueRobot) -> TrueRobot:
     """The robot with nothing that moves but the platform and its sheaves."""
-    return replace(true, cable_weight=0.0, compliance=0.0, winch_side=0.0, friction=0.0)
+    rigid = replace(true, compliance=0.0, compliance_up=0.0, winch_side=0.0)
+    return replace(rigid, cable_weight=0.0, friction=0.0)

@@ -32,7 +32,8 @@ class TrueRobot:
         exit_points, anchor_points: (m, 3) [m] where they really are.
         mass: [kg]; centre_of_mass: (3,) [m]; gravity: (3,) [m/s^2]; wrench: (6,) [N, N m].
         ea: (m,) [N]; quadratic, cubic: of T = EA (eps + quadratic eps^2 + cubic eps^3).
-        pulley_radius: [m]; winch_side: [m]; compliance: [m/N]; cable_weight: [N/m].
+        pulley_radius: [m]; winch_side: [m]; cable_weight: [N/m].
+        compliance, compliance_up: [m/N] of the exit points, sideways and upwards.
         friction: exponent of the capstan.
         hysteresis: amplitude [N]; hysteresis_stretch: [m].
         creep: part of the elastic strain; creep_time: [s].
@@ -58,6 +59,7 @@ class TrueRobot:
     pulley_radius: float = 0.0
     winch_side: float = 0.0
     compliance: float = 0.0
+    compliance_up: float = 0.0
     cable_weight: float = 0.0
     friction: float = 0.0
     hysteresis: float = 0.0
@@ -114,12 +116,26 @@ def true_robot(robot: Robot, effects: Sequence[Effect] = ()) -> TrueRobot:
                 f"effect {effect.name}: no truth with MuJoCo; expected one of "
                 f"{', '.join(TRUE_EFFECTS)}"
             )
+    if true.pulley_radius and true.compliance != true.compliance_up:
+        raise CrosscheckError(
+            f"frame_compliance {true.compliance:g} m/N sideways and {true.compliance_up:g} m/N "
+            "upwards: no truth with MuJoCo beside pulley_radius; expected the same both ways"
+        )
     return true
 
 
 def _zero_pose(true: TrueRobot, effect: Any) -> None:
     turned = quat_multiply(quat_from_rotvec(effect.rotation), true.zero_pose[3:])
     true.zero_pose = np.concatenate([true.zero_pose[:3] + effect.position, turned])
+
+
+def _yielding(true: TrueRobot, effect: Any) -> None:
+    true.compliance += effect.sideways
+    true.compliance_up += effect.upwards
+
+
+def _length_scale(true: TrueRobot, effect: Any) -> None:
+    true.gain = true.gain + effect.factor
 
 
 def _exit_friction(true: TrueRobot, effect: Any) -> None:
@@ -212,6 +228,7 @@ _BODILY: dict[str, Callable[[TrueRobot, Any], None]] = {
     "cable_length_offset": _add("offset", "offset"),
     "initial_pose_error": _zero_pose,
     "drum_gain": _add("gain", "gain"),
+    "length_scale": _length_scale,
     "drum_eccentricity": _eccentricity,
     "backlash": _add("backlash", "gap"),
     "thermal_expansion": _thermal,
@@ -226,7 +243,7 @@ _BODILY: dict[str, Callable[[TrueRobot, Any], None]] = {
     "hysteresis": _hysteresis,
     "creep": _creep,
     "exit_friction": _exit_friction,
-    "frame_compliance": _add("compliance", "compliance"),
+    "frame_compliance": _yielding,
     "platform_mass": _add("mass", "added"),
     "centre_of_mass": _add("centre_of_mass", "shift"),
     "external_wrench": _wrench,

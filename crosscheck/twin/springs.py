@@ -51,7 +51,8 @@ class Cable:
     Attributes:
         true: the robot; ea: [N].
         rest: paid-out length [m].
-        stretch, pull: e = l0 eps [m] and Dahl's part of the tension [N] when it last rested.
+        stretch, pull: e = l0 eps [m] and Dahl's part of the tension [N] when it last pulled: a
+            slack cable keeps those at which its tension ended, and pulls again from there.
         crept: creep strain then.
         creep_by_tension: creep strain by the end of this step per newton of tension at its end.
         winch_tension: [N] behind the exit point if the cable does not slip.
@@ -150,8 +151,10 @@ class Cable:
         tension, _, z = self.tension(self.strain)
         tension = 0.0 if slack else max(tension, 0.0)
         self.winch_tension = self.behind(tension)[0]
-        self.stretch = 0.0 if slack else self.rest * self.strain
-        self.pull = 0.0 if slack or self.fresh else z
+        # of a slack cable the strain is that at which its tension ends, if it has not before
+        if self.fresh or not slack or self.rest * self.strain < self.stretch:
+            self.stretch = self.rest * self.strain
+            self.pull = 0.0 if self.fresh else z
         self.crept += self.creep_by_tension * tension
         self.creep_by_tension = 0.0
         self.tension_before = tension

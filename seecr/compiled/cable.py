@@ -11,11 +11,13 @@ import math
 import numpy as np
 
 from seecr.compiled.algebra import solve_3x3
+from seecr.compiled.bracketed import guess_by_brackets
 from seecr.compiled.catenary import solve_catenary
 from seecr.compiled.columns import (
     ENERGY,
     GAP,
     HYSTERESIS_NOW,
+    LIFT,
     RADIUS,
     REST,
     SLACK,
@@ -27,6 +29,10 @@ from seecr.compiled.columns import (
 from seecr.compiled.jit import jit
 from seecr.compiled.law import straight_law, strain_of_tension, winch_tension
 from seecr.compiled.pulley import length_in_plane, pulley_geometry
+from seecr.compiled.yielding import along, lift_slope, lowered, soften
+
+# Most Newton steps for how far an exit point is lifted; two or three do.
+_LIFTINGS = 50
 
 
 @jit
@@ -40,7 +46,7 @@ def cable_pull(row, start, move, up, guess, work, force, stiffness, gradient, st
             stretch of a stiff cable is lost in the rounding of absolute coordinates.
         up: (3,) unit vector against gravity.
         guess: (3,) where the catenary starts and ends up.
-        work: (8, 3) scratch.
+        work: (N_WORK, 6) scratch.
         force: (3,) [N], filled.
         stiffness: (3, 3) [N/m], minus the derivative of the force by ``move``, filled.
         gradient: (3,) [N/m], derivative of the reported tension by ``move``, filled.
@@ -49,6 +55,27 @@ def cable_pull(row, start, move, up, guess, work, force, stiffness, gradient, st
     Returns:
         False when the cable's own equations could not be solved.
     """
+    if row[LIFT] == 0.0:
+        return _fixed_pull(row, start, move, up, guess, work, force, stiffness, gradient, state)
+    seen, more = work[32], row[LIFT]
+    lift, hanging = 0.0, row[WEIGHT] * row[REST]
+    for _ in range(_LIFTINGS):
+        lowered(move, lift, up, seen)
+        if not _fixed_pull(row, start, seen, up, guess, work, force, stiffness, gradient, state):
+            return False
+        pull = -along(up, force) - hanging
+        error = lift - more * pull
+        if abs(error) <= 1e-15 * row[REST]:
+            break
+        lift -= error / lift_slope(more, up, stiffness)
+    soften(more, up, stiffness, gradient, work[33])
+    state[ENERGY] += 0.5 * more * pull * pull
+    return True
+
+
+@jit
+def _fixed_pull(row, start, move, up, guess, work, force, stiffness, gradient, state):
+    """See cable_pull; of a cable whose exit point is where it is."""
     if row[WEIGHT] > 0.0:
         return _catenary_pull(row, start, move, up, guess, work, force, stiffness, gradient, state)
     if row[RADIUS] > 0.0:
@@ -148,7 +175,9 @@ def _catenary_pull(row, start, move, up, guess, work, force, stiffness, gradient
     if not solve_catenary(row, flat, -rise, guess, error, jacobian, scratch):
         guess[2] = 0.0  # once more from a first guess of its own
         if not solve_catenary(row, flat, -rise, guess, error, jacobian, scratch):
-            return False
+            guess_by_brackets(row, flat, -rise, guess)
+            if not solve_catenary(row, flat, -rise, guess, error, jacobian, scratch):
+                return False
     h, v, length = guess[0], guess[1], guess[2]
     top = v + row[WEIGHT] * length
     tension = math.sqrt(h * h + top * top)

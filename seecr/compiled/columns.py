@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 # Of a cable.
-N_COLUMNS = 27
+N_COLUMNS = 28
 (
     EXIT, _, _,  # A in the base frame [m]
     ANCHOR, _, _,  # B in the platform frame [m]
@@ -13,6 +13,7 @@ N_COLUMNS = 27
     QUADRATIC, CUBIC,  # T = EA (eps + quadratic eps^2 + cubic eps^3)
     RADIUS,  # of the pulley [m]
     COMPLIANCE,  # of the exit point along the cable [m/N]
+    LIFT,  # compliance of the exit point upwards less that sideways [m/N]
     WINCH_SIDE,  # length of elastic cable behind the exit point [m]
     WEIGHT,  # per metre of cable [N/m]
     CREEP, CREEP_RATE,  # creep strain = creep + creep_rate T

@@ -30,6 +30,7 @@ from seecr.compiled.columns import (
     FORCE_OF_WEIGHT,
     GAP,
     HYSTERESIS_NOW,
+    LIFT,
     RADIUS,
     REST,
     SLACK,
@@ -52,7 +53,7 @@ from seecr.compiled.rotation import rotated_less
 ARM, START, BEFORE, YIELD, RATE = 0, 3, 6, 7, 8
 N_READY = 9
 # Rows of scratch that evaluate needs.
-N_WORK = 32
+N_WORK = 34
 
 
 @jit
@@ -70,7 +71,8 @@ def prepare(cables, load, pose, ready):
             before += (ready[i, START + k] - cables[i, EXIT + k]) ** 2
         ready[i, BEFORE] = math.sqrt(before)
         ready[i, YIELD] = 0.0
-        if cables[i, WEIGHT] == 0.0 and cables[i, RADIUS] == 0.0 and is_linear(cables[i]):
+        straight = cables[i, WEIGHT] == 0.0 and cables[i, RADIUS] == 0.0
+        if straight and cables[i, LIFT] == 0.0 and is_linear(cables[i]):
             rest, ea = cables[i, REST], cables[i, EA]
             yields = rest * cables[i, CREEP_RATE] + cables[i, COMPLIANCE]
             ready[i, YIELD] = 1.0 / (rest + ea * yields + cables[i, WINCH_SIDE])

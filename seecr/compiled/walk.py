@@ -18,7 +18,6 @@ from seecr.compiled.columns import (
     HYSTERESIS_BEFORE,
     HYSTERESIS_NOW,
     REST,
-    SLACK,
     STRAIN,
     STRETCH_BEFORE,
     STUCK,
@@ -28,6 +27,7 @@ from seecr.compiled.columns import (
 )
 from seecr.compiled.descent import make_space, solve_in_stages
 from seecr.compiled.jit import jit
+from seecr.compiled.law import strain_of_tension
 
 
 @jit
@@ -59,8 +59,8 @@ def walk_in_order(
     n, m = cables.shape[0], cables.shape[1]
     softened = np.empty_like(cables[0])
     start, first = np.zeros(7), np.zeros(gradient.shape[1])
-    crept, amplitude = np.zeros(m), np.empty(m)
-    friction = np.empty(m)
+    crept, stretched = np.zeros(m), np.zeros(m)
+    amplitude, friction = np.empty(m), np.empty(m)
     space = make_space(m, gradient.shape[1], screws.shape[1])
     for k in range(n):
         if fresh[k]:
@@ -84,8 +84,10 @@ def walk_in_order(
                 continue
             row[CREEP] += share * before * states[k - 1, i, TENSION]
             row[CREEP_RATE] = share * now
-            row[STRETCH_BEFORE] = max(states[k - 1, i, STRAIN], 0.0) * cables[k - 1, i, REST]
-            row[HYSTERESIS_BEFORE] = states[k - 1, i, HYSTERESIS_NOW]
+            row[STRETCH_BEFORE], row[HYSTERESIS_BEFORE] = (
+                stretched[i],
+                states[k - 1, i, HYSTERESIS_NOW],
+            )
             if row[WINCH_SIDE] > 0.0:
                 paid = row[REST] - cables[k - 1, i, REST]
                 row[STUCK] = states[k - 1, i, WINCH_TENSION] - paid * row[EA] / row[WINCH_SIDE]
@@ -97,11 +99,16 @@ def walk_in_order(
         for i in range(m):
             row = cables[k, i]
             crept[i] = row[CREEP] + row[CREEP_RATE] * states[k, i, TENSION]
+            strain = states[k, i, STRAIN]
+            if states[k, i, TENSION] == 0.0:
+                # a slack cable keeps the stretch and the friction at which its tension ended
+                strain, _slope, friction_now = strain_of_tension(row, 0.0)
+                if not fresh[k] and strain * row[REST] >= stretched[i]:
+                    strain, friction_now = stretched[i] / row[REST], row[HYSTERESIS_BEFORE]
+                states[k, i, HYSTERESIS_NOW] = friction_now
+            stretched[i] = max(strain, 0.0) * row[REST]
             if fresh[k]:
                 row[HYSTERESIS], row[FRICTION] = amplitude[i], friction[i]
-                row[STRETCH_BEFORE] = max(states[k, i, STRAIN], 0.0) * row[REST]
-                row[HYSTERESIS_BEFORE] = 0.0
+                row[STRETCH_BEFORE], row[HYSTERESIS_BEFORE] = stretched[i], 0.0
                 row[STUCK] = states[k, i, WINCH_TENSION]
-                states[k, i, HYSTERESIS_NOW] = 0.0
-            elif states[k, i, SLACK] == 1.0:
                 states[k, i, HYSTERESIS_NOW] = 0.0

@@ -83,6 +83,27 @@ class DrumGain(Effect):
 
 
 @dataclass(frozen=True, eq=False)
+class LengthScale(Effect):
+    """All winches pay out more or less than told by one factor: change_i -> (1 + factor) change_i.
+
+    Drums of one lot that are all larger than assumed, a gear ratio, or a cable thickness that was
+    left out. Contained in the gains of the drums, with one number. Positive: more cable.
+    """
+
+    name: ClassVar[str] = "length_scale"
+    place: ClassVar[str] = "actuation"
+    title: ClassVar[str] = "all drums larger or smaller by the same factor"
+    advice: ClassVar[str] = (
+        "pay out ten turns of a drum along a tape: expect the length off by {factor:+.4f} of it"
+    )
+
+    factor: float = parameter("", 0.01, bounds=(-0.5, 1.0))
+
+    def edit_setup(self, setup: Setup) -> None:
+        setup.length_gain = setup.length_gain + self.factor
+
+
+@dataclass(frozen=True, eq=False)
 class DrumEccentricity(Effect):
     """A drum that runs out of true adds a sine of its angle to the paid-out length.
 

@@ -14,7 +14,7 @@ An effect of your own goes through the entry point group ``seecr.effects`` (docs
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar
 
@@ -117,6 +117,8 @@ class Effect:
         advice: how to measure it on its own; ``{name}`` is filled with a parameter in
             millimetres or degrees where those are its units, ``{largest}`` and ``{which}`` with
             the parameter that is the most plausible sizes from null, ``{ea}`` with E S [N].
+        renamed: of parameters in model files written before: each old key, and those that have
+            its value now.
     """
 
     name: ClassVar[str] = ""
@@ -125,6 +127,7 @@ class Effect:
     needs: ClassVar[tuple[str, ...]] = ()
     parent: ClassVar[str] = ""
     advice: ClassVar[str] = ""
+    renamed: ClassVar[Mapping[str, tuple[str, ...]]] = {}
 
     def edit_setup(self, setup: Setup) -> None:
         """Change numbers of the setup, in place."""

@@ -12,6 +12,7 @@ from seecr.effects.actuation import (
     DrumEccentricity,
     DrumGain,
     InitialPoseError,
+    LengthScale,
     ThermalExpansion,
 )
 from seecr.effects.base import Effect
@@ -36,6 +37,7 @@ BUILT_IN: tuple[type[Effect], ...] = (
     CableLengthOffset,
     InitialPoseError,
     DrumGain,
+    LengthScale,
     DrumEccentricity,
     Backlash,
     ThermalExpansion,

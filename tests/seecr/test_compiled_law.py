@@ -11,6 +11,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq, root
 
 from seecr.compiled import columns
+from seecr.compiled.bracketed import bracketed_pull
 from seecr.compiled.cable import cable_pull
 from seecr.compiled.catenary import catenary_span
 from seecr.compiled.columns import (
@@ -30,6 +31,7 @@ from seecr.compiled.columns import (
     WINCH_TENSION,
 )
 from seecr.compiled.law import dahl, winch_tension
+from seecr.compiled.platform import N_WORK
 from seecr.compiled.pulley import geometric_length, pulley_geometry
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -66,7 +68,7 @@ def pull(row: np.ndarray, anchor: Any, move: Any = (0.0, 0.0, 0.0)) -> Pull:
     row, start = row.copy(), np.array(anchor, float)
     row[GAP] = geometric_length(row, start, UP) - row[REST]
     force, slope, guess = np.zeros(3), np.zeros(3), np.zeros(3)
-    stiffness, state, work = np.zeros((3, 3)), np.zeros(N_STATE), np.zeros((28, 3))
+    stiffness, state, work = np.zeros((3, 3)), np.zeros(N_STATE), np.zeros((N_WORK, 6))
     ok = cable_pull(
         row, start, np.array(move, float), UP, guess, work, force, stiffness, slope, state
     )
@@ -89,6 +91,10 @@ KINDS: dict[str, dict[str, float]] = {
     "series": {"WINCH_SIDE": 1.5, "COMPLIANCE": 2e-4, "CREEP": 1e-3, "CREEP_RATE": 1e-6},
     "hysteresis": {"HYSTERESIS": 1.5, "HYSTERESIS_STRETCH": 0.004},
     "friction": {"FRICTION": 0.2, "STUCK": 4.0, "WINCH_SIDE": 1.5},
+    "yielding": {"COMPLIANCE": 2e-4, "LIFT": -1.5e-4},
+    "yielding-up": {"LIFT": 3e-4, "QUADRATIC": 3.0},
+    "yielding-pulley": {"RADIUS": 0.03, "COMPLIANCE": 2e-4, "LIFT": 3e-4},
+    "yielding-hanging": {"WEIGHT": 0.4, "COMPLIANCE": 2e-4, "LIFT": -1.5e-4},
     "hanging-all": {
         "WEIGHT": 0.4, "QUADRATIC": 3.0, "WINCH_SIDE": 1.5, "COMPLIANCE": 2e-4, "RADIUS": 0.03,
         "CREEP_RATE": 1e-6,
@@ -277,6 +283,24 @@ def test_catenary_between_two_points_by_quadrature(below: float, chord: float) -
     assert found.force[2] == pytest.approx(v, rel=1e-6, abs=1e-8)
     assert found.tension == pytest.approx(np.hypot(h, v + 0.4 * 2.0), rel=1e-6)
     assert found.state[SLACK] == float(chord < 2.0)
+
+
+def test_catenaries_by_brackets_are_those_by_quadrature() -> None:
+    for across, rise, w in ((0.3, 0.8, 0.4), (1e-4, -0.9, 0.01), (2e-7, 0.5, 2.0)):
+        h, v = bracketed_pull(across, rise, w, 1.0, 3000.0)
+        assert irvine(h, v, w, 1.0, 3000.0) == pytest.approx((across, rise), rel=1e-6, abs=1e-9)
+
+
+def test_cables_that_hang_nearly_straight_and_are_barely_slack_are_solved() -> None:
+    """Newton's method alone leaves about one in ten of these."""
+    random = np.random.default_rng(3)
+    for _ in range(400):
+        chord = 1.0 - 10.0 ** random.uniform(-9.0, -7.0)
+        aside = 10.0 ** random.uniform(-4.5, -3.0)
+        weight, ea = 10.0 ** random.uniform(-4.0, 1.0), 10.0 ** random.uniform(2.0, 6.0)
+        row = cable(REST=1.0, WEIGHT=weight, EA=ea)
+        anchor = chord * np.array([np.sin(aside), 0.0, random.choice([-1.0, 1.0]) * np.cos(aside)])
+        assert pull(row, anchor).ok
 
 
 def test_the_weight_of_a_hanging_cable_is_shared_by_its_ends() -> None:

@@ -35,7 +35,8 @@ from seecr.sensitivity import sensitivities
 
 # what users' model files and other people's scripts name
 PROMISED = {
-    "actuation": "cable_length_offset initial_pose_error drum_gain drum_eccentricity backlash "
+    "actuation": "cable_length_offset length_scale initial_pose_error drum_gain "
+    "drum_eccentricity backlash "
     "thermal_expansion",
     "geometry": "pulley_radius exit_point_error anchor_point_error",
     "cable": "stiffness cable_stiffness nonlinear_elasticity winch_side_length cable_weight "
@@ -199,11 +200,16 @@ COMBINATIONS = [
 
 @pytest.mark.parametrize("seed", range(len(COMBINATIONS)))
 def test_effects_together_are_solved_and_differentiated(seed: int) -> None:
-    experiment = experiment_of((*SHAPES, *KINDS)[seed % 7], seed=seed)
-    rng = np.random.default_rng(seed)
-    terms = Terms(random_term(rng, experiment, name) for name in COMBINATIONS[seed])
-    at = experiment.predict(terms.effects)
-    assert np.all(at.solved), COMBINATIONS[seed]
+    # nothing has a derivative where a cable is a micrometre from slack: other poses then
+    for poses in range(seed, seed + 10):
+        experiment = experiment_of((*SHAPES, *KINDS)[seed % 7], seed=poses)
+        rng = np.random.default_rng(seed)
+        terms = Terms(random_term(rng, experiment, name) for name in COMBINATIONS[seed])
+        at = experiment.predict(terms.effects)
+        assert np.all(at.solved), COMBINATIONS[seed]
+        nearly_slack = (at.tensions > 0.0) & (at.tensions < 1e-3 * experiment.robot.weight)
+        if not nearly_slack.any():
+            break
     worst, whose = worst_mismatch(experiment, terms, sensitivities(experiment, terms, at))
     assert worst < 1e-3, (COMBINATIONS[seed], whose)
 

@@ -200,7 +200,9 @@ def test_a_yielding_frame_is_a_length_behind_the_exit_point(kind: str) -> None:
     robot = experiment.robot
     compliance = 0.3 / robot.ea[0]
     assert np.all(robot.ea == pytest.approx(robot.ea[0]))
-    frame = experiment.predict([effect("frame_compliance", compliance=compliance)])
+    frame = experiment.predict(
+        [effect("frame_compliance", sideways=compliance, upwards=compliance)]
+    )
     behind = experiment.predict([effect("winch_side_length", length=0.3)])
     assert np.abs(change(frame, behind)).max() < 1e-9
 
@@ -224,13 +226,35 @@ def hung(*effects: Effect, robot: Robot = HUNG, **more: object) -> Prediction:
     return found
 
 
+@pytest.mark.parametrize("kind", ["demobot_cogiro", "demobot_parallel", "planar_vertical"])
+def test_a_frame_yields_sideways_and_upwards_by_what_each_cable_pulls(kind: str) -> None:
+    """Against exit points that are moved by C T u, over and over, on the plain robot."""
+    experiment = experiment_of(kind)
+    robot = experiment.robot
+    sideways, upwards = 0.5 / robot.ea[0], 0.1 / robot.ea[0]
+    frame = experiment.predict([effect("frame_compliance", sideways=sideways, upwards=upwards)])
+    assert frame.solved.all()
+    soft = np.full(3, sideways) + (upwards - sideways) * np.abs(robot.up)
+    lengths = experiment.setup([]).rest_lengths()
+    for pose, command, rest in zip(frame.pose, experiment.commands.pose, lengths, strict=True):
+        anchors = transform_points(pose[None], robot.anchor_points)[0]
+        moved = robot.exit_points.copy()
+        for _ in range(250):
+            there = replace(robot, exit_points=moved)
+            found = solve(there, command[None], rest_lengths=rest[None])
+            anchors = transform_points(found.pose, robot.anchor_points)[0]
+            along = (anchors - moved) / np.linalg.norm(anchors - moved, axis=1)[:, None]
+            moved = robot.exit_points + found.tensions[0][:, None] * along * soft
+        assert found.pose[0] == pytest.approx(pose, abs=1e-9)
+
+
 def test_closed_forms_of_one_hanging_cable() -> None:
     weight = 2 * 9.81
     strain = weight / 100
     fall = lambda *e: -hung(*e).readings.position[0, 2]  # noqa: E731
     assert fall() == pytest.approx(strain, rel=1e-12)
     assert fall(effect("winch_side_length", length=0.5)) == pytest.approx(1.5 * strain, rel=1e-12)
-    assert fall(effect("frame_compliance", compliance=0.01)) == pytest.approx(
+    assert fall(effect("frame_compliance", sideways=0.02, upwards=0.01)) == pytest.approx(
         strain + 0.01 * weight, rel=1e-12
     )
     quadratic, cubic = 2.0, 5.0
@@ -262,7 +286,7 @@ def test_weightless_catenaries_are_straight_cables(kind: str, beside: str | None
 
 @pytest.mark.parametrize("name, values", [
     ("winch_side_length", {"length": 0.3}),
-    ("frame_compliance", {"compliance": 1e-3}),
+    ("frame_compliance", {"sideways": 1e-3, "upwards": 4e-4}),
     ("nonlinear_elasticity", {"quadratic": 200.0}),
     ("hysteresis", {"amplitude": 0.1, "stretch": 2e-4}),
     ("creep", {"amount": 0.3, "time": 20.0}),

@@ -268,6 +268,57 @@ def test_dahls_law_is_followed_in_closed_form() -> None:
     assert dahl(row, 2e-3)[0] == pytest.approx(twice, rel=1e-12)
 
 
+def lift_by_small_steps(lengths: np.ndarray, amplitude: float, turning: float) -> list[float]:
+    """Heights of the lift: Dahl's law along the lengths in small steps, frozen while slack.
+
+    Where a cable would push, it pulls no more, and keeps stretch and friction until it would pull
+    again.
+    """
+    ea, weight, substeps = 1000.0, WEIGHT, 200
+    stretch, friction, heights = np.zeros(2), np.zeros(2), []
+
+    def tried(height: float, rest: np.ndarray, start: bool) -> tuple[np.ndarray, ...]:
+        e = np.array([1.0 - height, 1.0 + height]) - rest
+        limit = amplitude * np.sign(e - stretch)
+        z = limit + (friction - limit) * np.exp(-np.abs(e - stretch) / turning)
+        z = np.zeros(2) if start else z
+        return np.maximum(ea * e / rest + z, 0.0), e, z
+
+    def rests(rest: np.ndarray, start: bool) -> float:
+        low, high = -0.5, 0.5
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            tension = tried(middle, rest, start)[0]
+            low, high = (middle, high) if tension[0] - tension[1] > weight else (low, middle)
+        return low
+
+    before = lengths[0]
+    for row, target in enumerate(lengths):
+        for part in np.linspace(0.0, 1.0, substeps + 1)[1:] if row else [1.0]:
+            rest = before + part * (target - before)
+            height = rests(rest, row == 0)
+            tension, e, z = tried(height, rest, row == 0)
+            taut = tension > 0.0
+            stretch[taut], friction[taut] = e[taut], z[taut]
+        before = target
+        heights.append(height)
+    return heights
+
+
+def test_a_slack_cable_keeps_its_stretch_and_its_friction_and_pulls_again_from_there() -> None:
+    robot = lift()
+    lower = robot.rest_lengths[1] + np.array([0.0, 0.02, 0.08, 0.05, 0.09, 0.02, -0.01, 0.06, 0.0])
+    lengths = np.column_stack([np.full(len(lower), robot.rest_lengths[0]), lower])
+    pose = np.tile(robot.reference_pose, (len(lower), 1))
+    turned = effect("hysteresis", amplitude=2.0, stretch=5e-3)
+    found = Experiment(robot, Commands(pose, lengths)).predict([turned])
+    assert found.solved.all() and 0 < found.slack[:, 1].sum() < len(lower)
+    heights = lift_by_small_steps(lengths, 2.0, 5e-3)
+    plain = Experiment(robot, Commands(pose, lengths)).predict()
+    assert np.ptp(found.pose[:, 2] - plain.pose[:, 2]) > 5e-4  # or there is nothing to see
+    assert found.pose[:, 2] == pytest.approx(heights, abs=3e-6)
+
+
 @pytest.mark.parametrize("name, values", [
     ("hysteresis", {"amplitude": 0.2, "stretch": 2e-4}),
     ("exit_friction", {"friction": 0.2, "length": 0.4}),

@@ -122,6 +122,22 @@ def test_a_person_may_write_one_by_hand(robot, tmp_path):
     assert "which robot" in model.notes[0]
 
 
+def test_a_parameter_that_had_another_name_is_read_and_written_under_that_of_today(robot, tmp_path):
+    path = tmp_path / "model.toml"
+    path.write_text(
+        '[[effect]]\nname = "frame_compliance"\n'
+        "parameters = { compliance_m_per_N = { value = 2e-5, stderr = 1e-6 } }\n"
+    )
+    model = load_model(path, robot)
+    assert model.terms["frame_compliance"].vector == pytest.approx([2e-5, 2e-5])
+    assert model.stderr["frame_compliance"] == pytest.approx([1e-6, 1e-6])
+    said = "compliance_m_per_N is read as sideways_m_per_N and upwards_m_per_N"
+    assert any(said in note for note in model.notes)
+    save_model(path, model)
+    assert "compliance_m_per_N" not in path.read_text() and "upwards_m_per_N" in path.read_text()
+    assert not any("is read as" in note for note in load_model(path, robot).notes)
+
+
 def test_no_model_is_no_effect(robot, tmp_path):
     save_model(tmp_path / "new" / "m.toml", new_model(robot))
     assert not load_model(tmp_path / "new" / "m.toml", robot).terms

@@ -93,7 +93,10 @@ def world_of(name: str, segments: int, **values: float) -> World:
 
 @pytest.mark.parametrize(
     "world",
-    [world_of("cable_weight", 4, weight=0.2), world_of("frame_compliance", 1, compliance=1e-5)],
+    [
+        world_of("cable_weight", 4, weight=0.2),
+        world_of("frame_compliance", 1, sideways=1e-5, upwards=1e-5),
+    ],
     ids=["chains", "springs"],
 )
 def test_parts_of_cables_are_solved_as_one_system_would_be(world):

@@ -40,11 +40,11 @@ def test_the_seed_draws_the_size():
     assert dict(zip(creep.layout.names, creep.vector, strict=True))["time_s"] == 2000.0
 
 
-def test_twelve_effects_stand_against_our_own_mathematics():
+def test_thirteen_effects_stand_against_our_own_mathematics():
     ours = [
         case.effect for case in effect_cases(("demobot_parallel",)) if case.against is Against.OURS
     ]
-    assert len(ours) == 12 and len(TRUE_EFFECTS) == 26
+    assert len(ours) == 13 and len(TRUE_EFFECTS) == 27
     sensing = {name for name in TRUE_EFFECTS if name.startswith(("tracker", "tension"))}
     assert sensing <= set(ours)
     assert not {"pulley_radius", "cable_weight", "stiffness", "frame_compliance"} & set(ours)
