@@ -30,6 +30,7 @@ FLOORS = {
     "crosscheck.settle": 22, "crosscheck.measurements": 22, "crosscheck.model": 22,
     "crosscheck.twin": 23, "crosscheck.fit": 23,
     "crosscheck.suite": 24, "crosscheck.comparison": 24, "crosscheck.planning": 24,
+    "crosscheck.calibration": 24,
     "crosscheck.diagnosis": 25, "crosscheck.add": 25,
     "crosscheck.terminal": 26, "crosscheck.report": 26, "crosscheck.recording": 26,
     "crosscheck.cli": 27,

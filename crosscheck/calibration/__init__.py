@@ -1,0 +1,1 @@
+"""Every effect that the data can see, fitted at once, and which of them are needed."""

@@ -1,0 +1,175 @@
+"""Sets of effects in the linear model about an optimum, by their normal equations alone.
+
+With y = r + X z in white noise and z ~ N(0, width^2) for each effect (group of columns), the
+evidence of a set of effects needs X^T X and X^T y only, computed once. For one set, the inverse
+of its normal matrix says what each member is worth beside the others, and each other effect
+beside the set, for every width at once (:mod:`crosscheck.calibration.worth`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg, special
+
+from crosscheck.calibration.worth import log_gains
+from seecr.pose import Array
+
+# A set: the width of each effect in it.
+Widths = Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """The columns of one effect.
+
+    Attributes:
+        columns: their numbers. widths: prior widths it may have.
+        one_sided: it is a single parameter that cannot be negative.
+    """
+
+    columns: NDArray[np.intp]
+    widths: Array
+    one_sided: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Gram:
+    """Normal equations of all effects.
+
+    Attributes:
+        normal: (p, p) X^T X. gradient: (p,) X^T y. power: y^T y.
+        groups: by effect.
+    """
+
+    normal: Array
+    gradient: Array
+    power: float
+    groups: dict[str, Group]
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """All effects."""
+        return tuple(self.groups)
+
+    def solved(self, chosen: Widths) -> Solved:
+        """The set solved."""
+        empty = np.zeros(0, dtype=np.intp)
+        columns = np.concatenate([empty, *(self.groups[n].columns for n in chosen)])
+        width = np.concatenate([np.zeros(0), *(
+            np.full(len(self.groups[n].columns), w) for n, w in chosen.items()
+        )])  # fmt: skip
+        matrix = self.normal[np.ix_(columns, columns)] + np.diag(width**-2.0)
+        inverse = linalg.inv(matrix, check_finite=False) if len(columns) else matrix
+        return Solved(self, dict(chosen), columns, width, inverse)
+
+
+def gram_of(x: Array, y: Array, groups: dict[str, Group]) -> Gram:
+    """The normal equations of white columns (N, p) and readings (N,)."""
+    return Gram(x.T @ x, x.T @ y, float(y @ y), groups)
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """One set of effects, with one width for each.
+
+    Attributes:
+        gram: of all effects. chosen: the set.
+        columns: (k,) its columns. width: (k,) their widths.
+        inverse: (k, k) covariance of its values z.
+    """
+
+    gram: Gram
+    chosen: dict[str, float]
+    columns: NDArray[np.intp]
+    width: Array
+    inverse: Array
+
+    @cached_property
+    def values(self) -> Array:
+        """(k,) most likely z."""
+        return np.asarray(self.inverse @ self.gram.gradient[self.columns])
+
+    @cached_property
+    def log_evidence(self) -> float:
+        """ln Z with these widths; that of noise alone is -power/2, constants left out."""
+        gained = float(self.gram.gradient[self.columns] @ self.values)
+        _sign, volume = np.linalg.slogdet(self.inverse)
+        spread = float(volume) - 2.0 * float(np.sum(np.log(self.width)))
+        return -0.5 * (self.gram.power - gained) + 0.5 * spread + self._one_sided
+
+    @property
+    def _one_sided(self) -> float:
+        """What half a Gaussian as the prior of some members changes, each by itself."""
+        total = 0.0
+        for name in self.chosen:
+            if self.gram.groups[name].one_sided:
+                at = self._place(name)
+                error = float(np.sqrt(self.inverse[at[0], at[0]]))
+                total += np.log(2.0) + float(special.log_ndtr(self.values[at[0]] / error))
+        return total
+
+    def beside(self, name: str) -> tuple[Array, Array]:
+        """What the (other) members leave of an effect's normal matrix and gradient."""
+        gram, own = self.gram, self.gram.groups[name].columns
+        if name in self.chosen:
+            at = self._place(name)
+            precise = linalg.inv(self.inverse[np.ix_(at, at)], check_finite=False)
+            left = precise - np.eye(len(at)) / self.chosen[name] ** 2
+            return left, precise @ self.values[at]
+        cross = gram.normal[np.ix_(self.columns, own)]
+        left = gram.normal[np.ix_(own, own)] - cross.T @ self.inverse @ cross
+        return left, gram.gradient[own] - cross.T @ self.values
+
+    def gains(self, name: str) -> Array:
+        """ln gain of an effect beside the (other) members, for each of its widths."""
+        group = self.gram.groups[name]
+        normal, gradient = self.beside(name)
+        return log_gains(normal, gradient, group.widths, group.one_sided)
+
+    def gain(self, name: str) -> float:
+        """The same averaged over its widths."""
+        gains = self.gains(name)
+        return float(special.logsumexp(gains) - np.log(len(gains)))
+
+    def _place(self, name: str) -> NDArray[np.intp]:
+        counts = [len(self.gram.groups[n].columns) for n in self.chosen]
+        at = list(self.chosen).index(name)
+        first = sum(counts[:at])
+        return np.arange(first, first + counts[at])
+
+
+def best_widths(gram: Gram, start: Widths, sweeps: int = 3, price: float = 0.0) -> dict[str, float]:
+    """The widths of a set's members that raise its evidence most, one member after another.
+
+    Args:
+        gram: all effects.
+        start: the set; a width is changed where that gains more than ``price``.
+        sweeps: most rounds through the members.
+        price: in ln evidence.
+    """
+    chosen = dict(start)
+    for _ in range(sweeps):
+        before = dict(chosen)
+        for name, width in before.items():
+            widths = gram.groups[name].widths
+            gains = gram.solved(chosen).gains(name) - price * (widths != width)
+            chosen[name] = float(widths[int(np.argmax(gains))])
+        if chosen == before:
+            break
+    return chosen
+
+
+def averaged(gram: Gram, chosen: Widths) -> float:
+    """ln Z of a set, averaged over the width of each member about the best ones."""
+    solved = gram.solved(chosen)
+    total = solved.log_evidence
+    for name, width in chosen.items():
+        gains = solved.gains(name)
+        at = int(np.argmin(np.abs(gram.groups[name].widths - width)))
+        total += float(special.logsumexp(gains) - np.log(len(gains)) - gains[at])
+    return total

@@ -1,0 +1,183 @@
+"""Fit many effects at once: damped Gauss-Newton with plausible sizes as priors.
+
+The unknowns are z = (value - null)/scale with z ~ N(0, width^2): what the data see poorly stays
+near null. The noise is tempered: at first a hundred times its size, so that the prior holds the
+fit together while it is far off, then less and less. Rows count by how far off they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.calibration.colour import Chain, Colour, whitened
+from crosscheck.calibration.robust import row_weights
+from crosscheck.fit.problem import Problem
+from crosscheck.fit.state import State, derivatives, evaluate
+from seecr.effects import Terms
+from seecr.pose import Array
+
+TEMPERS = (100.0, 30.0, 10.0, 3.0, 1.0)
+# Gauss-Newton steps at each temperature, and at the last.
+_STEPS, _LAST = 4, 20
+# A step that gains less than this part of the objective, and less than this, is the last.
+_PART, _GAIN = 1e-3, 1e-2
+# Most plausible sizes that a parameter of plausible size moves at once.
+_MOST = 5.0
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """A joint fit.
+
+    Attributes:
+        state: the model at its best values.
+        jacobian: (N, p) derivatives by z, in units of the stated noise.
+        width: (p,) prior standard deviations of z.
+        colour: the noise it was fitted with.
+        weight: (N,) how much each reading counts.
+        settled: the last step gained nothing.
+    """
+
+    state: State
+    jacobian: Array
+    width: Array
+    colour: Colour
+    weight: Array
+    settled: bool
+
+    @property
+    def terms(self) -> Terms:
+        """The effects with their values."""
+        return self.state.terms
+
+    @property
+    def z(self) -> Array:
+        """(p,) values less null in plausible sizes."""
+        return self.state.terms.sizes
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """What stays the same through a fit.
+
+    Attributes:
+        problem, factor: the data and their noise factors, :meth:`Problem.noise`.
+        chain: how the readings follow one another.
+        frozen: take rows' history as given when deriving.
+        watch: called after each step with chi2 a reading.
+    """
+
+    problem: Problem
+    factor: Array
+    chain: Chain
+    frozen: bool = False
+    watch: Callable[[float], None] = lambda _chi2: None
+
+
+def tempered(setting: Setting, start: State, width: Array, colour: Colour) -> Joint:
+    """Fit with the noise a hundred times its size, then less and less."""
+    far = np.sqrt(start.chi2 / max(len(start.white), 1)) / float(np.min(colour.scale))
+    joint = None
+    for temper in TEMPERS:
+        if temper > max(far, 1.0):
+            continue  # the model is nearer than that already
+        steps = _LAST if temper == TEMPERS[-1] else _STEPS
+        state = start if joint is None else joint.state
+        joint = settle(setting, state, width, colour.hotter(temper), steps)
+    assert joint is not None
+    return Joint(joint.state, joint.jacobian, width, colour, joint.weight, joint.settled)
+
+
+def settle(
+    setting: Setting, state: State, width: Array, colour: Colour, steps: int = _LAST
+) -> Joint:
+    """Gauss-Newton steps until nothing is gained, or so many of them.
+
+    Args:
+        setting: data and derivatives.
+        state: where to start; must be valid.
+        width: (p,) prior standard deviations of z; 0 holds a parameter.
+        colour: the noise.
+        steps: most of them.
+    """
+    damping, settled = 1e-4, False
+    weight = row_weights(setting.chain, colour, state.white)
+    jacobian = scaled_derivatives(setting, state)
+    for _ in range(steps):
+        step = _step(setting, state, jacobian, width, colour, weight, damping)
+        if step is None:
+            settled = True
+            break
+        gain, before, damping, state = step
+        setting.watch(state.chi2 / max(len(state.white), 1))
+        weight = row_weights(setting.chain, colour, state.white)
+        jacobian = scaled_derivatives(setting, state)
+        if gain < max(_PART * before, _GAIN):
+            settled = True
+            break
+    return Joint(state, jacobian, width, colour, weight, settled)
+
+
+def scaled_derivatives(setting: Setting, state: State) -> Array:
+    """(N, p) derivatives of the prediction by z, in units of the stated noise."""
+    scale = state.terms.scale
+    if not len(scale):
+        return np.zeros((len(state.white), 0))
+    return derivatives(setting.problem, state, frozen=setting.frozen) * scale
+
+
+def _step(
+    setting: Setting, state: State, jacobian: Array, width: Array, colour: Colour,
+    weight: Array, damping: float,
+) -> tuple[float, float, float, State] | None:  # fmt: skip
+    """Gain, objective before, damping and state of a step that pays; None where there is none."""
+    terms = state.terms
+    scale, lower, upper = terms.scale, terms.lower, terms.upper
+    values, z = terms.vector, terms.sizes
+
+    def objective(at: State) -> float:
+        white = whitened(setting.chain, colour, weight, at.white)
+        return float(white @ white) + at.log_det + penalty(at.terms.sizes, width)
+
+    x = whitened(setting.chain, colour, weight, jacobian)
+    y = whitened(setting.chain, colour, weight, state.white)
+    move = _movable(-x.T @ y, z, width, values, (lower, upper))
+    x, inverse2 = x[:, move], 1.0 / width[move] ** 2
+    gradient = z[move] * inverse2 - x.T @ y
+    normal = x.T @ x + np.diag(inverse2)
+    before = objective(state)
+    for _ in range(12):
+        step = np.zeros(len(z))
+        damped = normal + np.diag(damping * np.diag(normal))
+        step[move] = -np.linalg.solve(damped, gradient)
+        step *= min(1.0, _MOST / max(float(np.max(np.abs(step) / np.maximum(width, 1.0))), 1e-300))
+        moved = np.clip(values + step * scale, lower, upper)
+        expected = -(2.0 * gradient @ step[move] + step[move] @ normal @ step[move])
+        if expected < 0.1 * _GAIN:
+            return None
+        trial = evaluate(setting.problem, terms.with_vector(moved), setting.factor, state)
+        after = objective(trial) if trial.valid else np.inf
+        if after < before:
+            return before - after, before, max(0.1 * damping, 1e-9), trial
+        damping = max(10.0 * damping, 1e-4)
+    return None
+
+
+def _movable(
+    slope: Array, z: Array, width: Array, values: Array, limits: tuple[Array, Array]
+) -> NDArray[np.intp]:
+    """Numbers of the parameters that may move: not held, not pressed against a bound."""
+    lower, upper = limits
+    slope = slope + z / np.where(width > 0.0, width, 1.0) ** 2
+    held = (width == 0.0) | ((values <= lower) & (slope > 0)) | ((values >= upper) & (slope < 0))
+    return np.flatnonzero(~held)
+
+
+def penalty(z: Array, width: Array) -> float:
+    """What the prior charges for values."""
+    free = width > 0.0
+    return float(np.sum((z[free] / width[free]) ** 2))

@@ -1,0 +1,112 @@
+"""Effects that join once the others are in: with history, with shapes, cables with weight.
+
+Their derivatives cost a walk through all rows, or mean something only for the right shape (a
+period, a time constant). What the joint fit leaves says which of them are worth it, and where
+their shapes start.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import linalg
+
+from crosscheck.calibration.colour import whitened
+from crosscheck.calibration.joint import Joint, Setting
+from crosscheck.calibration.worth import log_gain
+from crosscheck.fit.problem import Problem
+from crosscheck.fit.state import derivatives
+from seecr.effects import Term, catalogue, layout_of
+from seecr.effects.base import Layout
+from seecr.pose import Array
+
+# An effect joins where it gains this much evidence.
+_PAYS = 2.0
+# Neighbouring shapes are alike: about every third is one more chance of its own.
+_ALIKE = 3.0
+
+
+def has_inputs(problem: Problem, layout: Layout) -> bool:
+    """Whether the data have what the effect needs."""
+    data, needs = problem.data, layout.effect.needs
+    clock, warmth = data.t_s, data.temperature_C
+    return not (
+        ("poses" in needs and data.command_pose is None)
+        or ("time" in needs and (clock is None or np.ptp(clock) == 0))
+        or ("temperature" in needs and (warmth is None or np.ptp(warmth) == 0))
+        or ("tensions" in needs and not data.has_tension)
+    )
+
+
+def layouts(problem: Problem) -> tuple[list[Layout], list[Layout]]:
+    """Effects for the joint fit, and those that join later."""
+    at_once: list[Layout] = []
+    later: list[Layout] = []
+    for effect in catalogue().values():
+        layout = layout_of(effect, problem.robot)
+        if has_inputs(problem, layout):
+            (later if _waits(problem, layout) else at_once).append(layout)
+    return at_once, later
+
+
+def _waits(problem: Problem, layout: Layout) -> bool:
+    if layout.shape.any():
+        return True
+    moved = np.clip(layout.null + layout.scale, layout.lower, layout.upper)
+    setup = problem.experiment.setup([layout.build(moved)])
+    return bool(setup.has_history or np.any(setup.cable_weight))
+
+
+def worth_adding(setting: Setting, joint: Joint, later: Sequence[Layout]) -> list[Term]:
+    """Effects that are worth it beside the joint fit, at their most promising shapes."""
+    beside = _Beside(setting, joint)
+    out = []
+    for layout in later:
+        starts = [layout.start(s) for s in layout.effect.shapes(joint.state.prediction.setup)]
+        if not starts:
+            continue
+        gains = [beside.gain(Term(layout, start)) for start in starts]
+        price = np.log(max(1.0, len(starts) / _ALIKE))
+        if max(gains) - price > _PAYS:
+            out.append(Term(layout, _inside(layout, starts[int(np.argmax(gains))])))
+    return out
+
+
+def _inside(layout: Layout, start: Array) -> Array:
+    """A start off the bound, where history has a derivative on both sides."""
+    at_bound = (start <= layout.lower) & ~layout.shape
+    return np.asarray(np.where(at_bound, start + 0.1 * layout.scale, start))
+
+
+class _Beside:
+    """What is left of more columns beside those of a joint fit."""
+
+    def __init__(self, setting: Setting, joint: Joint) -> None:
+        self.setting, self.joint = setting, joint
+        self.left = self._white(joint.state.white)
+        self.columns = self._white(joint.jacobian) * joint.width
+        normal = self.columns.T @ self.columns + np.eye(self.columns.shape[1])
+        self.factor = linalg.cho_factor(normal, check_finite=False)
+
+    def _white(self, values: Array) -> Array:
+        return whitened(self.setting.chain, self.joint.colour, self.joint.weight, values)
+
+    def gain(self, term: Term) -> float:
+        """ln gain of an effect's amplitudes that start at null, the others as they are."""
+        x = self._white(added_columns(self.setting, self.joint, term))
+        cross = self.columns.T @ x
+        normal = x.T @ x - cross.T @ linalg.cho_solve(self.factor, cross, check_finite=False)
+        layout = term.layout
+        one_sided = bool(np.any(layout.lower == layout.null)) and x.shape[1] == 1
+        return log_gain(normal, x.T @ self.left, one_sided=one_sided)
+
+
+def added_columns(setting: Setting, joint: Joint, term: Term) -> Array:
+    """(N, k) derivatives by z of an added effect's amplitudes that are at null."""
+    layout = term.layout
+    own = np.flatnonzero(~layout.shape & (term.vector == layout.null))
+    terms = joint.terms.with_term(term)
+    state = joint.state.of(terms)
+    wanted = (terms.part(term.name).start + own).tolist()
+    return np.asarray(derivatives(setting.problem, state, wanted, frozen=True) * layout.scale[own])

@@ -1,0 +1,92 @@
+"""Where the tracker stands: its frame registered before anything else, by any angle.
+
+Every effect is read through the tracker, so its frame goes first, with no plausible size: what
+is then left does not depend on how the tracker was set up.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from crosscheck.fit.problem import Problem
+from seecr.effects import Term, effect_named, layout_of
+from seecr.experiment import Prediction
+from seecr.pose import Array, quat_conjugate, quat_multiply, quat_rotate, rotvec_from_quat
+
+NAME = "tracker_frame"
+# Rows count by the median distance; a few rounds settle which.
+_ROUNDS = 10
+# Points that spread by less than this part of their largest spread do not show a turn.
+_THIN = 1e-3
+
+
+def registered(problem: Problem, at: Prediction) -> Term | None:
+    """The tracker's frame that brings the predicted poses nearest to the measured ones.
+
+    Rows far off count little. None where neither whole positions nor orientations were read.
+    """
+    layout = layout_of(effect_named(NAME), problem.robot)
+    data = problem.data
+    whole = problem.use & np.isfinite(data.position).all(axis=1) & at.solved
+    turn = _turn(problem, at)
+    places = (at.readings.position[whole], data.position[whole])
+    if turn is None and whole.sum() >= 3:
+        turn = _turn_of_points(*places)
+    if turn is None:
+        return None
+    shift = np.zeros(3)
+    if whole.any():
+        shift = np.median(places[1] - quat_rotate(turn, places[0]), axis=0)
+    return Term(layout, np.concatenate([shift, rotvec_from_quat(turn)]))
+
+
+def _turn(problem: Problem, at: Prediction) -> Array | None:
+    """The turn (4,) between predicted and measured orientations; None where none were read."""
+    quat = problem.data.quat_wxyz
+    if quat is None:
+        return None
+    rows = problem.use & np.isfinite(quat).all(axis=1) & at.solved
+    if not rows.any():
+        return None
+    turns = quat_multiply(quat[rows], quat_conjugate(at.readings.quat_wxyz[rows]))
+    weight, mean = np.ones(len(turns)), turns[0]
+    for _ in range(_ROUNDS):
+        # the quaternion of the largest eigenvalue (Markley et al. 2007)
+        mean = np.linalg.eigh((turns * weight[:, None]).T @ turns)[1][:, -1]
+        off = np.linalg.norm(rotvec_from_quat(quat_multiply(turns, quat_conjugate(mean))), axis=1)
+        weight = _counting(off)
+    return np.asarray(mean)
+
+
+def _turn_of_points(here: Array, there: Array) -> Array | None:
+    """The turn (4,) that brings points (k, 3) nearest to others; None where they are in line.
+
+    By the eigenvector of Horn's matrix (Closed-form solution of absolute orientation, 1987).
+    """
+    weight, turn = np.ones(len(here)), None
+    for _ in range(_ROUNDS):
+        mean = [np.average(points, axis=0, weights=weight) for points in (here, there)]
+        turn = _turn_of_weighted(here - mean[0], there - mean[1], weight)
+        if turn is None:
+            return None
+        off = np.linalg.norm(there - mean[1] - quat_rotate(turn, here - mean[0]), axis=1)
+        weight = _counting(off)
+    return turn
+
+
+def _turn_of_weighted(here: Array, there: Array, weight: Array) -> Array | None:
+    spread = np.linalg.svd(here, compute_uv=False)
+    if spread[1] <= _THIN * spread[0]:
+        return None
+    s = (here * weight[:, None]).T @ there
+    cross = np.array([s[1, 2] - s[2, 1], s[2, 0] - s[0, 2], s[0, 1] - s[1, 0]])
+    matrix = np.zeros((4, 4))
+    matrix[0, 0] = np.trace(s)
+    matrix[0, 1:] = matrix[1:, 0] = cross
+    matrix[1:, 1:] = s + s.T - np.trace(s) * np.eye(3)
+    return np.asarray(np.linalg.eigh(matrix)[1][:, -1])
+
+
+def _counting(off: Array) -> Array:
+    """How much rows count by how far off they are (Cauchy's weights)."""
+    return np.asarray(1.0 / (1.0 + (off / max(float(np.median(off)), 1e-12)) ** 2))

@@ -1,0 +1,104 @@
+"""Everything at once: small errors everywhere, one effect, a tracker that stands askew."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_data import COGIRO, SIGMA, measured, term
+
+from crosscheck.calibration.calibrate import calibrate
+from crosscheck.calibration.leave_out import surprise_of, without
+from crosscheck.calibration.linearised import Linear
+from crosscheck.calibration.registration import registered
+from crosscheck.fit.prepare import prepare
+from crosscheck.fit.problem import Problem
+from crosscheck.fit.state import evaluate
+from crosscheck.measurements.data import Measurements
+from seecr.effects import Terms
+from seecr.mjcf import load_robot
+from seecr.pose import quat_from_rotvec, quat_multiply, quat_rotate
+
+ROBOT = load_robot(COGIRO)
+
+
+def hidden() -> list:
+    """Small errors of many kinds."""
+    rng = np.random.default_rng(0)
+    exits = {f"error_{i}_{a}_m": 1e-3 * rng.normal() for i in range(1, 9) for a in "xyz"}
+    return [
+        term(ROBOT, "exit_point_error", **exits),
+        term(ROBOT, "stiffness", factor=1.2),
+        term(ROBOT, "pulley_radius", radius_m=0.004),
+        term(ROBOT, "drum_gain", **{f"gain_{i}": 3e-3 * rng.normal() for i in range(1, 9)}),
+    ]
+
+
+def problem_of(data: Measurements) -> Problem:
+    problem, _notes, why = prepare(ROBOT, data, Terms())
+    assert not why
+    return problem
+
+
+def test_many_small_errors_are_fitted_together_and_predict_elsewhere() -> None:
+    terms = hidden()
+    data = measured(ROBOT, terms, points=14)
+    found = calibrate(problem_of(data))
+    before, after = (r["position_rms_m"] for r in (found.before, found.after))
+    assert before is not None and after is not None and SIGMA.position_m is not None
+    assert before > 20 * after
+    assert after < 1.1 * SIGMA.position_m
+    assert found.colour.scale[:2] == pytest.approx(1.0, abs=0.25)
+    # other rows of the same robot, read without noise
+    other = measured(ROBOT, terms, points=9, sigma=replace(SIGMA, position_m=1e-9), seed=5)
+    elsewhere = Problem(ROBOT, other, SIGMA, np.ones(other.n_rows, dtype=bool))
+    state = evaluate(elsewhere, found.terms, elsewhere.noise(elsewhere.experiment.predict()))
+    assert np.sqrt(np.mean(state.raw[:, :3] ** 2)) < 1.5 * SIGMA.position_m
+    assert float(np.max(found.held_out.surprise)) < 2.0
+
+
+def test_covariance_covers_what_the_data_see() -> None:
+    terms = hidden()
+    found = calibrate(problem_of(measured(ROBOT, terms, points=14)))
+    at = found.terms.labels.index(("pulley_radius", "radius_m"))
+    error = float(np.sqrt(found.covariance[at, at]))
+    assert 0.0 < error < 0.004
+    assert abs(found.terms.vector[at] - 0.004) < 4.0 * error
+
+
+@pytest.mark.parametrize("angle", [0.05, 1.5])
+def test_a_tracker_that_stands_askew_is_registered_first(angle: float) -> None:
+    data = measured(ROBOT, (), points=8)
+    turn = quat_from_rotvec(angle * np.array([0.6, -0.64, 0.48]))
+    assert data.quat_wxyz is not None
+    turned = replace(
+        data,
+        position=quat_rotate(turn, data.position) + np.array([1.0, -2.0, 0.5]),
+        quat_wxyz=quat_multiply(turn, data.quat_wxyz),
+    )
+    problem = Problem(ROBOT, turned, SIGMA, np.ones(data.n_rows, dtype=bool))
+    at = problem.experiment.predict()
+    for seen in (problem, replace(problem, data=replace(turned, quat_wxyz=None))):
+        frame = registered(seen, at)
+        assert frame is not None
+        assert frame.vector[3:] == pytest.approx(angle * np.array([0.6, -0.64, 0.48]), abs=2e-3)
+    found = calibrate(problem_of(turned))
+    assert (found.after["position_rms_m"] or 1.0) < 1.1 * (SIGMA.position_m or 0.0)
+
+
+def test_leaving_out_in_a_linear_model_is_refitting_without() -> None:
+    rng = np.random.default_rng(6)
+    x, y, width = rng.normal(size=(30, 4)), rng.normal(size=30), np.array([1.0, 0.5, 0.0, 2.0])
+    rows = np.arange(30) < 8
+    z = without(Linear(x, y, width), rows)
+    assert z[2] == 0.0
+    kept = x[8:, [0, 1, 3]]
+    slope = kept.T @ (y[8:] - kept @ z[[0, 1, 3]]) - z[[0, 1, 3]] / width[[0, 1, 3]] ** 2
+    assert slope == pytest.approx(0.0, abs=1e-10)
+    left = y[:8] - x[:8] @ z
+    known = np.linalg.inv(kept.T @ kept + np.diag(width[[0, 1, 3]] ** -2.0))
+    expected = np.eye(8) + x[:8][:, [0, 1, 3]] @ known @ x[:8][:, [0, 1, 3]].T
+    assert surprise_of(Linear(x, y, width), rows, left) == pytest.approx(
+        left @ np.linalg.solve(expected, left)
+    )

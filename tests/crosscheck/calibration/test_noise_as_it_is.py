@@ -1,0 +1,110 @@
+"""Noise that goes together along a run, rows far off, and what the joint fit says of both."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from made_data import COGIRO, measured
+
+from crosscheck.calibration.colour import WHITE, Chain, Colour, chain_of, log_det, whitened
+from crosscheck.calibration.restricted import estimate, log_evidence
+from crosscheck.calibration.robust import outliers, row_weights
+from crosscheck.fit.problem import Problem
+from crosscheck.measurements.data import Sigma
+from seecr.mjcf import load_robot
+
+
+def chain(rows: int, channels: int = 3, runs: int = 2) -> Chain:
+    """Readings of one kind in order of rows, cut into runs."""
+    row = np.repeat(np.arange(rows), channels)
+    before = np.arange(rows * channels) - channels
+    fresh = row % (rows // runs) == 0
+    return Chain(np.zeros(len(row), int), row, np.where(fresh, -1, before), np.ones(len(row)))
+
+
+def covariance(c: Chain, colour: Colour, weight: np.ndarray) -> np.ndarray:
+    """Of the noise, reading by reading: what whitening is the inverse root of."""
+    n = len(c.row)
+    root = np.zeros((n, n))
+    for k in range(n):
+        root[k, k] = 1.0
+        if c.before[k] >= 0:
+            phi = colour.rho[0] ** c.gap[k]
+            root[k] = phi * root[c.before[k]]
+            root[k, k] = np.sqrt(1 - phi**2)
+    root = root * (colour.scale[0] / np.sqrt(weight))[:, None]
+    return root @ root.T
+
+
+COLOUR = Colour(np.array([1.7, 1.0, 1.0]), np.array([0.8, 0.0, 0.0]))
+
+
+def test_whitening_is_an_inverse_root_of_the_noise() -> None:
+    c = chain(8)
+    weight = np.random.default_rng(0).uniform(0.1, 1.0, len(c.row))
+    sigma = covariance(c, COLOUR, weight)
+    root = whitened(c, COLOUR, weight, np.eye(len(c.row)))
+    assert root @ sigma @ root.T == pytest.approx(np.eye(len(c.row)), abs=1e-12)
+    assert log_det(c, COLOUR, weight) == pytest.approx(np.linalg.slogdet(sigma)[1])
+
+
+def test_marginal_evidence_is_that_of_the_whole_covariance() -> None:
+    rng = np.random.default_rng(1)
+    c = chain(6)
+    n = len(c.row)
+    x, y, width = rng.normal(size=(n, 4)), rng.normal(size=n), np.array([1.0, 2.0, 0.3, 1.0])
+    whole = (x * width**2) @ x.T + covariance(c, COLOUR, np.ones(n))
+    direct = -0.5 * (y @ np.linalg.solve(whole, y) + np.linalg.slogdet(whole)[1])
+    assert log_evidence(c, COLOUR, np.ones(n), x, y, width) == pytest.approx(direct)
+
+
+def test_size_and_correlation_are_found_though_half_the_readings_are_fitted_away() -> None:
+    rng = np.random.default_rng(2)
+    c = chain(144, runs=6)
+    n = len(c.row)
+    noise = np.linalg.cholesky(covariance(c, COLOUR, np.ones(n))) @ rng.normal(size=n)
+    x, width = 30 * rng.normal(size=(n, 60)), np.ones(60)
+    found = estimate(c, WHITE, np.ones(n), x, x @ rng.normal(size=60) + noise, width)
+    assert found.scale[0] == pytest.approx(1.7, rel=0.15)
+    assert found.rho[0] == pytest.approx(0.8, abs=0.08)
+
+
+def test_white_noise_is_called_white() -> None:
+    rng = np.random.default_rng(3)
+    c = chain(144, runs=6)
+    x = rng.normal(size=(len(c.row), 20))
+    found = estimate(c, WHITE, np.ones(len(c.row)), x, rng.normal(size=len(c.row)), np.ones(20))
+    assert found.rho[0] < 0.15
+    assert found.scale[0] == pytest.approx(1.0, abs=0.1)
+
+
+def test_rows_far_off_hardly_count_and_others_do() -> None:
+    rng = np.random.default_rng(4)
+    c = chain(144)
+    residual = rng.normal(size=len(c.row))
+    off = rng.choice(144, 14, replace=False)
+    residual[np.isin(c.row, off)] += 30.0
+    weight = row_weights(c, WHITE, residual)
+    assert set(np.flatnonzero(outliers(c, weight, 144))) == set(off)
+    assert np.median(weight) > 0.95
+    assert np.all(weight[np.isin(c.row, off)] * residual[np.isin(c.row, off)] ** 2 < 10.0)
+
+
+def test_where_all_rows_are_off_none_is_an_outlier() -> None:
+    c = chain(144)
+    residual = 50.0 * np.random.default_rng(5).normal(size=len(c.row))
+    assert not outliers(c, row_weights(c, WHITE, residual), 144).any()
+
+
+def test_chains_follow_runs_and_time() -> None:
+    robot = load_robot(COGIRO)
+    data = measured(robot, points=4)
+    problem = Problem(robot, data, Sigma(1e-3, 1e-3), np.ones(data.n_rows, dtype=bool))
+    c = chain_of(problem)
+    run = data.run_index[problem.row_of]
+    linked = c.before >= 0
+    assert linked.sum() == len(run) - 6 * len(data.runs)
+    assert np.all(run[linked] == run[c.before[linked]])
+    assert np.all(problem.column_of[linked] == problem.column_of[c.before[linked]])
+    assert np.all(c.row[linked] == c.row[c.before[linked]] + 1)
+    assert np.median(c.gap[linked]) == 1.0
