@@ -9,45 +9,34 @@ hint where to look, not a proof.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from enum import Enum, auto
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal, stats
+from scipy import stats
 
-from crosscheck.comparison.cable_space import cable_errors, cable_lengths, independent_part
-from crosscheck.comparison.travel import AXES, Travel, travel
+from crosscheck.comparison.cable_space import cable_errors, independent_part
+from crosscheck.comparison.quantities import (
+    Quantity,
+    QuantityKind,
+    channels,
+    in_time,
+    of_cables,
+    of_rows,
+)
+from crosscheck.comparison.travel import Travel, travel
 from crosscheck.fit.noise import as_table
 from crosscheck.fit.problem import Problem
 from seecr.experiment import Prediction
-from seecr.pose import Array, rotvec_from_quat
+from seecr.pose import Array
 
 SIGNIFICANT = 0.01
 """An association of a smaller p, over all that were tried, counts."""
 
-EVERYWHERE = "nothing: it is the same everywhere"
-"""The quantity of what does not change from row to row."""
-
 _BINS, _IN_A_BIN = 6, 4
-# A period is one that was seen so many times, of at most so many tried, and that explains so much
-# more of the variance than anything else.
-_CYCLES, _FREQUENCIES, _CLEARLY = 3.0, 20000, 0.15
-
-
-class Against(Enum):
-    """The sort of thing that residuals may go with."""
-
-    EVERYWHERE = auto()
-    PLACE = auto()
-    RUN = auto()
-    TRAVEL = auto()
-    TIME = auto()
-    TEMPERATURE = auto()
-    TENSION = auto()
-    CABLE = auto()
+# What comes again in time counts if it explains so much more of the variance than anything else.
+_CLEARLY = 0.15
 
 
 @dataclass(frozen=True)
@@ -77,7 +66,7 @@ class Association:
         bins: rows that are alike in the quantity.
     """
 
-    kind: Against
+    kind: QuantityKind
     against: str
     of: str
     share: float
@@ -97,21 +86,6 @@ class Association:
         return {**kept, "bins": [vars(part) for part in self.bins]}
 
 
-@dataclass(frozen=True, eq=False)
-class _Quantity:
-    """What residuals may go with.
-
-    Attributes:
-        kind: the sort of thing. name: for people.
-        values: (k,) numbers or names of groups. unit: of the numbers.
-    """
-
-    kind: Against
-    name: str
-    values: NDArray[Any]
-    unit: str = ""
-
-
 def associations(problem: Problem, white: Array, prediction: Prediction) -> list[Association]:
     """What residuals go with, the strongest first.
 
@@ -126,7 +100,7 @@ def associations(problem: Problem, white: Array, prediction: Prediction) -> list
     names, units = channels(problem)
     tried = [
         _row(quantity, "readings", table, raw, names, units, 1.0)
-        for quantity in _of_rows(problem, prediction, way)
+        for quantity in of_rows(problem, prediction, way)
     ]
     tried += _in_cables(problem, raw, prediction, way)
     found = [row for row in tried if row is not None]
@@ -139,41 +113,6 @@ def _order(row: Association) -> tuple[bool, float, float]:
     return (not row.significant, -row.share if row.significant else row.p, row.p)
 
 
-def channels(problem: Problem) -> tuple[list[str], list[str]]:
-    """Names and units of the 6 + m readings."""
-    turns = [f"angle {a}" if problem.uses_angles else f"rotation about {a[1]}" for a in AXES[3:]]
-    names = [*AXES[:3], *turns, *(f"tension of {c}" for c in problem.robot.cable_names)]
-    return names, ["m"] * 3 + ["rad"] * 3 + ["N"] * problem.robot.n_cables
-
-
-def _of_rows(problem: Problem, prediction: Prediction, way: Travel) -> Iterator[_Quantity]:
-    n, data = problem.data.n_rows, problem.data
-    yield _Quantity(Against.EVERYWHERE, EVERYWHERE, np.zeros(n))
-    turn = rotvec_from_quat(way.pose[:, 3:])
-    place = np.concatenate([way.pose[:, :3], turn], axis=1)
-    for k, axis in enumerate(AXES):
-        yield _Quantity(Against.PLACE, f"commanded {axis}", place[:, k], "m" if k < 3 else "rad")
-    yield _Quantity(Against.RUN, "the run", data.run)
-    yield _Quantity(Against.TRAVEL, "direction of travel", way.direction)
-    yield _Quantity(Against.TRAVEL, "speed of travel", way.speed, "m/s")
-    if data.t_s is not None:
-        yield _Quantity(Against.TIME, "time", data.t_s - data.t_s.min(), "s")
-        if len(data.runs) > 1:
-            starts = {name: data.t_s[data.run == name].min() for name in data.runs}
-            into = data.t_s - np.array([starts[name] for name in data.run.tolist()])
-            yield _Quantity(Against.TIME, "time since the start of the run", into, "s")
-    if data.temperature_C is not None:
-        yield _Quantity(Against.TEMPERATURE, "temperature", data.temperature_C, "C")
-    slack = prediction.slack
-    yield _Quantity(Against.TENSION, "number of slack cables", slack.sum(axis=1).astype(float))
-    taut = np.where(slack, np.nan, prediction.tensions)
-    some = np.isfinite(taut).any(axis=1)
-    for name, pick in (("smallest", np.nanmin), ("mean", np.nanmean)):
-        values = np.full(n, np.nan)
-        values[some] = pick(taut[some], axis=1)
-        yield _Quantity(Against.TENSION, f"{name} tension of the taut cables", values, "N")
-
-
 def _in_cables(
     problem: Problem, raw: Array, prediction: Prediction, way: Travel
 ) -> list[Association | None]:
@@ -181,25 +120,11 @@ def _in_cables(
     errors, noise = cable_errors(problem, raw, prediction)
     if not np.isfinite(errors).any() or not np.all(noise > 0):
         return []
-    n = len(errors)
-    lengths = cable_lengths(problem, prediction)
-    first = problem.experiment.commands.starts
-    home = problem.robot.nominal_lengths(problem.robot.reference_pose[None])
-    nominal = problem.robot.nominal_lengths(way.pose)
-    before = np.where(first[:, None], home, np.concatenate([home, nominal[:-1]]))
-    paid = nominal - before
-    motion = np.where(paid > 0, "paid out", "reeled in")
-    quantities = (
-        _Quantity(Against.CABLE, "the cable", np.tile(np.array(problem.robot.cable_names), n)),
-        _Quantity(Against.CABLE, "the cable's length", lengths.ravel(), "m"),
-        _Quantity(Against.CABLE, "the cable's tension", prediction.tensions.ravel(), "N"),
-        _Quantity(Against.CABLE, "whether the cable was paid out or reeled in", motion.ravel()),
-    )
     part = independent_part(problem, prediction)
     table = (errors / noise).reshape(-1, 1)
     return [
         _row(q, "cable lengths", table, errors.reshape(-1, 1), ["cable length"], ["m"], part)
-        for q in quantities
+        for q in of_cables(problem, prediction, way)
     ]
 
 
@@ -208,11 +133,9 @@ def _swinging(problem: Problem, table: Array, raw: Array, least: float) -> list[
 
     Commands that go to and fro make every error of place come again with them.
     """
-    period, tried = _period(problem, table)
-    if period is None or problem.data.t_s is None:
+    again, tried = in_time(problem, table)
+    if again is None:
         return []
-    phase = 360.0 * (problem.data.t_s / period % 1.0)
-    again = _Quantity(Against.TIME, f"time, again every {period:.3g} s", phase, "deg")
     names, units = channels(problem)
     row = _row(again, "readings", table, raw, names, units, 1.0)
     if row is None or row.share < least + _CLEARLY:
@@ -220,30 +143,8 @@ def _swinging(problem: Problem, table: Array, raw: Array, least: float) -> list[
     return [replace(row, p=min(1.0, row.p * tried))]
 
 
-def _period(problem: Problem, table: Array) -> tuple[float | None, int]:
-    """The period [s] that explains most (Lomb and Scargle's), and how many were tried."""
-    t = problem.data.t_s
-    some = np.isfinite(table).any(axis=1)
-    if t is None or some.sum() < 4 * _BINS:
-        return None, 0
-    span, steps = float(np.ptp(t[some])), np.diff(np.unique(t[some]))
-    if span <= 0.0:
-        return None, 0
-    most = min(0.5 / float(np.median(steps)), _FREQUENCIES * 0.25 / span)
-    frequencies = np.arange(_CYCLES / span, most, 0.25 / span)
-    if len(frequencies) == 0:
-        return None, 0
-    power = np.zeros(len(frequencies))
-    for column in table.T:
-        read = np.isfinite(column)
-        if read.sum() >= 4 * _BINS:
-            part = column[read] - column[read].mean()
-            power += signal.lombscargle(t[read], part, 2.0 * np.pi * frequencies)
-    return 1.0 / float(frequencies[np.argmax(power)]), len(frequencies)
-
-
 def _row(
-    quantity: _Quantity,
+    quantity: Quantity,
     of: str,
     table: Array,
     raw: Array,
@@ -253,7 +154,7 @@ def _row(
 ) -> Association | None:
     """One association, or None where the quantity never changes."""
     index, labels = _binned(quantity, np.asarray(np.isfinite(table).any(axis=1)))
-    constant = quantity.kind is Against.EVERYWHERE
+    constant = quantity.kind is QuantityKind.EVERYWHERE
     if len(labels) < (1 if constant else 2):
         return None
     between, within, counts = _squares(table, index, len(labels), constant)
@@ -305,7 +206,7 @@ def _squares(table: Array, index: Any, bins: int, constant: bool) -> tuple[Array
     return between, np.maximum((values**2).sum(axis=0) - between, 0.0), counts
 
 
-def _binned(quantity: _Quantity, some: NDArray[np.bool_]) -> tuple[NDArray[np.int64], list[str]]:
+def _binned(quantity: Quantity, some: NDArray[np.bool_]) -> tuple[NDArray[np.int64], list[str]]:
     """Bin of each row, -1 for none, and what the bins are called."""
     values = quantity.values
     index = np.full(len(values), -1, dtype=np.int64)

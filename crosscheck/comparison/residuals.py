@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from crosscheck.comparison.associations import associations, channels
+from crosscheck.comparison.associations import associations
+from crosscheck.comparison.quantities import channels
 from crosscheck.comparison.result import Comparison, Coordinate, Group, UnsolvedRow, WorstRow
 from crosscheck.comparison.travel import Travel, regions_of, travel
 from crosscheck.fit.noise import as_table, whiteness

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.comparison.associations import Against, Association, channels
+from crosscheck.comparison.associations import Association
+from crosscheck.comparison.quantities import QuantityKind, channels
 from crosscheck.comparison.travel import Travel
 from crosscheck.fit.noise import Whiteness
 from crosscheck.fit.problem import BY_NAME, KINDS, Problem, Rms
@@ -193,7 +194,7 @@ class Comparison(Result):
         if strongest is None:
             return ""
         share = f"{100 * strongest.share:.0f} %"
-        if strongest.kind is Against.EVERYWHERE:
+        if strongest.kind is QuantityKind.EVERYWHERE:
             return f"; {share} of their square is the same everywhere"
         return f"; {share} of their variance goes with {strongest.against}"
 

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.comparison.associations import Against, Association
+from crosscheck.comparison.associations import Association
+from crosscheck.comparison.quantities import QuantityKind
 from crosscheck.diagnosis.result import DiagnosisVerdict, MissingEffect
 from crosscheck.diagnosis.rivals import Rival
 from crosscheck.diagnosis.search import Search
@@ -112,8 +113,11 @@ _PLACE = (
 _RUN = "zero the winches and check the tracker before each run, and repeat the runs"
 _TIME = "stay at one pose and read it for as long as the measurements took"
 _FIRST = {
-    Against.PLACE: _PLACE, Against.RUN: _RUN, Against.TIME: _TIME, Against.TEMPERATURE: _TIME,
-}  # fmt: skip
+    QuantityKind.PLACE: _PLACE,
+    QuantityKind.RUN: _RUN,
+    QuantityKind.TIME: _TIME,
+    QuantityKind.TEMPERATURE: _TIME,
+}
 
 
 def _to_find(where: Sequence[Association]) -> str:

@@ -74,7 +74,7 @@ def with_fit(
     document = copy.deepcopy(model.document)
     if "effect" not in document:
         document.append("effect", tomlkit.aot())
-    tables = {str(table["name"]): table for table in document["effect"]}  # type: ignore[union-attr]
+    tables = {str(table["name"]): table for table in document["effect"]}
     order = [name for name in model.names if name != added] + [added]
     if added in model.names:
         order = list(model.names)
@@ -87,7 +87,7 @@ def with_fit(
             table["name"].comment(by_name[name].term.layout.effect.title)
             _fill(table, by_name[name])
             _describe(table, provenance, errors)
-            document["effect"].append(table)  # type: ignore[union-attr]
+            document["effect"].append(table)
             table.trivia.indent = "\n"
             continue
         _fill(table, by_name[name])

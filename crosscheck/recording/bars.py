@@ -92,7 +92,7 @@ def _places(values: np.ndarray, every: np.ndarray, floor: float) -> np.ndarray:
     low = np.log(0.5 * min(floor, float(every[every > 0].min(initial=floor))))
     high = np.log(max(float(every.max()), 2.0 * floor))
     part = (np.log(np.maximum(values, 1e-300)) - low) / (high - low)
-    return _LEFT + (_RIGHT - _LEFT) * np.clip(part, 0.01, 1.0)
+    return np.asarray(_LEFT + (_RIGHT - _LEFT) * np.clip(part, 0.01, 1.0))
 
 
 def _lit(stage: Stage) -> Rgba:

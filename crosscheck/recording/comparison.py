@@ -9,7 +9,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from crosscheck.comparison.associations import channels
+from crosscheck.comparison.quantities import channels
 from crosscheck.fit.problem import Kind
 from crosscheck.recording import colours, layout, misfit, plots, shapes, words
 from crosscheck.recording.diagnosis_words import plain

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 
-from crosscheck.comparison.associations import channels
 from crosscheck.comparison.cable_space import cable_errors, cable_lengths
+from crosscheck.comparison.quantities import channels
 from crosscheck.comparison.travel import travel
 from crosscheck.diagnosis.steps import Stage
 from crosscheck.fit.problem import KINDS, TENSION, Problem

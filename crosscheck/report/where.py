@@ -73,7 +73,7 @@ def _draw(
     if dots is not None and kind is not None:
         bar = figure.colorbar(dots, ax=panels.ravel().tolist(), shrink=0.7, pad=0.01, aspect=28)
         bar.set_label(f"{kind.name} error [{kind.unit}]")
-        bar.outline.set_visible(False)  # type: ignore[operator]
+        bar.outline.set_visible(False)
 
 
 def _title(stages: list[Stage], column: int, magnify: float) -> str:

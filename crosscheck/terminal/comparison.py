@@ -10,8 +10,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from crosscheck.comparison.associations import Against
 from crosscheck.comparison.limits import Exceeded
+from crosscheck.comparison.quantities import QuantityKind
 from crosscheck.comparison.result import Comparison, Group
 from crosscheck.fit.problem import KINDS, Kind, Rms
 from crosscheck.terminal.lines import cell, console_for, heading, say, table_of
@@ -100,7 +100,7 @@ def _print_associations(console: Console, found: Comparison) -> None:
         means = ", ".join(f"{mean:.3g} at {label}" for label, mean in steps[:6])
         share = f"{100 * row.share:.0f} %"
         text = f"The errors go with {row.against} ({share} of their variance)"
-        if row.kind is Against.EVERYWHERE:
+        if row.kind is QuantityKind.EVERYWHERE:
             text = f"The errors are the same everywhere ({share} of their square)"
             means = f"{steps[0][1]:.3g}"
         say(console, f"{text}: {row.strongest} [{unit}] {means}")

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from made_data import SIGMA, measured, soft_cogiro, term
 
-from crosscheck.comparison.associations import EVERYWHERE, SIGNIFICANT
+from crosscheck.comparison.associations import SIGNIFICANT
 from crosscheck.comparison.cable_space import cable_errors, independent_part
 from crosscheck.comparison.limits import Limits, check, load_limits, parse_limit, with_options
+from crosscheck.comparison.quantities import EVERYWHERE
 from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.travel import STILL
 from crosscheck.errors import CrosscheckError

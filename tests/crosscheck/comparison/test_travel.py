@@ -7,6 +7,7 @@ import pytest
 from made_data import measured, soft_cogiro
 
 from crosscheck.comparison.cable_space import cable_errors, cable_lengths, independent_part
+from crosscheck.comparison.quantities import QuantityKind, in_time, of_cables, of_rows
 from crosscheck.comparison.travel import STILL, regions_of, travel
 from crosscheck.fit.problem import Problem
 from seecr.effects import Terms
@@ -58,3 +59,32 @@ def test_a_shift_of_the_platform_is_an_error_of_each_cable(
     assert errors[problem.use] == pytest.approx(apart[problem.use], rel=0, abs=1e-10)
     assert np.all(noise >= problem.sigma.position_m)
     assert 0.0 < independent_part(problem, prediction) <= 1.0
+
+
+def test_quantities_are_of_rows_or_of_cables(case: tuple[Problem, Prediction]) -> None:
+    problem, prediction = case
+    way, n, m = travel(problem, prediction), problem.data.n_rows, problem.robot.n_cables
+    rows = {q.name: q for q in of_rows(problem, prediction, way)}
+    assert all(len(q.values) == n for q in rows.values())
+    assert rows["commanded z"].values.tolist() == way.pose[:, 2].tolist()
+    assert rows["the run"].kind is QuantityKind.RUN
+    cables = {q.name: q for q in of_cables(problem, prediction, way)}
+    assert all(len(q.values) == n * m for q in cables.values())
+    assert cables["the cable"].values[:m].tolist() == list(problem.robot.cable_names)
+    assert cables["the cable's tension"].values[m] == prediction.tensions[1, 0]
+    moved = cables["whether the cable was paid out or reeled in"].values
+    home = problem.robot.nominal_lengths(problem.robot.reference_pose[None])[0]
+    first = problem.robot.nominal_lengths(way.pose[:1])[0] > home
+    assert [word == "paid out" for word in moved[:m]] == first.tolist()
+
+
+def test_a_period_is_found_in_time(case: tuple[Problem, Prediction]) -> None:
+    problem, _ = case
+    assert problem.data.t_s is not None
+    span = float(np.ptp(problem.data.t_s))
+    table = np.sin(2.0 * np.pi * problem.data.t_s / (span / 5.0))[:, None]
+    found, tried = in_time(problem, table)
+    assert found is not None and tried > 10
+    period = float(found.name.split()[-2])
+    assert period == pytest.approx(span / 5.0, rel=0.05)
+    assert in_time(problem, np.full_like(table, np.nan)) == (None, 0)

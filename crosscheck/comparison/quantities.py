@@ -1,0 +1,145 @@
+"""What residuals may go with: commanded quantities and the model's own, row by row.
+
+Never measured ones: an error in both would make them agree by itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import Enum, auto
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import signal
+
+from crosscheck.comparison.cable_space import cable_lengths
+from crosscheck.comparison.travel import AXES, Travel
+from crosscheck.fit.problem import Problem
+from seecr.experiment import Prediction
+from seecr.pose import Array, rotvec_from_quat
+
+EVERYWHERE = "nothing: it is the same everywhere"
+"""The quantity of what does not change from row to row."""
+
+# A period is one that was seen so many times, of at most so many tried, in so many rows.
+_CYCLES, _FREQUENCIES, _FEWEST = 3.0, 20000, 24
+
+
+class QuantityKind(Enum):
+    """The sort of thing that residuals may go with."""
+
+    EVERYWHERE = auto()
+    PLACE = auto()
+    RUN = auto()
+    TRAVEL = auto()
+    TIME = auto()
+    TEMPERATURE = auto()
+    TENSION = auto()
+    CABLE = auto()
+
+
+@dataclass(frozen=True, eq=False)
+class Quantity:
+    """What residuals may go with.
+
+    Attributes:
+        kind: the sort of thing. name: for people.
+        values: (k,) numbers or names of groups. unit: of the numbers.
+    """
+
+    kind: QuantityKind
+    name: str
+    values: NDArray[Any]
+    unit: str = ""
+
+
+def channels(problem: Problem) -> tuple[list[str], list[str]]:
+    """Names and units of the 6 + m readings."""
+    turns = [f"angle {a}" if problem.uses_angles else f"rotation about {a[1]}" for a in AXES[3:]]
+    names = [*AXES[:3], *turns, *(f"tension of {c}" for c in problem.robot.cable_names)]
+    return names, ["m"] * 3 + ["rad"] * 3 + ["N"] * problem.robot.n_cables
+
+
+def of_rows(problem: Problem, prediction: Prediction, way: Travel) -> Iterator[Quantity]:
+    """What changes from row to row."""
+    n, data = problem.data.n_rows, problem.data
+    yield Quantity(QuantityKind.EVERYWHERE, EVERYWHERE, np.zeros(n))
+    turn = rotvec_from_quat(way.pose[:, 3:])
+    place = np.concatenate([way.pose[:, :3], turn], axis=1)
+    for k, axis in enumerate(AXES):
+        yield Quantity(
+            QuantityKind.PLACE, f"commanded {axis}", place[:, k], "m" if k < 3 else "rad"
+        )
+    yield Quantity(QuantityKind.RUN, "the run", data.run)
+    yield Quantity(QuantityKind.TRAVEL, "direction of travel", way.direction)
+    yield Quantity(QuantityKind.TRAVEL, "speed of travel", way.speed, "m/s")
+    if data.t_s is not None:
+        yield Quantity(QuantityKind.TIME, "time", data.t_s - data.t_s.min(), "s")
+        if len(data.runs) > 1:
+            starts = {name: data.t_s[data.run == name].min() for name in data.runs}
+            into = data.t_s - np.array([starts[name] for name in data.run.tolist()])
+            yield Quantity(QuantityKind.TIME, "time since the start of the run", into, "s")
+    if data.temperature_C is not None:
+        yield Quantity(QuantityKind.TEMPERATURE, "temperature", data.temperature_C, "C")
+    slack = prediction.slack
+    yield Quantity(QuantityKind.TENSION, "number of slack cables", slack.sum(axis=1).astype(float))
+    taut = np.where(slack, np.nan, prediction.tensions)
+    some = np.isfinite(taut).any(axis=1)
+    for name, pick in (("smallest", np.nanmin), ("mean", np.nanmean)):
+        values = np.full(n, np.nan)
+        values[some] = pick(taut[some], axis=1)
+        yield Quantity(QuantityKind.TENSION, f"{name} tension of the taut cables", values, "N")
+
+
+def of_cables(problem: Problem, prediction: Prediction, way: Travel) -> tuple[Quantity, ...]:
+    """What changes from cable to cable: (n m,) values, row by row."""
+    robot, n = problem.robot, problem.data.n_rows
+    lengths = cable_lengths(problem, prediction)
+    first = problem.experiment.commands.starts
+    home = robot.nominal_lengths(robot.reference_pose[None])
+    nominal = robot.nominal_lengths(way.pose)
+    before = np.where(first[:, None], home, np.concatenate([home, nominal[:-1]]))
+    motion = np.where(nominal > before, "paid out", "reeled in")
+    return (
+        Quantity(QuantityKind.CABLE, "the cable", np.tile(np.array(robot.cable_names), n)),
+        Quantity(QuantityKind.CABLE, "the cable's length", lengths.ravel(), "m"),
+        Quantity(QuantityKind.CABLE, "the cable's tension", prediction.tensions.ravel(), "N"),
+        Quantity(QuantityKind.CABLE, "whether the cable was paid out or reeled in", motion.ravel()),
+    )
+
+
+def in_time(problem: Problem, table: Array) -> tuple[Quantity | None, int]:
+    """The phase in the period that explains most, and how many periods were tried.
+
+    Args:
+        problem: the data. table: (n, c) whitened residuals, NaN where nothing was read.
+    """
+    period, tried = _period(problem, table)
+    if period is None or problem.data.t_s is None:
+        return None, tried
+    phase = 360.0 * (problem.data.t_s / period % 1.0)
+    return Quantity(QuantityKind.TIME, f"time, again every {period:.3g} s", phase, "deg"), tried
+
+
+def _period(problem: Problem, table: Array) -> tuple[float | None, int]:
+    """The period [s] that explains most (Lomb and Scargle's), and how many were tried."""
+    t = problem.data.t_s
+    some = np.isfinite(table).any(axis=1)
+    if t is None or some.sum() < _FEWEST:
+        return None, 0
+    span, steps = float(np.ptp(t[some])), np.diff(np.unique(t[some]))
+    if span <= 0.0:
+        return None, 0
+    most = min(0.5 / float(np.median(steps)), _FREQUENCIES * 0.25 / span)
+    frequencies = np.arange(_CYCLES / span, most, 0.25 / span)
+    if len(frequencies) == 0:
+        return None, 0
+    power = np.zeros(len(frequencies))
+    for column in table.T:
+        read = np.isfinite(column)
+        if read.sum() >= _FEWEST:
+            part = column[read] - column[read].mean()
+            power += signal.lombscargle(t[read], part, 2.0 * np.pi * frequencies)
+    return 1.0 / float(frequencies[np.argmax(power)]), len(frequencies)
