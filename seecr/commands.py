@@ -75,7 +75,7 @@ def play(
     while np.any(low < high):
         low[rows:], high[rows:] = _band_of_both(low[:-rows], high[:-rows], low[rows:], high[rows:])
         rows *= 2
-    return low
+    return np.asarray(low)
 
 
 def _band_of_both(low: Array, high: Array, least: Array, most: Array) -> tuple[Array, Array]:

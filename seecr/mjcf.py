@@ -232,4 +232,4 @@ def _site_in_world(model: mujoco.MjModel, site: int) -> Array:
     while body != 0:
         position = model.body_pos[body] + quat_rotate(model.body_quat[body], position)
         body = int(model.body_parentid[body])
-    return position
+    return np.asarray(position)

@@ -167,7 +167,7 @@ def _roots(to_exit: Array, h: float) -> Array:
     for _ in range(4):
         value, slope = _equation(theta, to_exit, h)
         theta = theta - value / np.where(slope == 0.0, np.inf, slope)
-    return theta
+    return np.asarray(theta)
 
 
 def _most_level(theta: Array, to_exit: Array, h: float) -> float:

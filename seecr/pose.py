@@ -28,7 +28,7 @@ def quat_multiply(a: Array, b: Array) -> Array:
 
 def quat_conjugate(quat_wxyz: Array) -> Array:
     """Inverse rotation of unit quaternions (..., 4)."""
-    return np.asarray(quat_wxyz, float) * np.array([1.0, -1.0, -1.0, -1.0])
+    return np.asarray(np.asarray(quat_wxyz, float) * np.array([1.0, -1.0, -1.0, -1.0]))
 
 
 def cross(a: Array, b: Array) -> Array:
@@ -75,7 +75,7 @@ def rotvec_from_quat(quat_wxyz: Array) -> Array:
     safe = np.where(sine < _SMALL_ANGLE, 1.0, sine)
     # Series of 2 asin(s)/s about zero; the next term is below 1e-17 here.
     factor = np.where(sine < _SMALL_ANGLE, 2.0 + sine**2 / 3.0, angle / safe)
-    return factor * q[..., 1:]
+    return np.asarray(factor * q[..., 1:])
 
 
 def quat_from_rxyz(angles_rad: Array) -> Array:

@@ -162,12 +162,12 @@ class Robot:
     @cached_property
     def reference_lengths(self) -> Array:
         """Straight lengths |A_i - (t + R B_i)| at the reference pose, (m,) [m]."""
-        return self.nominal_lengths(self.reference_pose[None])[0]
+        return np.asarray(self.nominal_lengths(self.reference_pose[None])[0])
 
     def nominal_lengths(self, poses: Array) -> Array:
         """Straight lengths |A_i - (t + R B_i)| at poses (n, 7), as (n, m) [m] (eqs 1, 2)."""
         anchors = transform_points(np.asarray(poses, float), self.anchor_points)
-        return np.linalg.norm(self.exit_points - anchors, axis=-1)
+        return np.asarray(np.linalg.norm(self.exit_points - anchors, axis=-1))
 
     def commanded_lengths(self, poses: Array) -> Array:
         """Rest lengths the winches pay out for commanded poses (n, 7), as (n, m) [m].

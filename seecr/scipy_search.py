@@ -30,7 +30,7 @@ def first_guess(setup: Setup) -> Array:
     anchors = tables.cables[0, :, ANCHOR : ANCHOR + 3]
     vertical = (setup.exit_points - transform_points(poses, anchors)) @ up
     weight = setup.mass * np.linalg.norm(setup.gravity)
-    return weight * vertical.mean(axis=1) / float(np.mean(setup.ea))
+    return np.asarray(weight * vertical.mean(axis=1) / float(np.mean(setup.ea)))
 
 
 def solve_with_scipy(
@@ -64,7 +64,7 @@ def solve_with_scipy(
         def residual(x: Array, one=one, point=point, base=base, counter=counter) -> Array:  # type: ignore[no-untyped-def]
             counter[0] += 1
             _place(one, point, base, x)
-            return statics.evaluate(one, point).gradient[0] / one.scale[0]
+            return np.asarray(statics.evaluate(one, point).gradient[0] / one.scale[0])
 
         x0 = np.zeros(tables.n_dof)
         if start is None:

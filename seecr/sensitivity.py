@@ -222,7 +222,7 @@ class _ByWrench:
         else:
             ahead, behind = self._tables(plus, minus)
             change = _response_by_cable(self.at, ahead, behind, shift.apart)
-        return self.read_rates @ change if self.sensing else change
+        return np.asarray(self.read_rates @ change if self.sensing else change)
 
     def _physical(self, plus: Setup, minus: Setup, apart: float) -> Array:
         if _differ_by_length_only(plus, minus):
@@ -325,7 +325,7 @@ def _difference(experiment: Experiment, shift: _Shift, at: Prediction) -> Array:
     behind = experiment.predict(shift.minus.effects, near)
     change = readings_difference(ahead.readings, behind.readings) / shift.apart
     change[~(ahead.solved & behind.solved)] = 0.0
-    return change
+    return np.asarray(change)
 
 
 def readings_difference(a: Readings, b: Readings) -> Array:

@@ -259,8 +259,8 @@ def residual_size(gradient: Array) -> Array:
     """Largest of force and torque over length, (n,) [N], of gradients (n, d)."""
     if gradient.shape[1] == 6:
         halves = np.linalg.norm(gradient.reshape(-1, 2, 3), axis=2)
-        return halves.max(axis=1)
-    return np.linalg.norm(gradient, axis=1)
+        return np.asarray(halves.max(axis=1))
+    return np.asarray(np.linalg.norm(gradient, axis=1))
 
 
 def take_evaluation(whole: Evaluation, rows: NDArray[np.integer]) -> Evaluation:

@@ -47,7 +47,7 @@ class MujocoRobot:
         for i, pose in enumerate(poses):
             physics.place(pose)
             lengths[i] = physics.data.ten_length
-        return lengths + self.pretension
+        return np.asarray(lengths + self.pretension)
 
     def settle(self, poses: Array) -> SettlingBatch:
         """Bring the platform to rest from commanded poses (n, 7), each by itself."""

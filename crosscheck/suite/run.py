@@ -166,7 +166,7 @@ class CaseResult(Result):
     @property
     def compared(self) -> NDArray[np.bool_]:
         """Poses whose differences mean something: no free motion or branch between, (n,)."""
-        return (self.verdict == Verdict.AGREES) | (self.verdict == Verdict.DIFFERS)
+        return np.asarray((self.verdict == Verdict.AGREES) | (self.verdict == Verdict.DIFFERS))
 
     @property
     def outcome(self) -> Outcome:

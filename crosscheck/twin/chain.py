@@ -58,7 +58,7 @@ def _pull(span: Array, part: Array, ea: Array, steps: Array) -> Array:
         pull = trial
         if np.all(np.linalg.norm(slope, axis=1) < 1e-12 * n * part):
             break
-    return pull
+    return np.asarray(pull)
 
 
 def _complementary(

@@ -184,7 +184,7 @@ def _zero(true: TrueRobot) -> Array:
             "over its sheave at the reference pose; expected anchor points aside of exit points"
         )
     pretension = robot.rest_lengths - _straight(true, robot.reference_pose[None])[0]
-    return world.cable_lengths() + pretension
+    return np.asarray(world.cable_lengths() + pretension)
 
 
 def _bare(true: TrueRobot) -> TrueRobot:

@@ -261,7 +261,7 @@ class World(Physics):
         else:
             hinges = self.true.robot.hinges
             rotate[: len(hinges)] = hinges
-        return rotate
+        return np.asarray(rotate)
 
 
 def _coupling(places: Places, n_dof: int, segments: int) -> list[Group]:
