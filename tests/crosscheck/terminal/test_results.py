@@ -55,7 +55,7 @@ def test_a_limit_that_is_exceeded_is_said(found: Comparison) -> None:
 def test_an_addition_tells_values_errors_and_what_was_written() -> None:
     robot = soft_cogiro()
     data = measured(robot, [term(robot, "stiffness", factor=1.4)])
-    added = add_effect(robot, data, (), "stiffness")
+    added = add_effect(robot, data, "stiffness")
     screen, out = console()
     print_addition(added, Path("m.toml"), True, screen)
     text = out.getvalue()
