@@ -25,6 +25,7 @@ bench: ## how fast it is, one process at a time
 
 docs: ## write the pages and pictures that are made from the sources
 	$(BIN)/python scripts/make_effects.py
+	$(BIN)/python scripts/make_api.py
 	$(BIN)/python scripts/draw_floors.py
 
 suite: ## SEECR against MuJoCo, every case; results in crosscheck-results/

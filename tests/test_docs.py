@@ -6,9 +6,12 @@ import re
 from pathlib import Path
 
 import draw_floors
+import make_api
 import make_effects
 import pytest
 
+import crosscheck
+import seecr
 from seecr import __version__
 from seecr.effects import BUILT_IN
 from seecr.setup import QUANTITIES
@@ -39,6 +42,17 @@ def test_the_page_about_effects_is_current() -> None:
     assert make_effects.with_tables(page) == page, AGAIN
     assert all(f"| `{effect.name}` |" in page for effect in BUILT_IN)
     assert all(f"| `{name}` |" in page for name in QUANTITIES)
+
+
+def test_the_page_of_public_names_is_current() -> None:
+    assert make_api.page() == make_api.PAGE.read_text(encoding="utf-8"), AGAIN
+
+
+def test_the_page_of_public_names_has_them_all() -> None:
+    page = make_api.PAGE.read_text(encoding="utf-8")
+    for face in (crosscheck, seecr):
+        assert all(f"\n### {face.__name__}.{name}\n" in page for name in face.__all__)
+    assert " at 0x" not in page
 
 
 def test_the_picture_of_the_floors_is_current() -> None:

@@ -7,18 +7,31 @@ import io
 import re
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
-def test_example_prints_what_it_says() -> None:
-    code = re.search(r"```python\n(.*?)```", README, re.DOTALL)
-    said = re.search(r"```text\n(x 0\.17.*?)```", README, re.DOTALL)
-    assert code and said
+def printed_by(number: int) -> tuple[str, str]:
+    """What an example of README prints, and what README says that it prints."""
+    examples = re.findall(r"```python\n(.*?)```\n\n```text\n(.*?)```", README, re.DOTALL)
+    code, said = examples[number]
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
-        exec(compile(code.group(1), "README.md", "exec"), {})
-    assert printed.getvalue() == said.group(1)
+        exec(compile(code, "README.md", "exec"), {})
+    return printed.getvalue(), said
+
+
+def test_the_example_of_seecr_prints_what_it_says() -> None:
+    printed, said = printed_by(0)
+    assert printed == said and said.startswith("x 0.17 m")
+
+
+@pytest.mark.slow
+def test_the_diagnosis_from_python_prints_what_it_says() -> None:
+    printed, said = printed_by(1)
+    assert printed == said and said.startswith("effects_found")
 
 
 def test_ci_runs_the_test_command_of_the_readme() -> None:

@@ -51,7 +51,7 @@ def test_one_class_is_all_it_takes(registered: None, tmp_path: Path) -> None:
     robot = seecr.load_robot(seecr.model_path("demobot_cogiro"))
     truth = seecr.Term.of(robot, "mounted_turned", angle_rad=0.004)
     data = measured(robot, [truth], points=6)
-    found = add_effect(robot, data, (), "mounted_turned")
+    found = add_effect(robot, data, "mounted_turned")
     angle, error = found.own.term.vector[0], found.own.stderr[0]
     assert found.pays and abs(angle - 0.004) < 4.0 * error < 2e-3
     assert found.after["orientation_rms_rad"] < found.before["orientation_rms_rad"]
