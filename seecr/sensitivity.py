@@ -9,7 +9,7 @@ Rows with history are the exception: their walk is repeated with each parameter 
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -298,6 +298,14 @@ def _motion_columns(at: Prediction) -> Array:
     screws = statics.joints_at_rest(at.tables, at.found)
     per = np.where(screws[..., 0] == 1.0, 1.0 / tables.length, 1.0)
     return motion_columns(screws, at.pose[:, :3]) * per[:, None, :]
+
+
+def with_inverse(at: Prediction, inverse: Array) -> Prediction:
+    """The prediction, whose rows answer forces by another inverse of their stiffness (n, d, d).
+
+    Such as a damped one, where the rows are at poses that are no equilibria.
+    """
+    return replace(at, kept={"inverse": inverse})
 
 
 def _inverse_stiffness(at: Prediction) -> Array:

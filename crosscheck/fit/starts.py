@@ -13,8 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import optimize
 
-from crosscheck.fit.gauss_newton import Fit
+from crosscheck.fit.gauss_newton import PRIOR_SIZES, Fit
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.state import State, derivatives
 from seecr import statics
@@ -23,17 +24,15 @@ from seecr.effects import Term, Terms
 from seecr.effects.base import Effect, Layout
 from seecr.experiment import Prediction
 from seecr.pose import Array, pose_add, pose_difference
-from seecr.sensitivity import motion_of, sensitivities
+from seecr.sensitivity import motion_of, sensitivities, with_inverse
 from seecr.tables import assemble
 
-# Steps of Gauss-Newton; halvings of a step that does not pay.
-_STEPS, _HALVINGS = 12, 5
+# Most times that the forces are evaluated; a fall of their squares by less ends the search.
+_EVALUATIONS, _FALL = 15, 1e-3
 # Directions softer than this part of a row's stiffest say little about forces.
 _SOFT = 0.02
 # No cable is as stiff as this [N/m].
 _ABSURD = 1e20
-# The weak prior, in plausible sizes.
-_PRIOR = 10.0
 # A start is at most this many plausible sizes from null.
 _START_SIZES = 3.0
 # Part of the cables that are slack from which a fit may end in a hollow.
@@ -138,42 +137,45 @@ def equation_start(
         (p,) values, or None where this says nothing: effects of the sensors, rows that depend
         on the rows before, rotations that were not read, platforms on joints.
     """
-    data = problem.data
-    senses = layout.effect.edit_readings is not Effect.edit_readings
-    if senses or data.quat_wxyz is None or base.prediction.has_history:
-        return None
-    if problem.robot.joints:
-        return None  # a measured pose is off what joints can reach, by its noise
-    whole = np.isfinite(data.position).all(axis=1) & np.isfinite(data.quat_wxyz).all(axis=1)
-    rows = problem.use & whole
-    if not rows.any() or base.prediction.setup.laws:
+    rows = _balanced_rows(problem, base, layout)
+    if not rows.any():
         return None
     forces = _Forces(problem, base, layout, factor, rows)
-    values, cost, white, at = start, *forces.at(start)
-    amplitudes = np.flatnonzero(~layout.shape)
-    scale = layout.scale[amplitudes]
-    for _ in range(_STEPS):
-        if at is None:
-            return None
-        x = forces.derivatives(values, at, amplitudes) * scale
-        z = (values - layout.null)[amplitudes] / scale
-        normal = x.T @ x + np.eye(len(z)) / _PRIOR**2
-        step = np.linalg.solve(normal, x.T @ white - z / _PRIOR**2)
-        for _half in range(_HALVINGS):
-            trial = values.copy()
-            trial[amplitudes] += step * scale
-            trial = np.clip(trial, layout.lower, layout.upper)
-            after, white_after, at_after = forces.at(trial)
-            if after < cost:
-                break
-            step = 0.5 * step
-        else:
-            break
-        paid = cost - after
-        values, cost, white, at = trial, after, white_after, at_after
-        if paid < 1e-3 * cost:
-            break
-    return values
+    free = ~layout.shape
+    null, scale = layout.null[free], layout.scale[free]
+
+    def values(z: Array) -> Array:
+        out = start.copy()
+        out[free] = null + z * scale
+        return out
+
+    def residuals(z: Array) -> Array:
+        return np.concatenate([forces.displacements(values(z)), z / PRIOR_SIZES])
+
+    def jacobian(z: Array) -> Array:
+        rates = forces.derivatives(values(z)) * scale
+        return np.concatenate([-rates, np.eye(len(z)) / PRIOR_SIZES])
+
+    begin = (start[free] - null) / scale
+    if not np.all(np.isfinite(residuals(begin))):
+        return None
+    bounds = (layout.lower[free] - null) / scale, (layout.upper[free] - null) / scale
+    found = optimize.least_squares(
+        residuals, begin, jacobian, bounds, max_nfev=_EVALUATIONS, ftol=_FALL, xtol=None, gtol=None
+    )
+    return np.clip(values(found.x), layout.lower, layout.upper)
+
+
+def _balanced_rows(problem: Problem, base: State, layout: Layout) -> NDArray[np.bool_]:
+    """(n,) rows whose measured pose says what the forces there are; none where nothing does."""
+    data, at = problem.data, base.prediction
+    senses = layout.effect.edit_readings is not Effect.edit_readings
+    # platforms on joints: a measured pose is off what they can reach, by its noise
+    silent = senses or at.has_history or bool(at.setup.laws) or bool(problem.robot.joints)
+    if silent or data.quat_wxyz is None:
+        return np.zeros(data.n_rows, dtype=bool)
+    read = np.isfinite(data.position).all(axis=1) & np.isfinite(data.quat_wxyz).all(axis=1)
+    return np.asarray(problem.use & read)
 
 
 class _Forces:
@@ -198,13 +200,33 @@ class _Forces:
         """The model with the effect."""
         return self.base.terms.with_term(Term(self.layout, values))
 
-    def at(self, values: Array) -> tuple[float, Array, Prediction | None]:
-        """Cost and whitened displacements (N,), and the state they belong to."""
-        problem, experiment = self.problem, self.base.experiment
-        effects = self.terms(values).effects
-        setup = experiment.setup(effects)
+    def displacements(self, values: Array) -> Array:
+        """(N,) displacements that would balance the forces, whitened; inf where there are none."""
+        at = self._at(values)
+        if at is None:
+            return np.full(self.problem.n_readings, np.inf)
+        moved = _damped_inverse(at.found.hessian) @ at.found.gradient[..., None]
+        off = (motion_of(at) @ moved)[..., 0]
+        table = np.zeros(self.problem.measured.shape)
+        table[self.rows, :6] = np.where(np.isfinite(off), off, 0.0)[self.rows]
+        return self.problem.whiten(self.factor, table)
+
+    def derivatives(self, values: Array) -> Array:
+        """(N, k) of the prediction by the effect's amplitudes, whitened; 0 where there is none."""
+        at, terms = self._at(values), self.terms(values)
+        wanted = np.flatnonzero(terms.own(self.layout.name))[~self.layout.shape].tolist()
+        if at is None:
+            return np.zeros((self.problem.n_readings, len(wanted)))
+        rates = sensitivities(self.base.experiment, terms, at, wanted, frozen=True)
+        rates[~self.rows] = 0.0
+        rates[:, 6:] = 0.0
+        return self.problem.whiten(self.factor, rates)
+
+    def _at(self, values: Array) -> Prediction | None:
+        """The model held at the measured poses; None where it has no answer there."""
+        setup = self.base.experiment.setup(self.terms(values).effects)
         if setup.has_history:
-            return np.inf, np.zeros(0), None
+            return None
         tables = assemble(setup)
         n, m = tables.cables.shape[:2]
         start = statics.Evaluation.empty(n, m, tables.n_dof)
@@ -215,28 +237,10 @@ class _Forces:
         size = np.where(np.isfinite(found.hessian), np.abs(found.hessian), np.inf)
         broken = (found.outcome != CONVERGED) | (size.max(axis=(1, 2)) > _ABSURD)
         if np.any(broken & self.rows):
-            return np.inf, np.zeros(0), None
+            return None
         found.hessian[broken], found.gradient[broken] = 0.0, 0.0
         at = Prediction(setup, tables, found, self.base.prediction.readings, False)
-        at.kept["inverse"] = _damped_inverse(found.hessian)
-        moved = at.kept["inverse"] @ found.gradient[..., None]
-        off = (motion_of(at) @ moved)[..., 0]
-        table = np.full(problem.measured.shape, np.nan)
-        table[self.rows, :6] = off[self.rows]
-        white = self._white(np.where(np.isfinite(table), table, 0.0))
-        return float(white @ white), white, at
-
-    def derivatives(self, values: Array, at: Prediction, columns: NDArray[np.intp]) -> Array:
-        """(N, k) of the displacements, whitened."""
-        terms = self.terms(values)
-        wanted = np.flatnonzero(terms.own(self.layout.name))[columns].tolist()
-        rates = sensitivities(self.base.experiment, terms, at, wanted, frozen=True)
-        rates[~self.rows] = 0.0
-        rates[:, 6:] = 0.0
-        return self._white(rates)
-
-    def _white(self, values: Array) -> Array:
-        return self.problem.whiten(self.factor, values)
+        return with_inverse(at, _damped_inverse(found.hessian))
 
 
 def _damped_inverse(stiffness: Array) -> Array:
