@@ -50,7 +50,7 @@ def command(
     """
     from crosscheck import load_commands, make_plan
     from crosscheck.files import json_text, staged, write_text
-    from crosscheck.terminal import plan_json, print_plan
+    from crosscheck.terminal import print_plan
     from crosscheck.units import parse_quantity
     from seecr import load_robot
 
@@ -69,7 +69,7 @@ def command(
     with staged(out) as folder:
         with progress_share("planning") as progress:
             plan = make_plan(machine, commands, replace(commands.sigma, **given), progress)
-        text = json_text({"exit_status": 0 if plan.converged else 3, **plan_json(plan)})
+        text = json_text({"exit_status": 0 if plan.converged else 3, **plan.as_json()})
         write_text(folder / "plan.json", text + "\n")
     if as_json:
         click.echo(text)

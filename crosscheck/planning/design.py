@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from crosscheck.fit.imitation import imitated
 from crosscheck.fit.prepare import Progress
-from crosscheck.fit.reasons import Reason
 from crosscheck.given import GivenRobot, robot_of
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import commands_of
 from crosscheck.planning.extensions import extensions
 from crosscheck.planning.greedy import Wanted
 from crosscheck.planning.planned import Planned, Reads, expected_sigma, near_slack, planned
-from crosscheck.planning.proposer import Suggestion, propose
+from crosscheck.planning.proposer import propose
+from crosscheck.planning.result import Plan, Visible
 from crosscheck.planning.visibility import (
     EXACT,
-    LEVEL,
-    POWER,
     Signal,
     left_over,
     needed,
@@ -29,110 +26,6 @@ from crosscheck.planning.visibility import (
     signals_like,
 )
 from seecr.pose import Array
-from seecr.result import Record, Result
-
-
-@dataclass(frozen=True, eq=False)
-class Visible:
-    """What a plan will show of an effect.
-
-    Attributes:
-        signal: what it does to the readings.
-        needed: squared signal that a test finds.
-        factor: smallest size that shows, of all its parameters alike, in plausible sizes; inf
-            where the poses do not see it at all.
-        identifiable: the same beside the best imitator that is no exact twin.
-        imitator: its name, "" where there is none.
-        confused: (name, what it cannot imitate) of effects it cannot be told from at its
-            plausible size, the best imitator first; exact twins not included.
-        twins: effects that imitate it exactly, whatever the poses read alike.
-    """
-
-    signal: Signal
-    needed: float
-    factor: float
-    identifiable: float
-    imitator: str
-    confused: tuple[tuple[str, float], ...]
-    twins: tuple[str, ...]
-
-    @property
-    def name(self) -> str:
-        """Name of the effect."""
-        return self.signal.layout.name
-
-    @property
-    def visible(self) -> bool:
-        """Whether a plausible size would show."""
-        return self.factor <= 1.0
-
-    def sizes(self, factor: float) -> dict[str, float]:
-        """Parameters at a multiple of their plausible sizes, without those that only shape it."""
-        layout = self.signal.layout
-        own = np.any(self.signal.columns != 0.0, axis=0)
-        own = own if own.any() else ~layout.shape
-        return {k: factor * float(layout.scale[i]) for i, k in enumerate(layout.names) if own[i]}
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Plan(Result):
-    """What planned commands will show.
-
-    Attributes:
-        planned: commands and noise. effects: the best visible first.
-        missing: effects that cannot be looked for, and why.
-        confusion: names and their (k, k) containment: part of the row's effect that the column's
-            imitates.
-        suggestions: what to add, the most useful first.
-        slack: (line, cable) about to go slack or taut.
-        notes: what was assumed or left out.
-    """
-
-    planned: Planned
-    effects: tuple[Visible, ...]
-    missing: Mapping[str, Reason]
-    confusion: tuple[tuple[str, ...], Array]
-    suggestions: tuple[Suggestion, ...]
-    slack: tuple[tuple[int, str], ...]
-    notes: tuple[str, ...]
-
-    @property
-    def sentence(self) -> str:
-        """The plan in a sentence."""
-        if not self.effects:
-            return "Nothing can be planned: the model has no equilibrium at any of the rows."
-        seen = [v for v in self.effects if v.visible]
-        alone = [v for v in seen if not v.confused and not v.twins]
-        return (
-            f"Of {len(self.effects)} effects, {len(seen)} would show at a plausible size and "
-            f"{len(alone)} of these could be named; {100 * POWER:.0f} % of such are found, "
-            f"with {100 * LEVEL:.0f} % false alarms over all."
-        )
-
-    def lines(self) -> list[str]:
-        """The sentence, what to add, and the notes."""
-        add = [f"add: {item.words}" for item in self.suggestions if item.reached]
-        return [self.sentence, *add, *(f"note: {note}" for note in self.notes)]
-
-    def records(self) -> list[Record]:
-        """A record for each effect: how large it must be to show and to be named."""
-        return [
-            {
-                "effect": found.name,
-                "visible": found.visible,
-                "smallest_visible_in_plausible_sizes": found.factor,
-                "smallest_named_in_plausible_sizes": found.identifiable,
-                "cannot_be_told_from": ", ".join(
-                    [*found.twins, *(name for name, _left in found.confused)]
-                ),
-            }
-            for found in self.effects
-        ]
-
-    @property
-    def converged(self) -> bool:
-        """Whether the model rests at every planned row."""
-        return not bool(self.planned.unsolved.any())
 
 
 def make_plan(

@@ -10,12 +10,11 @@ if TYPE_CHECKING:
     from crosscheck.terminal.addition import print_addition
     from crosscheck.terminal.comparison import print_comparison
     from crosscheck.terminal.diagnosis import print_diagnosis
-    from crosscheck.terminal.plan import plan_json, print_plan
+    from crosscheck.terminal.plan import print_plan
     from crosscheck.terminal.suite import print_run
 
 # Each imports what it prints: a command loads its own alone.
 _WHERE = {
-    "plan_json": "plan",
     "print_addition": "addition",
     "print_comparison": "comparison",
     "print_diagnosis": "diagnosis",
@@ -24,7 +23,6 @@ _WHERE = {
 }
 
 __all__ = [
-    "plan_json",
     "print_addition",
     "print_comparison",
     "print_diagnosis",

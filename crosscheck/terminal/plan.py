@@ -1,47 +1,19 @@
-"""A plan on the terminal and as JSON."""
+"""A plan on the terminal."""
 
 from __future__ import annotations
 
-from dataclasses import fields
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from crosscheck.fit.words import shown
-from crosscheck.planning.design import Plan, Visible
 from crosscheck.planning.proposer import Gain, Suggestion
-from crosscheck.planning.visibility import LEVEL, POWER
+from crosscheck.planning.result import Plan, Visible
 from crosscheck.terminal.lines import console_for, say
 from seecr.pose import rotvec_from_quat
 
 _MOST_GAINS, _MOST_NAMES, _MOST_SLACK = 3, 4, 5
-
-
-def size_words(found: Visible, factor: float) -> str:
-    """Parameters at a multiple of their plausible sizes, such as "radius 0.3 mm"."""
-    if not np.isfinite(factor):
-        return "none"
-    layout = found.signal.layout
-    sizes = found.sizes(factor)
-    parts = []
-    for field in fields(layout.effect):
-        unit = field.metadata["unit"]
-        keys = [key for key in sizes if _belongs(key, field.name, unit)]
-        if not keys or field.metadata["shape"]:
-            continue
-        null = float(field.metadata["null"])
-        size = shown(sizes[keys[0]], unit)
-        start = f"{null:g} +- " if null else ""
-        parts.append(f"{field.name} {start}{size}{' each' if len(keys) > 1 else ''}")
-    return ", ".join(parts)
-
-
-def _belongs(key: str, name: str, unit: str) -> bool:
-    stem = key.removesuffix(f"_{unit}") if unit else key
-    return stem == name or (stem.startswith(f"{name}_") and len(stem) > len(name) + 1)
 
 
 def print_plan(plan: Plan, out: Path, console: Console | None = None) -> None:
@@ -65,9 +37,9 @@ def _table(plan: Plan) -> Table:
     for head in ("effect", "smallest size that shows", "and can be named", "cannot be told from"):
         table.add_column(head)
     for found in plan.effects:
-        named = "-" if found.twins else size_words(found, found.identifiable)
+        named = "-" if found.twins else found.words(found.identifiable)
         style = "" if found.visible else "dim"
-        table.add_row(found.name, size_words(found, found.factor), named, alike(found), style=style)
+        table.add_row(found.name, found.words(found.factor), named, alike(found), style=style)
     return table
 
 
@@ -118,53 +90,3 @@ def gain_words(gain: Gain) -> str:
     if gain.other:
         return f"tells {gain.effect} from {gain.other} {numbers}"
     return f"shows {gain.effect} {numbers}"
-
-
-def plan_json(plan: Plan) -> dict[str, Any]:
-    """The content of ``plan.json``, SI."""
-    problem = plan.planned.problem
-    names, table = plan.confusion
-    return {
-        "sentence": plan.sentence,
-        "robot": problem.robot.name,
-        "poses": str(problem.data.path),
-        "rows": {"all": problem.data.n_rows, "used": int(problem.use.sum())},
-        "sigma": vars(problem.sigma),
-        "level": LEVEL,
-        "power": POWER,
-        "effects": [_effect(v) for v in plan.effects],
-        "not_with_these_data": {name: why.words for name, why in plan.missing.items()},
-        "confusion": {"effects": list(names), "containment": table},
-        "add": [_suggestion(s) for s in plan.suggestions],
-        "near_slack": [{"line": line, "cable": cable} for line, cable in plan.slack],
-        "notes": list(plan.notes),
-    }
-
-
-def _effect(found: Visible) -> dict[str, Any]:
-    return {
-        "effect": found.name,
-        "visible": found.visible,
-        "plausible": found.sizes(1.0),
-        "smallest_visible": found.sizes(found.factor),
-        "smallest_visible_in_plausible_sizes": found.factor,
-        "words": size_words(found, found.factor),
-        "smallest_identifiable": None if found.twins else found.sizes(found.identifiable),
-        "best_imitator": found.imitator or None,
-        "cannot_be_told_from": [
-            *({"effect": name, "exact": True, "signal": 0.0} for name in found.twins),
-            *({"effect": n, "exact": False, "signal": left} for n, left in found.confused),
-        ],
-        "signal": found.signal.power,
-        "needed": found.needed,
-        "shape": found.signal.shape,
-    }
-
-
-def _suggestion(item: Suggestion) -> dict[str, Any]:
-    return {
-        "kind": item.kind,
-        "words": item.words,
-        "poses": item.poses,
-        "gains": [{**vars(g), "enough": g.then >= g.needed} for g in item.gains],
-    }

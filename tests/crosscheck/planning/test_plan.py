@@ -19,7 +19,6 @@ from crosscheck.planning.greedy import Wanted, chosen_poses
 from crosscheck.planning.planned import near_slack
 from crosscheck.planning.proposer import MORE_POSES
 from crosscheck.planning.visibility import joined, left_over, needed, signals, signals_like
-from crosscheck.terminal.plan import plan_json, size_words
 from seecr.effects import Terms
 from seecr.mjcf import load_robot
 from seecr.pose import rotvec_from_quat
@@ -204,12 +203,12 @@ def test_poses_near_slack_are_flagged():
 
 
 def test_sizes_are_words_in_millimetres(plan):
-    assert size_words(effect(plan, "pulley_radius"), 1.0).startswith("radius ")
-    assert size_words(effect(plan, "pulley_radius"), 1.0).endswith(" mm")
-    assert size_words(effect(plan, "stiffness"), 1.0) == "factor 1 +- 0.3"
-    assert " deg each" in size_words(effect(plan, "tracker_frame"), 1.0)
-    assert size_words(effect(plan, "hysteresis"), 1.0).endswith(" N")
-    assert size_words(effect(plan, "stiffness"), np.inf) == "none"
+    assert effect(plan, "pulley_radius").words(1.0).startswith("radius ")
+    assert effect(plan, "pulley_radius").words(1.0).endswith(" mm")
+    assert effect(plan, "stiffness").words(1.0) == "factor 1 +- 0.3"
+    assert " deg each" in effect(plan, "tracker_frame").words(1.0)
+    assert effect(plan, "hysteresis").words(1.0).endswith(" N")
+    assert effect(plan, "stiffness").words(np.inf) == "none"
 
 
 def test_a_planar_robot_and_commanded_lengths(robot, few):
@@ -225,9 +224,9 @@ def test_a_planar_robot_and_commanded_lengths(robot, few):
 
 def test_constant_commands_and_slack_rows(robot, commands):
     still = make_plan(robot, commands.rows(np.zeros(12, dtype=int)))
-    json_text(plan_json(still))
+    json_text(still.as_json())
     loose = replace(robot, gravity=np.zeros(3), rest_lengths=robot.rest_lengths + 1.0)
     found = make_plan(loose, commands)
     assert not found.converged and found.effects == ()
     assert "left out" in found.notes[0]
-    json_text(plan_json(found))
+    json_text(found.as_json())

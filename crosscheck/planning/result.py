@@ -1,0 +1,187 @@
+"""What a plan says: which effects will show, which can be named, what to add; and its JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from crosscheck.fit.reasons import Reason
+from crosscheck.fit.words import shown
+from crosscheck.planning.planned import Planned
+from crosscheck.planning.proposer import Suggestion
+from crosscheck.planning.visibility import LEVEL, POWER, Signal
+from seecr.pose import Array
+from seecr.result import Record, Result
+
+
+@dataclass(frozen=True, eq=False)
+class Visible:
+    """What a plan will show of an effect.
+
+    Attributes:
+        signal: what it does to the readings.
+        needed: squared signal that a test finds.
+        factor: smallest size that shows, of all its parameters alike, in plausible sizes; inf
+            where the poses do not see it at all.
+        identifiable: the same beside the best imitator that is no exact twin.
+        imitator: its name, "" where there is none.
+        confused: (name, what it cannot imitate) of effects it cannot be told from at its
+            plausible size, the best imitator first; exact twins not included.
+        twins: effects that imitate it exactly, whatever the poses read alike.
+    """
+
+    signal: Signal
+    needed: float
+    factor: float
+    identifiable: float
+    imitator: str
+    confused: tuple[tuple[str, float], ...]
+    twins: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """Name of the effect."""
+        return self.signal.layout.name
+
+    @property
+    def visible(self) -> bool:
+        """Whether a plausible size would show."""
+        return self.factor <= 1.0
+
+    @property
+    def named(self) -> bool:
+        """Whether a plausible size would show and be told from everything else."""
+        return self.visible and not self.confused and not self.twins
+
+    def sizes(self, factor: float) -> dict[str, float]:
+        """Parameters at a multiple of their plausible sizes, without those that only shape it."""
+        layout = self.signal.layout
+        own = np.any(self.signal.columns != 0.0, axis=0)
+        own = own if own.any() else ~layout.shape
+        return {k: factor * float(layout.scale[i]) for i, k in enumerate(layout.names) if own[i]}
+
+    def words(self, factor: float) -> str:
+        """The same for people, such as "radius 0.3 mm"; "none" where factor is inf."""
+        if not np.isfinite(factor):
+            return "none"
+        effect, sizes = self.signal.layout.effect, self.sizes(factor)
+        parts = []
+        for item in fields(effect):
+            unit = item.metadata["unit"]
+            keys = [key for key in sizes if _belongs(key, item.name, unit)]
+            if not keys or item.metadata["shape"]:
+                continue
+            null = float(item.metadata["null"])
+            start = f"{null:g} +- " if null else ""
+            each = " each" if len(keys) > 1 else ""
+            parts.append(f"{item.name} {start}{shown(sizes[keys[0]], unit)}{each}")
+        return ", ".join(parts)
+
+    def as_json(self) -> dict[str, Any]:
+        """An item of ``effects``."""
+        return {
+            "effect": self.name,
+            "visible": self.visible,
+            "plausible": self.sizes(1.0),
+            "smallest_visible": self.sizes(self.factor),
+            "smallest_visible_in_plausible_sizes": self.factor,
+            "words": self.words(self.factor),
+            "smallest_identifiable": None if self.twins else self.sizes(self.identifiable),
+            "best_imitator": self.imitator or None,
+            "cannot_be_told_from": [
+                *({"effect": name, "exact": True, "signal": 0.0} for name in self.twins),
+                *({"effect": n, "exact": False, "signal": left} for n, left in self.confused),
+            ],
+            "signal": self.signal.power,
+            "needed": self.needed,
+            "shape": self.signal.shape,
+        }
+
+
+def _belongs(key: str, name: str, unit: str) -> bool:
+    stem = key.removesuffix(f"_{unit}") if unit else key
+    return stem == name or (stem.startswith(f"{name}_") and len(stem) > len(name) + 1)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Plan(Result):
+    """What planned commands will show.
+
+    Attributes:
+        planned: commands and noise. effects: the best visible first.
+        missing: effects that cannot be looked for, and why.
+        confusion: names and their (k, k) containment: part of the row's effect that the column's
+            imitates.
+        suggestions: what to add, the most useful first.
+        slack: (line, cable) about to go slack or taut.
+        notes: what was assumed or left out.
+    """
+
+    planned: Planned
+    effects: tuple[Visible, ...]
+    missing: Mapping[str, Reason]
+    confusion: tuple[tuple[str, ...], Array]
+    suggestions: tuple[Suggestion, ...]
+    slack: tuple[tuple[int, str], ...]
+    notes: tuple[str, ...]
+
+    @property
+    def sentence(self) -> str:
+        """The plan in a sentence."""
+        if not self.effects:
+            return "Nothing can be planned: the model has no equilibrium at any of the rows."
+        seen = [v for v in self.effects if v.visible]
+        named = [v for v in seen if v.named]
+        return (
+            f"Of {len(self.effects)} effects, {len(seen)} would show at a plausible size and "
+            f"{len(named)} of these could be named; {100 * POWER:.0f} % of such are found, "
+            f"with {100 * LEVEL:.0f} % false alarms over all."
+        )
+
+    def lines(self) -> list[str]:
+        """The sentence, what to add, and the notes."""
+        add = [f"add: {item.words}" for item in self.suggestions if item.reached]
+        return [self.sentence, *add, *(f"note: {note}" for note in self.notes)]
+
+    def records(self) -> list[Record]:
+        """A record for each effect: how large it must be to show and to be named."""
+        return [
+            {
+                "effect": found.name,
+                "visible": found.visible,
+                "smallest_visible_in_plausible_sizes": found.factor,
+                "smallest_named_in_plausible_sizes": found.identifiable,
+                "cannot_be_told_from": ", ".join(
+                    [*found.twins, *(name for name, _left in found.confused)]
+                ),
+            }
+            for found in self.effects
+        ]
+
+    @property
+    def converged(self) -> bool:
+        """Whether the model rests at every planned row."""
+        return not bool(self.planned.unsolved.any())
+
+    def as_json(self) -> dict[str, Any]:
+        """The content of ``plan.json``, SI."""
+        problem = self.planned.problem
+        names, table = self.confusion
+        return {
+            "sentence": self.sentence,
+            "robot": problem.robot.name,
+            "poses": str(problem.data.path),
+            "rows": {"all": problem.data.n_rows, "used": int(problem.use.sum())},
+            "sigma": vars(problem.sigma),
+            "level": LEVEL,
+            "power": POWER,
+            "effects": [found.as_json() for found in self.effects],
+            "not_with_these_data": {name: why.words for name, why in self.missing.items()},
+            "confusion": {"effects": list(names), "containment": table},
+            "add": [item.as_json() for item in self.suggestions],
+            "near_slack": [{"line": line, "cable": cable} for line, cable in self.slack],
+            "notes": list(self.notes),
+        }
