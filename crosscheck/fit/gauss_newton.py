@@ -26,6 +26,8 @@ PRIOR_SIZES = 10.0
 UNSEEN_SIZES = 100.0
 _ITERATIONS = 40
 _GAIN = 1e-3
+# Trials of a step, each damped ten times more; the longest step, in plausible sizes.
+_DAMPINGS, _LONGEST = 12, 5.0
 # A trial is given up after a few steps, or fewer where it is that much further off.
 _FEW, _FEW_FAR, _FAR = 4, 2, 10.0
 # Derivatives are computed afresh after this many more steps at the latest.
@@ -120,41 +122,14 @@ def fit(
     """
     state = evaluate(problem, terms, factor, start)
     p = len(terms)
-    free = np.ones(p, dtype=bool) if free is None else free
     if not state.valid:
         return _invalid(state, p, FitStatus.UNSOLVED_AT_START)
-    scale, lower, upper = terms.scale, terms.lower, terms.upper
-    damping, count = 1e-3, 0
-    stale = 0
-    jacobian = np.zeros((0, p))
-    while count < iterations and p:
-        count += 1
-        if stale == 0:
-            jacobian = derivatives(problem, state, frozen=quick) * scale
-        step_state, damping, gain = _step(
-            problem, state, factor, jacobian, free, (scale, lower, upper), damping
-        )
-        if step_state is None:
-            if stale == 0:
-                break
-            stale = 0  # not the derivatives' last word: they are of an earlier step
-            continue
-        # derivatives cost much more than a trial: they serve again where steps go well
-        if stale < _STALE and step_state.chi2 < 0.3 * state.chi2:
-            stale += 1
-            jacobian = _corrected(jacobian, state, step_state)
-        else:
-            stale = 0
-        state = step_state
-        lost = state.chi2 > (hopeless if count >= _FEW else _FAR * hopeless)
-        if gain < _GAIN or (count >= _FEW_FAR and lost):
-            break
-    jacobian = np.zeros((len(state.white), 0))
-    if p:
-        jacobian = derivatives(problem, state, frozen=quick) * scale
-    values = state.terms.vector
-    at_bound = (values <= lower) | (values >= upper)
-    covariance = _covariance(jacobian, scale, free & ~at_bound)
+    descent = _Descent(problem, factor, np.ones(p, dtype=bool) if free is None else free, quick)
+    state, count = descent.run(state, iterations if p else 0, hopeless)
+    jacobian = descent.jacobian(state) if p else np.zeros((len(state.white), 0))
+    found = state.terms
+    at_bound = (found.vector <= found.lower) | (found.vector >= found.upper)
+    covariance = _covariance(jacobian, found.scale, descent.free & ~at_bound)
     return Fit(state, jacobian, covariance, at_bound, FitStatus.SOLVED, count)
 
 
@@ -179,45 +154,82 @@ def _objective(state: State) -> float:
     return state.chi2 + state.log_det + float(z @ z)
 
 
-def _step(
-    problem: Problem,
-    state: State,
-    factor: Array,
-    jacobian: Array,
-    free: NDArray[np.bool_],
-    limits: tuple[Array, Array, Array],
-    damping: float,
-) -> tuple[State | None, float, float]:
-    """One accepted step, or None where no step improves."""
-    scale, lower, upper = limits
-    values = state.terms.vector
-    z = state.terms.sizes
-    gradient = -jacobian.T @ state.white + z / PRIOR_SIZES**2
-    normal = jacobian.T @ jacobian + np.eye(len(z)) / PRIOR_SIZES**2
-    held = ~free
-    held = held | ((values <= lower) & (gradient > 0)) | ((values >= upper) & (gradient < 0))
-    move = np.flatnonzero(~held)
-    if len(move) == 0:
-        return None, damping, 0.0
-    before = _objective(state)
-    diagonal = np.diag(normal)[move]
-    for _ in range(12):
-        matrix = normal[np.ix_(move, move)] + np.diag(damping * diagonal)
-        step = np.zeros(len(z))
-        step[move] = -np.linalg.solve(matrix, gradient[move])
-        # no parameter moves by more than a few plausible sizes at once
-        step *= min(1.0, 5.0 / max(float(np.max(np.abs(step))), 1e-300))
-        trial_values = np.clip(values + step * scale, lower, upper)
-        trial = evaluate(problem, state.terms.with_vector(trial_values), factor, state)
-        after = _objective(trial) if trial.valid else np.inf
-        if after < before:
-            gain = before - after
-            return trial, max(0.2 * damping, 1e-9), gain
-        expected = -(gradient @ step + 0.5 * step @ normal @ step)
-        if trial.valid and 2.0 * expected < _GAIN:  # nothing left to gain
+@dataclass(frozen=True, eq=False)
+class _Descent:
+    """Damped Gauss-Newton on a problem; ``free`` (p,) parameters move."""
+
+    problem: Problem
+    factor: Array
+    free: NDArray[np.bool_]
+    quick: bool
+
+    def jacobian(self, state: State) -> Array:
+        """(N, p) whitened derivatives by z."""
+        return derivatives(self.problem, state, frozen=self.quick) * state.terms.scale
+
+    def run(self, state: State, iterations: int, hopeless: float) -> tuple[State, int]:
+        """The best state, and the steps it took."""
+        damping, count, stale = 1e-3, 0, 0
+        jacobian = np.zeros((0, len(state.terms)))
+        while count < iterations:
+            count += 1
+            if stale == 0:
+                jacobian = self.jacobian(state)
+            after, damping, gain = self.step(state, jacobian, damping)
+            if after is None:
+                if stale == 0:
+                    break
+                stale = 0  # not the derivatives' last word: they are of an earlier step
+                continue
+            # derivatives cost much more than a trial: they serve again where steps go well
+            if stale < _STALE and after.chi2 < 0.3 * state.chi2:
+                stale += 1
+                jacobian = _corrected(jacobian, state, after)
+            else:
+                stale = 0
+            state = after
+            lost = state.chi2 > (hopeless if count >= _FEW else _FAR * hopeless)
+            if gain < _GAIN or (count >= _FEW_FAR and lost):
+                break
+        return state, count
+
+    def step(
+        self, state: State, jacobian: Array, damping: float
+    ) -> tuple[State | None, float, float]:
+        """One accepted step (None where none improves), the damping after it, and its gain."""
+        terms, z = state.terms, state.terms.sizes
+        gradient = -jacobian.T @ state.white + z / PRIOR_SIZES**2
+        normal = jacobian.T @ jacobian + np.eye(len(z)) / PRIOR_SIZES**2
+        move = self._moving(terms, gradient)
+        if len(move) == 0:
             return None, damping, 0.0
-        damping = max(10.0 * damping, 1e-4)
-    return None, damping, 0.0
+        before = _objective(state)
+        for _ in range(_DAMPINGS):
+            step = _damped_step(normal, gradient, move, damping)
+            values = np.clip(terms.vector + step * terms.scale, terms.lower, terms.upper)
+            trial = evaluate(self.problem, terms.with_vector(values), self.factor, state)
+            after = _objective(trial) if trial.valid else np.inf
+            if after < before:
+                return trial, max(0.2 * damping, 1e-9), before - after
+            expected = -(gradient @ step + 0.5 * step @ normal @ step)
+            if trial.valid and 2.0 * expected < _GAIN:  # nothing left to gain
+                break
+            damping = max(10.0 * damping, 1e-4)
+        return None, damping, 0.0
+
+    def _moving(self, terms: Terms, gradient: Array) -> NDArray[np.intp]:
+        """Parameters that are free and not pushed against a bound."""
+        low = (terms.vector <= terms.lower) & (gradient > 0)
+        high = (terms.vector >= terms.upper) & (gradient < 0)
+        return np.flatnonzero(self.free & ~low & ~high)
+
+
+def _damped_step(normal: Array, gradient: Array, move: NDArray[np.intp], damping: float) -> Array:
+    """(p,) step in plausible sizes; no parameter moves by more than a few at once."""
+    part = normal[np.ix_(move, move)]
+    step = np.zeros(len(gradient))
+    step[move] = -np.linalg.solve(part + np.diag(damping * np.diag(part)), gradient[move])
+    return step * min(1.0, _LONGEST / max(float(np.max(np.abs(step))), 1e-300))
 
 
 def _covariance(jacobian: Array, scale: Array, moved: NDArray[np.bool_]) -> Array:

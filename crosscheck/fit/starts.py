@@ -29,6 +29,8 @@ from seecr.tables import assemble
 
 # Most times that the forces are evaluated; a fall of their squares by less ends the search.
 _EVALUATIONS, _FALL = 15, 1e-3
+# So far inside its bounds it begins, in plausible sizes.
+_INSIDE = 1e-6
 # Directions softer than this part of a row's stiffest say little about forces.
 _SOFT = 0.02
 # No cable is as stiff as this [N/m].
@@ -156,12 +158,20 @@ def equation_start(
         rates = forces.derivatives(values(z)) * scale
         return np.concatenate([-rates, np.eye(len(z)) / PRIOR_SIZES])
 
-    begin = (start[free] - null) / scale
+    lower, upper = (layout.lower[free] - null) / scale, (layout.upper[free] - null) / scale
+    # from inside the bounds: friction that is null is another problem than any friction
+    begin = np.clip((start[free] - null) / scale, lower + _INSIDE, upper - _INSIDE)
     if not np.all(np.isfinite(residuals(begin))):
         return None
-    bounds = (layout.lower[free] - null) / scale, (layout.upper[free] - null) / scale
     found = optimize.least_squares(
-        residuals, begin, jacobian, bounds, max_nfev=_EVALUATIONS, ftol=_FALL, xtol=None, gtol=None
+        residuals,
+        begin,
+        jacobian,
+        (lower, upper),
+        max_nfev=_EVALUATIONS,
+        ftol=_FALL,
+        xtol=None,
+        gtol=None,
     )
     return np.clip(values(found.x), layout.lower, layout.upper)
 
