@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from crosscheck.measurements.data import Measurements, Sigma
     from crosscheck.measurements.read import load_commands, load_measurements
     from crosscheck.measurements.write import write_measurements
-    from crosscheck.planning.design import Plan, make_plan
+    from crosscheck.planning.design import make_plan
+    from crosscheck.planning.result import Plan
     from crosscheck.suite.run import CaseResult, run_suite
     from crosscheck.twin.make import Twin, make_twin
 
@@ -38,7 +39,7 @@ _WHERE = {
     "DiagnosisVerdict": "diagnosis.result",
     "Measurements": "measurements.data",
     "MissingEffect": "diagnosis.result",
-    "Plan": "planning.design",
+    "Plan": "planning.result",
     "Sigma": "measurements.data",
     "Twin": "twin.make",
     "add_effect": "add",
