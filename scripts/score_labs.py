@@ -87,11 +87,11 @@ def main() -> None:
         start = time.process_time()
         robot = load_robot(folder / "robot.xml")
         data = load_measurements(folder / "measured.csv", robot)
-        problem, _notes, why = prepare(robot, data, Terms())
-        if why:
-            print(f"{name}: {why}", flush=True)
+        ready = prepare(robot, data, Terms())
+        if ready.refusal:
+            print(f"{name}: {ready.refusal}", flush=True)
             continue
-        found = calibrate(problem)
+        found = calibrate(ready.problem)
         spent = time.process_time() - start
         print(line(name, answers[name], found, folder, spent), flush=True)
 

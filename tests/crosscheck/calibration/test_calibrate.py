@@ -36,9 +36,9 @@ def hidden() -> list:
 
 
 def problem_of(data: Measurements) -> Problem:
-    problem, _notes, why = prepare(ROBOT, data, Terms())
-    assert not why
-    return problem
+    ready = prepare(ROBOT, data, Terms())
+    assert ready.refusal is None
+    return ready.problem
 
 
 def test_many_small_errors_are_fitted_together_and_predict_elsewhere() -> None:
