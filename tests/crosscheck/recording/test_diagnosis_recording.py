@@ -16,7 +16,8 @@ from crosscheck.comparison.residuals import Comparison, compare
 from crosscheck.diagnosis.result import Diagnosis, DiagnosisVerdict
 from crosscheck.diagnosis.steps import Stage, stages_of
 from crosscheck.fit.problem import KINDS, POSITION
-from crosscheck.recording import write_comparison_recording, write_diagnosis_recording
+from crosscheck.recording.comparison import write_comparison_recording
+from crosscheck.recording.diagnosis import write_diagnosis_recording
 from crosscheck.recording.diagnosis_words import plain
 from crosscheck.recording.misfit import Misfit, read_poses, states_of, worst_row
 from crosscheck.recording.words import short_names

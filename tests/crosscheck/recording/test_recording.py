@@ -13,8 +13,10 @@ import pytest
 from recordings import Readback, headless_viewer
 from rerun.chunk import RrdReader
 
-from crosscheck.recording import shapes, write_case_recording
+from crosscheck.recording import shapes
+from crosscheck.recording.case import write_case_recording
 from crosscheck.recording.colours import cable_colours, round_up, scale_colours
+from crosscheck.recording.panels import NOW, READ_ME
 from crosscheck.recording.series import Series
 from crosscheck.settle.relax import SettleStatus
 from crosscheck.settle.settler import SettlingBatch
@@ -160,15 +162,15 @@ def test_the_settling_starts_at_the_command_and_ends_at_rest(
 
 
 def test_the_text_has_the_guide_and_the_numbers(back: Readback, result: CaseResult) -> None:
-    guide = back.static("/text/read_me", "TextDocument:text")[0]
+    guide = back.static(f"/{READ_ME}", "TextDocument:text")[0]
     assert "parallel-fishing-z0.10" in guide and "settling_time" in guide
     worst = result.worst["tension_N"]
     assert f"| tension | {worst.value:.3g} N | {worst.pose + 1} | 1e-06 N |" in guide
-    now = [row[0] for row in back.column("/text/now", "TextDocument:text")]
+    now = [row[0] for row in back.column(f"/{NOW}", "TextDocument:text")]
     assert len(now) == POSES
     assert "Pose 1 of 6" in now[0] and "x 170.00, y 250.00, z 100.00 mm" in now[0]
     assert "26.5" in now[0] and "| slack | 2, 4, 5, 7 |" in now[0]
-    assert "Settling, " in back.column("/text/now", "TextDocument:text", "settling_time")[0][0]
+    assert "Settling, " in back.column(f"/{NOW}", "TextDocument:text", "settling_time")[0][0]
 
 
 def test_the_legend_gives_the_scale_in_newtons(back: Readback, result: CaseResult) -> None:
@@ -269,8 +271,8 @@ def test_a_pose_without_an_answer_is_not_drawn(failed: CaseResult, tmp_path: Pat
     words = [row[0] for row in back.column("/lanes/cable1", "StateChange:state")]
     assert words[1:3] == ["no answer"] * 2
     assert np.isnan(back.scalars("/plot/deviation/seecr/dx")[1])
-    assert "SEECR moves by | no answer" in back.column("/text/now", "TextDocument:text")[1][0]
-    guide = back.static("/text/read_me", "TextDocument:text")[0]
+    assert "SEECR moves by | no answer" in back.column(f"/{NOW}", "TextDocument:text")[1][0]
+    guide = back.static(f"/{READ_ME}", "TextDocument:text")[0]
     assert f"- pose 2: {Verdict.SEECR_UNSOLVED.value}" in guide
 
 
@@ -280,7 +282,7 @@ def test_no_settling_to_watch(failed: CaseResult, tmp_path: Path) -> None:
     write_case_recording(nothing, tmp_path / "nothing.rrd")
     back = Readback(tmp_path / "nothing.rrd")
     assert back.timelines == {"pose"}
-    assert "settling_time" not in back.static("/text/read_me", "TextDocument:text")[0]
+    assert "settling_time" not in back.static(f"/{READ_ME}", "TextDocument:text")[0]
 
 
 ODD = """<mujoco model="odd"><worldbody>{sites}
