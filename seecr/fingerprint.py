@@ -51,7 +51,7 @@ def _toml(value: Any) -> Any:
 
 
 def check_robot(path: Path, table: Any, robot: Robot) -> tuple[str, ...]:
-    """Whether a model is this robot's.
+    """Check that a model was made for this robot.
 
     Args:
         path: the model's file.

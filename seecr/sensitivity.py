@@ -8,29 +8,26 @@ Rows with history are the exception: their walk is repeated with each parameter 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seecr import statics
-from seecr.compiled.columns import (
-    STRAIN,
-)
-from seecr.effects.base import Effect, Layout, Readings
-from seecr.effects.checked import is_built_in
-from seecr.effects.terms import Term, Terms
+from seecr.compiled.columns import STRAIN
+from seecr.effects.base import Effect, Readings
+from seecr.effects.terms import Terms
 from seecr.experiment import Experiment, Prediction, read
 from seecr.joints import motion_columns
 from seecr.pose import Array, pose_add, quat_conjugate, quat_multiply, rotvec_from_quat
 from seecr.setup import QUANTITIES, History, Setup
+from seecr.shifts import Shift, blocks_of_cables, positions, shifted
 from seecr.tables import Tables, assemble
 
-# Differencing steps, in plausible sizes of a parameter.
-_CENTRAL, _ONE_SIDED, _WALK = 1e-4, 1e-5, 1e-4
+# Differencing step of a walk that is repeated, in plausible sizes of a parameter.
+_WALK = 1e-4
 # Differencing step of what the sensors make of a pose: rad, or part of a length or tension.
 _READ = 1e-5
 
@@ -60,28 +57,14 @@ def sensitivities(
         return _by_walking(experiment, terms, at, wanted)
     out = np.zeros((*_shape(at), len(wanted)))
     by_wrench = _ByWrench(experiment, at, terms)
-    todo = {position: c for c, position in enumerate(_positions(terms, wanted))}
-    for term, group in _blocks(terms, todo):
-        block = by_wrench.block(_shifted(terms, term, group))
+    todo = {position: c for c, position in enumerate(positions(terms, wanted))}
+    for term, group in blocks_of_cables(terms, todo):
+        block = by_wrench.block(shifted(terms, term, group))
         if block is not None:
             out[..., [todo.pop((term, k)) for k in group.tolist()]] = block
     for (term, k), c in todo.items():
-        out[..., c] = by_wrench.column(_shifted(terms, term, k))
+        out[..., c] = by_wrench.column(shifted(terms, term, k))
     return out
-
-
-def _blocks(terms: Terms, todo: Container[tuple[Term, int]]) -> list[tuple[Term, NDArray[np.intp]]]:
-    """What every cable has one of: shifted together, told apart by what each cable does.
-
-    Of our own effects alone: nobody has tested that others' leave the other cables be.
-    """
-    return [
-        (term, group)
-        for term in terms
-        if is_built_in(term.layout.effect)
-        for group in term.layout.cable_by_cable
-        if all((term, k) in todo for k in group.tolist())
-    ]
 
 
 def length_sensitivities(at: Prediction) -> Array:
@@ -95,57 +78,6 @@ def length_sensitivities(at: Prediction) -> Array:
 def _shape(at: Prediction) -> tuple[int, int]:
     n, m = at.tables.cables.shape[:2]
     return n, 6 + m
-
-
-def _positions(terms: Terms, wanted: list[int]) -> list[tuple[Term, int]]:
-    """Whose parameters are wanted, and which of the term's own each is."""
-    every = [(term, k) for term in terms for k in range(len(term.layout))]
-    return [every[c] for c in wanted]
-
-
-@dataclass(frozen=True, eq=False)
-class _Shift:
-    """Terms with a parameter shifted up and down, or several of one effect together.
-
-    ``apart`` is by how much plus and minus differ, a number or one for each of several.
-    """
-
-    plus: Terms
-    minus: Terms
-    apart: Any
-    layout: Layout
-
-    @property
-    def physical(self) -> bool:
-        """Whether the shifted effect edits the setup."""
-        return self.layout.effect.edit_setup is not Effect.edit_setup
-
-    @property
-    def sensing(self) -> bool:
-        """Whether the shifted effect edits the readings."""
-        return self.layout.effect.edit_readings is not Effect.edit_readings
-
-
-def _shifted(terms: Terms, term: Term, k: Any, part: float | None = None) -> _Shift:
-    """Shift parameter ``k`` (or those of an index array, together) of one of the terms."""
-    layout, value = term.layout, term.vector[k]
-    lower, upper = layout.lower[k], layout.upper[k]
-    # a time constant, a radius: what counts is by which part of itself it changes; finely, since
-    # a drum of this radius may have turned many times, but above what a walk leaves unsolved
-    relative = layout.shape[k] & (lower > 0.0)
-    size = np.where(relative, value * (0.1 if part is None else 1.0), layout.scale[k])
-    step = (_CENTRAL if part is None else part) * size
-    low, high = value - step < lower, value + step > upper
-    small = (_ONE_SIDED if part is None else part) * size
-    up = np.where(low, value + small, np.where(high, value, value + step))
-    down = np.where(low, value, np.where(high, value - small, value - step))
-
-    def with_value(numbers: Array) -> Terms:
-        vector = term.vector.copy()
-        vector[k] = numbers
-        return terms.with_term(Term(layout, vector))
-
-    return _Shift(with_value(up), with_value(down), up - down, layout)
 
 
 # Quantities that do not reach the statics through the rest lengths alone.
@@ -194,7 +126,7 @@ class _ByWrench:
     def by_length(self) -> Array:
         return _kept(self.at, "by_length", length_sensitivities)
 
-    def column(self, shift: _Shift) -> Array:
+    def column(self, shift: Shift) -> Array:
         """Derivative of the readings (n, 6 + m) by the shifted parameter."""
         n, width = _shape(self.at)
         change = np.zeros((n, width))
@@ -208,7 +140,7 @@ class _ByWrench:
             return self._read(shift, change, shift.apart)
         return (self.read_rates @ change[..., None])[..., 0] if self.sensing else change
 
-    def block(self, shift: _Shift) -> Array | None:
+    def block(self, shift: Shift) -> Array | None:
         """Derivatives (n, 6 + m, m) by what each cable has of its own, shifted together."""
         if shift.sensing:
             return None
@@ -237,7 +169,7 @@ class _ByWrench:
             ahead, behind = (tables.with_past(self.at.tables) for tables in (ahead, behind))
         return ahead, behind
 
-    def _read(self, shift: _Shift, change: Array, apart: float) -> Array:
+    def _read(self, shift: Shift, change: Array, apart: float) -> Array:
         at, half = self.at, 0.5 * apart
         move, tension = half * change[:, :6], half * change[:, 6:]
         ahead = read(shift.plus.effects, at.setup, pose_add(at.pose, move), at.tensions + tension)
@@ -321,12 +253,12 @@ def _inverse_stiffness(at: Prediction) -> Array:
 
 def _by_walking(experiment: Experiment, terms: Terms, at: Prediction, wanted: list[int]) -> Array:
     out = np.zeros((*_shape(at), len(wanted)))
-    for c, (term, k) in enumerate(_positions(terms, wanted)):
-        out[..., c] = _difference(experiment, _shifted(terms, term, k, _WALK), at)
+    for c, (term, k) in enumerate(positions(terms, wanted)):
+        out[..., c] = _difference(experiment, shifted(terms, term, k, _WALK), at)
     return out
 
 
-def _difference(experiment: Experiment, shift: _Shift, at: Prediction) -> Array:
+def _difference(experiment: Experiment, shift: Shift, at: Prediction) -> Array:
     """Difference of two predictions that are solved in full."""
     near = None if at.has_history else at
     ahead = experiment.predict(shift.plus.effects, near)

@@ -1,4 +1,4 @@
-"""What became of a batch of poses: the answers, with what they are worth."""
+"""The answers to a batch of poses: where the platform rests, and whether that is certain."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from seecr.setup import QUANTITIES, Setup
 
 
 def check_class(effect: type[Effect], where: str) -> None:
-    """That a class declares an effect as :mod:`seecr.effects.base` says.
+    """Check that a class declares an effect as :mod:`seecr.effects.base` says.
 
     Raises:
         InputError: naming ``where`` it comes from and what is amiss.

@@ -1,0 +1,86 @@
+"""Terms with a parameter shifted up and down: what derivatives are differenced from."""
+
+from __future__ import annotations
+
+from collections.abc import Container
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seecr.effects.base import Effect, Layout
+from seecr.effects.checked import is_built_in
+from seecr.effects.terms import Term, Terms
+from seecr.pose import Array
+
+# Steps, in plausible sizes of a parameter.
+_CENTRAL, _ONE_SIDED = 1e-4, 1e-5
+
+
+@dataclass(frozen=True, eq=False)
+class Shift:
+    """Terms with a parameter shifted up and down, or several of one effect together.
+
+    ``apart`` is by how much plus and minus differ, a number or one for each of several.
+    """
+
+    plus: Terms
+    minus: Terms
+    apart: Any
+    layout: Layout
+
+    @property
+    def physical(self) -> bool:
+        """Whether the shifted effect edits the setup."""
+        return self.layout.effect.edit_setup is not Effect.edit_setup
+
+    @property
+    def sensing(self) -> bool:
+        """Whether the shifted effect edits the readings."""
+        return self.layout.effect.edit_readings is not Effect.edit_readings
+
+
+def shifted(terms: Terms, term: Term, k: Any, part: float | None = None) -> Shift:
+    """Shift parameter ``k`` (or those of an index array, together) of one of the terms."""
+    layout, value = term.layout, term.vector[k]
+    lower, upper = layout.lower[k], layout.upper[k]
+    # a time constant, a radius: what counts is by which part of itself it changes; finely, since
+    # a drum of this radius may have turned many times, but above what a walk leaves unsolved
+    relative = layout.shape[k] & (lower > 0.0)
+    size = np.where(relative, value * (0.1 if part is None else 1.0), layout.scale[k])
+    step = (_CENTRAL if part is None else part) * size
+    low, high = value - step < lower, value + step > upper
+    small = (_ONE_SIDED if part is None else part) * size
+    up = np.where(low, value + small, np.where(high, value, value + step))
+    down = np.where(low, value, np.where(high, value - small, value - step))
+
+    def with_value(numbers: Array) -> Terms:
+        vector = term.vector.copy()
+        vector[k] = numbers
+        return terms.with_term(Term(layout, vector))
+
+    return Shift(with_value(up), with_value(down), up - down, layout)
+
+
+def positions(terms: Terms, wanted: list[int]) -> list[tuple[Term, int]]:
+    """Whose parameters are wanted, and which of the term's own each is."""
+    every = [(term, k) for term in terms for k in range(len(term.layout))]
+    return [every[c] for c in wanted]
+
+
+def blocks_of_cables(
+    terms: Terms, todo: Container[tuple[Term, int]]
+) -> list[tuple[Term, NDArray[np.intp]]]:
+    """Parameters that every cable has one of: they are shifted together.
+
+    What each does is told apart by the cable it does it to. Of built-in effects alone: nothing
+    says that a user's effect leaves the other cables as they are.
+    """
+    return [
+        (term, group)
+        for term in terms
+        if is_built_in(term.layout.effect)
+        for group in term.layout.cable_by_cable
+        if all((term, k) in todo for k in group.tolist())
+    ]
