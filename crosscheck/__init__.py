@@ -26,13 +26,14 @@ if TYPE_CHECKING:
     from crosscheck.measurements.write import write_measurements
     from crosscheck.planning.design import make_plan
     from crosscheck.planning.result import Plan
-    from crosscheck.suite.run import CaseResult, run_suite
+    from crosscheck.suite.results import CaseResult
+    from crosscheck.suite.run import Run, run_suite
     from crosscheck.twin.make import Twin, make_twin
 
 # Imported when first used: SciPy, MuJoCo and the compiled loop take a while to load.
 _WHERE = {
     "Addition": "add",
-    "CaseResult": "suite.run",
+    "CaseResult": "suite.results",
     "Comparison": "comparison.result",
     "CrosscheckError": "errors",
     "Diagnosis": "diagnosis.result",
@@ -40,6 +41,7 @@ _WHERE = {
     "Measurements": "measurements.data",
     "MissingEffect": "diagnosis.result",
     "Plan": "planning.result",
+    "Run": "suite.run",
     "Sigma": "measurements.data",
     "Twin": "twin.make",
     "add_effect": "add",
@@ -63,6 +65,7 @@ __all__ = [
     "Measurements",
     "MissingEffect",
     "Plan",
+    "Run",
     "Sigma",
     "Twin",
     "add_effect",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -21,7 +20,7 @@ from crosscheck.cli.options import (
 from seecr.threads import processors
 
 if TYPE_CHECKING:
-    from crosscheck.suite import Case, CaseResult, EffectCase, EffectResult, Run, Thresholds
+    from crosscheck.suite import Case, CaseResult, EffectCase, Run, Thresholds
 
 
 @click.command(
@@ -151,13 +150,27 @@ def _run(
 ) -> int:
     from crosscheck.files import staged
 
-    began = time.perf_counter()
     with staged(out) as folder:
-        results, effects = _results(chosen, thresholds, jobs, folder if recordings else None)
-        from crosscheck.suite import Run
+        record = partial(_record, folder=folder) if recordings else None
+        with progress_bar("compiling", sum(map(len, chosen))) as advance:
+            from crosscheck.suite import run_suite
 
-        run = Run(results, thresholds, seed, jobs, time.perf_counter() - began, effects)
+            run = run_suite(
+                chosen,
+                thresholds,
+                seed=seed,
+                jobs=jobs,
+                record=record,
+                progress=lambda result: advance(len(result), result.case.name),
+            )
         _write(run, folder)
+    _tell(run, out, as_json)
+    return run.outcome.exit_status
+
+
+def _tell(run: Run, out: Path, as_json: bool) -> None:
+    for note in run.notes:
+        click.echo(f"note: {note}", err=True)
     if as_json:
         from crosscheck.suite import results_json
 
@@ -166,36 +179,6 @@ def _run(
         from crosscheck.terminal import print_run
 
         print_run(run, out)
-    for note in run.notes:
-        click.echo(f"note: {note}", err=True)
-    return run.outcome.exit_status
-
-
-def _results(
-    chosen: list[Case | EffectCase], thresholds: Thresholds, jobs: int, folder: Path | None
-) -> tuple[list[CaseResult], list[EffectResult]]:
-    """The poses' cases, then the effects, in the same processes and under one bar."""
-    from crosscheck.suite import Case
-
-    cases = [case for case in chosen if isinstance(case, Case)]
-    effects = [case for case in chosen if not isinstance(case, Case)]
-    total = sum(len(case.poses) for case in cases)
-    total += sum(len(case.commands) for case in effects)
-    with progress_bar("compiling", total) as advance:
-        from crosscheck.suite import Pool, run_effects, run_suite
-
-        with Pool(min(jobs, len(chosen))) as pool:
-            results = run_suite(
-                cases,
-                thresholds,
-                record=None if folder is None else partial(_record, folder=folder),
-                progress=lambda result: advance(len(result), result.case.name),
-                pool=pool,
-            )
-            found = run_effects(
-                effects, pool, lambda result: advance(len(result.compared), result.case.name)
-            )
-    return results, found
 
 
 def _record(result: CaseResult, folder: Path) -> str:

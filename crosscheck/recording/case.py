@@ -22,7 +22,7 @@ from crosscheck.recording.stream import (
 )
 
 if TYPE_CHECKING:
-    from crosscheck.suite.run import CaseResult
+    from crosscheck.suite.results import CaseResult
 
 
 def write_case_recording(result: CaseResult, path: str | Path) -> None:

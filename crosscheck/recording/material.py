@@ -20,7 +20,7 @@ from seecr.robot import Robot
 from seecr.solution import Status
 
 if TYPE_CHECKING:
-    from crosscheck.suite.run import CaseResult
+    from crosscheck.suite.results import CaseResult
 
 _EQUILIBRIA = (Status.CONVERGED, Status.SINGULAR)
 _FRAMES = 240

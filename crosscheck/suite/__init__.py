@@ -3,18 +3,10 @@
 from __future__ import annotations
 
 from crosscheck.suite.cases import Case, select, shipped_cases, user_cases
-from crosscheck.suite.effects import (
-    GROUP,
-    PREFIX,
-    EffectCase,
-    EffectResult,
-    effect_cases,
-    run_effects,
-)
+from crosscheck.suite.effects import GROUP, PREFIX, EffectCase, EffectResult, effect_cases
 from crosscheck.suite.junit import junit_xml
-from crosscheck.suite.pool import Pool
-from crosscheck.suite.results import Run, results_json
-from crosscheck.suite.run import CaseResult, run_suite
+from crosscheck.suite.results import CaseResult, Outcome
+from crosscheck.suite.run import Run, results_json, run_suite
 from crosscheck.suite.summary import summary_md
 from crosscheck.suite.thresholds import Thresholds, load_thresholds, thresholds_toml
 from crosscheck.suite.worst_pose import write_worst_pose
@@ -26,14 +18,13 @@ __all__ = [
     "CaseResult",
     "EffectCase",
     "EffectResult",
-    "Pool",
+    "Outcome",
     "Run",
     "Thresholds",
     "effect_cases",
     "junit_xml",
     "load_thresholds",
     "results_json",
-    "run_effects",
     "run_suite",
     "select",
     "shipped_cases",

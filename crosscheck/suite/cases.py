@@ -74,6 +74,10 @@ class Case:
     poses: Array
     has_names: bool = True
 
+    def __len__(self) -> int:
+        """Number of commanded poses."""
+        return len(self.poses)
+
     @property
     def ea(self) -> float | None:
         """k_c = E S [N] of every cable; None where the MJCF says it."""

@@ -19,14 +19,13 @@ from numpy.typing import NDArray
 
 from crosscheck.suite.gap import gap
 from crosscheck.suite.pool import Pool
-from crosscheck.suite.run import Outcome
+from crosscheck.suite.results import Outcome
 from crosscheck.twin.hidden import choose
 from crosscheck.twin.measure import measure
 from crosscheck.twin.robot import TRUE_EFFECTS
 from crosscheck.twin.trajectory import trajectory
 from seecr.commands import Commands
 from seecr.effects import Term
-from seecr.equilibrium import solve
 from seecr.experiment import Experiment
 from seecr.mjcf import load_robot
 from seecr.pose import Array
@@ -50,7 +49,7 @@ _CREEP_TIME_S = 2000.0
 _LONG = ("cable_weight",)
 
 
-class Against(Enum):
+class Counterpart(Enum):
     """What stands against seecr's mathematics of an effect."""
 
     MUJOCO = "MuJoCo's own means"
@@ -98,9 +97,13 @@ class EffectCase:
         return f"{PREFIX}{self.model.stem}-{self.effect}"
 
     @property
-    def against(self) -> Against:
+    def against(self) -> Counterpart:
         """What stands against seecr's mathematics of the effect."""
-        return Against.OURS if self.effect in _OURS else Against.MUJOCO
+        return Counterpart.OURS if self.effect in _OURS else Counterpart.MUJOCO
+
+    def __len__(self) -> int:
+        """Number of commanded poses."""
+        return len(self.commands)
 
     @property
     def robot(self) -> Robot:
@@ -138,6 +141,9 @@ class EffectResult:
     compared: NDArray[np.bool_]
     moved_m: float
     wall_s: float = np.nan
+
+    def __len__(self) -> int:
+        return len(self.compared)
 
     @property
     def worst(self) -> tuple[float, float, float]:
@@ -225,11 +231,6 @@ def run_effects(
     Returns:
         the results in the order of the cases.
     """
-    if not cases:
-        return []
-    if pool.jobs > 1:
-        # Have the compiled loop on disk before several processes want it.
-        solve(cases[0].robot, cases[0].robot.reference_pose[None])
     order = sorted(range(len(cases)), key=lambda i: cases[i].effect not in _LONG)
     return pool.run(run_effect, cases, order, tell)
 

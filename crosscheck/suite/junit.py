@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 from crosscheck.suite import words
 from crosscheck.suite.effects import GROUP
-from crosscheck.suite.run import Outcome
+from crosscheck.suite.results import Outcome
 
 if TYPE_CHECKING:
     from crosscheck.suite.effects import EffectResult
-    from crosscheck.suite.results import Run
-    from crosscheck.suite.run import CaseResult
+    from crosscheck.suite.results import CaseResult
+    from crosscheck.suite.run import Run
 
 # Characters that XML 1.0 cannot hold at all, escaped or not.
 _FORBIDDEN = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")

@@ -1,140 +1,224 @@
-"""The suite's results as ``results.json``: everything that the other reports are made of."""
+"""What became of a case: both physics' answers, how far apart they are, and how it ended."""
 
 from __future__ import annotations
 
-import platform
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
-from importlib.metadata import PackageNotFoundError, version
-from typing import TYPE_CHECKING, Any
+from enum import Enum
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
-from crosscheck.files import json_text
-from crosscheck.settle.model import ignored_note
-from crosscheck.suite.run import CaseResult, Outcome, Worst, worst_of
-from crosscheck.suite.thresholds import Thresholds
-from crosscheck.suite.verdicts import Verdict
+from crosscheck.suite.agreement import QUANTITIES, Allowance, Differences, ratios
+from crosscheck.suite.cases import Case
+from crosscheck.suite.mujoco_robot import MujocoRobot
+from crosscheck.suite.verdicts import UNSOLVED, PoseFinding, Verdict
+from seecr.pose import Array
+from seecr.result import COORDINATES, Record, Result, named
+from seecr.robot import Robot
+from seecr.solution import Solution
 
 if TYPE_CHECKING:
-    from crosscheck.suite.effects import EffectResult
+    from crosscheck.settle.settler import SettlingBatch
 
-FORMAT = 1
-"""Of ``results.json``; raised when a key changes its meaning or goes."""
 
-_PACKAGES = ("seecr", "mujoco", "numpy", "scipy", "numba", "rerun-sdk")
+class Outcome(Enum):
+    """How a case or a run ended; the value is the word that people read."""
+
+    AGREE = "agree"
+    DIFFER = "DIFFER"
+    NOT_CONVERGED = "NOT CONVERGED"
+
+    @property
+    def exit_status(self) -> int:
+        """0 agree (findings within limits), 1 differ by too much, 3 a solve did not converge."""
+        return {Outcome.AGREE: 0, Outcome.DIFFER: 1, Outcome.NOT_CONVERGED: 3}[self]
+
+    @classmethod
+    def of_all(cls, outcomes: Iterable[Outcome]) -> Outcome:
+        """A difference outweighs a solve without an answer."""
+        found = set(outcomes)
+        return next((one for one in (cls.DIFFER, cls.NOT_CONVERGED) if one in found), cls.AGREE)
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
-    """One run of the suite.
+class Worst:
+    """The largest difference of one quantity over a case, against what was allowed there.
 
     Attributes:
-        results: of its cases.
-        thresholds: that held.
-        seed: of the random poses.
-        jobs: cases at a time.
-        wall_s: [s] it took.
-        effects: results of its effects.
+        quantity: one of ``QUANTITIES``.
+        value: the difference [m, rad or N].
+        allowed: at that pose.
+        pose: its number in the case, from 0.
     """
 
-    results: Sequence[CaseResult]
-    thresholds: Thresholds
-    seed: int
-    jobs: int
-    wall_s: float
-    effects: Sequence[EffectResult] = ()
+    quantity: str
+    value: float
+    allowed: float
+    pose: int
 
     @property
-    def every(self) -> list[CaseResult | EffectResult]:
-        """Results of cases and effects."""
-        return [*self.results, *self.effects]
+    def ratio(self) -> float:
+        """Difference over what is allowed: above 1 it fails."""
+        return self.value / self.allowed
+
+    def as_json(self) -> dict[str, Any]:
+        """As in ``results.json``."""
+        return {**asdict(self), "ratio": self.ratio}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CaseResult(Result):
+    """One case as both physics answered it. All arrays have the n poses of the case in order.
+
+    Attributes:
+        case: what was run; ``case.poses`` (n, 7) are the commanded poses.
+        robot: as SEECR read it, on the case's cable.
+        solution: SEECR's answers: ``pose`` (n, 7), ``tensions`` (n, m) [N], ``slack`` (n, m),
+            ``deviation`` (n, 6), ``residual``, ``status``, ``smallest_eigenvalue``, ... (n,).
+        settling: MuJoCo's answers, the same way: ``settled_pose`` (n, 7) after plain settling,
+            ``pose`` (n, 7), ``tensions`` (n, m) [N], ``slack`` (n, m) after the polish,
+            ``settled_residual``, ``residual``, ``steps``, ``simulated_s``, ``status``,
+            ``smallest_eigenvalue``, ... (n,).
+        mujoco_rest_lengths: (n, m) [m] as MuJoCo's side paid them out.
+        ignored: what of MuJoCo's MJCF was switched off, such as "contacts".
+        difference: between the two, NaN where one has no answer.
+        allowance: what may differ, (n,) each.
+        verdict: (n,) of :class:`crosscheck.suite.verdicts.Verdict`.
+        findings: more about every pose whose verdict is not ``AGREES``.
+        seecr_s: [s] SEECR took for all poses on one processor, compiled beforehand.
+        wall_s: [s] the whole case took, recording included.
+        recording: name of its recording in the results' folder; None if there is none.
+    """
+
+    case: Case
+    robot: Robot
+    solution: Solution
+    settling: SettlingBatch
+    mujoco_rest_lengths: Array
+    ignored: tuple[str, ...]
+    difference: Differences
+    allowance: Allowance
+    verdict: NDArray[np.object_]
+    findings: tuple[PoseFinding, ...]
+    seecr_s: float
+    wall_s: float = np.nan
+    recording: str | None = None
+
+    def __len__(self) -> int:
+        return len(self.verdict)
+
+    def count(self, verdict: Verdict) -> int:
+        """Number of poses with a verdict."""
+        return int(np.sum(self.verdict == verdict))
+
+    @property
+    def compared(self) -> NDArray[np.bool_]:
+        """Poses whose differences mean something: no free motion or branch between, (n,)."""
+        return np.asarray((self.verdict == Verdict.AGREES) | (self.verdict == Verdict.DIFFERS))
 
     @property
     def outcome(self) -> Outcome:
         """How it ended."""
-        return Outcome.of_all(result.outcome for result in self.every)
+        if self.count(Verdict.DIFFERS) or any(one.beyond_limits for one in self.findings):
+            return Outcome.DIFFER
+        unsolved = any(self.count(verdict) for verdict in UNSOLVED)
+        return Outcome.NOT_CONVERGED if unsolved else Outcome.AGREE
 
     @property
-    def worst(self) -> tuple[CaseResult, Worst] | None:
-        """The case and difference nearest to, or furthest beyond, what is allowed."""
-        return worst_of(self.results)
+    def worst(self) -> dict[str, Worst]:
+        """Largest difference of each quantity over its allowance; none if nothing compares."""
+        rows = np.flatnonzero(self.compared)
+        if len(rows) == 0:
+            return {}
+        table = ratios(self.difference, self.allowance)[rows]
+        found = {}
+        for name, column in zip(QUANTITIES, table.T, strict=True):
+            i = int(rows[np.argmax(column)])
+            value, allowed = getattr(self.difference, name)[i], getattr(self.allowance, name)[i]
+            found[name] = Worst(name, float(value), float(allowed), i)
+        return found
 
     @property
-    def notes(self) -> list[str]:
-        """What of the robots' files MuJoCo's side leaves out, a sentence per file."""
-        found = {result.case.mujoco_model: result.ignored for result in self.results}
-        return [ignored_note(path, names) for path, names in found.items() if names]
+    def seecr_us(self) -> float:
+        """Microseconds that SEECR takes a pose, on one processor."""
+        return 1e6 * self.seecr_s / len(self)
+
+    @property
+    def mujoco_ms(self) -> float:
+        """Milliseconds that MuJoCo takes a pose, both stages, on one processor."""
+        return 1e3 * float(np.sum(self.settling.wall_s)) / len(self)
+
+    def lines(self) -> list[str]:
+        """How it ended, the worst difference, and each pose that does not simply agree."""
+        from crosscheck.suite import words
+
+        return [words.case_line(self), *words.failures(self), *words.findings(self)]
+
+    def records(self) -> list[Record]:
+        """A record for each pose: what was commanded, what both say of it, how far apart [SI]."""
+        poses = {"cmd": self.case.poses, "seecr": self.solution.pose, "mujoco": self.settling.pose}
+        gaps = {name: getattr(self.difference, name).tolist() for name in QUANTITIES}
+        return [
+            {"pose": i, "verdict": self.verdict[i].name.lower()}
+            | {key: v for n, rows in poses.items() for key, v in _pose(n, rows[i]).items()}
+            | {f"difference_{name}": values[i] for name, values in gaps.items()}
+            for i in range(len(self))
+        ]
+
+    def as_json(self) -> dict[str, Any]:
+        """As in ``results.json``: every number, pose by pose."""
+        case = self.case
+        return {
+            "name": case.name,
+            "model": str(case.model),
+            "mujoco_model": str(case.mujoco_model),
+            "cable": case.cable,
+            "kind": case.kind,
+            "exit_status": self.outcome.exit_status,
+            "poses": {"total": len(self), **counts(self)},
+            "worst": self.worst,
+            "widened": np.flatnonzero(self.allowance.widened),
+            "findings": self.findings,
+            "timing": _timing(self),
+            "recording": self.recording,
+            "ea_N": self.robot.ea,
+            "command": case.poses,
+            "rest_lengths_m": self.solution.rest_lengths,
+            "verdict": [verdict.name.lower() for verdict in self.verdict],
+            "seecr": _seecr(self),
+            "mujoco": _mujoco(self),
+            "difference": asdict(self.difference) | {"tension_N": self.difference.tension_N},
+            "allowed": asdict(self.allowance),
+        }
+
+    def mujoco_robot(self) -> MujocoRobot:
+        """MuJoCo's robot of the case, anew: to settle one of its poses again."""
+        return MujocoRobot(self.case.mujoco_model, self.case.mujoco_ea)
+
+
+def worst_of(results: Sequence[CaseResult]) -> tuple[CaseResult, Worst] | None:
+    """The case and difference nearest to, or furthest beyond, what is allowed."""
+    pairs = [(result, worst) for result in results for worst in result.worst.values()]
+    return max(pairs, key=lambda pair: pair[1].ratio, default=None)
+
+
+def _pose(name: str, pose: Array) -> Record:
+    """A pose (7,) as columns of a data frame."""
+    return named(f"{name}_{{}}", COORDINATES, pose)
+
+
+class Counted(Protocol):
+    """Whatever counts poses by their verdict."""
 
     def count(self, verdict: Verdict) -> int:
         """Number of poses with a verdict."""
-        return sum(result.count(verdict) for result in self.results)
 
 
-def results_json(run: Run) -> str:
-    """The text of ``results.json``: a head to read, then one line per case."""
-    head = json_text(_head(run), indent=2)
-    lines = [json_text(_case(result), indent=None) for result in run.results]
-    return head[: head.rindex("\n}")] + ',\n  "cases": [\n' + ",\n".join(lines) + "\n  ]\n}\n"
-
-
-def package_versions() -> dict[str, str]:
-    """Versions of what took part."""
-    found = {"python": platform.python_version()}
-    for name in _PACKAGES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "not installed"
-    return found
-
-
-def _head(run: Run) -> dict[str, Any]:
-    worst = run.worst
-    return {
-        "format": FORMAT,
-        "verdict": run.outcome,
-        "exit_status": run.outcome.exit_status,
-        "worst": None if worst is None else {"case": worst[0].case.name, **worst[1].as_json()},
-        "poses": {"total": sum(len(r) for r in run.results), **_counts(run)},
-        "thresholds": run.thresholds,
-        "notes": run.notes,
-        "seed": run.seed,
-        "jobs": run.jobs,
-        "wall_s": run.wall_s,
-        "packages": package_versions(),
-        "effects": run.effects,
-    }
-
-
-def _counts(counted: Run | CaseResult) -> dict[str, int]:
+def counts(counted: Counted) -> dict[str, int]:
+    """Number of poses with each verdict, by the verdict's name in small letters."""
     return {verdict.name.lower(): counted.count(verdict) for verdict in Verdict}
-
-
-def _case(result: CaseResult) -> dict[str, Any]:
-    case = result.case
-    return {
-        "name": case.name,
-        "model": str(case.model),
-        "mujoco_model": str(case.mujoco_model),
-        "cable": case.cable,
-        "kind": case.kind,
-        "exit_status": result.outcome.exit_status,
-        "poses": {"total": len(result), **_counts(result)},
-        "worst": result.worst,
-        "widened": np.flatnonzero(result.allowance.widened),
-        "findings": result.findings,
-        "timing": _timing(result),
-        "recording": result.recording,
-        "ea_N": result.robot.ea,
-        "command": case.poses,
-        "rest_lengths_m": result.solution.rest_lengths,
-        "verdict": [verdict.name.lower() for verdict in result.verdict],
-        "seecr": _seecr(result),
-        "mujoco": _mujoco(result),
-        "difference": asdict(result.difference) | {"tension_N": result.difference.tension_N},
-        "allowed": asdict(result.allowance),
-    }
 
 
 def _timing(result: CaseResult) -> dict[str, float]:

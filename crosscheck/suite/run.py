@@ -2,214 +2,130 @@
 
 from __future__ import annotations
 
+import platform
 import time
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, dataclass, replace
-from enum import Enum
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from crosscheck.suite.agreement import (
-    QUANTITIES,
-    Allowance,
-    Differences,
-    allowances,
-    compare,
-    ratios,
-)
+from crosscheck.files import json_text
+from crosscheck.settle.model import ignored_note
+from crosscheck.suite.agreement import allowances, compare
 from crosscheck.suite.cases import Case, shipped_cases
+from crosscheck.suite.effects import EffectCase, EffectResult, effect_cases, run_effects
 from crosscheck.suite.mujoco_robot import MujocoRobot
 from crosscheck.suite.pool import Pool
+from crosscheck.suite.results import CaseResult, Outcome, Worst, counts, worst_of
 from crosscheck.suite.thresholds import Thresholds, load_thresholds
-from crosscheck.suite.verdicts import UNSOLVED, Answers, PoseFinding, Verdict, held_to, judge
+from crosscheck.suite.verdicts import Answers, Verdict, held_to, judge
 from seecr.equilibrium import solve as seecr_solve
 from seecr.errors import InputFileError
 from seecr.mjcf import load_robot
 from seecr.pose import Array
-from seecr.result import Record as Row
 from seecr.result import Result
 from seecr.robot import Robot
 from seecr.solution import Solution
 
-if TYPE_CHECKING:
-    from crosscheck.settle.settler import SettlingBatch
+FORMAT = 1
+"""Of ``results.json``; raised when a key changes its meaning or goes."""
 
-# Columns of poses in a data frame.
-_POSE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
+_PACKAGES = ("seecr", "mujoco", "numpy", "scipy", "numba", "rerun-sdk")
 # SEECR takes microseconds: the best of this many runs is what it needs, the rest is the machine.
 _REPEATS = 3
 
-
-class Outcome(Enum):
-    """How a case or a run ended; the value is the word that people read."""
-
-    AGREE = "agree"
-    DIFFER = "DIFFER"
-    NOT_CONVERGED = "NOT CONVERGED"
-
-    @property
-    def exit_status(self) -> int:
-        """0 agree (findings within limits), 1 differ by too much, 3 a solve did not converge."""
-        return {Outcome.AGREE: 0, Outcome.DIFFER: 1, Outcome.NOT_CONVERGED: 3}[self]
-
-    @classmethod
-    def of_all(cls, outcomes: Iterable[Outcome]) -> Outcome:
-        """A difference outweighs a solve without an answer."""
-        found = set(outcomes)
-        return next((one for one in (cls.DIFFER, cls.NOT_CONVERGED) if one in found), cls.AGREE)
-
-
-@dataclass(frozen=True, eq=False)
-class Worst:
-    """The largest difference of one quantity over a case, against what was allowed there.
-
-    Attributes:
-        quantity: one of ``QUANTITIES``.
-        value: the difference [m, rad or N].
-        allowed: at that pose.
-        pose: its number in the case, from 0.
-    """
-
-    quantity: str
-    value: float
-    allowed: float
-    pose: int
-
-    @property
-    def ratio(self) -> float:
-        """Difference over what is allowed: above 1 it fails."""
-        return self.value / self.allowed
-
-    def as_json(self) -> dict[str, Any]:
-        """As in ``results.json``."""
-        return {**asdict(self), "ratio": self.ratio}
+Recorder = Callable[[CaseResult], str]
+"""Writes the recording of a case and returns its name."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CaseResult(Result):
-    """One case as both physics answered it. All arrays have the n poses of the case in order.
+class Run(Result):
+    """One run of the suite.
 
     Attributes:
-        case: what was run; ``case.poses`` (n, 7) are the commanded poses.
-        robot: as SEECR read it, on the case's cable.
-        solution: SEECR's answers: ``pose`` (n, 7), ``tensions`` (n, m) [N], ``slack`` (n, m),
-            ``deviation`` (n, 6), ``residual``, ``status``, ``smallest_eigenvalue``, ... (n,).
-        settling: MuJoCo's answers, the same way: ``settled_pose`` (n, 7) after plain settling,
-            ``pose`` (n, 7), ``tensions`` (n, m) [N], ``slack`` (n, m) after the polish,
-            ``settled_residual``, ``residual``, ``steps``, ``simulated_s``, ``status``,
-            ``smallest_eigenvalue``, ... (n,).
-        mujoco_rest_lengths: (n, m) [m] as MuJoCo's side paid them out.
-        ignored: what of MuJoCo's MJCF was switched off, such as "contacts".
-        difference: between the two, NaN where one has no answer.
-        allowance: what may differ, (n,) each.
-        verdict: (n,) of :class:`crosscheck.suite.verdicts.Verdict`.
-        findings: more about every pose whose verdict is not ``AGREES``.
-        seecr_s: [s] SEECR took for all poses on one processor, compiled beforehand.
-        wall_s: [s] the whole case took, recording included.
-        recording: name of its recording in the results' folder; None if there is none.
+        results: of its cases.
+        thresholds: that held.
+        seed: of the random poses.
+        jobs: cases at a time.
+        wall_s: [s] it took.
+        effects: results of its effects.
     """
 
-    case: Case
-    robot: Robot
-    solution: Solution
-    settling: SettlingBatch
-    mujoco_rest_lengths: Array
-    ignored: tuple[str, ...]
-    difference: Differences
-    allowance: Allowance
-    verdict: NDArray[np.object_]
-    findings: tuple[PoseFinding, ...]
-    seecr_s: float
-    wall_s: float = np.nan
-    recording: str | None = None
-
-    def __len__(self) -> int:
-        return len(self.verdict)
-
-    def lines(self) -> list[str]:
-        """How it ended, the worst difference, and each pose that does not simply agree."""
-        from crosscheck.suite import words
-
-        pair = worst_of([self])
-        remarks = words.remarks(self)
-        return [
-            f"{self.case.name}: {self.outcome.value}, {len(self)} poses"
-            + (f" ({remarks})" if remarks else ""),
-            words.worst_sentence(pair),
-            *words.failures(self),
-            *words.findings(self),
-        ]
-
-    def records(self) -> list[Row]:
-        """A record for each pose: what was commanded, what both say of it, how far apart [SI]."""
-        differences = {name: getattr(self.difference, name) for name in QUANTITIES}
-        columns = {
-            **{f"cmd_{c}": self.case.poses[:, k] for k, c in enumerate(_POSE)},
-            **{f"seecr_{c}": self.solution.pose[:, k] for k, c in enumerate(_POSE)},
-            **{f"mujoco_{c}": self.settling.pose[:, k] for k, c in enumerate(_POSE)},
-            **{f"difference_{name}": values for name, values in differences.items()},
-        }
-        return [
-            {"pose": i, "verdict": self.verdict[i].name.lower()}
-            | {name: float(values[i]) for name, values in columns.items()}
-            for i in range(len(self))
-        ]
-
-    def count(self, verdict: Verdict) -> int:
-        """Number of poses with a verdict."""
-        return int(np.sum(self.verdict == verdict))
+    results: Sequence[CaseResult]
+    thresholds: Thresholds
+    seed: int
+    jobs: int
+    wall_s: float
+    effects: Sequence[EffectResult] = ()
 
     @property
-    def compared(self) -> NDArray[np.bool_]:
-        """Poses whose differences mean something: no free motion or branch between, (n,)."""
-        return np.asarray((self.verdict == Verdict.AGREES) | (self.verdict == Verdict.DIFFERS))
+    def every(self) -> list[CaseResult | EffectResult]:
+        """Results of cases and effects."""
+        return [*self.results, *self.effects]
 
     @property
     def outcome(self) -> Outcome:
         """How it ended."""
-        if self.count(Verdict.DIFFERS) or any(one.beyond_limits for one in self.findings):
-            return Outcome.DIFFER
-        unsolved = any(self.count(verdict) for verdict in UNSOLVED)
-        return Outcome.NOT_CONVERGED if unsolved else Outcome.AGREE
+        return Outcome.of_all(result.outcome for result in self.every)
 
     @property
-    def worst(self) -> dict[str, Worst]:
-        """Largest difference of each quantity over its allowance; none if nothing compares."""
-        rows = np.flatnonzero(self.compared)
-        if len(rows) == 0:
-            return {}
-        table = ratios(self.difference, self.allowance)[rows]
-        found = {}
-        for name, column in zip(QUANTITIES, table.T, strict=True):
-            i = int(rows[np.argmax(column)])
-            value, allowed = getattr(self.difference, name)[i], getattr(self.allowance, name)[i]
-            found[name] = Worst(name, float(value), float(allowed), i)
-        return found
+    def worst(self) -> tuple[CaseResult, Worst] | None:
+        """The case and difference nearest to, or furthest beyond, what is allowed."""
+        return worst_of(self.results)
 
     @property
-    def seecr_us(self) -> float:
-        """Microseconds that SEECR takes a pose, on one processor."""
-        return 1e6 * self.seecr_s / len(self)
+    def notes(self) -> list[str]:
+        """What of the robots' files MuJoCo's side leaves out, a sentence per file."""
+        found = {result.case.mujoco_model: result.ignored for result in self.results}
+        return [ignored_note(path, names) for path, names in found.items() if names]
 
-    @property
-    def mujoco_ms(self) -> float:
-        """Milliseconds that MuJoCo takes a pose, both stages, on one processor."""
-        return 1e3 * float(np.sum(self.settling.wall_s)) / len(self)
+    def count(self, verdict: Verdict) -> int:
+        """Number of poses with a verdict."""
+        return sum(result.count(verdict) for result in self.results)
 
-    def mujoco_robot(self) -> MujocoRobot:
-        """MuJoCo's robot of the case, anew: to settle one of its poses again."""
-        return MujocoRobot(self.case.mujoco_model, self.case.mujoco_ea)
+    def lines(self) -> list[str]:
+        """The verdict, and what fails."""
+        from crosscheck.suite import words
+
+        failures = [f"{r.case.name}, {line}" for r in self.results for line in words.failures(r)]
+        return [words.verdict_line(self), *failures, *words.effect_failures(self.effects)]
+
+    def records(self) -> list[dict[str, Any]]:
+        """One row per pose of every case; effects have none."""
+        return [
+            {"case": result.case.name, **record}
+            for result in self.results
+            for record in result.records()
+        ]
+
+    def as_json(self) -> dict[str, Any]:
+        """As in ``results.json``."""
+        return {**self.head_json(), "cases": self.results}
+
+    def head_json(self) -> dict[str, Any]:
+        """All but the cases."""
+        worst = self.worst
+        return {
+            "format": FORMAT,
+            "verdict": self.outcome,
+            "exit_status": self.outcome.exit_status,
+            "worst": None if worst is None else {"case": worst[0].case.name, **worst[1].as_json()},
+            "poses": {"total": sum(len(r) for r in self.results), **counts(self)},
+            "thresholds": self.thresholds,
+            "notes": self.notes,
+            "seed": self.seed,
+            "jobs": self.jobs,
+            "wall_s": self.wall_s,
+            "packages": package_versions(),
+            "effects": self.effects,
+        }
 
 
-Record = Callable[[CaseResult], str]
-"""Writes the recording of a case and returns its name."""
-
-
-def run_case(case: Case, thresholds: Thresholds, record: Record | None = None) -> CaseResult:
+def run_case(case: Case, thresholds: Thresholds, record: Recorder | None = None) -> CaseResult:
     """Solve and settle the poses of a case and compare them.
 
     Args:
@@ -246,52 +162,67 @@ def run_case(case: Case, thresholds: Thresholds, record: Record | None = None) -
 
 
 def run_suite(
-    cases: Sequence[Case] | None = None,
+    cases: Sequence[Case | EffectCase] | None = None,
     thresholds: Thresholds | str | Path | None = None,
     *,
+    seed: int = 0,
     jobs: int = 1,
-    record: Record | None = None,
-    progress: Callable[[CaseResult], None] | None = None,
-    pool: Pool | None = None,
-) -> list[CaseResult]:
-    """Run cases, several at a time.
+    record: Recorder | None = None,
+    progress: Callable[[CaseResult | EffectResult], None] | None = None,
+) -> Run:
+    """Run cases and effects, several at a time.
 
     Args:
-        cases: what to run; all shipped ones if not given.
-        thresholds: what counts as agreement, or a file of it; the shipped ones if not given.
+        cases: what to run; all that are shipped by default.
+        thresholds: what counts as agreement, or a file of it; the shipped ones by default.
+        seed: of the shipped cases' random poses and of the effects' sizes.
         jobs: how many at a time.
         record: see :func:`run_case`; of a module, so that other processes find it.
         progress: called with each result as it comes.
-        pool: processes to run in, instead of ``jobs`` of its own.
 
     Returns:
         the results in the order of the cases.
     """
-    if cases is None:
-        cases = shipped_cases()
-    if not cases:
-        return []
+    began = time.perf_counter()
+    every: list[Case | EffectCase] = [*shipped_cases(seed), *effect_cases(seed=seed)]
+    chosen = every if cases is None else cases
     if not isinstance(thresholds, Thresholds):
         thresholds = load_thresholds(thresholds)
-    if pool is None:
-        with Pool(min(jobs, len(cases))) as own:
-            return run_suite(cases, thresholds, record=record, progress=progress, pool=own)
-    if pool.jobs > 1:
-        warm_up(cases[0])
-    one = partial(run_case, thresholds=thresholds, record=record)
-    order = sorted(range(len(cases)), key=lambda i: -len(cases[i].poses))
-    return pool.run(one, cases, order, progress or (lambda result: None))
+    poses = [case for case in chosen if isinstance(case, Case)]
+    effects = [case for case in chosen if isinstance(case, EffectCase)]
+    tell = progress or (lambda result: None)
+    with Pool(max(min(jobs, len(chosen)), 1)) as pool:
+        if pool.jobs > 1 and chosen:
+            _warm_up(chosen[0])
+        one = partial(run_case, thresholds=thresholds, record=record)
+        order = sorted(range(len(poses)), key=lambda i: -len(poses[i]))
+        results = pool.run(one, poses, order, tell)
+        found = run_effects(effects, pool, tell)
+    return Run(results, thresholds, seed, jobs, time.perf_counter() - began, found)
 
 
-def warm_up(case: Case) -> None:
+def results_json(run: Run) -> str:
+    """The text of ``results.json``: a head to read, then one line per case."""
+    head = json_text(run.head_json(), indent=2)
+    lines = [json_text(result.as_json(), indent=None) for result in run.results]
+    return head[: head.rindex("\n}")] + ',\n  "cases": [\n' + ",\n".join(lines) + "\n  ]\n}\n"
+
+
+def package_versions() -> dict[str, str]:
+    """Versions of what took part."""
+    found = {"python": platform.python_version()}
+    for name in _PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found
+
+
+def _warm_up(case: Case | EffectCase) -> None:
     """Have the compiled loop on disk before several processes want it."""
-    seecr_solve(load_robot(case.model), case.poses[:1])
-
-
-def worst_of(results: Sequence[CaseResult]) -> tuple[CaseResult, Worst] | None:
-    """The case and difference nearest to, or furthest beyond, what is allowed."""
-    pairs = [(result, worst) for result in results for worst in result.worst.values()]
-    return max(pairs, key=lambda pair: pair[1].ratio, default=None)
+    robot = load_robot(case.model)
+    seecr_solve(robot, robot.reference_pose[None])
 
 
 def _solve(robot: Robot, poses: Array) -> tuple[Solution, float]:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from crosscheck.suite import words
 
 if TYPE_CHECKING:
-    from crosscheck.suite.results import Run
-    from crosscheck.suite.run import CaseResult
+    from crosscheck.suite.results import CaseResult
+    from crosscheck.suite.run import Run
 
 
 def summary_md(run: Run, worst_pose: str) -> str:

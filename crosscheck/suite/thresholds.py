@@ -16,7 +16,7 @@ SHIPPED = Path(__file__).with_name("thresholds.toml")
 
 
 @dataclass(frozen=True)
-class Settled:
+class SettledLimits:
     """For MuJoCo after plain settling."""
 
     position_m: float = math.nan
@@ -24,7 +24,7 @@ class Settled:
 
 
 @dataclass(frozen=True)
-class Polished:
+class PolishedLimits:
     """For MuJoCo after the polish."""
 
     position_m: float = math.nan
@@ -61,8 +61,8 @@ class Thresholds:
         findings: how many poses may have more than one right answer.
     """
 
-    settled: Settled = field(default_factory=Settled)
-    polished: Polished = field(default_factory=Polished)
+    settled: SettledLimits = field(default_factory=SettledLimits)
+    polished: PolishedLimits = field(default_factory=PolishedLimits)
     findings: FindingLimits = field(default_factory=FindingLimits)
 
     def as_json(self) -> dict[str, dict[str, Any]]:

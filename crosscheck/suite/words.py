@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from crosscheck.suite.agreement import QUANTITIES
-from crosscheck.suite.effects import ORIENTATION_RAD, POSITION_M, TENSION_N, Against
-from crosscheck.suite.run import Outcome
+from crosscheck.suite.effects import ORIENTATION_RAD, POSITION_M, TENSION_N, Counterpart
+from crosscheck.suite.results import Outcome
 from crosscheck.suite.verdicts import FINDINGS, PoseFinding, Verdict
 
 if TYPE_CHECKING:
     from crosscheck.suite.effects import EffectResult
-    from crosscheck.suite.results import Run
-    from crosscheck.suite.run import CaseResult, Worst
+    from crosscheck.suite.results import CaseResult, Worst
+    from crosscheck.suite.run import Run
 
 HEADS = {
     "settled_position_m": "settled [m]",
@@ -139,6 +139,14 @@ def _line(result: CaseResult, finding: PoseFinding) -> str:
     return f"pose {finding.pose}, commanded {command(result, finding.pose)}: {finding.text}{limits}"
 
 
+def case_line(result: CaseResult) -> str:
+    """A case in a line: name, poses, how it ended, the worst difference."""
+    worst = max(result.worst.values(), key=lambda one: one.ratio, default=None)
+    poses, pair = count(len(result), "pose"), None if worst is None else (result, worst)
+    notes = f" ({remarks(result)})" if remarks(result) else ""
+    return f"{result.case.name}: {poses}, {result.outcome.value}{notes}; {worst_sentence(pair)}"
+
+
 def widened(result: CaseResult) -> list[str]:
     """One line for each pose whose thresholds are wider than those given."""
     rows = [i for i, wide in enumerate(result.allowance.widened) if wide]
@@ -184,25 +192,35 @@ EFFECT_HEADS = [
 
 
 def effects_line(results: Sequence[EffectResult]) -> str:
-    """How many effects agree with MuJoCo, the worst differences, and those that do not agree."""
+    """How many effects agree, with what, the worst differences, and those that do not agree."""
     robots = {result.case.model for result in results}
     effects = {result.case.effect for result in results}
     bad = [result.case.name for result in results if result.outcome is not Outcome.AGREE]
-    verdict = "all agree with MuJoCo"
+    verdict = "all agree"
     if bad:
-        verdict = f"{len(bad)} of {count(len(results), 'case')} not as MuJoCo: {name_list(bad)}"
+        verdict = f"{len(bad)} of {count(len(results), 'case')} do not agree: {name_list(bad)}"
     worst = max(results, key=lambda result: result.worst[0])
     orientation = max(result.worst[1] for result in results)
     tension = max(result.worst[2] for result in results)
     return (
-        f"{count(len(effects), 'effect')} on {count(len(robots), 'robot')}: {verdict}; worst "
-        f"{worst.worst[0]:.1e} m ({worst.case.name}), {orientation:.1e} rad, {tension:.1e} N."
+        f"{count(len(effects), 'effect')} on {count(len(robots), 'robot')} against "
+        f"{_counterparts(results)}: {verdict}; worst {worst.worst[0]:.1e} m "
+        f"({worst.case.name}), {orientation:.1e} rad, {tension:.1e} N."
     )
+
+
+def _counterparts(results: Sequence[EffectResult]) -> str:
+    """How many effects stand against what, in words."""
+    kinds = {
+        kind: {r.case.effect for r in results if r.case.against is kind} for kind in Counterpart
+    }
+    parts = [f"{kind.value} ({len(names)})" for kind, names in kinds.items() if names]
+    return " and ".join(parts)
 
 
 def against_line(results: Sequence[EffectResult]) -> str:
     """What stood against seecr's mathematics: MuJoCo's own means, or ours a second time."""
-    kinds: dict[Against, list[str]] = {}
+    kinds: dict[Counterpart, list[str]] = {}
     for result in results:
         kinds.setdefault(result.case.against, []).append(result.case.effect)
     return " ".join(

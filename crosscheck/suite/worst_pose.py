@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from crosscheck.files import written
-from crosscheck.suite.run import CaseResult, worst_of
+from crosscheck.suite.results import CaseResult, worst_of
 from crosscheck.suite.verdicts import FINDINGS, UNSOLVED, Verdict
 from seecr.errors import InputFileError
 from seecr.pose import Array

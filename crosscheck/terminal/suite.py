@@ -10,12 +10,12 @@ from rich.table import Table
 from rich.text import Text
 
 from crosscheck.suite import words
-from crosscheck.suite.run import Outcome
+from crosscheck.suite.results import Outcome
 from crosscheck.suite.verdicts import FINDINGS, Verdict
 
 if TYPE_CHECKING:
-    from crosscheck.suite.results import Run
-    from crosscheck.suite.run import CaseResult
+    from crosscheck.suite.results import CaseResult
+    from crosscheck.suite.run import Run
 
 _STYLE = {
     Outcome.AGREE: "green",

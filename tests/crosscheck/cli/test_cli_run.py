@@ -136,7 +136,7 @@ EFFECT = "effect-demobot_parallel-platform_mass"
 def test_an_effect_is_a_case_like_any_other(tmp_path):
     result = run(*SMALL, "--case", EFFECT, "--out", tmp_path)
     assert result.exit_code == 0
-    assert "1 effect on 1 robot: all agree with MuJoCo; worst " in result.stdout
+    assert "1 effect on 1 robot against MuJoCo's own means (1): all agree; worst " in result.stdout
     assert "SEECR and MuJoCo agree at 24 poses of 1 case" in result.stdout
     document = json.loads((tmp_path / "results.json").read_text())
     (effect,) = document["effects"]
@@ -156,7 +156,9 @@ def test_an_effect_is_a_case_like_any_other(tmp_path):
 def test_effects_alone_run_in_several_processes(tmp_path):
     result = run("--case", "effect-*-platform_mass", "--jobs", "2", "--out", tmp_path)
     assert result.exit_code == 0
-    assert result.stdout.startswith("1 effect on 2 robots: all agree with MuJoCo; worst ")
+    assert result.stdout.startswith(
+        "1 effect on 2 robots against MuJoCo's own means (1): all agree; worst "
+    )
     document = json.loads((tmp_path / "results.json").read_text())
     assert [effect["robot"] for effect in document["effects"]] == [
         "demobot_cogiro",
@@ -176,7 +178,7 @@ def test_an_effect_that_differs_ends_1_and_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr(effect_suite, "measure", heavier)
     result = run(*SMALL, "--case", EFFECT, "--out", tmp_path)
     assert result.exit_code == 1
-    assert f"1 of 1 case not as MuJoCo: {EFFECT}; worst" in result.stdout
+    assert f"1 of 1 case do not agree: {EFFECT}; worst" in result.stdout
     assert f"SEECR and MuJoCo differ in {EFFECT}; " in result.stdout
     assert json.loads((tmp_path / "results.json").read_text())["verdict"] == "differ"
     poses, effects = ET.parse(tmp_path / "junit.xml").getroot().findall("testsuite")

@@ -21,8 +21,8 @@ from crosscheck.recording.series import Series
 from crosscheck.settle.relax import SettleStatus
 from crosscheck.settle.settler import SettlingBatch
 from crosscheck.suite.cases import Case, demobot_sweep, user_cases
-from crosscheck.suite.results import Run, results_json
-from crosscheck.suite.run import CaseResult, run_case
+from crosscheck.suite.results import CaseResult
+from crosscheck.suite.run import Run, results_json, run_case
 from crosscheck.suite.thresholds import load_thresholds
 from crosscheck.suite.verdicts import Verdict
 from seecr.errors import InputFileError

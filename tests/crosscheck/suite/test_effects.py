@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from crosscheck.suite import words
-from crosscheck.suite.effects import Against, EffectCase, EffectResult, effect_cases
-from crosscheck.suite.run import Outcome
+from crosscheck.suite.effects import Counterpart, EffectCase, EffectResult, effect_cases
+from crosscheck.suite.results import Outcome
 from crosscheck.twin.robot import TRUE_EFFECTS
 from seecr.shipped import model_path
 
@@ -41,9 +41,8 @@ def test_the_seed_draws_the_size():
 
 
 def test_thirteen_effects_stand_against_our_own_mathematics():
-    ours = [
-        case.effect for case in effect_cases(("demobot_parallel",)) if case.against is Against.OURS
-    ]
+    cases = effect_cases(("demobot_parallel",))
+    ours = [case.effect for case in cases if case.against is Counterpart.OURS]
     assert len(ours) == 13 and len(TRUE_EFFECTS) == 27
     sensing = {name for name in TRUE_EFFECTS if name.startswith(("tracker", "tension"))}
     assert sensing <= set(ours)
@@ -58,7 +57,7 @@ def test_readme_and_changelog_say_how_many():
 
 
 def test_results_and_summary_say_what_stood_against_an_effect(good):
-    assert good.as_json()["against"] is Against.OURS
+    assert good.as_json()["against"] is Counterpart.OURS
     assert good.as_json()["poses"] == {"total": 2, "unsolved": 0}
     other = replace(good, case=EffectCase(PARALLEL, "pulley_radius"))
     line = words.against_line([good, other])

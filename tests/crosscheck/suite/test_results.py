@@ -18,8 +18,8 @@ from crosscheck.files import json_text, staged
 from crosscheck.suite import words
 from crosscheck.suite.cases import Case, demobot_sweep
 from crosscheck.suite.junit import junit_xml
-from crosscheck.suite.results import Run, results_json
-from crosscheck.suite.run import CaseResult, run_case
+from crosscheck.suite.results import CaseResult
+from crosscheck.suite.run import Run, results_json, run_case
 from crosscheck.suite.summary import summary_md
 from crosscheck.suite.thresholds import load_thresholds
 from crosscheck.suite.verdicts import PoseFinding, Verdict
@@ -102,6 +102,26 @@ def test_json_says_null_where_there_is_no_number(good):
     assert first["exit_status"] == 3
     assert second["findings"][0]["energy_mujoco_J"] == 2.0
     assert json.loads(results_json(run_of(unsolved(good))))["verdict"] == "not_converged"
+
+
+def test_a_run_shows_itself_and_has_a_row_per_pose(good):
+    run = run_of(good, failed(good, "bad"))
+    lines = str(run).splitlines()
+    assert lines[0] == words.verdict_line(run)
+    assert lines[1] == "bad, pose 1, commanded (0.4 0.25 0.1; 1 0 0 0): a <millimetre> apart"
+    assert "a &lt;millimetre&gt; apart" in run._repr_html_()
+    frame = run.to_frame()
+    assert frame.num_rows == 6
+    assert frame["verdict"].to_pylist()[4] == "differs"
+    np.testing.assert_array_equal(frame["mujoco_x_m"].to_numpy()[:3], good.settling.pose[:, 0])
+    np.testing.assert_array_equal(frame["seecr_qw"].to_numpy()[:3], good.solution.pose[:, 3])
+    assert str(good).startswith("good: 3 poses, agree; worst difference ")
+    assert str(failed(good, "bad")).splitlines()[1].startswith("pose 1, commanded ")
+
+
+def test_json_is_the_same_in_one_piece_or_case_by_case(good):
+    run = run_of(good, failed(good))
+    assert json.loads(results_json(run)) == json.loads(json_text(run.as_json()))
 
 
 def test_junit_has_a_test_per_case_and_names_the_pose(good):

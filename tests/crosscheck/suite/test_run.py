@@ -23,7 +23,8 @@ from crosscheck.suite.cases import (
     user_cases,
 )
 from crosscheck.suite.mujoco_robot import MujocoRobot, screw_motion
-from crosscheck.suite.run import CaseResult, Outcome, run_case, run_suite, worst_of
+from crosscheck.suite.results import CaseResult, Outcome, worst_of
+from crosscheck.suite.run import run_case, run_suite
 from crosscheck.suite.thresholds import SHIPPED, FindingLimits, load_thresholds, thresholds_toml
 from crosscheck.suite.verdicts import Verdict
 from seecr.errors import InputFileError
@@ -550,9 +551,9 @@ def test_processes_give_the_same_results_in_the_same_order():
         for case in select(shipped_cases(), ["parallel-vectran-*", "planar-two-cable"])
     ]
     seen: list[str] = []
-    alone = run_suite(few, load_thresholds(), progress=lambda r: seen.append(r.case.name))
+    alone = run_suite(few, load_thresholds(), progress=lambda r: seen.append(r.case.name)).results
     assert seen == [case.name for case in few]
-    together = run_suite(few, load_thresholds(), jobs=2)
+    together = run_suite(few, load_thresholds(), jobs=2).results
     for one, two, case in zip(alone, together, few, strict=True):
         assert one.case.name == two.case.name == case.name
         assert np.array_equal(one.solution.pose, two.solution.pose)

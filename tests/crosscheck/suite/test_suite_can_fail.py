@@ -24,8 +24,8 @@ from crosscheck.suite.cases import Case, shipped_cases
 from crosscheck.suite.effects import EffectCase, run_effect
 from crosscheck.suite.junit import junit_xml
 from crosscheck.suite.mujoco_robot import MujocoRobot
-from crosscheck.suite.results import Run
-from crosscheck.suite.run import Outcome, run_suite
+from crosscheck.suite.results import Outcome
+from crosscheck.suite.run import Run, run_suite
 from crosscheck.suite.thresholds import load_thresholds
 from seecr import equilibrium
 from seecr.compiled import columns
@@ -60,7 +60,7 @@ def few_cases() -> tuple[Case, ...]:
 
 
 def run_of_few() -> Run:
-    return Run(run_suite(few_cases(), THRESHOLDS), THRESHOLDS, seed=0, jobs=1, wall_s=0.0)
+    return run_suite(few_cases(), THRESHOLDS)
 
 
 # --- ways to plant an error --------------------------------------------------------------------
