@@ -50,13 +50,14 @@ def result_of(name: str) -> Result:
         "Addition": lambda: crosscheck.add_effect(ROBOT, data_file(), "pulley_radius"),
         "Plan": lambda: crosscheck.make_plan(ROBOT, data_file()),
         "Twin": lambda: crosscheck.make_twin(ROBOT, 1, points=4),
-        "CaseResult": lambda: crosscheck.run_suite([case()])[0],
+        "CaseResult": lambda: crosscheck.run_suite([case()]).results[0],
+        "Run": lambda: crosscheck.run_suite([case()]),
     }
     made: Result = functions[name]()
     return made
 
 
-NAMES = ["Measurements", "Comparison", "Diagnosis", "Addition", "Plan", "Twin", "CaseResult"]
+NAMES = ["Measurements", "Comparison", "Diagnosis", "Addition", "Plan", "Twin", "CaseResult", "Run"]
 
 
 @pytest.mark.parametrize("name", NAMES)
