@@ -43,7 +43,7 @@ class LeftOut:
 def leave_out(setting: Setting, joint: Joint) -> LeftOut:
     """Refit without each block (runs, where there are some) and predict it."""
     problem = setting.problem
-    blocks, _note = blocks_of(problem)
+    blocks = blocks_of(problem)
     linear = linearised(setting, joint)
     fitted = without(linear, np.zeros(len(linear.y), dtype=bool))
     raw = np.full(problem.measured.shape, np.nan)
