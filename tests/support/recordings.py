@@ -66,6 +66,7 @@ def headless_viewer() -> Iterator[Any]:
         client = ViewerClient.spawn(
             headless=True, port=20000 + os.getpid() % 20000, executable_path=str(program)
         )
+        client.take_screenshot()  # of nothing yet: whether it can draw shows only now
     except Exception as error:
         pytest.skip(f"no headless viewer here (mesa-vulkan-drivers?): {error}")
     with client:
