@@ -37,7 +37,7 @@ class Node:
 
     Attributes:
         fit, evidence, whiteness: of the model.
-        candidates: what came of trying further effects; none before it was explored.
+        candidates: what trying further effects gave; none before it was explored.
     """
 
     fit: Fit

@@ -14,7 +14,12 @@ from crosscheck.diagnosis.rivals import rivals_of
 from crosscheck.diagnosis.search import Search, search
 from crosscheck.diagnosis.small import is_plausible, share_of, small_effects_alone
 from crosscheck.fit.evidence import FALSE_ALARM
+from crosscheck.fit.gauss_newton import Fit
+from crosscheck.fit.problem import Problem
 from crosscheck.fit.reasons import Why
+from crosscheck.fit.starts import Starts
+from seecr.effects.base import Layout
+from seecr.pose import Array
 
 NAMES = (
     "cable_length_offset", "drum_gain", "stiffness", "centre_of_mass", "gravity_tilt",
@@ -192,3 +197,20 @@ def test_progress_goes_from_nothing_to_the_whole() -> None:
     assert told[0] == (f"round 1: looking at {NAMES[0]}", 0.0)
     assert all(0.0 <= part <= 1.0 for _text, part in told)
     assert any(text.startswith("round 2: fitting") for text, _part in told)
+
+
+def test_what_chance_explains_over_all_that_were_tried_is_refused_whatever_its_evidence() -> None:
+    """An effect of many shapes has as many chances."""
+    made = toy({"tracker_scale": 0.3}, NAMES)
+    node = node_of(made.trials, made.base)
+    once = next(c for c in explored(made.trials, node, True, {}, quiet).candidates if c.fit)
+    assert once.name == "tracker_scale" and once.why_not is None
+
+    def of_many_shapes(problem: Problem, base: Fit, layout: Layout, factor: Array) -> Starts:
+        starts = made.starts(problem, base, layout, factor)
+        return replace(starts, shapes=0.01 / once.p) if layout.name == once.name else starts
+
+    trials = replace(made.trials, starts=of_many_shapes)
+    again = next(c for c in explored(trials, node, True, {}, quiet).candidates if c.fit)
+    assert again.evidence is not None and again.evidence.log - node.evidence.log > LEAST_GAIN
+    assert again.why_not is not None and again.why_not.why is Why.CHANCE_OVER_ALL

@@ -14,10 +14,10 @@ from crosscheck.fit.candidates import Trials, null_fit, try_candidate
 from crosscheck.fit.problem import Problem
 from crosscheck.measurements.data import Sigma
 from crosscheck.planning.design import make_plan
-from crosscheck.planning.extensions import more_poses
+from crosscheck.planning.extensions import Adding, extensions, more_poses
 from crosscheck.planning.greedy import Wanted, chosen_poses
-from crosscheck.planning.planned import near_slack
-from crosscheck.planning.proposer import MORE_POSES
+from crosscheck.planning.planned import Reads, near_slack, planned
+from crosscheck.planning.proposer import MORE_POSES, NEEDED, telling_apart
 from crosscheck.planning.visibility import joined, left_over, needed, signals, signals_like
 from seecr.effects import Terms
 from seecr.mjcf import load_robot
@@ -230,3 +230,20 @@ def test_constant_commands_and_slack_rows(robot, commands):
     assert not found.converged and found.effects == ()
     assert "left out" in found.notes[0]
     json_text(found.as_json())
+
+
+def test_what_tells_two_effects_of_a_model_apart_is_proposed_by_the_same_means(robot, few):
+    """Mass and stiffness move a robot alike: sensors or a load part them, poses never do."""
+    model = Terms([term(robot, "stiffness", factor=1.4)])
+    here = planned(robot, few, SIGMA, Reads.whole(robot.n_cables), model)
+    options = list(extensions(here))
+    rival = term(robot, "platform_mass").layout
+    found = telling_apart(here, options, "stiffness", rival)
+    assert {s.kind for s in found} == {Adding.TENSIONS, Adding.PAYLOAD}
+    for suggestion in found:
+        (gain,) = suggestion.gains
+        assert gain.now == 0.0 and gain.then > gain.needed == NEEDED
+    # of a payload the words are those of a plan
+    words = {s.kind: s.words for s in make_plan(robot, few).suggestions}
+    payload = next(s for s in found if s.kind is Adding.PAYLOAD)
+    assert payload.words == words[Adding.PAYLOAD]
