@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from crosscheck.suite.gap import gap
 from crosscheck.suite.pool import Pool
 from crosscheck.suite.results import Outcome
-from crosscheck.twin.hidden import choose
+from crosscheck.twin.hidden import CONTAINED, choose
 from crosscheck.twin.measure import measure
 from crosscheck.twin.robot import TRUE_EFFECTS
 from crosscheck.twin.trajectory import trajectory
@@ -118,7 +118,7 @@ class EffectCase:
     @property
     def term(self) -> Term:
         """The effect with its values."""
-        random = np.random.default_rng([self.seed, TRUE_EFFECTS.index(self.effect)])
+        random = np.random.default_rng([self.seed, _number(self.effect)])
         return _slow(choose(self.robot, random, [self.effect])[0])
 
 
@@ -238,6 +238,11 @@ def run_effects(
 def _seen(readings: Any) -> Array:
     """Poses (n, 7) as the tracker reads them."""
     return np.concatenate([readings.position, readings.quat_wxyz], axis=1)
+
+
+def _number(effect: str) -> int:
+    """Which random numbers an effect has: one that another contains comes last and moves none."""
+    return [*(name for name in TRUE_EFFECTS if name not in CONTAINED), *CONTAINED].index(effect)
 
 
 def _slow(term: Term) -> Term:

@@ -142,12 +142,12 @@ class CaseResult(Result):
 
     @property
     def seecr_us(self) -> float:
-        """Microseconds that SEECR takes a pose, on one processor."""
+        """Microseconds that SEECR takes per pose, on one processor."""
         return 1e6 * self.seecr_s / len(self)
 
     @property
     def mujoco_ms(self) -> float:
-        """Milliseconds that MuJoCo takes a pose, both stages, on one processor."""
+        """Milliseconds that MuJoCo takes per pose, both stages, on one processor."""
         return 1e3 * float(np.sum(self.settling.wall_s)) / len(self)
 
     def lines(self) -> list[str]:

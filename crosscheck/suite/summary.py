@@ -36,7 +36,7 @@ def _cases(run: Run, worst_pose: str) -> list[str]:
         _table(run),
         "Largest differences between SEECR and MuJoCo over each case's poses; `settled` is MuJoCo "
         "brought to rest by its own dynamics, `polished` and the tensions after Newton's method on "
-        f"its inverse dynamics. Times are a pose, on one processor. {worst_pose}",
+        f"its inverse dynamics. Times are per pose, on one processor. {worst_pose}",
     ]
     parts += _section(run, "Failures", words.failures)
     parts += _section(run, "Findings", words.findings)

@@ -18,10 +18,11 @@ _SHARES = (0.2, 0.6, 0.2)
 _ONE, _SEVERAL = (1.0, 2.0), (0.5, 2.0)
 # A cable that loses stiffness as it stretches breaks in the end: these only stiffen.
 _UPWARDS = ("nonlinear_elasticity",)
-# Never drawn, since another contains it: all drums alike is a case of the drums' gains.
-_CONTAINED = {"length_scale"}
 # Sheaves need anchor points this far aside of exit points, in cable lengths.
 _ASIDE = 0.15
+
+CONTAINED = ("length_scale",)
+"""Never drawn, since another contains it: all drums alike is a case of the drums' gains."""
 
 Generator = np.random.Generator
 
@@ -79,7 +80,7 @@ def _alike_both_ways(hidden: Term) -> Term:
 
 def _drawn(robot: Robot, random: Generator, count: int | None, tensions: bool) -> list[str]:
     without = set() if tensions else {"tension_scale"}
-    without |= _CONTAINED | (set() if _room_for_sheaves(robot) else {"pulley_radius"})
+    without |= {*CONTAINED} | (set() if _room_for_sheaves(robot) else {"pulley_radius"})
     known = [name for name in TRUE_EFFECTS if name not in without]
     if count is None:
         count = int(random.choice(len(_SHARES), p=_SHARES))
