@@ -97,7 +97,7 @@ def diagnosed(folder: Path) -> Path:
 
 
 def photograph(page: Path, path: Path) -> str:
-    """Let Chromium draw the top of the page; says what came of it."""
+    """Let Chromium draw the top of the page; says what it drew."""
     browser = shutil.which("chromium") or shutil.which("google-chrome")
     if browser is None:
         return f"{path.name}: left out, as there is no Chromium here"

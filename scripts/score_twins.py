@@ -37,7 +37,7 @@ CLOSE, FLOOR = 3.0, 1.2
 
 @dataclass(frozen=True)
 class Score:
-    """What came of one twin.
+    """How the diagnosis of one twin turned out.
 
     Attributes:
         kind: "one", "pair" or "null".

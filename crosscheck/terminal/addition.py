@@ -1,4 +1,4 @@
-"""What came of fitting an effect, on the terminal."""
+"""The fit of an effect, on the terminal."""
 
 from __future__ import annotations
 
