@@ -32,6 +32,7 @@ __all__ = [
     "Toml",
     "json_text",
     "plain",
+    "read_text",
     "read_toml",
     "staged",
     "write_text",

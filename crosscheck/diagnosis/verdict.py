@@ -19,13 +19,14 @@ from crosscheck.diagnosis.small import is_plausible, share_of, small_effects_alo
 from crosscheck.fit.candidates import Candidate, Trials, null_fit
 from crosscheck.fit.gauss_newton import Fit
 from crosscheck.fit.noise import whiteness
-from crosscheck.fit.prepare import Progress, noise_floor, outlying_rows, prepare
+from crosscheck.fit.prepare import Prepared, Progress, noise_floor, outlying_rows, prepare
 from crosscheck.fit.problem import Problem, rms_by_kind
 from crosscheck.fit.reasons import Reason, Refusal, Unfit, Why
 from crosscheck.fit.state import derivatives
 from crosscheck.given import GivenModel, GivenRobot, model_of, robot_of
 from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.read import measurements_of
+from seecr.effects import Terms
 from seecr.pose import Array
 
 # Where structure is left over, an effect is listed only if it has few parameters and took away
@@ -39,9 +40,6 @@ _MOST_WHERE = 5
 _UNDERSTATED = 3.0
 
 
-# BLAS on several threads takes longer for matrices as narrow as these, and takes the processors
-# from the compiled loop.
-@threadpool_limits.wrap(limits=1, user_api="blas")
 def diagnose(
     robot: GivenRobot,
     data: Measurements | str | Path,
@@ -62,13 +60,22 @@ def diagnose(
     robot = robot_of(robot)
     data = measurements_of(data, robot)
     terms, said = model_of(model, robot)
-    ready = prepare(robot, data, terms)
+    # BLAS on several threads takes longer for matrices as narrow as these, and takes the
+    # processors from the compiled loop
+    with threadpool_limits(limits=1, user_api="blas"):
+        return _diagnosed(prepare(robot, data, terms), terms, said, progress)
+
+
+Notes = tuple[str, ...]
+
+
+def _diagnosed(ready: Prepared, terms: Terms, said: Notes, progress: Progress) -> Diagnosis:
     problem = ready.problem
     factor = problem.noise(problem.experiment.predict(terms.effects))
     base = null_fit(problem, terms, factor, refit=False)
     refusal = ready.refusal
     if refusal is None and not base.valid:
-        refusal = Refusal(Unfit.UNSOLVED_MODEL, data.n_rows)
+        refusal = Refusal(Unfit.UNSOLVED_MODEL, problem.data.n_rows)
     if refusal is not None:
         return no_verdict(problem, base, (*said, *ready.all_notes), refusal)
     base, refitted = _at_its_best(problem, base, factor)
@@ -76,9 +83,6 @@ def diagnose(
     found, outliers = _without_outliers(found, base, progress)
     found, larger = _with_larger_noise(found, progress)
     return conclude(found, (*said, *ready.all_notes, *refitted, *outliers, *larger))
-
-
-Notes = tuple[str, ...]
 
 
 def _at_its_best(problem: Problem, base: Fit, factor: Array) -> tuple[Fit, Notes]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
-from crosscheck.planning.design import Plan, make_plan
+from crosscheck.planning.design import make_plan
+from crosscheck.planning.result import Plan
 
 __all__ = ["Plan", "make_plan"]

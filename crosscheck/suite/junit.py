@@ -41,7 +41,8 @@ def junit_xml(run: Run) -> str:
         for effect in run.effects:
             _add_effect(suite, effect)
     ET.indent(root)
-    return ET.tostring(root, encoding="utf-8", xml_declaration=True).decode() + "\n"
+    text: bytes = ET.tostring(root, encoding="utf-8", xml_declaration=True)
+    return text.decode() + "\n"
 
 
 def _counts(results: Sequence[CaseResult | EffectResult], seconds: float) -> dict[str, str]:

@@ -90,8 +90,8 @@ def thresholds_toml(thresholds: Thresholds) -> str:
     document = tomlkit.parse(SHIPPED.read_text(encoding="utf-8"))
     for table, values in plain(thresholds).items():
         for key, value in values.items():
-            if document[table][key] != value:  # type: ignore[index]
-                document[table][key] = value  # type: ignore[index]
+            if document[table][key] != value:
+                document[table][key] = value
     return tomlkit.dumps(document)
 
 
