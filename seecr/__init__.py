@@ -13,8 +13,9 @@ one of your own.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from seecr.lazy import lazily
 
 if TYPE_CHECKING:
     from seecr.commands import Commands
@@ -111,10 +112,7 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    if name not in _WHERE:
-        raise AttributeError(f"module 'seecr' has no attribute {name!r}")
-    return getattr(import_module(f"seecr.{_WHERE[name]}"), name)
+__getattr__ = lazily(__name__, _WHERE)
 
 
 def __dir__() -> list[str]:

@@ -11,7 +11,10 @@ from stale import forget_stale
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """Forget what was compiled from older sources, before any worker starts to use it."""
+    """Forget what was compiled from older sources, before any worker starts to use it.
+
+    Each compiled function has one signature: two workers that compile it at once write the same.
+    """
     if hasattr(session.config, "workerinput"):
         return
     spec = importlib.util.find_spec("seecr")

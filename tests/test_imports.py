@@ -18,7 +18,8 @@ ROOT = Path(__file__).resolve().parents[1]
 
 # A folder or file on its floor. crosscheck stands on seecr: a lower floor of the two is seecr's.
 FLOORS = {
-    "seecr.errors": 0, "seecr.compiled": 0, "seecr.threads": 0, "seecr.files": 1, "seecr.result": 1,
+    "seecr.errors": 0, "seecr.compiled": 0, "seecr.threads": 0, "seecr.lazy": 0,
+    "seecr.files": 1, "seecr.result": 1,
     "seecr.shipped": 1, "seecr.pose": 1,
     "seecr.robot": 2, "seecr.commands": 3, "seecr.joints": 3, "seecr.mjcf": 3,
     "seecr.path": 4, "seecr.setup": 4, "seecr.fingerprint": 4,
@@ -27,7 +28,7 @@ FLOORS = {
     "seecr.scipy_search": 7, "seecr.solution": 7, "seecr.equilibrium": 8,
     "seecr.planar": 9, "seecr.workspace": 9, "seecr.experiment": 9,
     "seecr.sensitivity": 10,
-    "crosscheck.errors": 20, "crosscheck.lazy": 20,
+    "crosscheck.errors": 20,
     "crosscheck.files": 21, "crosscheck.units": 21, "crosscheck.given": 21,
     "crosscheck.settle": 22, "crosscheck.measurements": 22, "crosscheck.model": 22,
     "crosscheck.twin": 23, "crosscheck.fit": 23,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from crosscheck.lazy import lazily
+from seecr.lazy import lazily
 
 if TYPE_CHECKING:
     from crosscheck.terminal.addition import print_addition
