@@ -41,6 +41,7 @@ def problem_of(data: Measurements) -> Problem:
     return ready.problem
 
 
+@pytest.mark.slow
 def test_many_small_errors_are_fitted_together_and_predict_elsewhere() -> None:
     terms = hidden()
     data = measured(ROBOT, terms, points=14)
@@ -58,6 +59,7 @@ def test_many_small_errors_are_fitted_together_and_predict_elsewhere() -> None:
     assert float(np.max(found.held_out.surprise)) < 2.0
 
 
+@pytest.mark.slow
 def test_covariance_covers_what_the_data_see() -> None:
     terms = hidden()
     found = calibrate(problem_of(measured(ROBOT, terms, points=14)))
@@ -67,6 +69,7 @@ def test_covariance_covers_what_the_data_see() -> None:
     assert abs(found.terms.vector[at] - 0.004) < 4.0 * error
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("angle", [0.05, 1.5])
 def test_a_tracker_that_stands_askew_is_registered_first(angle: float) -> None:
     data = measured(ROBOT, (), points=8)
