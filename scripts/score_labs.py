@@ -2,6 +2,7 @@
 
     python scripts/score_labs.py ../shared/data/labs            all cases
     python scripts/score_labs.py ../shared/data/labs B13 B16    some
+    python scripts/score_labs.py --sets ../shared/data/twins    which effects are needed, too
 
 Each case is fitted on measured.csv and predicts validation.csv, another trajectory of the same
 robot. Its errors there are printed in units of the noise: 1 is a perfect model.
@@ -18,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.calibration.calibrate import Calibration, calibrate
+from crosscheck.calibration.search import Sought, seek
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.problem import Problem, kinds_read, rms_by_kind
 from crosscheck.fit.state import State, evaluate
@@ -76,10 +78,36 @@ def line(name: str, answer: dict[str, Any], found: Calibration, folder: Path, sp
     )
 
 
+def verdict_line(
+    name: str, answer: dict[str, Any], sought: Sought, folder: Path, spent: float
+) -> str:
+    """What is said to be missing, beside what was hidden."""
+    said = sought.judgement
+    probable = [
+        f"{'/'.join(members)} {p:.2f}"
+        for members, p in zip(sought.classes.members, sought.classes.probability, strict=True)
+        if p > 0.05
+    ]
+    best = sought.found.best
+    text = ""
+    if (folder / "validation.csv").exists():
+        robot = sought.calibration.setting.problem.robot
+        problem, state = predicted(robot, folder / "validation.csv", best.joint.terms)
+        errors = shares(problem, state, noise_in(answer))
+        text = "; best set " + ", ".join(f"{k.split('_')[0]} {v:.3f}" for k, v in errors.items())
+    return (
+        f"    {name} hidden {'+'.join(answer['hidden'])}: {said.verdict.value}, sure "
+        f"{', '.join(said.sure) or 'none'}; best {', '.join(sorted(best.names)) or 'none'}; field "
+        f"{sought.field_odds:+.1f}, open {said.undecided:.2f}; {', '.join(probable)}{text}; "
+        f"{len(sought.found.refits)} sets, {spent:.1f} s"
+    )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("cases", nargs="*")
+    parser.add_argument("--sets", action="store_true", help="which effects are needed, too")
     chosen = parser.parse_args()
     answers = json.loads((chosen.folder / "answers.json").read_text())
     for name in chosen.cases or sorted(answers):
@@ -91,9 +119,13 @@ def main() -> None:
         if ready.refusal:
             print(f"{name}: {ready.refusal}", flush=True)
             continue
-        found = calibrate(ready.problem)
+        sought = seek(ready.problem, data.sigma) if chosen.sets else None
+        found = calibrate(ready.problem) if sought is None else sought.calibration
         spent = time.process_time() - start
-        print(line(name, answers[name], found, folder, spent), flush=True)
+        if (folder / "validation.csv").exists():
+            print(line(name, answers[name], found, folder, spent), flush=True)
+        if sought is not None:
+            print(verdict_line(name, answers[name], sought, folder, spent), flush=True)
 
 
 if __name__ == "__main__":

@@ -34,7 +34,7 @@ PLAIN = Terms()
 # stands, and shapes.
 FLAT, SHAPES = 300.0, 30.0
 # Rounds of estimating the noise and fitting with it; it has settled within this part.
-_ROUNDS, _SETTLED = 4, 0.03
+_ROUNDS, _SETTLED, _STEPS = 4, 0.03, 8
 # Prior widths of effects, in plausible sizes: more than 1 only where that is surely better.
 WIDER = (1.0, 3.0, 10.0)
 _SURE = 3.0
@@ -143,7 +143,7 @@ def with_noise(setting: Setting, joint: Joint) -> Joint:
         before = joint.colour
         colour = noise_of(setting, joint)
         change = np.abs(np.log(colour.scale / before.scale)) + np.abs(colour.rho - before.rho)
-        joint = settle(setting, joint.state, joint.width, colour)
+        joint = settle(setting, joint.state, joint.width, colour, _STEPS)
         if float(np.max(change)) < _SETTLED:
             break
     return joint

@@ -69,6 +69,7 @@ class Setting:
         chain: how the readings follow one another.
         frozen: take rows' history as given when deriving.
         watch: called after each step with chi2 a reading.
+        weight: (N,) how much each reading counts; None to find that from what is left.
     """
 
     problem: Problem
@@ -76,6 +77,11 @@ class Setting:
     chain: Chain
     frozen: bool = False
     watch: Callable[[float], None] = lambda _chi2: None
+    weight: Array | None = None
+
+    def weight_at(self, colour: Colour, state: State) -> Array:
+        """(N,) how much each reading counts."""
+        return row_weights(self.chain, colour, state.white) if self.weight is None else self.weight
 
 
 def tempered(setting: Setting, start: State, width: Array, colour: Colour) -> Joint:
@@ -105,7 +111,7 @@ def settle(
         steps: most of them.
     """
     damping, settled = 1e-4, False
-    weight = row_weights(setting.chain, colour, state.white)
+    weight = setting.weight_at(colour, state)
     jacobian = scaled_derivatives(setting, state)
     for _ in range(steps):
         step = _step(setting, state, jacobian, width, colour, weight, damping)
@@ -114,7 +120,7 @@ def settle(
             break
         gain, before, damping, state = step
         setting.watch(state.chi2 / max(len(state.white), 1))
-        weight = row_weights(setting.chain, colour, state.white)
+        weight = setting.weight_at(colour, state)
         jacobian = scaled_derivatives(setting, state)
         if gain < max(_PART * before, _GAIN):
             settled = True
@@ -146,6 +152,8 @@ def _step(
     x = whitened(setting.chain, colour, weight, jacobian)
     y = whitened(setting.chain, colour, weight, state.white)
     move = _movable(-x.T @ y, z, width, values, (lower, upper))
+    if len(move) == 0:
+        return None
     x, inverse2 = x[:, move], 1.0 / width[move] ** 2
     gradient = z[move] * inverse2 - x.T @ y
     normal = x.T @ x + np.diag(inverse2)

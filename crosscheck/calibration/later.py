@@ -60,6 +60,19 @@ def _waits(problem: Problem, layout: Layout) -> bool:
 
 def worth_adding(setting: Setting, joint: Joint, later: Sequence[Layout]) -> list[Term]:
     """Effects that are worth it beside the joint fit, at their most promising shapes."""
+    found = _promising(setting, joint, later)
+    return [_inside(term) for term, gain in found if gain > _PAYS]
+
+
+def promising(setting: Setting, joint: Joint, later: Sequence[Layout]) -> list[Term]:
+    """Effects at their most promising shapes; as they are in the fit where they are there."""
+    there = [joint.terms[a.name] for a in later if a.name in joint.terms]
+    absent = [a for a in later if a.name not in joint.terms]
+    return [_at_null(t) for t in there] + [t for t, _g in _promising(setting, joint, absent)]
+
+
+def _promising(setting: Setting, joint: Joint, later: Sequence[Layout]) -> list[tuple[Term, float]]:
+    """Each with the ln evidence that it gains, less what looking at many shapes costs."""
     beside = _Beside(setting, joint)
     out = []
     for layout in later:
@@ -67,16 +80,22 @@ def worth_adding(setting: Setting, joint: Joint, later: Sequence[Layout]) -> lis
         if not starts:
             continue
         gains = [beside.gain(Term(layout, start)) for start in starts]
-        price = np.log(max(1.0, len(starts) / _ALIKE))
-        if max(gains) - price > _PAYS:
-            out.append(Term(layout, _inside(layout, starts[int(np.argmax(gains))])))
+        price = float(np.log(max(1.0, len(starts) / _ALIKE)))
+        out.append((Term(layout, starts[int(np.argmax(gains))]), max(gains) - price))
     return out
 
 
-def _inside(layout: Layout, start: Array) -> Array:
+def _at_null(term: Term) -> Term:
+    """An effect with its shape, its amplitudes null."""
+    layout = term.layout
+    return Term(layout, np.where(layout.shape, term.vector, layout.null))
+
+
+def _inside(term: Term) -> Term:
     """A start off the bound, where history has a derivative on both sides."""
-    at_bound = (start <= layout.lower) & ~layout.shape
-    return np.asarray(np.where(at_bound, start + 0.1 * layout.scale, start))
+    layout = term.layout
+    at_bound = (term.vector <= layout.lower) & ~layout.shape
+    return Term(layout, np.where(at_bound, term.vector + 0.1 * layout.scale, term.vector))
 
 
 class _Beside:

@@ -1,0 +1,93 @@
+"""The whole catalogue as a linear model about one fitted set: what each effect would be worth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from crosscheck.calibration.colour import whitened
+from crosscheck.calibration.gram import Gram, Group, gram_of
+from crosscheck.calibration.joint import Joint, Setting
+from crosscheck.calibration.later import added_columns
+from crosscheck.calibration.registration import NAME as TRACKER
+from crosscheck.calibration.worth import WIDTHS
+from crosscheck.fit.state import derivatives
+from seecr.effects import Term, Terms
+from seecr.effects.base import Layout
+from seecr.pose import Array
+
+# Where the tracker stands has no plausible size.
+TRACKER_WIDTHS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
+# Effects that move no reading by this part of its noise, for plausible sizes, are not seen.
+_UNSEEN = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Catalogue:
+    """All effects that might be missing, each with the values to start it from.
+
+    Attributes:
+        at_once: without history or shapes, at null.
+        later: the others, at their most promising shapes.
+    """
+
+    at_once: Terms
+    later: Terms
+
+    def start(self, name: str) -> Term:
+        """An effect as it starts."""
+        return self.at_once[name] if name in self.at_once else self.later[name]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All effects."""
+        return (*self.at_once.names, *self.later.names)
+
+
+def widths_for(layout: Layout) -> Array:
+    """Prior widths that an effect may have."""
+    return np.array(TRACKER_WIDTHS if layout.name == TRACKER else WIDTHS)
+
+
+def gram_about(setting: Setting, joint: Joint, catalogue: Catalogue) -> Gram:
+    """Normal equations of the whole catalogue about a fit of some of it."""
+    columns, z = catalogue_columns(setting, joint, catalogue)
+    groups, first = {}, 0
+    for name, x in columns.items():
+        count = x.shape[1]
+        layout = catalogue.start(name).layout
+        one_sided = count == 1 and bool(layout.lower[0] == layout.null[0])
+        groups[name] = Group(np.arange(first, first + count), widths_for(layout), one_sided)
+        first += count
+    x = np.concatenate(list(columns.values()), axis=1)
+    y = joint.state.white + x @ np.concatenate(list(z.values()))
+
+    def white(values: Array) -> Array:
+        return whitened(setting.chain, joint.colour, joint.weight, values)
+
+    return gram_of(white(x), white(y), groups)
+
+
+def catalogue_columns(
+    setting: Setting, joint: Joint, catalogue: Catalogue
+) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
+    """Of each effect that is seen: columns (N, k) of its amplitudes, and their z (k,) there."""
+    inside = joint.terms
+    every = Terms([*inside, *(t for t in catalogue.at_once if t.name not in inside)])
+    state = joint.state.of(every)
+    rates = derivatives(setting.problem, state, frozen=True) * every.scale
+    columns, z = {}, {}
+    for term in every:
+        part = np.flatnonzero(every.own(term.name))[~term.layout.shape]
+        columns[term.name], z[term.name] = rates[:, part], term.sizes[~term.layout.shape]
+    for term in catalogue.later:
+        if term.name not in inside:
+            own = added_columns(setting, joint, term)
+            columns[term.name], z[term.name] = own, np.zeros(own.shape[1])
+    seen = [
+        n for n, x in columns.items()
+        if n in inside or np.max(np.abs(x), initial=0.0) > _UNSEEN
+    ]  # fmt: skip
+    return {n: columns[n] for n in seen}, {n: z[n] for n in seen}

@@ -1,0 +1,77 @@
+"""An effect that no catalogue holds: a smooth field over the workspace, as a test.
+
+Each channel of readings gets a cubic of the commanded position of its own, one width for all
+coefficients. How much more evidence the data give with it, all effects integrated out and the
+noise at its best on both sides, says whether something smooth is left that none of them explains.
+It is never fitted: it would explain what effects explain.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations_with_replacement
+
+import numpy as np
+from scipy import special
+
+from crosscheck.calibration.colour import Colour
+from crosscheck.calibration.joint import Joint, Setting
+from crosscheck.calibration.linearised import unwhitened
+from crosscheck.calibration.restricted import estimate, log_evidence
+from crosscheck.fit.problem import Problem
+from seecr.pose import Array
+
+_DEGREE = 3
+_WIDTHS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
+# Spread of ln(true sigma/stated sigma) where it was stated.
+_STATED = 0.35
+# ln odds above which something unknown is there.
+UNKNOWN = 5.0
+
+
+def cubic(place: Array) -> Array:
+    """(n, 20) monomials to the third degree of places (n, 3), each axis scaled to [-1, 1]."""
+    middle = 0.5 * (place.max(axis=0) + place.min(axis=0))
+    half = 0.5 * np.ptp(place, axis=0)
+    unit = (place - middle) / np.where(half > 1e-3 * half.max(), half, np.inf)
+    columns = [np.ones(len(place))]
+    for degree in range(1, _DEGREE + 1):
+        for axes in combinations_with_replacement(range(3), degree):
+            columns.append(np.prod(unit[:, axes], axis=1))
+    whole = np.stack(columns, axis=1)
+    return np.asarray(whole[:, np.any(whole != 0.0, axis=0)])
+
+
+def field_columns(problem: Problem, place: Array) -> Array:
+    """(N, k) columns of the field in units of the noise, a cubic for each channel."""
+    shapes = cubic(place)[problem.row_of]
+    channels = np.unique(problem.column_of)
+    return np.concatenate(
+        [shapes * (problem.column_of == c)[:, None] for c in channels], axis=1
+    )  # fmt: skip
+
+
+def log_odds(setting: Setting, joint: Joint, stated: bool = True) -> float:
+    """ln evidence with a field less that without, effects integrated out.
+
+    Args:
+        setting, joint: the joint fit.
+        stated: whether the size of the noise was stated.
+    """
+    about, problem = unwhitened(joint), setting.problem
+    field = field_columns(problem, joint.state.prediction.pose[:, :3])
+    free = about.width > 0.0
+    x = np.concatenate([about.x[:, free], field], axis=1)
+
+    def score(width: float, colour: Colour) -> float:
+        widths = np.concatenate([about.width[free], np.full(field.shape[1], width)])
+        total = log_evidence(setting.chain, colour, joint.weight, x, about.y, widths)
+        off = np.log(colour.scale[np.unique(setting.chain.kind)])
+        return total - (0.5 * float(np.sum((off / _STATED) ** 2)) if stated else 0.0)
+
+    without = score(1e-9, joint.colour)
+    tried = [score(width, joint.colour) for width in _WIDTHS]
+    widths = np.full(x.shape[1], _WIDTHS[int(np.argmax(tried))])
+    widths[: int(free.sum())] = about.width[free]
+    better = estimate(setting.chain, joint.colour, joint.weight, x, about.y, widths)
+    found = [max(score(w, better), t) for w, t in zip(_WIDTHS, tried, strict=True)]
+    return float(special.logsumexp(found) - np.log(len(found)) - without)

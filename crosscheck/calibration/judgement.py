@@ -1,0 +1,111 @@
+"""What the compared sets say: the verdict, the effects that are sure, and what to do.
+
+Something unknown is there where a smooth field over the workspace earns more evidence than chance
+gives it, or where runs left out are predicted worse than the fit itself expects. Where the data
+leave open which effects it is, or it takes many, that is a calibration and no diagnosis.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from crosscheck.calibration.field import UNKNOWN
+from crosscheck.calibration.probability import Classes
+from crosscheck.calibration.refits import NONE, Found
+from crosscheck.calibration.sets import Names
+
+# An effect is sure from this probability of it or its equals.
+SURE = 0.95
+# Sets up to this size are a diagnosis; at most this many classes may be open.
+_FEW, _OPEN = 5, 1.0
+# Runs left out may be this many times as far off as the fit expected.
+_SURPRISE = 2.0
+# In a large set each effect must carry more than this part of what all explain: others may
+# imitate what is missing.
+_PART, _WORTH = 0.01, 25.0
+
+
+class Verdict(Enum):
+    """What the data say, by the names of the file formats."""
+
+    NO_EFFECT_MISSING = "no_effect_missing"
+    EFFECTS_FOUND = "effects_found"
+    MANY_EFFECTS = "many_effects"
+    UNKNOWN_EFFECT = "unknown_effect"
+
+
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """The verdict and what is sure.
+
+    Attributes:
+        verdict: of the data.
+        sure: effects that are missing beyond doubt, each the first of its class.
+        undecided: how many classes are open.
+    """
+
+    verdict: Verdict
+    sure: tuple[str, ...]
+    undecided: float
+
+
+def judge(found: Found, classes: Classes, field_odds: float, surprise: float) -> Judgement:
+    """The verdict.
+
+    Args:
+        found: the compared sets.
+        classes: probabilities.
+        field_odds: ln odds of a smooth field beside the whole catalogue.
+        surprise: of the worst run left out of the joint fit, a reading.
+    """
+    best, undecided = found.best.names, classes.undecided
+    unknown = field_odds > UNKNOWN or surprise > _SURPRISE
+    few = len(best) <= _FEW and undecided < _OPEN
+    sure = sure_effects(found, classes, few and not unknown)
+    if unknown:
+        return Judgement(Verdict.UNKNOWN_EFFECT, sure, undecided)
+    if not best and undecided < _OPEN:
+        return Judgement(Verdict.NO_EFFECT_MISSING, (), undecided)
+    verdict = Verdict.EFFECTS_FOUND if few else Verdict.MANY_EFFECTS
+    return Judgement(verdict, sure, undecided)
+
+
+def sure_effects(found: Found, classes: Classes, few: bool) -> tuple[str, ...]:
+    """Members of the best set that are missing beyond doubt, the most valuable first.
+
+    Args:
+        found: the compared sets.
+        classes: probabilities.
+        few: these few effects explain everything; else those count that carry much of it.
+    """
+    worth = worths(found)
+    least = 0.0 if few else max(_WORTH, _PART * sum(worth.values()))
+    probability = {
+        e: p
+        for members, p in zip(classes.members, classes.probability, strict=True)
+        for e in members
+    }
+    some = [e for e in worth if probability[e] > SURE and worth[e] > least]
+    return tuple(sorted(some, key=lambda e: -worth[e]))
+
+
+def worths(found: Found) -> dict[str, float]:
+    """ln evidence that each member of the best set is worth: refitted without it, or linear."""
+    best = found.best
+    linear = found.scores.neighbours(best.names)
+    base = found.scores.score(best.names)
+    return {name: _worth(found, linear, base, best.names - {name}) for name in best.names}
+
+
+def _worth(found: Found, linear: dict[Names, float], base: float, rest: Names) -> float:
+    if rest in found.refits:
+        return found.best.score - found.refits[rest].score
+    return base - linear.get(rest, -np.inf)
+
+
+def explained(found: Found) -> float:
+    """ln evidence of the best set over none at all."""
+    return found.best.score - found.refits[NONE].score

@@ -1,0 +1,81 @@
+"""How probable each effect is, and which of them the data cannot tell apart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import special
+
+from crosscheck.calibration.refits import Found
+from crosscheck.calibration.sets import Names
+
+# Effects whose exchange costs less evidence than this are equals.
+EQUAL = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Classes:
+    """Probabilities from sets and their scores.
+
+    Attributes:
+        effect: of each effect, that it is missing.
+        members: classes of equals, the most probable first; every effect in one.
+        probability: of each class, that some member is missing.
+    """
+
+    effect: dict[str, float]
+    members: list[tuple[str, ...]]
+    probability: list[float]
+
+    @property
+    def undecided(self) -> float:
+        """Sum of min(P, 1 - P) over classes: how many of them are open."""
+        return float(sum(min(p, 1.0 - p) for p in self.probability))
+
+
+def all_scores(found: Found) -> dict[Names, float]:
+    """Exact scores, and linear ones of sets with one effect more than the best."""
+    out = {names: refit.score for names, refit in found.refits.items()}
+    best = found.best.names
+    linear = found.scores.score(best)
+    for names, score in found.scores.neighbours(best).items():
+        if names > best and names not in out:
+            out[names] = found.best.score + score - linear
+    return out
+
+
+def probabilities(scores: Mapping[Names, float], best: Names, effects: Iterable[str]) -> Classes:
+    """Probabilities of effects and classes: sums over sets."""
+    names = list(scores)
+    logs = np.array([scores[n] for n in names])
+    share = np.exp(logs - special.logsumexp(logs))
+
+    def chance(some: Iterable[str]) -> float:
+        wanted = set(some)
+        return float(sum(p for n, p in zip(names, share, strict=True) if wanted & n))
+
+    members = _classes(scores, best, list(effects))
+    order = sorted(members, key=lambda c: -chance(c))
+    return Classes({e: chance([e]) for e in effects}, order, [chance(c) for c in order])
+
+
+def _classes(
+    scores: Mapping[Names, float], best: Names, effects: list[str]
+) -> list[tuple[str, ...]]:
+    """Members of the best set with what could stand in their place; the others by themselves."""
+    together = {e: {e} for e in effects}
+    for names, score in scores.items():
+        gone, come = best - names, names - best
+        if len(gone) == 1 and len(come) == 1 and score > scores[best] - EQUAL:
+            (a,), (b,) = gone, come
+            joined = together[a] | together[b]
+            for e in joined:
+                together[e] = joined
+    out = []
+    for e in effects:
+        if together[e] and e == min(together[e], key=effects.index):
+            first = sorted(together[e], key=lambda m: (m not in best, effects.index(m)))
+            out.append(tuple(first))
+    return out

@@ -1,0 +1,200 @@
+"""Sets of effects fitted in earnest, and the search that goes between linear and exact.
+
+Linear evidence alone can be confidently wrong: cables go slack, products of parameters bend. So
+the best sets by linear evidence are refitted exactly, the empty one always among them, and the
+catalogue is made linear about the best of them again, until that stays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from crosscheck.calibration.catalogue import Catalogue, gram_about, widths_for
+from crosscheck.calibration.gram import Gram, averaged, best_widths, gram_of
+from crosscheck.calibration.joint import Joint, Setting, settle
+from crosscheck.calibration.linearised import groups_of, linearised
+from crosscheck.calibration.sets import Names, Scores, explore, log_prior
+from crosscheck.fit.state import State, evaluate
+from seecr.effects import Term, Terms
+from seecr.pose import Array
+
+NONE: Names = frozenset()
+# Sets refitted about one linear model, and how much worse than the best they may be.
+_REFITTED, _WITHIN = 20, 12.0
+# Rounds of making the catalogue linear about the best set.
+_ROUNDS = 4
+_STEPS = 12
+# A refit this much worse than its linear evidence may have ended in a hollow: it starts again.
+_HOLLOW = 8.0
+# Sets up to this size are tried from more starts, and without each of their members.
+_FEW = 5
+_SHAPES = 30.0
+
+
+@dataclass(frozen=True, eq=False)
+class Refit:
+    """A set of effects, fitted exactly.
+
+    Attributes:
+        names: the set. joint: its fit.
+        widths: prior width of each member.
+        score: ln evidence and ln prior.
+    """
+
+    names: Names
+    joint: Joint
+    widths: dict[str, float]
+    score: float
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Sets that were compared.
+
+    Attributes:
+        refits: exact ones, by set. best: the best of them.
+        scores: linear ones about the best.
+        settled: the best set stayed when the catalogue was made linear about it.
+    """
+
+    refits: dict[Names, Refit]
+    best: Refit
+    scores: Scores
+    settled: bool
+
+
+def compare_sets(
+    setting: Setting,
+    joint: Joint,
+    catalogue: Catalogue,
+    plain: State,
+    told: Callable[[str], None] = lambda _text: None,
+    most: int = _REFITTED,
+) -> Found:
+    """Search the sets of effects, linear and exact in turn.
+
+    Args:
+        setting: the data; noise and weights of the joint fit stay for all sets.
+        joint: everything fitted together, about which the first linear model is.
+        catalogue: effects that may be in a set.
+        plain: the model without any of them.
+        told: called with what is going on.
+        most: sets to refit about one linear model.
+    """
+    fixed = replace(setting, frozen=True, weight=joint.weight)
+    refits: dict[Names, Refit] = {}
+    best: Refit | None = None
+    settled = False
+    scores = Scores(gram_about(fixed, joint, catalogue), len(catalogue.names))
+    for _ in range(_ROUNDS):
+        everything = frozenset(scores.gram.names)
+        starts = [NONE, everything] if best is None else [NONE, best.names]
+        explore(scores, starts)
+
+        def refit(some: Iterable[Names], scores: Scores = scores) -> Refit:
+            for names in some:
+                if names not in refits:
+                    told(" + ".join(sorted(names)) or "none")
+                    found = _refitted(fixed, joint, catalogue, plain, scores, names)
+                    if found is not None:
+                        refits[names] = found
+            return max(refits.values(), key=lambda r: r.score)
+
+        before, best = best, refit([NONE, *scores.best(most, _WITHIN)])
+        best = _dropped(best, refit)
+        if before is not None and before.names == best.names:
+            settled = True
+            break
+        scores = Scores(gram_about(fixed, best.joint, catalogue), len(catalogue.names))
+    assert best is not None
+    return Found(refits, best, scores, settled)
+
+
+def _dropped(best: Refit, refit: Callable[[Iterable[Names]], Refit]) -> Refit:
+    """The best set, each of its members dropped in earnest, until none is one too many."""
+    while len(best.names) <= _FEW:
+        better = refit([best.names - {name} for name in sorted(best.names)])
+        if better.names == best.names:
+            break
+        best = better
+    return best
+
+
+def _refitted(
+    setting: Setting, joint: Joint, catalogue: Catalogue, plain: State, scores: Scores, names: Names
+) -> Refit | None:
+    """A set fitted exactly from its linear values, and from null where that ends badly."""
+    linear, widths = scores.score(names), scores.widths(names)
+    found = _settled(setting, joint, plain, _linear_terms(catalogue, scores, names), widths)
+    best = None if found is None else _scored(setting, found, names, widths, scores.of)
+    if 0 < len(names) <= _FEW and (best is None or best.score < linear - _HOLLOW):
+        terms = Terms(_inside(catalogue.start(name)) for name in names)
+        again = _settled(setting, joint, plain, terms, widths)
+        other = None if again is None else _scored(setting, again, names, widths, scores.of)
+        if other is not None and (best is None or other.score > best.score):
+            best = other
+    return best
+
+
+def _linear_terms(catalogue: Catalogue, scores: Scores, names: Names) -> Terms:
+    """The set at the values of the linear model."""
+    solved = scores.gram.solved(scores.widths(names))
+    out, first = [], 0
+    for name in solved.chosen:
+        layout, start = catalogue.start(name).layout, catalogue.start(name).vector
+        count = len(scores.gram.groups[name].columns)
+        own = np.flatnonzero(~layout.shape)
+        if count < len(own):  # the others start where they are
+            own = np.flatnonzero(~layout.shape & (start == layout.null))
+        vector = start.copy()
+        vector[own] = layout.null[own] + solved.values[first : first + count] * layout.scale[own]
+        out.append(_inside(Term(layout, np.clip(vector, layout.lower, layout.upper))))
+        first += count
+    return Terms(out)
+
+
+def _inside(term: Term) -> Term:
+    """Off a bound at null, where a law with history has a derivative on both sides."""
+    layout = term.layout
+    pressed = (term.vector <= layout.lower) & ~layout.shape
+    return Term(layout, np.where(pressed, term.vector + 0.03 * layout.scale, term.vector))
+
+
+def _settled(
+    setting: Setting, joint: Joint, plain: State, terms: Terms, widths: dict[str, float]
+) -> Joint | None:
+    state = evaluate(setting.problem, terms, setting.factor, plain)
+    if not state.valid:
+        return None
+    return settle(setting, state, _width(terms, widths), joint.colour, _STEPS)
+
+
+def _width(terms: Terms, widths: dict[str, float]) -> Array:
+    parts = [np.where(t.layout.shape, _SHAPES, widths[t.name]) for t in terms]
+    return np.concatenate(parts) if parts else np.zeros(0)
+
+
+def _scored(
+    setting: Setting, joint: Joint, names: Names, widths: dict[str, float], of: int
+) -> Refit:
+    """A fit with its evidence about its own optimum, averaged over widths."""
+    gram = own_gram(setting, joint)
+    inside = {n: widths[n] for n in gram.names}
+    better = best_widths(gram, inside)
+    score = averaged(gram, better) + log_prior(len(names), of)
+    return Refit(names, joint, widths | better, score - 0.5 * joint.state.log_det)
+
+
+def own_gram(setting: Setting, joint: Joint) -> Gram:
+    """Normal equations of a fit's own effects about its optimum; those on a bound are absent."""
+    groups = groups_of(joint, widths_for)
+    linear = linearised(setting, joint)
+    z = np.zeros(len(joint.z))
+    for group in groups.values():
+        z[group.columns] = joint.z[group.columns]
+    # shapes stay as they are: only amplitudes are explained
+    y = linear.y - linear.x @ (joint.z - z)
+    return gram_of(linear.x, y, groups)

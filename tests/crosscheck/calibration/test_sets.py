@@ -1,0 +1,99 @@
+"""Search of sets of effects against all of them; probabilities and classes from scores."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from crosscheck.calibration.field import cubic
+from crosscheck.calibration.gram import Gram, Group, gram_of
+from crosscheck.calibration.probability import probabilities
+from crosscheck.calibration.sets import Names, Scores, explore, log_prior, thinned
+
+WIDTHS = np.array([0.1, 0.3, 1.0, 3.0, 10.0])
+NONE: Names = frozenset()
+
+
+def toy(seed: int, there: tuple[int, ...], alike: bool = False) -> Gram:
+    """Eight effects of one to four columns, some of which are there."""
+    rng = np.random.default_rng(seed)
+    counts = [1, 2, 3, 4, 1, 2, 3, 4]
+    ends = np.cumsum(counts)
+    x = 2.0 * rng.normal(size=(80, ends[-1]))
+    if alike:  # the second is the first, turned, and a little of its own
+        x[:, 4:5] = x[:, :1] + 1e-3 * rng.normal(size=(80, 1))
+        x[:, 1:3] = x[:, 8:10] + 0.3 * rng.normal(size=(80, 2))
+    parts = {f"e{k}": np.arange(ends[k] - n, ends[k]) for k, n in enumerate(counts)}
+    y = rng.normal(size=80)
+    for k in there:
+        y = y + x[:, parts[f"e{k}"]] @ rng.normal(size=counts[k])
+    return gram_of(x, y, {n: Group(c, WIDTHS) for n, c in parts.items()})
+
+
+def every_set(gram: Gram) -> list[Names]:
+    return [frozenset(s) for k in range(9) for s in combinations(gram.names, k)]
+
+
+@pytest.mark.parametrize("alike", [False, True])
+@pytest.mark.parametrize("there", [(), (3,), (0, 5), (1, 2, 6), (0, 2, 3, 5, 7)])
+def test_the_search_ends_at_the_best_of_all_sets(there: tuple[int, ...], alike: bool) -> None:
+    for seed in range(1):
+        gram = toy(seed, there, alike)
+        scores = Scores(gram, 8)
+        best = max(every_set(gram), key=scores.score)
+        fresh = Scores(gram, 8)
+        found = explore(fresh, [NONE, frozenset(gram.names)])
+        assert fresh.score(found) == pytest.approx(scores.score(best), abs=1e-6)
+
+
+def test_neighbours_of_a_set_are_scored_as_those_sets_are() -> None:
+    scores = Scores(toy(0, (1, 2, 6)), 8)
+    at = frozenset({"e1", "e2"})
+    for names, score in scores.neighbours(at).items():
+        if len(names) != 2:  # one more or one less: widths are looked for again
+            assert score <= scores.score(names) + 0.7
+            assert score > scores.score(names) - 3.0
+
+
+def test_prior_is_a_prior() -> None:
+    whole = sum(np.exp(log_prior(k, 8)) * len(list(combinations(range(8), k))) for k in range(9))
+    assert whole == pytest.approx(1.0)
+    assert log_prior(0, 8) == pytest.approx(log_prior(8, 8))
+
+
+def test_a_large_set_is_thinned_without_losing_what_is_there() -> None:
+    rng = np.random.default_rng(1)
+    x = rng.normal(size=(200, 20))
+    y = 3.0 * x[:, 4] - 4.0 * x[:, 11] + rng.normal(size=200)
+    gram = gram_of(x, y, {f"e{k}": Group(np.array([k]), WIDTHS) for k in range(20)})
+    left = thinned(Scores(gram, 20), frozenset(gram.names))
+    assert len(left) <= 8
+    assert {"e4", "e11"} <= left
+
+
+def test_probabilities_are_sums_over_sets_and_equals_are_one_class() -> None:
+    a, b, c = "abc"
+    scores = {
+        NONE: -50.0, frozenset({a}): 0.0, frozenset({b}): -1.0, frozenset({a, c}): np.log(0.25),
+        frozenset({c}): -40.0,
+    }  # fmt: skip
+    found = probabilities(scores, frozenset({a}), [a, b, c])
+    total = 1.0 + np.exp(-1.0) + 0.25
+    assert found.effect[a] == pytest.approx(1.25 / total)
+    assert found.effect[c] == pytest.approx(0.25 / total)
+    assert found.members[0] == (a, b)
+    assert found.probability[0] == pytest.approx(1.0)
+    assert found.undecided == pytest.approx(0.25 / total)
+
+
+def test_a_cubic_has_its_monomials_and_a_flat_axis_has_none() -> None:
+    rng = np.random.default_rng(2)
+    place = rng.uniform(size=(50, 3))
+    assert cubic(place).shape == (50, 20)
+    place[:, 2] = 0.3
+    assert cubic(place).shape == (50, 10)
+    target = place[:, 0] ** 3 - place[:, 0] * place[:, 1]
+    left = target - cubic(place) @ np.linalg.lstsq(cubic(place), target, rcond=None)[0]
+    assert np.abs(left).max() < 1e-12
