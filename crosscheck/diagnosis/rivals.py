@@ -65,8 +65,9 @@ def _rival(found: Search, candidate: Candidate, without: Fit) -> Rival | None:
     best = trials.refit(trial.fit.terms, trial.fit.state)
     if not best.valid:
         return None
-    # where structure is left over, differences count against that, not against the noise
-    left = max(1.0, final.whiteness.scale**2)
+    # where structure is left over, differences count against that, not against the noise, and
+    # residuals that go together count for fewer
+    left = final.whiteness.inflation**2
     loss = (final.evidence.log - trials.evidence(best).log) / left
     worse = (best.chi2 - final.fit.chi2) / trials.noise_scale**2 / left
     alike = abs(loss) < EQUAL and worse < _TOLD_APART
@@ -81,7 +82,8 @@ def _likely(found: Search, name: str, without: Fit) -> list[Candidate]:
     signal = beside(signal, basis(final.fit.jacobian[:, ~own]))
     pool, best = _tried_beside(found, name)
     # structure that was left over then counts as noise
-    margin = 4.0 * _TOLD_APART * max(found.noise_scale**2, best / max(final.whiteness.dof, 1))
+    left = max(best / max(final.whiteness.dof, 1), final.whiteness.inflation**2)
+    margin = 4.0 * _TOLD_APART * max(found.noise_scale**2, left)
 
     def likely(fitted: Fit, other: str) -> bool:
         if fitted.chi2 < best + margin:

@@ -11,12 +11,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from crosscheck.diagnosis.node import node_of
+from crosscheck.diagnosis.node import LEAST_GAIN, node_of
 from crosscheck.diagnosis.order import Step, step_of
 from crosscheck.diagnosis.search import MOST_EFFECTS, Search
 from crosscheck.fit.candidates import Candidate, try_candidate
 from crosscheck.fit.gauss_newton import Fit
 from crosscheck.fit.held_out import significantly_improves
+from crosscheck.fit.smooth import beyond_smooth
 from seecr.effects import Term
 
 # Where structure is left over, an effect of more plausible sizes than this is not believed.
@@ -30,7 +31,8 @@ def small_effects_alone(
 
     For data that keep some structure whatever is added: large groups imitate anything, but an
     effect of a few parameters that takes away nearly all is there; and so may be the next one,
-    if it takes away a good part of what the first leaves.
+    if it takes away a good part of what the first leaves. What a smooth field over the
+    workspace explains as well is not listed: a lens looks much like a scale.
 
     Args:
         found: a search that did not end with noise.
@@ -62,17 +64,26 @@ def _small_step(way: Search, parameters: int, share: float) -> Step | None:
         return None
     step = step_of(way.trials, best.name, node_of(way.trials, full))
     significant = significantly_improves(way.last.held_out, step.held_out)
-    listed = significant and not np.any(full.at_bound)
-    return step if listed and share_of(way.last, step) > share else None
+    listed = significant and not np.any(full.at_bound) and share_of(way.last, step) > share
+    if not listed or not beyond_smooth(way.problem, way.last.fit.state, full.state, share):
+        return None
+    return step
 
 
 def _best_small(candidates: Sequence[Candidate], parameters: int) -> Candidate | None:
     def fits(c: Candidate, found: Fit | None) -> bool:
-        few = len(c.layout) <= parameters
+        few = len(c.layout) <= parameters and not _contradicted(c, candidates)
         return few and found is not None and not np.any(found.at_bound) and _happens(found, c)
 
     small = [c for c in candidates if fits(c, c.fit)]
     return max(small, key=lambda c: c.evidence.log if c.evidence else -np.inf, default=None)
+
+
+def _contradicted(candidate: Candidate, others: Sequence[Candidate]) -> bool:
+    """Whether an effect that contains this one explains more: not all drums are off alike, say."""
+    own = candidate.evidence
+    wider = [c.evidence for c in others if c.layout.effect.parent == candidate.name]
+    return own is not None and any(e is not None and e.log > own.log + LEAST_GAIN for e in wider)
 
 
 def _happens(found: Fit, candidate: Candidate) -> bool:

@@ -71,6 +71,7 @@ class DrumGain(Effect):
     name: ClassVar[str] = "drum_gain"
     place: ClassVar[str] = "actuation"
     title: ClassVar[str] = "drums larger or smaller than assumed"
+    parent: ClassVar[str] = "length_scale"
     advice: ClassVar[str] = (
         "measure each drum with a caliper: expect its diameter off by its gain, the largest "
         "{largest:+.4f} ({which})"

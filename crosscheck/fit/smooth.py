@@ -1,0 +1,67 @@
+"""What a smooth field over the workspace could explain just as well as an effect does.
+
+An error that no catalogue holds (the lens of a tracker, a curved reference) is often smooth over
+the workspace, and much of it looks like a scale or a shift. Where structure is left over, an
+effect is told from such a field only by what the field cannot imitate.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations_with_replacement
+
+import numpy as np
+
+from crosscheck.fit.imitation import basis
+from crosscheck.fit.problem import TENSION, Problem
+from crosscheck.fit.state import State
+from seecr.pose import Array
+
+_DEGREE = 3
+# A name is owed from about this fall of chi2 beside others.
+_OWED = 25.0
+
+
+def cubic(place: Array) -> Array:
+    """(n, k) monomials to the third degree of places (n, 3), each axis scaled to [-1, 1].
+
+    Axes along which nothing moves are left out.
+    """
+    middle = 0.5 * (place.max(axis=0) + place.min(axis=0))
+    half = 0.5 * np.ptp(place, axis=0)
+    moves = half > 1e-3 * max(float(half.max()), 1e-300)
+    unit = ((place - middle) / np.where(moves, half, 1.0))[:, moves]
+    columns = [np.ones(len(place))]
+    for degree in range(1, _DEGREE + 1):
+        for axes in combinations_with_replacement(range(unit.shape[1]), degree):
+            columns.append(np.prod(unit[:, axes], axis=1))
+    return np.stack(columns, axis=1)
+
+
+def field_columns(problem: Problem, place: Array) -> Array:
+    """(N, k) a cubic of places (n, 3) for each channel of the pose that was read."""
+    shapes = cubic(place)[problem.row_of]
+    channels = [c for c in np.unique(problem.column_of) if c < TENSION.start]
+    parts = [shapes * (problem.column_of == c)[:, None] for c in channels]
+    return np.concatenate(parts, axis=1) if parts else np.zeros((len(problem.row_of), 0))
+
+
+def beyond_smooth(problem: Problem, before: State, after: State, share: float) -> bool:
+    """Whether an effect explains what a smooth field of the measured pose would not.
+
+    Args:
+        problem: the data.
+        before, after: the model without the effect and with it.
+        share: least part of what the field leaves unexplained that the effect must take away.
+    """
+    span = basis(field_columns(problem, before.prediction.pose[:, :3]))
+
+    def beside(white: Array) -> Array:
+        return white - span @ (span.T @ white)
+
+    left, explained = beside(before.white), beside(before.white - after.white)
+    power = float(explained @ explained)
+    if power == 0.0:
+        return False
+    fall = float(left @ explained) ** 2 / power
+    unexplained = float(left @ left) - (len(left) - span.shape[1])
+    return bool(fall > max(_OWED, share * unexplained))
