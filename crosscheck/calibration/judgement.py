@@ -21,6 +21,8 @@ from crosscheck.calibration.sets import Names
 SURE = 0.95
 # Sets up to this size are a diagnosis; at most this many classes may be open.
 _FEW, _OPEN = 5, 1.0
+# A name is owed from this much ln evidence; what explains less may be chance.
+_OWED = 12.5
 # Runs left out may be this many times as far off as the fit expected.
 _SURPRISE = 2.0
 # In a large set each effect must carry more than this part of what all explain: others may
@@ -67,9 +69,9 @@ def judge(found: Found, classes: Classes, field_odds: float, surprise: float) ->
     sure = sure_effects(found, classes, few and not unknown)
     if unknown:
         return Judgement(Verdict.UNKNOWN_EFFECT, sure, undecided)
-    if not best and undecided < _OPEN:
+    if not sure and undecided < _OPEN and explained(found) < _OWED:
         return Judgement(Verdict.NO_EFFECT_MISSING, (), undecided)
-    verdict = Verdict.EFFECTS_FOUND if few else Verdict.MANY_EFFECTS
+    verdict = Verdict.EFFECTS_FOUND if few and sure else Verdict.MANY_EFFECTS
     return Judgement(verdict, sure, undecided)
 
 
