@@ -16,6 +16,7 @@ from seecr.lazy import lazily
 
 if TYPE_CHECKING:
     from crosscheck.add import Addition, add_effect
+    from crosscheck.calibration.result import Calibrated, calibrate
     from crosscheck.comparison.residuals import compare
     from crosscheck.comparison.result import Comparison
     from crosscheck.diagnosis.result import Diagnosis, DiagnosisVerdict, MissingEffect
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 # Imported when first used: SciPy, MuJoCo and the compiled loop take a while to load.
 _WHERE = {
     "Addition": "add",
+    "Calibrated": "calibration.result",
     "CaseResult": "suite.results",
     "Comparison": "comparison.result",
     "CrosscheckError": "errors",
@@ -45,6 +47,7 @@ _WHERE = {
     "Sigma": "measurements.data",
     "Twin": "twin.make",
     "add_effect": "add",
+    "calibrate": "calibration.result",
     "compare": "comparison.residuals",
     "diagnose": "diagnosis.verdict",
     "load_commands": "measurements.read",
@@ -57,6 +60,7 @@ _WHERE = {
 
 __all__ = [
     "Addition",
+    "Calibrated",
     "CaseResult",
     "Comparison",
     "CrosscheckError",
@@ -69,6 +73,7 @@ __all__ = [
     "Sigma",
     "Twin",
     "add_effect",
+    "calibrate",
     "compare",
     "diagnose",
     "load_commands",

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.errors import CrosscheckError
+from crosscheck.errors import CrosscheckError, UnsolvedError
 from crosscheck.fit.candidates import (
     Trials,
     candidates_for,
@@ -40,12 +40,6 @@ _IMPLAUSIBLE = 5.0
 # Parameters whose errors go together like this are hardly determined apart.
 _CORRELATED = 0.95
 _MOST_NAMED = 4
-
-
-class UnsolvedError(CrosscheckError):
-    """Rows that have no equilibrium, so that nothing can be fitted."""
-
-    exit_status = 3
 
 
 @dataclass(frozen=True, eq=False, repr=False)

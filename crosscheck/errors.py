@@ -7,3 +7,9 @@ from seecr.errors import SeecrError
 
 class CrosscheckError(SeecrError):
     """Arguments, options or data that crosscheck cannot work with."""
+
+
+class UnsolvedError(CrosscheckError):
+    """Rows that have no equilibrium, so that nothing can be fitted."""
+
+    exit_status = 3

@@ -27,7 +27,7 @@ _OWED = 12.5
 _SURPRISE = 2.0
 # In a large set each effect must carry more than this part of what all explain: others may
 # imitate what is missing.
-_PART, _WORTH = 0.01, 25.0
+_PART, _WORTH = 0.1, 25.0
 
 
 class Verdict(Enum):

@@ -17,6 +17,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "diagnose": ("diagnose", "Find which effects a model misses, from measurements."),
     "plan": ("plan", "Before measuring: what planned poses will be able to show."),
     "add": ("add", "Fit an effect to measurements and add it to a model."),
+    "calibrate": ("calibrate", "Fit all effects at once to measurements, for predicting."),
     "twin": ("twin", "Make measurements with a hidden effect, MuJoCo being the truth."),
 }
 

@@ -48,6 +48,7 @@ def result_of(name: str) -> Result:
         "Comparison": lambda: crosscheck.compare(str(ROBOT), str(data_file())),
         "Diagnosis": found,
         "Addition": lambda: crosscheck.add_effect(ROBOT, data_file(), "pulley_radius"),
+        "Calibrated": lambda: crosscheck.calibrate(ROBOT, data_file()),
         "Plan": lambda: crosscheck.make_plan(ROBOT, data_file()),
         "Twin": lambda: crosscheck.make_twin(ROBOT, 1, points=4),
         "CaseResult": lambda: crosscheck.run_suite([case()]).results[0],
@@ -57,7 +58,10 @@ def result_of(name: str) -> Result:
     return made
 
 
-NAMES = ["Measurements", "Comparison", "Diagnosis", "Addition", "Plan", "Twin", "CaseResult", "Run"]
+NAMES = [
+    "Measurements", "Comparison", "Diagnosis", "Addition", "Calibrated", "Plan", "Twin",
+    "CaseResult", "Run",
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -1,0 +1,171 @@
+"""A model calibrated from files: every effect that the data see, with errors and how they go."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from crosscheck.calibration.calibrate import Calibration
+from crosscheck.calibration.calibrate import calibrate as calibrated
+from crosscheck.errors import CrosscheckError, UnsolvedError
+from crosscheck.fit.prepare import Progress, prepare
+from crosscheck.fit.problem import KINDS, Rms, kinds_read
+from crosscheck.fit.words import rms_words, value_lines, value_records
+from crosscheck.given import GivenModel, GivenRobot, model_of, robot_of
+from crosscheck.measurements.data import Measurements
+from crosscheck.measurements.read import measurements_of
+from crosscheck.model.write import Fitted
+from seecr.effects import Terms
+from seecr.pose import Array
+from seecr.result import Record, Result
+
+# A parameter that is not known better than this part of its plausible size is the prior's.
+_UNSEEN = 0.98
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Calibrated(Result):
+    """Every effect that data see, fitted at once.
+
+    Attributes:
+        fitted: the effects with standard errors; those that the data do not see are left out.
+        covariance: (p, p) of all their parameters, in their order; SI.
+        before: rms errors of the model as it stood. after: of this one.
+        held_out: on runs left out, refitted by linear algebra.
+        scale, rho: of each kind of reading, the noise in units of the stated one, and its
+            correlation from one row of a run to the next.
+        outliers: lines that hardly count.
+        notes: about the data.
+    """
+
+    fitted: tuple[Fitted, ...]
+    covariance: Array
+    before: Rms
+    after: Rms
+    held_out: Rms
+    scale: dict[str, float]
+    rho: dict[str, float]
+    outliers: tuple[int, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def terms(self) -> Terms:
+        """All effects with their values, as a model for the next call."""
+        return Terms(one.term for one in self.fitted)
+
+    @property
+    def labels(self) -> list[str]:
+        """Names of the parameters, in the order of the covariance."""
+        return [f"{effect}.{key}" for effect, key in self.terms.labels]
+
+    def lines(self) -> list[str]:
+        """Errors before and after, the noise, and how many values there are."""
+        noise = ", ".join(
+            f"{name} {self.scale[name]:.2f} of the stated, correlation {self.rho[name]:.2f}"
+            for name in self.scale
+        )
+        out = [
+            f"{len(self.labels)} parameters of {len(self.fitted)} effects: "
+            f"{rms_words(self.before)} before, {rms_words(self.after)} after, "
+            f"{rms_words(self.held_out)} on runs left out (refitted linearly)",
+            f"noise: {noise}",
+        ]
+        if self.outliers:
+            out.append(f"hardly counted, far off: lines {', '.join(map(str, self.outliers))}")
+        return [*out, *(f"note: {note}" for note in self.notes)]
+
+    def value_lines(self) -> list[str]:
+        """A line for each parameter, its standard error beside it."""
+        return [
+            f"{one.term.name}: {line}"
+            for one in self.fitted
+            for line in value_lines(one.term.layout, one.term.vector, one.stderr, one.at_bound)
+        ]
+
+    def records(self) -> Sequence[Record]:
+        """A record for each parameter: value and standard error, SI."""
+        return [
+            record
+            for one in self.fitted
+            for record in value_records(one.term.layout, one.term.vector, one.stderr, one.at_bound)
+        ]
+
+    def as_json(self) -> dict[str, Any]:
+        """The content of ``calibration.json``, in SI."""
+        return {
+            "before": self.before,
+            "after": self.after,
+            "held_out": self.held_out,
+            "noise": {"scale": self.scale, "correlation": self.rho},
+            "outliers": list(self.outliers),
+            "parameters": self.labels,
+            "values": self.terms.vector.tolist(),
+            "covariance": self.covariance.tolist(),
+            "notes": list(self.notes),
+        }
+
+
+def calibrate(
+    robot: GivenRobot,
+    data: Measurements | str | Path,
+    model: GivenModel = (),
+    progress: Progress = lambda _text, _part: None,
+) -> Calibrated:
+    """Fit every effect that the data can see, plausible sizes as priors.
+
+    Args:
+        robot: as described, or its MJCF.
+        data: measurements, or their file.
+        model: effects to start from, or their file; the plain model without.
+        progress: called with what is being done and the part of it that is done.
+
+    Raises:
+        CrosscheckError: the data cannot carry it.
+    """
+    robot = robot_of(robot)
+    data = measurements_of(data, robot)
+    terms, said = model_of(model, robot)
+    ready = prepare(robot, data, terms)
+    if ready.refusal is not None:
+        kind = UnsolvedError if ready.refusal.unsolved else CrosscheckError
+        raise kind(f"{data.path}: {ready.refusal}; nothing was fitted")
+    found = calibrated(ready.problem, terms, progress)
+    return _result(found, terms, (*said, *ready.all_notes))
+
+
+def _result(found: Calibration, before: Terms, notes: tuple[str, ...]) -> Calibrated:
+    covariance = found.covariance
+    fitted = _fitted(found, covariance, before)
+    kept = {one.term.name for one in fitted}
+    own = np.flatnonzero([name in kept for name, _key in found.terms.labels])
+    data = found.setting.problem.data
+    kinds = {KINDS.index(kind): kind.name for kind in kinds_read(found.setting.problem)}
+    return Calibrated(
+        fitted=fitted,
+        covariance=covariance[np.ix_(own, own)],
+        before=found.before,
+        after=found.after,
+        held_out=found.held_out.rms,
+        scale={name: float(found.colour.scale[k]) for k, name in kinds.items()},
+        rho={name: float(found.colour.rho[k]) for k, name in kinds.items()},
+        outliers=tuple(int(line) for line in data.line[found.outliers]),
+        notes=notes,
+    )
+
+
+def _fitted(found: Calibration, covariance: Array, before: Terms) -> tuple[Fitted, ...]:
+    """The effects of which the data see something, and those that were there."""
+    error = np.sqrt(np.diag(covariance))
+    free = error > 0.0
+    out = []
+    for term in found.terms:
+        part = found.terms.part(term.name)
+        seen = np.any(free[part] & (error[part] < _UNSEEN * term.layout.scale))
+        if seen or term.name in before:
+            stderr = np.where(free[part], error[part], np.inf)
+            out.append(Fitted(term, stderr, ~free[part]))
+    return tuple(out)
