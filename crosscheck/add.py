@@ -102,7 +102,7 @@ class Addition(Result):
         """The content of ``add.json``, in SI."""
         return {
             "effect": self.name,
-            "effects": {f.term.name: _parameters(f) for f in self.fitted},
+            "effects": {f.term.name: f.as_json() for f in self.fitted},
             "before": dict(self.before),
             "after": dict(self.after),
             "held_out_before": dict(self.held_out_before),
@@ -121,19 +121,6 @@ class Addition(Result):
     def own(self) -> Fitted:
         """The effect itself."""
         return next(f for f in self.fitted if f.term.name == self.name)
-
-
-def _parameters(fitted: Fitted) -> dict[str, Any]:
-    layout = fitted.term.layout
-    return {
-        key: {
-            "value": float(fitted.term.vector[i]),
-            "stderr": float(fitted.stderr[i]),
-            "unit": layout.units[i],
-            "at_bound": bool(fitted.at_bound[i]),
-        }
-        for i, key in enumerate(layout.names)
-    }
 
 
 def add_effect(

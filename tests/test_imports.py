@@ -124,6 +124,19 @@ def test_an_upward_import_is_seen_also_a_lazy_one() -> None:
     assert upward("crosscheck.fit.problem", imports_of(only_types)) == set()
 
 
+def test_no_two_modules_import_each_other() -> None:
+    """Not even by way of others; types aside. A package's face, which is lazy, does not count."""
+    files = {name_of(p): p for package in ("seecr", "crosscheck") for p in modules(package)}
+    files = {name: path for name, path in files.items() if path.stem != "__init__"}
+    arrows = {name: (imports(path) & set(files)) - {name} for name, path in files.items()}
+    while True:
+        leaves = {name for name, targets in arrows.items() if not targets & set(arrows)}
+        if not leaves:
+            break
+        arrows = {name: targets for name, targets in arrows.items() if name not in leaves}
+    assert sorted(arrows) == []
+
+
 # The two physics are worth comparing because they share the description of the robot alone.
 DESCRIPTION = {
     "seecr.errors",

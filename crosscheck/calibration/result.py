@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from crosscheck.calibration.calibrate import Calibration
 from crosscheck.calibration.calibrate import calibrate as calibrated
@@ -39,6 +40,7 @@ class Calibrated(Result):
         scale, rho: of each kind of reading, the noise in units of the stated one, and its
             correlation from one row of a run to the next.
         outliers: lines that hardly count.
+        settled: the fit came to an end; what did not is not to be used.
         notes: about the data.
     """
 
@@ -50,6 +52,7 @@ class Calibrated(Result):
     scale: dict[str, float]
     rho: dict[str, float]
     outliers: tuple[int, ...]
+    settled: bool
     notes: tuple[str, ...]
 
     @property
@@ -62,20 +65,32 @@ class Calibrated(Result):
         """Names of the parameters, in the order of the covariance."""
         return [f"{effect}.{key}" for effect, key in self.terms.labels]
 
+    @property
+    def pays(self) -> bool:
+        """Whether runs left out are predicted better than by the model as it stood."""
+        pairs = [(was, self.held_out[key]) for key, was in self.before.items()]
+        gains = [np.log(was / held) for was, held in pairs if was and held]
+        return self.settled and float(np.sum(gains)) > 0.0
+
+    def noise_lines(self) -> list[str]:
+        """The noise of each kind of reading as the fit found it, and lines that hardly count."""
+        out = [
+            f"noise of the {name}: {self.scale[name]:.2f} times the stated one, correlation "
+            f"{self.rho[name]:.2f} along a run"
+            for name in self.scale
+        ]
+        if self.outliers:
+            out.append(f"hardly counted, far off: lines {', '.join(map(str, self.outliers))}")
+        return out
+
     def lines(self) -> list[str]:
         """Errors before and after, the noise, and how many values there are."""
-        noise = ", ".join(
-            f"{name} {self.scale[name]:.2f} of the stated, correlation {self.rho[name]:.2f}"
-            for name in self.scale
-        )
         out = [
             f"{len(self.labels)} parameters of {len(self.fitted)} effects: "
             f"{rms_words(self.before)} before, {rms_words(self.after)} after, "
             f"{rms_words(self.held_out)} on runs left out (refitted linearly)",
-            f"noise: {noise}",
+            *self.noise_lines(),
         ]
-        if self.outliers:
-            out.append(f"hardly counted, far off: lines {', '.join(map(str, self.outliers))}")
         return [*out, *(f"note: {note}" for note in self.notes)]
 
     def value_lines(self) -> list[str]:
@@ -102,8 +117,10 @@ class Calibrated(Result):
             "held_out": self.held_out,
             "noise": {"scale": self.scale, "correlation": self.rho},
             "outliers": list(self.outliers),
+            "settled": self.settled,
+            "improves_held_out": self.pays,
+            "effects": {one.term.name: one.as_json() for one in self.fitted},
             "parameters": self.labels,
-            "values": self.terms.vector.tolist(),
             "covariance": self.covariance.tolist(),
             "notes": list(self.notes),
         }
@@ -133,7 +150,9 @@ def calibrate(
     if ready.refusal is not None:
         kind = UnsolvedError if ready.refusal.unsolved else CrosscheckError
         raise kind(f"{data.path}: {ready.refusal}; nothing was fitted")
-    found = calibrated(ready.problem, terms, progress)
+    # BLAS on several threads takes longer for matrices as narrow as these
+    with threadpool_limits(limits=1, user_api="blas"):
+        found = calibrated(ready.problem, terms, progress)
     return _result(found, terms, (*said, *ready.all_notes))
 
 
@@ -153,6 +172,7 @@ def _result(found: Calibration, before: Terms, notes: tuple[str, ...]) -> Calibr
         scale={name: float(found.colour.scale[k]) for k, name in kinds.items()},
         rho={name: float(found.colour.rho[k]) for k, name in kinds.items()},
         outliers=tuple(int(line) for line in data.line[found.outliers]),
+        settled=found.joint.settled,
         notes=notes,
     )
 

@@ -86,17 +86,9 @@ def _check_names(old: Model, effect: str, refit: bool, path: Path) -> None:
 
 
 def _write(found: Addition, old: Model, robot: Robot, data: Path, path: Path) -> None:
-    from datetime import date
+    from crosscheck.model import provenance_of, renewed, save_model, with_fit
 
-    from crosscheck.model import Provenance, renewed, save_model, with_fit
-    from seecr import __version__
-
-    source = Provenance(
-        data=data.name,
-        date=date.today().isoformat(),
-        version=f"seecr {__version__}",
-        by=f"crosscheck add {found.name}",
-    )
+    source = provenance_of(data, f"crosscheck add {found.name}")
     errors = {"before": found.before, "after": found.after, "held_out": found.held_out}
     save_model(path, renewed(with_fit(old, found.fitted, found.name, source, errors), robot))
 

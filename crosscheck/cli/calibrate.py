@@ -1,4 +1,4 @@
-"""``crosscheck calibrate``: fit every effect at once and write the model."""
+"""``crosscheck calibrate``: fit all effects that the data can see at once."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from crosscheck.cli.options import FILE, json_option, progress_share
 
 if TYPE_CHECKING:
     from crosscheck import Calibrated
-    from seecr import Model
+    from seecr import Model, Robot
 
 
 @click.command(
-    short_help="Fit all effects at once and write the model.",
+    short_help="Fit all effects at once: a model that predicts.",
     epilog="""\b
 Examples:
   crosscheck calibrate robot.xml measured.csv --model model.toml
-  crosscheck compare robot.xml second_day.csv --model model.toml
+  crosscheck compare robot.xml another_day.csv --model model.toml
 """,
 )
 @click.argument("robot", type=FILE, metavar="ROBOT.xml")
@@ -27,17 +27,21 @@ Examples:
 @click.option(
     "--model", type=FILE, required=True, metavar="M.toml", help="The model; made if need be."
 )
+@click.option("--force", is_flag=True, help="Write it even if it does not predict any better.")
 @click.option("--out", type=FILE, metavar="DIR", help="Folder for calibration.json.")
 @json_option
-def command(robot: Path, data: Path, model: Path, out: Path | None, as_json: bool) -> int:
-    """Fit every effect that DATA.csv can show, all at once, and write them to the model.
+def command(
+    robot: Path, data: Path, model: Path, force: bool, out: Path | None, as_json: bool
+) -> int:
+    """Fit every effect that DATA.csv can see, all together, and write the model.
 
-    Plausible sizes are priors, so what the data see poorly stays near null. The model is for
-    predicting; which effects are really there is what crosscheck diagnose says. The covariance
-    of the values is kept beside the model, in M.covariance.json.
+    Each parameter's plausible size is its prior: what the data hardly see stays near null. The
+    noise is taken as it is, its size and its correlation along the runs estimated. Such a model
+    is worth what it predicts; which of its effects are real is what diagnose says.
 
     \b
-    Exit status: 0 written, 2 bad input, 3 rows without an equilibrium.
+    Exit status: 0 written, 1 not written since runs left out are not predicted any better or the
+    fit did not settle, 2 bad input, 3 rows without an equilibrium.
     """
     from crosscheck import calibrate, load_measurements
     from seecr import load_model, load_robot, new_model
@@ -46,44 +50,32 @@ def command(robot: Path, data: Path, model: Path, out: Path | None, as_json: boo
     old = load_model(model, machine) if model.exists() else new_model(machine)
     measured = load_measurements(data, machine)
     with progress_share("calibrating") as progress:
-        found = calibrate(machine, measured, old.terms, progress)
-    _write(found, old, robot, data, model)
-    _tell(found, old, model, out, as_json)
-    return 0
+        found = calibrate(machine, measured, old, progress)
+    written = found.pays or (force and found.settled)
+    if written:
+        _write(found, old, machine, data, model)
+    _tell(found, model, written, out, as_json)
+    return 0 if written else 1
 
 
-def _write(found: Calibrated, old: Model, robot: Path, data: Path, path: Path) -> None:
-    from datetime import date
+def _write(found: Calibrated, old: Model, robot: Robot, data: Path, path: Path) -> None:
+    from crosscheck.model import calibrated, provenance_of, renewed, save_model
 
-    from crosscheck.files import json_text, write_text
-    from crosscheck.model import Provenance, renewed, save_model, with_fit
-    from seecr import __version__, load_robot
-
-    source = Provenance(
-        data=data.name,
-        date=date.today().isoformat(),
-        version=f"seecr {__version__}",
-        by="crosscheck calibrate",
-    )
+    source = provenance_of(data, "crosscheck calibrate")
     errors = {"before": found.before, "after": found.after, "held_out": found.held_out}
-    new = old
-    for one in found.fitted:
-        new = with_fit(new, found.fitted, one.term.name, source, errors)
-    save_model(path, renewed(new, load_robot(robot)))
-    beside = {"parameters": found.labels, "covariance": found.covariance.tolist()}
-    write_text(path.with_suffix(".covariance.json"), json_text(beside) + "\n")
+    new = calibrated(old, found.fitted, found.covariance, source, errors)
+    save_model(path, renewed(new, robot))
 
 
-def _tell(found: Calibrated, old: Model, model: Path, out: Path | None, as_json: bool) -> None:
+def _tell(found: Calibrated, model: Path, written: bool, out: Path | None, as_json: bool) -> None:
     from crosscheck.files import json_text, staged, write_text
+    from crosscheck.terminal import print_calibration
 
-    text = json_text({"model": str(model), **found.as_json(), "model_notes": list(old.notes)})
+    text = json_text({"written": written, "model": str(model), **found.as_json()})
     if out is not None:
         with staged(out) as folder:
             write_text(folder / "calibration.json", text + "\n")
     if as_json:
         click.echo(text)
         return
-    for line in [*(f"note: {note}" for note in old.notes), *found.lines()]:
-        click.echo(line)
-    click.echo(f"Written to {model}: {', '.join(one.term.name for one in found.fitted)}")
+    print_calibration(found, model, written)

@@ -18,7 +18,7 @@ from scipy import stats
 
 from crosscheck.comparison.cable_space import cable_errors, independent_part
 from crosscheck.comparison.quantities import (
-    Quantity,
+    Abscissa,
     QuantityKind,
     channels,
     in_time,
@@ -144,7 +144,7 @@ def _swinging(problem: Problem, table: Array, raw: Array, least: float) -> list[
 
 
 def _row(
-    quantity: Quantity,
+    quantity: Abscissa,
     of: str,
     table: Array,
     raw: Array,
@@ -206,7 +206,7 @@ def _squares(table: Array, index: Any, bins: int, constant: bool) -> tuple[Array
     return between, np.maximum((values**2).sum(axis=0) - between, 0.0), counts
 
 
-def _binned(quantity: Quantity, some: NDArray[np.bool_]) -> tuple[NDArray[np.int64], list[str]]:
+def _binned(quantity: Abscissa, some: NDArray[np.bool_]) -> tuple[NDArray[np.int64], list[str]]:
     """Bin of each row, -1 for none, and what the bins are called."""
     values = quantity.values
     index = np.full(len(values), -1, dtype=np.int64)

@@ -41,7 +41,7 @@ class QuantityKind(Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class Quantity:
+class Abscissa:
     """What residuals may go with.
 
     Attributes:
@@ -62,38 +62,38 @@ def channels(problem: Problem) -> tuple[list[str], list[str]]:
     return names, ["m"] * 3 + ["rad"] * 3 + ["N"] * problem.robot.n_cables
 
 
-def of_rows(problem: Problem, prediction: Prediction, way: Travel) -> Iterator[Quantity]:
+def of_rows(problem: Problem, prediction: Prediction, way: Travel) -> Iterator[Abscissa]:
     """What changes from row to row."""
     n, data = problem.data.n_rows, problem.data
-    yield Quantity(QuantityKind.EVERYWHERE, EVERYWHERE, np.zeros(n))
+    yield Abscissa(QuantityKind.EVERYWHERE, EVERYWHERE, np.zeros(n))
     turn = rotvec_from_quat(way.pose[:, 3:])
     place = np.concatenate([way.pose[:, :3], turn], axis=1)
     for k, axis in enumerate(AXES):
-        yield Quantity(
+        yield Abscissa(
             QuantityKind.PLACE, f"commanded {axis}", place[:, k], "m" if k < 3 else "rad"
         )
-    yield Quantity(QuantityKind.RUN, "the run", data.run)
-    yield Quantity(QuantityKind.TRAVEL, "direction of travel", way.direction)
-    yield Quantity(QuantityKind.TRAVEL, "speed of travel", way.speed, "m/s")
+    yield Abscissa(QuantityKind.RUN, "the run", data.run)
+    yield Abscissa(QuantityKind.TRAVEL, "direction of travel", way.direction)
+    yield Abscissa(QuantityKind.TRAVEL, "speed of travel", way.speed, "m/s")
     if data.t_s is not None:
-        yield Quantity(QuantityKind.TIME, "time", data.t_s - data.t_s.min(), "s")
+        yield Abscissa(QuantityKind.TIME, "time", data.t_s - data.t_s.min(), "s")
         if len(data.runs) > 1:
             starts = {name: data.t_s[data.run == name].min() for name in data.runs}
             into = data.t_s - np.array([starts[name] for name in data.run.tolist()])
-            yield Quantity(QuantityKind.TIME, "time since the start of the run", into, "s")
+            yield Abscissa(QuantityKind.TIME, "time since the start of the run", into, "s")
     if data.temperature_C is not None:
-        yield Quantity(QuantityKind.TEMPERATURE, "temperature", data.temperature_C, "C")
+        yield Abscissa(QuantityKind.TEMPERATURE, "temperature", data.temperature_C, "C")
     slack = prediction.slack
-    yield Quantity(QuantityKind.TENSION, "number of slack cables", slack.sum(axis=1).astype(float))
+    yield Abscissa(QuantityKind.TENSION, "number of slack cables", slack.sum(axis=1).astype(float))
     taut = np.where(slack, np.nan, prediction.tensions)
     some = np.isfinite(taut).any(axis=1)
     for name, pick in (("smallest", np.nanmin), ("mean", np.nanmean)):
         values = np.full(n, np.nan)
         values[some] = pick(taut[some], axis=1)
-        yield Quantity(QuantityKind.TENSION, f"{name} tension of the taut cables", values, "N")
+        yield Abscissa(QuantityKind.TENSION, f"{name} tension of the taut cables", values, "N")
 
 
-def of_cables(problem: Problem, prediction: Prediction, way: Travel) -> tuple[Quantity, ...]:
+def of_cables(problem: Problem, prediction: Prediction, way: Travel) -> tuple[Abscissa, ...]:
     """What changes from cable to cable: (n m,) values, row by row."""
     robot, n = problem.robot, problem.data.n_rows
     lengths = cable_lengths(problem, prediction)
@@ -103,14 +103,14 @@ def of_cables(problem: Problem, prediction: Prediction, way: Travel) -> tuple[Qu
     before = np.where(first[:, None], home, np.concatenate([home, nominal[:-1]]))
     motion = np.where(nominal > before, "paid out", "reeled in")
     return (
-        Quantity(QuantityKind.CABLE, "the cable", np.tile(np.array(robot.cable_names), n)),
-        Quantity(QuantityKind.CABLE, "the cable's length", lengths.ravel(), "m"),
-        Quantity(QuantityKind.CABLE, "the cable's tension", prediction.tensions.ravel(), "N"),
-        Quantity(QuantityKind.CABLE, "whether the cable was paid out or reeled in", motion.ravel()),
+        Abscissa(QuantityKind.CABLE, "the cable", np.tile(np.array(robot.cable_names), n)),
+        Abscissa(QuantityKind.CABLE, "the cable's length", lengths.ravel(), "m"),
+        Abscissa(QuantityKind.CABLE, "the cable's tension", prediction.tensions.ravel(), "N"),
+        Abscissa(QuantityKind.CABLE, "whether the cable was paid out or reeled in", motion.ravel()),
     )
 
 
-def in_time(problem: Problem, table: Array) -> tuple[Quantity | None, int]:
+def in_time(problem: Problem, table: Array) -> tuple[Abscissa | None, int]:
     """The phase in the period that explains most, and how many periods were tried.
 
     Args:
@@ -120,7 +120,7 @@ def in_time(problem: Problem, table: Array) -> tuple[Quantity | None, int]:
     if period is None or problem.data.t_s is None:
         return None, tried
     phase = 360.0 * (problem.data.t_s / period % 1.0)
-    return Quantity(QuantityKind.TIME, f"time, again every {period:.3g} s", phase, "deg"), tried
+    return Abscissa(QuantityKind.TIME, f"time, again every {period:.3g} s", phase, "deg"), tried
 
 
 def _period(problem: Problem, table: Array) -> tuple[float | None, int]:

@@ -2,6 +2,20 @@
 
 from __future__ import annotations
 
-from crosscheck.model.write import Provenance, renewed, save_model, with_fit
+from crosscheck.model.write import (
+    Provenance,
+    calibrated,
+    provenance_of,
+    renewed,
+    save_model,
+    with_fit,
+)
 
-__all__ = ["Provenance", "renewed", "save_model", "with_fit"]
+__all__ = [
+    "Provenance",
+    "calibrated",
+    "provenance_of",
+    "renewed",
+    "save_model",
+    "with_fit",
+]

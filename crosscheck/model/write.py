@@ -6,6 +6,7 @@ import copy
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 import tomlkit
 
 from crosscheck.files import written
+from seecr import __version__
 from seecr.effects import Term, Terms
 from seecr.effects.base import Layout
 from seecr.fingerprint import fingerprint
@@ -53,6 +55,24 @@ class Fitted:
     stderr: Array
     at_bound: Any
 
+    def as_json(self) -> dict[str, Any]:
+        """Its parameters by name, in SI."""
+        layout = self.term.layout
+        return {
+            key: {
+                "value": float(self.term.vector[i]),
+                "stderr": float(self.stderr[i]),
+                "unit": layout.units[i],
+                "at_bound": bool(self.at_bound[i]),
+            }
+            for i, key in enumerate(layout.names)
+        }
+
+
+def provenance_of(data: Path, by: str) -> Provenance:
+    """Of values fitted today to a file by a command."""
+    return Provenance(data.name, date.today().isoformat(), f"seecr {__version__}", by)
+
 
 def with_fit(
     model: Model,
@@ -82,13 +102,7 @@ def with_fit(
     for name in order:
         table = tables.get(name)
         if table is None:
-            table = tomlkit.table()
-            table["name"] = name
-            table["name"].comment(by_name[name].term.layout.effect.title)
-            _fill(table, by_name[name])
-            _describe(table, provenance, errors)
-            document["effect"].append(table)
-            table.trivia.indent = "\n"
+            _describe(_appended(document, by_name[name]), provenance, errors)
             continue
         _fill(table, by_name[name])
         if name == added:
@@ -98,6 +112,83 @@ def with_fit(
     terms = Terms(by_name[name].term for name in order)
     stderr = {name: np.asarray(by_name[name].stderr, float) for name in order}
     return replace(model, terms=terms, stderr=stderr, document=document)
+
+
+def calibrated(
+    model: Model,
+    fitted: Sequence[Fitted],
+    covariance: Array,
+    provenance: Provenance,
+    errors: Mapping[str, Rms],
+) -> Model:
+    """The model with all effects as fitted together, and how their errors go together.
+
+    Args:
+        model: left as it is.
+        fitted: all effects of the new model.
+        covariance: (p, p) of their values in the order of ``fitted``.
+        provenance: of the fit.
+        errors: rms by kind: "before", "after", "held_out".
+    """
+    document = copy.deepcopy(model.document)
+    if "effect" not in document:
+        document.append("effect", tomlkit.aot())
+    tables = {str(table["name"]): table for table in document["effect"]}
+    for one in fitted:
+        if one.term.name in tables:
+            _fill(tables[one.term.name], one)
+        else:
+            _appended(document, one)
+    document.pop("calibration", None)
+    document["calibration"] = _together(fitted, covariance, provenance, errors)
+    return replace(
+        model,
+        terms=Terms(one.term for one in fitted),
+        stderr={one.term.name: np.asarray(one.stderr, float) for one in fitted},
+        document=document,
+    )
+
+
+def _appended(document: Any, fitted: Fitted) -> Any:
+    """A table for an effect that the document has not, at its end."""
+    table = tomlkit.table()
+    table["name"] = fitted.term.name
+    table["name"].comment(fitted.term.layout.effect.title)
+    _fill(table, fitted)
+    document["effect"].append(table)
+    table.trivia.indent = "\n"
+    return table
+
+
+def _together(
+    fitted: Sequence[Fitted], covariance: Array, provenance: Provenance, errors: Mapping[str, Rms]
+) -> Any:
+    """Where the values come from, what they are worth, and the correlations of their errors.
+
+    The covariance is the correlation times the standard errors; a row ends at its diagonal.
+    """
+    table = tomlkit.table()
+    table.trivia.indent = "\n"
+    _describe(table, provenance, errors)
+    stderr = np.sqrt(np.diag(covariance))
+    known = np.where(stderr > 0.0, stderr, np.inf)
+    correlation = covariance / np.outer(known, known) + np.diag((stderr == 0.0).astype(float))
+    names = [f"{one.term.name}.{key}" for one in fitted for key in one.term.layout.names]
+    table["parameters"] = _lines([f'"{name}"' for name in names])
+    rows = [", ".join(f"{c:.6g}" for c in row[: i + 1]) for i, row in enumerate(correlation)]
+    table["correlation"] = _lines([f"[{_with_points(row)}]" for row in rows])
+    return table
+
+
+def _with_points(row: str) -> str:
+    """Numbers that TOML reads as such: all floats, none an integer."""
+    return ", ".join(c if {".", "e"} & set(c) else f"{c}.0" for c in row.split(", "))
+
+
+def _lines(items: Sequence[str]) -> Any:
+    """An array with an item on each line."""
+    inside = "".join(f"    {item},\n" for item in items)
+    return tomlkit.parse(f"x = [\n{inside}]")["x"]
 
 
 def _fill(table: Any, fitted: Fitted) -> None:

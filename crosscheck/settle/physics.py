@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 # we choose it so that the platform has about this mass. A power of two, so no digit changes.
 _MASS_IN_MUJOCO = 1e6
 Index = NDArray[np.int64]
-Group = tuple[Index, Index, Index]
+Together = tuple[Index, Index, Index]
 """Coordinates, and the (rows, columns) of the stiffness that one shift of all of them gives."""
 _FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
@@ -105,7 +105,7 @@ class Physics:
         self.rotations = self._which_rotate()
         self.metre = np.where(self.rotations, self.length, 1.0)
         every = np.arange(self.n_dof)
-        self.coupling: list[Group] = [(every[k : k + 1], every, 0 * every + k) for k in every]
+        self.coupling: list[Together] = [(every[k : k + 1], every, 0 * every + k) for k in every]
         self.force_scale = 1.0
         self.set_load()
 

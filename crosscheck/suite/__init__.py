@@ -5,7 +5,8 @@ from __future__ import annotations
 from crosscheck.suite.cases import Case, select, shipped_cases, user_cases
 from crosscheck.suite.effects import GROUP, PREFIX, EffectCase, EffectResult, effect_cases
 from crosscheck.suite.junit import junit_xml
-from crosscheck.suite.results import CaseResult, Outcome
+from crosscheck.suite.outcome import Outcome
+from crosscheck.suite.results import CaseResult
 from crosscheck.suite.run import Run, results_json, run_suite
 from crosscheck.suite.summary import summary_md
 from crosscheck.suite.thresholds import Thresholds, load_thresholds, thresholds_toml

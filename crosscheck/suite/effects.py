@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.suite.gap import gap
+from crosscheck.suite.outcome import Outcome
 from crosscheck.suite.pool import Pool
-from crosscheck.suite.results import Outcome
 from crosscheck.twin.hidden import CONTAINED, choose
 from crosscheck.twin.measure import measure
 from crosscheck.twin.robot import TRUE_EFFECTS

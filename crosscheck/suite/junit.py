@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from crosscheck.suite import words
 from crosscheck.suite.effects import GROUP
-from crosscheck.suite.results import Outcome
+from crosscheck.suite.outcome import Outcome
 
 if TYPE_CHECKING:
     from crosscheck.suite.effects import EffectResult

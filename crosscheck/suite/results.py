@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from enum import Enum
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from crosscheck.suite.agreement import QUANTITIES, Allowance, Differences, ratios
 from crosscheck.suite.cases import Case
 from crosscheck.suite.mujoco_robot import MujocoRobot
+from crosscheck.suite.outcome import Outcome
 from crosscheck.suite.verdicts import UNSOLVED, PoseFinding, Verdict
 from seecr.pose import Array
 from seecr.result import COORDINATES, Record, Result, named
@@ -21,25 +21,6 @@ from seecr.solution import Solution
 
 if TYPE_CHECKING:
     from crosscheck.settle.settler import SettlingBatch
-
-
-class Outcome(Enum):
-    """How a case or a run ended; the value is the word that people read."""
-
-    AGREE = "agree"
-    DIFFER = "DIFFER"
-    NOT_CONVERGED = "NOT CONVERGED"
-
-    @property
-    def exit_status(self) -> int:
-        """0 agree (findings within limits), 1 differ by too much, 3 a solve did not converge."""
-        return {Outcome.AGREE: 0, Outcome.DIFFER: 1, Outcome.NOT_CONVERGED: 3}[self]
-
-    @classmethod
-    def of_all(cls, outcomes: Iterable[Outcome]) -> Outcome:
-        """A difference outweighs a solve without an answer."""
-        found = set(outcomes)
-        return next((one for one in (cls.DIFFER, cls.NOT_CONVERGED) if one in found), cls.AGREE)
 
 
 @dataclass(frozen=True, eq=False)

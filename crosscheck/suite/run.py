@@ -19,8 +19,9 @@ from crosscheck.suite.agreement import allowances, compare
 from crosscheck.suite.cases import Case, shipped_cases
 from crosscheck.suite.effects import EffectCase, EffectResult, effect_cases, run_effects
 from crosscheck.suite.mujoco_robot import MujocoRobot
+from crosscheck.suite.outcome import Outcome
 from crosscheck.suite.pool import Pool
-from crosscheck.suite.results import CaseResult, Outcome, Worst, counts, worst_of
+from crosscheck.suite.results import CaseResult, Worst, counts, worst_of
 from crosscheck.suite.thresholds import Thresholds, load_thresholds
 from crosscheck.suite.verdicts import Answers, Verdict, held_to, judge
 from seecr.equilibrium import solve as seecr_solve

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from crosscheck.suite.agreement import QUANTITIES
 from crosscheck.suite.effects import ORIENTATION_RAD, POSITION_M, TENSION_N, Counterpart
-from crosscheck.suite.results import Outcome
+from crosscheck.suite.outcome import Outcome
 from crosscheck.suite.verdicts import FINDINGS, PoseFinding, Verdict
 
 if TYPE_CHECKING:

@@ -8,6 +8,7 @@ from seecr.lazy import lazily
 
 if TYPE_CHECKING:
     from crosscheck.terminal.addition import print_addition
+    from crosscheck.terminal.calibration import print_calibration
     from crosscheck.terminal.comparison import print_comparison
     from crosscheck.terminal.diagnosis import print_diagnosis
     from crosscheck.terminal.plan import print_plan
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 # Each imports what it prints: a command loads its own alone.
 _WHERE = {
     "print_addition": "addition",
+    "print_calibration": "calibration",
     "print_comparison": "comparison",
     "print_diagnosis": "diagnosis",
     "print_plan": "plan",
@@ -24,6 +26,7 @@ _WHERE = {
 
 __all__ = [
     "print_addition",
+    "print_calibration",
     "print_comparison",
     "print_diagnosis",
     "print_plan",

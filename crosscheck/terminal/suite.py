@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from crosscheck.suite import words
-from crosscheck.suite.results import Outcome
+from crosscheck.suite.outcome import Outcome
 from crosscheck.suite.verdicts import FINDINGS, Verdict
 
 if TYPE_CHECKING:

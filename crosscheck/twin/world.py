@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.settle.physics import Group, Index, Parts, Physics
+from crosscheck.settle.physics import Index, Parts, Physics, Together
 from crosscheck.twin.build import Places, build
 from crosscheck.twin.chain import hang
 from crosscheck.twin.robot import TrueRobot
@@ -264,13 +264,13 @@ class World(Physics):
         return np.asarray(rotate)
 
 
-def _coupling(places: Places, n_dof: int, segments: int) -> list[Group]:
+def _coupling(places: Places, n_dof: int, segments: int) -> list[Together]:
     """Groups of coordinates that may be shifted together to difference the forces.
 
     Cables meet only on the platform and segments only at their ends, so however
     long the chains are, a few groups do.
     """
-    groups: list[Group] = []
+    groups: list[Together] = []
     for k in range(places.n_platform):
         rows = np.arange(n_dof)
         groups.append((np.array([k]), rows, np.full(n_dof, k)))

@@ -1,41 +1,84 @@
-"""``crosscheck calibrate``: one call, a model at the noise, its covariance beside it."""
+"""``crosscheck calibrate``: a model that predicts elsewhere, with the covariance of its values."""
 
 from __future__ import annotations
 
 import json
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
-from made_data import case, refused, run
+from made_data import SIGMA, case, refused, run
 
-from seecr import load_model, load_robot
+from seecr.mjcf import load_robot
+from seecr.model import load_model
 
-HIDDEN = {"pulley_radius": {"radius_m": 0.01}, "centre_of_mass": {"shift_x_m": 0.004}}
+HIDDEN = {
+    "pulley_radius": {"radius_m": 0.006},
+    "stiffness": {"factor": 1.2},
+    "drum_gain": {f"gain_{i}": 2e-3 * (-1) ** i for i in range(1, 9)},
+    "centre_of_mass": {"shift_x_m": 0.002, "shift_z_m": -0.003},
+    "exit_point_error": {f"error_{i}_{a}_m": 5e-4 * (-1) ** i for i in range(1, 9) for a in "xz"},
+}
+
+
+@pytest.fixture(scope="module")
+def many(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """Five effects at once."""
+    return case(tmp_path_factory.mktemp("many"), HIDDEN)
 
 
 @pytest.mark.slow
-def test_the_model_predicts_to_the_noise_and_keeps_its_covariance(tmp_path):
-    files = case(tmp_path, HIDDEN)
-    model, out = tmp_path / "model.toml", tmp_path / "out"
-    done = run("calibrate", *files, "--model", model, "--json", "--out", out)
-    assert done.exit_code == 0
-    told = json.loads(done.stdout)
-    assert told["after"]["position_rms_m"] < 0.1 * told["before"]["position_rms_m"]
-    assert told["noise"]["scale"]["position"] == pytest.approx(1.0, abs=0.3)
-    assert json.loads((out / "calibration.json").read_text()) == told
-    gate = ("--max-position", "0.04mm", "--max-orientation", "0.025deg", "--no-recording")
-    compared = run("compare", *files, "--model", model, *gate, "--out", tmp_path / "compared")
-    assert compared.exit_code == 0
-    beside = json.loads(model.with_suffix(".covariance.json").read_text())
-    covariance = np.array(beside["covariance"])
-    assert covariance.shape == (len(beside["parameters"]),) * 2
-    written = load_model(model, load_robot(files[0]))
-    at = beside["parameters"].index("pulley_radius.radius_m")
-    stated = written.stderr["pulley_radius"][0]
-    assert np.sqrt(covariance[at, at]) == pytest.approx(stated, rel=0.01)
-    assert written.terms["pulley_radius"].vector[0] == pytest.approx(0.01, abs=5 * stated)
+def test_all_at_once_the_error_falls_to_the_noise_and_the_model_can_be_used(
+    many: tuple[Path, Path], tmp_path: Path
+) -> None:
+    model = tmp_path / "model.toml"
+    result = run("calibrate", *many, "--model", model, "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    assert "on runs left out" in result.stdout and f"Written to {model}" in result.stdout
+    found = json.loads((tmp_path / "out" / "calibration.json").read_text())
+    assert found["settled"] and found["improves_held_out"]
+    assert found["before"]["position_rms_m"] > 10 * SIGMA.position_m
+    assert found["held_out"]["position_rms_m"] < 1.5 * SIGMA.position_m
+    known = load_model(model, load_robot(many[0]))
+    assert {"pulley_radius", "stiffness", "drum_gain"} <= set(known.names)
+    radius = known.terms["pulley_radius"].vector[0], known.stderr["pulley_radius"][0]
+    assert abs(radius[0] - 0.006) < 4 * radius[1] < 0.004
+    again = run("compare", *many, "--model", model, "--no-recording", "--out", tmp_path / "cmp")
+    assert again.exit_code == 0 and "what is left is noise" in again.stdout
+    the_covariance_is_there(model)
+    # from its own model on there is nothing more to gain: nothing is lost either
+    second = run("calibrate", *many, "--model", model, "--force", "--json")
+    assert second.exit_code == 0
+    assert json.loads(second.stdout)["held_out"]["position_rms_m"] < 1.5 * SIGMA.position_m
+    assert model.read_text().count("[calibration]") == 1
 
 
-def test_bad_input_is_one_line(tmp_path):
-    text = refused("calibrate", tmp_path / "gone.xml", tmp_path / "gone.csv", "--model", "m.toml")
-    assert "gone.xml" in text
+def the_covariance_is_there(model: Path) -> None:
+    table = tomllib.loads(model.read_text())["calibration"]
+    rows, names = table["correlation"], table["parameters"]
+    assert len(rows) == len(names) == len(set(names)) and "pulley_radius.radius_m" in names
+    whole = np.array([row + [0.0] * (len(rows) - len(row)) for row in rows])
+    whole = whole + whole.T - np.eye(len(rows))
+    assert np.linalg.eigvalsh(whole).min() > -1e-4
+    assert table["provenance"]["by"] == "crosscheck calibrate"
+    assert table["after"]["position_rms_m"] < table["before"]["position_rms_m"]
+
+
+@pytest.mark.slow
+def test_where_nothing_is_gained_nothing_is_written(tmp_path: Path) -> None:
+    files = case(tmp_path, {})
+    model = tmp_path / "model.toml"
+    result = run("calibrate", *files, "--model", model)
+    assert result.exit_code == 1 and not model.exists()
+    assert "Runs left out are not predicted any better: not written" in result.stdout
+
+
+def test_data_that_cannot_carry_it_are_refused(many: tuple[Path, Path], tmp_path: Path) -> None:
+    robot, data = many
+    few = tmp_path / "few.csv"
+    few.write_text("\n".join(data.read_text().splitlines()[:1]) + "\n")
+    message = refused("calibrate", robot, few, "--model", tmp_path / "m.toml")
+    assert str(few) in message and "expected" in message
+    missing = refused("calibrate", robot, tmp_path / "no.csv", "--model", tmp_path / "m.toml")
+    assert "no.csv" in missing and not (tmp_path / "m.toml").exists()

@@ -10,7 +10,7 @@ import pytest
 
 from crosscheck.suite import words
 from crosscheck.suite.effects import Counterpart, EffectCase, EffectResult, _number, effect_cases
-from crosscheck.suite.results import Outcome
+from crosscheck.suite.outcome import Outcome
 from crosscheck.twin.hidden import CONTAINED
 from crosscheck.twin.robot import TRUE_EFFECTS
 from seecr.shipped import model_path

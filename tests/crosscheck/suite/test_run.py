@@ -23,7 +23,8 @@ from crosscheck.suite.cases import (
     user_cases,
 )
 from crosscheck.suite.mujoco_robot import MujocoRobot, screw_motion
-from crosscheck.suite.results import CaseResult, Outcome, worst_of
+from crosscheck.suite.outcome import Outcome
+from crosscheck.suite.results import CaseResult, worst_of
 from crosscheck.suite.run import run_case, run_suite
 from crosscheck.suite.thresholds import SHIPPED, FindingLimits, load_thresholds, thresholds_toml
 from crosscheck.suite.verdicts import Verdict

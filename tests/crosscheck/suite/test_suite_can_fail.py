@@ -24,7 +24,7 @@ from crosscheck.suite.cases import Case, shipped_cases
 from crosscheck.suite.effects import EffectCase, run_effect
 from crosscheck.suite.junit import junit_xml
 from crosscheck.suite.mujoco_robot import MujocoRobot
-from crosscheck.suite.results import Outcome
+from crosscheck.suite.outcome import Outcome
 from crosscheck.suite.run import Run, run_suite
 from crosscheck.suite.thresholds import load_thresholds
 from seecr import equilibrium

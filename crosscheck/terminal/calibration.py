@@ -1,0 +1,52 @@
+"""A calibrated model, on the terminal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+
+from crosscheck.calibration.result import Calibrated
+from crosscheck.model.write import Fitted
+from crosscheck.terminal.lines import console_for, rms_table, say, table_of
+
+# A value this many standard errors from null is shown as sure.
+_SURE = 3.0
+
+
+def print_calibration(
+    found: Calibrated, model: Path, written: bool, console: Console | None = None
+) -> None:
+    """Print the errors, the effects whose values are sure, the noise, and what was written."""
+    console = console_for(console)
+    for note in found.notes:
+        say(console, f"note: {note}", "dim")
+    rows = (
+        ("before", found.before, ""),
+        ("calibrated", found.after, "bold"),
+        ("calibrated, on runs left out", found.held_out, ""),
+    )
+    console.print(rms_table("rms error", rows))
+    table = table_of(["effect", "parameters", "largest in its standard errors"])
+    for one in found.fitted:
+        table.add_row(one.term.name, str(len(one.term.layout)), _largest(one))
+    console.print(table)
+    for line in found.noise_lines():
+        say(console, line)
+    if not found.settled:
+        say(console, "The fit did not settle: its values are not to be used.", "bold yellow")
+    elif not found.pays:
+        why = "Runs left out are not predicted any better: not written; --force writes it"
+        say(console, why, "bold yellow")
+    if written:
+        parts = f"{len(found.fitted)} effects, {len(found.covariance)} parameters"
+        say(console, f"Written to {model}: {parts}, with their covariance")
+
+
+def _largest(one: Fitted) -> str:
+    """The value that stands out most from null, in standard errors; a dash where none does."""
+    away = np.abs(one.term.vector - one.term.layout.null)
+    known = one.stderr > 0.0
+    ratio = np.divide(away, one.stderr, out=np.zeros_like(away), where=known)
+    return f"{ratio.max():.1f}" if ratio.max() > _SURE else "-"
