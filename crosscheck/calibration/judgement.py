@@ -66,9 +66,9 @@ def judge(found: Found, classes: Classes, field_odds: float, surprise: float) ->
     best, undecided = found.best.names, classes.undecided
     unknown = field_odds > UNKNOWN or surprise > _SURPRISE
     few = len(best) <= _FEW and undecided < _OPEN
-    sure = sure_effects(found, classes, few and not unknown)
-    if unknown:
-        return Judgement(Verdict.UNKNOWN_EFFECT, sure, undecided)
+    sure = sure_effects(found, classes, few)
+    if unknown:  # known effects imitate it: none of them is sure
+        return Judgement(Verdict.UNKNOWN_EFFECT, (), undecided)
     if not sure and undecided < _OPEN and explained(found) < _OWED:
         return Judgement(Verdict.NO_EFFECT_MISSING, (), undecided)
     verdict = Verdict.EFFECTS_FOUND if few and sure else Verdict.MANY_EFFECTS

@@ -55,6 +55,7 @@ def test_equals_share_their_certainty() -> None:
 def test_a_field_or_runs_left_out_make_it_unknown() -> None:
     scores = {"": -900.0, "a": 0.0}
     assert judged(scores, odds=6.0).verdict is Verdict.UNKNOWN_EFFECT
+    assert judged(scores, odds=6.0).sure == ()
     assert judged(scores, surprise=3.0).verdict is Verdict.UNKNOWN_EFFECT
 
 
