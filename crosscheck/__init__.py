@@ -19,9 +19,10 @@ if TYPE_CHECKING:
     from crosscheck.calibration.result import Calibrated, calibrate
     from crosscheck.comparison.residuals import compare
     from crosscheck.comparison.result import Comparison
-    from crosscheck.diagnosis.result import Diagnosis, DiagnosisVerdict, MissingEffect
+    from crosscheck.diagnosis.result import Diagnosis, MissingEffect
     from crosscheck.diagnosis.verdict import diagnose
     from crosscheck.errors import CrosscheckError
+    from crosscheck.fit.reasons import DiagnosisVerdict
     from crosscheck.measurements.data import Measurements, Sigma
     from crosscheck.measurements.read import load_commands, load_measurements
     from crosscheck.measurements.write import write_measurements
@@ -39,7 +40,7 @@ _WHERE = {
     "Comparison": "comparison.result",
     "CrosscheckError": "errors",
     "Diagnosis": "diagnosis.result",
-    "DiagnosisVerdict": "diagnosis.result",
+    "DiagnosisVerdict": "fit.reasons",
     "Measurements": "measurements.data",
     "MissingEffect": "diagnosis.result",
     "Plan": "planning.result",

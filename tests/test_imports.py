@@ -137,6 +137,17 @@ def test_no_two_modules_import_each_other() -> None:
     assert sorted(arrows) == []
 
 
+def test_no_two_classes_have_one_name() -> None:
+    names = [
+        node.name
+        for package in ("seecr", "crosscheck")
+        for path in modules(package)
+        for node in ast.parse(path.read_text(encoding="utf-8")).body
+        if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
+    ]
+    assert sorted({name for name in names if names.count(name) > 1}) == []
+
+
 # The two physics are worth comparing because they share the description of the robot alone.
 DESCRIPTION = {
     "seecr.errors",

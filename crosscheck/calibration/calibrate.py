@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from crosscheck.calibration.colour import WHITE, Colour, chain_of
 from crosscheck.calibration.gram import best_widths, gram_of
-from crosscheck.calibration.joint import Joint, Setting, settle, tempered
+from crosscheck.calibration.joint import JointFit, Setting, settle, tempered
 from crosscheck.calibration.later import layouts, worth_adding
 from crosscheck.calibration.leave_out import LeftOut, leave_out
 from crosscheck.calibration.linearised import groups_of, linearised, unwhitened
@@ -54,7 +54,7 @@ class Calibration:
     """
 
     setting: Setting
-    joint: Joint
+    joint: JointFit
     before: Rms
     after: Rms
     held_out: LeftOut
@@ -101,7 +101,7 @@ def calibrate(
     )
 
 
-def fit_everything(setting: Setting, terms: Terms, progress: Progress) -> Joint:
+def fit_everything(setting: Setting, terms: Terms, progress: Progress) -> JointFit:
     """The joint fit, effects that join later among them."""
     at_once, later = layouts(setting.problem)
     progress("fitting all effects", 0.05)
@@ -137,7 +137,7 @@ def widths_of(terms: Terms) -> Array:
     return np.concatenate(parts) if parts else np.zeros(0)
 
 
-def with_noise(setting: Setting, joint: Joint) -> Joint:
+def with_noise(setting: Setting, joint: JointFit) -> JointFit:
     """Estimate the noise and fit with it, until it stays."""
     for _ in range(_ROUNDS):
         before = joint.colour
@@ -149,13 +149,13 @@ def with_noise(setting: Setting, joint: Joint) -> Joint:
     return joint
 
 
-def noise_of(setting: Setting, joint: Joint) -> Colour:
+def noise_of(setting: Setting, joint: JointFit) -> Colour:
     """The noise by the joint fit's marginal evidence."""
     about = unwhitened(joint)
     return estimate(setting.chain, joint.colour, joint.weight, about.x, about.y, about.width)
 
 
-def widened(setting: Setting, joint: Joint) -> Joint:
+def widened(setting: Setting, joint: JointFit) -> JointFit:
     """The fit with wider priors for effects that are surely larger than plausible."""
     linear = linearised(setting, joint)
     groups = groups_of(joint, lambda layout: np.array([FLAT] if layout.name == TRACKER else WIDER))
@@ -169,7 +169,7 @@ def widened(setting: Setting, joint: Joint) -> Joint:
     return with_noise(setting, settle(setting, joint.state, width, joint.colour))
 
 
-def _joined(setting: Setting, joint: Joint, first: Terms, added: list[Term]) -> Joint:
+def _joined(setting: Setting, joint: JointFit, first: Terms, added: list[Term]) -> JointFit:
     """The fit with more effects: from where the others ended and, if that was poor, from afar."""
     starts = [Terms([*joint.terms, *added])]
     if float(np.max(joint.colour.scale)) > _POOR:
@@ -188,13 +188,13 @@ def _joined(setting: Setting, joint: Joint, first: Terms, added: list[Term]) -> 
     return max(found, key=lambda j: worth(setting, j))
 
 
-def worth(setting: Setting, joint: Joint) -> float:
+def worth(setting: Setting, joint: JointFit) -> float:
     """ln evidence of a joint fit, by Laplace, with its own noise."""
     about = unwhitened(joint)
     return log_evidence(setting.chain, joint.colour, joint.weight, about.x, about.y, about.width)
 
 
-def covariance(setting: Setting, joint: Joint) -> Array:
+def covariance(setting: Setting, joint: JointFit) -> Array:
     """(p, p) of the values in their units: the data's and the prior's knowledge together.
 
     0 for parameters that stayed where they were, held or on a bound.

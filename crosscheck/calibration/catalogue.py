@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from crosscheck.calibration.colour import whitened
-from crosscheck.calibration.gram import Gram, Group, gram_of
-from crosscheck.calibration.joint import Joint, Setting
+from crosscheck.calibration.gram import ColumnGroup, Gram, gram_of
+from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.later import added_columns
 from crosscheck.calibration.registration import NAME as TRACKER
 from crosscheck.calibration.worth import WIDTHS
@@ -51,7 +51,7 @@ def widths_for(layout: Layout) -> Array:
     return np.array(TRACKER_WIDTHS if layout.name == TRACKER else WIDTHS)
 
 
-def gram_about(setting: Setting, joint: Joint, catalogue: Catalogue) -> Gram:
+def gram_about(setting: Setting, joint: JointFit, catalogue: Catalogue) -> Gram:
     """Normal equations of the whole catalogue about a fit of some of it."""
     columns, z = catalogue_columns(setting, joint, catalogue)
     groups, first = {}, 0
@@ -59,7 +59,7 @@ def gram_about(setting: Setting, joint: Joint, catalogue: Catalogue) -> Gram:
         count = x.shape[1]
         layout = catalogue.start(name).layout
         one_sided = count == 1 and bool(layout.lower[0] == layout.null[0])
-        groups[name] = Group(np.arange(first, first + count), widths_for(layout), one_sided)
+        groups[name] = ColumnGroup(np.arange(first, first + count), widths_for(layout), one_sided)
         first += count
     x = np.concatenate(list(columns.values()), axis=1)
     y = joint.state.white + x @ np.concatenate(list(z.values()))
@@ -71,7 +71,7 @@ def gram_about(setting: Setting, joint: Joint, catalogue: Catalogue) -> Gram:
 
 
 def catalogue_columns(
-    setting: Setting, joint: Joint, catalogue: Catalogue
+    setting: Setting, joint: JointFit, catalogue: Catalogue
 ) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
     """Of each effect that is seen: columns (N, k) of its amplitudes, and their z (k,) there."""
     inside = joint.terms

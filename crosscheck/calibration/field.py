@@ -14,7 +14,7 @@ import numpy as np
 from scipy import special
 
 from crosscheck.calibration.colour import Colour
-from crosscheck.calibration.joint import Joint, Setting
+from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.linearised import unwhitened
 from crosscheck.calibration.restricted import estimate, log_evidence
 from crosscheck.fit.problem import Problem
@@ -50,7 +50,7 @@ def field_columns(problem: Problem, place: Array) -> Array:
     )  # fmt: skip
 
 
-def log_odds(setting: Setting, joint: Joint, stated: bool = True) -> float:
+def log_odds(setting: Setting, joint: JointFit, stated: bool = True) -> float:
     """ln evidence with a field less that without, effects integrated out.
 
     Args:

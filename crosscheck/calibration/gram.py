@@ -24,7 +24,7 @@ Widths = Mapping[str, float]
 
 
 @dataclass(frozen=True, eq=False)
-class Group:
+class ColumnGroup:
     """The columns of one effect.
 
     Attributes:
@@ -49,7 +49,7 @@ class Gram:
     normal: Array
     gradient: Array
     power: float
-    groups: dict[str, Group]
+    groups: dict[str, ColumnGroup]
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -68,7 +68,7 @@ class Gram:
         return Solved(self, dict(chosen), columns, width, inverse)
 
 
-def gram_of(x: Array, y: Array, groups: dict[str, Group]) -> Gram:
+def gram_of(x: Array, y: Array, groups: dict[str, ColumnGroup]) -> Gram:
     """The normal equations of white columns (N, p) and readings (N,)."""
     return Gram(x.T @ x, x.T @ y, float(y @ y), groups)
 

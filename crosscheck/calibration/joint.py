@@ -30,7 +30,7 @@ _MOST = 5.0
 
 
 @dataclass(frozen=True, eq=False)
-class Joint:
+class JointFit:
     """A joint fit.
 
     Attributes:
@@ -84,7 +84,7 @@ class Setting:
         return row_weights(self.chain, colour, state.white) if self.weight is None else self.weight
 
 
-def tempered(setting: Setting, start: State, width: Array, colour: Colour) -> Joint:
+def tempered(setting: Setting, start: State, width: Array, colour: Colour) -> JointFit:
     """Fit with the noise a hundred times its size, then less and less."""
     far = np.sqrt(start.chi2 / max(len(start.white), 1)) / float(np.min(colour.scale))
     joint = None
@@ -95,12 +95,12 @@ def tempered(setting: Setting, start: State, width: Array, colour: Colour) -> Jo
         state = start if joint is None else joint.state
         joint = settle(setting, state, width, colour.hotter(temper), steps)
     assert joint is not None
-    return Joint(joint.state, joint.jacobian, width, colour, joint.weight, joint.settled)
+    return JointFit(joint.state, joint.jacobian, width, colour, joint.weight, joint.settled)
 
 
 def settle(
     setting: Setting, state: State, width: Array, colour: Colour, steps: int = _LAST
-) -> Joint:
+) -> JointFit:
     """Gauss-Newton steps until nothing is gained, or so many of them.
 
     Args:
@@ -125,7 +125,7 @@ def settle(
         if gain < max(_PART * before, _GAIN):
             settled = True
             break
-    return Joint(state, jacobian, width, colour, weight, settled)
+    return JointFit(state, jacobian, width, colour, weight, settled)
 
 
 def scaled_derivatives(setting: Setting, state: State) -> Array:

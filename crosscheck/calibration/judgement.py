@@ -8,7 +8,6 @@ leave open which effects it is, or it takes many, that is a calibration and no d
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from crosscheck.calibration.field import UNKNOWN
 from crosscheck.calibration.probability import Classes
 from crosscheck.calibration.refits import NONE, Found
 from crosscheck.calibration.sets import Names
+from crosscheck.fit.reasons import DiagnosisVerdict
 
 # An effect is sure from this probability of it or its equals.
 SURE = 0.95
@@ -30,15 +30,6 @@ _SURPRISE = 2.0
 _PART, _WORTH = 0.1, 25.0
 
 
-class Verdict(Enum):
-    """What the data say, by the names of the file formats."""
-
-    NO_EFFECT_MISSING = "no_effect_missing"
-    EFFECTS_FOUND = "effects_found"
-    MANY_EFFECTS = "many_effects"
-    UNKNOWN_EFFECT = "unknown_effect"
-
-
 @dataclass(frozen=True, eq=False)
 class Judgement:
     """The verdict and what is sure.
@@ -49,7 +40,7 @@ class Judgement:
         undecided: how many classes are open.
     """
 
-    verdict: Verdict
+    verdict: DiagnosisVerdict
     sure: tuple[str, ...]
     undecided: float
 
@@ -68,10 +59,10 @@ def judge(found: Found, classes: Classes, field_odds: float, surprise: float) ->
     few = len(best) <= _FEW and undecided < _OPEN
     sure = sure_effects(found, classes, few)
     if unknown:  # known effects imitate it: none of them is sure
-        return Judgement(Verdict.UNKNOWN_EFFECT, (), undecided)
+        return Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, (), undecided)
     if not sure and undecided < _OPEN and explained(found) < _OWED:
-        return Judgement(Verdict.NO_EFFECT_MISSING, (), undecided)
-    verdict = Verdict.EFFECTS_FOUND if few and sure else Verdict.MANY_EFFECTS
+        return Judgement(DiagnosisVerdict.NO_EFFECT_MISSING, (), undecided)
+    verdict = DiagnosisVerdict.EFFECTS_FOUND if few and sure else DiagnosisVerdict.MANY_EFFECTS
     return Judgement(verdict, sure, undecided)
 
 

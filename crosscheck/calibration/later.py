@@ -13,7 +13,7 @@ import numpy as np
 from scipy import linalg
 
 from crosscheck.calibration.colour import whitened
-from crosscheck.calibration.joint import Joint, Setting
+from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.worth import log_gain
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.state import derivatives
@@ -58,20 +58,22 @@ def _waits(problem: Problem, layout: Layout) -> bool:
     return bool(setup.has_history or np.any(setup.cable_weight))
 
 
-def worth_adding(setting: Setting, joint: Joint, later: Sequence[Layout]) -> list[Term]:
+def worth_adding(setting: Setting, joint: JointFit, later: Sequence[Layout]) -> list[Term]:
     """Effects that are worth it beside the joint fit, at their most promising shapes."""
     found = _promising(setting, joint, later)
     return [_inside(term) for term, gain in found if gain > _PAYS]
 
 
-def promising(setting: Setting, joint: Joint, later: Sequence[Layout]) -> list[Term]:
+def promising(setting: Setting, joint: JointFit, later: Sequence[Layout]) -> list[Term]:
     """Effects at their most promising shapes; as they are in the fit where they are there."""
     there = [joint.terms[a.name] for a in later if a.name in joint.terms]
     absent = [a for a in later if a.name not in joint.terms]
     return [_at_null(t) for t in there] + [t for t, _g in _promising(setting, joint, absent)]
 
 
-def _promising(setting: Setting, joint: Joint, later: Sequence[Layout]) -> list[tuple[Term, float]]:
+def _promising(
+    setting: Setting, joint: JointFit, later: Sequence[Layout]
+) -> list[tuple[Term, float]]:
     """Each with the ln evidence that it gains, less what looking at many shapes costs."""
     beside = _Beside(setting, joint)
     out = []
@@ -101,7 +103,7 @@ def _inside(term: Term) -> Term:
 class _Beside:
     """What is left of more columns beside those of a joint fit."""
 
-    def __init__(self, setting: Setting, joint: Joint) -> None:
+    def __init__(self, setting: Setting, joint: JointFit) -> None:
         self.setting, self.joint = setting, joint
         self.left = self._white(joint.state.white)
         self.columns = self._white(joint.jacobian) * joint.width
@@ -121,7 +123,7 @@ class _Beside:
         return log_gain(normal, x.T @ self.left, one_sided=one_sided)
 
 
-def added_columns(setting: Setting, joint: Joint, term: Term) -> Array:
+def added_columns(setting: Setting, joint: JointFit, term: Term) -> Array:
     """(N, k) derivatives by z of an added effect's amplitudes that are at null."""
     layout = term.layout
     own = np.flatnonzero(~layout.shape & (term.vector == layout.null))

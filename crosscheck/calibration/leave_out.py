@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.calibration.colour import whitened
-from crosscheck.calibration.joint import Joint, Setting
+from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.linearised import Linear, linearised
 from crosscheck.fit.held_out import blocks_of
 from crosscheck.fit.noise import as_table
@@ -40,7 +40,7 @@ class LeftOut:
     surprise: Array
 
 
-def leave_out(setting: Setting, joint: Joint) -> LeftOut:
+def leave_out(setting: Setting, joint: JointFit) -> LeftOut:
     """Refit without each block (runs, where there are some) and predict it."""
     problem = setting.problem
     blocks = blocks_of(problem)
@@ -81,11 +81,11 @@ def surprise_of(linear: Linear, rows: NDArray[np.bool_], left: Array) -> float:
     return float(left @ left - part @ np.linalg.solve(precision + own.T @ own, part))
 
 
-def _white(setting: Setting, joint: Joint, values: Array) -> Array:
+def _white(setting: Setting, joint: JointFit, values: Array) -> Array:
     return whitened(setting.chain, joint.colour, joint.weight, values)
 
 
-def _unwhitened(setting: Setting, joint: Joint, change: Array) -> Array:
+def _unwhitened(setting: Setting, joint: JointFit, change: Array) -> Array:
     """A change (N,) in units of the stated noise as one of the raw residuals (n, 6 + m)."""
     table = np.nan_to_num(as_table(setting.problem, change))
     return np.asarray(np.einsum("nij,nj->ni", joint.state.factor, table))

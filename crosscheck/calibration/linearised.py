@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.calibration.colour import whitened
-from crosscheck.calibration.gram import Group
-from crosscheck.calibration.joint import Joint, Setting
+from crosscheck.calibration.gram import ColumnGroup
+from crosscheck.calibration.joint import JointFit, Setting
 from seecr.effects.base import Layout
 from seecr.pose import Array
 
@@ -34,21 +34,21 @@ class Linear:
     width: Array
 
 
-def free_of(joint: Joint) -> NDArray[np.bool_]:
+def free_of(joint: JointFit) -> NDArray[np.bool_]:
     """(p,) parameters that are neither held nor on a bound."""
     terms = joint.terms
     on_bound = (terms.vector <= terms.lower) | (terms.vector >= terms.upper)
     return np.asarray((joint.width > 0.0) & ~on_bound)
 
 
-def unwhitened(joint: Joint) -> Linear:
+def unwhitened(joint: JointFit) -> Linear:
     """The linear model in units of the stated noise, its correlation left in."""
     free = free_of(joint)
     x = joint.jacobian * free
     return Linear(x, joint.state.white + x @ joint.z, joint.width * free)
 
 
-def linearised(setting: Setting, joint: Joint) -> Linear:
+def linearised(setting: Setting, joint: JointFit) -> Linear:
     """The linear model with the noise made white."""
     about = unwhitened(joint)
     chain, colour, weight = setting.chain, joint.colour, joint.weight
@@ -59,7 +59,7 @@ def linearised(setting: Setting, joint: Joint) -> Linear:
     )
 
 
-def groups_of(joint: Joint, widths: Callable[[Layout], Array]) -> dict[str, Group]:
+def groups_of(joint: JointFit, widths: Callable[[Layout], Array]) -> dict[str, ColumnGroup]:
     """The columns of each effect that are free and no shapes, with the widths they may have."""
     free = free_of(joint)
     out = {}
@@ -69,5 +69,5 @@ def groups_of(joint: Joint, widths: Callable[[Layout], Array]) -> dict[str, Grou
         own = own[free[own] & ~layout.shape]
         if len(own):
             one_sided = len(own) == 1 and bool(layout.lower[0] == layout.null[0])
-            out[term.name] = Group(own, widths(layout), one_sided)
+            out[term.name] = ColumnGroup(own, widths(layout), one_sided)
     return out

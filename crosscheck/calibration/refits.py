@@ -14,7 +14,7 @@ import numpy as np
 
 from crosscheck.calibration.catalogue import Catalogue, gram_about, widths_for
 from crosscheck.calibration.gram import Gram, averaged, best_widths, gram_of
-from crosscheck.calibration.joint import Joint, Setting, settle
+from crosscheck.calibration.joint import JointFit, Setting, settle
 from crosscheck.calibration.linearised import groups_of, linearised
 from crosscheck.calibration.sets import Names, Scores, explore, log_prior
 from crosscheck.fit.state import State, evaluate
@@ -45,7 +45,7 @@ class Refit:
     """
 
     names: Names
-    joint: Joint
+    joint: JointFit
     widths: dict[str, float]
     score: float
 
@@ -68,7 +68,7 @@ class Found:
 
 def compare_sets(
     setting: Setting,
-    joint: Joint,
+    joint: JointFit,
     catalogue: Catalogue,
     plain: State,
     told: Callable[[str], None] = lambda _text: None,
@@ -124,7 +124,12 @@ def _dropped(best: Refit, refit: Callable[[Iterable[Names]], Refit]) -> Refit:
 
 
 def _refitted(
-    setting: Setting, joint: Joint, catalogue: Catalogue, plain: State, scores: Scores, names: Names
+    setting: Setting,
+    joint: JointFit,
+    catalogue: Catalogue,
+    plain: State,
+    scores: Scores,
+    names: Names,
 ) -> Refit | None:
     """A set fitted exactly from its linear values, and from null where that ends badly."""
     linear, widths = scores.score(names), scores.widths(names)
@@ -164,8 +169,8 @@ def _inside(term: Term) -> Term:
 
 
 def _settled(
-    setting: Setting, joint: Joint, plain: State, terms: Terms, widths: dict[str, float]
-) -> Joint | None:
+    setting: Setting, joint: JointFit, plain: State, terms: Terms, widths: dict[str, float]
+) -> JointFit | None:
     state = evaluate(setting.problem, terms, setting.factor, plain)
     if not state.valid:
         return None
@@ -178,7 +183,7 @@ def _width(terms: Terms, widths: dict[str, float]) -> Array:
 
 
 def _scored(
-    setting: Setting, joint: Joint, names: Names, widths: dict[str, float], of: int
+    setting: Setting, joint: JointFit, names: Names, widths: dict[str, float], of: int
 ) -> Refit:
     """A fit with its evidence about its own optimum, averaged over widths."""
     gram = own_gram(setting, joint)
@@ -188,7 +193,7 @@ def _scored(
     return Refit(names, joint, widths | better, score - 0.5 * joint.state.log_det)
 
 
-def own_gram(setting: Setting, joint: Joint) -> Gram:
+def own_gram(setting: Setting, joint: JointFit) -> Gram:
     """Normal equations of a fit's own effects about its optimum; those on a bound are absent."""
     groups = groups_of(joint, widths_for)
     linear = linearised(setting, joint)

@@ -9,9 +9,10 @@ import numpy as np
 
 from crosscheck.comparison.associations import Association
 from crosscheck.comparison.quantities import QuantityKind
-from crosscheck.diagnosis.result import DiagnosisVerdict, MissingEffect
+from crosscheck.diagnosis.result import MissingEffect
 from crosscheck.diagnosis.rivals import Rival
 from crosscheck.diagnosis.search import Search
+from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.planning.extensions import Extension, extensions
 from crosscheck.planning.planned import Planned, Reads
 from crosscheck.planning.proposer import Suggestion, telling_apart

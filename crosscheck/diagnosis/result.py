@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from enum import StrEnum
 from typing import Any
 
 import numpy as np
@@ -15,34 +14,12 @@ from crosscheck.diagnosis.search import Search
 from crosscheck.files import plain
 from crosscheck.fit.noise import Whiteness
 from crosscheck.fit.problem import Rms
-from crosscheck.fit.reasons import Reason, Refusal
+from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Refusal
 from crosscheck.fit.words import rms_words, value_lines, value_records
 from seecr.effects import Term, Terms
 from seecr.effects.base import Layout
 from seecr.pose import Array
 from seecr.result import Record, Result
-
-
-class DiagnosisVerdict(StrEnum):
-    """What a diagnosis comes to, in the words of ``diagnosis.json``."""
-
-    NO_EFFECT_MISSING = "no_effect_missing", "model and data agree"
-    EFFECTS_FOUND = "effects_found", "what is left after them is noise"
-    UNKNOWN_EFFECT = "unknown_effect", "structure remains that no known effect explains"
-    NO_VERDICT = "no_verdict", "the data or the solves are not fit for one"
-
-    meaning: str
-
-    def __new__(cls, word: str, meaning: str) -> DiagnosisVerdict:
-        """A word with what it means."""
-        verdict = str.__new__(cls, word)
-        verdict._value_, verdict.meaning = word, meaning
-        return verdict
-
-    @property
-    def heading(self) -> str:
-        """The same as a heading."""
-        return self.value.replace("_", " ").capitalize()
 
 
 @dataclass(frozen=True, eq=False)

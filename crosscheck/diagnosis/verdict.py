@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from crosscheck.comparison.associations import Association, associations
 from crosscheck.diagnosis.advice import check_of, measure_next
-from crosscheck.diagnosis.result import Diagnosis, DiagnosisVerdict, MissingEffect, NotListed
+from crosscheck.diagnosis.result import Diagnosis, MissingEffect, NotListed
 from crosscheck.diagnosis.rivals import rivals_of
 from crosscheck.diagnosis.search import Search, search
 from crosscheck.diagnosis.small import is_plausible, share_of, small_effects_alone
@@ -21,7 +21,7 @@ from crosscheck.fit.gauss_newton import Fit
 from crosscheck.fit.noise import whiteness
 from crosscheck.fit.prepare import Prepared, Progress, noise_floor, outlying_rows, prepare
 from crosscheck.fit.problem import Problem, rms_by_kind
-from crosscheck.fit.reasons import Reason, Refusal, Unfit, Why
+from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Refusal, Unfit, Why
 from crosscheck.fit.state import derivatives
 from crosscheck.given import GivenModel, GivenRobot, model_of, robot_of
 from crosscheck.measurements.data import Measurements

@@ -6,7 +6,7 @@ Nothing is decided by the text: whoever asks why looks at the enum, as with :cla
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum
+from enum import Enum, StrEnum
 
 
 class Why(Enum):
@@ -111,3 +111,26 @@ class Refusal:
 
     def __str__(self) -> str:
         return self.unfit.value.format(rows=self.rows, lost=self.lost, readings=self.readings)
+
+
+class DiagnosisVerdict(StrEnum):
+    """What a diagnosis comes to, in the words of ``diagnosis.json``."""
+
+    NO_EFFECT_MISSING = "no_effect_missing", "model and data agree"
+    EFFECTS_FOUND = "effects_found", "what is left after them is noise"
+    MANY_EFFECTS = "many_effects", "no few effects explain the error, all together do"
+    UNKNOWN_EFFECT = "unknown_effect", "structure remains that no known effect explains"
+    NO_VERDICT = "no_verdict", "the data or the solves are not fit for one"
+
+    meaning: str
+
+    def __new__(cls, word: str, meaning: str) -> DiagnosisVerdict:
+        """A word with what it means."""
+        verdict = str.__new__(cls, word)
+        verdict._value_, verdict.meaning = word, meaning
+        return verdict
+
+    @property
+    def heading(self) -> str:
+        """The same as a heading."""
+        return self.value.replace("_", " ").capitalize()

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
-from crosscheck.diagnosis.result import DiagnosisVerdict, MissingEffect
+from crosscheck.diagnosis.result import MissingEffect
+from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.terminal.lines import console_for, print_parameters, rms_table, say
 
 if TYPE_CHECKING:

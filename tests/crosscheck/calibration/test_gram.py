@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import integrate, special, stats
 
-from crosscheck.calibration.gram import Gram, Group, averaged, best_widths, gram_of
+from crosscheck.calibration.gram import ColumnGroup, Gram, averaged, best_widths, gram_of
 from crosscheck.calibration.worth import log_gain, log_gains
 
 WIDTHS = np.array([0.1, 0.3, 1.0, 3.0, 10.0])
@@ -22,7 +22,7 @@ def toy(seed: int = 0, groups: int = 5, size: int = 3, one_sided: bool = False) 
     z[:size], z[2 * size : 3 * size] = 1.5, -2.0
     y = x @ z + rng.normal(size=60)
     parts = {
-        f"e{k}": Group(np.arange(k * size, (k + 1) * size), WIDTHS, one_sided)
+        f"e{k}": ColumnGroup(np.arange(k * size, (k + 1) * size), WIDTHS, one_sided)
         for k in range(groups)
     }
     return gram_of(x, y, parts)

@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.calibration.gram import Group, gram_of
-from crosscheck.calibration.judgement import Judgement, Verdict, judge
+from crosscheck.calibration.gram import ColumnGroup, gram_of
+from crosscheck.calibration.judgement import Judgement, judge
 from crosscheck.calibration.probability import all_scores, probabilities
 from crosscheck.calibration.refits import Found, Refit
 from crosscheck.calibration.sets import Scores
+from crosscheck.fit.reasons import DiagnosisVerdict
 
 NAMES = ("a", "b", "c", "d", "e", "f", "g")
 NO_FIT: Any = None
@@ -21,7 +22,7 @@ def found_of(scores: dict[str, float]) -> Found:
     refits = {frozenset(k): Refit(frozenset(k), NO_FIT, {}, s) for k, s in scores.items()}
     best = max(refits.values(), key=lambda r: r.score)
     x = np.random.default_rng(0).normal(size=(20, len(NAMES)))
-    groups = {n: Group(np.array([k]), np.array([1.0])) for k, n in enumerate(NAMES)}
+    groups = {n: ColumnGroup(np.array([k]), np.array([1.0])) for k, n in enumerate(NAMES)}
     return Found(refits, best, Scores(gram_of(x, 0.0 * x[:, 0], groups), len(NAMES)), True)
 
 
@@ -33,33 +34,33 @@ def judged(scores: dict[str, float], odds: float = -5.0, surprise: float = 1.0) 
 
 def test_none_is_best() -> None:
     said = judged({"": 0.0, "a": -4.0})
-    assert (said.verdict, said.sure) == (Verdict.NO_EFFECT_MISSING, ())
+    assert (said.verdict, said.sure) == (DiagnosisVerdict.NO_EFFECT_MISSING, ())
 
 
 def test_a_hint_of_an_effect_is_not_named() -> None:
     said = judged({"": -0.7, "a": 0.0})
-    assert (said.verdict, said.sure) == (Verdict.NO_EFFECT_MISSING, ())
+    assert (said.verdict, said.sure) == (DiagnosisVerdict.NO_EFFECT_MISSING, ())
 
 
 def test_one_effect_beyond_doubt() -> None:
     said = judged({"": -900.0, "a": 0.0, "ab": -3.0})
-    assert (said.verdict, said.sure) == (Verdict.EFFECTS_FOUND, ("a",))
+    assert (said.verdict, said.sure) == (DiagnosisVerdict.EFFECTS_FOUND, ("a",))
 
 
 def test_equals_share_their_certainty() -> None:
     said = judged({"": -900.0, "a": 0.0, "b": -1.0})
-    assert (said.verdict, said.sure) == (Verdict.EFFECTS_FOUND, ("a",))
+    assert (said.verdict, said.sure) == (DiagnosisVerdict.EFFECTS_FOUND, ("a",))
     assert said.undecided < 0.5
 
 
 def test_a_field_or_runs_left_out_make_it_unknown() -> None:
     scores = {"": -900.0, "a": 0.0}
-    assert judged(scores, odds=6.0).verdict is Verdict.UNKNOWN_EFFECT
+    assert judged(scores, odds=6.0).verdict is DiagnosisVerdict.UNKNOWN_EFFECT
     assert judged(scores, odds=6.0).sure == ()
-    assert judged(scores, surprise=3.0).verdict is Verdict.UNKNOWN_EFFECT
+    assert judged(scores, surprise=3.0).verdict is DiagnosisVerdict.UNKNOWN_EFFECT
 
 
 def test_a_large_set_is_many_effects_and_names_what_carries_it() -> None:
     without = {"abcdef".replace(x, ""): -40.0 for x in "bcdef"}
     said = judged({"": -90000.0, "abcdef": 0.0, "bcdef": -50000.0, **without})
-    assert (said.verdict, said.sure) == (Verdict.MANY_EFFECTS, ("a",))
+    assert (said.verdict, said.sure) == (DiagnosisVerdict.MANY_EFFECTS, ("a",))

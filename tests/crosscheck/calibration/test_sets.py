@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from crosscheck.calibration.field import cubic
-from crosscheck.calibration.gram import Gram, Group, gram_of
+from crosscheck.calibration.gram import ColumnGroup, Gram, gram_of
 from crosscheck.calibration.probability import probabilities
 from crosscheck.calibration.sets import Names, Scores, explore, log_prior, thinned
 
@@ -29,7 +29,7 @@ def toy(seed: int, there: tuple[int, ...], alike: bool = False) -> Gram:
     y = rng.normal(size=80)
     for k in there:
         y = y + x[:, parts[f"e{k}"]] @ rng.normal(size=counts[k])
-    return gram_of(x, y, {n: Group(c, WIDTHS) for n, c in parts.items()})
+    return gram_of(x, y, {n: ColumnGroup(c, WIDTHS) for n, c in parts.items()})
 
 
 def every_set(gram: Gram) -> list[Names]:
@@ -67,7 +67,7 @@ def test_a_large_set_is_thinned_without_losing_what_is_there() -> None:
     rng = np.random.default_rng(1)
     x = rng.normal(size=(200, 20))
     y = 3.0 * x[:, 4] - 4.0 * x[:, 11] + rng.normal(size=200)
-    gram = gram_of(x, y, {f"e{k}": Group(np.array([k]), WIDTHS) for k in range(20)})
+    gram = gram_of(x, y, {f"e{k}": ColumnGroup(np.array([k]), WIDTHS) for k in range(20)})
     left = thinned(Scores(gram, 20), frozenset(gram.names))
     assert len(left) <= 8
     assert {"e4", "e11"} <= left

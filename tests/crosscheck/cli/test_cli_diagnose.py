@@ -13,10 +13,9 @@ import pytest
 from made_data import case, run, term
 
 from crosscheck.diagnosis import verdict as verdict_module
-from crosscheck.diagnosis.result import DiagnosisVerdict
 from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.fit.gauss_newton import FitStatus
-from crosscheck.fit.reasons import Unfit
+from crosscheck.fit.reasons import DiagnosisVerdict, Unfit
 from crosscheck.measurements.read import load_measurements
 from crosscheck.measurements.write import write_measurements
 from seecr.mjcf import load_robot

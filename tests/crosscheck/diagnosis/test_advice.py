@@ -9,8 +9,8 @@ from made_data import soft_cogiro, term
 from crosscheck.comparison.associations import Association
 from crosscheck.comparison.quantities import QuantityKind
 from crosscheck.diagnosis.advice import check_of, measure_next, measured_directly
-from crosscheck.diagnosis.result import DiagnosisVerdict
 from crosscheck.diagnosis.search import Search, search
+from crosscheck.fit.reasons import DiagnosisVerdict
 
 
 @pytest.fixture(scope="module")

@@ -13,9 +13,10 @@ import pytest
 from recordings import Readback, headless_viewer
 
 from crosscheck.comparison.residuals import Comparison, compare
-from crosscheck.diagnosis.result import Diagnosis, DiagnosisVerdict
+from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import Stage, stages_of
 from crosscheck.fit.problem import KINDS, POSITION
+from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.recording.comparison import write_comparison_recording
 from crosscheck.recording.diagnosis import write_diagnosis_recording
 from crosscheck.recording.diagnosis_words import plain

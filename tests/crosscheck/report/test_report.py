@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from crosscheck.diagnosis.result import Diagnosis, DiagnosisVerdict, NotListed
+from crosscheck.diagnosis.result import Diagnosis, NotListed
 from crosscheck.diagnosis.steps import (
     by_block,
     drawn,
@@ -26,7 +26,7 @@ from crosscheck.diagnosis.steps import (
 )
 from crosscheck.fit.imitation import imitated
 from crosscheck.fit.problem import KINDS
-from crosscheck.fit.reasons import Reason, Why
+from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 from crosscheck.report import write_report
 from crosscheck.report.cables import Wall, draw_wall, paid_out, walls_of
 from crosscheck.report.confusion import confusion_of
