@@ -46,6 +46,14 @@ def check_of(term: Term, robot: Robot) -> str:
         return layout.effect.advice
 
 
+# Many small errors at once look like an unknown one: no single effect is worth anything before the
+# others are in.
+_ALL_AT_ONCE = (
+    "if every tolerance of the robot may be a little off: crosscheck calibrate fits all effects at "
+    "once and says what that predicts on runs left out"
+)
+
+
 def measure_next(
     found: Search,
     missing: Sequence[MissingEffect],
@@ -62,7 +70,7 @@ def measure_next(
         if not effect.rivals:
             out.append(f"to confirm {effect.effect}: {effect.check}")
     if verdict is DiagnosisVerdict.UNKNOWN_EFFECT:
-        out.append(_to_find(where))
+        out += [_to_find(where), _ALL_AT_ONCE]
     if verdict is DiagnosisVerdict.NO_EFFECT_MISSING:
         out.append("nothing is missing; to see smaller effects, see crosscheck plan")
     return list(dict.fromkeys(out))
