@@ -14,6 +14,9 @@ from seecr.effects.base import Layout
 
 # Models whose log evidence differs by less explain equally well.
 EQUAL = 3.0
+# A small effect with a parameter more costs about so much evidence though it explains the same: a
+# frame that yields alike in all directions is a cable behind the exit point, and has two numbers.
+_SMALL, _ONE_MORE = 3, 3.0
 # An effect that can imitate less than this part of another's signal is not refitted for it.
 _LIKELY = 0.9
 # A rival that leaves this much more chi2 has been told apart, whatever its evidence.
@@ -45,7 +48,8 @@ def rivals_of(found: Search, name: str) -> list[Rival]:
     without = found.trials.refit(rest, final.fit.state) if rest else found.steps[0].fit
     if not without.valid:
         return []
-    tried = [_rival(found, c, without) for c in _likely(found, name, without)]
+    own = len(final.fit.terms[name].layout)
+    tried = [_rival(found, c, without, own) for c in _likely(found, name, without)]
     out = [rival for rival in tried if rival is not None]
     # one that contains another (friction on a cable behind the exit point, with no friction)
     # says nothing that the other does not
@@ -54,8 +58,8 @@ def rivals_of(found: Search, name: str) -> list[Rival]:
     return sorted(out, key=lambda r: r.loss)
 
 
-def _rival(found: Search, candidate: Candidate, without: Fit) -> Rival | None:
-    """The candidate in place of the effect, if it explains the data as well."""
+def _rival(found: Search, candidate: Candidate, without: Fit, own: int) -> Rival | None:
+    """The candidate in place of the effect of ``own`` parameters, if it explains as well."""
     trials, final = found.trials, found.last
     trial = candidate
     if trial.fit is None or len(found.found) > 1:
@@ -70,7 +74,8 @@ def _rival(found: Search, candidate: Candidate, without: Fit) -> Rival | None:
     left = final.whiteness.inflation**2
     loss = (final.evidence.log - trials.evidence(best).log) / left
     worse = (best.chi2 - final.fit.chi2) / trials.noise_scale**2 / left
-    alike = abs(loss) < EQUAL and worse < _TOLD_APART
+    more = max(0, len(candidate.layout) - own) if len(candidate.layout) <= _SMALL else 0
+    alike = -EQUAL < loss < EQUAL + _ONE_MORE * more and worse < _TOLD_APART
     return Rival(candidate.name, best, loss) if alike else None
 
 

@@ -22,6 +22,7 @@ from crosscheck.fit.noise import whiteness
 from crosscheck.fit.prepare import Prepared, Progress, noise_floor, outlying_rows, prepare
 from crosscheck.fit.problem import Problem, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Refusal, Unfit, Why
+from crosscheck.fit.smooth import beyond_smooth
 from crosscheck.fit.state import derivatives
 from crosscheck.given import GivenModel, GivenRobot, model_of, robot_of
 from crosscheck.measurements.data import Measurements
@@ -184,7 +185,7 @@ def conclude(found: Search, notes: Sequence[str]) -> Diagnosis:
 def _warranted(found: Search) -> tuple[list[MissingEffect], Search]:
     """What the data warrant where structure is left over, and the way that far."""
     # what was found beside an effect that is not warranted is not warranted either
-    first = list(takewhile(_is_warranted, (_missing(found, name) for name in found.found)))
+    first = list(takewhile(lambda name: _is_warranted(found, name), found.found))
     if first:
         way: Search | None = replace(found, steps=found.steps[: 1 + len(first)])
     else:
@@ -194,10 +195,16 @@ def _warranted(found: Search) -> tuple[list[MissingEffect], Search]:
     return [_missing(way, name) for name in way.found], way
 
 
-def _is_warranted(effect: MissingEffect) -> bool:
-    few = len(effect.layout) <= _FEW_PARAMETERS
-    stopped = bool(np.any(effect.at_bound))
-    return few and effect.share > _LEAST_SHARE and not stopped and is_plausible(effect.term)
+def _is_warranted(found: Search, name: str) -> bool:
+    index = 1 + found.found.index(name)
+    before, step = found.steps[index - 1], found.steps[index]
+    best, part = found.last.fit, found.last.fit.terms.part(name)
+    few = len(best.terms[name].layout) <= _FEW_PARAMETERS and is_plausible(best.terms[name])
+    stopped = bool(np.any(best.at_bound[part]))
+    if not few or stopped or share_of(before, step) <= _LEAST_SHARE:
+        return False
+    # no share of what the field leaves: that may all be what nobody knows
+    return beyond_smooth(found.problem, before.fit.state, step.fit.state, 0.0)
 
 
 def _missing(found: Search, name: str) -> MissingEffect:

@@ -121,7 +121,8 @@ class LinearToy:
             table -= self.columns[term.name] @ term.sizes
         table = np.where(problem.measured, table, np.nan)
         white = table[problem.counted]
-        solved: Any = SimpleNamespace(solved=np.ones(len(table), dtype=bool))
+        told = problem.data.command_pose
+        solved: Any = SimpleNamespace(solved=np.ones(len(table), dtype=bool), pose=told)
         experiment: Any = None
         return State(
             terms, solved, table * problem.reading_sigma, table, white, np.zeros(0),
