@@ -88,7 +88,7 @@ def test_a_model_that_cannot_be_solved_gives_no_verdict_with_the_reason(
 def test_verdicts_are_the_words_of_the_file_with_a_heading_and_a_meaning() -> None:
     assert DiagnosisVerdict("effects_found") is DiagnosisVerdict.EFFECTS_FOUND
     assert [v.heading for v in DiagnosisVerdict] == [
-        "No effect missing", "Effects found", "Unknown effect", "No verdict",
+        "No effect missing", "Effects found", "Many effects", "Unknown effect", "No verdict",
     ]  # fmt: skip
     assert all(v.meaning for v in DiagnosisVerdict)
     assert json.dumps(made.pulleys().as_json()["verdict"]) == '"effects_found"'
