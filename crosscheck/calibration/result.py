@@ -75,7 +75,7 @@ class Calibrated(Result):
     def noise_lines(self) -> list[str]:
         """The noise of each kind of reading as the fit found it, and lines that hardly count."""
         out = [
-            f"noise of the {name}: {self.scale[name]:.2f} times the stated one, correlation "
+            f"noise of the {name}: {self.scale[name]:.2f} times the assumed one, correlation "
             f"{self.rho[name]:.2f} along a run"
             for name in self.scale
         ]
