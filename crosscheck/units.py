@@ -65,28 +65,31 @@ class Unit:
 UNITS = (
     Unit("", "", column=True),
     Unit("m", "m", column=True),
-    Unit("cm", "m", over=100.0),
+    Unit("cm", "m", over=100.0, column=True),
     Unit("mm", "m", over=1000.0, column=True, shown=True),
-    Unit("um", "m", over=1e6, also=("µm",)),
+    Unit("um", "m", over=1e6, also=("µm",), column=True),
     Unit("rad", "rad", column=True),
     Unit("mrad", "rad", over=1000.0),
     Unit("deg", "rad", times=math.pi / 180.0, also=("°",), column=True, shown=True),
     Unit("N", "N", column=True),
     Unit("mN", "N", over=1000.0),
-    Unit("kN", "N", times=1000.0),
+    Unit("kN", "N", times=1000.0, column=True),
+    Unit("kg", "kg", column=True),
+    Unit("g", "kg", over=1000.0, column=True),
     Unit("s", "s", column=True),
+    Unit("ms", "s", over=1000.0, column=True),
     Unit("C", "C", symbol="°C", column=True, shown=True),
-    Unit("Nm", "Nm", symbol="N m", shown=True),
+    Unit("Nm", "Nm", symbol="N m", column=True, shown=True),
     Unit("mm_per_N", "m_per_N", over=1000.0, symbol="mm/N", shown=True),
     Unit("um_per_m_K", "1_per_K", over=1e6, symbol="µm/(m K)", shown=True),
 )
 """Every unit that files, people and results use."""
 
-SI = {"position": "m", "orientation": "rad", "tension": "N"}
-"""The SI unit of each kind of reading."""
+SI = {"position": "m", "orientation": "rad", "tension": "N", "length": "m"}
+"""The SI unit of each kind of reading, and of commanded lengths."""
 
-EXAMPLE = {"position": "0.5mm", "orientation": "0.2deg", "tension": "1N"}
-"""What a person may type for each kind of reading."""
+EXAMPLE = {"position": "0.5mm", "orientation": "0.2deg", "tension": "1N", "length": "0.2mm"}
+"""What a person may type for each of them."""
 
 _SHOWN = {unit.si: unit for unit in UNITS if unit.shown}
 _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
@@ -112,7 +115,7 @@ def parse_quantity(label: str, kind: str, text: str) -> float:
 
     Args:
         label: the option or key, to say where.
-        kind: "position", "orientation" or "tension".
+        kind: one of :data:`SI`.
         text: such as ``0.5mm``.
 
     Raises:

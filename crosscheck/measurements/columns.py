@@ -181,7 +181,8 @@ _SI = {"run": "", "t": "s", "temperature": "C"}
 def _unit_fault(quantity: str, suffix: str, units: dict[str, Unit]) -> str:
     if "" in units:
         return f"a quaternion has no unit, got {show(suffix)}; expected {quantity}"
-    expected = " or ".join(f"{quantity}_{unit}" for unit in units)
+    *others, last = [f"{quantity}_{unit}" for unit in units]
+    expected = f"{', '.join(others)} or {last}" if others else last
     fault = f"unknown unit {show(suffix)}" if suffix else "missing unit"
     return f"{fault}; expected {expected}"
 

@@ -25,7 +25,9 @@ from crosscheck.units import (
 def test_columns_of_millimetres_are_rounded_once() -> None:
     # 103 * 1e-3 is another double than 0.103
     assert of_columns("m")["mm"].to_si(np.array([103.0]))[0] == 0.103 != 103.0 * 1e-3
-    assert set(of_columns("m")) == {"m", "mm"} and set(of_columns("rad")) == {"rad", "deg"}
+    assert set(of_columns("m")) == {"m", "cm", "mm", "um"}
+    assert set(of_columns("rad")) == {"rad", "deg"} and set(of_columns("N")) == {"N", "kN"}
+    assert set(of_columns("kg")) == {"kg", "g"} and set(of_columns("s")) == {"s", "ms"}
     assert of_columns("rad")["deg"].to_si(180.0) == np.deg2rad(180.0)
 
 
@@ -61,6 +63,7 @@ def test_each_spelling_and_each_shown_unit_is_there_once() -> None:
         ("orientation", "180°", math.pi),
         ("orientation", "1e1 mrad", 0.01),
         ("tension", "2kN", 2000.0),
+        ("length", "0.1 cm", 0.001),
     ],
 )
 def test_quantities_with_their_unit(kind: str, text: str, value: float) -> None:

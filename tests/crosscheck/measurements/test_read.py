@@ -332,18 +332,21 @@ REFUSED = {
     ),
     "no unit": (
         ["cmd_x,cmd_y_m,cmd_z_m,meas_x_m", "0,0,0,0"],
-        "line 1, column cmd_x: missing unit; expected cmd_x_m or cmd_x_mm",
+        "line 1, column cmd_x: missing unit; expected cmd_x_m, cmd_x_cm, cmd_x_mm or cmd_x_um",
     ),
     "inches": (
         ["cmd_x_in,cmd_y_m,cmd_z_m,meas_x_m", "0,0,0,0"],
-        "line 1, column cmd_x_in: unknown unit 'in'; expected cmd_x_m or cmd_x_mm",
+        "line 1, column cmd_x_in: unknown unit 'in'; expected cmd_x_m, cmd_x_cm",
     ),
     "metres as angle": (
         [CMD + ",meas_rx_m", "0,0,0,0"],
         "column meas_rx_m: unknown unit 'm'; expected meas_rx_rad or meas_rx_deg",
     ),
     "small n": ([CMD + ",tension_1_n", "0,0,0,0"], "unknown unit 'n'; expected tension_1_N"),
-    "milliseconds": (["t_ms," + POSE, "0,0,0,0,0"], "column t_ms: unknown unit 'ms'; expected t_s"),
+    "minutes": (
+        ["t_min," + POSE, "0,0,0,0,0"],
+        "column t_min: unknown unit 'min'; expected t_s or t_ms",
+    ),
     "time without unit": (["t," + POSE, "0,0,0,0,0"], "column t: missing unit; expected t_s"),
     "kelvin": (["temperature_K," + POSE, "0,0,0,0,0"], "unknown unit 'K'; expected temperature_C"),
     "quaternion unit": (
