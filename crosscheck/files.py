@@ -1,32 +1,16 @@
-"""Files: read with the place of what is wrong in them, written whole or not at all.
+"""Files as both packages read and write them; the names are :mod:`seecr.files`' own."""
 
-Text, TOML and JSON of the whole package go through here, so that a file that is missing, of
-another kind or not to be written is told in the same words everywhere.
-"""
-
-from __future__ import annotations
-
-import contextlib
-import errno
-import json
-import math
-import os
-import re
-import shutil
-import tempfile
-import tomllib
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass
-from enum import Enum
-from pathlib import Path
-from typing import Any
-
-import numpy as np
-
-from crosscheck.errors import CrosscheckError
-from seecr.errors import InputFileError
-from seecr.files import read_text, reason_of
+from seecr.files import (
+    Toml,
+    json_text,
+    plain,
+    read_text,
+    read_toml,
+    staged,
+    write_text,
+    write_texts,
+    written,
+)
 
 __all__ = [
     "Toml",
@@ -39,151 +23,3 @@ __all__ = [
     "write_texts",
     "written",
 ]
-
-
-@dataclass(frozen=True, eq=False)
-class Toml:
-    """A TOML file of the user's: what it says, and on which line it says so.
-
-    Attributes:
-        path: the file. text: all of it. content: its tables and values.
-    """
-
-    path: Path
-    text: str
-    content: dict[str, Any]
-
-    def error(self, text: str, key: str = "") -> InputFileError:
-        """An error, at the line of a key or table where one is named."""
-        return InputFileError.at(self.path, text, line=self.line_of(key) if key else None)
-
-    def line_of(self, key: str) -> int | None:
-        """The first line, from 1, that gives a key its value or opens the table of that name."""
-        name = re.escape(key)
-        pattern = re.compile(rf"^[^#]*(?:\b{name}\b[\"']?\s*=|\[\s*{name}\s*\])")
-        lines = enumerate(self.text.splitlines(), start=1)
-        return next((number for number, line in lines if pattern.match(line)), None)
-
-
-def read_toml(path: Path, expected: str) -> Toml:
-    """A TOML file.
-
-    Raises:
-        InputFileError: the file is missing, unreadable, not UTF-8 or not TOML.
-    """
-    text = read_text(path, expected)
-    try:
-        return Toml(path, text, tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:
-        # tomllib's sentence ends with line and column
-        raise InputFileError.at(path, f"is not TOML: {error}; {expected}") from None
-
-
-@contextmanager
-def written(*paths: Path, failure: str = "cannot be written") -> Iterator[tuple[Path, ...]]:
-    """Temporary files that take the place of others, all together, when the block ends well.
-
-    Args:
-        paths: the files to be written, renamed in that order; errors name the last.
-        failure: what went wrong if the system refuses, such as "cannot write the report".
-
-    Raises:
-        InputFileError: one of them cannot be written; all are then as they were.
-    """
-    temporary = tuple(path.with_name(f".{path.name}.{os.getpid()}.part") for path in paths)
-    try:
-        for path in paths:
-            if path.is_dir():  # else found out after others have been renamed
-                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
-        yield temporary
-        for part, path in zip(temporary, paths, strict=True):
-            part.replace(path)
-    except OSError as error:
-        raise InputFileError.at(paths[-1], f"{failure}: {reason_of(error)}") from None
-    finally:
-        for part in temporary:
-            with contextlib.suppress(OSError):
-                part.unlink()
-
-
-def write_texts(contents: Mapping[Path, str], failure: str = "cannot be written") -> None:
-    """Write files in UTF-8 together: all of them, in this order, or none."""
-    with written(*contents, failure=failure) as parts:
-        for part, text in zip(parts, contents.values(), strict=True):
-            part.write_text(text, encoding="utf-8", newline="\n")
-
-
-def write_text(path: Path, text: str, failure: str = "cannot be written") -> None:
-    """Write one file in UTF-8, or leave what was there."""
-    write_texts({path: text}, failure)
-
-
-@contextmanager
-def staged(out: str | Path) -> Iterator[Path]:
-    """A temporary folder whose files move into ``out`` when the block ends well.
-
-    It lies inside ``out``, so that moving is renaming; if the block fails, ``out`` is as it was.
-
-    Args:
-        out: the folder of results, made if need be.
-
-    Raises:
-        CrosscheckError: it cannot be made or written to; said before any work is done.
-    """
-    out = Path(out)
-    made = _missing(out)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        folder = Path(tempfile.mkdtemp(prefix=".unfinished-", dir=out))
-    except OSError as error:
-        _remove_empty(made)
-        raise CrosscheckError(
-            f"--out {out}: cannot write there: {reason_of(error)}; expected a folder that can be "
-            "made or written to"
-        ) from None
-    done = False
-    try:
-        yield folder
-        for file in sorted(folder.iterdir()):
-            file.replace(out / file.name)
-        done = True
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-        if not done:
-            _remove_empty(made)
-
-
-def _missing(path: Path) -> list[Path]:
-    """The folders that have to be made, innermost first."""
-    return [folder for folder in (path, *path.parents) if not folder.exists()]
-
-
-def _remove_empty(folders: list[Path]) -> None:
-    for folder in folders:
-        if folder.is_dir() and not any(folder.iterdir()):
-            folder.rmdir()
-
-
-def json_text(document: Mapping[str, Any], indent: int | None = 1) -> str:
-    """A document as JSON, without a newline at the end."""
-    return json.dumps(plain(document), indent=indent, allow_nan=False, ensure_ascii=False)
-
-
-def plain(value: Any) -> Any:
-    """What JSON can say: null for numbers that are not finite, an enum's name in small letters.
-
-    Whatever has a method ``as_json`` says itself what it is.
-    """
-    if hasattr(value, "as_json"):
-        return plain(value.as_json())
-    if isinstance(value, Mapping):
-        return {str(key): plain(part) for key, part in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
-        return plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [plain(part) for part in value]
-    if isinstance(value, Enum):
-        return value.name.lower()
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

@@ -22,7 +22,7 @@ from seecr.result import Result
 
 ROOT = Path(__file__).resolve().parents[1]
 FACES = [seecr, crosscheck]
-COMMANDS = [path for path in modules("crosscheck") if path.parent.name == "cli"]
+COMMANDS = [p for face in ("seecr", "crosscheck") for p in modules(face) if p.parent.name == "cli"]
 RESULTS = [
     crosscheck.Addition,
     crosscheck.CaseResult,
@@ -77,7 +77,7 @@ def taken(path: Path) -> set[tuple[str, str]]:
 
 def is_public(module: str, name: str) -> bool:
     """Whether a package, folder or file declares the name."""
-    own = module.startswith("crosscheck.cli")
+    own = module.startswith(("seecr.cli", "crosscheck.cli"))
     return own or name in {*getattr(import_module(module), "__all__", ()), "__version__"}
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from crosscheck.cli.options import FILE, json_option, progress_share
+from seecr.cli.options import FILE, json_option, progress_share
 
 if TYPE_CHECKING:
     from crosscheck import Addition

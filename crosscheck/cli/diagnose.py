@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from crosscheck.cli.options import FILE, json_option, out_option, progress_share
+from seecr.cli.options import FILE, json_option, out_option, progress_share
 
 
 @click.command(

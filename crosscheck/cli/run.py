@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from crosscheck.cli.options import (
+from seecr.cli.options import (
     FILE,
     jobs_option,
     json_option,

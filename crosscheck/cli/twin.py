@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from crosscheck.cli.options import FILE, json_option, out_option, progress_bar
+from seecr.cli.options import FILE, json_option, out_option, progress_bar
 
 if TYPE_CHECKING:
     from crosscheck import Twin

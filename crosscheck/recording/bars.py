@@ -9,10 +9,10 @@ import rerun.blueprint as rrb
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import Stage, floor_of
 from crosscheck.fit.problem import Kind, kinds_read
-from crosscheck.recording import colours, layout
-from crosscheck.recording.colours import Rgba
-from crosscheck.recording.stream import Recording
 from crosscheck.units import short
+from seecr.recording import colours, layout
+from seecr.recording.colours import Rgba
+from seecr.recording.stream import Recording
 
 ROOT = "bars"
 # The drawing is 100 wide; y points down, one row per model.

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import rerun.blueprint as rrb
 
-from crosscheck.recording import layout, shapes
-from crosscheck.recording.colours import COMMAND, MUJOCO, SEECR
 from crosscheck.recording.material import Material, gather
 from crosscheck.recording.panels import Panels
-from crosscheck.recording.scene import LEGEND, Scene, write_legend
 from crosscheck.recording.series import LANES, Series
-from crosscheck.recording.stream import (
+from seecr.recording import layout, shapes
+from seecr.recording.colours import COMMAND, MUJOCO, SEECR
+from seecr.recording.scene import LEGEND, Scene, write_legend
+from seecr.recording.stream import (
     Recording,
     pose_index,
     recording_file,

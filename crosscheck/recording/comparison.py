@@ -11,12 +11,13 @@ import rerun.blueprint as rrb
 
 from crosscheck.comparison.quantities import channels
 from crosscheck.fit.problem import Kind
-from crosscheck.recording import colours, layout, misfit, plots, shapes, words
+from crosscheck.recording import misfit, words
 from crosscheck.recording.diagnosis_words import plain
 from crosscheck.recording.misfit import MEASURED, Misfit
-from crosscheck.recording.scene import Scene
-from crosscheck.recording.stream import Recording, pose_index, recording_file
 from crosscheck.units import in_unit, short
+from seecr.recording import colours, layout, plots, shapes
+from seecr.recording.scene import Scene
+from seecr.recording.stream import Recording, pose_index, recording_file
 
 if TYPE_CHECKING:
     from crosscheck.comparison.result import Comparison

@@ -16,12 +16,13 @@ import rerun.blueprint as rrb
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import Stage, stages_of
 from crosscheck.fit.problem import Kind
-from crosscheck.recording import bars, colours, layout, misfit, plots, shapes, words
+from crosscheck.recording import bars, misfit, words
 from crosscheck.recording.diagnosis_words import model_words, pose_words, verdict_words
 from crosscheck.recording.misfit import MEASURED, Misfit
-from crosscheck.recording.scene import Scene
-from crosscheck.recording.stream import MODEL_STEP, Recording, pose_index, recording_file
 from seecr.pose import Array
+from seecr.recording import colours, layout, plots, shapes
+from seecr.recording.scene import Scene
+from seecr.recording.stream import MODEL_STEP, Recording, pose_index, recording_file
 
 _MARKDOWN = rr.MediaType.MARKDOWN
 _STEPS_A_SECOND = 1.0

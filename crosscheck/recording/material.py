@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.recording import colours, words
-from crosscheck.recording.shapes import States
+from crosscheck.recording import words
 from crosscheck.settle.physics import Physics
 from crosscheck.settle.settler import Settler, Settling
 from crosscheck.suite.agreement import Differences
 from crosscheck.suite.verdicts import Verdict
 from seecr.pose import Array, pose_difference
+from seecr.recording import colours
+from seecr.recording.shapes import States
 from seecr.robot import Robot
 from seecr.solution import Status
 

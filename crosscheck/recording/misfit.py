@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from crosscheck.diagnosis.steps import drawn, magnification, views_of
 from crosscheck.fit.problem import POSITION, Kind, Problem, kinds_read
 from crosscheck.fit.state import State
-from crosscheck.recording import colours, layout
-from crosscheck.recording.shapes import States
-from crosscheck.recording.stream import Recording
 from seecr.pose import Array, quat_from_rxyz, rxyz_from_quat
+from seecr.recording import colours, layout
+from seecr.recording.shapes import States
+from seecr.recording.stream import Recording
 
 MEASURED: colours.Rgba = colours.MUJOCO
 # Top of a colour scale: this percentile of the errors.

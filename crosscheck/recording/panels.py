@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from crosscheck.recording import words
 from crosscheck.recording.material import Material
-from crosscheck.recording.stream import Recording
 from crosscheck.suite.verdicts import Verdict
 from seecr.pose import pose_difference
+from seecr.recording.stream import Recording
 
 READ_ME, NOW = "text/read_me", "text/now"
 _LISTED = 12

@@ -7,11 +7,12 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from crosscheck.recording import colours, layout, plots
-from crosscheck.recording.colours import Rgba
 from crosscheck.recording.material import Material
-from crosscheck.recording.stream import Recording
+from crosscheck.suite.verdicts import UNSOLVED, Verdict
 from seecr.pose import Array, pose_difference
+from seecr.recording import colours, layout, plots
+from seecr.recording.colours import Rgba
+from seecr.recording.stream import Recording
 
 DEVIATION, TILT, TENSION = "plot/deviation", "plot/tilt", "plot/tension"
 DIFFERENCE, SETTLED, LIMIT = "plot/difference", "plot/plain_settling", "plot/limit"
@@ -21,6 +22,10 @@ VERDICT = f"{LANES}/Verdict"
 _UNSEEN = 1e-6
 # What moves less than this [mm or degrees] does not move, and is shown on an axis of this.
 _NOISE, _STILL = 1e-6, 0.1
+_GREEN: Rgba = (24, 92, 60, 255)
+_RED: Rgba = (215, 45, 45, 255)
+_YELLOW: Rgba = (150, 120, 20, 255)
+_PURPLE: Rgba = (110, 50, 120, 255)
 _COMPONENTS: dict[str, Rgba] = {
     "dx": colours.SKY,
     "dy": colours.GREEN,
@@ -69,7 +74,7 @@ class Series:
         self._lanes(index, plots.lane_states(material.seecr.slack, material.slack_differs, both))
         verdicts = [verdict.name.lower() for verdict in material.result.verdict]
         plots.lanes(self.recording, VERDICT, index, verdicts)
-        plots.verdict_style(self.recording, VERDICT)
+        _verdict_style(self.recording)
         self._style()
 
     def over_settling(self, index: rr.TimeColumn) -> None:
@@ -143,6 +148,14 @@ class Series:
         else:
             plots.as_crosses(self.recording, line, name, colour, 4.5)
         plots.as_dots(self.recording, dots, name, colour, 2.5)
+
+
+def _verdict_style(recording: Recording) -> None:
+    """Green where all is well, red where a threshold is exceeded, in between findings."""
+    shades = {verdict.name.lower(): _YELLOW for verdict in Verdict}
+    shades |= {"agrees": _GREEN, "differs": _RED}
+    shades |= {verdict.name.lower(): _PURPLE for verdict in UNSOLVED}
+    plots.state_colours(recording, VERDICT, shades)
 
 
 def _components(material: Material) -> tuple[list[str], list[str]]:

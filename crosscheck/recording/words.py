@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from crosscheck.recording.plots import DEG, MM
 from seecr.pose import Array, pose_difference, rxyz_from_quat
+from seecr.recording.plots import DEG, MM
 
 _READ_ME = """# {name}
 {sentence}

@@ -14,11 +14,11 @@ import click
 import pytest
 from click.testing import CliRunner, Result
 
-from crosscheck import cli
 from crosscheck.cli import COMMANDS, main
 from crosscheck.suite import effects as effect_suite
 from crosscheck.suite import run as suite
 from crosscheck.twin.robot import TRUE_EFFECTS
+from seecr.cli.group import LazyGroup
 from seecr.shipped import model_path
 
 SMALL = ("--case", "planar-two-cable", "--no-recordings", "--jobs", "1")
@@ -337,7 +337,7 @@ def test_interrupts_end_as_in_a_shell(monkeypatch):
 
     monkeypatch.setitem(COMMANDS, "probe", ("probe", ""))
     probe = click.command()(interrupted)
-    monkeypatch.setattr(cli.LazyGroup, "get_command", lambda self, ctx, name: probe)
+    monkeypatch.setattr(LazyGroup, "get_command", lambda self, ctx, name: probe)
     result = CliRunner().invoke(main, ["probe"])
     assert result.exit_code == 130
     assert result.stderr.strip() == "crosscheck: interrupted"

@@ -7,8 +7,8 @@ import pytest
 from click.testing import CliRunner
 
 from crosscheck.cli.compare import command as compare_command
-from crosscheck.cli.options import json_option, out_option, progress_bar, progress_share
 from crosscheck.comparison.limits import RULES, option
+from seecr.cli.options import json_option, out_option, progress_bar, progress_share
 
 
 @click.command()

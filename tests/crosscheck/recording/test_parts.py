@@ -11,11 +11,12 @@ from made_data import soft_cogiro
 from recordings import Readback
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.recording import bars, layout, plots
-from crosscheck.recording.scene import Scene, write_legend
-from crosscheck.recording.shapes import States
-from crosscheck.recording.stream import pose_index, recording_file, settling_index
+from crosscheck.recording import bars
 from seecr.errors import InputFileError
+from seecr.recording import layout, plots
+from seecr.recording.scene import Scene, write_legend
+from seecr.recording.shapes import States
+from seecr.recording.stream import pose_index, recording_file, settling_index
 
 
 def blueprint() -> rrb.Blueprint:

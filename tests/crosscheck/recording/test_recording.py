@@ -13,9 +13,7 @@ import pytest
 from recordings import Readback, headless_viewer
 from rerun.chunk import RrdReader
 
-from crosscheck.recording import shapes
 from crosscheck.recording.case import write_case_recording
-from crosscheck.recording.colours import cable_colours, round_up, scale_colours
 from crosscheck.recording.panels import NOW, READ_ME
 from crosscheck.recording.series import Series
 from crosscheck.settle.relax import SettleStatus
@@ -28,6 +26,8 @@ from crosscheck.suite.verdicts import Verdict
 from seecr.errors import InputFileError
 from seecr.mjcf import load_robot
 from seecr.pose import quat_conjugate, quat_multiply
+from seecr.recording import shapes
+from seecr.recording.colours import cable_colours, round_up, scale_colours
 from seecr.shipped import model_path
 from seecr.solution import Status
 

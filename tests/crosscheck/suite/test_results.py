@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from crosscheck.errors import CrosscheckError
 from crosscheck.files import json_text, staged
 from crosscheck.suite import words
 from crosscheck.suite.cases import Case, demobot_sweep
@@ -25,6 +24,7 @@ from crosscheck.suite.thresholds import load_thresholds
 from crosscheck.suite.verdicts import PoseFinding, Verdict
 from crosscheck.suite.worst_pose import worst_pose, write_worst_pose
 from crosscheck.terminal.suite import print_run
+from seecr.errors import SeecrError
 from seecr.shipped import model_path
 
 THRESHOLDS = load_thresholds()
@@ -256,6 +256,6 @@ def test_output_folder_is_complete_or_untouched(tmp_path):
 
 def test_a_folder_that_cannot_be_made(tmp_path):
     (tmp_path / "file").write_text("")
-    refusal = pytest.raises(CrosscheckError, match=r"--out .*file/out: cannot write there: Not a")
+    refusal = pytest.raises(SeecrError, match=r"--out .*file/out: cannot write there: Not a")
     with refusal, staged(tmp_path / "file" / "out"):
         pytest.fail("must not get here")

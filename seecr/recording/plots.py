@@ -8,10 +8,9 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from crosscheck.recording.colours import Rgba
-from crosscheck.recording.stream import Recording
-from crosscheck.suite.verdicts import UNSOLVED, Verdict
 from seecr.pose import Array, pose_difference
+from seecr.recording.colours import Rgba
+from seecr.recording.stream import Recording
 
 MM, DEG = 1e3, 180.0 / np.pi
 TRANSLATIONS, TURNS = ("dx", "dy", "dz"), ("about x", "about y", "about z")
@@ -24,10 +23,7 @@ TAUT, SLACK, DIFFER, NONE = "taut", "slack", "differs", "no answer"
 _DIM = 0.55
 _GREY: Rgba = (70, 72, 76, 255)
 _BLACK: Rgba = (20, 20, 20, 255)
-_GREEN: Rgba = (24, 92, 60, 255)
 _RED: Rgba = (215, 45, 45, 255)
-_YELLOW: Rgba = (150, 120, 20, 255)
-_PURPLE: Rgba = (110, 50, 120, 255)
 
 
 def as_line(recording: Recording, entity: str, name: str, colour: Rgba, width: float) -> None:
@@ -94,18 +90,11 @@ def lanes(recording: Recording, entity: str, index: rr.TimeColumn, words: Sequen
 def lane_style(recording: Recording, entity: str, colour: Rgba) -> None:
     """Taut in the cable's colour, slack in grey; warnings stand out."""
     shades = {TAUT: _dim(colour), SLACK: _GREY, DIFFER: _RED, NONE: _BLACK}
-    _state_colours(recording, entity, shades)
+    state_colours(recording, entity, shades)
 
 
-def verdict_style(recording: Recording, entity: str) -> None:
-    """Green where all is well, red where a threshold is exceeded, in between findings."""
-    shades = {verdict.name.lower(): _YELLOW for verdict in Verdict}
-    shades |= {"agrees": _GREEN, "differs": _RED}
-    shades |= {verdict.name.lower(): _PURPLE for verdict in UNSOLVED}
-    _state_colours(recording, entity, shades)
-
-
-def _state_colours(recording: Recording, entity: str, shades: dict[str, Rgba]) -> None:
+def state_colours(recording: Recording, entity: str, shades: dict[str, Rgba]) -> None:
+    """Words of a lane with their colours."""
     style = rr.StateConfiguration(
         values=list(shades), labels=list(shades), colors=list(shades.values())
     )

@@ -13,7 +13,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import ArrayLike
 
-from crosscheck.files import written
+from seecr.files import written
 from seecr.pose import Array
 
 POSE, SETTLING, MODEL_STEP = "pose", "settling_time", "model_step"

@@ -8,11 +8,11 @@ from __future__ import annotations
 import numpy as np
 import rerun as rr
 
-from crosscheck.recording import colours, shapes
-from crosscheck.recording.colours import Rgba
-from crosscheck.recording.shapes import States
-from crosscheck.recording.stream import Recording
 from seecr.pose import Array, transform_points
+from seecr.recording import colours, shapes
+from seecr.recording.colours import Rgba
+from seecr.recording.shapes import States
+from seecr.recording.stream import Recording
 from seecr.robot import Robot
 
 ROOT, LEGEND = "scene", "legend"

@@ -8,10 +8,10 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from crosscheck.recording import scene as scenes
-from crosscheck.recording import shapes
-from crosscheck.recording.stream import POSE
 from seecr.pose import Array
+from seecr.recording import scene as scenes
+from seecr.recording import shapes
+from seecr.recording.stream import POSE
 from seecr.robot import Robot
 
 # Half the viewer's vertical field of view [rad], and the part of it that is filled.

@@ -1,0 +1,1 @@
+"""The command line of seecr, and what command lines share."""

@@ -1,0 +1,81 @@
+"""A command line whose commands live in modules of their own, imported only when used."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from importlib import import_module
+from typing import Any, TypeAlias
+
+import click
+
+from seecr import SeecrError
+
+CommandTable: TypeAlias = Mapping[str, tuple[str, str]]
+
+BAD_INPUT = 2
+# As a shell counts what SIGINT and SIGPIPE end.
+_INTERRUPTED, _CUT_OFF = 130, 141
+
+
+class LazyGroup(click.Group):
+    """A group that imports a command when it is called, and ends bad input in one line.
+
+    Args:
+        package: where the commands' modules are; each holds its own as ``command``.
+        table: of each command its module and its line in ``--help``, in the order of the help.
+    """
+
+    def __init__(self, *args: Any, package: str, table: CommandTable, **extra: Any) -> None:
+        super().__init__(*args, **extra)
+        self.package, self.table = package, table
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names in the order of the table."""
+        return list(self.table)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """The command, imported."""
+        if cmd_name not in self.table:
+            return None
+        module = import_module(f"{self.package}.{self.table[cmd_name][0]}")
+        command: click.Command = module.command
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """List the commands without importing them."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, line) for name, (_, line) in self.table.items()])
+
+    def main(self, *args: Any, **extra: Any) -> Any:
+        """Run; bad input is one line on standard error and status 2, never a traceback."""
+        if not extra.pop("standalone_mode", True):
+            return self._run(*args, **extra)
+        try:
+            status = self._run(*args, **extra)
+        except click.ClickException as error:
+            sys.exit(self._refuse(_usage_text(error)))
+        except SeecrError as error:
+            sys.exit(self._refuse(str(error), error.exit_status))
+        except SystemExit as done:
+            # click ends 1 when whoever read our output has left; here 1 means something else
+            sys.exit(_CUT_OFF if done.code == 1 else done.code)
+        except OSError as error:
+            sys.exit(self._refuse(f"{error.filename or 'file'}: {error.strerror or error}"))
+        except (click.Abort, KeyboardInterrupt):
+            sys.exit(self._refuse("interrupted", _INTERRUPTED))
+        sys.exit(status if isinstance(status, int) else 0)
+
+    def _refuse(self, text: str, status: int = BAD_INPUT) -> int:
+        click.echo(f"{self.package.partition('.')[0]}: {' '.join(text.split())}", err=True)
+        return status
+
+    def _run(self, *args: Any, **extra: Any) -> Any:
+        # click's overloads tell its two modes apart by a literal that *args hides
+        return super().main(*args, standalone_mode=False, **extra)  # type: ignore[call-overload]
+
+
+def _usage_text(error: click.ClickException) -> str:
+    context = getattr(error, "ctx", None)
+    hint = f" (see {context.command_path} --help)" if context is not None else ""
+    return f"{error.format_message()}{hint}"
