@@ -38,6 +38,7 @@ if TYPE_CHECKING:
         SeecrError,
     )
     from seecr.experiment import Experiment, Prediction, predict
+    from seecr.loads import Loads
     from seecr.mjcf import load_robot
     from seecr.model import Model, load_model, new_model
     from seecr.planar import bar_tilt, midline_point, solution_manifold
@@ -60,6 +61,7 @@ _MODULES = {
     "equilibrium": ("solve",),
     "errors": ("InputError", "InputFileError", "MissingPackageError", "RobotError", "SeecrError"),
     "experiment": ("Experiment", "Prediction", "predict"),
+    "loads": ("Loads",),
     "mjcf": ("load_robot",),
     "model": ("Model", "load_model", "new_model"),
     "planar": ("bar_tilt", "midline_point", "solution_manifold"),
@@ -79,6 +81,7 @@ __all__ = [
     "InputError",
     "InputFileError",
     "Joint",
+    "Loads",
     "MissingPackageError",
     "Model",
     "Prediction",

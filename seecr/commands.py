@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from seecr.loads import Loads
 from seecr.pose import Array
 from seecr.robot import Robot
 
@@ -23,6 +24,13 @@ class Commands:
         temperature: (n,) [deg C] or None.
         passed: (k, n, m) [m] commanded changes of length (or lengths) that the way to each row
             passes, in order: where it starts and where cables turn round; None where nobody asks.
+        told: whether lengths are what the winches were told, counted as the plain robot counts: its
+            rest lengths at the reference pose, and from there the winch turns by the difference.
+            Lengths that are not told are absolute: all the cable there is from the exit point on.
+        loads: what the platform carried, or None.
+        stands: (n,) bool, rows whose run starts at its first row, at rest; the others' runs start
+            at the reference pose. None: all of them.
+        clock: (n,) int, number of the clock that ``time`` is read from; None for one alone.
     """
 
     pose: Array
@@ -31,6 +39,10 @@ class Commands:
     time: Array | None = None
     temperature: Array | None = None
     passed: Array | None = None
+    told: bool = False
+    loads: Loads | None = None
+    stands: NDArray[np.bool_] | None = None
+    clock: NDArray[np.int64] | None = None
 
     def __len__(self) -> int:
         return len(self.pose)
@@ -43,6 +55,39 @@ class Commands:
         if self.run is not None:
             fresh[1:] = self.run[1:] != self.run[:-1]
         return fresh
+
+    @property
+    def absolute(self) -> bool:
+        """Whether lengths are commanded that no reference applies to."""
+        return self.lengths is not None and not self.told
+
+    @property
+    def starts_here(self) -> NDArray[np.bool_]:
+        """(n,) rows that start a run where they are, not at the reference pose."""
+        return self.starts & (False if self.stands is None else self.stands)
+
+    def change(self, robot: Robot) -> Array:
+        """Lengths (n, m) [m] that winches were told to pay out since they were zeroed.
+
+        For absolute lengths these themselves.
+        """
+        if self.lengths is None:
+            return self.nominal_change(robot)
+        return self.lengths - robot.rest_lengths if self.told else self.lengths
+
+    def home(self, robot: Robot) -> Array:
+        """What ``change`` is where a run starts, at the reference pose, (m,) [m]."""
+        return robot.rest_lengths if self.absolute else np.zeros(robot.n_cables)
+
+    def before(self, rows: Array, home: Array) -> Array:
+        """What ``rows`` (n, k) are at the start of the way to each row.
+
+        That is the row before, ``home`` (k,) where a run starts, or the row itself if it starts
+        there.
+        """
+        before = np.roll(rows, 1, axis=0)
+        before[self.starts] = home
+        return np.where(self.starts_here[:, None], rows, before)
 
     def nominal_change(self, robot: Robot) -> Array:
         """Straight lengths at the commanded poses less those at the reference, (n, m) [m]."""

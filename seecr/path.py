@@ -1,7 +1,8 @@
 """The way of a robot through its commands: waypoints, and where cables turn round between them.
 
-A run starts at the robot's reference pose, goes straight to its first row and straight from row
-to row, in what the platform may do. What depends on the rows before (see
+A run starts at the robot's reference pose (or at its first row, where commands say so), goes
+straight to its first row and straight from row to row, in what the platform may do. Where the load
+changes it does so first, at the row before. What depends on the rows before (see
 :mod:`seecr.compiled.walk`, and :func:`seecr.commands.play`) depends on this way.
 """
 
@@ -50,6 +51,16 @@ class Path:
     fresh: NDArray[np.bool_]
     elapsed: Array
 
+    @property
+    def new_clock(self) -> NDArray[np.bool_]:
+        """(N,) bool, waypoints from which on another clock tells the time; the first is one."""
+        clock = self.commands.clock
+        changes = np.zeros(len(self.source), dtype=bool)
+        if clock is not None:
+            changes[1:] = np.diff(clock) != 0
+        changes[:1] = True
+        return changes
+
     @cached_property
     def turning(self) -> Commands:
         """Of all waypoints, with where lengths turn round in between, for backlash."""
@@ -64,32 +75,48 @@ class Path:
 def path_of(robot: Robot, commands: Commands) -> Path:
     """The waypoints of commands: straight from the reference pose, straight between rows."""
     n = len(commands)
-    ways = _ways(robot, commands)
-    clock = commands.time if commands.time is not None else np.zeros(n)
-    since = np.maximum(np.diff(clock, prepend=clock[:1]), 0.0)
-    steps = np.where(ways.fresh, _APPROACH, _BETWEEN)
-    source = np.repeat(np.arange(n), steps + ways.fresh)
-    rows = np.cumsum(steps + ways.fresh) - 1
+    ways, fresh = _ways(robot, commands), commands.starts
+    # a way begins with a waypoint of its own where a run starts, or with another load
+    begins = fresh.copy() if commands.loads is None else fresh | commands.loads.changes
+    steps = np.where(commands.starts_here, 0, np.where(fresh, _APPROACH, _BETWEEN))
+    source = np.repeat(np.arange(n), steps + begins)
+    rows = np.cumsum(steps + begins) - 1
     step = np.arange(len(source)) - (rows - steps)[source]
-    part = step / steps[source]
+    first = (step == 0) & fresh[source]
+    part = step / np.maximum(steps, 1)[source]
     pose = ways.at(source, part)[0]
-    pose[step == 0], pose[rows] = robot.reference_pose, commands.pose
+    pose[first], pose[rows] = robot.reference_pose, commands.pose
     lengths = None
     if commands.lengths is not None:
-        last = _before(commands.lengths, robot.rest_lengths, ways.fresh)
+        last = commands.before(commands.lengths, robot.rest_lengths)
         lengths = last[source] + part[:, None] * (commands.lengths - last)[source]
         lengths[rows] = commands.lengths
+    since = _since(commands)
     # a run's clock starts at its first row: before, the robot waits at home
-    elapsed = np.where(ways.fresh, 0.0, since / steps)[source]
-    elapsed[step == 0] = since[ways.fresh]
+    elapsed = np.where(fresh, 0.0, since / np.maximum(steps, 1))[source]
+    elapsed[step == 0] = np.where(fresh, since, 0.0)[source[step == 0]]
     whole = Commands(
         pose=pose,
         lengths=lengths,
         run=(np.zeros(n, dtype=np.int64) if commands.run is None else commands.run)[source],
         time=None if commands.time is None else commands.time[source],
         temperature=None if commands.temperature is None else commands.temperature[source],
+        told=commands.told,
+        loads=None if commands.loads is None else commands.loads.rows(source),
+        stands=None if commands.stands is None else commands.stands[source],
+        clock=None if commands.clock is None else commands.clock[source],
     )
-    return Path(robot, commands, whole, rows, source, step == 0, elapsed)
+    return Path(robot, commands, whole, rows, source, first, elapsed)
+
+
+def _since(commands: Commands) -> Array:
+    """(n,) [s] since the row before; none where another clock begins."""
+    if commands.time is None:
+        return np.zeros(len(commands))
+    since = np.maximum(np.diff(commands.time, prepend=commands.time[:1]), 0.0)
+    if commands.clock is not None:
+        since[1:][np.diff(commands.clock) != 0] = 0.0
+    return since
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,13 +124,11 @@ class _Ways:
     """The ways to n rows, straight in what the platform may do: poses, or values of its joints.
 
     Attributes:
-        fresh: (n,) bool, those that start at the reference pose.
         start: (n, 7) poses or (n, d) values; change: (n, 6) or (n, d).
         turn: (n,) [rad] no less than the platform turns on the way.
     """
 
     robot: Robot
-    fresh: NDArray[np.bool_]
     start: Array
     change: Array
     turn: Array
@@ -130,22 +155,14 @@ class _Ways:
 
 
 def _ways(robot: Robot, commands: Commands) -> _Ways:
-    fresh = commands.starts
     if not robot.joints:
-        start = _before(commands.pose, robot.reference_pose, fresh)
+        start = commands.before(commands.pose, robot.reference_pose)
         change = pose_difference(commands.pose, start)
-        return _Ways(robot, fresh, start, change, np.linalg.norm(change[:, 3:], axis=1))
+        return _Ways(robot, start, change, np.linalg.norm(change[:, 3:], axis=1))
     values = values_of_pose(robot, commands.pose)[0]
-    start = _before(values, np.zeros(robot.n_dof), fresh)
+    start = commands.before(values, np.zeros(robot.n_dof))
     change = values - start
-    return _Ways(robot, fresh, start, change, np.abs(change[:, robot.hinges]).sum(axis=1))
-
-
-def _before(rows: Array, home: Array, fresh: NDArray[np.bool_]) -> Array:
-    """The rows before the rows, ``home`` before those that start a run."""
-    before = np.roll(rows, 1, axis=0)
-    before[fresh] = home
-    return before
+    return _Ways(robot, start, change, np.abs(change[:, robot.hinges]).sum(axis=1))
 
 
 def turning(robot: Robot, commands: Commands) -> Commands:
@@ -154,14 +171,14 @@ def turning(robot: Robot, commands: Commands) -> Commands:
     Between rows a cable's commanded length turns round where its rate is zero. Lengths commanded
     as such never do.
     """
+    told = commands.change(robot)
+    start = commands.before(told, commands.home(robot))
     if commands.lengths is not None:
-        fresh = commands.starts
-        start = _before(commands.lengths, robot.rest_lengths, fresh)
         return replace(commands, passed=start[None])
-    ways, told = _ways(robot, commands), commands.nominal_change(robot)
+    ways = _ways(robot, commands)
     row, cable, number, length = _turns(ways)
     passed = np.tile(told, (2 + int(np.max(number, initial=-1)), 1, 1))
-    passed[0] = _before(told, np.zeros(robot.n_cables), ways.fresh)
+    passed[0] = start
     passed[1 + number, row, cable] = length - robot.reference_lengths[cable]
     return replace(commands, passed=passed)
 

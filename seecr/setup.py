@@ -21,6 +21,7 @@ import numpy as np
 from seecr.commands import Commands, play
 from seecr.compiled import columns
 from seecr.errors import InputError
+from seecr.loads import Loads
 from seecr.pose import Array
 from seecr.robot import Robot
 
@@ -167,9 +168,7 @@ class Setup:
         history=History.SHAPES,
     )  # fmt: skip
     mass: float = quantity("of the platform", "kg", (), "mass")
-    centre_of_mass: Array = quantity(
-        "of the platform, in its frame", "m", (3,), "centre_of_mass", entry=columns.CENTRE_OF_MASS
-    )
+    centre_of_mass: Array = quantity("of the platform, in its frame", "m", (3,), "centre_of_mass")
     gravity: Array = quantity("in the base frame", "m/s^2", (3,), "gravity")
     wrench: Array = quantity(
         "external force at the platform's origin and moment, base frame", "N, N m",
@@ -181,29 +180,32 @@ class Setup:
     def commanded_change(self) -> Array:
         """Length [m] the winches were told to pay out since they were zeroed, (n, m).
 
-        For commands in lengths, which are absolute, the lengths themselves.
+        For commands in absolute lengths, the lengths themselves.
         """
-        if self.commands.lengths is not None:
-            return self.commands.lengths
-        return self.commands.nominal_change(self.robot)
+        return self.commands.change(self.robot)
 
     def rest_lengths(self) -> Array:
         """Rest lengths really paid out, (n, m) [m].
 
         At the reference pose the winches were zeroed with the cables as they really ran there;
-        elsewhere the paid-out length has moved by the commanded change. Lengths commanded as
-        such are absolute.
+        elsewhere the paid-out length has moved by the commanded change. To absolute lengths no
+        reference applies.
         """
         told = self.commanded_change
         if np.any(self.backlash):
             told = play(told, self.commands.starts, 0.5 * self.backlash, self.commands.passed)
         paid = told * (1.0 + self.length_gain) + self.extra_length
-        if self.commands.lengths is not None:
+        if self.commands.absolute:
             return paid * self.length_factor
         robot = self.robot
         pretension = robot.rest_lengths - robot.reference_lengths
         zero = self.geometric_lengths(self.zero_pose[None])
         return (zero + pretension + paid) * self.length_factor
+
+    def carried(self) -> tuple[Array, Array]:
+        """Mass (n,) [kg] and centre of mass (n, 3) [m] of the platform with its known payloads."""
+        loads = self.commands.loads or Loads.of(len(self.commands))
+        return loads.with_platform(self.mass, self.centre_of_mass)
 
     def geometric_lengths(self, poses: Array) -> Array:
         """Lengths (k, m) [m] of straight cables over their pulleys at poses (k, 7)."""
@@ -238,15 +240,17 @@ def plain_setup(robot: Robot, commands: Commands, wrench: Array | None = None) -
     Args:
         robot: the robot.
         commands: n rows.
-        wrench: (6,) or (n, 6) external wrench; none by default.
+        wrench: (6,) or (n, 6) external wrench besides that of the commands' loads; none by default.
     """
     n = len(commands)
     setup = Setup(
         robot, commands, **{name: item.plain_of(robot, n) for name, item in QUANTITIES.items()}
     )
+    if commands.loads is not None:
+        setup.wrench = commands.loads.wrench.copy()
     if wrench is not None:
         given = np.asarray(wrench, float)
         if given.shape not in ((6,), (n, 6)):
             raise InputError(f"wrench must be (6,) or ({n}, 6), got {given.shape}")
-        setup.wrench = np.broadcast_to(given, (n, 6)).copy()
+        setup.wrench = setup.wrench + given
     return setup

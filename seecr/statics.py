@@ -141,13 +141,13 @@ def walk(tables: Tables, path: Path, limit: int) -> Evaluation:
     """Solve the waypoints of a path in order, each from the one before.
 
     Fills the columns of the past in ``tables``. Runs are independent, but for creep, which goes
-    by the clock through all of them.
+    by the clock through all that were timed by the same.
     """
     n, m = tables.cables.shape[:2]
     out = Evaluation.empty(n, m, tables.n_dof)
     out.energy = np.full(n, np.nan)
     creeps = bool(np.any(tables.cables[..., CREEP_PART]))
-    edges = [0, n] if creeps else [*np.flatnonzero(path.fresh).tolist(), n]
+    edges = [*np.flatnonzero(path.new_clock if creeps else path.fresh).tolist(), n]
 
     def run(part: slice) -> None:
         walk_in_order(

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.compiled.columns import (
+    CENTRE_OF_MASS,
     EXTRA,
     EXTRA_SLOPE,
     FORCE_OF_WEIGHT,
@@ -77,7 +78,9 @@ def assemble(setup: Setup, strains: Array | None = None) -> Tables:
     gap = setup.geometric_lengths(poses) - rest
     cables, load = np.zeros((n, m, N_COLUMNS)), np.zeros((n, N_LOAD))
     cables[..., REST], cables[..., GAP] = rest, gap
-    load[:, FORCE_OF_WEIGHT : FORCE_OF_WEIGHT + 3] = setup.mass * setup.gravity
+    mass, centre = setup.carried()
+    load[:, FORCE_OF_WEIGHT : FORCE_OF_WEIGHT + 3] = mass[:, None] * setup.gravity
+    load[:, CENTRE_OF_MASS : CENTRE_OF_MASS + 3] = centre
     load[:, UP : UP + 3] = _hanging(setup)
     _write_quantities(setup, cables, load)
     if setup.laws:
@@ -124,7 +127,7 @@ def _hanging(setup: Setup) -> Array:
 
 def _load_scale(setup: Setup) -> Array:
     """Load [N] of each pose: weight, external force and moment over the robot's length."""
-    weight = setup.mass * np.linalg.norm(setup.gravity)
+    weight = setup.carried()[0] * np.linalg.norm(setup.gravity)
     force = np.linalg.norm(setup.wrench[:, :3], axis=1)
     moment = np.linalg.norm(setup.wrench[:, 3:], axis=1) / setup.robot.length
     scale = weight + force + moment

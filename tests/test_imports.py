@@ -21,7 +21,7 @@ FLOORS = {
     "seecr.errors": 0, "seecr.compiled": 0, "seecr.threads": 0, "seecr.lazy": 0,
     "seecr.files": 1, "seecr.result": 1,
     "seecr.shipped": 1, "seecr.pose": 1,
-    "seecr.robot": 2, "seecr.commands": 3, "seecr.joints": 3, "seecr.mjcf": 3,
+    "seecr.robot": 2, "seecr.loads": 2, "seecr.commands": 3, "seecr.joints": 3, "seecr.mjcf": 3,
     "seecr.path": 4, "seecr.setup": 4, "seecr.fingerprint": 4,
     "seecr.effects": 5, "seecr.tables": 5, "seecr.model": 6, "seecr.shifts": 6,
     "seecr.statics": 6,

@@ -64,8 +64,8 @@ class InitialPoseError(Effect):
 class DrumGain(Effect):
     """Winch i pays out more or less than it is told to: change_i -> (1 + gain_i) change_i.
 
-    Of the commanded change since the zero; of the whole length where lengths are commanded
-    as such. Positive: the drum is larger than assumed.
+    Of the commanded change since the zero; of the whole length where absolute lengths are
+    commanded. Positive: the drum is larger than assumed.
     """
 
     name: ClassVar[str] = "drum_gain"
@@ -130,7 +130,7 @@ class DrumEccentricity(Effect):
         if not (np.any(self.sine) or np.any(self.cosine)):
             return
         angle = setup.commanded_change / self.drum_radius
-        zero = 1.0 if setup.commands.lengths is None else 0.0
+        zero = 0.0 if setup.commands.absolute else 1.0
         setup.extra_length += self.sine * np.sin(angle) + self.cosine * (np.cos(angle) - zero)
 
     @classmethod

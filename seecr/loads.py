@@ -1,0 +1,85 @@
+"""Known loads: what the platform carried besides itself, row by row."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seecr.errors import InputError
+from seecr.pose import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Loads:
+    """Payloads and external wrenches of n rows that are known, such as weights hung on.
+
+    A payload weighs through the model's gravity and hangs before the way to its row begins.
+
+    Attributes:
+        mass: (n,) [kg] of the payload.
+        centre: (n, 3) [m] of the payload, in the platform's frame; NaN where it is the platform's
+            own centre of mass, wherever effects move that.
+        wrench: (n, 6) [N, N m] force at the platform's origin and moment, base frame.
+    """
+
+    mass: Array
+    centre: Array
+    wrench: Array
+
+    @classmethod
+    def of(
+        cls,
+        n: int,
+        mass: Array | None = None,
+        centre: Array | None = None,
+        wrench: Array | None = None,
+    ) -> Loads:
+        """Loads of n rows from what there is of them; one number or vector is that of all rows.
+
+        Raises:
+            InputError: a shape that does not fit n rows, or numbers that are not finite.
+        """
+        return cls(
+            _filled("payload mass", mass, 0.0, (n,)),
+            _filled("payload centre", centre, np.nan, (n, 3)),
+            _filled("wrench", wrench, 0.0, (n, 6)),
+        )
+
+    def __len__(self) -> int:
+        return len(self.mass)
+
+    def rows(self, index: NDArray[np.integer]) -> Loads:
+        """Those of some rows."""
+        return Loads(self.mass[index], self.centre[index], self.wrench[index])
+
+    @property
+    def changes(self) -> NDArray[np.bool_]:
+        """(n,) rows that carry another load than the row before."""
+        table = np.concatenate([self.mass[:, None], self.centre, self.wrench], axis=1)
+        same = (table[1:] == table[:-1]) | (np.isnan(table[1:]) & np.isnan(table[:-1]))
+        return np.concatenate([[False], ~same.all(axis=1)])
+
+    def with_platform(self, mass: float, centre: Array) -> tuple[Array, Array]:
+        """Mass (n,) [kg] and centre of mass (n, 3) [m] of the platform with its payloads.
+
+        Args:
+            mass: [kg] of the platform alone. centre: (3,) [m] its centre of mass.
+        """
+        total = mass + self.mass
+        # the lever from the platform's own centre: exactly that centre where nothing is said
+        lever = np.where(np.isnan(self.centre), 0.0, self.centre - centre)
+        share = np.divide(self.mass, total, out=np.zeros_like(total), where=total != 0.0)
+        return total, centre + share[:, None] * lever
+
+
+def _filled(name: str, value: Array | None, otherwise: float, shape: tuple[int, ...]) -> Array:
+    given = np.asarray(otherwise if value is None else value, float)
+    try:
+        out = np.array(np.broadcast_to(given, shape))
+    except ValueError:
+        raise InputError(f"{name} must be {shape}, got {given.shape}") from None
+    if np.isinf(out).any() or (otherwise == 0.0 and np.isnan(out).any()):
+        raise InputError(f"{name} must be finite numbers, got {given}")
+    return out
