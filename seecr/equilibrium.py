@@ -9,22 +9,25 @@ from numpy.typing import ArrayLike
 
 from seecr import statics
 from seecr.commands import Commands
+from seecr.effects.checked import edit_setup
 from seecr.errors import InputError
-from seecr.joints import values_of_pose
+from seecr.experiment import Experiment, GivenEffects, effects_of
 from seecr.pose import Array
 from seecr.robot import Robot
 from seecr.setup import Setup, plain_setup
 from seecr.solution import Solution, certify
-from seecr.tables import Tables, assemble
+from seecr.starts import commanded_poses, finite, start_of
+from seecr.tables import assemble
 
 METHODS = ("newton", "fsolve", "least_squares")
 
 
 def solve(
     robot: Robot,
-    poses: ArrayLike | None = None,
+    poses: Commands | ArrayLike | None = None,
     *,
     rest_lengths: ArrayLike | None = None,
+    effects: GivenEffects = (),
     method: str = "newton",
     wrench: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
@@ -37,9 +40,11 @@ def solve(
     Args:
         robot: from :func:`seecr.load_robot`, or made by hand.
         poses: (n, 7) or (7,) commanded poses; the winches pay out the straight lengths there
-            (eqs 1, 2).
+            (eqs 1, 2). Or :class:`seecr.Commands` with runs, times, lengths.
         rest_lengths: (n, m) or (m,) [m] instead of, or beside, the poses: then the poses are
             only where the search starts, the reference pose by default.
+        effects: what the robot has beyond the paper's plain one: a model, or effects with
+            values. Where one has history, rows are solved in order.
         method: ``"newton"`` follows the energy downhill, compiled; ``"fsolve"`` and
             ``"least_squares"`` are the paper's own, on SciPy with its first guess (step 4).
         wrench: (6,) or (n, 6) external force [N] at the platform origin and moment [N m].
@@ -52,7 +57,8 @@ def solve(
         a :class:`Solution`; look at ``status`` or ``converged`` before using a pose.
 
     Raises:
-        InputError: shapes, values that are not finite, an unknown method.
+        InputError: shapes, values that are not finite, an unknown method, arguments that do not
+            go together.
     """
     if method not in METHODS:
         raise InputError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
@@ -61,7 +67,18 @@ def solve(
     if gravity is not None:
         robot = replace(robot, gravity=_array(gravity, (3,), "gravity"))
     commands = _commands(robot, poses, rest_lengths)
-    setup = plain_setup(robot, commands, None if wrench is None else _finite(wrench, "wrench"))
+    setup = plain_setup(robot, commands, None if wrench is None else finite(wrench, "wrench"))
+    acting = effects_of(effects)
+    for effect in acting:
+        edit_setup(effect, setup)
+    if setup.has_history or setup.laws:
+        if method != "newton" or start is not None or wrench is not None:
+            raise InputError(
+                "effects with history or with a law of their own are solved along the way; "
+                "expected no other method, no start, and external_wrench among the effects "
+                "instead of wrench"
+            )
+        return Experiment(robot, commands).predict(acting).solution()
     starts = None
     if start is not None:
         starts = commanded_poses(start, "start")
@@ -89,24 +106,18 @@ def solve_setup(
     return certify(setup.robot, tables, found)
 
 
-def start_of(
-    robot: Robot, tables: Tables, start: Array | None
-) -> tuple[Array | None, Array | None]:
-    """Deviations and joint values of start poses (n, 7)."""
-    if start is None:
-        return None, None
-    if not robot.joints:
-        return statics.deviations(tables, start), None
-    change = values_of_pose(robot, start)[0] - values_of_pose(robot, tables.poses)[0]
-    return statics.deviations(tables, start), change * np.where(robot.hinges, robot.length, 1.0)
-
-
-def _commands(robot: Robot, poses: ArrayLike | None, lengths: ArrayLike | None) -> Commands:
+def _commands(
+    robot: Robot, poses: Commands | ArrayLike | None, lengths: ArrayLike | None
+) -> Commands:
+    if isinstance(poses, Commands):
+        if lengths is not None:
+            raise InputError("commands have their own lengths; expected no rest_lengths beside")
+        return poses
     if lengths is None:
         if poses is None:
             raise InputError("solve needs commanded poses (n, 7) or rest_lengths (n, m); got none")
         return Commands(commanded_poses(poses))
-    table = np.atleast_2d(_finite(lengths, "rest_lengths"))
+    table = np.atleast_2d(finite(lengths, "rest_lengths"))
     if table.ndim != 2 or table.shape[1] != robot.n_cables:
         raise InputError(
             f"rest_lengths must be (n, {robot.n_cables}) for {robot.name}, got {np.shape(lengths)}"
@@ -123,33 +134,8 @@ def _commands(robot: Robot, poses: ArrayLike | None, lengths: ArrayLike | None) 
     return Commands(rows, lengths=table)
 
 
-def _finite(values: ArrayLike, name: str) -> Array:
-    array = np.asarray(values, dtype=float)
-    if not np.all(np.isfinite(array)):
-        raise InputError(f"{name} holds numbers that are not finite; expected finite ones")
-    return array
-
-
 def _array(values: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
-    array = _finite(values, name)
+    array = finite(values, name)
     if array.shape != shape:
         raise InputError(f"{name} must be {shape}, got {array.shape}")
     return array
-
-
-def commanded_poses(values: ArrayLike, name: str = "poses") -> Array:
-    """Poses (n, 7) with unit quaternions, checked; ``name`` is what an error calls them."""
-    array = np.atleast_2d(_finite(values, name))
-    if array.ndim != 2 or array.shape[1] != 7:
-        raise InputError(f"{name} must be (n, 7), x y z qw qx qy qz, got {np.shape(values)}")
-    norm = np.linalg.norm(array[:, 3:], axis=1)
-    if np.any(np.abs(norm - 1.0) > 1e-3):
-        row = int(np.argmax(np.abs(norm - 1.0)))
-        raise InputError(
-            f"{name} row {row} has a quaternion of norm {norm[row]:.4g}; expected a unit "
-            "quaternion, scalar first"
-        )
-    out = array.copy()
-    exact = np.abs(norm - 1.0) > 1e-15
-    out[exact, 3:] /= norm[exact, None]
-    return out

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,17 +16,20 @@ from seecr.compiled.outcomes import CONVERGED, SINGULAR, STALLED, TOLERANCE
 from seecr.effects.base import Effect, Readings
 from seecr.effects.checked import edit_readings, edit_setup
 from seecr.effects.terms import Term, Terms
-from seecr.equilibrium import commanded_poses, start_of
 from seecr.path import Path, path_of
 from seecr.pose import Array
 from seecr.result import COORDINATES, Record, Result, named
 from seecr.robot import Robot
 from seecr.setup import Setup, plain_setup
 from seecr.solution import Solution, certify
+from seecr.starts import commanded_poses, start_of
 from seecr.tables import Tables, assemble, take
 
 if TYPE_CHECKING:
     from seecr.model import Model
+
+GivenEffects: TypeAlias = "Model | Terms | Iterable[Term | Effect]"
+"""A model, or effects with their values."""
 
 # Rounds of linearising users' laws about the strains found with them.
 _LAW_ROUNDS = 30
@@ -218,7 +221,7 @@ class Experiment:
 def predict(
     robot: Robot,
     commands: Commands | ArrayLike,
-    model: Model | Terms | Iterable[Term | Effect] = (),
+    model: GivenEffects = (),
 ) -> Prediction:
     """Where a robot with effects comes to rest, and what its sensors would report.
 
@@ -235,11 +238,15 @@ def predict(
     """
     if not isinstance(commands, Commands):
         commands = Commands(commanded_poses(commands))
+    return Experiment(robot, commands).predict(effects_of(model))
+
+
+def effects_of(model: GivenEffects) -> list[Effect]:
+    """The effects of a model, of terms with values, or as they are."""
     from seecr.model import Model  # takes a while to import
 
     terms: Iterable[Term | Effect] = model.terms if isinstance(model, Model) else model
-    effects = [one.effect() if isinstance(one, Term) else one for one in terms]
-    return Experiment(robot, commands).predict(effects)
+    return [one.effect() if isinstance(one, Term) else one for one in terms]
 
 
 def read(effects: Sequence[Effect], setup: Setup, poses: Array, tensions: Array) -> Readings:

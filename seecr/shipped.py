@@ -7,6 +7,8 @@ from pathlib import Path
 
 from seecr.errors import InputError
 
+__all__ = ["CABLES", "model_names", "model_path"]
+
 CABLES: dict[str, float] = {"vectran": 3000.0, "fishing": 300.0}
 """k_c = E S [N] of the paper's two cables (eq 10), by name.
 

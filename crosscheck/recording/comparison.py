@@ -48,7 +48,7 @@ def write_comparison_recording(found: Comparison, path: str | Path) -> None:
     with recording_file(path, name, _blueprint(found, shown, name, seen)) as recording:
         top = colours.round_up(float(np.nanmax(found.state.prediction.tensions, initial=0.0)))
         scene = Scene(recording, problem.robot, seen, top)
-        scene.surroundings(words.short_names(problem.robot.cable_names))
+        scene.surroundings(plots.short_names(problem.robot.cable_names))
         _over_poses(recording, scene, found, shown)
         _verdict(recording, found, shown)
 

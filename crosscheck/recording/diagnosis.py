@@ -16,7 +16,7 @@ import rerun.blueprint as rrb
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import Stage, stages_of
 from crosscheck.fit.problem import Kind
-from crosscheck.recording import bars, misfit, words
+from crosscheck.recording import bars, misfit
 from crosscheck.recording.diagnosis_words import model_words, pose_words, verdict_words
 from crosscheck.recording.misfit import MEASURED, Misfit
 from seecr.pose import Array
@@ -47,7 +47,7 @@ def write_diagnosis_recording(found: Diagnosis, path: str | Path) -> None:
     shown = Misfit(found.search.problem, stages[0].state)
     with recording_file(path, _name(found), _blueprint(found, stages, shown)) as recording:
         scene = Scene(recording, shown.problem.robot, _seen(shown), _top_tension(stages))
-        scene.surroundings(words.short_names(shown.problem.robot.cable_names))
+        scene.surroundings(plots.short_names(shown.problem.robot.cable_names))
         _over_steps(recording, scene, found, stages, shown)
         _over_poses(recording, scene, stages, shown)
         document = rr.TextDocument(verdict_words(found, shown), media_type=_MARKDOWN)

@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.recording import words
 from crosscheck.settle.physics import Physics
 from crosscheck.settle.settler import Settler, Settling
 from crosscheck.suite.agreement import Differences
 from crosscheck.suite.verdicts import Verdict
 from seecr.pose import Array, pose_difference
-from seecr.recording import colours
+from seecr.recording import colours, plots
 from seecr.recording.shapes import States
 from seecr.robot import Robot
 from seecr.solution import Status
@@ -90,7 +89,7 @@ class Material:
     @cached_property
     def labels(self) -> list[str]:
         """Names of the cables without what all have in common in front."""
-        return words.short_names(self.robot.cable_names)
+        return plots.short_names(self.robot.cable_names)
 
     @cached_property
     def seecr(self) -> States:

@@ -66,15 +66,6 @@ def read_me(
     )
 
 
-def short_names(names: Sequence[str]) -> list[str]:
-    """Names without what all have in common in front."""
-    common = 0
-    while len({name[: common + 1] for name in names}) == 1 and common < min(map(len, names)):
-        common += 1
-    short = [name[common:] for name in names]
-    return short if all(short) else list(names)
-
-
 def table(rows: Sequence[tuple[str, ...]], head: tuple[str, ...] | None = None) -> str:
     """A Markdown table; without a head its first row is the head, as Markdown knows no other."""
     if head is None:

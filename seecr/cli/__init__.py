@@ -1,1 +1,36 @@
-"""The command line of seecr, and what command lines share."""
+"""The command line of seecr. Each command lives in its own module, imported when it is used."""
+
+from __future__ import annotations
+
+import click
+
+from seecr import __version__
+from seecr.cli.group import LazyGroup
+
+# Command, module in seecr.cli that holds it as `command`, and its line in --help.
+COMMANDS: dict[str, tuple[str, str]] = {
+    "pose": ("pose", "Where the platform rests at one command, and how each cable pulls."),
+    "sweep": ("sweep", "The same for many commands: a line, a grid, a file."),
+}
+
+
+@click.group(
+    cls=LazyGroup,
+    package="seecr.cli",
+    table=COMMANDS,
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="'seecr COMMAND --help' shows a command's options and examples.",
+)
+@click.version_option(__version__, prog_name="seecr")
+@click.pass_context
+def main(ctx: click.Context) -> None:
+    """Statics of cable-driven parallel robots with elastic cables: where the platform rests.
+
+    \b
+    ROBOT is an MJCF file, or the name of a shipped robot (demobot_cogiro, planar_vertical ...).
+    Exit status: 0 all well, 1 a threshold exceeded, 2 bad input or usage,
+    3 a solve did not converge.
+    """
+    if ctx.invoked_subcommand is None:
+        click.echo(ctx.get_help())

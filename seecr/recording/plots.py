@@ -104,3 +104,12 @@ def state_colours(recording: Recording, entity: str, shades: dict[str, Rgba]) ->
 def _dim(colour: Rgba) -> Rgba:
     red, green, blue = (int(_DIM * c) for c in colour[:3])
     return red, green, blue, 255
+
+
+def short_names(names: Sequence[str]) -> list[str]:
+    """Names without what all have in common in front."""
+    common = 0
+    while len({name[: common + 1] for name in names}) == 1 and common < min(map(len, names)):
+        common += 1
+    short = [name[common:] for name in names]
+    return short if all(short) else list(names)

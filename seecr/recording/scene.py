@@ -5,6 +5,8 @@ Frame, platforms and cables, at every pose and at every instant of a settling.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import rerun as rr
 
@@ -21,6 +23,10 @@ _FRAME, _TAUT, _LOOSE, _EDGE, _PATH = 0.0045, 0.0022, 0.0011, 0.0018, 0.0008
 _SLICES = 48
 # The strip is 100 wide and 10 high; y points down.
 _BAR = (4.0, 44.0, 5.2)
+_PLACES = (56.0, 68.0, 79.0, 92.0)
+PHYSICS: Mapping[str, Rgba] = {
+    "command": colours.COMMAND, "SEECR": colours.SEECR, "MuJoCo": colours.MUJOCO,
+}  # fmt: skip
 
 
 class Scene:
@@ -117,8 +123,8 @@ class Scene:
         self.recording.always(entity, rr.LineStrips3D.from_fields(radii=[_TAUT * self.size]))
 
 
-def write_legend(recording: Recording, top: float) -> None:
-    """The tension scale from 0 to ``top`` [N], and whose colour is whose."""
+def write_legend(recording: Recording, top: float, who: Mapping[str, Rgba] = PHYSICS) -> None:
+    """The tension scale from 0 to ``top`` [N], and whose colour is whose, slack cables first."""
     left, right, y = _BAR
     x = np.linspace(left, right, _SLICES + 1)
     pieces = [np.array([[x[i], y], [x[i + 1], y]]) for i in range(_SLICES)]
@@ -132,9 +138,8 @@ def write_legend(recording: Recording, top: float) -> None:
         [f"{part * top:g} N" for part in ticks],
         [colours.COMMAND] * 3,
     )
-    places = [(56.0, y), (68.0, y), (79.0, y), (92.0, y)]
-    names = ["slack", "command", "SEECR", "MuJoCo"]
-    shades_of = [colours.SLACK, colours.COMMAND, colours.SEECR, colours.MUJOCO]
+    places = [(px, y) for px in _PLACES[: 1 + len(who)]]
+    names, shades_of = ["slack", *who], [colours.SLACK, *who.values()]
     for place, name, colour in zip(places, names, shades_of, strict=True):
         strips = [np.array([[place[0] - 2.5 + d, y], [place[0] - 1.5 + d, y]]) for d in (0, 2, 4)]
         dashed = strips if name == "slack" else [np.array([strips[0][0], strips[-1][1]])]

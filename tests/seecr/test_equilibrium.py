@@ -11,8 +11,10 @@ from plain_steps import exact_residual
 from random_robots import KINDS, random_poses, random_robot
 
 from seecr import statics
+from seecr.effects import Term
 from seecr.equilibrium import METHODS, solve
 from seecr.errors import InputError
+from seecr.experiment import predict
 from seecr.mjcf import load_robot
 from seecr.pose import (
     pose_add,
@@ -614,3 +616,21 @@ def test_a_quaternion_is_normalised_only_where_it_needs_to_be() -> None:
     assert loose.command[0, 3:] == pytest.approx(quat, abs=1e-15)
     exact = solve(hung(), [0, 0, 0, *quat])
     assert np.array_equal(exact.command[0, 3:], quat)
+
+
+def test_effects_act_in_a_solve_as_in_a_prediction(cogiro):
+    pose = [[0.3, 0.2, 0.1, 1, 0, 0, 0], [0.5, 0.3, 0.2, 1, 0, 0, 0]]
+    sag = Term.of(cogiro, "cable_weight", weight_N_per_m=0.02)
+    lag = Term.of(cogiro, "hysteresis", amplitude_N=0.05)
+    for effects in ([sag], [sag, lag]):
+        solved = solve(cogiro, pose, effects=effects)
+        assert solved.converged.all()
+        np.testing.assert_array_equal(solved.pose, predict(cogiro, pose, effects).pose)
+    plain = solve(cogiro, pose).pose[:, :3]
+    assert np.all(np.abs(solved.pose[:, :3] - plain).max(axis=1) > 1e-6)
+
+
+def test_what_history_does_not_go_with_is_said(cogiro):
+    lag = Term.of(cogiro, "hysteresis", amplitude_N=0.05)
+    with pytest.raises(InputError, match=r"solved along the way; expected no other method"):
+        solve(cogiro, cogiro.reference_pose, effects=[lag], method="fsolve")

@@ -21,9 +21,9 @@ from crosscheck.recording.comparison import write_comparison_recording
 from crosscheck.recording.diagnosis import write_diagnosis_recording
 from crosscheck.recording.diagnosis_words import plain
 from crosscheck.recording.misfit import Misfit, read_poses, states_of, worst_row
-from crosscheck.recording.words import short_names
 from crosscheck.units import short
 from seecr.errors import InputFileError
+from seecr.recording.plots import short_names
 
 STEP = "model_step"
 

@@ -1,0 +1,85 @@
+"""What the commands of seecr are given: a robot, a model, numbers that may be negative."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from seecr.cli.options import FILE
+
+if TYPE_CHECKING:
+    from seecr import Model, Robot
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+
+
+class NumbersCommand(click.Command):
+    """A command whose negative numbers are values, not options."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Let negative numbers pass as arguments; refuse other unknown options as ever."""
+        known = {name for p in self.get_params(ctx) for name in (*p.opts, *p.secondary_opts)}
+        for arg in args[: args.index("--") if "--" in args else None]:
+            name = arg.partition("=")[0]
+            is_option = len(arg) > 1 and arg.startswith("-") and not _NUMBER.fullmatch(arg)
+            if is_option and name not in known:
+                near = difflib.get_close_matches(name, known, n=3)
+                raise click.NoSuchOption(name, possibilities=near, ctx=ctx)
+        ctx.ignore_unknown_options = True
+        return super().parse_args(ctx, args)
+
+
+def robot_options(function: F) -> F:
+    """``ROBOT``, ``--cable`` and ``--model``, given as ``robot``, ``cable`` and ``model``."""
+    function = click.option(
+        "--model", type=FILE, metavar="M.toml", help="The effects it has; plain SEECR without."
+    )(function)
+    function = click.option(
+        "--cable",
+        metavar="NAME|N",
+        help="k_c = E S of all cables instead of the file's: vectran, fishing, or a number [N].",
+    )(function)
+    return click.argument("robot", type=FILE, metavar="ROBOT")(function)
+
+
+def robot_at(given: Path, cable: str | None = None) -> Robot:
+    """The robot of a file, or the shipped one of that name, with another cable if one is named.
+
+    Raises:
+        RobotError, InputError: no such file and no such name, no such cable.
+    """
+    import numpy as np
+
+    from seecr import InputError, load_robot, model_names, model_path
+    from seecr.shipped import CABLES
+
+    shipped = str(given) in model_names() and not given.exists()
+    if not given.exists() and not given.suffix:
+        model_path(str(given))  # tells the names there are
+    robot = load_robot(model_path(str(given)) if shipped else given)
+    if cable is None:
+        return robot
+    try:
+        ea = CABLES[cable] if cable in CABLES else float(cable)
+    except ValueError:
+        ea = -1.0
+    if not 0.0 < ea < float("inf"):
+        raise InputError(
+            f"--cable: expected {', '.join(CABLES)} or k_c above zero [N], got {cable!r}"
+        )
+    return replace(robot, ea=np.full(robot.n_cables, ea))
+
+
+def model_at(given: Path | None, robot: Robot) -> Model | None:
+    """The model of a file, or none."""
+    from seecr import load_model
+
+    return None if given is None else load_model(given, robot)

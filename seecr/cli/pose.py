@@ -1,0 +1,72 @@
+"""``seecr pose``: where the platform rests at one command."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from seecr.cli.arguments import NumbersCommand, model_at, robot_at, robot_options
+from seecr.cli.options import FILE, json_option
+
+
+@click.command(
+    cls=NumbersCommand,
+    short_help="Where the platform rests at one command.",
+    epilog="""\b
+Examples:
+  seecr pose demobot_parallel 0.17 0.25 0.1
+  seecr pose robot.xml -4.8 0 1.5 --model model.toml
+  seecr pose robot.xml 0.4 0.25 0.1 0.966 0 0.259 0 --json
+""",
+)
+@robot_options
+@click.argument("coordinates", nargs=-1, type=float, metavar="X Y Z [QW QX QY QZ]")
+@click.option("--out", type=FILE, metavar="DIR", help="Write pose.json there too.")
+@json_option
+def command(
+    robot: Path,
+    coordinates: tuple[float, ...],
+    cable: str | None,
+    model: Path | None,
+    out: Path | None,
+    as_json: bool,
+) -> int:
+    """Show where the platform comes to rest when it is sent to a pose, and how each cable pulls.
+
+    ROBOT is an MJCF file or the name of a shipped robot. X Y Z are metres in the base frame, QW
+    QX QY QZ a quaternion, scalar first; without one the orientation is that of the reference pose.
+
+    \b
+    Exit status: 0 at rest, 2 bad input, 3 no rest found.
+    """
+    from seecr import InputError, solve
+    from seecr.files import json_text, staged, write_text
+    from seecr.report.rows import rows_of
+    from seecr.report.words import at_rest, cable_lines, pose_lines
+
+    machine = robot_at(robot, cable)
+    own = model_at(model, machine)
+    if len(coordinates) not in (3, 7):
+        raise InputError(f"expected X Y Z or X Y Z QW QX QY QZ, got {len(coordinates)} numbers")
+    orientation = coordinates[3:] or machine.reference_pose[3:]
+    solution = solve(machine, [[*coordinates[:3], *orientation]], effects=own or ())
+    status = 0 if at_rest(solution) else 3
+    notes = list(own.notes) if own else []
+    document = {
+        "exit_status": status,
+        "robot": machine.name,
+        "cables": machine.cable_names,
+        **rows_of(solution)[0],
+        "sentence": solution.sentence(0),
+        "notes": notes,
+    }
+    if out is not None:
+        with staged(out) as folder:
+            write_text(folder / "pose.json", json_text(document) + "\n")
+    if as_json:
+        click.echo(json_text(document))
+        return status
+    for line in [*notes, *pose_lines(solution), *cable_lines(solution)]:
+        click.echo(line)
+    return status

@@ -1,0 +1,181 @@
+"""``seecr sweep``: where the platform rests at many commands."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from seecr.cli.arguments import NumbersCommand, model_at, robot_at, robot_options
+from seecr.cli.options import FILE, json_option, out_option
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from seecr import Commands, Robot
+
+
+@click.command(
+    cls=NumbersCommand,
+    short_help="Where the platform rests at many commands.",
+    epilog="""\b
+Examples:
+  seecr sweep demobot_parallel --line 0.17 0.25 0.1 0.63 0.25 0.1
+  seecr sweep robot.xml poses.csv --model model.toml
+  seecr sweep robot.xml --grid 0.1:0.7:25 0.25 0.05:0.35:13 --json
+""",
+)
+@robot_options
+@click.argument("poses", type=FILE, metavar="[POSES.csv]", required=False)
+@click.option(
+    "--line", nargs=6, type=float, metavar="X Y Z X Y Z", help="From a position to another [m]."
+)
+@click.option(
+    "--count", type=click.IntRange(min=1), default=24, show_default=True, help="Poses of --line."
+)
+@click.option(
+    "--grid",
+    nargs=3,
+    metavar="X Y Z",
+    help="Each FIRST:LAST:COUNT or one number [m]; z goes fastest.",
+)
+@click.option(
+    "--turned",
+    nargs=4,
+    type=float,
+    metavar="QW QX QY QZ",
+    help="Orientation of --line and --grid.  [default: that of the reference pose]",
+)
+@click.option(
+    "--figure",
+    type=click.Choice(["png", "svg", "none"]),
+    default="png",
+    show_default=True,
+    help="Kind of the figure.",
+)
+@click.option("--no-recording", is_flag=True, help="Write no .rrd.")
+@out_option("seecr-sweep")
+@json_option
+def command(
+    robot: Path,
+    poses: Path | None,
+    cable: str | None,
+    model: Path | None,
+    figure: str,
+    no_recording: bool,
+    out: Path,
+    as_json: bool,
+    **given: Any,
+) -> int:
+    """Show where the platform comes to rest at each of many commands.
+
+    ROBOT is an MJCF file or the name of a shipped robot. POSES.csv holds commands as a file of
+    measurements does: cmd_x_m ... or length_1_m ..., with run, t_s and temperature_C for effects
+    that depend on them; or poses come from --line or --grid.
+
+    Writes sweep.json, sweep.csv, a figure and sweep.rrd.
+
+    \b
+    Exit status: 0 all at rest, 2 bad input, 3 a pose without rest.
+    """
+    from seecr import solve
+    from seecr.files import json_text, staged, write_text
+    from seecr.report.figures import sweep_figure
+    from seecr.report.rows import csv_text, rows_of
+    from seecr.report.words import at_rest, sweep_lines
+
+    machine = robot_at(robot, cable)
+    own = model_at(model, machine)
+    commands, more = _commands(machine, poses, given)
+    with staged(out) as folder:
+        solution = solve(machine, commands, effects=own or ())
+        commanded = commands.lengths is None
+        rows = rows_of(solution, commands.lengths, more)
+        status = 0 if at_rest(solution) else 3
+        notes = list(own.notes) if own else []
+        document = {
+            "exit_status": status,
+            "robot": machine.name,
+            "cables": machine.cable_names,
+            "model": None if own is None else own.names,
+            "notes": notes,
+            "rows": rows,
+        }
+        text = json_text(document)
+        write_text(folder / "sweep.json", text + "\n")
+        write_text(folder / "sweep.csv", csv_text(rows))
+        if figure != "none":
+            sweep_figure(folder / f"sweep.{figure}", solution, commanded)
+        if not no_recording:
+            # takes a second or two to import
+            from seecr.recording.sweep import write_sweep_recording
+
+            write_sweep_recording(solution, folder / "sweep.rrd", commanded)
+    if as_json:
+        click.echo(text)
+        return status
+    for line in [*notes, *sweep_lines(solution, commanded), f"Results in {out}/"]:
+        click.echo(line)
+    return status
+
+
+def _commands(
+    robot: Robot, poses: Path | None, given: dict[str, Any]
+) -> tuple[Commands, dict[str, Any]]:
+    """The commands, and what else their file says of each row."""
+    from seecr import Commands, InputError
+    from seecr.command_file import read_commands
+
+    ways = [name for name in ("line", "grid") if given[name]]
+    if len(ways) + (poses is not None) != 1:
+        got = " and ".join([*(["POSES.csv"] if poses else []), *(f"--{w}" for w in ways)])
+        raise InputError(f"expected one of POSES.csv, --line, --grid; got {got or 'none'}")
+    if poses is None:
+        return Commands(_along(robot, given)), {}
+    read = read_commands(poses, robot)
+    more: dict[str, Any] = {}
+    if len(set(read.run)) > 1:
+        more["run"] = read.run
+    if read.commands.time is not None:
+        more["t_s"] = read.commands.time.tolist()
+    if read.commands.temperature is not None:
+        more["temperature_C"] = read.commands.temperature.tolist()
+    return read.commands, more
+
+
+def _along(robot: Robot, given: dict[str, Any]) -> NDArray[np.float64]:
+    """Poses (n, 7) of --line or --grid."""
+    import numpy as np
+
+    from seecr.starts import commanded_poses
+
+    if given["line"]:
+        places = np.linspace(given["line"][:3], given["line"][3:], given["count"])
+    else:
+        axes = [_axis(text) for text in given["grid"]]
+        places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    turned = given["turned"] or robot.reference_pose[3:]
+    return commanded_poses(np.column_stack([places, np.tile(turned, (len(places), 1))]))
+
+
+def _axis(text: str) -> NDArray[np.float64]:
+    """One axis of a grid."""
+    import numpy as np
+
+    from seecr import InputError
+
+    parts = text.split(":")
+    try:
+        if len(parts) == 1:
+            return np.array([float(text)])
+        first, last, count = float(parts[0]), float(parts[1]), int(parts[2])
+        if len(parts) != 3 or count < 1:
+            raise ValueError
+    except (ValueError, IndexError):
+        raise InputError(
+            f"--grid: expected FIRST:LAST:COUNT with a count above zero, or one number [m], "
+            f"got {text!r}"
+        ) from None
+    return np.linspace(first, last, count)

@@ -1,0 +1,92 @@
+"""The recording of a sweep: command and platform at rest, cables by tension, plots, lanes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from seecr.pose import Array
+from seecr.recording import colours, layout, plots, shapes
+from seecr.recording.colours import COMMAND, SEECR
+from seecr.recording.scene import LEGEND, Scene, write_legend
+from seecr.recording.shapes import States
+from seecr.recording.stream import Recording, pose_index, recording_file
+from seecr.solution import Solution
+
+__all__ = ["write_sweep_recording"]
+
+_LANES, _AWAY, _TURN, _PULL = "lanes", "plot/deviation", "plot/rotation", "plot/tension"
+
+
+def write_sweep_recording(solution: Solution, path: str | Path, commanded: bool = True) -> None:
+    """Write a sweep for the Rerun viewer.
+
+    Args:
+        solution: of the sweep.
+        path: the ``.rrd`` file.
+        commanded: whether poses were commanded, and not lengths.
+
+    Raises:
+        InputFileError: the file cannot be written.
+    """
+    robot, name = solution.robot, f"{solution.robot.name} sweep"
+    seen = np.concatenate([solution.command, solution.pose])
+    top = colours.round_up(float(np.nanmax(solution.tensions, initial=0.0)))
+    with recording_file(path, name, _blueprint(solution, seen, name, commanded)) as recording:
+        index = pose_index(len(solution))
+        scene = Scene(recording, robot, seen, top)
+        scene.surroundings(plots.short_names(robot.cable_names))
+        scene.platform("seecr", index, solution.pose, SEECR, solid=True)
+        states = States(solution.pose, solution.tensions, solution.rest_lengths, solution.slack)
+        scene.cables("seecr", index, states)
+        who = {"SEECR": SEECR}
+        if commanded:
+            scene.platform("command", index, solution.command, COMMAND)
+            who = {"command": COMMAND, **who}
+        write_legend(recording, top, who)
+        _plots(recording, index, solution, commanded)
+
+
+def _blueprint(solution: Solution, seen: Array, name: str, commanded: bool) -> rrb.Blueprint:
+    robot = solution.robot
+    share = layout.lanes_share(robot.n_cables)
+    low, high = shapes.extent(robot, seen)
+    scene = layout.scene_view(robot, low, high, name, 1.2 * layout.COLUMN_ASPECT / (0.87 - share))
+    lanes = layout.lanes("Which cables pull, which are slack", _LANES)
+    drawn = [layout.plot("Tension [N]", [f"{_PULL}/**"])]
+    if commanded:
+        drawn = [
+            layout.plot("Deviation from the command [mm]", [f"{_AWAY}/**"]),
+            layout.plot("Rotation from the command [°]", [f"{_TURN}/**"]),
+            *drawn,
+        ]
+    left = rrb.Vertical(scene, layout.legend(LEGEND), lanes, row_shares=[0.9 - share, 0.1, share])
+    return layout.blueprint(rrb.Horizontal(left, rrb.Vertical(*drawn), column_shares=[6, 5]))
+
+
+def _plots(recording: Recording, index: rr.TimeColumn, solution: Solution, commanded: bool) -> None:
+    if commanded:
+        parts = plots.deviation(solution.pose, solution.command)
+        for (name, values), colour in zip(parts.items(), colours.SERIES, strict=False):
+            entity = f"{_AWAY if name in plots.TRANSLATIONS else _TURN}/{_entity(name)}"
+            recording.scalars(entity, index, values)
+            plots.as_line(recording, entity, name, colour, 1.5)
+    known = np.asarray(np.isfinite(solution.pose).all(axis=1))
+    nowhere = np.zeros(solution.slack.shape, dtype=bool)
+    states = plots.lane_states(solution.slack, nowhere, known)
+    names = plots.short_names(solution.robot.cable_names)
+    for k, shade in enumerate(colours.cable_colours(solution.robot.n_cables)):
+        colour = (int(shade[0]), int(shade[1]), int(shade[2]), 255)
+        entity = f"{_PULL}/{_entity(names[k])}"
+        recording.scalars(entity, index, solution.tensions[:, k])
+        plots.as_line(recording, entity, names[k], colour, 1.5)
+        lane = f"{_LANES}/{rr.escape_entity_path_part('cable' + names[k])}"
+        plots.lanes(recording, lane, index, list(states[:, k]))
+        plots.lane_style(recording, lane, colour)
+
+
+def _entity(name: str) -> str:
+    return rr.escape_entity_path_part(name.replace(" ", "_"))

@@ -1,0 +1,1 @@
+"""Results for people and for files: rows, words, figures. Nothing is computed here."""

@@ -1,0 +1,146 @@
+"""Figures of results: labels with units, colours that everybody tells apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from seecr.pose import Array
+from seecr.solution import Solution
+
+__all__ = ["figure", "sweep_figure"]
+
+# Okabe and Ito (2008), "Color Universal Design".
+COLOURS = (
+    "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#000000", "#B8A800",
+)  # fmt: skip
+# More cables than colours are told apart by dashes.
+_DASHES = ("-", "--", ":", "-.")
+# Beyond so many cables a legend says nothing.
+_MOST_NAMED = 24
+_STYLE: Any = {
+    "font.size": 9, "axes.grid": True, "grid.alpha": 0.3, "axes.spines.top": False,
+    "axes.spines.right": False, "legend.frameon": False, "figure.dpi": 150,
+    "svg.hashsalt": "seecr", "svg.fonttype": "none", "axes.titlesize": 9.5,
+}  # fmt: skip
+
+
+@contextmanager
+def figure(path: Path, rows: int = 1, columns: int = 1, **options: Any) -> Iterator[Any]:
+    """Axes (rows, columns) of a figure that is written to a file when the block ends.
+
+    Args:
+        path: the file; its ending says of what kind: png, svg, pdf.
+        rows, columns: of axes.
+        options: of ``matplotlib.pyplot.subplots``.
+    """
+    import matplotlib
+
+    with matplotlib.rc_context(_STYLE):
+        # without pyplot: no window system, and nothing that stays in memory
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        size = options.pop("figsize", (6.4 * columns, 2.2 * rows))
+        drawn = Figure(figsize=size, layout="constrained")
+        FigureCanvasAgg(drawn)
+        yield drawn.subplots(rows, columns, squeeze=False, **options)
+        metadata = {"Date": None} if path.suffix == ".svg" else None
+        drawn.savefig(path, metadata=metadata)
+
+
+def sweep_figure(path: Path, solution: Solution, commanded: bool = True) -> None:
+    """Deviation, rotation, tensions and slack cables along a sweep.
+
+    Args:
+        path: the file.
+        solution: of the sweep.
+        commanded: whether poses were commanded, and not lengths.
+    """
+    at, label = _along(solution, commanded)
+    mark: dict[str, Any] = {"marker": "o", "markersize": 2.5, "linewidth": 1.1}
+    if label == "pose number":
+        mark["linewidth"] = 0.5
+    panels = [_tensions, _slack]
+    if commanded:
+        panels = [_deviations, _rotations, *panels]
+    with figure(path, len(panels), 1, sharex=True, figsize=(7.4, 2.1 * len(panels))) as axes:
+        for panel, ax in zip(panels, axes[:, 0], strict=True):
+            panel(ax, solution, at, mark)
+        axes[0, 0].set_title(solution.robot.name)
+        axes[-1, 0].set_xlabel(label)
+
+
+def _along(solution: Solution, commanded: bool) -> tuple[Array, str]:
+    """What to draw over: the coordinate that the sweep goes along, else the number of the pose."""
+    if commanded and len(solution) > 1:
+        steps = np.diff(solution.command, axis=0)
+        moves = [k for k in range(7) if np.any(np.abs(steps[:, k]) > 1e-12)]
+        one_way = len(moves) == 1 and len({*np.sign(steps[:, moves[0]])}) == 1
+        if one_way and moves[0] < 3:
+            return 1e3 * solution.command[:, moves[0]], f"commanded {'xyz'[moves[0]]} [mm]"
+    return np.arange(1.0, len(solution) + 1.0), "pose number"
+
+
+Panel = Callable[[Any, Solution, Array, dict[str, Any]], None]
+
+
+def _deviations(ax: Any, solution: Solution, at: Array, mark: dict[str, Any]) -> None:
+    for k, name in enumerate("xyz"):
+        ax.plot(at, 1e3 * solution.deviation[:, k], color=COLOURS[k], label=f"d{name}", **mark)
+    ax.set_ylabel("deviation [mm]")
+    _legend(ax)
+
+
+def _rotations(ax: Any, solution: Solution, at: Array, mark: dict[str, Any]) -> None:
+    for k, name in enumerate("xyz"):
+        turn = np.degrees(solution.deviation[:, 3 + k])
+        ax.plot(at, turn, color=COLOURS[k], label=f"about {name}", **mark)
+    ax.set_ylabel("rotation [°]")
+    _legend(ax)
+
+
+def _tensions(ax: Any, solution: Solution, at: Array, mark: dict[str, Any]) -> None:
+    for k, (names, values) in enumerate(_alike(solution)):
+        style = _DASHES[k // len(COLOURS) % len(_DASHES)]
+        ax.plot(at, values, style, color=COLOURS[k % len(COLOURS)], label=names, **mark)
+    ax.set_ylabel("tension [N]")
+    ax.set_ylim(bottom=min(0.0, ax.get_ylim()[0]))
+    if solution.robot.n_cables <= _MOST_NAMED:
+        _legend(ax)
+
+
+def _alike(solution: Solution) -> list[tuple[str, Array]]:
+    """Tensions (n,) with the names of the cables that all have them: one would hide another."""
+    tensions, near = solution.tensions, 1e-6 * np.nanmax(solution.tensions, initial=0.0)
+    groups: list[list[int]] = []
+    for k in range(solution.robot.n_cables):
+        for group in groups:
+            if np.allclose(tensions[:, group[0]], tensions[:, k], 0.0, near, equal_nan=True):
+                group.append(k)
+                break
+        else:
+            groups.append([k])
+    names = solution.robot.cable_names
+    return [(", ".join(names[k] for k in group), tensions[:, group[0]]) for group in groups]
+
+
+def _legend(ax: Any) -> None:
+    """Beside the axes, where it covers nothing."""
+    ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
+
+
+def _slack(ax: Any, solution: Solution, at: Array, mark: dict[str, Any]) -> None:
+    count = np.where(solution.converged, solution.slack.sum(axis=1), np.nan)
+    ax.plot(at, count, color="black", drawstyle="steps-mid", **mark)
+    lost = ~solution.converged
+    if np.any(lost):
+        ax.plot(at[lost], np.zeros(int(lost.sum())), "x", color=COLOURS[4], label="no rest")
+        _legend(ax)
+    ax.set_ylabel("slack cables")
+    ax.set_ylim(-0.3, solution.robot.n_cables + 0.3)
+    ax.yaxis.get_major_locator().set_params(integer=True)

@@ -1,0 +1,88 @@
+"""The seecr command: arguments, files, statuses; what it computes is tested elsewhere."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from seecr.cli import COMMANDS, main
+
+PLACE = ["0.17", "0.25", "0.1"]
+
+
+def run(*args: str | Path) -> Result:
+    return CliRunner().invoke(main, [str(a) for a in args])
+
+
+def test_every_command_has_help_with_examples() -> None:
+    text = run().stdout
+    for name, (_, line) in COMMANDS.items():
+        assert f"  {name} " in text and line in " ".join(text.split())
+        assert f"seecr {name} " in run(name, "--help").stdout
+
+
+def test_pose_prints_and_writes(tmp_path: Path) -> None:
+    result = run("pose", "demobot_parallel", *PLACE, "--cable", "fishing", "--out", tmp_path)
+    assert result.exit_code == 0
+    assert "turned by 26.53 deg" in result.stdout
+    document = json.loads((tmp_path / "pose.json").read_text())
+    assert document["exit_status"] == 0 and len(document["tensions_N"]) == 8
+    said = run("pose", "demobot_parallel", *PLACE, "--cable", "300", "--json")
+    assert json.loads(said.stdout) == document
+
+
+def test_negative_numbers_are_coordinates() -> None:
+    result = run("pose", "planar_two_cable", "-0.1", "0", "5e-1", "--json")
+    assert json.loads(result.stdout)["command"][:3] == [-0.1, 0.0, 0.5]
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (["pose", "nobot", *PLACE], "shipped robot 'nobot': expected one of"),
+        (["pose", "no.xml", *PLACE], "no.xml: no such file; expected an MJCF model"),
+        (["pose", "demobot_cogiro", "1", "2"], "expected X Y Z or X Y Z QW QX QY QZ, got 2"),
+        (
+            ["pose", "demobot_cogiro", *PLACE, "--modle", "a"],
+            "'--modle'. Did you mean '--model'?",
+        ),
+        (["pose", "demobot_cogiro", *PLACE, "--cable", "-1"], "--cable: expected vectran, fishing"),
+        (["pose", "demobot_cogiro", *PLACE, "--model", "no.toml"], "no.toml: no such file"),
+        (["pose", "planar_vertical", "0.4", "0.1", "0.2"], "off what its joints can reach"),
+        (["sweep", "demobot_cogiro"], "expected one of POSES.csv, --line, --grid; got none"),
+        (["sweep", "demobot_cogiro", "no.csv"], "no.csv: no such file; expected a CSV of commands"),
+        (["sweep", "demobot_cogiro", "--grid", "0:1", "0", "0"], "--grid: expected FIRST:LAST:"),
+        (["sweep", "demobot_cogiro", "--grid", "0:1:0", "0", "0"], "a count above zero"),
+    ],
+)
+def test_bad_input_is_one_line_and_nothing_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, args: list[str], words: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = run(*args)
+    assert result.exit_code == 2
+    assert result.stderr.count("\n") == 1 and result.stderr.startswith("seecr: ")
+    assert words in result.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_sweep_writes_its_files(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    grid = ["--grid", "0.3:0.5:3", "0.25", "0.1:0.2:2", "--turned", "1", "0", "0", "0"]
+    result = run("sweep", "demobot_cogiro", *grid, "--out", out, "--json")
+    assert result.exit_code == 0
+    document = json.loads(result.stdout)
+    assert [row["command"][2] for row in document["rows"]] == [0.1, 0.2] * 3
+    names = {file.name for file in out.iterdir()}
+    assert names == {"sweep.json", "sweep.csv", "sweep.png", "sweep.rrd"}
+    assert json.loads((out / "sweep.json").read_text()) == document
+    again = ["sweep", "demobot_cogiro", out / "sweep.csv", "--figure", "none", "--no-recording"]
+    said = run(*again, "--out", out / "again")
+    assert said.exit_code == 0
+    assert "6 of 6 poses at rest" in said.stdout
+    assert {file.name for file in (out / "again").iterdir()} == {"sweep.json", "sweep.csv"}
+    rows = json.loads((out / "again" / "sweep.json").read_text())["rows"]
+    assert rows == document["rows"]

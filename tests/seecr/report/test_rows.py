@@ -1,0 +1,87 @@
+"""Rows, words, figure and recording of a sweep say what the solution says."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from recordings import Readback
+
+from seecr.command_file import read_commands
+from seecr.equilibrium import solve
+from seecr.files import json_text
+from seecr.mjcf import load_robot
+from seecr.recording.sweep import write_sweep_recording
+from seecr.report.figures import sweep_figure
+from seecr.report.rows import csv_text, rows_of
+from seecr.report.words import at_rest, cable_lines, pose_lines, sweep_lines
+from seecr.shipped import model_path
+from seecr.solution import Solution, Status
+
+POSES = [[x, 0.25, 0.1, 1, 0, 0, 0] for x in (0.17, 0.3, 0.4)]
+
+
+@pytest.fixture(scope="module")
+def sweep() -> Solution:
+    return solve(load_robot(model_path("demobot_parallel")), POSES)
+
+
+def test_rows_are_the_solution(sweep: Solution) -> None:
+    rows = json.loads(json_text({"rows": rows_of(sweep)}))["rows"]
+    np.testing.assert_array_equal([row["pose"] for row in rows], sweep.pose)
+    np.testing.assert_array_equal([row["command"] for row in rows], POSES)
+    away = [[*row["deviation_m"], *row["rotation_rad"]] for row in rows]
+    np.testing.assert_array_equal(away, sweep.deviation)
+    assert rows[0]["slack"] == ["cable2", "cable4", "cable5", "cable7"]
+    assert [row["status"] for row in rows] == ["converged"] * 3
+
+
+def test_the_csv_is_read_again_as_commands(sweep: Solution, tmp_path: Path) -> None:
+    path = tmp_path / "sweep.csv"
+    path.write_text(csv_text(rows_of(sweep)))
+    np.testing.assert_array_equal(read_commands(path, sweep.robot).commands.pose, POSES)
+    lengths = sweep.rest_lengths
+    path.write_text(csv_text(rows_of(sweep, lengths)))
+    again = read_commands(path, sweep.robot).commands.lengths
+    np.testing.assert_array_equal(np.asarray(again), lengths)
+
+
+def test_words_of_a_pose(sweep: Solution) -> None:
+    text = "\n".join([*pose_lines(sweep), *cable_lines(sweep)])
+    assert "rests at x y z 204.136, 250.000, 92.110 mm, turned rx ry rz 0.000, 26.428, 0" in text
+    assert "off its command by +34.1357, +0.0000, -7.8905 mm (35.04 mm)" in text
+    assert "\ncable2       0.0000         0.420631  slack\n" in text
+    assert "poses by number of slack cables: 1 with 0, 2 with 4" in sweep_lines(sweep)
+
+
+def test_a_pose_without_rest_has_no_numbers(sweep: Solution) -> None:
+    status = np.array([Status.FALLING] * 3, dtype=object)
+    lost = replace(sweep, pose=np.full((3, 7), np.nan), status=status)
+    assert list(pose_lines(lost)) == [f"demobot_parallel: {Status.FALLING.value}"]
+    assert at_rest(sweep) and not at_rest(lost)
+    assert rows_of(lost)[0]["status"] == "falling"
+    assert ",,,,,,," in csv_text(rows_of(lost))
+
+
+@pytest.mark.parametrize("kind", ["png", "svg"])
+def test_the_figure_is_written(sweep: Solution, tmp_path: Path, kind: str) -> None:
+    path = tmp_path / f"sweep.{kind}"
+    sweep_figure(path, sweep)
+    data = path.read_bytes()
+    assert data.startswith(b"\x89PNG" if kind == "png" else b"<?xml")
+    if kind == "svg":
+        for words in (b"commanded x [mm]", b"tension [N]", b"cable2, cable4"):
+            assert words in data
+
+
+def test_the_recording_holds_the_numbers(sweep: Solution, tmp_path: Path) -> None:
+    path = tmp_path / "sweep.rrd"
+    write_sweep_recording(sweep, path)
+    back = Readback(path)
+    np.testing.assert_array_equal(back.scalars("/plot/tension/1"), sweep.tensions[:, 0])
+    np.testing.assert_allclose(
+        back.scalars("/plot/deviation/dx"), 1e3 * sweep.deviation[:, 0], atol=1e-9
+    )
