@@ -54,12 +54,29 @@ class Loads:
         """Those of some rows."""
         return Loads(self.mass[index], self.centre[index], self.wrench[index])
 
+    def followed_by(self, other: Loads) -> Loads:
+        """These rows and then others."""
+        return Loads(
+            *(
+                np.concatenate([getattr(self, name), getattr(other, name)])
+                for name in ("mass", "centre", "wrench")
+            )
+        )
+
+    @property
+    def kinds(self) -> NDArray[np.int64]:
+        """(n,) number of each row's load among the different ones."""
+        loaded = self.mass[:, None] != 0.0
+        # NaN, the platform's own centre, is alike to itself; and where nothing hangs is no matter
+        own = np.isnan(self.centre) & loaded
+        centre = np.where(loaded & ~own, self.centre, 0.0)
+        table = np.concatenate([self.mass[:, None], own, centre, self.wrench], axis=1)
+        return np.asarray(np.unique(table, axis=0, return_inverse=True)[1].reshape(-1))
+
     @property
     def changes(self) -> NDArray[np.bool_]:
         """(n,) rows that carry another load than the row before."""
-        table = np.concatenate([self.mass[:, None], self.centre, self.wrench], axis=1)
-        same = (table[1:] == table[:-1]) | (np.isnan(table[1:]) & np.isnan(table[:-1]))
-        return np.concatenate([[False], ~same.all(axis=1)])
+        return np.concatenate([[False], np.diff(self.kinds) != 0])
 
     def with_platform(self, mass: float, centre: Array) -> tuple[Array, Array]:
         """Mass (n,) [kg] and centre of mass (n, 3) [m] of the platform with its payloads.

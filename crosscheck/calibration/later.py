@@ -32,7 +32,7 @@ def has_inputs(problem: Problem, layout: Layout) -> bool:
     data, needs = problem.data, layout.effect.needs
     clock, warmth = data.t_s, data.temperature_C
     return not (
-        ("poses" in needs and data.command_pose is None)
+        ("poses" in needs and data.absolute)
         or ("time" in needs and (clock is None or np.ptp(clock) == 0))
         or ("temperature" in needs and (warmth is None or np.ptp(warmth) == 0))
         or ("tensions" in needs and not data.has_tension)

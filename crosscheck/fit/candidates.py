@@ -80,7 +80,7 @@ def _lacking(problem: Problem, layout: Layout) -> Reason | None:
     still = data.temperature_C is not None and np.ptp(data.temperature_C) == 0
     timeless = data.t_s is None or np.ptp(data.t_s) == 0
     lacks = (
-        ("poses", data.command_pose is None, Why.NEEDS_POSES),
+        ("poses", data.absolute, Why.NEEDS_POSES),
         ("time", timeless, Why.NEEDS_TIME),
         ("temperature", data.temperature_C is None, Why.NEEDS_TEMPERATURE),
         ("temperature", still, Why.CONSTANT_TEMPERATURE),

@@ -17,6 +17,8 @@ STRUCTURED = 4.0
 POOR_FIT = 1e-3
 # Fewer pairs than this say nothing of how rows go together.
 _LEAST_PAIRS = 8
+# Robot's lengths by which commands under different loads are taken to be apart.
+_APART = 1e3
 # From so many standard errors on chances add up, and P is too close to one for doubles.
 _TAIL = 5.0
 # Residuals are not taken to go together more than this.
@@ -152,6 +154,10 @@ def _nearest_rows(problem: Problem) -> NDArray[np.int64]:
     else:
         turn = rotvec_from_quat(commands.pose[rows, 3:]) * problem.robot.length
         place = np.concatenate([commands.pose[rows, :3], turn], axis=1)
+    if commands.loads is not None:
+        # another load is another place
+        apart = _APART * problem.robot.length * commands.loads.kinds[rows, None]
+        place = np.concatenate([place, apart], axis=1)
     tree = spatial.cKDTree(place)
     _distance, index = tree.query(place, k=min(4, len(rows)))
     pairs = set()

@@ -72,16 +72,17 @@ def _solved_rows(problem: Problem, plain: Prediction) -> Problem:
         (plain.singular, "the platform is free to move there"),
         (~plain.solved & ~plain.singular, "no equilibrium was found there"),
     ):
-        if rows.any():
-            some = ", ".join(str(k) for k in lines[rows][:_MOST_LINES])
-            rest = int(rows.sum()) - _MOST_LINES
+        if np.any(rows & problem.use):
+            lost = lines[rows & problem.use]
+            some = ", ".join(str(k) for k in lost[:_MOST_LINES])
+            rest = len(lost) - _MOST_LINES
             more = f" and {rest} more" if rest > 0 else ""
             problem = problem.without(rows, f"lines {some}{more} left out: {words}")
     return problem
 
 
 def _refusal(problem: Problem) -> Refusal | None:
-    n, readings = problem.data.n_rows, problem.n_readings
+    n, readings = int(problem.data.read.sum()), problem.n_readings
     lost = n - int(problem.use.sum())
     checks = (
         (lost > max(_LOST * n, 1), Unfit.NO_EQUILIBRIUM),
@@ -94,6 +95,8 @@ def _refusal(problem: Problem) -> Refusal | None:
 def _constant_commands(problem: Problem) -> bool:
     commands = problem.experiment.commands
     table = commands.pose if commands.lengths is None else commands.lengths
+    if commands.loads is not None:
+        table = np.concatenate([table, commands.loads.kinds[:, None]], axis=1)
     table = table[problem.use]
     return len(table) > 1 and bool(np.all(np.ptp(table, axis=0) == 0))
 

@@ -48,6 +48,9 @@ def commands_of(robot: Robot, data: Measurements) -> Commands:
         run=data.run_index,
         time=data.t_s,
         temperature=data.temperature_C,
+        told=data.told,
+        loads=data.loads,
+        stands=data.stands,
     )
 
 
@@ -58,7 +61,7 @@ class Problem:
     Attributes:
         robot, data: what was measured.
         sigma: noise of each kind of reading; every kind that was read has a number.
-        use: (n,) bool rows that count; others were left out, see ``left_out``.
+        use: (n,) bool rows that count; others are way points or were left out, see ``left_out``.
         left_out: sentences that name the rows left out and why.
     """
 
@@ -71,6 +74,7 @@ class Problem:
 
     def __post_init__(self) -> None:
         self.experiment = Experiment(self.robot, commands_of(self.robot, self.data))
+        self.use = self.use & self.data.read
 
     def without(self, rows: NDArray[np.bool_], why: str) -> Problem:
         """The same problem with some rows left out, sharing what is already computed."""

@@ -13,7 +13,7 @@ class Why(Enum):
     """Why an effect is no candidate or was not chosen; the values are what people read."""
 
     TOO_MANY_PARAMETERS = "{parameters} parameters, but the data have {rows} rows"
-    NEEDS_POSES = "needs commanded poses; these data command lengths"
+    NEEDS_POSES = "needs commanded poses, or lengths as told; these are absolute"
     NEEDS_TIME = "needs the time of each row (t_s)"
     NEEDS_TEMPERATURE = "needs temperature_C"
     CONSTANT_TEMPERATURE = "the temperature never changed"

@@ -6,7 +6,6 @@ Quaternions (``cmd_qw``) have no unit. Columns of other names are kept out and n
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -14,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from crosscheck.measurements.data import Mask
+from crosscheck.measurements.names import meant_by, other_rotations, question, unused_note
 from crosscheck.measurements.table import Table, show
 from crosscheck.units import Unit, of_columns
 from seecr.errors import InputFileError
@@ -24,12 +24,15 @@ QUATERNION = ("qw", "qx", "qy", "qz")
 ANGLES = ("rx", "ry", "rz")
 
 _QUANTITY = re.compile(
-    r"(t|temperature|run|(?:cmd|meas)_(?:q[wxyz]|r?[xyz])|(?:length|tension)_\d+)(?:_([^_]*))?"
+    r"(t|temperature|run|(?:cmd|meas)_(?:q[wxyz]|r?[xyz])|(?:length|tension)_\d+"
+    r"|payload(?:_[xyz])?|(?:force|moment)_[xyz])(?:_([^_]*))?"
 )
-# "t" begins many other names; only these endings are surely meant as a unit of time.
-_TIME_UNITS = {"", "s", "ms", "us", "ns", "sec", "min", "h", "S"}
-# What others call a column, where the spelling is not close enough to be guessed from.
-_ALIASES = {"time": "t_s", "time_s": "t_s", "timestamp": "t_s", "temp_c": "temperature_C"}
+# These begin many other names; only these endings are surely meant as a unit.
+_SURE_UNITS = {
+    "t": {"", "s", "ms", "us", "ns", "sec", "min", "h", "S"},
+    "payload": {"", "kg", "g", "mg", "t", "lb", "lbs", "oz", "N", "Kg", "KG"},
+    "run": {""},
+}
 
 
 @dataclass(frozen=True)
@@ -102,8 +105,9 @@ class Columns:
 
     def near_misses(self) -> str:
         """`` (NOTE; NOTE)`` of misspelt columns, for errors about a column that is not there."""
-        notes = [_misspelt(name, meant) for name, meant in self.meant.items()]
-        return f" ({'; '.join(notes)})" if notes else ""
+        notes = [question(name, meant) for name, meant in self.meant.items()]
+        notes += unused_note([], other_rotations(self.unused))
+        return f" ({'; '.join(note.rstrip('.') for note in notes)})" if notes else ""
 
 
 def know_columns(table: Table, n_cables: int) -> Columns:
@@ -126,8 +130,10 @@ def know_columns(table: Table, n_cables: int) -> Columns:
             text = f"says the same as {known[quantity].name}; expected one of the two"
             raise table.error(text, column=name)
         known[quantity] = Column(name, index, unit)
-    meant = _meant(unused, known, n_cables)
-    notes = [_misspelt(name, near) for name, near in meant.items()]
+    meant = meant_by(unused, _absent(known, n_cables))
+    turned = other_rotations(unused)
+    rest = [name for name in unused if name not in meant and name not in turned]
+    notes = [question(name, near) for name, near in meant.items()] + unused_note(rest, turned)
     columns = Columns(table, known, tuple(unused), meant, notes)
     _check_one_way(columns)
     return columns
@@ -153,8 +159,7 @@ def _parse_name(table: Table, name: str, n_cables: int) -> tuple[str, Unit] | No
     if match is None:
         return None
     quantity, suffix = match[1], match[2] or ""
-    foreign = suffix not in _TIME_UNITS if quantity == "t" else name.startswith("run_")
-    if foreign:
+    if suffix not in _SURE_UNITS.get(quantity, {suffix}):
         return None
     units = of_columns(_si_of(quantity))
     if suffix not in units:
@@ -168,14 +173,18 @@ def _si_of(quantity: str) -> str:
     if quantity in _SI:
         return _SI[quantity]
     prefix, _, last = quantity.rpartition("_")
-    if prefix == "tension":
-        return "N"
+    if prefix in _SI:
+        return _SI[prefix]
     if last in QUATERNION:
         return ""
     return "rad" if last in ANGLES else "m"
 
 
-_SI = {"run": "", "t": "s", "temperature": "C"}
+# Of quantities, and of those that begin so where all of them have one.
+_SI = {
+    "run": "", "t": "s", "temperature": "C", "payload": "kg", "payload_x": "m", "payload_y": "m",
+    "payload_z": "m", "tension": "N", "length": "m", "force": "N", "moment": "Nm",
+}  # fmt: skip
 
 
 def _unit_fault(quantity: str, suffix: str, units: dict[str, Unit]) -> str:
@@ -199,28 +208,18 @@ def _check_cable(table: Table, quantity: str, name: str, n_cables: int) -> None:
         )
 
 
-def _quantities(n_cables: int) -> list[str]:
-    """Every quantity that a column may hold."""
+def _absent(known: dict[str, Column], n_cables: int) -> list[str]:
+    """Names, in each of their units, of every quantity that has no column."""
     of_poses = [f"{p}_{part}" for p in ("cmd", "meas") for part in POSITION + QUATERNION + ANGLES]
     of_cables = [f"{p}_{i}" for p in ("length", "tension") for i in range(1, n_cables + 1)]
-    return ["run", "t", *of_poses, *of_cables, "temperature"]
-
-
-def _meant(unused: Sequence[str], known: dict[str, Column], n_cables: int) -> dict[str, str]:
-    """Of the unused names, what those are thought to mean that are near one that is absent."""
-    absent: dict[str, str] = {}
-    for quantity in _quantities(n_cables):
-        if quantity not in known:
-            units = of_columns(_si_of(quantity))
-            names = [f"{quantity}_{unit}" if unit else quantity for unit in units]
-            absent |= {name.lower(): name for name in names}
-    absent |= {alias: n for alias, n in _ALIASES.items() if n.rpartition("_")[0] not in known}
-    near = {n: difflib.get_close_matches(n.lower(), absent, n=1, cutoff=0.75) for n in unused}
-    return {name: absent[close[0]] for name, close in near.items() if close}
-
-
-def _misspelt(name: str, meant: str) -> str:
-    return f"Column {show(name)} is not used; did you mean {meant}?"
+    of_loads = [f"{p}_{axis}" for p in ("payload", "force", "moment") for axis in POSITION]
+    quantities = ["run", "t", *of_poses, *of_cables, "temperature", "payload", *of_loads]
+    return [
+        f"{quantity}_{unit}" if unit else quantity
+        for quantity in quantities
+        if quantity not in known
+        for unit in of_columns(_si_of(quantity))
+    ]
 
 
 def _check_one_way(columns: Columns) -> None:

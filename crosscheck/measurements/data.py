@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seecr.loads import Loads
 from seecr.pose import Array
 from seecr.result import COORDINATES, Record, Result
 
@@ -33,6 +34,7 @@ _PER_ROW = (
     "angles_rad",
     "tensions",
     "temperature_C",
+    "stands",
     "line",
 )
 
@@ -67,7 +69,8 @@ class Measurements(Result):
         n_cables: m.
         run: (n,) name of the continuous motion each row belongs to.
         command_pose: (n, 7) commanded platform pose, or None.
-        command_lengths: (n, m) [m] paid-out rest lengths, or None.
+        command_lengths: (n, m) [m] rest lengths, or None. told: whether they are what the winches
+            were told, counted as the plain model counts; else they are absolute.
         t_s: (n,) [s] or None.
         position: (n, 3) [m] in the base frame, NaN where not read.
         quat_wxyz: (n, 4) unit quaternions, NaN rows where not read, or None.
@@ -77,6 +80,8 @@ class Measurements(Result):
         angle_mask: (3,) angles that were read in some row; all false beside ``quat_wxyz``.
         tension_mask: (m,) cables whose tension was read in some row.
         temperature_C: (n,) [deg C] or None.
+        loads: what the platform carried, or None.
+        stands: (n,) bool, rows whose run starts at its first row instead of the reference pose.
         sigma: stated noise.
         line: (n,) line of the file (row, for Parquet) each row came from.
         unused_columns: names of columns that mean nothing here.
@@ -97,6 +102,9 @@ class Measurements(Result):
     angle_mask: Mask = _FILLED_IN
     tension_mask: Mask = _FILLED_IN
     temperature_C: Array | None = None
+    told: bool = False
+    loads: Loads | None = None
+    stands: Mask = _FILLED_IN
     sigma: Sigma = field(default_factory=Sigma)
     line: NDArray[np.int64] = _FILLED_IN
     unused_columns: tuple[str, ...] = ()
@@ -117,9 +125,10 @@ class Measurements(Result):
         ):
             if getattr(self, name) is None:
                 self._set(name, np.any(np.isfinite(values), axis=0))
-        line: Any = self.line
-        if line is None:
-            self._set("line", np.arange(2, n + 2))
+        filled: dict[str, Any] = {"line": np.arange(2, n + 2), "stands": np.zeros(n, dtype=bool)}
+        for name, value in filled.items():
+            if getattr(self, name) is None:
+                self._set(name, value)
         self._check_shapes()
 
     def _set(self, name: str, value: object) -> None:
@@ -130,7 +139,7 @@ class Measurements(Result):
         widths = {"command_pose": 7, "command_lengths": m, "position": 3, "quat_wxyz": 4}
         widths |= {"angles_rad": 3, "tensions": m}
         shapes: dict[str, tuple[int, ...]] = {k: (n, width) for k, width in widths.items()}
-        shapes |= {"t_s": (n,), "temperature_C": (n,), "line": (n,)}
+        shapes |= {"t_s": (n,), "temperature_C": (n,), "line": (n,), "stands": (n,)}
         for name, shape in shapes.items():
             value = getattr(self, name)
             if value is not None and np.shape(value) != shape:
@@ -151,6 +160,18 @@ class Measurements(Result):
         """(n,) number of each row's run in :attr:`runs`."""
         number = {name: i for i, name in enumerate(self.runs)}
         return np.array([number[name] for name in self.run.tolist()], dtype=np.int64)
+
+    @property
+    def absolute(self) -> bool:
+        """Whether lengths are commanded that no reference applies to."""
+        return self.command_lengths is not None and not self.told
+
+    @property
+    def read(self) -> Mask:
+        """(n,) rows of which anything was read; the others are way points."""
+        tables = [self.position, self.angles_rad, self.tensions]
+        tables += [] if self.quat_wxyz is None else [self.quat_wxyz]
+        return np.asarray(np.isfinite(np.concatenate(tables, axis=1)).any(axis=1))
 
     @property
     def has_position(self) -> bool:
@@ -202,6 +223,8 @@ class Measurements(Result):
         yield from _columns([f"meas_r{c}_rad" for c in "xyz"], self.angles_rad, self.angle_mask)
         yield from _columns([f"tension_{i}_N" for i in cables], self.tensions, self.tension_mask)
         yield from _columns(["temperature_C"], self.temperature_C)
+        if self.loads is not None:
+            yield from _load_columns(self.loads)
 
     def rows(self, index: ArrayLike | slice) -> Measurements:
         """Some rows: numbers, a mask (n,) or a slice. Masks of what was read stay as they are."""
@@ -210,7 +233,19 @@ class Measurements(Result):
         for name in _PER_ROW:
             value = getattr(self, name)
             values[name] = None if value is None else value[chosen]
+        values["loads"] = None if self.loads is None else self.loads.rows(chosen)
         return dataclasses.replace(self, **values)
+
+
+def _load_columns(loads: Loads) -> Iterator[tuple[str, list[Any]]]:
+    """Those of payload and wrench that say anything."""
+    if np.any(loads.mass):
+        yield from _columns(["payload_kg"], loads.mass)
+        centre = [f"payload_{c}_m" for c in "xyz"]
+        yield from _columns(centre, loads.centre, np.isfinite(loads.centre).any(axis=0))
+    wrench = [*(f"force_{c}_N" for c in "xyz"), *(f"moment_{c}_Nm" for c in "xyz")]
+    acts = np.array([bool(column.any()) for column in loads.wrench.T])
+    yield from _columns(wrench, loads.wrench, acts)
 
 
 def _columns(

@@ -39,7 +39,11 @@ _BEGINNINGS = (
     (b"\xfe\xff", "UTF-16 text"),
 )
 _TEXT_BEGINNINGS = {"{": "JSON", "[": "JSON or TOML", "<": "XML, such as a robot's MJCF"}
-_SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars"}
+_SEPARATORS = (",", ";", "\t")
+# What stands for a reading that was not made, besides an empty cell.
+_NOT_READ = ("nan", "NaN")
+_COMMA_NUMBER = re.compile(r"[+-]?(\d+,\d*|,\d+)(e[+-]?\d+)?", re.IGNORECASE)
+_POINT_NUMBER = re.compile(r"[+-]?(\d+\.\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE)
 _NO_NUMBER = {"nan", "inf", "infinity", "na", "n/a", "#n/a", "null", "none", "-", "--"}
 
 
@@ -52,7 +56,7 @@ class Table:
         names: of the columns, stripped, as in the header.
         line: (n,) where each row begins, counted from 1.
         header_line: where the header is; None where the file has no lines.
-        cells: of each column the stripped texts, (n,) each.
+        cells: of each column the stripped texts, (n,) each; numbers with decimal points.
     """
 
     path: Path
@@ -71,8 +75,10 @@ class Table:
         return InputFileError.at(self.path, text, line=line, column=column, line_word=word)
 
     def numbers(self, index: int, *, blank_is_nan: bool) -> Array:
-        """Numbers (n,) of one column, as written; NaN for an empty cell where that is allowed."""
+        """Numbers (n,) of one column, as written; NaN where nothing was read, if that may be."""
         cells = self.cells[index]
+        if blank_is_nan:
+            cells = ["" if cell in _NOT_READ else cell for cell in cells]
         try:
             values = np.array([float(cell) if cell else math.nan for cell in cells])
         except ValueError:
@@ -141,33 +147,61 @@ def _read_csv(path: Path, data: bytes) -> Table:
     if not numbered:
         raise InputFileError.at(path, f"is empty; {EXPECTED_FILE}")
     _check_first_line(path, *numbered[0])
-    (header_line, header), *body = _csv_rows(path, numbered)
+    separator = _separator(path, *numbered[0])
+    (header_line, header), *body = _csv_rows(path, numbered, separator)
     if not body:
         raise InputFileError.at(
             path, "has a header but no rows; expected one row per resting pose", line=header_line
         )
     _check_cell_counts(path, header_line, len(header), body)
+    columns = zip(*(row for _, row in body), strict=True)
+    cells = [[cell.strip() for cell in column] for column in columns]
     return Table(
         path=path,
         names=tuple(name.strip() for name in header),
         line=np.array([line for line, _ in body]),
         header_line=header_line,
-        cells=[[c.strip() for c in cells] for cells in zip(*(row for _, row in body), strict=True)],
+        cells=cells if separator == "," else _with_points(cells),
     )
+
+
+def _with_points(cells: list[list[str]]) -> list[list[str]]:
+    """Decimal commas become points, if no number has a point: one file has one kind."""
+    every = [cell for column in cells for cell in column]
+    if any(_POINT_NUMBER.fullmatch(cell) for cell in every):
+        return cells
+    return [
+        [cell.replace(",", ".") if _COMMA_NUMBER.fullmatch(cell) else cell for cell in column]
+        for column in cells
+    ]
 
 
 def _check_first_line(path: Path, number: int, line: str) -> None:
     kind = _TEXT_BEGINNINGS.get(line.lstrip()[0])
     if kind:
         raise InputFileError.at(path, f"looks like {kind}; {EXPECTED_FILE}", line=number)
-    for mark, word in _SEPARATORS.items():
-        if line.count(mark) > line.count(","):
-            text = f"expected commas between cells, got {word}; write 1.5,2.5 for two cells"
-            raise InputFileError.at(path, text, line=number)
+    if line.count("|") > max(line.count(mark) for mark in _SEPARATORS):
+        text = "expected commas, semicolons or tabs between cells, got bars; write 1.5,2.5"
+        raise InputFileError.at(path, text, line=number)
 
 
-def _csv_rows(path: Path, numbered: list[tuple[int, str]]) -> list[tuple[int, list[str]]]:
-    reader = csv.reader((line for _, line in numbered), strict=True, skipinitialspace=True)
+def _separator(path: Path, number: int, line: str) -> str:
+    """What stands between the names of the header: a comma, a semicolon or a tab."""
+    outside = re.sub(r'"[^"]*"', "", line)
+    counts = {mark: outside.count(mark) for mark in _SEPARATORS}
+    mark = max(_SEPARATORS, key=lambda one: counts[one])
+    others = [count for one, count in counts.items() if one != mark]
+    if counts[mark] and counts[mark] in others:
+        text = "expected one kind of mark between the names, got as many of one as of another"
+        raise InputFileError.at(path, f"{text}; write all with commas", line=number)
+    return mark
+
+
+def _csv_rows(
+    path: Path, numbered: list[tuple[int, str]], separator: str
+) -> list[tuple[int, list[str]]]:
+    lines = (line for _, line in numbered)
+    reader = csv.reader(lines, delimiter=separator, strict=True, skipinitialspace=separator != "\t")
     rows, first = [], 0
     try:
         for row in reader:
@@ -187,7 +221,10 @@ def _check_cell_counts(
             cells = "1 cell" if len(row) == 1 else f"{len(row)} cells"
             text = f"expected {n_columns} cells as in the header (line {header_line}), got {cells}"
             if len(row) > n_columns:
-                text += "; a decimal comma splits a number in two: write 1.5, not 1,5"
+                text += (
+                    "; a decimal comma splits a number in two: write 1.5, not 1,5, or put "
+                    "semicolons between cells"
+                )
             raise InputFileError.at(path, text, line=line)
 
 
@@ -226,7 +263,7 @@ def _cell_fault(cell: str, blank_is_nan: bool) -> str | None:
         return None if blank_is_nan else f"{expected}, got an empty cell; fill it or drop the row"
     if cell.lower().lstrip("+-") in _NO_NUMBER or cell.lower() in _NO_NUMBER:
         return f"{expected}, got {show(cell)}"
-    if re.fullmatch(r"[+-]?\d*,\d+(e[+-]?\d+)?", cell, re.IGNORECASE):
+    if _COMMA_NUMBER.fullmatch(cell):
         point = cell.replace(",", ".")
         return f"{expected}, got a decimal comma in {show(cell)}; write {point}"
     if re.fullmatch(r"[+-]?[\d.]+(e[+-]?\d+)?\s*[^\W\d_]+", cell, re.IGNORECASE):

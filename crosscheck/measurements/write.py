@@ -5,13 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 from crosscheck.files import write_texts
-from crosscheck.measurements.data import Measurements, Sigma
+from crosscheck.measurements.data import Measurements
 
 
 def write_measurements(path: str | Path, data: Measurements) -> None:
-    """Write the CSV and, beside it, the TOML with sigma; both whole or not at all.
+    """Write the CSV and, beside it, the TOML with all that is no column; both whole or not at all.
 
-    Numbers have 9 significant digits, readings that are missing are empty cells.
+    Numbers have 9 significant digits, readings that are missing are empty cells. Runs start all at
+    the reference pose or all at their first rows: a TOML cannot say it run by run.
 
     Raises:
         InputFileError: the folder cannot be written.
@@ -21,7 +22,7 @@ def write_measurements(path: str | Path, data: Measurements) -> None:
     rows = (",".join(map(_cell, row)) for row in zip(*columns.values(), strict=True))
     text = "\n".join([",".join(columns), *rows]) + "\n"
     # The CSV last: a TOML without it is no measurement.
-    write_texts({path.with_suffix(".toml"): _sigma_toml(data.sigma), path: text})
+    write_texts({path.with_suffix(".toml"): _toml(data), path: text})
 
 
 def _cell(value: str | float | None) -> str:
@@ -38,10 +39,12 @@ def _quoted(name: str) -> str:
     return name
 
 
-def _sigma_toml(sigma: Sigma) -> str:
+def _toml(data: Measurements) -> str:
     """The text that reading gives back exactly."""
-    lines = ["# one standard deviation of each kind of reading", "[sigma]"]
-    for key, value in vars(sigma).items():
+    lines = ['lengths = "told"'] if data.told else []
+    lines += ['start = "first_row"'] if data.stands.any() else []
+    lines += ["# one standard deviation of each kind of reading", "[sigma]"]
+    for key, value in vars(data.sigma).items():
         if value is not None:
             lines.append(f"{key} = {float(value)!r}")
     return "\n".join(lines) + "\n"

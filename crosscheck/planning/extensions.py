@@ -20,6 +20,7 @@ from crosscheck.planning.planned import (
     planned,
 )
 from seecr.joints import pose_of_values, values_of_pose
+from seecr.loads import Loads
 from seecr.pose import Array, quat_from_rotvec, quat_multiply
 from seecr.robot import Robot
 from seecr.workspace import feasible
@@ -72,18 +73,18 @@ def extensions(plan: Planned) -> Iterator[Extension]:
     Args:
         plan: what is read so far, about the model that predicts it.
     """
-    data = plan.problem.data.rows(plan.problem.use)
+    ways = ~plan.problem.data.read & ~plan.unsolved
+    data = plan.problem.data.rows(plan.problem.use | ways)
     for make in (_sensors, _payload, _way_back, _later, _more_poses):
         yield from make(plan, data)
 
 
 def _like(
-    plan: Planned, data: Measurements, robot: Robot | None = None, reads: Reads | None = None,
-    sigma: Sigma | None = None,
-) -> Planned:  # fmt: skip
-    """Other rows, another robot, other sensors; all else as in the plan."""
+    plan: Planned, data: Measurements, reads: Reads | None = None, sigma: Sigma | None = None
+) -> Planned:
+    """Other rows, other sensors; all else as in the plan."""
     return planned(
-        robot or plan.problem.robot, data, sigma or plan.problem.sigma, reads or plan.reads,
+        plan.problem.robot, data, sigma or plan.problem.sigma, reads or plan.reads,
         plan.base.terms,
     )  # fmt: skip
 
@@ -116,9 +117,18 @@ def _payload(plan: Planned, data: Measurements) -> Iterator[Extension]:
         yield Extension(
             Adding.PAYLOAD,
             f"repeat the poses with a known {PAYLOAD * robot.mass:.2g} kg more at the centre of "
-            "mass",
-            _like(plan, data, replace(robot, mass=(1.0 + PAYLOAD) * robot.mass)),
+            "mass (payload_kg)",
+            _like(plan, replace(data, loads=_heavier(data, robot, PAYLOAD * robot.mass))),
         )
+
+
+def _heavier(data: Measurements, robot: Robot, mass: float) -> Loads:
+    """The rows' loads and a payload [kg] at the platform's centre of mass besides."""
+    here = data.loads or Loads.of(data.n_rows)
+    total, centre = here.mass + mass, here.centre
+    share = np.divide(here.mass, total, out=np.zeros_like(total), where=total != 0.0)[:, None]
+    both = robot.centre_of_mass + share * (centre - robot.centre_of_mass)
+    return Loads(total, np.where(here.mass[:, None] == 0.0, np.nan, both), here.wrench)
 
 
 def _way_back(plan: Planned, data: Measurements) -> Iterator[Extension]:
@@ -157,6 +167,9 @@ def _after(plan: Planned, first: Measurements, later: Measurements) -> Planned:
         command_pose=_stack(first.command_pose, later.command_pose),
         command_lengths=_stack(first.command_lengths, later.command_lengths),
         temperature_C=_stack(first.temperature_C, later.temperature_C),
+        told=first.told,
+        loads=_both(first.loads, later.loads),
+        stands=np.concatenate([first.stands, later.stands]),
     )
     whole = _like(plan, both)
     rest = whole.problem.only(np.arange(both.n_rows) >= first.n_rows)
@@ -166,6 +179,10 @@ def _after(plan: Planned, first: Measurements, later: Measurements) -> Planned:
 
 def _stack(a: Array | None, b: Array | None) -> Array | None:
     return None if a is None or b is None else np.concatenate([a, b])
+
+
+def _both(a: Loads | None, b: Loads | None) -> Loads | None:
+    return None if a is None or b is None else a.followed_by(b)
 
 
 def _more_poses(plan: Planned, _data: Measurements) -> Iterator[Extension]:
@@ -208,6 +225,7 @@ def _commands(problem: Problem, poses: Array) -> Measurements:
         run=np.array([f"added {k + 1}" for k in range(n)]),
         command_pose=None if in_lengths else poses,
         command_lengths=problem.robot.commanded_lengths(poses) if in_lengths else None,
+        told=data.told,
         t_s=None if data.t_s is None else data.t_s.max() + 60.0 * np.arange(1.0, n + 1.0),
         temperature_C=None
         if data.temperature_C is None

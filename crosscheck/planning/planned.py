@@ -113,16 +113,20 @@ def planned(
 
 
 def _as_read(commands: Measurements, readings: Readings, reads: Reads) -> Measurements:
-    """Commands with the readings that would be made of them."""
+    """Commands with the readings that would be made of them, but for way points.
+
+    Way points are those without readings among others that have some: a list of commands has none.
+    """
+    stops = (commands.read | ~commands.read.any())[:, None]
     angles = np.zeros((commands.n_rows, 3))
     if reads.angles.any():
         angles = rxyz_from_quat(readings.quat_wxyz)
     return replace(
         commands,
-        position=np.where(reads.position, readings.position, np.nan),
-        quat_wxyz=readings.quat_wxyz.copy() if reads.orientation else None,
-        angles_rad=np.where(reads.angles, angles, np.nan),
-        tensions=np.where(reads.tensions, readings.tensions, np.nan),
+        position=np.where(stops & reads.position, readings.position, np.nan),
+        quat_wxyz=np.where(stops, readings.quat_wxyz, np.nan) if reads.orientation else None,
+        angles_rad=np.where(stops & reads.angles, angles, np.nan),
+        tensions=np.where(stops & reads.tensions, readings.tensions, np.nan),
         position_mask=reads.position,
         angle_mask=reads.angles,
         tension_mask=reads.tensions,

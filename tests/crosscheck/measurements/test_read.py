@@ -97,7 +97,7 @@ def test_units_and_order_of_columns_are_free(csv_file, robot):
     assert data.tensions[0, 2] == 12.5
     assert (data.t_s[0], data.temperature_C[0], data.runs) == (3.5, 21.5, ("a",))
     assert data.unused_columns == ("remark",)
-    assert data.notes == ()
+    assert data.notes == ("Not used: remark.",)
     assert data.sigma == Sigma()
     assert (data.n_rows, data.line.tolist(), data.n_cables) == (1, [2], 4)
     assert data.has_position and data.has_orientation and data.has_tension
@@ -188,7 +188,7 @@ def test_row_without_readings_is_kept_and_said(csv_file, robot):
     assert not data.has_tension
     assert data.notes[1:] == (
         "Column tension_1_N is empty: not measured.",
-        "1 row has a command but no reading; kept as a place where the robot went.",
+        "1 row has a command but no reading: a way point, gone through and not compared.",
     )
 
 
@@ -313,11 +313,18 @@ REFUSED = {
     "json": (['{"run": [1, 2]}'], "line 1: looks like JSON; expected a CSV"),
     "toml": (["# sigma", "[sigma]", "a = 1"], "line 2: looks like JSON or TOML; expected a CSV"),
     "xml": (["<mujoco>", "</mujoco>"], "line 1: looks like XML, such as a robot's MJCF; expected"),
-    "semicolons": (
-        [POSE.replace(",", ";"), "0;0;0;0,5"],
-        "line 1: expected commas between cells, got semicolons",
+    "bars": (
+        [POSE.replace(",", "|"), "0|0|0|0"],
+        "line 1: expected commas, semicolons or tabs between cells, got bars",
     ),
-    "tabs": ([POSE.replace(",", "\t"), "0\t0\t0\t0"], "got tabs"),
+    "marks of two kinds": (
+        ["cmd_x_m;cmd_y_m,cmd_z_m;meas_x_m,run", "0;0,0;0,a"],
+        "line 1: expected one kind of mark between the names, got as many of one as of another",
+    ),
+    "points and commas": (
+        [POSE.replace(",", ";"), "0;0;0;0.5", "0;0;0;1,5"],
+        "line 3, column meas_x_m: .*got a decimal comma in '1,5'; write 1.5",
+    ),
     "no header": (
         ["0,0,0,1.5", "0,0,0,1.6"],
         "line 1: expected a header row with column names such as cmd_x_m, got the number '0'",
@@ -454,10 +461,10 @@ REFUSED = {
         [POSE, "0,NaN,0,0"],
         "line 2, column cmd_y_m: expected a number in every row, got 'NaN'",
     ),
-    "NaN reading": (
-        [POSE, "0,0,0,0", "0,0,0,nan"],
+    "not available": (
+        [POSE, "0,0,0,0", "0,0,0,N/A"],
         "line 3, column meas_x_m: expected a number, or an empty cell where the "
-        "reading is missing, got 'nan'",
+        "reading is missing, got 'N/A'",
     ),
     "infinite": ([POSE, "0,0,0,-inf"], "line 2, column meas_x_m: .*got '-inf'"),
     "overflow": ([POSE, "0,0,0,1e999"], "line 2, column meas_x_m: .*got '1e999'"),
@@ -578,13 +585,19 @@ def test_sigma_beside_the_data_or_named(csv_file, robot, tmp_path):
         ("[sigma]\nposition_m = \n", "measured.toml: is not TOML: .*line 2"),
         (
             "[sigma]\nposition_m = 0\n",
-            r"line 2: position_m must be a positive number \[m\], got 0;",
+            r'line 2: position_m must be a positive number \[m\] or a text such as "0.5mm", got 0;',
         ),
         (
             "[sigma]\n\ntension_N = -1.5\n",
-            r"line 3: tension_N must be a positive number \[N\], got -1.5",
+            r'line 3: tension_N must be a positive number \[N\] or a text such as "1N", got -1.5',
         ),
-        ("[sigma]\nposition_m = '3 mm'\n", "got '3 mm'; leave it out if it is not known"),
+        (
+            "[sigma]\nposition_m = '3 N'\n",
+            "line 2: position_m: expected a number with its unit .m, cm, mm, .*got unit 'N'",
+        ),
+        ("lengths = 'tolled'\n", "line 1: lengths must be .absolute. or .told., got 'tolled'"),
+        ("start = 3\n", "line 1: start must be .reference. or .first_row., got 3"),
+        ("lenghts = 'told'\n", "line 1: unknown key lenghts; expected lengths$"),
         ("[sigma]\nposition_m = nan\n", "line 2: position_m must be .* got nan"),
         ("[sigma]\nlength_m = inf\n", "got inf"),
         ("[sigma]\nlength_m = true\n", "got True"),
@@ -720,8 +733,8 @@ def test_parquet_has_the_same_columns(tmp_path, robot):
     ("change", "expected"),
     [
         (
-            {"meas_x_m": [0.0, float("nan")]},
-            "measured.parquet: row 2, column meas_x_m: .*got 'nan'",
+            {"meas_x_m": [0.0, float("inf")]},
+            "measured.parquet: row 2, column meas_x_m: .*got 'inf'",
         ),
         ({"cmd_y_m": [None, 1.0]}, "row 1, column cmd_y_m: .*got an empty cell"),
         ({"cmd_y_in": [1.0, 1.0]}, "measured.parquet: column cmd_y_in: unknown unit 'in'"),

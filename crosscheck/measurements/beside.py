@@ -1,0 +1,90 @@
+"""The TOML beside a file of measurements: noise, what lengths mean, where runs start."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+
+from crosscheck.errors import CrosscheckError
+from crosscheck.files import Toml, read_toml
+from crosscheck.measurements.data import Sigma
+from crosscheck.units import EXAMPLE, parse_quantity
+
+_SIGMAS = tuple(item.name for item in fields(Sigma))
+# What a key may say, the default first.
+_CHOICES = {"lengths": ("absolute", "told"), "start": ("reference", "first_row")}
+
+
+@dataclass(frozen=True)
+class Beside:
+    """What the TOML says.
+
+    Attributes:
+        sigma: stated noise.
+        told: ``lengths = "told"``: lengths are what the winches were told.
+        stands: ``start = "first_row"``: runs start at their first row.
+    """
+
+    sigma: Sigma = field(default_factory=Sigma)
+    told: bool = False
+    stands: bool = False
+
+
+def read_beside(path: Path) -> Beside:
+    """Read the TOML.
+
+    Raises:
+        InputFileError: missing or broken TOML, an unknown key, a value that is no positive
+            quantity, or another word than those a key may say.
+    """
+    toml = read_toml(path, "expected a TOML file with a table [sigma]")
+    _check_names(toml)
+    table = toml.content.get("sigma", {})
+    if not isinstance(table, dict):
+        raise toml.error("sigma must be a table, [sigma]", "sigma")
+    said = {key: _choice(toml, key) for key in _CHOICES}
+    sigma = Sigma(**{key: _sigma(toml, key, value) for key, value in table.items()})
+    return Beside(sigma, said["lengths"] == "told", said["start"] == "first_row")
+
+
+def _check_names(toml: Toml) -> None:
+    """Other names are the user's own; a misspelt one of ours must not be passed over."""
+    known = ["sigma", *_CHOICES]
+    for name in toml.content:
+        if name in _SIGMAS:
+            raise toml.error(f"{name} stands outside [sigma]; put it under that", name)
+        near = difflib.get_close_matches(name.lower(), known, n=1, cutoff=0.7)
+        if name not in known and near:
+            shown = "[{}]" if near[0] == "sigma" else "{}"
+            what = "table" if near[0] == "sigma" else "key"
+            text = f"unknown {what} {shown.format(name)}; expected {shown.format(near[0])}"
+            raise toml.error(text, name)
+
+
+def _choice(toml: Toml, key: str) -> str:
+    value = toml.content.get(key, _CHOICES[key][0])
+    if value not in _CHOICES[key]:
+        words = " or ".join(f'"{word}"' for word in _CHOICES[key])
+        raise toml.error(f"{key} must be {words}, got {value!r}", key)
+    return str(value)
+
+
+def _sigma(toml: Toml, key: str, value: object) -> float:
+    if key not in _SIGMAS:
+        # Nearest first, so that the likely one is read first.
+        likeness = {k: difflib.SequenceMatcher(None, key, k).ratio() for k in _SIGMAS}
+        known = ", ".join(sorted(_SIGMAS, key=lambda k: -likeness[k]))
+        raise toml.error(f"unknown key {key} in [sigma]; known are {known}", key)
+    kind, _, unit = key.rpartition("_")
+    if isinstance(value, str):
+        try:
+            return parse_quantity(key, kind, value)
+        except CrosscheckError as error:
+            raise toml.error(str(error), key) from None
+    number = float(value) if isinstance(value, int | float) and value is not True else 0.0
+    if not (math.isfinite(number) and number > 0):
+        text = f'{key} must be a positive number [{unit}] or a text such as "{EXAMPLE[kind]}"'
+        raise toml.error(f"{text}, got {value!r}; leave it out if it is not known", key)
+    return number

@@ -1,0 +1,76 @@
+"""Names of columns that are near to ours, and names that are only alike."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Sequence
+
+from crosscheck.measurements.table import show
+
+# What others call a column, where the spelling is not close enough to be guessed from.
+_ALIASES = {"time": "t_s", "time_s": "t_s", "timestamp": "t_s", "temp_c": "temperature_C"}
+# Likeness from which on a name may be a misspelt one.
+_NEAR = 0.75
+_ROTATION = re.compile(
+    r"roll|pitch|yaw|euler|heading|rotvec|rodrigues|(?:^|_)(?:phi|theta|psi|rot)(?:_|$)",
+    re.IGNORECASE,
+)
+OUR_ROTATIONS = (
+    "a rotation is meas_rx_deg meas_ry_deg meas_rz_deg with R = Rx(rx) Ry(ry) Rz(rz), or the "
+    "quaternion meas_qw meas_qx meas_qy meas_qz"
+)
+
+
+def meant_by(unused: Sequence[str], absent: Sequence[str]) -> dict[str, str]:
+    """Of unused names, what those are thought to mean that are near one that is absent.
+
+    Only spelling is guessed at: what tells one of ours from another (the axis, the cable) has to
+    stand in the name as it is.
+    """
+    ours = {name.lower(): name for name in absent}
+    ours |= {alias: name for alias, name in _ALIASES.items() if name in absent}
+    found = {}
+    for name in unused:
+        if _ROTATION.search(name):
+            continue
+        near = difflib.get_close_matches(name.lower(), ours, n=8, cutoff=_NEAR)
+        told = [one for one in near if one in _ALIASES or _distinct(one) <= _distinct(name)]
+        if told:
+            found[name] = ours[told[0]]
+    return found
+
+
+def _distinct(name: str) -> set[str]:
+    """Parts of a name that say which one it is: x, qw, rz, the number of a cable."""
+    parts = re.split(r"[\W_]+|(?<=\D)(?=\d)|(?<=\d)(?=\D)", name.lower())
+    whole = {part for part in parts if re.fullmatch(r"q[wxyz]|r?[xyz]|\d+", part)}
+    # cmdx_m: the axis stuck to the word before
+    stuck = {part[-1] for part in parts if re.fullmatch(r"[a-pr-z]{2,}[xyz]", part)}
+    return whole | stuck
+
+
+def other_rotations(unused: Sequence[str]) -> list[str]:
+    """Those that name rotations in words which mean different things to different people."""
+    return [name for name in unused if _ROTATION.search(name)]
+
+
+def question(name: str, meant: str) -> str:
+    """What is asked about a name that is near one of ours."""
+    return f"Column {show(name)} is not used; did you mean {meant}?"
+
+
+def unused_note(names: Sequence[str], rotations: Sequence[str]) -> list[str]:
+    """Sentences that name the columns that mean nothing here."""
+    notes = []
+    if rotations:
+        word = "Column" if len(rotations) == 1 else "Columns"
+        verb = "is" if len(rotations) == 1 else "are"
+        listed = " ".join(rotations)
+        notes.append(
+            f"{word} {listed} {verb} not used, since roll, pitch and yaw have many meanings: here "
+            f"{OUR_ROTATIONS}."
+        )
+    if names:
+        notes.append(f"Not used: {', '.join(names)}.")
+    return notes

@@ -1,0 +1,166 @@
+"""Mistakes that no single cell shows: units, orders and rows that cannot be what they say."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from crosscheck.measurements.columns import POSITION, Columns
+from crosscheck.measurements.data import Measurements
+from seecr.pose import Array, quat_conjugate, quat_multiply, rotvec_from_quat
+
+if TYPE_CHECKING:
+    from seecr.robot import Robot
+
+# Commands beyond this many times the frame's reach are in another unit; beyond the lesser, odd.
+_ABSURD, _FAR = 10.0, 2.5
+# Readings that spread by this much more, or less, than what was commanded are in another unit.
+_OTHER_UNIT, _LEAST_ROWS = 100.0, 4
+# Quaternions this far [rad] from where they should be, and near it in another order.
+_TURNED, _UNTURNED = np.radians(90.0), np.radians(45.0)
+_MOST_LINES = 8
+
+
+def notice(columns: Columns, robot: Robot, data: Measurements) -> list[str]:
+    """What a reader should be told of.
+
+    Raises:
+        InputFileError: commands or readings that must be in another unit or order.
+    """
+    _check_reach(columns, robot, data)
+    _check_spread(columns, data)
+    return [*_far(robot, data), *_other_order(columns, robot, data), *_twice(data)]
+
+
+def _reach(robot: Robot) -> float:
+    """Distance [m] of the farthest exit point from the reference position, or of two of them."""
+    points = np.concatenate([robot.exit_points, robot.reference_pose[None, :3]])
+    return float(np.max(np.linalg.norm(points[:, None] - points[None], axis=-1)))
+
+
+def _away(robot: Robot, data: Measurements) -> Array:
+    """How far (n, k) [m] commands are from the reference position; lengths as they are."""
+    if data.command_lengths is not None:
+        return data.command_lengths
+    assert data.command_pose is not None
+    return np.abs(data.command_pose[:, :3] - robot.reference_pose[:3])
+
+
+def _commanded(data: Measurements) -> list[str]:
+    """The quantities whose columns :func:`_away` looks at."""
+    if data.command_lengths is not None:
+        return [f"length_{i + 1}" for i in range(data.n_cables)]
+    return [f"cmd_{axis}" for axis in POSITION]
+
+
+def _check_reach(columns: Columns, robot: Robot, data: Measurements) -> None:
+    reach = _reach(robot)
+    for quantity, away in zip(_commanded(data), _away(robot, data).T, strict=True):
+        if quantity in columns.known:
+            _refuse_far(columns, quantity, away, reach)
+
+
+def _refuse_far(columns: Columns, quantity: str, away: Array, reach: float) -> None:
+    unit, given = columns.known[quantity].unit.suffix, columns.numbers(quantity)
+    columns.refuse(
+        away > _ABSURD * reach,
+        quantity,
+        lambda row: (
+            f"far outside the robot: expected numbers of the size of its frame, {reach:.3g} m "
+            f"across, got {given[row]:.4g} m; are these really {unit}? Name the column by its "
+            f"unit, such as {quantity}_mm"
+        ),
+    )
+
+
+def _far(robot: Robot, data: Measurements) -> list[str]:
+    reach, away = _reach(robot), np.max(_away(robot, data), axis=1)
+    row = int(np.argmax(away))
+    if away[row] <= _FAR * reach:
+        return []
+    return [
+        f"Line {data.line[row]}: a command {away[row]:.3g} m away, where the frame is "
+        f"{reach:.3g} m across: check its unit."
+    ]
+
+
+def _spread(values: Array) -> float:
+    """Usual distance [m] from the middle, (n, 3), of what is not NaN."""
+    known = values[np.isfinite(values).all(axis=1)]
+    if len(known) < _LEAST_ROWS:
+        return 0.0
+    return float(np.median(np.linalg.norm(known - np.median(known, axis=0), axis=1)))
+
+
+def _check_spread(columns: Columns, data: Measurements) -> None:
+    """Positions read in another unit than their column says."""
+    if data.command_pose is None:
+        return
+    which = [k for k in range(3) if data.position_mask[k]]
+    read, told = _spread(data.position[:, which]), _spread(data.command_pose[:, :3][:, which])
+    if not (read > 0.0 and told > 0.0) or 1.0 / _OTHER_UNIT < read / told < _OTHER_UNIT:
+        return
+    column = columns.known[f"meas_{POSITION[which[0]]}"]
+    raise columns.table.error(
+        f"positions were read over {read:.3g} m where {told:.3g} m were commanded; expected about "
+        f"the same; are these really {column.unit.suffix}? Name the columns by their unit, such as "
+        f"meas_{POSITION[which[0]]}_{'mm' if read > told else 'm'}",
+        column=column.name,
+    )
+
+
+def _turn(quat: Array, of: Array) -> Array:
+    """Angles (n,) [rad] between quaternions."""
+    return np.asarray(
+        np.linalg.norm(rotvec_from_quat(quat_multiply(quat, quat_conjugate(of))), axis=-1)
+    )
+
+
+def _other_order(columns: Columns, robot: Robot, data: Measurements) -> list[str]:
+    """Quaternions that stand on their head, but not if their last number is the scalar."""
+    home = np.tile(robot.reference_pose[3:], (data.n_rows, 1))
+    if data.command_pose is not None and "cmd_qw" in columns.known:
+        quat = data.command_pose[:, 3:]
+        if np.all(_turn(quat, home) > _TURNED) and np.all(
+            _turn(np.roll(quat, 1, axis=1), home) < _UNTURNED
+        ):
+            raise columns.table.error(
+                "every command turns the platform by more than 90 deg from the reference pose, "
+                "and read with the scalar last none by 45; expected the scalar first; give each "
+                "of cmd_qw cmd_qx cmd_qy cmd_qz its own numbers",
+                column="cmd_qw",
+            )
+    if data.quat_wxyz is None or "meas_qw" not in columns.known:
+        return []
+    rows = np.isfinite(data.quat_wxyz).all(axis=1)
+    told = (home if data.command_pose is None else data.command_pose[:, 3:])[rows]
+    quat = data.quat_wxyz[rows]
+    here = np.degrees(np.median(_turn(quat, told)))
+    there = np.degrees(np.median(_turn(np.roll(quat, 1, axis=1), told)))
+    if here < np.degrees(_TURNED) or there > 0.2 * here:
+        return []
+    return [
+        f"The measured quaternions are {here:.0f} deg from the commanded ones, and only "
+        f"{there:.0f} deg if their last number is the scalar: are meas_qw meas_qx meas_qy meas_qz "
+        "in the right order?"
+    ]
+
+
+def _twice(data: Measurements) -> list[str]:
+    """Rows that say the same as another to the last digit: noise never does."""
+    columns = [column for name, column in data.columns() if name != "run"]
+    first: dict[tuple[object, ...], int] = {}
+    pairs = []
+    for row, values in enumerate(zip(*columns, strict=True)):
+        if data.read[row]:
+            before = first.setdefault(values, row)
+            if before != row:
+                pairs.append(f"{data.line[row]} as {data.line[before]}")
+    if not pairs:
+        return []
+    more = f" and {len(pairs) - _MOST_LINES} more" if len(pairs) > _MOST_LINES else ""
+    return [
+        f"Rows given twice, to the last digit: line {', '.join(pairs[:_MOST_LINES])}{more}; they "
+        "count twice: take one of each out if it was read once."
+    ]
