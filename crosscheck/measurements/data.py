@@ -241,8 +241,8 @@ def _load_columns(loads: Loads) -> Iterator[tuple[str, list[Any]]]:
     """Those of payload and wrench that say anything."""
     if np.any(loads.mass):
         yield from _columns(["payload_kg"], loads.mass)
-        centre = [f"payload_{c}_m" for c in "xyz"]
-        yield from _columns(centre, loads.centre, np.isfinite(loads.centre).any(axis=0))
+        if np.isfinite(loads.centre).any():
+            yield from _columns([f"payload_{c}_m" for c in "xyz"], loads.centre)
     wrench = [*(f"force_{c}_N" for c in "xyz"), *(f"moment_{c}_Nm" for c in "xyz")]
     acts = np.array([bool(column.any()) for column in loads.wrench.T])
     yield from _columns(wrench, loads.wrench, acts)
