@@ -190,6 +190,8 @@ def _base(problem: Problem, terms: Terms, layout: Layout, factor: Array) -> Fit:
 def _fitted(problem: Problem, terms: Terms, layout: Layout, factor: Array) -> Fit:
     """The best joint fit, from where the effect stands and from its most promising starts."""
     fits = [fit(problem, terms, factor)] if layout.name in terms else []
+    if fits and fits[0].valid and terms[layout.name].knowledge.any:
+        return fits[0]  # what is known of it says where it is
     base = _base(problem, terms, layout, factor)
     tried = try_candidate(Trials(problem, factor), base, layout)
     if tried.fit is not None:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from seecr.commands import Commands
     from seecr.effects import (
         Effect,
+        Knowledge,
         Readings,
         Term,
         Terms,
@@ -55,8 +56,8 @@ __version__ = "0.1.0"
 _MODULES = {
     "commands": ("Commands",),
     "effects": (
-        "Effect", "Readings", "Term", "Terms", "catalogue", "effect_named", "layout_of",
-        "parameter",
+        "Effect", "Knowledge", "Readings", "Term", "Terms", "catalogue", "effect_named",
+        "layout_of", "parameter",
     ),
     "equilibrium": ("solve",),
     "errors": ("InputError", "InputFileError", "MissingPackageError", "RobotError", "SeecrError"),
@@ -81,6 +82,7 @@ __all__ = [
     "InputError",
     "InputFileError",
     "Joint",
+    "Knowledge",
     "Loads",
     "MissingPackageError",
     "Model",

@@ -4,6 +4,7 @@
     [robot]                      # whose model it is, to notice when it is used for another
     [[effect]]                   # in the order of adding
     name = "pulley_radius"
+    fixed = true                 # optional: none of its values is ever fitted
     [effect.parameters]
     radius_m = { value = 0.0099, stderr = 0.0001, unit = "m", at_bound = false }
     [effect.provenance]          # data file, date, version, who or what put it there
@@ -12,7 +13,10 @@
     [effect.held_out]
 
 ``stderr = "unseen"`` stands for a parameter that the data do not see. A person may write a model
-by hand: name, parameters and values are all that is needed.
+by hand: name, parameters and values are all that is needed. What a person knows beside the data
+stands with the parameter (:mod:`seecr.cells`): ``fixed = true`` holds its value in every fit,
+``known = { value = 0.03, stderr = 0.0005 }`` is a reading in every fit. A key without the
+component's number or axis (``shift_m``, ``gain``) says the same of all components.
 """
 
 from __future__ import annotations
@@ -30,7 +34,8 @@ import tomlkit
 from tomlkit import TOMLDocument
 from tomlkit.exceptions import TOMLKitError
 
-from seecr.effects import Term, Terms, catalogue, effect_named, layout_of
+from seecr.cells import Where, cell_of
+from seecr.effects import Knowledge, Term, Terms, catalogue, effect_named, layout_of
 from seecr.effects.base import Layout
 from seecr.errors import InputError, InputFileError
 from seecr.files import read_text
@@ -44,10 +49,10 @@ if TYPE_CHECKING:
 FORMAT = 1
 """Of the file; raised when a key changes its meaning or goes."""
 
-UNSEEN = "unseen"
-"""What stands in place of an infinite standard error."""
-
-_TABLES = ("format", "robot", "effect")
+_TABLES = ("format", "robot", "effect", "calibration")
+_OF_EFFECT = (
+    "name", "fixed", "parameters", "provenance", "refitted", "before", "after", "held_out",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -109,8 +114,11 @@ class Model(Result):
 def _values(term: Term, stderr: Array, most: int = 3) -> str:
     """Values of an effect for people, the first few."""
     parts = [
-        f"{key} = {value:.6g}" + (f" +- {error:.2g}" if math.isfinite(error) else "")
-        for key, value, error in zip(term.layout.names, term.vector, stderr, strict=True)
+        f"{key} = {value:.6g}"
+        + (" (fixed)" if fixed else f" +- {error:.2g}" if math.isfinite(error) else "")
+        for key, value, error, fixed in zip(
+            term.layout.names, term.vector, stderr, term.knowledge.fixed, strict=True
+        )
     ]
     more = [f"{len(parts) - most} more"] if len(parts) > most else []
     return ", ".join([*parts[:most], *more])
@@ -140,7 +148,7 @@ def load_model(path: str | Path, robot: Robot) -> Model:
     path = Path(path)
     text = read_text(path, "expected a model as crosscheck add writes it")
     document = _parse(path, text)
-    where = _Where(path, text)
+    where = Where(path, text)
     _check_tables(where, document)
     notes = check_robot(path, document.get("robot"), robot)
     terms: list[Term] = []
@@ -155,35 +163,6 @@ def load_model(path: str | Path, robot: Robot) -> Model:
     return Model(Terms(terms), errors, document, notes, path)
 
 
-@dataclass(frozen=True)
-class _Where:
-    """The file, to say where in it something is."""
-
-    path: Path
-    text: str
-
-    def error(self, words: str, effect: int | None = None, key: str = "") -> InputFileError:
-        """An error at the line of a key, of the k-th effect where one is given."""
-        return InputFileError.at(self.path, words, line=self.line(effect, key))
-
-    def line(self, effect: int | None, key: str) -> int | None:
-        seen, found = -1, None
-        for number, line in enumerate(self.text.splitlines(), start=1):
-            bare = line.split("#")[0].strip().replace(" ", "")
-            if bare == "[[effect]]":
-                seen += 1
-                if seen == effect:
-                    found = number
-            inside = effect is None or seen == effect
-            if inside and key and (_is_key(bare, key) or bare.strip("[]").split(".")[-1] == key):
-                return number
-        return found
-
-
-def _is_key(bare: str, key: str) -> bool:
-    return bare.split("=")[0].strip("\"'").split(".")[-1].strip("\"'") == key and "=" in bare
-
-
 def _parse(path: Path, text: str) -> TOMLDocument:
     try:
         return tomlkit.parse(text)
@@ -192,7 +171,7 @@ def _parse(path: Path, text: str) -> TOMLDocument:
         raise InputFileError.at(path, f"is not TOML: {error}", line=line) from None
 
 
-def _check_tables(where: _Where, document: Mapping[str, Any]) -> None:
+def _check_tables(where: Where, document: Mapping[str, Any]) -> None:
     """Tables of other names are the user's own; a misspelt one must not be passed over."""
     for name in document:
         near = difflib.get_close_matches(name.lower(), _TABLES, cutoff=0.7)
@@ -206,14 +185,14 @@ def _check_tables(where: _Where, document: Mapping[str, Any]) -> None:
         )
 
 
-def _effect_tables(where: _Where, document: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
+def _effect_tables(where: Where, document: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
     tables = document.get("effect", [])
     if not isinstance(tables, list) or not all(isinstance(t, Mapping) for t in tables):
         raise where.error("effect: expected tables [[effect]], one per effect", key="effect")
     return tables
 
 
-def _migrate(where: _Where, document: Mapping[str, Any]) -> list[str]:
+def _migrate(where: Where, document: Mapping[str, Any]) -> list[str]:
     """Put parameters that had another name when the model was written under those of today."""
     notes = []
     for table in _effect_tables(where, document):
@@ -229,26 +208,70 @@ def _migrate(where: _Where, document: Mapping[str, Any]) -> list[str]:
     return notes
 
 
-def _term(where: _Where, k: int, table: Mapping[str, Any], robot: Robot) -> tuple[Term, Array]:
-    name = table.get("name")
-    if not isinstance(name, str):
-        raise where.error(f'expected name = "..." of an effect, got {name!r}', k, "name")
-    try:
-        layout = layout_of(effect_named(str(name)), robot)
-    except InputError as error:
-        raise where.error(str(error), k, "name") from None
+def _term(where: Where, k: int, table: Mapping[str, Any], robot: Robot) -> tuple[Term, Array]:
+    layout = _layout(where, k, table, robot)
     given = table.get("parameters")
     if not isinstance(given, Mapping):
         raise where.error(
-            f"effect {name}: expected a table [effect.parameters] with {_some(layout.names)}", k
-        )
+            f"effect {layout.name}: expected a table [effect.parameters] with "
+            f"{_some(layout.names)}", k,
+        )  # fmt: skip
+    fixed = table.get("fixed", False)
+    if not isinstance(fixed, bool):
+        text = f"effect {layout.name}: fixed must be true or false, got {fixed!r}"
+        raise where.error(text, k, "fixed")
+    given = _spread(layout, given)
     _check_names(where, k, layout, given)
-    cells = [_cell(where, k, layout, i, given[key]) for i, key in enumerate(layout.names)]
-    values, errors = zip(*cells, strict=True)
-    return Term(layout, np.array(values)), np.array(errors)
+    names = enumerate(layout.names)
+    cells = [cell_of(where, k, layout, i, given[key], fixed) for i, key in names]
+    knowledge = Knowledge(
+        np.array([cell.fixed for cell in cells]),
+        np.array([cell.known for cell in cells]),
+        np.array([cell.known_stderr for cell in cells]),
+    )
+    term = Term(layout, np.array([cell.value for cell in cells]), knowledge)
+    return term, np.array([cell.stderr for cell in cells])
 
 
-def _check_names(where: _Where, k: int, layout: Layout, given: Mapping[str, Any]) -> None:
+def _layout(where: Where, k: int, table: Mapping[str, Any], robot: Robot) -> Layout:
+    """The effect that a table is of; other keys are the user's own, if they are not misspelt."""
+    name = table.get("name")
+    if not isinstance(name, str):
+        raise where.error(f'expected name = "..." of an effect, got {name!r}', k, "name")
+    for key in table:
+        near = difflib.get_close_matches(key.lower(), _OF_EFFECT, cutoff=0.7)
+        if key not in _OF_EFFECT and near:
+            raise where.error(f"effect {name}: unknown {key}; expected {near[0]}", k, key)
+    try:
+        return layout_of(effect_named(str(name)), robot)
+    except InputError as error:
+        raise where.error(str(error), k, "name") from None
+
+
+def _spread(layout: Layout, given: Mapping[str, Any]) -> Mapping[str, Any]:
+    """What is said of a parameter as a whole, said of each of its components.
+
+    In the file's tree itself where it is one, so that what is written has a place for each.
+    """
+    for whole, parts in layout.groups.items():
+        if whole in given and isinstance(given, MutableMapping):
+            said = given.pop(whole)
+            for key in parts:
+                given[key] = _both(given.get(key), said)
+    return given
+
+
+def _both(own: Any, said: Any) -> Any:
+    """What a component says and what is said of all of its kind; its own word counts."""
+    if own is None:
+        return copy.deepcopy(said)
+    cells = [cell if isinstance(cell, Mapping) else {"value": cell} for cell in (said, own)]
+    whole = tomlkit.inline_table()
+    whole.update({**cells[0], **cells[1]})
+    return whole
+
+
+def _check_names(where: Where, k: int, layout: Layout, given: Mapping[str, Any]) -> None:
     for key in given:
         if key not in layout.names:
             near = difflib.get_close_matches(key, layout.names, n=len(layout), cutoff=0.0)
@@ -267,41 +290,3 @@ def _check_names(where: _Where, k: int, layout: Layout, given: Mapping[str, Any]
 def _some(names: Sequence[str], most: int = 8) -> str:
     rest = f" and {len(names) - most} more" if len(names) > most else ""
     return ", ".join(names[:most]) + rest
-
-
-def _cell(where: _Where, k: int, layout: Layout, i: int, cell: Any) -> tuple[float, float]:
-    """Value and standard error of parameter i."""
-    key = layout.names[i]
-    table = cell if isinstance(cell, Mapping) else {"value": cell}
-    start = f"effect {layout.name}: {key}"
-    for word in table:
-        if word not in ("value", "stderr", "unit", "at_bound"):
-            raise where.error(
-                f"{start}: unknown {word}; expected value, stderr, unit, at_bound", k, key
-            )
-    value = _number(table.get("value"))
-    if value is None:
-        raise where.error(f"{start}: expected a number, got {table.get('value')!r}", k, key)
-    low, high = layout.lower[i], layout.upper[i]
-    if not low <= value <= high:
-        raise where.error(
-            f"{start}: {value:g} is out of bounds; expected {low:g} to {high:g}", k, key
-        )
-    unit = table.get("unit", layout.units[i])
-    if unit != layout.units[i]:
-        raise where.error(f"{start}: expected unit {layout.units[i]!r}, got {unit!r}", k, key)
-    error = table.get("stderr", math.nan)
-    if error == UNSEEN:
-        return value, math.inf
-    number = math.nan if error is math.nan else _number(error)
-    if number is None or number < 0:
-        raise where.error(
-            f'{start}: stderr must be a number from 0 or "{UNSEEN}", got {error!r}', k, key
-        )
-    return value, number
-
-
-def _number(value: Any) -> float | None:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return None
-    return float(value) if math.isfinite(value) else None

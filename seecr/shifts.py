@@ -58,7 +58,7 @@ def shifted(terms: Terms, term: Term, k: Any, part: float | None = None) -> Shif
     def with_value(numbers: Array) -> Terms:
         vector = term.vector.copy()
         vector[k] = numbers
-        return terms.with_term(Term(layout, vector))
+        return terms.with_term(term.with_vector(vector))
 
     return Shift(with_value(up), with_value(down), up - down, layout)
 

@@ -130,11 +130,11 @@ def start_of(setting: Setting, terms: Terms, others: Terms) -> State:
 
 
 def widths_of(terms: Terms) -> Array:
-    """(p,) prior standard deviations in plausible sizes."""
+    """(p,) prior standard deviations in plausible sizes; 0 for values that are fixed."""
     parts = [
         np.where(t.layout.shape, SHAPES, FLAT if t.name == TRACKER else 1.0) for t in terms
     ]  # fmt: skip
-    return np.concatenate(parts) if parts else np.zeros(0)
+    return np.where(terms.knowledge.fixed, 0.0, np.concatenate([np.zeros(0), *parts]))
 
 
 def with_noise(setting: Setting, joint: JointFit) -> JointFit:

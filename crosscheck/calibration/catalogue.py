@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,9 +10,10 @@ import numpy as np
 from crosscheck.calibration.colour import whitened
 from crosscheck.calibration.gram import ColumnGroup, Gram, gram_of
 from crosscheck.calibration.joint import JointFit, Setting
-from crosscheck.calibration.later import added_columns
+from crosscheck.calibration.later import added_columns, amplitudes, amplitudes_at_null
 from crosscheck.calibration.registration import NAME as TRACKER
 from crosscheck.calibration.worth import WIDTHS
+from crosscheck.fit.known import known_readings
 from crosscheck.fit.state import derivatives
 from seecr.effects import Term, Terms
 from seecr.effects.base import Layout
@@ -67,7 +68,22 @@ def gram_about(setting: Setting, joint: JointFit, catalogue: Catalogue) -> Gram:
     def white(values: Array) -> Array:
         return whitened(setting.chain, joint.colour, joint.weight, values)
 
-    return gram_of(white(x), white(y), groups)
+    known, readings = known_of(joint, catalogue, tuple(columns))
+    return gram_of(
+        np.concatenate([white(x), known]), np.concatenate([white(y), readings]), groups
+    )  # fmt: skip
+
+
+def known_of(joint: JointFit, catalogue: Catalogue, names: Sequence[str]) -> tuple[Array, Array]:
+    """What was measured independently: columns (k, p) of the effects' amplitudes, readings (k,)."""
+    terms = Terms(joint.terms[n] if n in joint.terms else catalogue.start(n) for n in names)
+    columns, readings = known_readings(terms)
+    order = []
+    for name in names:
+        term = terms[name]
+        own = amplitudes(term) if name in joint.terms else amplitudes_at_null(term)
+        order.append(np.flatnonzero(terms.own(name))[own])
+    return columns[:, np.concatenate(order)], readings
 
 
 def catalogue_columns(
@@ -80,14 +96,14 @@ def catalogue_columns(
     rates = derivatives(setting.problem, state, frozen=True) * every.scale
     columns, z = {}, {}
     for term in every:
-        part = np.flatnonzero(every.own(term.name))[~term.layout.shape]
-        columns[term.name], z[term.name] = rates[:, part], term.sizes[~term.layout.shape]
+        part = np.flatnonzero(every.own(term.name))[amplitudes(term)]
+        columns[term.name], z[term.name] = rates[:, part], term.sizes[amplitudes(term)]
     for term in catalogue.later:
         if term.name not in inside:
             own = added_columns(setting, joint, term)
             columns[term.name], z[term.name] = own, np.zeros(own.shape[1])
     seen = [
         n for n, x in columns.items()
-        if n in inside or np.max(np.abs(x), initial=0.0) > _UNSEEN
+        if x.shape[1] and (n in inside or np.max(np.abs(x), initial=0.0) > _UNSEEN)
     ]  # fmt: skip
     return {n: columns[n] for n in seen}, {n: z[n] for n in seen}

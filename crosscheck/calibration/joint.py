@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from crosscheck.calibration.colour import Chain, Colour, whitened
 from crosscheck.calibration.robust import row_weights
+from crosscheck.fit.known import free_derivatives, known_left, known_readings
 from crosscheck.fit.problem import Problem
-from crosscheck.fit.state import State, derivatives, evaluate
+from crosscheck.fit.state import State, evaluate
 from seecr.effects import Terms
 from seecr.pose import Array
 
@@ -130,10 +131,7 @@ def settle(
 
 def scaled_derivatives(setting: Setting, state: State) -> Array:
     """(N, p) derivatives of the prediction by z, in units of the stated noise."""
-    scale = state.terms.scale
-    if not len(scale):
-        return np.zeros((len(state.white), 0))
-    return derivatives(setting.problem, state, frozen=setting.frozen) * scale
+    return free_derivatives(setting.problem, state, frozen=setting.frozen)
 
 
 def _step(
@@ -147,10 +145,15 @@ def _step(
 
     def objective(at: State) -> float:
         white = whitened(setting.chain, colour, weight, at.white)
-        return float(white @ white) + at.log_det + penalty(at.terms.sizes, width)
+        off = known_left(at.terms)
+        power = float(white @ white) + float(off @ off)
+        return power + at.log_det + penalty(at.terms.sizes, width)
 
-    x = whitened(setting.chain, colour, weight, jacobian)
-    y = whitened(setting.chain, colour, weight, state.white)
+    known = known_readings(terms)[0]
+    x = np.concatenate([whitened(setting.chain, colour, weight, jacobian), known])
+    y = np.concatenate(
+        [whitened(setting.chain, colour, weight, state.white), known_left(terms)]
+    )  # fmt: skip
     move = _movable(-x.T @ y, z, width, values, (lower, upper))
     if len(move) == 0:
         return None

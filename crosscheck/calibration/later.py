@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import linalg
 
 from crosscheck.calibration.colour import whitened
@@ -90,14 +91,15 @@ def _promising(
 def _at_null(term: Term) -> Term:
     """An effect with its shape, its amplitudes null."""
     layout = term.layout
-    return Term(layout, np.where(layout.shape, term.vector, layout.null))
+    held = layout.shape | term.knowledge.fixed
+    return term.with_vector(np.where(held, term.vector, layout.null))
 
 
 def _inside(term: Term) -> Term:
     """A start off the bound, where history has a derivative on both sides."""
     layout = term.layout
     at_bound = (term.vector <= layout.lower) & ~layout.shape
-    return Term(layout, np.where(at_bound, term.vector + 0.1 * layout.scale, term.vector))
+    return term.with_vector(np.where(at_bound, term.vector + 0.1 * layout.scale, term.vector))
 
 
 class _Beside:
@@ -123,10 +125,20 @@ class _Beside:
         return log_gain(normal, x.T @ self.left, one_sided=one_sided)
 
 
+def amplitudes(term: Term) -> NDArray[np.bool_]:
+    """(p,) parameters that linear algebra is about: neither shapes nor fixed."""
+    return np.asarray(~term.layout.shape & ~term.knowledge.fixed)
+
+
+def amplitudes_at_null(term: Term) -> NDArray[np.bool_]:
+    """(p,) those of them that an effect that starts elsewhere has not started yet."""
+    return np.asarray(amplitudes(term) & (term.vector == term.layout.null))
+
+
 def added_columns(setting: Setting, joint: JointFit, term: Term) -> Array:
     """(N, k) derivatives by z of an added effect's amplitudes that are at null."""
     layout = term.layout
-    own = np.flatnonzero(~layout.shape & (term.vector == layout.null))
+    own = np.flatnonzero(amplitudes_at_null(term))
     terms = joint.terms.with_term(term)
     state = joint.state.of(terms)
     wanted = (terms.part(term.name).start + own).tolist()

@@ -50,11 +50,13 @@ def leave_out(setting: Setting, joint: JointFit) -> LeftOut:
     chi2, readings, surprise = (np.zeros(len(blocks)) for _ in range(3))
     for b, rows in enumerate(blocks):
         mine = rows[problem.row_of]
-        moved = fitted - without(linear, mine)
+        # what was measured independently belongs to no block
+        absent = np.concatenate([mine, np.zeros(len(linear.y) - len(mine), dtype=bool)])
+        moved = fitted - without(linear, absent)
         raw[rows] = (joint.state.raw + _unwhitened(setting, joint, joint.jacobian @ moved))[rows]
         left = _white(setting, joint, joint.state.white + joint.jacobian @ moved)[mine]
         chi2[b], readings[b] = float(left @ left), len(left)
-        surprise[b] = surprise_of(linear, mine, left) / max(len(left), 1)
+        surprise[b] = surprise_of(linear, absent, left) / max(len(left), 1)
     return LeftOut(raw, rms_by_kind(problem, raw), chi2, readings, surprise)
 
 

@@ -1,7 +1,7 @@
 """A joint fit as a linear model about its optimum: white columns, readings, effects as groups.
 
 A parameter on its bound is not at the optimum that linear algebra is about, and one that is held
-is not fitted: both stay where they are.
+is not fitted: both stay where they are. What was measured independently is a reading like others.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from crosscheck.calibration.colour import whitened
 from crosscheck.calibration.gram import ColumnGroup
 from crosscheck.calibration.joint import JointFit, Setting
+from crosscheck.fit.known import known_left, known_readings
 from seecr.effects.base import Layout
 from seecr.pose import Array
 
@@ -42,21 +43,30 @@ def free_of(joint: JointFit) -> NDArray[np.bool_]:
 
 
 def unwhitened(joint: JointFit) -> Linear:
-    """The linear model in units of the stated noise, its correlation left in."""
+    """The linear model in units of the stated noise, its correlation left in.
+
+    What was measured independently narrows the prior and moves its middle, and ``y`` with it.
+    """
     free = free_of(joint)
-    x = joint.jacobian * free
-    return Linear(x, joint.state.white + x @ joint.z, joint.width * free)
+    x, width = joint.jacobian * free, joint.width * free
+    columns, readings = known_readings(joint.terms)
+    power = np.sum(columns**2, axis=0)
+    inverse2 = np.divide(1.0, width**2, out=np.zeros_like(width), where=free)
+    narrow = np.where(free, 1.0 / np.sqrt(np.maximum(inverse2 + power, 1e-300)), 0.0)
+    middle = narrow**2 * (columns.T @ readings)
+    return Linear(x, joint.state.white + x @ (joint.z - middle), narrow)
 
 
 def linearised(setting: Setting, joint: JointFit) -> Linear:
-    """The linear model with the noise made white."""
-    about = unwhitened(joint)
+    """The linear model with the noise made white; what was measured independently comes last."""
+    free = free_of(joint)
     chain, colour, weight = setting.chain, joint.colour, joint.weight
-    return Linear(
-        whitened(chain, colour, weight, about.x),
-        whitened(chain, colour, weight, about.y),
-        about.width,
-    )
+    columns = known_readings(joint.terms)[0] * free
+    x = np.concatenate([whitened(chain, colour, weight, joint.jacobian * free), columns])
+    left = np.concatenate(
+        [whitened(chain, colour, weight, joint.state.white), known_left(joint.terms)]
+    )  # fmt: skip
+    return Linear(x, left + x @ joint.z, joint.width * free)
 
 
 def groups_of(joint: JointFit, widths: Callable[[Layout], Array]) -> dict[str, ColumnGroup]:

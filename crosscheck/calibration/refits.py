@@ -149,14 +149,15 @@ def _linear_terms(catalogue: Catalogue, scores: Scores, names: Names) -> Terms:
     solved = scores.gram.solved(scores.widths(names))
     out, first = [], 0
     for name in solved.chosen:
-        layout, start = catalogue.start(name).layout, catalogue.start(name).vector
+        term = catalogue.start(name)
+        layout, start = term.layout, term.vector
         count = len(scores.gram.groups[name].columns)
-        own = np.flatnonzero(~layout.shape)
+        own = np.flatnonzero(~layout.shape & ~term.knowledge.fixed)
         if count < len(own):  # the others start where they are
-            own = np.flatnonzero(~layout.shape & (start == layout.null))
+            own = own[start[own] == layout.null[own]]
         vector = start.copy()
         vector[own] = layout.null[own] + solved.values[first : first + count] * layout.scale[own]
-        out.append(_inside(Term(layout, np.clip(vector, layout.lower, layout.upper))))
+        out.append(_inside(term.with_vector(np.clip(vector, layout.lower, layout.upper))))
         first += count
     return Terms(out)
 
@@ -164,8 +165,8 @@ def _linear_terms(catalogue: Catalogue, scores: Scores, names: Names) -> Terms:
 def _inside(term: Term) -> Term:
     """Off a bound at null, where a law with history has a derivative on both sides."""
     layout = term.layout
-    pressed = (term.vector <= layout.lower) & ~layout.shape
-    return Term(layout, np.where(pressed, term.vector + 0.03 * layout.scale, term.vector))
+    pressed = (term.vector <= layout.lower) & ~layout.shape & ~term.knowledge.fixed
+    return term.with_vector(np.where(pressed, term.vector + 0.03 * layout.scale, term.vector))
 
 
 def _settled(
@@ -179,7 +180,7 @@ def _settled(
 
 def _width(terms: Terms, widths: dict[str, float]) -> Array:
     parts = [np.where(t.layout.shape, _SHAPES, widths[t.name]) for t in terms]
-    return np.concatenate(parts) if parts else np.zeros(0)
+    return np.where(terms.knowledge.fixed, 0.0, np.concatenate([np.zeros(0), *parts]))
 
 
 def _scored(

@@ -180,12 +180,13 @@ def _result(found: Calibration, before: Terms, notes: tuple[str, ...]) -> Calibr
 def _fitted(found: Calibration, covariance: Array, before: Terms) -> tuple[Fitted, ...]:
     """The effects of which the data see something, and those that were there."""
     error = np.sqrt(np.diag(covariance))
+    fixed = found.terms.knowledge.fixed
     free = error > 0.0
     out = []
     for term in found.terms:
         part = found.terms.part(term.name)
         seen = np.any(free[part] & (error[part] < _UNSEEN * term.layout.scale))
         if seen or term.name in before:
-            stderr = np.where(free[part], error[part], np.inf)
-            out.append(Fitted(term, stderr, ~free[part]))
+            stderr = np.where(free[part] | fixed[part], error[part], np.inf)
+            out.append(Fitted(term, stderr, ~free[part] & ~fixed[part]))
     return tuple(out)

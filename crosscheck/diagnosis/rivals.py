@@ -84,7 +84,7 @@ def _likely(found: Search, name: str, without: Fit) -> list[Candidate]:
     final = found.last
     own = final.fit.terms.own(name)
     signal = final.fit.jacobian[:, own] @ final.fit.terms.sizes[own]
-    signal = beside(signal, basis(final.fit.jacobian[:, ~own]))
+    signal = beside(signal, final.fit.spanned(~own))
     pool, best = _tried_beside(found, name)
     # structure that was left over then counts as noise
     left = max(best / max(final.whiteness.dof, 1), final.whiteness.inflation**2)

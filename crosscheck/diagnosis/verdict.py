@@ -18,12 +18,12 @@ from crosscheck.diagnosis.search import Search, search
 from crosscheck.diagnosis.small import is_plausible, share_of, small_effects_alone
 from crosscheck.fit.candidates import Candidate, Trials, null_fit
 from crosscheck.fit.gauss_newton import Fit
+from crosscheck.fit.known import free_derivatives
 from crosscheck.fit.noise import whiteness
 from crosscheck.fit.prepare import Prepared, Progress, noise_floor, outlying_rows, prepare
 from crosscheck.fit.problem import Problem, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Refusal, Unfit, Why
 from crosscheck.fit.smooth import beyond_smooth
-from crosscheck.fit.state import derivatives
 from crosscheck.given import GivenModel, GivenRobot, model_of, robot_of
 from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.read import measurements_of
@@ -97,7 +97,7 @@ def _at_its_best(problem: Problem, base: Fit, factor: Array) -> tuple[Fit, Notes
 
 
 def _with_derivatives(problem: Problem, base: Fit) -> Fit:
-    return replace(base, jacobian=derivatives(problem, base.state) * base.terms.scale)
+    return replace(base, jacobian=free_derivatives(problem, base.state))
 
 
 def no_verdict(problem: Problem, base: Fit, notes: Sequence[str], refusal: Refusal) -> Diagnosis:

@@ -14,7 +14,7 @@ import numpy as np
 
 from crosscheck.fit.evidence import Evidence, evidence, p_value
 from crosscheck.fit.gauss_newton import Fit, FitStatus, fit
-from crosscheck.fit.imitation import basis, beside
+from crosscheck.fit.imitation import beside
 from crosscheck.fit.noise import Whiteness, whiteness
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.reasons import Reason, Why
@@ -182,7 +182,7 @@ def judged(trials: Trials, found: Fit, base: Fit, screened: Candidate) -> Candid
 def seen_directions(found: Fit, name: str) -> int:
     """How many directions of an effect's parameters the data see beside the other terms."""
     own = found.terms.own(name)
-    columns = beside(found.jacobian[:, own], basis(found.jacobian[:, ~own]))
+    columns = beside(found.jacobian[:, own], found.spanned(~own))
     return max(1, int(np.sum(np.linalg.eigvalsh(columns.T @ columns) > _SEEN)))
 
 

@@ -19,6 +19,7 @@ import numpy as np
 from scipy import special, stats
 
 from crosscheck.fit.gauss_newton import Fit
+from crosscheck.fit.known import known_readings
 
 # Family-wise chance of a false alarm, over all candidates of a step.
 FALSE_ALARM = 0.01
@@ -49,8 +50,11 @@ def evidence(fit: Fit, noise_scale: float = 1.0) -> Evidence:
         return Evidence(-0.5 * (float(white @ white) + fit.state.log_det), fit.chi2, 0)
     # a parameter stopped by its bound is not at the optimum the formula is about
     free = ~fit.at_bound
-    x = fit.jacobian[:, free] / noise_scale
-    y = white + x @ fit.terms.sizes[free]
+    columns, readings = known_readings(fit.terms)
+    x = np.concatenate([fit.jacobian / noise_scale, columns])
+    left = np.concatenate([white, readings - columns @ fit.terms.sizes])
+    x = x[:, free]
+    y = left + x @ fit.terms.sizes[free]
     power, v = np.linalg.eigh(x.T @ x)
     s = np.sqrt(np.maximum(power, 0.0))
     c2 = (v.T @ (x.T @ y)) ** 2 / np.maximum(power, 1e-300)

@@ -3,6 +3,7 @@
 Unknowns are counted in plausible sizes from null, z = (value - null)/scale. A weak prior of ten
 plausible sizes keeps directions that the data do not see at null instead of at random. A trial
 with a row that cannot be solved is no trial; a fit that ends on one is invalid, never a number.
+Fixed values stay as they are; values measured independently are readings like the others.
 """
 
 from __future__ import annotations
@@ -15,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.fit.imitation import basis
+from crosscheck.fit.known import free_derivatives, known_left, known_readings
 from crosscheck.fit.problem import Problem
-from crosscheck.fit.state import State, derivatives, evaluate
+from crosscheck.fit.state import State, evaluate
 from seecr.effects import Terms
 from seecr.pose import Array
 
@@ -48,7 +50,7 @@ class Fit:
 
     Attributes:
         state: the model at its best values.
-        jacobian: (N, p) whitened derivatives by z.
+        jacobian: (N, p) whitened derivatives by z; 0 for fixed values.
         covariance: (p, p) of the values in their units; inf on the diagonal where unseen.
         at_bound: (p,) bool parameters that ended on a bound.
         status: whether the rows were solved.
@@ -79,8 +81,17 @@ class Fit:
 
     @cached_property
     def span(self) -> Array:
-        """Orthonormal basis (N, k) of what the parameters can imitate."""
-        return basis(self.jacobian)
+        """Basis (N, k) of what the parameters can imitate, see :meth:`spanned`."""
+        return self.spanned(np.ones(len(self.terms), dtype=bool))
+
+    def spanned(self, which: NDArray[np.bool_]) -> Array:
+        """Basis (N, k) of what some parameters (p,) can imitate.
+
+        Orthonormal; shorter where values are known: those are not free to imitate anything.
+        """
+        columns, _readings = known_readings(self.terms)
+        whole = np.concatenate([self.jacobian, columns])[:, which]
+        return basis(whole)[: len(self.jacobian)]
 
     @property
     def stderr(self) -> Array:
@@ -114,7 +125,7 @@ def fit(
         terms: effects; their values are the start.
         factor: noise factors, :meth:`Problem.noise`, kept through the fit.
         start: a state near the start, to save solving.
-        free: (p,) which parameters may move; all by default.
+        free: (p,) which parameters may move; by default all that are not fixed.
         iterations: most Gauss-Newton steps.
         quick: take rows' history as given when deriving; near enough to compare models, not for
             values.
@@ -124,12 +135,15 @@ def fit(
     p = len(terms)
     if not state.valid:
         return _invalid(state, p, FitStatus.UNSOLVED_AT_START)
-    descent = _Descent(problem, factor, np.ones(p, dtype=bool) if free is None else free, quick)
+    fixed = terms.knowledge.fixed
+    descent = _Descent(problem, factor, ~fixed if free is None else free & ~fixed, quick)
     state, count = descent.run(state, iterations if p else 0, hopeless)
     jacobian = descent.jacobian(state) if p else np.zeros((len(state.white), 0))
     found = state.terms
-    at_bound = (found.vector <= found.lower) | (found.vector >= found.upper)
-    covariance = _covariance(jacobian, found.scale, descent.free & ~at_bound)
+    at_bound = ((found.vector <= found.lower) | (found.vector >= found.upper)) & ~fixed
+    whole = np.concatenate([jacobian, known_readings(found)[0]])
+    covariance = _covariance(whole, found.scale, descent.free & ~at_bound)
+    covariance[fixed] = 0.0
     return Fit(state, jacobian, covariance, at_bound, FitStatus.SOLVED, count)
 
 
@@ -150,8 +164,8 @@ def _corrected(jacobian: Array, before: State, after: State) -> Array:
 
 
 def _objective(state: State) -> float:
-    z = state.terms.sizes / PRIOR_SIZES
-    return state.chi2 + state.log_det + float(z @ z)
+    z, off = state.terms.sizes / PRIOR_SIZES, known_left(state.terms)
+    return state.chi2 + state.log_det + float(z @ z) + float(off @ off)
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +179,7 @@ class _Descent:
 
     def jacobian(self, state: State) -> Array:
         """(N, p) whitened derivatives by z."""
-        return derivatives(self.problem, state, frozen=self.quick) * state.terms.scale
+        return free_derivatives(self.problem, state, frozen=self.quick)
 
     def run(self, state: State, iterations: int, hopeless: float) -> tuple[State, int]:
         """The best state, and the steps it took."""
@@ -198,8 +212,9 @@ class _Descent:
     ) -> tuple[State | None, float, float]:
         """One accepted step (None where none improves), the damping after it, and its gain."""
         terms, z = state.terms, state.terms.sizes
-        gradient = -jacobian.T @ state.white + z / PRIOR_SIZES**2
-        normal = jacobian.T @ jacobian + np.eye(len(z)) / PRIOR_SIZES**2
+        known, off = known_readings(terms)[0], known_left(terms)
+        gradient = z / PRIOR_SIZES**2 - jacobian.T @ state.white - known.T @ off
+        normal = jacobian.T @ jacobian + known.T @ known + np.eye(len(z)) / PRIOR_SIZES**2
         move = self._moving(terms, gradient)
         if len(move) == 0:
             return None, damping, 0.0

@@ -39,6 +39,8 @@ def value_lines(
         layout.names, layout.units, values, stderr, at_bound, strict=True
     ):
         spread = f"+- {shown(error, unit)}" if np.isfinite(error) else "not seen by these data"
+        if error == 0.0:
+            spread = "(fixed)"
         stop = " (at its bound)" if bound else ""
         yield f"{parameter_name(name, unit)} = {shown(value, unit)} {spread}{stop}"
 

@@ -15,10 +15,11 @@ import tomlkit
 
 from crosscheck.files import written
 from seecr import __version__
-from seecr.effects import Term, Terms
+from seecr.cells import UNSEEN
+from seecr.effects import Knowledge, Term, Terms
 from seecr.effects.base import Layout
 from seecr.fingerprint import fingerprint
-from seecr.model import UNSEEN, Model
+from seecr.model import Model
 from seecr.pose import Array
 from seecr.robot import Robot
 
@@ -197,12 +198,24 @@ def _fill(table: Any, fitted: Fitted) -> None:
         table["parameters"] = tomlkit.table()
     parameters = table["parameters"]
     for i, key in enumerate(layout.names):
+        if key in parameters and fitted.term.knowledge.fixed[i]:
+            continue  # stands as somebody wrote it
         cell = _cell(layout, i, fitted)
         if isinstance(parameters.get(key), Mapping):
             for word, value in cell.items():
                 parameters[key][word] = value
         else:
-            parameters[key] = _inline(cell)
+            parameters[key] = _inline(cell | _known(fitted.term.knowledge, i))
+
+
+def _known(knowledge: Knowledge, i: int) -> dict[str, Any]:
+    """What is known of a parameter beside the data."""
+    if knowledge.fixed[i]:
+        return {"fixed": True}
+    if not knowledge.measured[i]:
+        return {}
+    value, stderr = float(knowledge.value[i]), float(knowledge.stderr[i])
+    return {"known": _inline({"value": value, "stderr": stderr})}
 
 
 def _inline(cell: Mapping[str, Any]) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from seecr.effects.base import PLACES, Effect, Layout, Readings, layout_of, parameter
+from seecr.effects.knowledge import Knowledge
 from seecr.effects.registry import BUILT_IN, catalogue, effect_named
 from seecr.effects.terms import Term, Terms
 
@@ -10,6 +11,7 @@ __all__ = [
     "BUILT_IN",
     "PLACES",
     "Effect",
+    "Knowledge",
     "Layout",
     "Readings",
     "Term",

@@ -179,6 +179,18 @@ class Layout:
             first += count
         return out
 
+    @property
+    def groups(self) -> dict[str, tuple[str, ...]]:
+        """Names of the components of each parameter that has several, by its own: ``shift_m``."""
+        out, first = {}, 0
+        for name, count, size in self._parts:
+            unit = self.units[first]
+            if size != "one":
+                key = f"{name}_{unit}" if unit else name
+                out[key] = self.names[first : first + count]
+            first += count
+        return out
+
     def build(self, vector: Array) -> Effect:
         """The effect with these parameters."""
         values: dict[str, Any] = {}

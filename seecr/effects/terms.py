@@ -4,25 +4,39 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seecr.effects.base import Effect, Layout, layout_of
+from seecr.effects.knowledge import Knowledge
 from seecr.effects.registry import catalogue, effect_named
 from seecr.errors import InputError
 from seecr.pose import Array
 from seecr.robot import Robot
 
+# Default of a field that __post_init__ makes from the others when it is not given.
+_FILLED_IN: Any = None
+
 
 @dataclass(frozen=True, eq=False)
 class Term:
-    """An effect with values: ``layout`` says which, ``vector`` (p,) how much."""
+    """An effect with values: ``layout`` says which, ``vector`` (p,) how much.
+
+    ``knowledge`` says which values no fit may move and which were measured independently.
+    """
 
     layout: Layout
     vector: Array
+    knowledge: Knowledge = _FILLED_IN
+
+    def __post_init__(self) -> None:
+        given: Any = self.knowledge
+        if given is None:
+            object.__setattr__(self, "knowledge", Knowledge.nothing(len(self.layout)))
 
     @classmethod
     def of(cls, robot: Robot, name: str, **values: float) -> Term:
@@ -39,13 +53,43 @@ class Term:
         layout = layout_of(effect_named(name), robot)
         vector = layout.null.copy()
         for key, value in values.items():
-            if key not in layout.names:
-                near = difflib.get_close_matches(key, layout.names, n=3, cutoff=0.0)
-                raise InputError(
-                    f"effect {name}: no parameter {key}; the nearest are {', '.join(near)}"
-                )
-            vector[layout.names.index(key)] = value
+            vector[_place_of(layout, key)] = value
         return cls(layout, vector)
+
+    def with_vector(self, values: Array) -> Term:
+        """The same effect with other values (p,); what is known of them stays."""
+        return replace(self, vector=values)
+
+    def fixed(self, *names: str) -> Term:
+        """The same, its values never to be fitted: those of the named parameters, or all.
+
+        Raises:
+            InputError: no such parameter.
+        """
+        held = self.knowledge.fixed.copy()
+        held[[_place_of(self.layout, name) for name in names or self.layout.names]] = True
+        return replace(self, knowledge=replace(self.knowledge, fixed=held))
+
+    def measured(self, **values: tuple[float, float]) -> Term:
+        """The same, some parameters measured independently: a reading in every fit.
+
+        Args:
+            values: (value, standard error) by the parameters' names; fits start at the value.
+
+        Raises:
+            InputError: no such parameter, or an error that is not above zero.
+        """
+        vector, known = self.vector.copy(), self.knowledge
+        value, stderr = known.value.copy(), known.stderr.copy()
+        for key, (number, error) in values.items():
+            if not (np.isfinite(error) and error > 0.0):
+                raise InputError(
+                    f"effect {self.name}: {key}: expected a standard error above 0, got {error!r}"
+                )
+            k = _place_of(self.layout, key)
+            vector[k] = value[k] = number
+            stderr[k] = error
+        return replace(self, vector=vector, knowledge=replace(known, value=value, stderr=stderr))
 
     @property
     def name(self) -> str:
@@ -60,6 +104,16 @@ class Term:
     def effect(self) -> Effect:
         """The effect itself."""
         return self.layout.build(self.vector)
+
+
+def _place_of(layout: Layout, key: str) -> int:
+    """The number of a parameter."""
+    if key not in layout.names:
+        near = difflib.get_close_matches(key, layout.names, n=3, cutoff=0.0)
+        raise InputError(
+            f"effect {layout.name}: no parameter {key}; the nearest are {', '.join(near)}"
+        )
+    return layout.names.index(key)
 
 
 class Terms:
@@ -141,6 +195,11 @@ class Terms:
         """(p,) highest values."""
         return _joined([term.layout.upper for term in self._terms])
 
+    @cached_property
+    def knowledge(self) -> Knowledge:
+        """Which values (p,) no fit may move, and which were measured independently."""
+        return Knowledge.joined([term.knowledge for term in self._terms])
+
     @property
     def sizes(self) -> Array:
         """(p,) z = (value - null)/scale: how many plausible sizes the values are from null."""
@@ -168,7 +227,7 @@ class Terms:
         ends = np.cumsum([len(term.layout) for term in self._terms], dtype=int)[:-1]
         parts = np.split(vector, ends)
         return Terms(
-            Term(term.layout, part.copy()) for term, part in zip(self._terms, parts, strict=False)
+            term.with_vector(part.copy()) for term, part in zip(self._terms, parts, strict=False)
         )
 
     def with_term(self, term: Term) -> Terms:

@@ -165,7 +165,7 @@ BAD = {
     ),
     "wrong unit": ('unit = "m"', 'unit = "mm"', r"radius_m: expected unit 'm', got 'mm'"),
     "bad error": ("stderr = 0.0001", "stderr = -1", r"stderr must be a number from 0 or"),
-    "odd word": ("at_bound", "atbound", r"unknown atbound; expected value, stderr, unit"),
+    "odd word": ("at_bound", "atbound", r"unknown atbound; expected at_bound, .*nearest first"),
     "misspelt table": (
         "[[effect]]", "[[effects]]\n[[effect]]", r"line \d+: unknown effects; expected effect",
     ),
@@ -234,3 +234,105 @@ def test_an_unwritable_place_leaves_the_old_model(robot, saved, tmp_path):
     with pytest.raises(InputFileError, match="the model cannot be written"):
         save_model(blocked / "m.toml", new_model(robot))
     assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "model.toml"]
+
+
+KNOWN = {
+    "known without its error": (
+        "value = 0.01,", "known = { value = 0.01 },",
+        r"radius_m: expected known = \{ value = ..., stderr = ... \}: .*, got \{ value = 0.01 \}",
+    ),
+    "known is a number": ("value = 0.01,", "known = 0.01,", r"expected known = .*, got 0.01"),
+    "known is exact": (
+        "value = 0.01,", "known = { value = 0.01, stderr = 0 },",
+        r"known: stderr must be a number above 0, got 0; .* fixed = true",
+    ),
+    "known out of bounds": (
+        "value = 0.01,", "known = { value = -0.01, stderr = 1e-3 },",
+        r"line \d+: .* radius_m: known: -0.01 is out of bounds; expected 0 to ",
+    ),
+    "fixed out of bounds": (
+        "value = 0.01,", "value = -0.01, fixed = true,", r"radius_m: -0.01 is out of bounds",
+    ),
+    "unknown word": (
+        "value = 0.01,", "value = 0.01, fix = true,",
+        r"radius_m: unknown fix; expected fixed, .*nearest first",
+    ),
+    "unknown word in known": (
+        "value = 0.01,", "known = { value = 0.01, stderr = 1e-3, sdterr = 1 },",
+        r"radius_m: unknown sdterr in known; expected stderr, value",
+    ),
+    "both": (
+        "value = 0.01,", "value = 0.01, fixed = true, known = { value = 0.01, stderr = 1 },",
+        r"radius_m: is both fixed and known; leave one",
+    ),
+    "neither yes nor no": (
+        "value = 0.01,", "value = 0.01, fixed = 1,", r"fixed must be true or false, got 1",
+    ),
+    "an effect neither yes nor no": (
+        "[effect.parameters]", 'fixed = "yes"\n[effect.parameters]',
+        r"line \d+: effect pulley_radius: fixed must be true or false, got 'yes'",
+    ),
+    "misspelt": (
+        "[effect.parameters]", "fixd = true\n[effect.parameters]",
+        r"line \d+: effect pulley_radius: unknown fixd; expected fixed",
+    ),
+    "fixed without a value": (
+        "value = 0.01,", "fixed = true,", r"radius_m: expected a number, got None",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", KNOWN)
+def test_what_is_known_is_said_in_full(kind, robot, saved):
+    old, new, words = KNOWN[kind]
+    assert re.search(words, error_of(changed(saved, old, new), robot))
+
+
+def test_known_and_fixed_values_are_read(robot, saved):
+    changed(saved, "value = 0.01, stderr = 0.0001,", "known = { value = 0.03, stderr = 0.0005 },")
+    known = load_model(saved, robot).terms["pulley_radius"]
+    assert known.vector == pytest.approx([0.03])  # fits start at what was measured
+    assert known.knowledge.value == pytest.approx([0.03])
+    assert known.knowledge.stderr == pytest.approx([0.0005])
+    assert known.knowledge.measured.all() and not known.knowledge.fixed.any()
+    changed(saved, "known = { value = 0.03, stderr = 0.0005 },", "value = 0.03, fixed = true,")
+    model = load_model(saved, robot)
+    assert model.terms["pulley_radius"].knowledge.fixed.all()
+    assert "radius_m = 0.03 (fixed)" in "\n".join(model.lines())
+
+
+def test_a_whole_effect_and_all_components_of_a_parameter_can_be_known(robot, tmp_path):
+    path = tmp_path / "model.toml"
+    path.write_text(
+        '[[effect]]\nname = "stiffness"\nfixed = true\nparameters.factor = 1.4\n'
+        '[[effect]]\nname = "tracker_frame"\n[effect.parameters]\nshift_x_m = 0.002\n'
+        "shift_m = { value = 0.0, fixed = true }\n"
+        "rotation_rad = { known = { value = 0.0, stderr = 1e-3 } }\n"
+        "rotation_y_rad = { known = { value = 0.01, stderr = 1e-3 } }\n"
+    )
+    terms = load_model(path, robot).terms
+    assert terms["stiffness"].knowledge.fixed.all()
+    frame = terms["tracker_frame"]
+    assert frame.vector == pytest.approx([0.002, 0, 0, 0, 0.01, 0])
+    assert frame.knowledge.fixed.tolist() == [True] * 3 + [False] * 3
+    assert frame.knowledge.measured.tolist() == [False] * 3 + [True] * 3
+
+
+def test_what_is_known_stays_when_a_model_is_written_again(robot, saved):
+    changed(saved, "value = 0.01, stderr = 0.0001,", "value = 0.03, fixed = true,")
+    model = load_model(saved, robot)
+    line = next(x for x in saved.read_text().splitlines() if x.startswith("radius_m"))
+    moved = Fitted(model.terms["pulley_radius"], np.zeros(1), np.zeros(1, bool))
+    one = fitted(robot, "stiffness", factor=1.2).term.measured(factor=(1.1, 0.02))
+    new = Fitted(one, np.full(1, 0.01), np.zeros(1, bool))
+    save_model(saved, with_fit(model, [moved, new], "stiffness", SOURCE, ERRORS))
+    assert line in saved.read_text()
+    back = load_model(saved, robot).terms
+    assert back["pulley_radius"].knowledge.fixed.all()
+    assert back["stiffness"].knowledge.value == pytest.approx([1.1])
+    # and once more, as a fit would: the value moves, what was measured does not
+    again = load_model(saved, robot)
+    other = replace(new, term=back["stiffness"].with_vector(np.array([1.15])))
+    save_model(saved, with_fit(again, [moved, other], "stiffness", SOURCE, ERRORS))
+    last = load_model(saved, robot).terms["stiffness"]
+    assert last.vector == pytest.approx([1.15]) and last.knowledge.value == pytest.approx([1.1])
