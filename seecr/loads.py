@@ -78,18 +78,6 @@ class Loads:
         """(n,) rows that carry another load than the row before."""
         return np.concatenate([[False], np.diff(self.kinds) != 0])
 
-    def with_platform(self, mass: float, centre: Array) -> tuple[Array, Array]:
-        """Mass (n,) [kg] and centre of mass (n, 3) [m] of the platform with its payloads.
-
-        Args:
-            mass: [kg] of the platform alone. centre: (3,) [m] its centre of mass.
-        """
-        total = mass + self.mass
-        # the lever from the platform's own centre: exactly that centre where nothing is said
-        lever = np.where(np.isnan(self.centre), 0.0, self.centre - centre)
-        share = np.divide(self.mass, total, out=np.zeros_like(total), where=total != 0.0)
-        return total, centre + share[:, None] * lever
-
 
 def _filled(name: str, value: Array | None, otherwise: float, shape: tuple[int, ...]) -> Array:
     given = np.asarray(otherwise if value is None else value, float)

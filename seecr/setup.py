@@ -205,7 +205,11 @@ class Setup:
     def carried(self) -> tuple[Array, Array]:
         """Mass (n,) [kg] and centre of mass (n, 3) [m] of the platform with its known payloads."""
         loads = self.commands.loads or Loads.of(len(self.commands))
-        return loads.with_platform(self.mass, self.centre_of_mass)
+        total = self.mass + loads.mass
+        # the lever from the platform's own centre: exactly that centre where nothing is said
+        lever = np.where(np.isnan(loads.centre), 0.0, loads.centre - self.centre_of_mass)
+        share = np.divide(loads.mass, total, out=np.zeros_like(total), where=total != 0.0)
+        return total, self.centre_of_mass + share[:, None] * lever
 
     def geometric_lengths(self, poses: Array) -> Array:
         """Lengths (k, m) [m] of straight cables over their pulleys at poses (k, 7)."""

@@ -165,7 +165,7 @@ def test_mujocos_side_takes_the_description_of_seecr_alone(folder: str) -> None:
     # a trajectory is poses that the robot's joints can reach: what is commanded, no physics
     files = [p for p in (ROOT / "crosscheck" / folder).glob("*.py") if p.stem != "trajectory"]
     taken = {t for path in files for t in imports(path) if t.startswith("seecr.")}
-    commands = {"seecr.commands", "seecr.commands.Commands"}
+    commands = {"seecr.commands", "seecr.commands.Commands", "seecr.loads", "seecr.loads.Loads"}
     how_results_print = {"seecr.result", "seecr.result.Record", "seecr.result.Result"}
     assert {t for t in taken if place(t) not in DESCRIPTION} <= commands | how_results_print
     text = "".join(path.read_text(encoding="utf-8") for path in files)

@@ -41,7 +41,7 @@ class Places:
     """Where things are in the compiled model, per cable.
 
     Attributes:
-        platform: its body; n_platform: its coordinates, the first ones.
+        platform: its body; n_platform: its coordinates, the first ones. payload: a body on it.
         exit_dofs: (m, 3) or (m, 0); slider_dofs: (m, 1) or (m, 0).
         node_dofs: (m, N - 1, 3).
         tendons: (m, N), the first the one at the exit point.
@@ -52,6 +52,7 @@ class Places:
     """
 
     platform: int
+    payload: int
     n_platform: int
     exit_dofs: Index
     slider_dofs: Index
@@ -122,6 +123,8 @@ def _add_platform(spec: mujoco.MjSpec, true: TrueRobot, segments: int) -> None:
             axis=quat_rotate(back, joint.axis),
             pos=quat_rotate(back, joint.point - position),
         )
+    hook = body.add_body(name="payload")
+    hook.explicitinertial = True
     for i, anchor in enumerate(true.anchor_points):
         body.add_site(name=f"b{i}", pos=anchor)
         if segments > 1:
@@ -248,6 +251,7 @@ def _places(model: mujoco.MjModel, true: TrueRobot, segments: int) -> Places:
     ends = [number(body, f"e{i}") for i in range(m)] if segments > 1 else []
     return Places(
         platform=number(body, "platform"),
+        payload=number(body, "payload"),
         n_platform=len(dofs("platform")),
         exit_dofs=np.array([dofs(f"x{i}") for i in range(m)], dtype=int),
         slider_dofs=np.array([dofs(f"p{i}") for i in range(m)], dtype=int),

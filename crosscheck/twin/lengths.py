@@ -25,14 +25,16 @@ class Way:
     """The commands with all points on the way, N in all.
 
     Attributes:
-        pose: (N, 7) commanded; lengths: (N, m) [m] commanded, or None.
+        pose: (N, 7) commanded; lengths: (N, m) [m] commanded, or None. told: whether they are what
+            winches were told, counted from the reference pose's rest lengths.
         row: (N,) the row a point belongs to; is_row: (N,) whether it is that row.
-        fresh: (N,) at the reference pose, before a run.
+        fresh: (N,) where a run starts from, at rest: the reference pose or its first row.
         elapsed: (N,) [s] since the point before.
     """
 
     pose: Array
     lengths: Array | None
+    told: bool
     row: NDArray[np.int64]
     is_row: NDArray[np.bool_]
     fresh: NDArray[np.bool_]
@@ -40,9 +42,13 @@ class Way:
 
 
 def way_of(true: TrueRobot, commands: Commands, waypoints: tuple[int, int] = WAYPOINTS) -> Way:
-    """Every run from the reference pose straight to its first row, then from row to row."""
+    """Every run from the reference pose straight to its first row, then from row to row.
+
+    A run that starts at its first row is there at once; a load is changed before setting out.
+    """
     robot, n = true.robot, len(commands)
     run = np.zeros(n, dtype=int) if commands.run is None else commands.run
+    stands = np.zeros(n, dtype=bool) if commands.stands is None else commands.stands
     clock = np.zeros(n) if commands.time is None else commands.time
     points: list[tuple[Array, Array, int, bool, bool, float]] = []
     none = np.zeros(0)
@@ -55,9 +61,14 @@ def way_of(true: TrueRobot, commands: Commands, waypoints: tuple[int, int] = WAY
         if commands.lengths is not None:
             told = commands.lengths[k]
             paid = robot.rest_lengths if starts else commands.lengths[k - 1]
+        if starts and stands[k]:
+            points.append((commands.pose[k], told, k, True, True, passed))
+            continue
         if starts:
             points.append((robot.reference_pose, paid, k, False, True, passed))
             passed = 0.0
+        elif _reloaded(commands, k):
+            points.append((before, paid, k, False, False, 0.0))
         steps = waypoints[0] if starts else waypoints[1]
         parts = np.arange(1, steps + 1) / steps
         poses = [*_straight_way(guide, before, commands.pose[k], parts[:-1]), commands.pose[k]]
@@ -65,7 +76,18 @@ def way_of(true: TrueRobot, commands: Commands, waypoints: tuple[int, int] = WAY
             length = paid + part * (told - paid)
             points.append((pose, length, k, part == 1.0, False, passed / steps))
     way, lengths, *others = (np.array(part) for part in zip(*points, strict=True))
-    return Way(way, None if commands.lengths is None else lengths, *others)
+    return Way(way, None if commands.lengths is None else lengths, commands.told, *others)
+
+
+def _reloaded(commands: Commands, k: int) -> bool:
+    """Whether a row's load is another than that of the row before."""
+    loads = commands.loads
+    if loads is None:
+        return False
+    return any(
+        not np.array_equal(values[k], values[k - 1], equal_nan=True)
+        for values in (loads.mass, loads.centre, loads.wrench)
+    )
 
 
 def _guide(true: TrueRobot) -> World | None:
@@ -100,16 +122,22 @@ def paid_out(true: TrueRobot, way: Way, temperature: Array | None) -> Array:
         way: its commands.
         temperature: (n,) [deg C] of the rows, or None.
     """
-    told = way.lengths if way.lengths is not None else _straight_change(true, way.pose)
+    absolute = way.lengths is not None and not way.told
+    if way.lengths is None:
+        told = _straight_change(true, way.pose)
+    else:
+        told = way.lengths - (0.0 if absolute else true.robot.rest_lengths)
     turned = told
     if true.backlash > 0.0:
-        turned = _with_play(told, _watched(true, way), way.fresh, 0.5 * true.backlash)
+        # lengths are told evenly: nothing turns round between two points
+        watched = _watched(true, way) if way.lengths is None else [told[:0]] * len(told)
+        turned = _with_play(told, watched, way.fresh, 0.5 * true.backlash)
     paid = (1.0 + true.gain) * turned + true.offset
-    zero = 1.0 if way.lengths is None else 0.0
+    zero = 0.0 if absolute else 1.0
     for sine, cosine, radius in true.run_out:
         angle = told / radius
         paid = paid + sine * np.sin(angle) + cosine * (np.cos(angle) - zero)
-    if way.lengths is None:
+    if not absolute:
         paid = paid + _zero(true)
     if temperature is not None and true.expansion != 0.0:
         warmer = temperature[way.row] - true.zero_temperature
@@ -134,8 +162,6 @@ def _watched(true: TrueRobot, way: Way) -> list[Array]:
     The squared length at even steps, each put right by the vertex of the parabola through it and
     its neighbours where it turns round there; for a translation that is all of its course.
     """
-    if way.lengths is not None:
-        return [told[None] for told in way.lengths]
     guide, home = _guide(true), _straight(true, true.robot.reference_pose[None])[0]
     # a step too far at either end: what turns round there is seen too
     parts = np.arange(-1, _WATCHED + 2) / _WATCHED

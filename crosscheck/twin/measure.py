@@ -16,6 +16,7 @@ from crosscheck.twin.springs import Cable, Springs
 from crosscheck.twin.world import World
 from seecr.commands import Commands
 from seecr.effects import Effect
+from seecr.loads import Loads
 from seecr.pose import Array, pose_add, pose_difference
 from seecr.robot import Robot
 
@@ -98,12 +99,13 @@ def measure(
     """
     true = true_robot(robot, effects)
     way = way_of(true, commands, waypoints)
-    rest = paid_out(true, way, commands.temperature)
+    rest, loads = paid_out(true, way, commands.temperature), commands.loads
     tell = progress or (lambda rows: None)
     settle = _walk if true.has_history else _each
-    rows = settle(World(true, segments[-1] if true.cable_weight > 0 else 1), way, rest, tell)
+    fine = World(true, segments[-1] if true.cable_weight > 0 else 1)
+    rows = settle(fine, way, rest, loads, tell)
     if true.cable_weight > 0 and len(segments) > 1:
-        coarse = settle(World(true, segments[0]), way, rest, lambda rows: None)
+        coarse = settle(World(true, segments[0]), way, rest, loads, lambda rows: None)
         rows = _extrapolated(coarse, rows, (segments[-1] / segments[0]) ** 2)
     reading = (rows.pose[:, :3], rows.pose[:, 3:], rows.tensions)
     for sensor in true.sensors:
@@ -131,17 +133,25 @@ def _extrapolated(coarse: _Rows, fine: _Rows, ratio: float) -> _Rows:
     return _Rows(pose, tensions, at_rest, free, fine.residual)
 
 
-def _each(world: World, way: Way, rest: Array, tell: Progress) -> _Rows:
+def _each(world: World, way: Way, rest: Array, loads: Loads | None, tell: Progress) -> _Rows:
     """Every row by itself, from its commanded pose."""
     poses, lengths = way.pose[way.is_row], rest[way.is_row]
     out = _Rows.empty(len(poses), world.n_cables)
     bare = _without_weight(world)
     for k, pose in enumerate(poses):
         springs = Springs.plain(lengths[k], world.true)
+        _carry((world, bare), loads, k)
         go = _start(world, bare, pose, springs)
         _note(world, out, k, _settle(world, springs) if go else _NOWHERE)
         tell(1)
     return out
+
+
+def _carry(worlds: tuple[World, ...], loads: Loads | None, row: int) -> None:
+    """Hang the load of a row on the platform."""
+    if loads is not None:
+        for world in worlds:
+            world.carry(float(loads.mass[row]), loads.centre[row], loads.wrench[row])
 
 
 def _without_weight(world: World) -> World:
@@ -194,7 +204,7 @@ def _note(world: World, out: _Rows, k: int, found: Descent) -> None:
         out.pose[k] = world.pose()
 
 
-def _walk(world: World, way: Way, rest: Array, tell: Progress) -> _Rows:
+def _walk(world: World, way: Way, rest: Array, loads: Loads | None, tell: Progress) -> _Rows:
     """All points of the way in order, each from where the last one rested."""
     true = world.true
     out = _Rows.empty(int(way.is_row.sum()), world.n_cables)
@@ -202,6 +212,7 @@ def _walk(world: World, way: Way, rest: Array, tell: Progress) -> _Rows:
     bare = _without_weight(world)
     found = _NOWHERE
     for k, pose in enumerate(way.pose):
+        _carry((world, bare), loads, int(way.row[k]))
         for cable, length in zip(cables, rest[k], strict=True):
             cable.pays_out(float(length), float(way.elapsed[k]), bool(way.fresh[k]))
         go = found.balanced

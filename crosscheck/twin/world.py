@@ -107,6 +107,20 @@ class World(Physics):
         mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
         self._segment_weight = self.true.cable_weight * segment
 
+    def carry(self, mass: float, centre: Array, wrench: Array) -> None:
+        """Hang a payload on the platform, and let a known wrench act on it besides the robot's own.
+
+        Args:
+            mass: [kg]. centre: (3,) [m] in the platform's frame; NaN is its centre of mass.
+            wrench: (6,) [N, N m].
+        """
+        hook, model = self.places.payload, self.model
+        model.body_mass[hook] = mass / self.mass_unit
+        model.body_ipos[hook] = np.where(np.isnan(centre), self.true.centre_of_mass, centre)
+        mujoco.mj_setConst(model, mujoco.MjData(model))
+        self.mass = self.true.mass + mass
+        self.set_load(self.true.wrench + wrench, self.true.gravity)
+
     def place(self, pose: Array) -> None:
         """Platform at a pose (7,), cables straight, or hanging where they have weight."""
         self.data.qpos[:] = self.reference_qpos
