@@ -6,16 +6,42 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TypeAlias
 
-from seecr.effects import Term, Terms
+from crosscheck.errors import CrosscheckError
+from seecr.effects import Term, Terms, catalogue, effect_named
 from seecr.mjcf import load_robot
 from seecr.model import Model, load_model
 from seecr.robot import Robot
+
+__all__ = ["GivenModel", "GivenRobot", "considered", "model_of", "robot_of"]
 
 GivenRobot: TypeAlias = Robot | str | Path
 """A robot, or the path of its MJCF."""
 
 GivenModel: TypeAlias = Model | Iterable[Term] | str | Path
 """A model, its effects alone, or the path of its TOML; ``()`` is the plain model."""
+
+
+def considered(only: Iterable[str] = (), exclude: Iterable[str] = ()) -> frozenset[str]:
+    """Names of the effects that may be missing.
+
+    Args:
+        only: these alone; all of the catalogue where there are none.
+        exclude: and not these.
+
+    Raises:
+        InputError: no effect of a name; the known ones are listed, nearest first.
+        CrosscheckError: none is left.
+    """
+    chosen, left_out = list(only), list(exclude)
+    for name in (*chosen, *left_out):
+        effect_named(name)
+    names = frozenset(chosen or catalogue()) - frozenset(left_out)
+    if not names:
+        raise CrosscheckError(
+            f"no effect is left to consider: only {', '.join(chosen) or 'all'} and not "
+            f"{', '.join(left_out)}; leave one of them out"
+        )
+    return names
 
 
 def robot_of(given: GivenRobot) -> Robot:

@@ -46,7 +46,7 @@ def layouts(problem: Problem) -> tuple[list[Layout], list[Layout]]:
     later: list[Layout] = []
     for effect in catalogue().values():
         layout = layout_of(effect, problem.robot)
-        if has_inputs(problem, layout):
+        if layout.name in problem.considered and has_inputs(problem, layout):
             (later if _waits(problem, layout) else at_once).append(layout)
     return at_once, later
 

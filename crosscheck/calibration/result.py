@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from crosscheck.errors import CrosscheckError, UnsolvedError
 from crosscheck.fit.prepare import Progress, prepare
 from crosscheck.fit.problem import KINDS, Rms, kinds_read
 from crosscheck.fit.words import rms_words, value_lines, value_records
-from crosscheck.given import GivenModel, GivenRobot, model_of, robot_of
+from crosscheck.given import GivenModel, GivenRobot, considered, model_of, robot_of
 from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.read import measurements_of
 from crosscheck.model.write import Fitted
@@ -131,6 +131,9 @@ def calibrate(
     data: Measurements | str | Path,
     model: GivenModel = (),
     progress: Progress = lambda _text, _part: None,
+    *,
+    only: Iterable[str] = (),
+    exclude: Iterable[str] = (),
 ) -> Calibrated:
     """Fit every effect that the data can see, plausible sizes as priors.
 
@@ -139,14 +142,17 @@ def calibrate(
         data: measurements, or their file.
         model: effects to start from, or their file; the plain model without.
         progress: called with what is being done and the part of it that is done.
+        only: names of the effects to fit beside the model's own; all without.
+        exclude: names of effects that are not fitted, unless the model has them.
 
     Raises:
+        InputError: no effect of a name.
         CrosscheckError: the data cannot carry it.
     """
     robot = robot_of(robot)
     data = measurements_of(data, robot)
     terms, said = model_of(model, robot)
-    ready = prepare(robot, data, terms)
+    ready = prepare(robot, data, terms, considered(only, exclude))
     if ready.refusal is not None:
         kind = UnsolvedError if ready.refusal.unsolved else CrosscheckError
         raise kind(f"{data.path}: {ready.refusal}; nothing was fitted")

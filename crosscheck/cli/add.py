@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from crosscheck.cli.choices import sigma_option
 from seecr.cli.options import FILE, json_option, progress_share
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ Examples:
 )
 @click.option("--refit", is_flag=True, help="Fit again an effect that the model has.")
 @click.option("--force", is_flag=True, help="Add it even if it does not predict any better.")
+@sigma_option
 @click.option("--out", type=FILE, metavar="DIR", help="Folder for add.json.  [default: none]")
 @json_option
 def command(
@@ -40,6 +42,7 @@ def command(
     model: Path,
     refit: bool,
     force: bool,
+    sigmas: tuple[str, ...],
     out: Path | None,
     as_json: bool,
 ) -> int:
@@ -56,6 +59,7 @@ def command(
     equilibrium.
     """
     from crosscheck import add_effect, load_measurements
+    from crosscheck.measurements.stated import with_stated
     from seecr import load_model, load_robot, new_model
     from seecr.effects import effect_named
 
@@ -63,7 +67,7 @@ def command(
     machine = load_robot(robot)
     old = load_model(model, machine) if model.exists() else new_model(machine)
     _check_names(old, effect, refit, model)
-    measured = load_measurements(data, machine)
+    measured = with_stated(load_measurements(data, machine), sigmas)
     with progress_share(f"adding {effect}") as progress:
         found = add_effect(machine, measured, effect, old.terms, progress)
     written = found.pays or force

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from crosscheck.cli.choices import exclude_option, listed, only_option, sigma_option
 from seecr.cli.options import FILE, json_option, progress_share
 
 if TYPE_CHECKING:
@@ -27,11 +28,22 @@ Examples:
 @click.option(
     "--model", type=FILE, required=True, metavar="M.toml", help="The model; made if need be."
 )
+@only_option
+@exclude_option
+@sigma_option
 @click.option("--force", is_flag=True, help="Write it even if it does not predict any better.")
 @click.option("--out", type=FILE, metavar="DIR", help="Folder for calibration.json.")
 @json_option
 def command(
-    robot: Path, data: Path, model: Path, force: bool, out: Path | None, as_json: bool
+    robot: Path,
+    data: Path,
+    model: Path,
+    only: tuple[str, ...],
+    exclude: tuple[str, ...],
+    sigmas: tuple[str, ...],
+    force: bool,
+    out: Path | None,
+    as_json: bool,
 ) -> int:
     """Fit every effect that DATA.csv can see, all together, and write the model.
 
@@ -44,13 +56,18 @@ def command(
     fit did not settle, 2 bad input, 3 rows without an equilibrium.
     """
     from crosscheck import calibrate, load_measurements
+    from crosscheck.given import considered
+    from crosscheck.measurements.stated import with_stated
     from seecr import load_model, load_robot, new_model
 
+    considered(listed(only), listed(exclude))  # a wrong name is told before any file is read
     machine = load_robot(robot)
     old = load_model(model, machine) if model.exists() else new_model(machine)
-    measured = load_measurements(data, machine)
+    measured = with_stated(load_measurements(data, machine), sigmas)
     with progress_share("calibrating") as progress:
-        found = calibrate(machine, measured, old, progress)
+        found = calibrate(
+            machine, measured, old, progress, only=listed(only), exclude=listed(exclude)
+        )
     written = found.pays or (force and found.settled)
     if written:
         _write(found, old, machine, data, model)

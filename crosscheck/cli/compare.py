@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from crosscheck.cli.choices import sigma_option
 from seecr.cli.options import FILE, json_option, out_option
 
 
@@ -34,6 +35,7 @@ Examples:
     metavar="FILE.toml",
     help='Limits from a file: max_position = "0.5mm" and so on; options go first.',
 )
+@sigma_option
 @click.option("--no-recording", is_flag=True, help="Write no .rrd.")
 @out_option("crosscheck-comparison")
 @json_option
@@ -42,6 +44,7 @@ def command(
     data: Path,
     model: Path | None,
     limits_file: Path | None,
+    sigmas: tuple[str, ...],
     no_recording: bool,
     out: Path,
     as_json: bool,
@@ -61,11 +64,12 @@ def command(
     from crosscheck import compare, load_measurements
     from crosscheck.comparison import Limits, check, load_limits, with_options
     from crosscheck.files import json_text, staged, write_text
+    from crosscheck.measurements.stated import with_stated
     from seecr import load_model, load_robot
 
     limits = with_options(load_limits(limits_file) if limits_file else Limits(), options)
     machine = load_robot(robot)
-    measured = load_measurements(data, machine)
+    measured = with_stated(load_measurements(data, machine), sigmas)
     own = load_model(model, machine) if model is not None else None
     with staged(out) as folder:
         found = compare(machine, measured, own.terms if own else ())

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from crosscheck.cli.choices import exclude_option, listed, only_option, sigma_option
 from seecr.cli.options import FILE, json_option, out_option, progress_share
 
 
@@ -15,11 +16,22 @@ from seecr.cli.options import FILE, json_option, out_option, progress_share
 @click.argument("robot", type=FILE, metavar="ROBOT.xml")
 @click.argument("data", type=FILE, metavar="DATA.csv")
 @click.option("--model", type=FILE, metavar="M.toml", help="Effects the model has already.")
+@only_option
+@exclude_option
+@sigma_option
 @click.option("--no-recording", is_flag=True, help="Write no .rrd.")
 @out_option("crosscheck-diagnosis")
 @json_option
 def command(
-    robot: Path, data: Path, model: Path | None, no_recording: bool, out: Path, as_json: bool
+    robot: Path,
+    data: Path,
+    model: Path | None,
+    only: tuple[str, ...],
+    exclude: tuple[str, ...],
+    sigmas: tuple[str, ...],
+    no_recording: bool,
+    out: Path,
+    as_json: bool,
 ) -> int:
     """Find which effects a model misses, in the order in which adding them pays.
 
@@ -28,15 +40,20 @@ def command(
     """
     from crosscheck import diagnose, load_measurements
     from crosscheck.files import json_text, staged, write_text
+    from crosscheck.given import considered
+    from crosscheck.measurements.stated import with_stated
     from crosscheck.report import write_report
     from seecr import load_model, load_robot
 
+    considered(listed(only), listed(exclude))  # a wrong name is told before any file is read
     machine = load_robot(robot)
-    measured = load_measurements(data, machine)
+    measured = with_stated(load_measurements(data, machine), sigmas)
     own = load_model(model, machine) if model is not None else ()
     with staged(out) as folder:
         with progress_share("diagnosing") as progress:
-            found = diagnose(machine, measured, own, progress)
+            found = diagnose(
+                machine, measured, own, progress, only=listed(only), exclude=listed(exclude)
+            )
         text = json_text(found.as_json())
         write_text(folder / "diagnosis.json", text + "\n")
         write_report(found, folder / "diagnosis.html")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import takewhile
 from pathlib import Path
@@ -24,7 +24,7 @@ from crosscheck.fit.prepare import Prepared, Progress, noise_floor, outlying_row
 from crosscheck.fit.problem import Problem, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Refusal, Unfit, Why
 from crosscheck.fit.smooth import beyond_smooth
-from crosscheck.given import GivenModel, GivenRobot, model_of, robot_of
+from crosscheck.given import GivenModel, GivenRobot, considered, model_of, robot_of
 from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.read import measurements_of
 from seecr.effects import Terms
@@ -46,6 +46,9 @@ def diagnose(
     data: Measurements | str | Path,
     model: GivenModel = (),
     progress: Progress = lambda _text, _part: None,
+    *,
+    only: Iterable[str] = (),
+    exclude: Iterable[str] = (),
 ) -> Diagnosis:
     """Find the effects that a model misses.
 
@@ -54,6 +57,8 @@ def diagnose(
         data: its measurements, or their file.
         model: effects the model has already, or their file; the plain model without.
         progress: called with what is being done and the part of it that is done.
+        only: names of the effects that may be missing; all of the catalogue without.
+        exclude: names of effects that are not considered.
 
     Raises:
         SeecrError: a file that cannot be read, or is of another robot.
@@ -64,7 +69,8 @@ def diagnose(
     # BLAS on several threads takes longer for matrices as narrow as these, and takes the
     # processors from the compiled loop
     with threadpool_limits(limits=1, user_api="blas"):
-        return _diagnosed(prepare(robot, data, terms), terms, said, progress)
+        ready = prepare(robot, data, terms, considered(only, exclude))
+        return _diagnosed(ready, terms, said, progress)
 
 
 Notes = tuple[str, ...]

@@ -75,6 +75,8 @@ def _lacking(problem: Problem, layout: Layout) -> Reason | None:
     """What the data lack that the effect needs."""
     data, needs = problem.data, layout.effect.needs
     rows = int(problem.use.sum())
+    if layout.name not in problem.considered:
+        return Reason(Why.EXCLUDED)
     if len(layout) > min(problem.n_readings, rows) or rows < 2:
         return Reason(Why.TOO_MANY_PARAMETERS, parameters=len(layout), rows=rows)
     still = data.temperature_C is not None and np.ptp(data.temperature_C) == 0

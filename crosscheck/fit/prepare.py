@@ -13,7 +13,7 @@ from crosscheck.fit.problem import Problem, Rms, rms_by_kind
 from crosscheck.fit.reasons import Refusal, Unfit
 from crosscheck.fit.state import State
 from crosscheck.measurements.data import Measurements
-from seecr.effects import Terms
+from seecr.effects import Terms, catalogue
 from seecr.experiment import Prediction
 from seecr.robot import Robot
 
@@ -53,9 +53,19 @@ class Prepared:
         return (*self.notes, self.blocks_note) if self.blocks_note else self.notes
 
 
-def prepare(robot: Robot, data: Measurements, terms: Terms) -> Prepared:
-    """Leave out the rows that have no equilibrium, estimate noise that nobody stated."""
-    problem = Problem(robot, data, data.sigma, np.ones(data.n_rows, dtype=bool))
+def prepare(
+    robot: Robot, data: Measurements, terms: Terms, considered: frozenset[str] | None = None
+) -> Prepared:
+    """Leave out the rows that have no equilibrium, estimate noise that nobody stated.
+
+    Args:
+        robot, data: what was measured.
+        terms: effects of the model as it stands.
+        considered: names of the effects that may be missing; all of the catalogue without.
+    """
+    considered = frozenset(catalogue()) if considered is None else considered
+    every = np.ones(data.n_rows, dtype=bool)
+    problem = Problem(robot, data, data.sigma, every, considered=considered)
     if not problem.measured.any():
         return Prepared(problem, tuple(data.notes), "", Refusal(Unfit.NO_READINGS, data.n_rows))
     plain = problem.experiment.predict(terms.effects)

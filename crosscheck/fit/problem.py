@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.units import in_unit
 from seecr.commands import Commands
+from seecr.effects import catalogue
 from seecr.effects.base import Readings
 from seecr.experiment import Experiment, Prediction
 from seecr.pose import (
@@ -63,6 +64,7 @@ class Problem:
         sigma: noise of each kind of reading; every kind that was read has a number.
         use: (n,) bool rows that count; others are way points or were left out, see ``left_out``.
         left_out: sentences that name the rows left out and why.
+        considered: names of the effects that may explain them.
     """
 
     robot: Robot
@@ -70,6 +72,7 @@ class Problem:
     sigma: Sigma
     use: NDArray[np.bool_]
     left_out: tuple[str, ...] = ()
+    considered: frozenset[str] = field(default_factory=lambda: frozenset(catalogue()))
     experiment: Experiment = field(init=False, repr=False)
 
     def __post_init__(self) -> None:

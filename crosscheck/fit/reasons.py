@@ -12,6 +12,7 @@ from enum import Enum, StrEnum
 class Why(Enum):
     """Why an effect is no candidate or was not chosen; the values are what people read."""
 
+    EXCLUDED = "not considered, as was asked for"
     TOO_MANY_PARAMETERS = "{parameters} parameters, but the data have {rows} rows"
     NEEDS_POSES = "needs commanded poses, or lengths as told; these are absolute"
     NEEDS_TIME = "needs the time of each row (t_s)"
@@ -33,6 +34,7 @@ class Why(Enum):
 
 
 _LACKING = {
+    Why.EXCLUDED,
     Why.TOO_MANY_PARAMETERS,
     Why.NEEDS_POSES,
     Why.NEEDS_TIME,

@@ -75,15 +75,16 @@ def test_evidence_counts_what_is_known_against_a_model(data: Measurements) -> No
 
 def test_a_calibration_holds_what_is_fixed_and_takes_what_is_known(data: Measurements) -> None:
     frame = Term.of(robot(), "tracker_frame", shift_x_m=1e-4).fixed()
-    found = calibrate(robot(), data, [frame, pulleys(0.0).measured(radius_m=(0.0105, 1e-5))])
-    held, known = (
+    known = pulleys(0.0).measured(radius_m=(0.0105, 1e-5))
+    found = calibrate(robot(), data, [frame, known], only=["stiffness", "platform_mass"])
+    held, pulled = (
         next(f for f in found.fitted if f.term.name == name)
         for name in ("tracker_frame", "pulley_radius")
     )
     assert np.array_equal(held.term.vector, frame.vector)
     assert np.all(held.stderr == 0.0) and not held.at_bound.any()
-    assert known.term.vector[0] == pytest.approx(0.0105, abs=5e-5)
-    assert known.stderr[0] == pytest.approx(1e-5, rel=0.1)
+    assert pulled.term.vector[0] == pytest.approx(0.0105, abs=5e-5)
+    assert pulled.stderr[0] == pytest.approx(1e-5, rel=0.1)
 
 
 def test_a_diagnosis_beside_a_known_stiffness_names_the_mass_alone() -> None:

@@ -1,0 +1,42 @@
+"""Noise stated on the command line: ``position=0.1mm``."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import replace
+
+from crosscheck.errors import CrosscheckError
+from crosscheck.measurements.data import Measurements, Sigma
+from crosscheck.units import SI, parse_quantity
+
+__all__ = ["stated", "with_stated"]
+
+
+def with_stated(data: Measurements, texts: Iterable[str]) -> Measurements:
+    """The measurements with noise as stated, in place of what the TOML says of those kinds.
+
+    Args:
+        data: as read.
+        texts: each a kind of reading and a quantity, such as ``"tension=0.5N"``.
+
+    Raises:
+        CrosscheckError: an unknown kind, no quantity, or one in another unit.
+    """
+    return replace(data, sigma=stated(data.sigma, texts))
+
+
+def stated(sigma: Sigma, texts: Iterable[str]) -> Sigma:
+    """The noise with some of it stated anew; see :func:`with_stated`."""
+    values = {}
+    for text in texts:
+        kind, equals, quantity = text.partition("=")
+        kind = kind.strip()
+        if not equals or kind not in SI:
+            near = difflib.get_close_matches(kind, SI, n=len(SI), cutoff=0.0)
+            raise CrosscheckError(
+                f"--sigma {text}: expected KIND=QUANTITY such as position=0.1mm, KIND one of "
+                f"{', '.join(near)} (nearest first)"
+            )
+        values[f"{kind}_{SI[kind]}"] = parse_quantity(f"--sigma {kind}", kind, quantity)
+    return replace(sigma, **values)
