@@ -20,6 +20,7 @@ Examples:
   crosscheck twin my_robot.xml --hide 7 --out case7
   crosscheck diagnose case7/robot.xml case7/measured.csv
   crosscheck twin --open case7
+  crosscheck twin my_robot.xml --hide 8 --poses my_poses.csv --out case8
 """,
 )
 @click.argument("robot", type=FILE, metavar="ROBOT.xml", required=False)
@@ -46,6 +47,12 @@ Examples:
 )
 @click.option("--tensions", is_flag=True, help="Record tensions too.")
 @click.option(
+    "--poses",
+    type=FILE,
+    metavar="POSES.csv",
+    help="Your own commands, with loads and way points, instead of the sweeps.",
+)
+@click.option(
     "--open",
     "opened",
     type=FILE,
@@ -60,6 +67,7 @@ def command(
     count: int | None,
     names: tuple[str, ...],
     tensions: bool,
+    poses: Path | None,
     opened: Path | None,
     out: Path,
     as_json: bool,
@@ -68,7 +76,8 @@ def command(
 
     The platform is commanded along sweeps to and fro, at two heights and across, and around a
     tilted loop, 144 rows in all, scaled to the robot. MuJoCo brings it to rest at each; a tracker
-    with noise reads its pose.
+    with noise reads its pose. With --poses it goes your own way: rows of POSES.csv that alone have
+    no reading are way points; noise is that of the TOML beside it.
 
     \b
     Writes into --out:
@@ -94,6 +103,7 @@ def command(
             n_effects=count,
             out=out,
             tensions=tensions,
+            poses=poses,
             progress=lambda rows, now: advance(0, "measuring"),
         )
         advance(1, "measured")

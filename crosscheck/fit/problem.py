@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.units import in_unit
-from seecr.commands import Commands
 from seecr.effects import catalogue
 from seecr.effects.base import Readings
 from seecr.experiment import Experiment, Prediction
@@ -36,23 +35,6 @@ from seecr.sensitivity import length_sensitivities
 
 # Columns of a residual row: position, orientation, then tensions.
 POSITION, ORIENTATION, TENSION = slice(0, 3), slice(3, 6), slice(6, None)
-
-
-def commands_of(robot: Robot, data: Measurements) -> Commands:
-    """The commands of measurements, as the statics takes them."""
-    poses = data.command_pose
-    if poses is None:
-        poses = np.tile(robot.reference_pose, (data.n_rows, 1))
-    return Commands(
-        pose=np.asarray(poses, float),
-        lengths=data.command_lengths,
-        run=data.run_index,
-        time=data.t_s,
-        temperature=data.temperature_C,
-        told=data.told,
-        loads=data.loads,
-        stands=data.stands,
-    )
 
 
 @dataclass(eq=False)
@@ -76,7 +58,7 @@ class Problem:
     experiment: Experiment = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        self.experiment = Experiment(self.robot, commands_of(self.robot, self.data))
+        self.experiment = Experiment(self.robot, self.data.as_commands(self.robot))
         self.use = self.use & self.data.read
 
     def without(self, rows: NDArray[np.bool_], why: str) -> Problem:

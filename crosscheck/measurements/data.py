@@ -15,9 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seecr.commands import Commands
 from seecr.loads import Loads
 from seecr.pose import Array
 from seecr.result import COORDINATES, Record, Result
+from seecr.robot import Robot
 
 Mask = NDArray[np.bool_]
 Names = NDArray[np.str_]
@@ -172,6 +174,22 @@ class Measurements(Result):
         tables = [self.position, self.angles_rad, self.tensions]
         tables += [] if self.quat_wxyz is None else [self.quat_wxyz]
         return np.asarray(np.isfinite(np.concatenate(tables, axis=1)).any(axis=1))
+
+    def as_commands(self, robot: Robot) -> Commands:
+        """What the robot was told and carried, as the statics takes it."""
+        poses = self.command_pose
+        if poses is None:
+            poses = np.tile(robot.reference_pose, (self.n_rows, 1))
+        return Commands(
+            pose=np.asarray(poses, float),
+            lengths=self.command_lengths,
+            run=self.run_index,
+            time=self.t_s,
+            temperature=self.temperature_C,
+            told=self.told,
+            loads=self.loads,
+            stands=self.stands,
+        )
 
     @property
     def has_position(self) -> bool:

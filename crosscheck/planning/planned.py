@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from crosscheck.fit.candidates import null_fit
 from crosscheck.fit.gauss_newton import Fit
-from crosscheck.fit.problem import Problem, commands_of
+from crosscheck.fit.problem import Problem
 from crosscheck.measurements.data import Measurements, Sigma
 from seecr.compiled.columns import REST, STRAIN, TENSION
 from seecr.effects import Terms
@@ -105,7 +105,7 @@ def planned(
         terms: effects of the model; plain without.
     """
     model = Terms() if terms is None else terms
-    prediction = Experiment(robot, commands_of(robot, commands)).predict(model.effects)
+    prediction = Experiment(robot, commands.as_commands(robot)).predict(model.effects)
     full = _as_read(commands, prediction.readings, reads)
     problem = Problem(robot, full, sigma, np.asarray(prediction.solved))
     factor = problem.noise(prediction)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -46,6 +46,7 @@ def choose(
     names: Sequence[str] | None = None,
     count: int | None = None,
     tensions: bool = False,
+    lacking: Mapping[str, str] | None = None,
 ) -> list[Term]:
     """Draw the effects of a twin.
 
@@ -55,14 +56,19 @@ def choose(
         names: these effects; None draws them.
         count: how many to draw; None draws that too.
         tensions: whether tensions are recorded (else their scale is no candidate).
+        lacking: what the commands have not of what effects need, in words.
 
     Raises:
         CrosscheckError: an effect that MuJoCo has no truth for, or more than there are.
     """
+    lacking = lacking or {}
     if names is None:
-        names = _drawn(robot, random, count, tensions)
+        names = _drawn(robot, random, count, tensions, lacking)
     for name in names:
-        effect_named(name)  # says which are known, nearest first
+        needs = effect_named(name).needs  # says which are known, nearest first
+        if set(needs) & set(lacking):
+            want = " and ".join(lacking[need] for need in needs if need in lacking)
+            raise CrosscheckError(f"effect {name}: needs {want}; expected commands that have them")
         if name not in TRUE_EFFECTS:
             raise CrosscheckError(f"effect {name}: no truth with MuJoCo, so no twin can hide it")
     if len(set(names)) != len(names):
@@ -78,9 +84,12 @@ def _alike_both_ways(hidden: Term) -> Term:
     return Term(hidden.layout, np.full(2, hidden.vector[0]))
 
 
-def _drawn(robot: Robot, random: Generator, count: int | None, tensions: bool) -> list[str]:
+def _drawn(
+    robot: Robot, random: Generator, count: int | None, tensions: bool, lacking: Mapping[str, str]
+) -> list[str]:
     without = set() if tensions else {"tension_scale"}
     without |= {*CONTAINED} | (set() if _room_for_sheaves(robot) else {"pulley_radius"})
+    without |= {name for name in TRUE_EFFECTS if set(effect_named(name).needs) & set(lacking)}
     known = [name for name in TRUE_EFFECTS if name not in without]
     if count is None:
         count = int(random.choice(len(_SHARES), p=_SHARES))

@@ -82,6 +82,7 @@ def measure(
     commands: Commands,
     effects: Sequence[Effect] = (),
     *,
+    length_errors: Array | None = None,
     segments: tuple[int, ...] = SEGMENTS,
     waypoints: tuple[int, int] = WAYPOINTS,
     progress: Progress | None = None,
@@ -92,6 +93,7 @@ def measure(
         robot: as described.
         commands: n rows.
         effects: what it has besides, in the order in which they act.
+        length_errors: (n, m) [m] paid out besides in each row: noise of the winches, no effect.
         segments: N of each cable, where cables have weight; of two, the poses are extrapolated.
         waypoints: on the way to the first row of a run and from row to row, where what happened
             on the way counts.
@@ -100,6 +102,8 @@ def measure(
     true = true_robot(robot, effects)
     way = way_of(true, commands, waypoints)
     rest, loads = paid_out(true, way, commands.temperature), commands.loads
+    if length_errors is not None:
+        rest = rest + length_errors[way.row]
     tell = progress or (lambda rows: None)
     settle = _walk if true.has_history else _each
     fine = World(true, segments[-1] if true.cable_weight > 0 else 1)

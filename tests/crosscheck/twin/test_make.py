@@ -15,6 +15,7 @@ from scipy.stats import chi2
 from crosscheck.cli import main
 from crosscheck.errors import CrosscheckError
 from crosscheck.files import json_text
+from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import load_measurements
 from crosscheck.twin.answer import NAME, Answer, Moves, seal, unseal
 from crosscheck.twin.hidden import choose, times
@@ -50,6 +51,63 @@ def residuals(twin):
     if sigma.tension_N is not None:
         parts.append((data.tensions - seen.readings.tensions) / sigma.tension_N)
     return np.concatenate(parts, axis=1)
+
+
+def users_poses(folder, way_points=True):
+    """A user's own commands: loads, and rows that were only gone through."""
+    robot = load_robot(COGIRO)
+    poses = trajectory(robot, 6, 0.5).pose[:12]
+    lines = ["run,t_s,cmd_x_mm,cmd_y_m,cmd_z_m,meas_x_m,payload_kg,force_x_N"]
+    for k, pose in enumerate(poses):
+        read = "" if way_points and k % 4 == 1 else "0"
+        load = f"{0.1 * (k > 5)},{0.2 * (k == 9)}"
+        lines.append(f"a,{10 * k},{1e3 * pose[0]:.6f},{pose[1]:.9f},{pose[2]:.9f},{read},{load}")
+    path = folder / "poses.csv"
+    path.write_text("\n".join(lines) + "\n")
+    path.with_suffix(".toml").write_text('start = "first_row"\n[sigma]\nposition_m = "20um"\n')
+    return path
+
+
+def test_a_user_s_own_poses_are_measured_with_their_loads_and_way_points(tmp_path):
+    path = users_poses(tmp_path)
+    sigma = Sigma(position_m=1e-6, tension_N=0.05)
+    hide = ["hysteresis", "platform_mass"]
+    twin = make_twin(COGIRO, 5, effects=hide, poses=path, sigma=sigma, out=tmp_path / "case")
+    data = load_measurements(tmp_path / "case" / "measured.csv", twin.robot)
+    assert data.n_rows == 12 and data.stands.all()
+    assert np.array_equal(np.flatnonzero(~data.read), [1, 5, 9])
+    assert data.loads.mass.tolist() == [0.0] * 6 + [0.1] * 6
+    assert np.flatnonzero(data.loads.wrench[:, 0]).tolist() == [9]
+    assert data.sigma == Sigma(1e-6, 3.5e-4, 0.05)
+    effects = [one.effect() for one in twin.hidden]
+    seen = Experiment(twin.robot, data.as_commands(twin.robot)).predict(effects)
+    off = (data.position - seen.readings.position)[data.read] / 1e-6
+    assert is_noise(off)
+    bare = dataclasses.replace(data, loads=None).as_commands(twin.robot)
+    unloaded = Experiment(twin.robot, bare).predict(effects)
+    assert not is_noise((data.position - unloaded.readings.position)[data.read] / 1e-6)
+
+
+def test_commands_that_cannot_show_an_effect_hide_none_of_it(tmp_path):
+    path = users_poses(tmp_path, way_points=False)
+    with pytest.raises(CrosscheckError, match="effect thermal_expansion: needs temperature_C; exp"):
+        make_twin(COGIRO, 1, effects=["thermal_expansion"], poses=path)
+    path.write_text(path.read_text().replace("a,0,", "a,0,9"))  # 9 m to the side
+    with pytest.raises(InputFileError, match="line 2, column cmd_x_mm: far outside the robot"):
+        make_twin(COGIRO, 1, effects=[], poses=path)
+
+
+def test_noise_of_the_winches_moves_the_platform(tmp_path):
+    path = users_poses(tmp_path, way_points=False)
+    quiet, noisy = (
+        make_twin(COGIRO, 2, effects=(), poses=path, sigma=Sigma(2e-5, 1e-4, None, length))
+        for length in (None, 1e-4)
+    )
+    errors = noisy.truth.rest_lengths - quiet.truth.rest_lengths
+    assert (
+        chi2.ppf(1e-4, errors.size) < np.sum((errors / 1e-4) ** 2) < chi2.ppf(0.9999, errors.size)
+    )
+    assert np.std(noisy.truth.position - quiet.truth.position) > 2e-5
 
 
 def is_noise(values):

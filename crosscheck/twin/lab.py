@@ -1,0 +1,197 @@
+"""How a twin is measured: what is commanded, where MuJoCo rests there, and the noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.errors import CrosscheckError
+from crosscheck.measurements.data import Measurements, Sigma
+from crosscheck.twin.answer import Moves
+from crosscheck.twin.hidden import times
+from crosscheck.twin.measure import Truth, measure
+from crosscheck.twin.trajectory import trajectory
+from seecr.effects import Effect, Term
+from seecr.pose import quat_from_rotvec, quat_multiply
+from seecr.robot import Robot
+
+# Noise of a tracker, over the mean cable length (30 micrometres on a DemoBot), and of its angles.
+_POSITION, _ORIENTATION_RAD = 6e-5, 3.5e-4
+# Noise of load cells over the mean tension.
+_TENSION = 0.02
+# An effect that moves no reading by this many times its noise is made larger, so often.
+_VISIBLE, _ENLARGED = 2.0, (1.0, 2.0, 3.0)
+# Extents of the sweeps, the smaller ones tried where MuJoCo finds no rest at some commands.
+EXTENTS = (1.0, 0.75, 0.5, 0.35)
+# Rows at which it has to rest; the others are left out.
+_AT_REST = 0.95
+
+Progress = Callable[[int, str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Lab:
+    """Who measures: the robot, its seed, the noise that was stated, whether tensions are read."""
+
+    robot: Robot
+    seed: int
+    stated: Sigma
+    tensions: bool
+    tell: Progress
+
+    def measure(self, case: Measurements, effects: Sequence[Effect], now: str) -> Truth:
+        """The truth at commands, their lengths off by the noise of the winches."""
+        errors = None
+        if self.stated.length_m is not None:
+            noise = random_of(self.seed, 3).standard_normal((case.n_rows, case.n_cables))
+            errors = self.stated.length_m * noise
+        return measure(
+            self.robot, case.as_commands(self.robot), effects, length_errors=errors,
+            progress=lambda rows: self.tell(rows, now),
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What MuJoCo said: without effects, with all, and with each alone."""
+
+    case: Measurements
+    plain: Truth
+    truth: Truth
+    sigma: Sigma
+    alone: list[tuple[Term, Truth]]
+    at_rest: NDArray[np.bool_]
+
+
+def random_of(seed: int, stream: int) -> np.random.Generator:
+    """Its own random numbers for each purpose: the noise does not depend on what is hidden."""
+    return np.random.default_rng([seed, stream])
+
+
+def lacking_in(case: Measurements) -> dict[str, str]:
+    """What commands have not of what effects need, in words."""
+    there = {
+        "time": (case.t_s is not None, "the time of each row (t_s)"),
+        "temperature": (case.temperature_C is not None, "temperature_C"),
+        "poses": (not case.absolute, "poses, or lengths as told"),
+    }
+    return {need: words for need, (has, words) in there.items() if not has}
+
+
+def rest_of(lab: Lab, cases: Sequence[Measurements], hidden: list[Term]) -> Measured:
+    """The first commands at which MuJoCo rests, and sizes of effects that show there."""
+    for case in cases:
+        plain = lab.measure(case, (), "without effects")
+        if not _mostly(plain.at_rest):
+            continue
+        sigma = _sigma(lab, plain)
+        alone = [_made_visible(lab, case, one, plain, sigma) for one in hidden]
+        if any(one is None for one in alone):
+            continue
+        fine = [one for one in alone if one is not None]
+        truth = _together(lab, case, fine, plain)
+        at_rest = truth.at_rest & plain.at_rest
+        if _mostly(at_rest):
+            return Measured(case, plain, truth, sigma, fine, at_rest)
+    where = "the twin's commands, however close to the reference pose"
+    if len(cases) == 1:
+        where = f"the commands of {cases[0].path}"
+    raise CrosscheckError(
+        f"robot {lab.robot.name}: MuJoCo finds no stable rest along {where}; expected a robot "
+        "whose cables hold its platform around there"
+    )
+
+
+def _mostly(at_rest: NDArray[np.bool_]) -> bool:
+    """Whether few rows have to be left out, because nobody can measure a platform that sways."""
+    return float(np.mean(at_rest)) >= _AT_REST
+
+
+def _together(lab: Lab, case: Measurements, alone: list[tuple[Term, Truth]], plain: Truth) -> Truth:
+    """The truth with all effects."""
+    if len(alone) < 2:
+        return alone[0][1] if alone else plain
+    return lab.measure(case, [one.effect() for one, _ in alone], "both effects")
+
+
+def sweeps(robot: Robot, points: int, extent: float, seed: int) -> Measurements:
+    """Sweeps to and fro, and the temperature at which they are commanded."""
+    way = trajectory(robot, points, extent)
+    random = random_of(seed, 1)
+    # a hall that warms up, and somebody opens the door now and then
+    t = way.t_s
+    rise, period = random.uniform(3.0, 6.0), random.uniform(200.0, 400.0)
+    drift = rise * (1.0 - np.exp(-t / 300.0)) + 0.5 * np.sin(2.0 * np.pi * t / period)
+    return Measurements(
+        path=Path("measured.csv"), n_cables=robot.n_cables, run=way.run, t_s=t,
+        command_pose=way.pose, temperature_C=np.round(20.0 + drift, 2),
+    )  # fmt: skip
+
+
+def _made_visible(
+    lab: Lab, case: Measurements, hidden: Term, plain: Truth, sigma: Sigma
+) -> tuple[Term, Truth] | None:
+    """The effect, larger where it would drown in the noise; None where MuJoCo finds no rest."""
+    best = None
+    for factor in _ENLARGED:
+        one = times(hidden, factor)
+        truth = lab.measure(case, [one.effect()], "with effects")
+        if not _mostly(truth.at_rest & plain.at_rest):
+            break
+        best = one, truth
+        if Moves.of(truth, plain, sigma).max > _VISIBLE:
+            break
+    return best
+
+
+def _sigma(lab: Lab, plain: Truth) -> Sigma:
+    """What is stated, else the noise of a good tracker and, where they are read, of load cells."""
+    robot, stated = lab.robot, lab.stated
+    length = float(np.mean(robot.nominal_lengths(robot.reference_pose[None])))
+    pull = _one_digit(_TENSION * float(np.nanmean(plain.tensions))) if lab.tensions else None
+    return Sigma(
+        stated.position_m or _one_digit(_POSITION * length),
+        stated.orientation_rad or _ORIENTATION_RAD,
+        stated.tension_N or pull,
+        stated.length_m,
+    )
+
+
+def _one_digit(value: float) -> float:
+    return float(f"{value:.0e}")
+
+
+def read_of(made: Measured, random: np.random.Generator) -> Measurements:
+    """Readings with noise, none at way points and where the platform does not rest."""
+    case, truth, sigma = made.case, made.truth, made.sigma
+    assert sigma.position_m is not None and sigma.orientation_rad is not None
+    n = len(truth.position)
+    noise = random.standard_normal((n, 6))
+    turn = quat_from_rotvec(sigma.orientation_rad * noise[:, 3:])
+    quat = quat_multiply(turn, truth.quat_wxyz)
+    quat *= np.where(quat[:, :1] < 0.0, -1.0, 1.0)
+    pull: Any = None
+    if sigma.tension_N is not None:
+        pull = truth.tension_readings + sigma.tension_N * random.standard_normal(
+            truth.tension_readings.shape
+        )
+    stops = ((case.read | ~case.read.any()) & made.at_rest)[:, None]
+    anew: dict[str, Any] = dict.fromkeys(
+        ("angles_rad", "position_mask", "angle_mask", "tension_mask", "line")
+    )
+    anew["tensions"] = None if pull is None else np.where(stops, pull, np.nan)
+    return replace(
+        case,
+        path=Path("measured.csv"),
+        position=np.where(stops, truth.position + sigma.position_m * noise[:, :3], np.nan),
+        quat_wxyz=np.where(stops, quat, np.nan),
+        sigma=sigma,
+        unused_columns=(),
+        notes=(),
+        **anew,
+    )
