@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,8 +26,7 @@ from crosscheck.fit.reasons import Why
 from crosscheck.fit.state import evaluate
 from crosscheck.fit.words import rms_words, value_lines, value_records
 from crosscheck.given import GivenModel, GivenRobot, model_of, robot_of
-from crosscheck.measurements.data import Measurements
-from crosscheck.measurements.read import measurements_of
+from crosscheck.measurements.read import GivenData, measurements_of
 from crosscheck.model.write import Fitted
 from seecr.effects import Terms, effect_named, layout_of
 from seecr.effects.base import Layout
@@ -125,7 +123,7 @@ class Addition(Result):
 
 def add_effect(
     robot: GivenRobot,
-    data: Measurements | str | Path,
+    data: GivenData,
     name: str,
     model: GivenModel = (),
     progress: Progress = lambda _text, _part: None,
@@ -161,7 +159,7 @@ def add_effect(
     progress("looking for outliers", 0.4)
     outliers = outlying_rows(problem, best.state)
     if outliers.any():
-        lines = ", ".join(str(k) for k in data.line[outliers])
+        lines = data.places(outliers)
         word = "line" if outliers.sum() == 1 else "lines"
         words = f"{word} {lines} left out: outliers, far off the others"
         notes.append(words)

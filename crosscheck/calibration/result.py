@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,8 +16,7 @@ from crosscheck.fit.prepare import Progress, prepare
 from crosscheck.fit.problem import KINDS, Rms, kinds_read
 from crosscheck.fit.words import rms_words, value_lines, value_records
 from crosscheck.given import GivenModel, GivenRobot, considered, model_of, robot_of
-from crosscheck.measurements.data import Measurements
-from crosscheck.measurements.read import measurements_of
+from crosscheck.measurements.read import GivenData, measurements_of
 from crosscheck.model.write import Fitted
 from seecr.effects import Terms
 from seecr.pose import Array
@@ -128,7 +126,7 @@ class Calibrated(Result):
 
 def calibrate(
     robot: GivenRobot,
-    data: Measurements | str | Path,
+    data: GivenData,
     model: GivenModel = (),
     progress: Progress = lambda _text, _part: None,
     *,

@@ -26,7 +26,7 @@ Examples:
 )
 @click.argument("effect", metavar="EFFECT")
 @click.argument("robot", type=FILE, metavar="ROBOT.xml")
-@click.argument("data", type=FILE, metavar="DATA.csv")
+@click.argument("data", type=FILE, nargs=-1, required=True, metavar="DATA.csv...")
 @click.option(
     "--model", type=FILE, required=True, metavar="M.toml", help="The model; made if need be."
 )
@@ -38,7 +38,7 @@ Examples:
 def command(
     effect: str,
     robot: Path,
-    data: Path,
+    data: tuple[Path, ...],
     model: Path,
     refit: bool,
     force: bool,
@@ -72,7 +72,7 @@ def command(
         found = add_effect(machine, measured, effect, old.terms, progress)
     written = found.pays or force
     if written:
-        _write(found, old, machine, data, model)
+        _write(found, old, machine, measured.path, model)
     _tell(found, old, model, written, out, as_json)
     return 0 if written else 1
 

@@ -24,7 +24,7 @@ Examples:
 """,
 )
 @click.argument("robot", type=FILE, metavar="ROBOT.xml")
-@click.argument("data", type=FILE, metavar="DATA.csv")
+@click.argument("data", type=FILE, nargs=-1, required=True, metavar="DATA.csv...")
 @click.option(
     "--model", type=FILE, required=True, metavar="M.toml", help="The model; made if need be."
 )
@@ -36,7 +36,7 @@ Examples:
 @json_option
 def command(
     robot: Path,
-    data: Path,
+    data: tuple[Path, ...],
     model: Path,
     only: tuple[str, ...],
     exclude: tuple[str, ...],
@@ -70,7 +70,7 @@ def command(
         )
     written = found.pays or (force and found.settled)
     if written:
-        _write(found, old, machine, data, model)
+        _write(found, old, machine, measured.path, model)
     _tell(found, model, written, out, as_json)
     return 0 if written else 1
 

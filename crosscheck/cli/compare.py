@@ -20,7 +20,7 @@ Examples:
 """,
 )
 @click.argument("robot", type=FILE, metavar="ROBOT.xml")
-@click.argument("data", type=FILE, metavar="DATA.csv")
+@click.argument("data", type=FILE, nargs=-1, required=True, metavar="DATA.csv...")
 @click.option("--model", type=FILE, metavar="M.toml", help="The model; plain SEECR without.")
 @click.option("--max-position", metavar="0.5mm", help="Limit on the rms position error.")
 @click.option("--max-orientation", metavar="0.2deg", help="Limit on the rms orientation error.")
@@ -41,7 +41,7 @@ Examples:
 @json_option
 def command(
     robot: Path,
-    data: Path,
+    data: tuple[Path, ...],
     model: Path | None,
     limits_file: Path | None,
     sigmas: tuple[str, ...],

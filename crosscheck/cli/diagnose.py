@@ -14,7 +14,7 @@ from seecr.cli.options import FILE, json_option, out_option, progress_share
     epilog="Example: crosscheck diagnose robot.xml measured.csv --out diagnosis",
 )
 @click.argument("robot", type=FILE, metavar="ROBOT.xml")
-@click.argument("data", type=FILE, metavar="DATA.csv")
+@click.argument("data", type=FILE, nargs=-1, required=True, metavar="DATA.csv...")
 @click.option("--model", type=FILE, metavar="M.toml", help="Effects the model has already.")
 @only_option
 @exclude_option
@@ -24,7 +24,7 @@ from seecr.cli.options import FILE, json_option, out_option, progress_share
 @json_option
 def command(
     robot: Path,
-    data: Path,
+    data: tuple[Path, ...],
     model: Path | None,
     only: tuple[str, ...],
     exclude: tuple[str, ...],

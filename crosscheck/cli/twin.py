@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from crosscheck.cli.choices import sigma_option
 from seecr.cli.options import FILE, json_option, out_option, progress_bar
 
 if TYPE_CHECKING:
@@ -52,6 +53,7 @@ Examples:
     metavar="POSES.csv",
     help="Your own commands, with loads and way points, instead of the sweeps.",
 )
+@sigma_option
 @click.option(
     "--open",
     "opened",
@@ -68,6 +70,7 @@ def command(
     names: tuple[str, ...],
     tensions: bool,
     poses: Path | None,
+    sigmas: tuple[str, ...],
     opened: Path | None,
     out: Path,
     as_json: bool,
@@ -77,7 +80,7 @@ def command(
     The platform is commanded along sweeps to and fro, at two heights and across, and around a
     tilted loop, 144 rows in all, scaled to the robot. MuJoCo brings it to rest at each; a tracker
     with noise reads its pose. With --poses it goes your own way: rows of POSES.csv that alone have
-    no reading are way points; noise is that of the TOML beside it.
+    no reading are way points; noise is that of the TOML beside it, or of --sigma.
 
     \b
     Writes into --out:
@@ -92,8 +95,11 @@ def command(
         raise click.UsageError("expected ROBOT.xml and --hide SEED, or --open FILE")
     if names and count is not None:
         raise click.UsageError("--effect says how many there are: leave out --effects")
-    from crosscheck import make_twin
+    from crosscheck import load_commands, make_twin
+    from crosscheck.measurements.data import Sigma
+    from crosscheck.measurements.stated import stated
 
+    commands = load_commands(poses, robot) if poses is not None else None
     # whatever is hidden, the bar shows the same: rows of one kind, done or not
     with progress_bar("measuring", 1) as advance:
         twin = make_twin(
@@ -103,7 +109,8 @@ def command(
             n_effects=count,
             out=out,
             tensions=tensions,
-            poses=poses,
+            poses=commands,
+            sigma=stated(commands.sigma if commands else Sigma(), sigmas),
             progress=lambda rows, now: advance(0, "measuring"),
         )
         advance(1, "measured")

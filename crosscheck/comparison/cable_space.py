@@ -26,8 +26,9 @@ def cable_errors(problem: Problem, raw: Array, prediction: Prediction) -> tuple[
     turned = np.cross(raw[:, None, ORIENTATION], arm)
     errors = -np.sum(unit * (raw[:, None, POSITION] + turned), axis=-1)
     lever = np.linalg.norm(np.cross(arm, unit), axis=-1)
-    sigma = problem.sigma
-    noise = np.hypot(sigma.position_m or 0.0, (sigma.orientation_rad or 0.0) * lever)
+    sigma, ratio = problem.sigma, problem.data.sigma_ratio
+    turn = (sigma.orientation_rad or 0.0) * ratio[:, 1:2] * lever
+    noise = np.hypot((sigma.position_m or 0.0) * ratio[:, :1], turn)
     if problem.uses_angles:
         # differences of Euler angles are no rotation vector
         errors = np.full_like(errors, np.nan)

@@ -161,6 +161,6 @@ def _words(found: Comparison, rule: Rule, limit: float, value: float) -> str:
     data = found.problem.data
     return (
         f"{rule.words} {factor * value:.4g} {unit} exceeds {factor * limit:.4g} {unit} by "
-        f"{factor * (value - limit):.4g} {unit}; worst at line {data.line[k]}, run "
+        f"{factor * (value - limit):.4g} {unit}; worst at line {data.place(k)}, run "
         f"{data.run[k]}, {found.place(k)}: {factor * float(sizes[k]):.4g} {unit}"
     )

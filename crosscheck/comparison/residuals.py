@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from pathlib import Path
 
 import numpy as np
 
@@ -16,15 +15,13 @@ from crosscheck.fit.prepare import noise_floor, outlying_rows, prepare
 from crosscheck.fit.problem import Problem, rms_by_kind
 from crosscheck.fit.state import State, evaluate
 from crosscheck.given import GivenModel, GivenRobot, model_of, robot_of
-from crosscheck.measurements.data import Measurements, Names
-from crosscheck.measurements.read import measurements_of
+from crosscheck.measurements.data import Names
+from crosscheck.measurements.read import GivenData, measurements_of
 
 _MOST_WORST = 10
 
 
-def compare(
-    robot: GivenRobot, data: Measurements | str | Path, model: GivenModel = ()
-) -> Comparison:
+def compare(robot: GivenRobot, data: GivenData, model: GivenModel = ()) -> Comparison:
     """Hold a model against measurements; nothing is fitted.
 
     Args:
@@ -71,7 +68,7 @@ def _outliers(problem: Problem, state: State) -> list[str]:
     rows = outlying_rows(problem, state)
     if not rows.any():
         return []
-    lines = ", ".join(str(k) for k in problem.data.line[rows])
+    lines = problem.data.places(rows)
     word = "line" if rows.sum() == 1 else "lines"
     return [f"{word} {lines}: far off all the others, outliers? (counted)"]
 

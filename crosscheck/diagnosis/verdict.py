@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import takewhile
-from pathlib import Path
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -25,8 +24,7 @@ from crosscheck.fit.problem import Problem, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Refusal, Unfit, Why
 from crosscheck.fit.smooth import beyond_smooth
 from crosscheck.given import GivenModel, GivenRobot, considered, model_of, robot_of
-from crosscheck.measurements.data import Measurements
-from crosscheck.measurements.read import measurements_of
+from crosscheck.measurements.read import GivenData, measurements_of
 from seecr.effects import Terms
 from seecr.pose import Array
 
@@ -43,7 +41,7 @@ _UNDERSTATED = 3.0
 
 def diagnose(
     robot: GivenRobot,
-    data: Measurements | str | Path,
+    data: GivenData,
     model: GivenModel = (),
     progress: Progress = lambda _text, _part: None,
     *,
@@ -129,7 +127,7 @@ def _without_outliers(found: Search, base: Fit, progress: Progress) -> tuple[Sea
     rows = outlying_rows(problem, state)
     if not rows.any():
         return found, ()
-    lines = ", ".join(str(k) for k in problem.data.line[rows])
+    lines = problem.data.places(rows)
     word = "line" if rows.sum() == 1 else "lines"
     note = f"{word} {lines} left out: outliers, far from all the others"
     cleaned = problem.without(rows, note)

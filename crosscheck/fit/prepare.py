@@ -24,8 +24,6 @@ Progress = Callable[[str, float], None]
 _LOST = 0.05
 # Fewer readings than this say nothing.
 _LEAST_READINGS = 6
-# Lines named in a note.
-_MOST_LINES = 8
 # Rows that stick out by this many robust deviations, alone, are outliers.
 _OUTLIER = 6.0
 _MOST_OUTLIERS = 0.05
@@ -77,17 +75,13 @@ def prepare(
 
 def _solved_rows(problem: Problem, plain: Prediction) -> Problem:
     """The problem without the rows that have no equilibrium."""
-    lines = problem.data.line
     for rows, words in (
         (plain.singular, "the platform is free to move there"),
         (~plain.solved & ~plain.singular, "no equilibrium was found there"),
     ):
         if np.any(rows & problem.use):
-            lost = lines[rows & problem.use]
-            some = ", ".join(str(k) for k in lost[:_MOST_LINES])
-            rest = len(lost) - _MOST_LINES
-            more = f" and {rest} more" if rest > 0 else ""
-            problem = problem.without(rows, f"lines {some}{more} left out: {words}")
+            lines = problem.data.places(rows & problem.use)
+            problem = problem.without(rows, f"lines {lines} left out: {words}")
     return problem
 
 

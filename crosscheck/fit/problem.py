@@ -146,14 +146,15 @@ class Problem:
 
     @cached_property
     def reading_sigma(self) -> Array:
-        """(6 + m,) noise of each reading."""
-        return np.concatenate(
-            [
-                np.full(3, self.sigma.position_m or 1.0),
-                np.full(3, self.sigma.orientation_rad or 1.0),
-                np.full(self.data.n_cables, self.sigma.tension_N or 1.0),
-            ]
-        )
+        """(n, 6 + m) noise of each reading."""
+        stated = (self.sigma.position_m, self.sigma.orientation_rad, self.sigma.tension_N)
+        by_kind = np.array([value or 1.0 for value in stated]) * self.data.sigma_ratio[:, :3]
+        return np.repeat(by_kind, [3, 3, self.data.n_cables], axis=1)
+
+    @cached_property
+    def length_sigma(self) -> Array:
+        """(n, 1) [m] noise of each row's commanded lengths."""
+        return (self.sigma.length_m or 0.0) * self.data.sigma_ratio[:, 3:]
 
     def by_length(self, at: Prediction) -> Array:
         """Derivative of what was read by the rest lengths, (n, 6 + m, m)."""
@@ -169,7 +170,7 @@ class Problem:
         index = np.arange(width)
         covariance = np.zeros((n, width, width))
         if by_length is not None and self.sigma.length_m:
-            rate = by_length * self.sigma.length_m
+            rate = by_length * self.length_sigma[:, None]
             covariance = rate @ np.swapaxes(rate, 1, 2)
         covariance[:, index, index] += self.reading_sigma**2
         blank = ~self.measured

@@ -162,7 +162,7 @@ def with_length_errors(
         errors: (n, m) [m] to start from, or None.
         near: a prediction to start from, or None: then more rounds are made.
     """
-    spread = problem.sigma.length_m or 1.0
+    spread = problem.length_sigma
     if errors is None:
         errors = np.zeros((problem.data.n_rows, problem.data.n_cables))
     here = Rows.predicted(problem, effects, errors, near)
@@ -170,8 +170,8 @@ def with_length_errors(
     together = True
     for _ in range(_ROUNDS if near is None else _ROUNDS_NEAR):
         step = here.better_errors(problem, spread) - here.length_errors
-        size = np.max(np.abs(step), axis=1, initial=0.0)
-        moving = problem.use & (share * size > 1e-2 * spread)
+        size = np.max(np.abs(step) / spread, axis=1, initial=0.0)
+        moving = problem.use & (share * size > 1e-2)
         if not moving.any():
             break
         moved = here.length_errors + (share * moving)[:, None] * step
@@ -220,7 +220,7 @@ class Rows:
             factor=mixed(self.factor, other.factor),
         )
 
-    def cost(self, problem: Problem, spread: float) -> Array:
+    def cost(self, problem: Problem, spread: Array) -> Array:
         """(n,) sum of squares of readings and length errors, in units of their noise."""
         filled = np.where(problem.measured & np.isfinite(self.raw), self.raw, 0.0)
         cost = ((filled / problem.reading_sigma) ** 2).sum(axis=1)
@@ -231,7 +231,7 @@ class Rows:
         """Residuals as they would be at the commanded lengths, to first order."""
         return self.raw + (self.rate @ self.length_errors[..., None])[..., 0]
 
-    def better_errors(self, problem: Problem, spread: float) -> Array:
+    def better_errors(self, problem: Problem, spread: Array) -> Array:
         """Errors of the lengths (n, m) that the readings make likeliest, to first order."""
         weighed = _precision_times(problem, self.factor, self.linear_raw())
         return spread**2 * (np.swapaxes(self.rate, 1, 2) @ weighed[..., None])[..., 0]

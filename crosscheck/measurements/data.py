@@ -7,18 +7,19 @@ was not read is NaN. :mod:`crosscheck.measurements.read` reads them from files.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from crosscheck.measurements.named import named_columns
 from seecr.commands import Commands
 from seecr.loads import Loads
 from seecr.pose import Array
-from seecr.result import COORDINATES, Record, Result
+from seecr.result import Record, Result
 from seecr.robot import Robot
 
 Mask = NDArray[np.bool_]
@@ -37,6 +38,8 @@ _PER_ROW = (
     "tensions",
     "temperature_C",
     "stands",
+    "sigma_ratio",
+    "file",
     "line",
 )
 
@@ -85,6 +88,8 @@ class Measurements(Result):
         loads: what the platform carried, or None.
         stands: (n,) bool, rows whose run starts at its first row instead of the reference pose.
         sigma: stated noise.
+        sigma_ratio: (n, 4) noise of each row over that, by kind: each file has its own.
+        files: their names, where they are several; file: (n,) number of each row's file.
         line: (n,) line of the file (row, for Parquet) each row came from.
         unused_columns: names of columns that mean nothing here.
         notes: sentences for the reader: what was assumed, filled in or left out.
@@ -108,6 +113,9 @@ class Measurements(Result):
     loads: Loads | None = None
     stands: Mask = _FILLED_IN
     sigma: Sigma = field(default_factory=Sigma)
+    sigma_ratio: Array = _FILLED_IN
+    files: tuple[str, ...] = ()
+    file: NDArray[np.int64] = _FILLED_IN
     line: NDArray[np.int64] = _FILLED_IN
     unused_columns: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
@@ -127,7 +135,12 @@ class Measurements(Result):
         ):
             if getattr(self, name) is None:
                 self._set(name, np.any(np.isfinite(values), axis=0))
-        filled: dict[str, Any] = {"line": np.arange(2, n + 2), "stands": np.zeros(n, dtype=bool)}
+        filled: dict[str, Any] = {
+            "line": np.arange(2, n + 2),
+            "stands": np.zeros(n, dtype=bool),
+            "file": np.zeros(n, dtype=np.int64),
+            "sigma_ratio": np.ones((n, len(fields(Sigma)))),
+        }
         for name, value in filled.items():
             if getattr(self, name) is None:
                 self._set(name, value)
@@ -141,7 +154,8 @@ class Measurements(Result):
         widths = {"command_pose": 7, "command_lengths": m, "position": 3, "quat_wxyz": 4}
         widths |= {"angles_rad": 3, "tensions": m}
         shapes: dict[str, tuple[int, ...]] = {k: (n, width) for k, width in widths.items()}
-        shapes |= {"t_s": (n,), "temperature_C": (n,), "line": (n,), "stands": (n,)}
+        shapes |= dict.fromkeys(("t_s", "temperature_C", "line", "stands", "file"), (n,))
+        shapes |= {"sigma_ratio": (n, len(fields(Sigma)))}
         for name, shape in shapes.items():
             value = getattr(self, name)
             if value is not None and np.shape(value) != shape:
@@ -175,6 +189,26 @@ class Measurements(Result):
         tables += [] if self.quat_wxyz is None else [self.quat_wxyz]
         return np.asarray(np.isfinite(np.concatenate(tables, axis=1)).any(axis=1))
 
+    def with_notes(self, notes: Iterable[str]) -> Measurements:
+        """The same with more notes."""
+        return dataclasses.replace(self, notes=(*self.notes, *notes))
+
+    def places(self, rows: ArrayLike, most: int = 8) -> str:
+        """Lines of some rows (numbers or a mask) in words, with their files where several are.
+
+        Such as ``3, 5 and 2 more`` or ``monday.csv 3, tuesday.csv 5``.
+        """
+        chosen = np.arange(self.n_rows)[np.asarray(rows)]
+        words = [self.place(int(row)) for row in chosen[:most]]
+        more = f" and {len(chosen) - most} more" if len(chosen) > most else ""
+        return ", ".join(words) + more
+
+    def place(self, row: int) -> str:
+        """The line of one row, and its file where several are."""
+        return (
+            f"{self.files[self.file[row]]} {self.line[row]}" if self.files else f"{self.line[row]}"
+        )
+
     def as_commands(self, robot: Robot) -> Commands:
         """What the robot was told and carried, as the statics takes it."""
         poses = self.command_pose
@@ -189,6 +223,7 @@ class Measurements(Result):
             told=self.told,
             loads=self.loads,
             stands=self.stands,
+            clock=self.file if self.files else None,
         )
 
     @property
@@ -231,18 +266,7 @@ class Measurements(Result):
 
     def columns(self) -> Iterator[tuple[str, list[Any]]]:
         """The columns of the file, in SI, by name; None where nothing was read."""
-        yield "run", self.run.tolist()
-        cables = range(1, self.n_cables + 1)
-        yield from _columns(["t_s"], self.t_s)
-        yield from _columns([f"cmd_{c}" for c in COORDINATES], self.command_pose)
-        yield from _columns([f"length_{i}_m" for i in cables], self.command_lengths)
-        yield from _columns([f"meas_{c}_m" for c in "xyz"], self.position, self.position_mask)
-        yield from _columns([f"meas_q{c}" for c in "wxyz"], self.quat_wxyz)
-        yield from _columns([f"meas_r{c}_rad" for c in "xyz"], self.angles_rad, self.angle_mask)
-        yield from _columns([f"tension_{i}_N" for i in cables], self.tensions, self.tension_mask)
-        yield from _columns(["temperature_C"], self.temperature_C)
-        if self.loads is not None:
-            yield from _load_columns(self.loads)
+        return named_columns(self)
 
     def rows(self, index: ArrayLike | slice) -> Measurements:
         """Some rows: numbers, a mask (n,) or a slice. Masks of what was read stay as they are."""
@@ -253,26 +277,3 @@ class Measurements(Result):
             values[name] = None if value is None else value[chosen]
         values["loads"] = None if self.loads is None else self.loads.rows(chosen)
         return dataclasses.replace(self, **values)
-
-
-def _load_columns(loads: Loads) -> Iterator[tuple[str, list[Any]]]:
-    """Those of payload and wrench that say anything."""
-    if np.any(loads.mass):
-        yield from _columns(["payload_kg"], loads.mass)
-        if np.isfinite(loads.centre).any():
-            yield from _columns([f"payload_{c}_m" for c in "xyz"], loads.centre)
-    wrench = [*(f"force_{c}_N" for c in "xyz"), *(f"moment_{c}_Nm" for c in "xyz")]
-    acts = np.array([bool(column.any()) for column in loads.wrench.T])
-    yield from _columns(wrench, loads.wrench, acts)
-
-
-def _columns(
-    names: list[str], values: Array | None, mask: Mask | None = None
-) -> Iterator[tuple[str, list[Any]]]:
-    """Columns (n,) or (n, k) under their names; none of what the mask (k,) says was not read."""
-    if values is None:
-        return
-    for k, name in enumerate(names):
-        if mask is None or mask[k]:
-            column = values if values.ndim == 1 else values[:, k]
-            yield name, [None if v != v else v for v in column.tolist()]

@@ -30,7 +30,7 @@ def notice(columns: Columns, robot: Robot, data: Measurements) -> list[str]:
     """
     _check_reach(columns, robot, data)
     _check_spread(columns, data)
-    return [*_far(robot, data), *_other_order(columns, robot, data), *_twice(data)]
+    return [*_far(robot, data), *_other_order(columns, robot, data), *twice(data)]
 
 
 def _reach(robot: Robot) -> float:
@@ -80,7 +80,7 @@ def _far(robot: Robot, data: Measurements) -> list[str]:
     if away[row] <= _FAR * reach:
         return []
     return [
-        f"Line {data.line[row]}: a command {away[row]:.3g} m away, where the frame is "
+        f"Line {data.place(row)}: a command {away[row]:.3g} m away, where the frame is "
         f"{reach:.3g} m across: check its unit."
     ]
 
@@ -147,7 +147,7 @@ def _other_order(columns: Columns, robot: Robot, data: Measurements) -> list[str
     ]
 
 
-def _twice(data: Measurements) -> list[str]:
+def twice(data: Measurements) -> list[str]:
     """Rows that say the same as another to the last digit: noise never does."""
     columns = [column for name, column in data.columns() if name != "run"]
     first: dict[tuple[object, ...], int] = {}
@@ -156,7 +156,7 @@ def _twice(data: Measurements) -> list[str]:
         if data.read[row]:
             before = first.setdefault(values, row)
             if before != row:
-                pairs.append(f"{data.line[row]} as {data.line[before]}")
+                pairs.append(f"{data.place(row)} as {data.place(before)}")
     if not pairs:
         return []
     more = f" and {len(pairs) - _MOST_LINES} more" if len(pairs) > _MOST_LINES else ""

@@ -6,9 +6,10 @@ SI from here on.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from crosscheck.measurements.notice import notice
 from crosscheck.measurements.poses import command_lengths, command_poses, measured_orientation
 from crosscheck.measurements.table import read_table
 from crosscheck.measurements.times import runs, times
+from crosscheck.measurements.together import together
 from seecr.pose import Array
 
 if TYPE_CHECKING:
@@ -29,13 +31,20 @@ if TYPE_CHECKING:
 _ABSOLUTE_ZERO_C = -273.15
 
 
+GivenData: TypeAlias = Measurements | str | Path | Sequence[str | Path]
+"""Measurements, their file, or several files of one robot."""
+
+
 def load_measurements(
-    path: str | Path, robot: GivenRobot, *, sigma_path: str | Path | None = None
+    path: str | Path | Sequence[str | Path],
+    robot: GivenRobot,
+    *,
+    sigma_path: str | Path | None = None,
 ) -> Measurements:
     """Read measurements, and the TOML beside them where there is one: noise and the like.
 
     Args:
-        path: CSV or Parquet.
+        path: CSV or Parquet, or several of them: each has its own TOML, runs keep apart.
         robot: whose measurements these are, or its MJCF.
         sigma_path: the TOML, where it is not the data file's name with ``.toml``.
 
@@ -43,6 +52,11 @@ def load_measurements(
         InputFileError: anything wrong with either file.
     """
     robot = robot_of(robot)
+    paths = [path] if isinstance(path, str | Path) else path
+    return together([_measured(Path(one), robot, sigma_path) for one in paths])
+
+
+def _measured(path: Path, robot: Robot, sigma_path: str | Path | None) -> Measurements:
     columns = _open(path, robot)
     data = _load(columns, robot, sigma_path)
     if not (data.has_position or data.has_orientation or data.has_tension):
@@ -70,9 +84,9 @@ def load_commands(
     return _load(_open(path, robot), robot, sigma_path)
 
 
-def measurements_of(given: Measurements | str | Path, robot: Robot) -> Measurements:
+def measurements_of(given: GivenData, robot: Robot) -> Measurements:
     """The measurements, read if need be."""
-    return load_measurements(given, robot) if isinstance(given, str | Path) else given
+    return given if isinstance(given, Measurements) else load_measurements(given, robot)
 
 
 def commands_of(given: Measurements | str | Path, robot: Robot) -> Measurements:

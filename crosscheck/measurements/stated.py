@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import fields, replace
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.measurements.data import Measurements, Sigma
@@ -23,7 +23,13 @@ def with_stated(data: Measurements, texts: Iterable[str]) -> Measurements:
     Raises:
         CrosscheckError: an unknown kind, no quantity, or one in another unit.
     """
-    return replace(data, sigma=stated(data.sigma, texts))
+    texts = list(texts)
+    sigma, ratio = stated(data.sigma, texts), data.sigma_ratio.copy()
+    said = [text.partition("=")[0].strip() for text in texts]
+    for k, item in enumerate(fields(Sigma)):
+        if item.name.partition("_")[0] in said:
+            ratio[:, k] = 1.0  # in all files
+    return replace(data, sigma=sigma, sigma_ratio=ratio)
 
 
 def stated(sigma: Sigma, texts: Iterable[str]) -> Sigma:

@@ -75,10 +75,9 @@ def _unsolved(plan: Planned) -> list[str]:
     rows = np.flatnonzero(plan.unsolved)
     if len(rows) == 0:
         return []
-    lines = ", ".join(str(plan.problem.data.line[k]) for k in rows[:8])
-    more = f" and {len(rows) - 8} more" if len(rows) > 8 else ""
+    lines = plan.problem.data.places(rows)
     status = plan.base.state.prediction.solution().status[rows[0]].value
-    return [f"lines {lines}{more} left out: {status}"]
+    return [f"lines {lines} left out: {status}"]
 
 
 def _all_visible(own: Mapping[str, Signal]) -> dict[str, Visible]:

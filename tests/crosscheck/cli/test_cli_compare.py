@@ -40,6 +40,21 @@ def test_json_alone_on_standard_output(stiff, tmp_path):
     assert json.loads(result.stdout) == json.loads((tmp_path / "comparison.json").read_text())
 
 
+def test_two_files_are_one_comparison_with_runs_that_keep_apart(stiff, tmp_path):
+    xml, first = stiff
+    second = tmp_path / "second.csv"
+    header, *rows = first.read_text().splitlines()
+    second.write_text("\n".join([header, *rows[:16]]) + "\n")
+    second.with_suffix(".toml").write_text('[sigma]\nposition_m = "0.1mm"\n')
+    result = compare(xml, first, second, "--max-position-worst", "1um", "--out", tmp_path / "out")
+    assert result.exit_code == 1, result.output
+    assert "run second.csv: along_low_fwd" in result.stdout
+    assert "Rows given twice" in result.stdout and "worst at line measured.csv " in result.stdout
+    document = json.loads((tmp_path / "out" / "comparison.json").read_text())
+    assert document["data"] == "measured.csv + second.csv" and document["rows"]["compared"] == 80
+    assert "given twice; expected each file once" in refused("compare", xml, first, first)
+
+
 def test_a_limit_exceeded_ends_1_and_says_by_how_much_and_where(stiff, tmp_path):
     result = compare(*stiff, "--max-position", "0.05mm", "--out", tmp_path)
     assert result.exit_code == 1

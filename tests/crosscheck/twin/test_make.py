@@ -88,6 +88,19 @@ def test_a_user_s_own_poses_are_measured_with_their_loads_and_way_points(tmp_pat
     assert not is_noise((data.position - unloaded.readings.position)[data.read] / 1e-6)
 
 
+def test_the_command_takes_poses_and_noise(tmp_path):
+    path = users_poses(tmp_path)
+    args = ["twin", str(COGIRO), "--hide", "1", "--effects", "0", "--poses", str(path)]
+    args += ["--sigma", "position=2um", "--sigma", "tension=0.1N", "--out", str(tmp_path / "case")]
+    result = CliRunner().invoke(main, args)
+    assert result.exit_code == 0, result.output
+    assert "12 rows of demobot_cogiro in 1 runs; noise 0.002 mm" in result.output
+    toml = (tmp_path / "case" / "measured.toml").read_text()
+    assert 'start = "first_row"' in toml and "tension_N = 0.1" in toml
+    header = (tmp_path / "case" / "measured.csv").read_text().partition("\n")[0]
+    assert "payload_kg,force_x_N" in header and "tension_8_N" in header
+
+
 def test_commands_that_cannot_show_an_effect_hide_none_of_it(tmp_path):
     path = users_poses(tmp_path, way_points=False)
     with pytest.raises(CrosscheckError, match="effect thermal_expansion: needs temperature_C; exp"):

@@ -1,0 +1,123 @@
+"""Several files of one robot: runs, clocks, noise and loads keep apart."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from random_robots import random_robot
+
+from crosscheck.fit.problem import Problem
+from crosscheck.fit.state import evaluate
+from crosscheck.measurements.data import Sigma
+from crosscheck.measurements.read import load_measurements
+from crosscheck.measurements.stated import with_stated
+from seecr.effects import Terms
+from seecr.errors import InputFileError
+from seecr.pose import quat_from_rxyz
+from seecr.robot import Robot
+
+CMD = "run,t_s,cmd_x_m,cmd_y_m,cmd_z_m"
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return random_robot(np.random.default_rng(1), cables=4)
+
+
+def case(folder: Path, name: str, *lines: str, toml: str = "") -> Path:
+    path = folder / name
+    path.parent.mkdir(exist_ok=True)
+    path.write_text("\n".join(lines) + "\n")
+    path.with_suffix(".toml").write_text(toml)
+    return path
+
+
+def test_two_days_are_one_with_their_own_noise_clock_and_start(tmp_path: Path, robot: Robot):
+    monday = case(
+        tmp_path, "monday.csv", f"{CMD},meas_x_m,payload_kg", "a,5,0,0,0,0.1,0", "a,9,0,0,.1,.1,1",
+        toml="[sigma]\nposition_m = '0.1mm'\nlength_m = 1e-3",
+    )  # fmt: skip
+    tuesday = case(
+        tmp_path, "tuesday.csv", f"{CMD},meas_x_m,tension_2_N", "a,0,0,0,0,.3,7", "b,1,.1,0,.1,.3,",
+        toml='start = "first_row"\n[sigma]\nposition_m = 3e-4\ntension_N = 2.0',
+    )  # fmt: skip
+    data = load_measurements([monday, tuesday], robot)
+    assert data.runs == ("monday.csv: a", "tuesday.csv: a", "tuesday.csv: b")
+    assert data.path.name == "monday.csv + tuesday.csv"
+    assert data.sigma == Sigma(1e-4, None, 2.0, 1e-3)
+    problem = Problem(robot, data, data.sigma, np.ones(4, dtype=bool))
+    assert problem.reading_sigma[:, 0] == pytest.approx([1e-4, 1e-4, 3e-4, 3e-4])
+    assert problem.reading_sigma[:, 7] == pytest.approx([2.0] * 4)
+    assert problem.length_sigma[:2, 0] == pytest.approx([1e-3, 1e-3])
+    assert np.all(problem.length_sigma[2:] < 1e-8)
+    assert data.stands.tolist() == [False, False, True, True]
+    assert data.loads is not None and data.loads.mass.tolist() == [0, 1, 0, 0]
+    commands = data.as_commands(robot)
+    assert commands.clock is not None and commands.clock.tolist() == [0, 0, 1, 1]
+    assert data.places([1, 2]) == "monday.csv 3, tuesday.csv 2"
+    assert "tuesday.csv without length_m: these lengths are taken as exact." in data.notes
+    assert "monday.csv without tension_N: that of tuesday.csv is used." in data.notes
+    quieter = with_stated(data, ["position=2mm"])
+    assert quieter.sigma.position_m == 2e-3 and np.all(quieter.sigma_ratio[:, 0] == 1.0)
+    assert np.any(quieter.sigma_ratio[:, 3] != 1.0)
+
+
+def test_rows_count_by_the_noise_of_their_own_file(tmp_path: Path, robot: Robot):
+    rows = [f"a,{k},0.0{k},0,0,{0.001 + 0.01 * k}" for k in range(1, 5)]
+    files = [
+        case(tmp_path, f"{k}.csv", f"{CMD},meas_x_m", *rows, toml=f"[sigma]\nposition_m = {s}")
+        for k, s in enumerate((1e-4, 1e-3))
+    ]
+    alone = [load_measurements(file, robot) for file in files]
+    chi2 = []
+    for data in (*alone, load_measurements(files, robot)):
+        problem = Problem(robot, data, data.sigma, np.ones(data.n_rows, dtype=bool))
+        factor = problem.noise(problem.experiment.predict())
+        chi2.append(evaluate(problem, Terms(), factor).chi2)
+    assert chi2[2] == pytest.approx(chi2[0] + chi2[1], rel=1e-9)
+    assert chi2[0] == pytest.approx(100 * chi2[1], rel=1e-9)
+    again = load_measurements(files, robot).notes
+    assert any("Rows given twice, to the last digit: line 1.csv 2 as 0.csv 2" in n for n in again)
+
+
+def test_orientations_meet_as_angles_where_one_file_has_only_these(tmp_path: Path, robot: Robot):
+    angles = np.array([0.1, -0.2, 0.3])
+    quat = ",".join(f"{v:.12f}" for v in quat_from_rxyz(angles))
+    whole = case(tmp_path, "a.csv", f"{CMD},meas_qw,meas_qx,meas_qy,meas_qz", f"a,0,0,0,0,{quat}")
+    part = case(tmp_path, "b.csv", f"{CMD},meas_rx_rad", "a,0,0,0,0,0.5")
+    none = case(tmp_path, "c.csv", f"{CMD},meas_x_m", "a,0,0,0,0,0.5")
+    data = load_measurements([whole, part], robot)
+    assert data.quat_wxyz is None
+    assert data.angles_rad[0] == pytest.approx(angles, abs=1e-9)
+    assert data.angles_rad[1, 0] == 0.5 and np.isnan(data.angles_rad[1, 1:]).all()
+    data = load_measurements([none, whole], robot)
+    assert data.quat_wxyz is not None and np.isnan(data.quat_wxyz[0]).all()
+
+
+def test_files_of_one_name_are_told_apart_by_their_folders(tmp_path: Path, robot: Robot):
+    files = [
+        case(tmp_path, f"{day}/measured.csv", f"{CMD},meas_x_m", f"a,0,0,0,0,{k}.5")
+        for k, day in enumerate(("mon", "tue"))
+    ]
+    assert load_measurements(files, robot).files == ("mon/measured.csv", "tue/measured.csv")
+
+
+def test_files_that_do_not_go_together(tmp_path: Path, robot: Robot):
+    poses = case(tmp_path, "a.csv", f"{CMD},meas_x_m", "a,0,0,0,0,0.5")
+    header = ",".join(f"length_{i}_m" for i in range(1, 5)) + ",meas_x_m"
+    told = case(tmp_path, "b.csv", header, "1,1,1,1,0", toml='lengths = "told"')
+    lengths = case(tmp_path, "c.csv", header, "1,1,1,1,0")
+    empty = case(tmp_path, "d.csv", CMD, "a,0,0,0,0")
+    with pytest.raises(InputFileError, match=r"a\.csv: is given twice; expected each file once"):
+        load_measurements([poses, poses.parent / "." / "a.csv"], robot)
+    with pytest.raises(InputFileError, match=r"b\.csv: commands lengths as told, .*a\.csv poses;"):
+        load_measurements([poses, told], robot)
+    with pytest.raises(InputFileError, match=r"c\.csv: commands absolute lengths, .*as told; exp"):
+        load_measurements([told, lengths], robot)
+    with pytest.raises(InputFileError, match=r"d\.csv: line 1: no measurement"):
+        load_measurements([poses, empty], robot)
+    still = case(tmp_path, "e.csv", "run,cmd_x_m,cmd_y_m,cmd_z_m,meas_x_m", "a,0,0,0,0.7")
+    data = load_measurements([poses, still], robot)
+    assert data.t_s is None and "e.csv without t_s: that of the others is not used." in data.notes
