@@ -95,8 +95,7 @@ def command(
         raise click.UsageError("expected ROBOT.xml and --hide SEED, or --open FILE")
     if names and count is not None:
         raise click.UsageError("--effect says how many there are: leave out --effects")
-    from crosscheck import load_commands, make_twin
-    from crosscheck.measurements.data import Sigma
+    from crosscheck import Sigma, load_commands, make_twin
     from crosscheck.measurements.stated import stated
 
     commands = load_commands(poses, robot) if poses is not None else None
