@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from seecr.lazy import lazily
 
 if TYPE_CHECKING:
-    from crosscheck.add import Addition, add_effect
+    from crosscheck.add import Addition, add_effect, add_effects
     from crosscheck.calibration.result import Calibrated, calibrate
     from crosscheck.comparison.residuals import compare
     from crosscheck.comparison.result import Comparison
@@ -48,6 +48,7 @@ _WHERE = {
     "Sigma": "measurements.data",
     "Twin": "twin.make",
     "add_effect": "add",
+    "add_effects": "add",
     "calibrate": "calibration.result",
     "compare": "comparison.residuals",
     "diagnose": "diagnosis.verdict",
@@ -74,6 +75,7 @@ __all__ = [
     "Sigma",
     "Twin",
     "add_effect",
+    "add_effects",
     "calibrate",
     "compare",
     "diagnose",

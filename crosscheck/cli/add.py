@@ -1,7 +1,8 @@
-"""``crosscheck add``: fit an effect and put it into a model."""
+"""``crosscheck add``: fit effects and put them into a model."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,11 +23,16 @@ Examples:
   crosscheck add pulley_radius robot.xml measured.csv --model model.toml
   crosscheck compare robot.xml measured.csv --model model.toml
   crosscheck add pulley_radius robot.xml second_day.csv --model model.toml --refit
+  crosscheck add --all-from diagnosis.json robot.xml measured.csv --model model.toml
 """,
 )
-@click.argument("effect", metavar="EFFECT")
-@click.argument("robot", type=FILE, metavar="ROBOT.xml")
-@click.argument("data", type=FILE, nargs=-1, required=True, metavar="DATA.csv...")
+@click.argument("words", nargs=-1, metavar="EFFECT ROBOT.xml DATA.csv...")
+@click.option(
+    "--all-from",
+    type=FILE,
+    metavar="diagnosis.json",
+    help="Instead of EFFECT: all effects that this diagnosis lists, together.",
+)
 @click.option(
     "--model", type=FILE, required=True, metavar="M.toml", help="The model; made if need be."
 )
@@ -36,9 +42,8 @@ Examples:
 @click.option("--out", type=FILE, metavar="DIR", help="Folder for add.json.  [default: none]")
 @json_option
 def command(
-    effect: str,
-    robot: Path,
-    data: tuple[Path, ...],
+    words: tuple[str, ...],
+    all_from: Path | None,
     model: Path,
     refit: bool,
     force: bool,
@@ -52,29 +57,53 @@ def command(
     model keeps values, standard errors, where they come from, and the errors before and after.
 
     An effect that does not predict runs left out of the fit any better is not added: more
-    parameters always fit better. --force adds it all the same.
+    parameters always fit better. Nor is one whose values are together no further from nothing
+    than their standard errors. --force adds it all the same.
 
     \b
     Exit status: 0 added, 1 not added since it does not pay, 2 bad input, 3 rows without an
-    equilibrium.
+    equilibrium or a fit that does not come to an end.
     """
-    from crosscheck import add_effect, load_measurements
+    from crosscheck import add_effect, add_effects, load_measurements
     from crosscheck.measurements.stated import with_stated
+    from crosscheck.model import load_diagnosed
     from seecr import load_model, load_robot, new_model
     from seecr.effects import effect_named
 
-    effect_named(effect)
+    effect, robot, data = _arguments(words, all_from)
+    if effect is not None:
+        effect_named(effect)
     machine = load_robot(robot)
+    listed = load_diagnosed(all_from, machine) if all_from is not None else ()
+    names = [effect] if effect is not None else [term.name for term in listed]
     old = load_model(model, machine) if model.exists() else new_model(machine)
-    _check_names(old, effect, refit, model)
+    for name in names:
+        _check_names(old, name, refit, model)
     measured = with_stated(load_measurements(data, machine), sigmas)
-    with progress_share(f"adding {effect}") as progress:
-        found = add_effect(machine, measured, effect, old.terms, progress)
+    with progress_share(f"adding {' + '.join(names)}") as progress:
+        if effect is not None:
+            found = add_effect(machine, measured, effect, old.terms, progress)
+        else:
+            found = add_effects(machine, measured, listed, old.terms, progress)
     written = found.pays or force
     if written:
         _write(found, old, machine, measured.path, model)
     _tell(found, old, model, written, out, as_json)
     return 0 if written else 1
+
+
+def _arguments(
+    words: Sequence[str], all_from: Path | None
+) -> tuple[str | None, Path, tuple[Path, ...]]:
+    """The effect, unless a diagnosis names them, the robot's file and those of the data."""
+    expected = ["EFFECT", "ROBOT.xml", "DATA.csv"][0 if all_from is None else 1 :]
+    if len(words) < len(expected):
+        given = " ".join(words) or "nothing"
+        beside = "" if all_from is None else " beside --all-from"
+        raise click.UsageError(f"expected {' '.join(expected)}{beside}, got {given}")
+    effect = words[0] if all_from is None else None
+    robot, *data = (Path(word) for word in words[len(expected) - 2 :])
+    return effect, robot, tuple(data)
 
 
 def _check_names(old: Model, effect: str, refit: bool, path: Path) -> None:
@@ -94,7 +123,7 @@ def _write(found: Addition, old: Model, robot: Robot, data: Path, path: Path) ->
 
     source = provenance_of(data, f"crosscheck add {found.name}")
     errors = {"before": found.before, "after": found.after, "held_out": found.held_out}
-    save_model(path, renewed(with_fit(old, found.fitted, found.name, source, errors), robot))
+    save_model(path, renewed(with_fit(old, found.fitted, found.names, source, errors), robot))
 
 
 def _tell(

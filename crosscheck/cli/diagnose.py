@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from crosscheck.cli.choices import exclude_option, listed, only_option, sigma_option
 from seecr.cli.options import FILE, json_option, out_option, progress_share
+
+if TYPE_CHECKING:
+    from crosscheck import Diagnosis
+    from seecr import Model, Robot
 
 
 @click.command(
@@ -19,6 +24,15 @@ from seecr.cli.options import FILE, json_option, out_option, progress_share
 @only_option
 @exclude_option
 @sigma_option
+@click.option(
+    "--model-out", type=FILE, metavar="M.toml", help="Write the model with what is missing added."
+)
+@click.option(
+    "--fail-on",
+    multiple=True,
+    metavar="VERDICT,...",
+    help="End 1 where the verdict is one of these, such as unknown_effect,no_verdict.",
+)
 @click.option("--no-recording", is_flag=True, help="Write no .rrd.")
 @out_option("crosscheck-diagnosis")
 @json_option
@@ -29,6 +43,8 @@ def command(
     only: tuple[str, ...],
     exclude: tuple[str, ...],
     sigmas: tuple[str, ...],
+    model_out: Path | None,
+    fail_on: tuple[str, ...],
     no_recording: bool,
     out: Path,
     as_json: bool,
@@ -37,18 +53,23 @@ def command(
 
     ROBOT.xml is the robot's MJCF, DATA.csv its measurements, with sigma in a TOML beside it.
     Writes diagnosis.json, diagnosis.html and diagnosis.rrd.
+
+    \b
+    Exit status: 0 with a verdict, or none for want of data; 1 a verdict of --fail-on, 2 bad input,
+    3 rows without an equilibrium.
     """
-    from crosscheck import diagnose, load_measurements
+    from crosscheck import DiagnosisVerdict, diagnose, load_measurements
     from crosscheck.files import json_text, staged, write_text
     from crosscheck.given import considered
     from crosscheck.measurements.stated import with_stated
     from crosscheck.report import write_report
-    from seecr import load_model, load_robot
+    from seecr import load_model, load_robot, new_model
 
+    gates = [DiagnosisVerdict.named(word) for word in listed(fail_on)]
     considered(listed(only), listed(exclude))  # a wrong name is told before any file is read
     machine = load_robot(robot)
     measured = with_stated(load_measurements(data, machine), sigmas)
-    own = load_model(model, machine) if model is not None else ()
+    own = load_model(model, machine) if model is not None else new_model(machine)
     with staged(out) as folder:
         with progress_share("diagnosing") as progress:
             found = diagnose(
@@ -61,10 +82,30 @@ def command(
             from crosscheck.recording import write_diagnosis_recording
 
             write_diagnosis_recording(found, folder / "diagnosis.rrd")
+    note = _keep(found, own, machine, measured.path, model_out) if model_out is not None else ""
     if as_json:
         click.echo(text)
     else:
         from crosscheck.terminal import print_diagnosis
 
         print_diagnosis(found, out)
+    if note:
+        click.echo(note, err=as_json)
+    if found.verdict in gates:
+        return 1
     return 0 if found.converged else 3
+
+
+def _keep(found: Diagnosis, own: Model, robot: Robot, data: Path, path: Path) -> str:
+    """Write the model that was found, if there was a verdict; what was done."""
+    from crosscheck.diagnosis import found_effects
+    from crosscheck.model import provenance_of, renewed, save_model, with_fit
+
+    fitted = found_effects(found)
+    if found.refusal is not None:
+        return f"{path} not written: there is no verdict"
+    names = [effect.effect for effect in found.missing]
+    errors = {"before": found.before, "after": found.after, "held_out": found.held_out}
+    source = provenance_of(data, "crosscheck diagnose")
+    save_model(path, renewed(with_fit(own, fitted, names, source, errors), robot))
+    return f"Written to {path}: {', '.join(names) or 'the model as it stands, nothing is added'}"

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crosscheck.fit.evidence import Evidence, evidence, p_value
 from crosscheck.fit.gauss_newton import Fit, FitStatus, fit
@@ -177,13 +178,13 @@ def judged(trials: Trials, found: Fit, base: Fit, screened: Candidate) -> Candid
     assert starts is not None
     one_sided = bool(np.isfinite(layout.lower[0])) and layout.lower[0] == layout.null[0]
     drop = (base.chi2 - found.chi2) / trials.noise_scale**2
-    p = p_value(drop, seen_directions(found, layout.name), one_sided) * starts.shapes
+    own = found.terms.own(layout.name)
+    p = p_value(drop, seen_directions(found, own), one_sided) * starts.shapes
     return Candidate(layout, found, trials.evidence(found), drop, p, starts=starts)
 
 
-def seen_directions(found: Fit, name: str) -> int:
-    """How many directions of an effect's parameters the data see beside the other terms."""
-    own = found.terms.own(name)
+def seen_directions(found: Fit, own: NDArray[np.bool_]) -> int:
+    """How many directions of some parameters (p,) the data see beside the others."""
     columns = beside(found.jacobian[:, own], found.spanned(~own))
     return max(1, int(np.sum(np.linalg.eigvalsh(columns.T @ columns) > _SEEN)))
 

@@ -55,6 +55,7 @@ class Fit:
         at_bound: (p,) bool parameters that ended on a bound.
         status: whether the rows were solved.
         iterations: Gauss-Newton steps.
+        settled: the steps came to an end by themselves.
     """
 
     state: State
@@ -63,6 +64,7 @@ class Fit:
     at_bound: NDArray[np.bool_]
     status: FitStatus
     iterations: int
+    settled: bool = True
 
     @property
     def valid(self) -> bool:
@@ -137,14 +139,14 @@ def fit(
         return _invalid(state, p, FitStatus.UNSOLVED_AT_START)
     fixed = terms.knowledge.fixed
     descent = _Descent(problem, factor, ~fixed if free is None else free & ~fixed, quick)
-    state, count = descent.run(state, iterations if p else 0, hopeless)
+    state, count, settled = descent.run(state, iterations if p else 0, hopeless)
     jacobian = descent.jacobian(state) if p else np.zeros((len(state.white), 0))
     found = state.terms
     at_bound = ((found.vector <= found.lower) | (found.vector >= found.upper)) & ~fixed
     whole = np.concatenate([jacobian, known_readings(found)[0]])
     covariance = _covariance(whole, found.scale, descent.free & ~at_bound)
     covariance[fixed] = 0.0
-    return Fit(state, jacobian, covariance, at_bound, FitStatus.SOLVED, count)
+    return Fit(state, jacobian, covariance, at_bound, FitStatus.SOLVED, count, settled)
 
 
 def _invalid(state: State, p: int, status: FitStatus) -> Fit:
@@ -181,8 +183,8 @@ class _Descent:
         """(N, p) whitened derivatives by z."""
         return free_derivatives(self.problem, state, frozen=self.quick)
 
-    def run(self, state: State, iterations: int, hopeless: float) -> tuple[State, int]:
-        """The best state, and the steps it took."""
+    def run(self, state: State, iterations: int, hopeless: float) -> tuple[State, int, bool]:
+        """The best state, the steps it took, and whether there was nothing left to gain."""
         damping, count, stale = 1e-3, 0, 0
         jacobian = np.zeros((0, len(state.terms)))
         while count < iterations:
@@ -192,7 +194,7 @@ class _Descent:
             after, damping, gain = self.step(state, jacobian, damping)
             if after is None:
                 if stale == 0:
-                    break
+                    return state, count, True
                 stale = 0  # not the derivatives' last word: they are of an earlier step
                 continue
             # derivatives cost much more than a trial: they serve again where steps go well
@@ -203,9 +205,11 @@ class _Descent:
                 stale = 0
             state = after
             lost = state.chi2 > (hopeless if count >= _FEW else _FAR * hopeless)
-            if gain < _GAIN or (count >= _FEW_FAR and lost):
+            if gain < _GAIN:
+                return state, count, True
+            if count >= _FEW_FAR and lost:
                 break
-        return state, count
+        return state, count, iterations == 0
 
     def step(
         self, state: State, jacobian: Array, damping: float

@@ -5,8 +5,11 @@ Nothing is decided by the text: whoever asks why looks at the enum, as with :cla
 
 from __future__ import annotations
 
+import difflib
 from dataclasses import dataclass
 from enum import Enum, StrEnum
+
+from crosscheck.errors import CrosscheckError
 
 
 class Why(Enum):
@@ -131,6 +134,20 @@ class DiagnosisVerdict(StrEnum):
         verdict = str.__new__(cls, word)
         verdict._value_, verdict.meaning = word, meaning
         return verdict
+
+    @classmethod
+    def named(cls, word: str) -> DiagnosisVerdict:
+        """The verdict of that name.
+
+        Raises:
+            CrosscheckError: there is none; lists them, nearest first.
+        """
+        by_word = {verdict.value: verdict for verdict in cls}
+        if word in by_word:
+            return by_word[word]
+        every = list(by_word)
+        near = difflib.get_close_matches(word, every, n=len(every), cutoff=0.0)
+        raise CrosscheckError(f"no verdict {word!r}; there are, nearest first: {', '.join(near)}")
 
     @property
     def heading(self) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from crosscheck.model.diagnosed import load_diagnosed
 from crosscheck.model.write import (
     Provenance,
     calibrated,
@@ -14,6 +15,7 @@ from crosscheck.model.write import (
 __all__ = [
     "Provenance",
     "calibrated",
+    "load_diagnosed",
     "provenance_of",
     "renewed",
     "save_model",

@@ -78,17 +78,17 @@ def provenance_of(data: Path, by: str) -> Provenance:
 def with_fit(
     model: Model,
     fitted: Sequence[Fitted],
-    added: str,
+    added: Sequence[str],
     provenance: Provenance,
     errors: Mapping[str, Rms],
 ) -> Model:
-    """The model with an effect added (or fitted again), and all values as fitted.
+    """The model with effects added (or fitted again), and all values as fitted.
 
     Args:
         model: left as it is.
         fitted: all effects of the new model.
-        added: name of the one that is new; it gets provenance and errors. The others, whose
-            values have moved with it, get a table ``refitted``.
+        added: names of those that are new; they get provenance and errors. The others, whose
+            values have moved with them, get a table ``refitted``.
         provenance: of the fit.
         errors: rms by kind: "before", "after", "held_out".
     """
@@ -96,9 +96,7 @@ def with_fit(
     if "effect" not in document:
         document.append("effect", tomlkit.aot())
     tables = {str(table["name"]): table for table in document["effect"]}
-    order = [name for name in model.names if name != added] + [added]
-    if added in model.names:
-        order = list(model.names)
+    order = [*model.names, *(name for name in added if name not in model.names)]
     by_name = {f.term.name: f for f in fitted}
     for name in order:
         table = tables.get(name)
@@ -106,9 +104,9 @@ def with_fit(
             _describe(_appended(document, by_name[name]), provenance, errors)
             continue
         _fill(table, by_name[name])
-        if name == added:
+        if name in added:
             _describe(table, provenance, errors)
-        else:
+        elif not by_name[name].term.knowledge.fixed.all():
             table["refitted"] = _plain(vars(provenance))
     terms = Terms(by_name[name].term for name in order)
     stderr = {name: np.asarray(by_name[name].stderr, float) for name in order}

@@ -38,7 +38,12 @@ def print_addition(
 def why_not(found: Addition) -> str:
     """Why an effect is not worth adding."""
     mean, error = found.fall
-    if found.p >= FALSE_ALARM:
+    if found.is_nothing:
+        reason = (
+            f"{found.name} is no further from nothing than its standard errors "
+            f"({found.from_nothing:.2g} of them, all values together)"
+        )
+    elif found.p >= FALSE_ALARM:
         reason = f"chance explains what {found.name} explains (p {found.p:.2g})"
     else:
         reason = (

@@ -58,7 +58,7 @@ def test_one_class_is_all_it_takes(registered: None, tmp_path: Path) -> None:
     # and a model keeps it
     errors = {"before": found.before, "after": found.after, "held_out": found.held_out}
     source = Provenance("measured.csv", "2026-01-01", "1", "a test")
-    model = with_fit(new_model(robot), found.fitted, "mounted_turned", source, errors)
+    model = with_fit(new_model(robot), found.fitted, ["mounted_turned"], source, errors)
     save_model(tmp_path / "m.toml", model)
     again = seecr.load_model(tmp_path / "m.toml", robot)
     assert again.terms.labels == (("mounted_turned", "angle_rad"),)

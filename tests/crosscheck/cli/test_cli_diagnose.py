@@ -10,7 +10,7 @@ from pathlib import Path
 import made_diagnoses as made
 import numpy as np
 import pytest
-from made_data import case, run, term
+from made_data import case, refused, run, term
 
 from crosscheck.diagnosis import verdict as verdict_module
 from crosscheck.diagnosis.verdict import diagnose
@@ -19,6 +19,7 @@ from crosscheck.fit.reasons import DiagnosisVerdict, Unfit
 from crosscheck.measurements.read import load_measurements
 from crosscheck.measurements.write import write_measurements
 from seecr.mjcf import load_robot
+from seecr.model import load_model
 from seecr.shipped import model_path
 
 
@@ -92,3 +93,76 @@ def test_verdicts_are_the_words_of_the_file_with_a_heading_and_a_meaning() -> No
     ]  # fmt: skip
     assert all(v.meaning for v in DiagnosisVerdict)
     assert json.dumps(made.pulleys().as_json()["verdict"]) == '"effects_found"'
+
+
+QUICK = ("--only", "pulley_radius,stiffness", "--no-recording")
+
+
+def test_the_model_that_was_found_is_written_and_gates_end_1(
+    planar: tuple[Path, Path], tmp_path: Path
+) -> None:
+    out, first = tmp_path / "o", tmp_path / "found.toml"
+    gate = ("--fail-on", "effects_found,unknown_effect")
+    done = run("diagnose", *planar, *QUICK, "--out", out, "--model-out", first, *gate)
+    assert done.exit_code == 1 and f"Written to {first}: pulley_radius" in done.stdout
+    robot = load_robot(planar[0])
+    model = load_model(first, robot)
+    assert model.terms["pulley_radius"].vector == pytest.approx([0.01], abs=2e-4)
+    table = model.document["effect"][0]
+    assert table["provenance"]["by"] == "crosscheck diagnose"
+    assert table["before"]["position_rms_m"] > 5.0 * table["after"]["position_rms_m"]
+    # with it nothing is missing: the gate is open, and the model is written as it stands
+    again = tmp_path / "again.toml"
+    told = ("--model", first, "--model-out", again, *gate)
+    done = run("diagnose", *planar, *QUICK, "--out", out, *told)
+    assert done.exit_code == 0 and "nothing is added" in done.stdout
+    assert load_model(again, robot).names == ("pulley_radius",)
+    assert load_model(again, robot).document["effect"][0]["before"] == table["before"]
+
+
+def test_all_that_a_diagnosis_lists_is_added_at_once(
+    planar: tuple[Path, Path], tmp_path: Path
+) -> None:
+    out, model = tmp_path / "o", tmp_path / "model.toml"
+    assert run("diagnose", *planar, *QUICK, "--out", out).exit_code == 0
+    found = out / "diagnosis.json"
+    done = run("add", "--all-from", found, *planar, "--model", model)
+    assert done.exit_code == 0, done.output
+    assert load_model(model, load_robot(planar[0])).names == ("pulley_radius",)
+    other = model_path("demobot_cogiro")
+    for text, words in (
+        ("{", "line 1: is not JSON"),
+        ("[]", "has no verdict and no list of missing effects"),
+        ('{"verdict": "no_effect_missing", "missing": []}', "lists no missing effect (no_effect_"),
+        ('{"verdict": "effects_found", "missing": [{}]}', "an item of missing without effect"),
+        (_listing("puley_radius"), "no effect 'puley_radius'; known, nearest first: pulley_radius"),
+        (_listing("drum_gain", gain_1=0.1), "drum_gain: expected a number for gain_2; is it of"),
+    ):
+        found.write_text(text)
+        said = refused("add", "--all-from", found, other, planar[1], "--model", model)
+        assert f"{found}" in said and words in said
+    said = refused("add", "--all-from", found, planar[0], "--model", model)
+    assert "expected ROBOT.xml DATA.csv beside --all-from, got " in said
+    said = refused("add", *planar, "--model", model)
+    assert "expected EFFECT ROBOT.xml DATA.csv, got " in said
+
+
+def _listing(effect: str, **values: float) -> str:
+    cells = {key: {"value": value} for key, value in values.items()}
+    item = {"effect": effect, "parameters": cells}
+    return json.dumps({"verdict": "effects_found", "missing": [item]})
+
+
+def test_gates_are_named(planar: tuple[Path, Path], tmp_path: Path) -> None:
+    said = refused("diagnose", *planar, "--fail-on", "unkown_effect", "--out", tmp_path / "o")
+    assert "no verdict 'unkown_effect'; there are, nearest first: unknown_effect, " in said
+
+
+def test_without_a_verdict_no_model_is_written(tmp_path: Path) -> None:
+    xml, data = case(tmp_path, points=3)
+    rows = load_measurements(data, load_robot(xml))
+    write_measurements(data, rows.rows(np.zeros(12, dtype=int)))
+    model, out = tmp_path / "model.toml", ("--no-recording", "--out", tmp_path / "o")
+    done = run("diagnose", xml, data, "--model-out", model, "--fail-on", "no_verdict", *out)
+    assert done.exit_code == 1 and not model.exists()
+    assert "not written: there is no verdict" in done.stdout

@@ -38,7 +38,7 @@ def fitted(robot, name, error=1e-4, bound=False, **values):
 @pytest.fixture
 def saved(robot, tmp_path):
     pulley = fitted(robot, "pulley_radius", radius_m=0.01)
-    model = with_fit(new_model(robot), [pulley], "pulley_radius", SOURCE, ERRORS)
+    model = with_fit(new_model(robot), [pulley], ["pulley_radius"], SOURCE, ERRORS)
     path = tmp_path / "model.toml"
     save_model(path, model)
     return path
@@ -75,7 +75,7 @@ def test_a_saved_model_is_read_back(robot, saved):
 def test_values_keep_their_digits(robot, tmp_path):
     values = {"radius_m": 0.0099123456789}
     model = with_fit(
-        new_model(robot), [fitted(robot, "pulley_radius", **values)], "pulley_radius", SOURCE,
+        new_model(robot), [fitted(robot, "pulley_radius", **values)], ["pulley_radius"], SOURCE,
         ERRORS,
     )  # fmt: skip
     save_model(tmp_path / "m.toml", model)
@@ -85,7 +85,7 @@ def test_values_keep_their_digits(robot, tmp_path):
 
 def test_what_is_unseen_is_said_so(robot, tmp_path):
     unseen = fitted(robot, "pulley_radius", error=np.inf, bound=True, radius_m=0.0)
-    model = with_fit(new_model(robot), [unseen], "pulley_radius", SOURCE, ERRORS)
+    model = with_fit(new_model(robot), [unseen], ["pulley_radius"], SOURCE, ERRORS)
     save_model(tmp_path / "m.toml", model)
     assert 'stderr = "unseen", unit = "m", at_bound = true' in (tmp_path / "m.toml").read_text()
     assert np.isinf(load_model(tmp_path / "m.toml", robot).stderr["pulley_radius"][0])
@@ -100,7 +100,7 @@ def test_comments_survive_another_effect(robot, saved):
         fitted(robot, "pulley_radius", radius_m=0.011),
     ]
     again = replace(SOURCE, by="crosscheck add stiffness")
-    save_model(saved, with_fit(model, both, "stiffness", again, ERRORS))
+    save_model(saved, with_fit(model, both, ["stiffness"], again, ERRORS))
     text = saved.read_text()
     assert "# measured with the old tracker" in text and "# caliper: 9.9 mm" in text
     back = load_model(saved, robot)
@@ -325,7 +325,7 @@ def test_what_is_known_stays_when_a_model_is_written_again(robot, saved):
     moved = Fitted(model.terms["pulley_radius"], np.zeros(1), np.zeros(1, bool))
     one = fitted(robot, "stiffness", factor=1.2).term.measured(factor=(1.1, 0.02))
     new = Fitted(one, np.full(1, 0.01), np.zeros(1, bool))
-    save_model(saved, with_fit(model, [moved, new], "stiffness", SOURCE, ERRORS))
+    save_model(saved, with_fit(model, [moved, new], ["stiffness"], SOURCE, ERRORS))
     assert line in saved.read_text()
     back = load_model(saved, robot).terms
     assert back["pulley_radius"].knowledge.fixed.all()
@@ -333,6 +333,6 @@ def test_what_is_known_stays_when_a_model_is_written_again(robot, saved):
     # and once more, as a fit would: the value moves, what was measured does not
     again = load_model(saved, robot)
     other = replace(new, term=back["stiffness"].with_vector(np.array([1.15])))
-    save_model(saved, with_fit(again, [moved, other], "stiffness", SOURCE, ERRORS))
+    save_model(saved, with_fit(again, [moved, other], ["stiffness"], SOURCE, ERRORS))
     last = load_model(saved, robot).terms["stiffness"]
     assert last.vector == pytest.approx([1.15]) and last.knowledge.value == pytest.approx([1.1])

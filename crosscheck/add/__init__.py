@@ -1,0 +1,8 @@
+"""Fit effects to measurements and say what they are worth in a model."""
+
+from __future__ import annotations
+
+from crosscheck.add.fit import add_effect, add_effects
+from crosscheck.add.result import Addition
+
+__all__ = ["Addition", "add_effect", "add_effects"]

@@ -1,0 +1,156 @@
+"""Fit effects to measurements, together with those a model has."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import TypeAlias
+
+from crosscheck.add.result import Addition
+from crosscheck.add.weigh import base_of, weigh
+from crosscheck.errors import CrosscheckError, UnsolvedError
+from crosscheck.fit.candidates import Trials, candidates_for, try_candidate
+from crosscheck.fit.gauss_newton import Fit, fit
+from crosscheck.fit.prepare import Progress, outlying_rows, prepare
+from crosscheck.fit.problem import Problem
+from crosscheck.fit.reasons import Why
+from crosscheck.fit.state import State
+from crosscheck.given import GivenModel, GivenRobot, model_of, robot_of
+from crosscheck.measurements.read import GivenData, measurements_of
+from seecr.effects import Term, Terms, effect_named, layout_of
+from seecr.effects.base import Layout
+from seecr.pose import Array
+
+# Steps of a fit, and how often it may go on after that many.
+_STEPS, _TIMES = 40, 2
+
+Fitter: TypeAlias = Callable[[Problem, Terms, Array], Fit]
+"""Fits effects to a problem, given those of the model and the noise."""
+
+
+def add_effect(
+    robot: GivenRobot,
+    data: GivenData,
+    name: str,
+    model: GivenModel = (),
+    progress: Progress = lambda _text, _part: None,
+) -> Addition:
+    """Fit an effect to data, jointly with those the model has.
+
+    Args:
+        robot: as described, or its MJCF.
+        data: measurements, or their file.
+        name: of the effect.
+        model: effects of the model, or their file; where the named one is among them it is
+            fitted again. The plain model without.
+        progress: called with what is being done and the part of it that is done.
+
+    Raises:
+        InputError: no effect of that name.
+        CrosscheckError: the data cannot carry it.
+        UnsolvedError: rows have no equilibrium, or the fit does not come to an end.
+    """
+    robot = robot_of(robot)
+    layout = layout_of(effect_named(name), robot)
+
+    def fitter(problem: Problem, terms: Terms, factor: Array) -> Fit:
+        return _fitted(problem, terms, layout, factor)
+
+    return _added(robot, data, [layout], model, progress, fitter)
+
+
+def add_effects(
+    robot: GivenRobot,
+    data: GivenData,
+    effects: Iterable[Term],
+    model: GivenModel = (),
+    progress: Progress = lambda _text, _part: None,
+) -> Addition:
+    """Fit several effects to data at once, from the values that they have.
+
+    Args:
+        robot: as described, or its MJCF.
+        data: measurements, or their file.
+        effects: such as ``diagnose(...).terms``.
+        model: effects of the model, or their file; the plain model without.
+        progress: called with what is being done and the part of it that is done.
+
+    Raises:
+        CrosscheckError: there are none, or the data cannot carry them.
+        UnsolvedError: rows have no equilibrium, or the fit does not come to an end.
+    """
+    some = list(effects)
+    if not some:
+        raise CrosscheckError("no effects were given; there is nothing to add")
+
+    def fitter(problem: Problem, terms: Terms, factor: Array) -> Fit:
+        every = {term.name: term for term in (*terms, *some)}
+        known = {term.name: term for term in terms if term.knowledge.any}
+        return _to_the_end(problem, Terms((every | known).values()), factor)
+
+    return _added(robot, data, [term.layout for term in some], model, progress, fitter)
+
+
+def _added(
+    robot: GivenRobot, data: GivenData, layouts: Sequence[Layout],
+    model: GivenModel, progress: Progress, fitter: Fitter,
+) -> Addition:  # fmt: skip
+    robot = robot_of(robot)
+    data = measurements_of(data, robot)
+    terms, said = model_of(model, robot)
+    names = [layout.name for layout in layouts]
+    ready = prepare(robot, data, terms)
+    problem, notes = ready.problem, [*said, *ready.all_notes]
+    if ready.refusal is not None:
+        kind = UnsolvedError if ready.refusal.unsolved else CrosscheckError
+        raise kind(f"{data.path}: {ready.refusal}; {' + '.join(names)} was not fitted")
+    for layout in layouts:
+        _refuse(problem, layout)
+    progress(f"fitting {' + '.join(names)}", 0.0)
+    factor = problem.noise(problem.experiment.predict(terms.effects))
+    best = fitter(problem, terms, factor)
+    progress("looking for outliers", 0.4)
+    outliers = outlying_rows(problem, best.state)
+    if outliers.any():
+        lines = data.places(outliers)
+        word = "line" if outliers.sum() == 1 else "lines"
+        words = f"{word} {lines} left out: outliers, far off the others"
+        notes.append(words)
+        problem = problem.without(outliers, words)
+        best = fitter(problem, terms, factor)
+    progress("predicting runs left out", 0.6)
+    return weigh(problem, terms, names, factor, best, notes)
+
+
+def _refuse(problem: Problem, layout: Layout) -> None:
+    reason = next(c.why_not for c in candidates_for(problem) if c.name == layout.name)
+    if reason is not None:
+        raise CrosscheckError(f"{problem.data.path} cannot carry {layout.name}: {reason.words}")
+
+
+def _fitted(problem: Problem, terms: Terms, layout: Layout, factor: Array) -> Fit:
+    """The best joint fit, from where the effect stands and from its most promising starts."""
+    fits = [_to_the_end(problem, terms, factor)] if layout.name in terms else []
+    if fits and fits[0].valid and terms[layout.name].knowledge.any:
+        return fits[0]  # what is known of it says where it is
+    base = base_of(problem, terms, [layout.name], factor)
+    tried = try_candidate(Trials(problem, factor), base, layout)
+    if tried.fit is not None:
+        fits.append(_to_the_end(problem, tried.fit.terms, factor, tried.fit.state))
+    good = [found for found in fits if found.valid]
+    if not good:
+        reason = tried.why_not
+        unsolved = reason is None or reason.why is Why.UNSOLVED
+        kind = UnsolvedError if unsolved else CrosscheckError
+        why = reason or fits[0].status.value
+        raise kind(f"{problem.data.path} cannot carry {layout.name}: {why}")
+    return min(good, key=lambda found: found.chi2)
+
+
+def _to_the_end(problem: Problem, terms: Terms, factor: Array, near: State | None = None) -> Fit:
+    """A fit that came to an end, however many steps that takes within reason."""
+    found = fit(problem, terms, factor, near, iterations=_STEPS)
+    for _ in range(_TIMES):
+        if found.settled:
+            break
+        found = fit(problem, found.terms, factor, found.state, iterations=_STEPS)
+    return found

@@ -1,0 +1,112 @@
+"""What adding effects to a model comes to: values, errors, and whether it is worth it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from crosscheck.fit.noise import Whiteness
+from crosscheck.fit.problem import Rms
+from crosscheck.fit.words import rms_words, value_lines, value_records
+from crosscheck.model.write import Fitted
+from seecr.effects import Terms
+from seecr.result import Record, Result
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Addition(Result):
+    """Effects fitted to data, with the rest of the model.
+
+    Attributes:
+        names: of the effects that are new, or fitted again.
+        fitted: all effects of the new model with their errors.
+        before: rms errors of the model as it stood. after: of the new one.
+        held_out_before, held_out: the same on runs left out of the fit.
+        fall: mean fall of chi2 on a block left out, and its standard error.
+        p: chance of the fall of chi2 on all data where the effect is absent.
+        predicts: whether the effects improve what was left out, and not by chance.
+        from_nothing: how far their values together are from nothing, in standard errors
+            (Mahalanobis).
+        is_nothing: whether that is no further than one standard error of one value.
+        whiteness: of what is left.
+        warnings: about the values. notes: about the data.
+    """
+
+    names: tuple[str, ...]
+    fitted: tuple[Fitted, ...]
+    before: Rms
+    after: Rms
+    held_out_before: Rms
+    held_out: Rms
+    fall: tuple[float, float]
+    p: float
+    predicts: bool
+    from_nothing: float
+    is_nothing: bool
+    whiteness: Whiteness
+    warnings: tuple[str, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """The effects in a line."""
+        return " + ".join(self.names)
+
+    @property
+    def pays(self) -> bool:
+        """Whether the effects are worth adding."""
+        return self.predicts and not self.is_nothing
+
+    @property
+    def terms(self) -> Terms:
+        """All effects of the new model with their values, as a model for the next call."""
+        return Terms(one.term for one in self.fitted)
+
+    def lines(self) -> list[str]:
+        """Errors without and with the effect, the values, and what speaks against them."""
+        worth = "pays" if self.pays else "does not pay"
+        left = rms_words(self.held_out_before), rms_words(self.held_out)
+        out = [
+            f"{self.name} {worth} on runs left out: {left[0]} before, {left[1]} with it",
+            f"on all rows: {rms_words(self.before)} before, {rms_words(self.after)} with it",
+        ]
+        for one in self.fitted:
+            values = value_lines(one.term.layout, one.term.vector, one.stderr, one.at_bound)
+            out += [f"{one.term.name}: {line}" for line in values]
+        out += [f"warning: {warning}" for warning in self.warnings]
+        return [*out, *(f"note: {note}" for note in self.notes)]
+
+    def records(self) -> list[Record]:
+        """A record for each parameter of the new model: value and standard error, SI."""
+        return [
+            record
+            for one in self.fitted
+            for record in value_records(one.term.layout, one.term.vector, one.stderr, one.at_bound)
+        ]
+
+    def as_json(self) -> dict[str, Any]:
+        """The content of ``add.json``, in SI."""
+        return {
+            "effect": self.name,
+            "added": list(self.names),
+            "effects": {f.term.name: f.as_json() for f in self.fitted},
+            "before": dict(self.before),
+            "after": dict(self.after),
+            "held_out_before": dict(self.held_out_before),
+            "held_out": dict(self.held_out),
+            "improves_held_out": self.predicts,
+            "standard_errors_from_nothing": self.from_nothing,
+            "is_nothing": self.is_nothing,
+            "p": self.p,
+            "chi2_fall_a_block": self.fall[0],
+            "chi2_fall_stderr": self.fall[1],
+            "is_noise": self.whiteness.is_noise,
+            "residual": vars(self.whiteness),
+            "warnings": list(self.warnings),
+            "notes": list(self.notes),
+        }
+
+    @property
+    def own(self) -> Fitted:
+        """The effect itself; the first of several."""
+        return next(f for f in self.fitted if f.term.name == self.names[0])

@@ -1,0 +1,197 @@
+"""What effects fitted to data are worth, and how well their values are known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from crosscheck.add.result import Addition
+from crosscheck.errors import UnsolvedError
+from crosscheck.fit.candidates import null_fit, seen_directions
+from crosscheck.fit.evidence import FALSE_ALARM, p_value
+from crosscheck.fit.gauss_newton import Fit, fit
+from crosscheck.fit.held_out import HeldOut, hold_out, improves, pays, unfitted
+from crosscheck.fit.noise import whiteness
+from crosscheck.fit.problem import Problem, rms_by_kind
+from crosscheck.fit.state import evaluate
+from crosscheck.fit.systematic import moved_by_others
+from crosscheck.model.write import Fitted
+from seecr.effects import Terms
+from seecr.pose import Array
+
+# A value this many plausible sizes from null deserves a second look.
+_IMPLAUSIBLE = 5.0
+# Parameters whose errors go together like this are hardly determined apart.
+_CORRELATED = 0.95
+_MOST_NAMED = 4
+# Runs left out are never predicted better than fitted, but for this part of chance: where they
+# are, the fit has ended in a hollow.
+_HOLLOW = 0.9
+
+
+def weigh(
+    problem: Problem, terms: Terms, names: Sequence[str], factor: Array, best: Fit,
+    notes: Sequence[str],
+) -> Addition:  # fmt: skip
+    """What the named effects are worth in the best fit, against the model without them.
+
+    Raises:
+        UnsolvedError: the fit is none: it did not come to an end, or ended in a hollow.
+    """
+    base = base_of(problem, terms, names, factor)
+    some_left = any(name not in names for name in terms.names)
+    without = hold_out(problem, base, factor) if some_left else unfitted(problem, base)
+    best, held = _out_of_hollows(problem, factor, best)
+    _refuse_unsettled(problem, names, best, held)
+    own = np.isin([effect for effect, _key in best.terms.labels], list(names))
+    white = whiteness(problem, best.state.white, int(np.sum(np.isfinite(best.stderr))))
+    # stated noise that is too small, or noise that goes together, makes standard errors too
+    # small, and so does another effect that is still missing
+    moved = np.zeros(len(own)) if white.is_noise else moved_by_others(problem, best)
+    covariance = white.inflation**2 * best.covariance + np.diag(moved**2)
+    fitted = _split(best, np.sqrt(np.diag(covariance)))
+    drop = (base.chi2 - best.chi2) / max(1.0, white.scale) ** 2
+    p = p_value(drop, seen_directions(best, own), False)
+    distance, count = distance_from_nothing(best.terms, covariance, own)
+    return Addition(
+        names=tuple(names),
+        fitted=fitted,
+        before=rms_by_kind(problem, evaluate(problem, terms, factor).raw),
+        after=rms_by_kind(problem, best.state.raw),
+        held_out_before=without.rms,
+        held_out=held.rms,
+        fall=improves(without, held),
+        p=p,
+        predicts=pays(without, held) and p < FALSE_ALARM,
+        from_nothing=distance,
+        is_nothing=is_nothing(distance, count),
+        whiteness=white,
+        warnings=tuple(_warnings(best, fitted, own)),
+        notes=tuple(dict.fromkeys(notes)),
+    )
+
+
+def base_of(problem: Problem, terms: Terms, names: Sequence[str], factor: Array) -> Fit:
+    """The model without the effects, at its own best."""
+    rest = Terms(term for term in terms if term.name not in names)
+    base = null_fit(problem, rest, factor, refit=bool(rest))
+    if not base.valid:
+        why = base.status.value
+        raise UnsolvedError(f"{problem.data.path}: the model without {' + '.join(names)}: {why}")
+    return base
+
+
+def _out_of_hollows(problem: Problem, factor: Array, best: Fit) -> tuple[Fit, HeldOut]:
+    """The fit and its errors on runs left out; fitted again from where those did better."""
+    held = hold_out(problem, best, factor)
+    if not _hollow(best, held):
+        return best, held
+    k = int(np.argmin(held.chi2 / np.maximum(held.readings, 1.0)))
+    other = fit(problem, best.terms.with_vector(held.values[k]), factor, best.state)
+    if not (other.valid and other.chi2 < best.chi2):
+        return best, held
+    return other, hold_out(problem, other, factor)
+
+
+def _hollow(best: Fit, held: HeldOut) -> bool:
+    return held.valid and float(held.chi2.sum()) < _HOLLOW * best.chi2
+
+
+def _refuse_unsettled(problem: Problem, names: Sequence[str], best: Fit, held: HeldOut) -> None:
+    if best.settled and not _hollow(best, held):
+        return
+    why = "ended in a hollow: runs left out are predicted better than it fits them"
+    if not best.settled:
+        why = f"did not come to an end in {best.iterations} steps"
+    raise UnsolvedError(
+        f"{problem.data.path}: the fit of {' + '.join(names)} {why}; nothing was added: look for "
+        "what else is missing with crosscheck diagnose, or fix values that are known in the model"
+    )
+
+
+def distance_from_nothing(
+    terms: Terms, covariance: Array, own: NDArray[np.bool_]
+) -> tuple[float, int]:
+    """How far some parameters together are from null, in standard errors (Mahalanobis).
+
+    Args:
+        terms: with their values. covariance: (p, p) of those; inf on the diagonal where unseen.
+        own: (p,) bool, which parameters.
+
+    Returns:
+        the distance and how many parameters it is of: shapes mean nothing by themselves, fixed
+        values are no finding, and what the data do not see is not away from anything. A distance
+        of infinity where nothing is left that was fitted.
+    """
+    shape = np.concatenate([term.layout.shape for term in terms])
+    free = own & ~shape & ~terms.knowledge.fixed
+    if not free.any():
+        return float("inf"), 0
+    seen = np.flatnonzero(free & np.isfinite(np.diag(covariance)) & (np.diag(covariance) > 0.0))
+    if not len(seen):
+        return 0.0, 1
+    scale = terms.scale[seen]
+    z = (terms.vector - terms.null)[seen] / scale
+    part = covariance[np.ix_(seen, seen)] / np.outer(scale, scale)
+    squared = float(z @ np.linalg.pinv(part, hermitian=True) @ z)
+    return float(np.sqrt(max(squared, 0.0))), len(seen)
+
+
+def is_nothing(distance: float, count: int) -> bool:
+    """Whether values together are within one standard error of nothing.
+
+    Of one value that is a distance of 1, which chance stays below in 68 %; of several the
+    distance that chance stays below as often.
+    """
+    if not np.isfinite(distance):
+        return False
+    return bool(stats.chi2.cdf(distance**2, count) <= stats.chi2.cdf(1.0, 1))
+
+
+def _split(best: Fit, stderr: Array) -> tuple[Fitted, ...]:
+    parts = [(term, best.terms.part(term.name)) for term in best.terms]
+    return tuple(Fitted(t, stderr[own], best.at_bound[own]) for t, own in parts)
+
+
+def _warnings(best: Fit, fitted: Sequence[Fitted], own: NDArray[np.bool_]) -> list[str]:
+    out = []
+    for f in fitted:
+        names = np.array(f.term.layout.names)
+        unseen, stopped = ~np.isfinite(f.stderr), np.asarray(f.at_bound, bool)
+        if stopped.any():
+            out.append(f"{f.term.name}: {_some(names[stopped])} ended on a bound")
+        if (unseen & ~stopped).any():
+            out.append(f"{f.term.name}: {_some(names[unseen & ~stopped])} not seen by these data")
+        size = np.abs(f.term.sizes)
+        large = (size > _IMPLAUSIBLE) & ~f.term.layout.shape
+        if large.any():
+            out.append(
+                f"{f.term.name}: {_some(names[large])} is up to {size[large].max():.3g} times a "
+                "plausible size: check it on the robot"
+            )
+    return out + _together(best, own)
+
+
+def _together(best: Fit, own: NDArray[np.bool_]) -> list[str]:
+    """Parameters of the effects that are hardly determined apart from those of another."""
+    labels = [".".join(label) for label in best.terms.labels]
+    table = np.abs(best.correlation)
+    pairs = [
+        (float(table[i, j]), i, j)
+        for i in np.flatnonzero(own).tolist()
+        for j in np.flatnonzero(~own).tolist()
+        if table[i, j] > _CORRELATED
+    ]
+    return [
+        f"{labels[i]} and {labels[j]} are hardly determined apart (correlation {c:.3f})"
+        for c, i, j in sorted(pairs, reverse=True)[:_MOST_NAMED]
+    ]
+
+
+def _some(names: Any) -> str:
+    rest = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
+    return ", ".join(names[:_MOST_NAMED]) + rest

@@ -1,0 +1,76 @@
+"""Effects that a diagnosis listed, read from its ``diagnosis.json``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from crosscheck.files import read_text
+from seecr.cells import number_of
+from seecr.effects import Term, Terms
+from seecr.errors import InputError, InputFileError
+from seecr.robot import Robot
+
+__all__ = ["load_diagnosed"]
+
+_EXPECTED = "expected diagnosis.json as crosscheck diagnose writes it"
+
+
+def load_diagnosed(path: str | Path, robot: Robot) -> Terms:
+    """The missing effects that a diagnosis lists, with the values that it found.
+
+    Args:
+        path: a ``diagnosis.json``.
+        robot: that it is of.
+
+    Raises:
+        InputFileError: no such file, no diagnosis, one of another robot, or one that lists none.
+    """
+    path = Path(path)
+    document = _document(path)
+    missing = document.get("missing")
+    if not isinstance(missing, list) or "verdict" not in document:
+        raise InputFileError.at(path, f"has no verdict and no list of missing effects; {_EXPECTED}")
+    terms = [_term(path, item, robot) for item in missing]
+    if not terms:
+        raise InputFileError.at(
+            path, f"lists no missing effect ({document['verdict']}); there is nothing to add"
+        )
+    try:
+        return Terms(terms)
+    except InputError as error:
+        raise InputFileError.at(path, str(error)) from None
+
+
+def _document(path: Path) -> Mapping[str, Any]:
+    try:
+        document = json.loads(read_text(path, _EXPECTED))
+    except json.JSONDecodeError as error:
+        text = f"is not JSON: {error.msg}; {_EXPECTED}"
+        raise InputFileError.at(path, text, line=error.lineno) from None
+    return document if isinstance(document, Mapping) else {}
+
+
+def _term(path: Path, item: Any, robot: Robot) -> Term:
+    name = item.get("effect") if isinstance(item, Mapping) else None
+    given = item.get("parameters") if isinstance(item, Mapping) else None
+    if not isinstance(name, str) or not isinstance(given, Mapping):
+        raise InputFileError.at(
+            path, f"an item of missing without effect and parameters; {_EXPECTED}"
+        )
+    values = {
+        key: number_of(cell.get("value")) if isinstance(cell, Mapping) else None
+        for key, cell in given.items()
+    }
+    try:
+        term = Term.of(robot, name, **{k: v for k, v in values.items() if v is not None})
+    except InputError as error:
+        raise InputFileError.at(path, str(error)) from None
+    lacking = [key for key in term.layout.names if values.get(key) is None]
+    if lacking:
+        raise InputFileError.at(
+            path, f"effect {name}: expected a number for {lacking[0]}; is it of another robot?"
+        )
+    return term

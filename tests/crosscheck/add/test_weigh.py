@@ -1,0 +1,126 @@
+"""What is added is worth it, is something, and came from a fit that ended."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from made_data import measured
+from made_diagnoses import POINTS, SIGMA, readings, robot
+from scipy import stats
+
+import crosscheck.add.fit
+from crosscheck.add import add_effect, add_effects, weigh
+from crosscheck.add.weigh import distance_from_nothing, is_nothing
+from crosscheck.errors import CrosscheckError, UnsolvedError
+from crosscheck.fit.gauss_newton import fit
+from crosscheck.fit.prepare import prepare
+from crosscheck.terminal.addition import why_not
+from seecr.effects import Term, Terms
+from seecr.mjcf import load_robot
+from seecr.shipped import model_path
+
+EVERY = np.ones(4, dtype=bool)
+
+
+def offsets(*values: float) -> Terms:
+    numbers = {f"offset_{k + 1}_m": value for k, value in enumerate(values)}
+    return Terms([Term.of(robot(), "cable_length_offset", **numbers)])
+
+
+def test_the_distance_from_nothing_counts_how_errors_go_together() -> None:
+    terms = offsets(1e-3, 1e-3, 0.0, 0.0)
+    apart = np.diag([1e-6, 1e-6, 1e-6, 1e-6])
+    assert distance_from_nothing(terms, apart, EVERY) == (pytest.approx(2.0**0.5), 4)
+    together = apart.copy()
+    together[0, 1] = together[1, 0] = 0.9e-6
+    # both up is what errors that go together do by themselves: chi2 = 2/(1 + 0.9)
+    expected = (2.0 / 1.9) ** 0.5
+    assert distance_from_nothing(terms, together, EVERY) == (pytest.approx(expected), 4)
+
+
+def test_what_is_not_seen_shapes_or_is_fixed_is_no_distance() -> None:
+    terms = offsets(1e-3, 5e-3, 0.0, 0.0)
+    unseen = np.diag([1e-6, np.inf, 1e-6, 1e-6])
+    assert distance_from_nothing(terms, unseen, EVERY) == (pytest.approx(1.0), 3)
+    assert distance_from_nothing(terms, np.diag([np.inf] * 4), EVERY) == (0.0, 1)
+    fixed = Terms([terms["cable_length_offset"].fixed()])
+    assert distance_from_nothing(fixed, np.zeros((4, 4)), EVERY) == (np.inf, 0)
+    creep = Terms([Term.of(robot(), "creep", amount=0.0, time_s=500.0)])
+    far = np.diag([0.01, 1.0])
+    assert distance_from_nothing(creep, far, np.ones(2, dtype=bool)) == (0.0, 1)
+
+
+def test_within_one_standard_error_is_as_likely_for_several_values_as_for_one() -> None:
+    assert is_nothing(0.99, 1) and not is_nothing(1.01, 1)
+    for count in (3, 24):
+        limit = float(np.sqrt(stats.chi2.ppf(stats.chi2.cdf(1.0, 1), count)))
+        assert is_nothing(0.999 * limit, count) and not is_nothing(1.001 * limit, count)
+    assert not is_nothing(np.inf, 0)
+
+
+def test_an_effect_that_is_nothing_is_not_worth_adding() -> None:
+    found = add_effect(robot(), readings(), "tracker_scale")
+    assert found.is_nothing and found.from_nothing < 1.0 and not found.pays
+    assert "no further from nothing than its standard errors" in why_not(found)
+    sure = add_effect(robot(), readings(radius_m=0.01), "pulley_radius")
+    assert not sure.is_nothing and sure.from_nothing > 50.0 and sure.pays
+
+
+def test_errors_cover_what_another_missing_effect_does_to_a_value(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The tilt of the frame is missing: the centre of mass takes a part of it."""
+    parallel = load_robot(model_path("demobot_parallel"))
+    shift = {"shift_x_m": 0.00836, "shift_y_m": -0.00296, "shift_z_m": 0.01097}
+    centre = Term.of(parallel, "centre_of_mass", **shift)
+    tilt = Term.of(parallel, "gravity_tilt", tilt_x_rad=0.0089, tilt_y_rad=0.0062)
+    data = measured(parallel, [centre, tilt], points=4)
+    alone = add_effect(parallel, data, "centre_of_mass")
+    off = np.abs(alone.own.term.vector - centre.vector) / alone.own.stderr
+    assert alone.pays and not alone.whiteness.is_noise and np.all(off < 2.0)
+    monkeypatch.setattr(weigh, "moved_by_others", lambda _problem, best: np.zeros(len(best.terms)))
+    blind = add_effect(parallel, data, "centre_of_mass")
+    assert np.max(np.abs(blind.own.term.vector - centre.vector) / blind.own.stderr) > 5.0
+
+
+def test_a_fit_knows_whether_it_came_to_an_end() -> None:
+    ready = prepare(robot(), readings(radius_m=0.01), Terms())
+    factor = ready.problem.noise(ready.problem.experiment.predict())
+    start = Terms([Term.of(robot(), "pulley_radius", radius_m=0.05)])
+    assert fit(ready.problem, start, factor).settled
+    assert not fit(ready.problem, start, factor, iterations=1).settled
+
+
+def test_a_fit_that_did_not_end_is_never_a_number(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(crosscheck.add.fit, "_STEPS", 1)
+    monkeypatch.setattr(crosscheck.add.fit, "_TIMES", 0)
+    monkeypatch.setattr(weigh, "_HOLLOW", 0.0)
+    start = [Term.of(robot(), "pulley_radius", radius_m=0.05)]
+    with pytest.raises(UnsolvedError, match="did not come to an end in 1 steps; nothing was") as e:
+        add_effects(robot(), readings(radius_m=0.01), start)
+    assert e.value.exit_status == 3
+
+
+def test_a_fit_in_a_hollow_goes_on_from_where_runs_left_out_did_better(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(crosscheck.add.fit, "_STEPS", 1)
+    monkeypatch.setattr(crosscheck.add.fit, "_TIMES", 0)
+    start = [Term.of(robot(), "pulley_radius", radius_m=0.05)]
+    found = add_effects(robot(), readings(radius_m=0.01), start)
+    assert abs(found.own.term.vector[0] - 0.01) < 4.0 * found.own.stderr[0] and found.pays
+
+
+def test_several_effects_are_added_together() -> None:
+    hidden = [
+        Term.of(robot(), "pulley_radius", radius_m=0.01),
+        Term.of(robot(), "stiffness", factor=1.3),
+    ]
+    data = measured(robot(), hidden, points=POINTS, sigma=SIGMA, tensions=True)
+    near = [term.with_vector(1.1 * term.vector) for term in hidden]
+    found = add_effects(robot(), data, near)
+    assert found.pays and found.names == ("pulley_radius", "stiffness")
+    for one, truth in zip(found.fitted, Terms(hidden), strict=True):
+        assert abs(one.term.vector[0] - truth.vector[0]) < 4.0 * one.stderr[0]
+    with pytest.raises(CrosscheckError, match="there is nothing to add"):
+        add_effects(robot(), data, [])
