@@ -39,6 +39,7 @@ if TYPE_CHECKING:
         SeecrError,
     )
     from seecr.experiment import Experiment, Prediction, predict
+    from seecr.inverse import Correction, correct
     from seecr.loads import Loads
     from seecr.mjcf import load_robot
     from seecr.model import Model, load_model, new_model
@@ -63,6 +64,7 @@ _MODULES = {
     "errors": ("InputError", "InputFileError", "MissingPackageError", "RobotError", "SeecrError"),
     "experiment": ("Experiment", "Prediction", "predict"),
     "loads": ("Loads",),
+    "inverse": ("Correction", "correct"),
     "mjcf": ("load_robot",),
     "model": ("Model", "load_model", "new_model"),
     "planar": ("bar_tilt", "midline_point", "solution_manifold"),
@@ -77,6 +79,7 @@ _WHERE = {name: module for module, names in _MODULES.items() for name in names}
 
 __all__ = [
     "Commands",
+    "Correction",
     "Effect",
     "Experiment",
     "InputError",
@@ -99,6 +102,7 @@ __all__ = [
     "Zone",
     "bar_tilt",
     "catalogue",
+    "correct",
     "effect_named",
     "feasible",
     "layout_of",

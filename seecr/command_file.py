@@ -1,7 +1,9 @@
 """Commands from a CSV: poses or lengths, with runs, times and temperatures where they are given.
 
 The columns are those of a file of measurements: ``cmd_x_m``, ``cmd_qw``, ``cmd_ry_deg``,
-``length_1_m``, ``run``, ``t_s``, ``temperature_C``, in any order; others are not looked at.
+``length_1_m``, ``run``, ``t_s``, ``temperature_C``, ``payload_kg``, ``force_x_N`` and so on, in any
+order; others are not looked at. The TOML beside it may say ``lengths = "told"`` and
+``start = "first_row"``.
 """
 
 from __future__ import annotations
@@ -11,13 +13,15 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from seecr.commands import Commands
 from seecr.errors import InputFileError
-from seecr.files import read_text
+from seecr.files import read_text, read_toml
+from seecr.loads import Loads
 from seecr.pose import Array, quat_from_rxyz
 from seecr.robot import Robot
 
@@ -25,13 +29,17 @@ __all__ = ["CommandFile", "read_commands"]
 
 _EXPECTED = "expected a CSV of commands with a header row, such as cmd_x_m,cmd_y_m,cmd_z_m"
 _NAME = re.compile(
-    r"((?:cmd|want)_(?:r?[xyz])|length_\d+|t|temperature)_([A-Za-z]*)|((?:cmd|want)_q[wxyz]|run)"
+    r"((?:cmd|want)_r?[xyz]|length_\d+|t|temperature|payload(?:_[xyz])?|(?:force|moment)_[xyz])"
+    r"_([A-Za-z]*)|((?:cmd|want)_q[wxyz]|run)"
 )
 _UNITS = {
     "length": {"m": 1.0, "cm": 100.0, "mm": 1e3, "um": 1e6},
     "angle": {"rad": 1.0, "deg": 180.0 / np.pi},
     "t": {"s": 1.0, "ms": 1e3},
     "temperature": {"C": 1.0},
+    "payload": {"kg": 1.0, "g": 1e3},
+    "force": {"N": 1.0, "kN": 1e-3},
+    "moment": {"Nm": 1.0},
 }
 _POSITION, _QUATERNION = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
 _ANGLES = ("rx", "ry", "rz")
@@ -126,6 +134,8 @@ def read_commands(path: str | Path, robot: Robot) -> CommandFile:
         run=_numbered(cells, run),
         time=optional.get("t"),
         temperature=optional.get("temperature"),
+        loads=_loads(cells),
+        **_beside(Path(path), n, lengths is not None),
     )
     _check_times(cells, commands)
     return CommandFile(Path(path), commands, wanted, run)
@@ -170,7 +180,9 @@ def _unit(path: Path, name: str, quantity: str, unit: str | None) -> float:
         return 1.0
     kind = quantity
     if quantity not in _UNITS:
-        kind = "angle" if quantity.endswith(_ANGLES) else "length"
+        kind = quantity.partition("_")[0]
+        if kind not in ("force", "moment"):
+            kind = "angle" if quantity.endswith(_ANGLES) else "length"
     if unit not in _UNITS[kind]:
         known = " or ".join(f"{quantity}_{one}" for one in _UNITS[kind])
         raise InputFileError.at(path, f"unknown unit {unit!r}; expected {known}", column=name)
@@ -210,6 +222,33 @@ def _poses(cells: _Cells, prefix: str, robot: Robot) -> Array | None:
     else:
         quat = np.tile(robot.reference_pose[3:], (len(cells.lines), 1))
     return np.concatenate([position, quat], axis=1)
+
+
+def _loads(cells: _Cells) -> Loads | None:
+    """Known loads, where there are columns of them; a coordinate that is not given is zero."""
+    n, zero = len(cells.lines), np.zeros(len(cells.lines))
+    wrench = [f"{kind}_{axis}" for kind in ("force", "moment") for axis in _POSITION]
+    if not any(q in cells.texts for q in ("payload", *wrench)):
+        return None
+    parts = [cells.numbers(q) if q in cells.texts else zero for q in wrench]
+    mass = cells.numbers("payload") if "payload" in cells.texts else None
+    centre = cells.together([f"payload_{axis}" for axis in _POSITION], "centre of the payload")
+    return Loads.of(n, mass, centre, np.stack(parts, axis=1))
+
+
+def _beside(path: Path, n: int, in_lengths: bool) -> dict[str, Any]:
+    """What the TOML beside the file says of its commands; the rest of it is of measurements."""
+    toml_path = path.with_suffix(".toml")
+    if not toml_path.exists():
+        return {}
+    toml = read_toml(toml_path, "expected a TOML beside the commands")
+    told, start = toml.content.get("lengths"), toml.content.get("start")
+    if told not in (None, "told", "absolute"):
+        raise toml.error(f"lengths must be 'told' or 'absolute', got {told!r}", "lengths")
+    if start not in (None, "reference", "first_row"):
+        raise toml.error(f"start must be 'reference' or 'first_row', got {start!r}", "start")
+    stands = np.ones(n, dtype=bool) if start == "first_row" else None
+    return {"told": told == "told" and in_lengths, "stands": stands}
 
 
 def _numbered(cells: _Cells, run: Sequence[str]) -> NDArray[np.int64]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +47,18 @@ class Commands:
 
     def __len__(self) -> int:
         return len(self.pose)
+
+    def rows(self, index: NDArray[np.integer]) -> Commands:
+        """Some rows, for what does not depend on the rows before."""
+
+        def of(values: NDArray[Any] | None) -> NDArray[Any] | None:
+            return None if values is None else values[index]
+
+        return Commands(
+            pose=self.pose[index], lengths=of(self.lengths), run=of(self.run), time=of(self.time),
+            temperature=of(self.temperature), told=self.told, stands=of(self.stands),
+            clock=of(self.clock), loads=None if self.loads is None else self.loads.rows(index),
+        )  # fmt: skip
 
     @property
     def starts(self) -> NDArray[np.bool_]:

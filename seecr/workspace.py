@@ -12,8 +12,8 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import nnls
 
+from seecr.distribution import balanced, tension_limits
 from seecr.errors import InputError
 from seecr.joints import motion_columns, values_of_pose
 from seecr.pose import Array, quat_rotate, transform_points
@@ -75,10 +75,10 @@ def unbalanced(
     Forces, and torques over the robot's length, weigh alike. Arguments as in :func:`feasible`.
     """
     places = _poses(poses)
-    low, high = _bounds(robot, lowest, highest)
-    matrices, loads = _balance(robot, places, wrench)
+    low, high = tension_limits(robot, lowest, highest)
+    matrices, loads = balance_equations(robot, places, wrench)
     return np.array(
-        [_left_over(w, load, low, high) for w, load in zip(matrices, loads, strict=True)]
+        [balanced(w, load, low, high)[1] for w, load in zip(matrices, loads, strict=True)]
     )
 
 
@@ -104,7 +104,9 @@ def wrench_matrix(robot: Robot, poses: ArrayLike) -> Array:
     return np.swapaxes(np.concatenate([unit, moment], axis=-1), 1, 2)
 
 
-def _balance(robot: Robot, poses: Array, wrench: ArrayLike | None) -> tuple[Array, Array]:
+def balance_equations(
+    robot: Robot, poses: Array, wrench: ArrayLike | None = None
+) -> tuple[Array, Array]:
     """Equations of balance W tau = load, (n, d, m) and (n, d), torques over the length."""
     n = len(poses)
     outer = np.zeros(6) if wrench is None else np.asarray(wrench, float)
@@ -124,38 +126,8 @@ def _balance(robot: Robot, poses: Array, wrench: ArrayLike | None) -> tuple[Arra
     return along @ matrix, -np.einsum("ndk,nk->nd", along, load)
 
 
-def _left_over(matrix: Array, load: Array, low: Array, high: Array) -> float:
-    """Least |matrix tau - load| / |load| for low <= tau <= high, by non-negative least squares.
-
-    An upper bound is one more equation, tau_i + spare_i = high_i with spare_i >= 0.
-    """
-    scale = float(np.linalg.norm(load)) or 1.0
-    bounded = np.flatnonzero(np.isfinite(high))
-    d, m, k = len(load), len(low), len(bounded)
-    table = np.zeros((d + k, m + k))
-    table[:d, :m] = matrix
-    table[d + np.arange(k), bounded] = 1.0
-    table[d + np.arange(k), m + np.arange(k)] = 1.0
-    aim = np.concatenate([load - matrix @ low, (high - low)[bounded]]) / scale
-    return float(nnls(table, aim, maxiter=100 * (m + k))[1])
-
-
 def _poses(values: ArrayLike) -> Array:
     poses = np.atleast_2d(np.asarray(values, float))
     if poses.ndim != 2 or poses.shape[1] != 7 or not np.all(np.isfinite(poses)):
         raise InputError(f"poses must be (n, 7) finite numbers, got {np.shape(values)}")
     return poses
-
-
-def _bounds(robot: Robot, lowest: ArrayLike, highest: ArrayLike) -> tuple[Array, Array]:
-    m = robot.n_cables
-    bounds = []
-    for name, value in (("lowest", lowest), ("highest", highest)):
-        array = np.asarray(value, float)
-        if array.shape not in ((), (m,)):
-            raise InputError(f"{name} must be one number or ({m},) [N], got {array.shape}")
-        bounds.append(np.broadcast_to(array, (m,)))
-    low, high = bounds
-    if not (np.all(np.isfinite(low)) and np.all(low >= 0.0) and np.all(high >= low)):
-        raise InputError("tension bounds must be 0 <= lowest <= highest [N]")
-    return low, high

@@ -86,3 +86,27 @@ def test_sweep_writes_its_files(tmp_path: Path) -> None:
     assert {file.name for file in (out / "again").iterdir()} == {"sweep.json", "sweep.csv"}
     rows = json.loads((out / "again" / "sweep.json").read_text())["rows"]
     assert rows == document["rows"]
+
+
+def test_correct_writes_commands_that_every_command_reads(tmp_path: Path) -> None:
+    poses, model = tmp_path / "poses.csv", tmp_path / "model.toml"
+    poses.write_text("run,cmd_x_m,cmd_y_m,cmd_z_m\na,0.4,0.25,0.1\nb,0.45,0.2,0.15\n")
+    model.write_text(
+        'format = 1\n[[effect]]\nname = "stiffness"\nparameters = { factor = 0.2 }\n'
+        '[[effect]]\nname = "length_scale"\nparameters = { factor = 0.01 }\n'
+    )
+    args = ["correct", "demobot_cogiro", poses, "--model", model, "--lowest", "0.2"]
+    result = run(*args, "--out", tmp_path / "out", "--json")
+    assert result.exit_code == 0
+    document = json.loads(result.stdout)
+    assert document["reached"] == document["poses"] == 2
+    again = ["sweep", "demobot_cogiro", tmp_path / "out" / "corrected.csv", "--model", model]
+    said = run(*again, "--figure", "none", "--no-recording", "--out", tmp_path, "--json")
+    rows = json.loads(said.stdout)["rows"]
+    assert [row["run"] for row in rows] == ["a", "b"]
+    for row, wanted in zip(rows, ([0.4, 0.25, 0.1], [0.45, 0.2, 0.15]), strict=True):
+        assert row["pose"][:3] == pytest.approx(wanted, abs=1e-12)
+        assert min(row["tensions_N"]) > 0.2 - 1e-9
+    lost = run(*args, "--lowest", "50", "--highest", "51", "--out", tmp_path / "lost")
+    assert lost.exit_code == 3
+    assert "2 cannot be held: no tensions within the limits" in lost.stdout

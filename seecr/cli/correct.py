@@ -1,0 +1,103 @@
+"""``seecr correct``: what to tell the winches so that the platform comes to wanted poses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from seecr.cli.arguments import NumbersCommand, model_at, robot_at, robot_options
+from seecr.cli.options import FILE, json_option, out_option
+
+
+@click.command(
+    cls=NumbersCommand,
+    short_help="What to tell the winches so that the platform comes to wanted poses.",
+    epilog="""\b
+Examples:
+  seecr correct robot.xml poses.csv --model model.toml --out corrected
+  seecr correct robot.xml poses.csv --lowest 1 --highest 50 --aim middle
+  seecr sweep robot.xml corrected/corrected.csv --model model.toml
+""",
+)
+@robot_options
+@click.argument("poses", type=FILE, metavar="POSES.csv")
+@click.option(
+    "--lowest",
+    type=float,
+    default=0.0,
+    show_default=True,
+    metavar="N",
+    help="Least tension of every cable [N].",
+)
+@click.option("--highest", type=float, metavar="N", help="Largest tension of every cable [N].")
+@click.option(
+    "--aim",
+    type=click.Choice(["minimum", "middle"]),
+    default="minimum",
+    show_default=True,
+    help="Where between the limits tensions should be.",
+)
+@click.option(
+    "--prefer",
+    type=click.Choice(["pose", "position"]),
+    default="pose",
+    show_default=True,
+    help="What to keep of a pose that cannot be held.",
+)
+@out_option("seecr-correction")
+@json_option
+def command(
+    robot: Path,
+    poses: Path,
+    cable: str | None,
+    model: Path | None,
+    lowest: float,
+    highest: float | None,
+    aim: str,
+    prefer: str,
+    out: Path,
+    as_json: bool,
+) -> int:
+    """Find what to tell the winches so that the platform comes to rest at the poses of a file.
+
+    ROBOT is an MJCF file or the name of a shipped robot, POSES.csv a list of commands: the poses
+    wanted. Elasticity and all effects of the model are taken into account; tensions stay within
+    the limits. A pose that cannot be held is replaced by the nearest one that can.
+
+    Writes corrected.csv and corrected.toml, which every command reads as commands, and
+    correction.json. Poses without any answer are left out of corrected.csv.
+
+    \b
+    Exit status: 0 all poses reached or replaced by the nearest, 2 bad input,
+    3 a pose without an answer.
+    """  # fmt: skip
+    from seecr import correct
+    from seecr.command_file import read_commands
+    from seecr.files import json_text, staged, write_texts
+    from seecr.report.corrections import corrected_csv, corrected_toml, document_of
+
+    machine = robot_at(robot, cable)
+    own = model_at(model, machine)
+    wanted = read_commands(poses, machine)
+    limits = float("inf") if highest is None else highest
+    with staged(out) as folder:
+        found = correct(
+            machine, wanted.commands, effects=own or (), lowest=lowest, highest=limits, aim=aim,
+            prefer=prefer,
+        )  # fmt: skip
+        status = 0 if (found.found & found.solution.converged).all() else 3
+        notes = list(own.notes) if own else []
+        document = {"exit_status": status, "notes": notes, **document_of(found)}
+        files = {
+            "corrected.csv": corrected_csv(found, wanted),
+            "corrected.toml": corrected_toml(wanted),
+            "correction.json": json_text(document) + "\n",
+        }
+        write_texts({folder / name: text for name, text in files.items()})
+    if as_json:
+        click.echo(json_text(document))
+        return status
+    for line in [*notes, *found.lines(), f"Results in {out}/"]:
+        click.echo(line)
+    return status

@@ -1,0 +1,161 @@
+"""The tensions nearest to wanted ones that balance a load within limits, by their dual."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from seecr.compiled.algebra import cholesky, solve_factored
+from seecr.compiled.jit import jit
+
+FOUND, NONE, UNDECIDED = 0, 1, 2
+# Most steps, most halvings of one, what of a balance may be left relative to its load, and how
+# much a step is damped relative to what is left.
+_STEPS, _HALVINGS, _LEFT, _DAMPING = 100, 40, 1e-13, 1e-9
+_NEARLY = 1e-9
+# Tensions beyond this many loads are none that anyone has.
+_MOST_EVER = 1e6
+# A proof that nothing balances has to be clear of rounding by this part.
+_PROVEN = 1e-10
+
+
+@jit
+def _clipped(matrix, aim, low, high, dual, tension):
+    """tension = aim + A^T dual within limits; the part of the dual's value that hangs on it."""
+    d, m = matrix.shape
+    value = 0.0
+    for i in range(m):
+        z = aim[i]
+        for k in range(d):
+            z += matrix[k, i] * dual[k]
+        t = min(max(z, low[i]), high[i])
+        tension[i] = t
+        value += t * z - 0.5 * t * t
+    return value
+
+
+@jit
+def _unbalanced(matrix, load, tension, left):
+    """left = A tension - load; the largest of it."""
+    d, m = matrix.shape
+    most = 0.0
+    for k in range(d):
+        total = -load[k]
+        for i in range(m):
+            total += matrix[k, i] * tension[i]
+        left[k] = total
+        most = max(most, abs(total))
+    return most
+
+
+@jit
+def _newton_step(matrix, low, high, tension, left, damping, step):
+    """The step of the dual that balances if the cables inside their limits stay inside."""
+    d, m = matrix.shape
+    square, factor = np.zeros((d, d)), np.zeros((d, d))
+    trace = 0.0
+    for i in range(m):
+        for k in range(d):
+            trace += matrix[k, i] ** 2
+        if low[i] < tension[i] < high[i]:
+            for k in range(d):
+                for j in range(k + 1):
+                    square[k, j] += matrix[k, i] * matrix[j, i]
+    shift = damping * trace / d
+    for _ in range(20):
+        if cholesky(square, shift, factor):
+            break
+        shift = 10.0 * max(shift, 1e-16 * trace)
+    for k in range(d):
+        left[k] = -left[k]
+    solve_factored(factor, left, step)
+    for k in range(d):
+        left[k] = -left[k]
+
+
+@jit
+def _take_up(matrix, low, high, step, tension):
+    """A^T step to the tensions inside their limits, which they keep."""
+    for i in range(matrix.shape[1]):
+        if low[i] < tension[i] < high[i]:
+            change = 0.0
+            for k in range(matrix.shape[0]):
+                change += matrix[k, i] * step[k]
+            tension[i] = min(max(tension[i] + change, low[i]), high[i])
+
+
+@jit
+def _none_balance(matrix, load, low, high, most_ever, dual):
+    """Whether the dual proves that no tensions within limits balance (Farkas)."""
+    d, m = matrix.shape
+    most, size = 0.0, 0.0
+    for k in range(d):
+        most -= dual[k] * load[k]
+        size += abs(dual[k] * load[k])
+    for i in range(m):
+        along = 0.0
+        for k in range(d):
+            along += dual[k] * matrix[k, i]
+        if along != 0.0:
+            most += along * (min(high[i], most_ever) if along > 0.0 else low[i])
+    return most < -_PROVEN * size
+
+
+@jit
+def project(matrix, load, aim, low, high, tension):
+    """min |tension - aim|^2 with A tension = load, low <= tension <= high; whether there are any.
+
+    A semismooth Newton method on the dual, whose gradient A clip(aim + A^T dual) - load is
+    piecewise linear (Qi and Sun 1993; for projections on polyhedra Qi and Sun 2006): it ends
+    after finitely many steps, most often two or three. Returns FOUND, NONE with a proof by
+    Farkas' lemma, or UNDECIDED where tensions are so many times the load that steps creep.
+
+    Args:
+        matrix: (d, m). load: (d,). aim, low, high: (m,). tension: (m,), filled.
+    """
+    d = matrix.shape[0]
+    dual, tried, step, left = np.zeros(d), np.zeros(d), np.zeros(d), np.zeros(d)
+    scale = 1e-300
+    for k in range(d):
+        scale = max(scale, abs(load[k]))
+    for i in range(matrix.shape[1]):
+        scale = max(scale, low[i], abs(aim[i]))
+    value = _clipped(matrix, aim, low, high, dual, tension)
+    most = _unbalanced(matrix, load, tension, left)
+    for _ in range(_STEPS):
+        if most <= _NEARLY * scale:
+            # rounding of a long dual is left: the cables inside their limits take that up
+            for _ in range(3):
+                if most <= _LEFT * scale:
+                    break
+                _newton_step(matrix, low, high, tension, left, 0.0, step)
+                _take_up(matrix, low, high, step, tension)
+                most = _unbalanced(matrix, load, tension, left)
+            return FOUND if most <= 1e3 * _LEFT * scale else UNDECIDED
+        if _none_balance(matrix, load, low, high, _MOST_EVER * scale, dual):
+            return NONE
+        _newton_step(matrix, low, high, tension, left, _DAMPING * min(1.0, most / scale), step)
+        descent = 0.0
+        for k in range(d):
+            descent += left[k] * step[k]
+        part, before = 1.0, most
+        for _ in range(_HALVINGS):
+            work = 0.0
+            for k in range(d):
+                tried[k] = dual[k] + part * step[k]
+                work += load[k] * tried[k]
+            new = _clipped(matrix, aim, low, high, tried, tension) - work
+            most = _unbalanced(matrix, load, tension, left)
+            # near the answer the dual's value is rounding, and what is left decides
+            if new <= value + 1e-4 * part * descent or most < 0.5 * before:
+                break
+            part *= 0.5
+        dual[:] = tried
+        value = new
+    return UNDECIDED
+
+
+@jit
+def project_batch(matrix, load, aim, low, high, tension, outcome):
+    """:func:`project` for n poses: (n, d, m), (n, d), (n, m) each; fills tension and outcome."""
+    for r in range(matrix.shape[0]):
+        outcome[r] = project(matrix[r], load[r], aim[r], low[r], high[r], tension[r])

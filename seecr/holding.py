@@ -1,0 +1,144 @@
+"""Rest lengths that hold platforms at given poses: the elastic statics, the other way round.
+
+At a given pose the tensions follow from balance, W tau = -w (paper, eq 3), as near to wanted ones
+as limits allow, and rest lengths from each cable's law, l0 = l/(1 + tau/(E S)) for a plain one.
+Where a pull's direction depends on its size (sag, yielding exit points), Newton's method brings
+both together, with the law's own derivatives.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seecr import statics
+from seecr.compiled.columns import EA, GAP, REST, STRAIN, TENSION
+from seecr.distribution import distribute
+from seecr.pose import Array
+from seecr.tables import Tables, take
+
+# Rounds of Newton's method; balance to this part of the load ends them.
+_ROUNDS, _BALANCED = 40, 1e-12
+# Step of a rest length for its derivative, relative to it.
+_STEP = 1e-7
+# A slack cable is this much longer than the way it bridges: it needs a margin, not a value.
+_MARGIN = 2e-3
+# Below this part of the load a tension is none.
+_NONE = 1e-9
+
+
+@dataclass(eq=False)
+class Held:
+    """Rest lengths that hold n poses.
+
+    Attributes:
+        rest: (n, m) [m].
+        tensions: (n, m) [N].
+        strains: (n, m).
+        fine: (n,) bool, the pose can be held within the limits.
+    """
+
+    rest: Array
+    tensions: Array
+    strains: Array
+    fine: NDArray[np.bool_]
+
+
+def hold(tables: Tables, aim: Array, low: Array, high: Array) -> Held:
+    """Find rest lengths with which the poses of ``tables`` are in balance.
+
+    Args:
+        tables: of n poses, whose own rest lengths do not matter.
+        aim: (n, m) tensions wanted [N].
+        low, high: (m,) limits [N].
+    """
+    n, m = tables.cables.shape[:2]
+    bridged = tables.cables[..., REST] + tables.cables[..., GAP]
+    first = np.maximum(low, tables.scale[:, None] / m)
+    rest = bridged / (1.0 + first / tables.cables[..., EA])
+    out = Held(rest, np.zeros((n, m)), np.zeros((n, m)), np.zeros(n, dtype=bool))
+    rows, known, wanted = np.arange(n), None, out.tensions
+    here = _here(tables)
+    for _ in range(_ROUNDS):
+        now = with_rest(take(tables, rows), out.rest[rows])
+        at = statics.evaluate(now, statics.take_evaluation(here, rows), threads=None)
+        statics.put_evaluation(here, rows, at)
+        missed = np.abs(at.states[..., TENSION] - wanted).max(axis=1)
+        fine = (at.residual <= _BALANCED) & (missed <= _NONE * now.scale)
+        out.fine[rows] = fine
+        rows, now, at = rows[~fine], take(now, ~fine), statics.take_evaluation(at, ~fine)
+        if len(rows) == 0:
+            break
+        by_tension, own = _rates(now, at)
+        if known is not None:
+            # a cable that is just slack has no rates: those of when it pulled are near
+            idle = own >= 0.0
+            by_tension = np.where(idle[:, None, :], known[0][rows], by_tension)
+            own = np.where(idle, known[1][rows], own)
+        else:
+            known = by_tension.copy(), own.copy()
+        known[0][rows], known[1][rows] = by_tension, own
+        tensions = at.states[..., TENSION]
+        load = np.einsum("ndm,nm->nd", by_tension, tensions) - at.gradient
+        wanted, possible = distribute(by_tension, load, aim[rows], low, high)
+        step = wanted - tensions
+        # a plain cable's tension is linear in 1/l0
+        slope = -own * out.rest[rows] ** 2
+        inverse = 1.0 / out.rest[rows] + step / slope
+        inverse = np.clip(inverse * out.rest[rows], 0.5, 2.0) / out.rest[rows]
+        going = possible & np.isfinite(inverse).all(axis=1)
+        out.rest[rows[going]] = 1.0 / inverse[going]
+        rows, wanted = rows[going], wanted[going]
+    out.tensions, out.strains = here.states[..., TENSION], here.states[..., STRAIN]
+    # rounding may keep a row that is in balance to nine digits from the last ones
+    out.fine |= (here.residual < 1e-10) & _within(out.tensions, low, high, tables.scale)
+    slack = (out.tensions <= _NONE * tables.scale[:, None]) & (low <= 0.0)
+    out.rest = np.where(slack & out.fine[:, None], (1.0 + _MARGIN) * bridged, out.rest)
+    return out
+
+
+def with_rest(tables: Tables, rest: Array) -> Tables:
+    """The same tables with other rest lengths (n, m) [m]."""
+    cables = tables.cables.copy()
+    cables[..., GAP] += cables[..., REST] - rest
+    cables[..., REST] = rest
+    return replace(tables, cables=cables)
+
+
+def _here(tables: Tables) -> statics.Evaluation:
+    """The platform at the poses of the tables."""
+    n, m = tables.cables.shape[:2]
+    return statics.Evaluation.empty(n, m, tables.n_dof)
+
+
+def _rates(tables: Tables, at: statics.Evaluation) -> tuple[Array, Array]:
+    """Gradient (n, d, m) by each cable's tension, and tension (n, m) by its rest length [N/m]."""
+    step = _STEP * tables.length
+    force, tension = statics.change_by_cable(tables, tables.lengthened(-step), at)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(
+            tension[:, None, :] != 0.0, force / tension[:, None, :], 0.0
+        ), tension / step
+
+
+def _within(tensions: Array, low: Array, high: Array, scale: Array) -> NDArray[np.bool_]:
+    room = 1e-9 * scale[:, None]
+    inside = (tensions >= low - room) & (tensions <= high + room)
+    return np.asarray(inside.all(axis=1))
+
+
+def balance_of(tables: Tables, low: Array) -> tuple[Array, Array]:
+    """Balance A tau = load at the poses of tables: (n, d, m) and (n, d) [N], torques over length.
+
+    Taken where the cables just pull, and linear in the tensions from there.
+    """
+    m = tables.cables.shape[1]
+    bridged = tables.cables[..., REST] + tables.cables[..., GAP]
+    first = np.maximum(low, tables.scale[:, None] / m)
+    now = with_rest(tables, bridged / (1.0 + first / tables.cables[..., EA]))
+    at = statics.evaluate(now, _here(now), threads=None)
+    by_tension, _ = _rates(now, at)
+    load = np.einsum("ndm,nm->nd", by_tension, at.states[..., TENSION]) - at.gradient
+    return by_tension, load

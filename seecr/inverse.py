@@ -1,0 +1,256 @@
+"""Commands that correct: what to tell the winches so that the platform comes to wanted poses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from seecr.commands import Commands
+from seecr.distribution import tension_limits, wanted_tensions
+from seecr.effects.base import Effect
+from seecr.errors import InputError
+from seecr.experiment import Experiment, GivenEffects, Prediction, effects_of
+from seecr.holding import Held, balance_of, hold
+from seecr.nearest import nearest
+from seecr.pose import Array, pose_difference
+from seecr.result import COORDINATES, Record, Result, named
+from seecr.robot import Robot
+from seecr.solution import Solution
+from seecr.starts import commanded_poses
+from seecr.tables import Tables, assemble
+from seecr.told import told_lengths
+
+PREFERENCES = ("pose", "position")
+"""What may give way at a pose that cannot be held: both, or the orientation alone."""
+
+# Rounds of history, or of users' laws, and by how much a pose may be missed at the end [of length].
+_ROUNDS, _MISSED = 40, 1e-10
+# A pose that is missed by less than this [m, and rad over the length] has been reached.
+_REACHED = 1e-6
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Correction(Result):
+    """What to tell the winches for n wanted poses.
+
+    Attributes:
+        wanted: (n, 7).
+        aimed: (n, 7) the wanted poses where they can be held, else the nearest that can.
+        lengths: (n, m) [m] to tell the winches, counted as the plain robot counts.
+        held: (n,) bool, the wanted pose can be held by tensions within the limits.
+        found: (n,) bool, there is an answer: lengths for the wanted pose or the nearest.
+        solution: where the platform rests with these lengths, certified.
+    """
+
+    robot: Robot
+    wanted: Array
+    aimed: Array
+    lengths: Array
+    held: NDArray[np.bool_]
+    found: NDArray[np.bool_]
+    solution: Solution
+
+    @property
+    def left(self) -> Array:
+        """(n, 6) [m, rad] from the wanted pose to where the platform rests."""
+        return pose_difference(self.solution.pose, self.wanted)
+
+    @property
+    def reached(self) -> NDArray[np.bool_]:
+        """(n,) bool, the platform rests at the wanted pose, stably, to within a micrometre."""
+        size = np.where(np.arange(6) < 3, 1.0, self.robot.length)
+        near = np.abs(self.left * size).max(axis=1) < _REACHED
+        return np.asarray(self.held & near & self.solution.converged)
+
+    @property
+    def commands(self) -> Commands:
+        """The lengths as commands that every function takes."""
+        return Commands(self.aimed, lengths=self.lengths, told=True)
+
+    def lines(self) -> list[str]:
+        """How many poses are reached, what is left, and what cannot be held."""
+        n, left = len(self.wanted), self.left
+        at, lost = self.reached, ~self.held
+        out = [f"{self.robot.name}: {int(at.sum())} of {n} poses reached"]
+        if np.any(at):
+            out.append(
+                f"left there: {1e3 * np.linalg.norm(left[at, :3], axis=1).max():.2g} mm and "
+                f"{np.degrees(np.linalg.norm(left[at, 3:], axis=1).max()):.2g} deg at most"
+            )
+            pulls = self.solution.tensions[at]
+            out.append(f"tensions there from {pulls.min():.4g} to {pulls.max():.4g} N")
+        near = lost & self.found
+        if np.any(lost):
+            out.append(
+                f"{int(lost.sum())} cannot be held: no tensions within the limits balance the load"
+            )
+        if np.any(near):
+            out.append(
+                f"the nearest poses that can be held are up to "
+                f"{1e3 * np.linalg.norm(left[near, :3], axis=1).max():.4g} mm and "
+                f"{np.degrees(np.linalg.norm(left[near, 3:], axis=1).max()):.4g} deg away"
+            )
+        stays = self.solution.converged
+        for rows, text in (
+            (lost & ~self.found, "of them have no pose near that can be held either"),
+            (self.found & ~stays, "are balanced, but the platform would not stay there"),
+            (self.held & stays & ~at, "are missed"),
+        ):
+            if np.any(rows):
+                out.append(f"{int(rows.sum())} {text}")
+        return out
+
+    def records(self) -> list[Record]:
+        """One row per pose: wanted, lengths, what is left, tensions."""
+        cables, left = self.robot.cable_names, self.left
+        moved = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
+        return [
+            {
+                **named("want_{}", COORDINATES, self.wanted[i]),
+                **named("length_{}_m", [str(k + 1) for k in range(len(cables))], self.lengths[i]),
+                "held": bool(self.held[i]),
+                "reached": bool(self.reached[i]),
+                **named("left_{}", moved, left[i]),
+                **named("tension_{}_N", cables, self.solution.tensions[i]),
+            }
+            for i in range(len(self.wanted))
+        ]
+
+
+def correct(
+    robot: Robot,
+    poses: Commands | ArrayLike,
+    *,
+    effects: GivenEffects = (),
+    lowest: ArrayLike = 0.0,
+    highest: ArrayLike = np.inf,
+    aim: str | ArrayLike = "minimum",
+    prefer: str = "pose",
+) -> Correction:
+    """Lengths to tell the winches so that the platform comes to rest at wanted poses.
+
+    Elasticity and all effects are taken into account; what more cables than freedoms leave free
+    goes to tensions as near to ``aim`` as the limits allow. Where a pose cannot be held, the
+    nearest one that can is aimed at.
+
+    Args:
+        robot: as described.
+        poses: (n, 7) wanted, or :class:`seecr.Commands` with runs and times, for effects that
+            depend on them.
+        effects: a model, or effects with values.
+        lowest: (m,) or one [N], not negative. A cable that may have none gets a margin.
+        highest: (m,) or one [N]; infinite for none.
+        aim: "minimum", "middle" (of the limits), or tensions (m,) or (n, m) [N].
+        prefer: "pose": least position^2 + (length x rotation)^2; "position": only the
+            orientation gives way.
+
+    Raises:
+        InputError: shapes, limits that leave nothing, an unknown aim or preference.
+    """
+    if prefer not in PREFERENCES:
+        raise InputError(f"prefer must be one of {', '.join(PREFERENCES)}, got {prefer!r}")
+    given = poses if isinstance(poses, Commands) else Commands(commanded_poses(poses))
+    if given.lengths is not None:
+        raise InputError("correct needs wanted poses (n, 7); got lengths")
+    low, high = tension_limits(robot, lowest, highest)
+    target = wanted_tensions(aim, low, high)
+    if target.ndim == 2 and len(target) != len(given):
+        raise InputError(f"aim must have {len(given)} rows, got {len(target)}")
+    limits = _Limits(np.broadcast_to(target, (len(given), robot.n_cables)), low, high)
+    return _Search(robot, given, effects_of(effects), limits).run(prefer == "position")
+
+
+@dataclass(frozen=True, eq=False)
+class _Limits:
+    aim: Array
+    low: Array
+    high: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """One call of :func:`correct`."""
+
+    robot: Robot
+    given: Commands
+    effects: Sequence[Effect]
+    limits: _Limits
+
+    def run(self, fix_position: bool) -> Correction:
+        held, tables = self._held(self.given)
+        found, aimed = held.fine.copy(), self.given.pose.copy()
+        lost = np.flatnonzero(~held.fine)
+        if len(lost):
+            aimed[lost], found[lost] = self._nearest(lost, tables.scale, fix_position)
+        commands = replace(self.given, pose=aimed)
+        lengths, prediction = self._lengths(commands)
+        lengths[~found] = np.nan
+        solution = prediction.solution()
+        return Correction(
+            self.robot, self.given.pose, aimed, lengths, held.fine, found,
+            _without(solution, ~found),
+        )  # fmt: skip
+
+    def _tables(self, commands: Commands) -> Tables:
+        """Tables at the poses of commands; what is paid out does not matter."""
+        plain = self.robot.commanded_lengths(commands.pose)
+        trial = replace(commands, lengths=plain, told=True)
+        return assemble(Experiment(self.robot, trial).setup(self.effects))
+
+    def _held(self, commands: Commands, past: Prediction | None = None) -> tuple[Held, Tables]:
+        tables = self._tables(commands) if past is None else past.tables
+        limits = self.limits
+        return hold(tables, limits.aim, limits.low, limits.high), tables
+
+    def _nearest(
+        self, rows: NDArray[np.intp], scale: Array, fix_position: bool
+    ) -> tuple[Array, NDArray[np.bool_]]:
+        wanted, limits = self.given.pose[rows], self.limits
+        whole = self.given.pose.copy()
+
+        def balance(poses: Array, some: NDArray[np.intp]) -> tuple[Array, Array]:
+            at = rows[some]
+            whole[at] = poses
+            part = replace(self.given, pose=whole).rows(at)
+            return balance_of(self._tables(part), limits.low)
+
+        args = (self.robot, wanted, balance, limits.low, limits.high, scale[rows])
+        poses, found = nearest(*args, fix_position)
+        again = np.flatnonzero(~found)
+        if fix_position and len(again):
+            # the position cannot be kept either
+            other = _Search(self.robot, self.given, self.effects, limits)
+            poses[again], found[again] = other._nearest(rows[again], scale, False)
+        return poses, found
+
+    def _lengths(self, commands: Commands) -> tuple[Array, Prediction]:
+        """Lengths to tell, and what comes of them."""
+        held, _ = self._held(commands)
+        for _ in range(_ROUNDS):
+            told = told_lengths(self.robot, commands, self.effects, held.rest)
+            trial = replace(commands, lengths=told, told=True)
+            prediction = Experiment(self.robot, trial).predict(self.effects)
+            if not (prediction.has_history or prediction.setup.laws):
+                break
+            missed = np.abs(pose_difference(prediction.pose, commands.pose)).max(axis=1)
+            if np.all(missed[held.fine] <= _MISSED * self.robot.length):
+                break
+            held, _ = self._held(commands, prediction)
+        return told, prediction
+
+
+def _without(solution: Solution, rows: NDArray[np.bool_]) -> Solution:
+    """The solution without numbers where there is nothing to solve."""
+    if not np.any(rows):
+        return solution
+    kept = ~rows[:, None]
+    return replace(
+        solution,
+        pose=np.where(kept, solution.pose, np.nan),
+        deviation=np.where(kept, solution.deviation, np.nan),
+        tensions=np.where(kept, solution.tensions, np.nan),
+        rest_lengths=np.where(kept, solution.rest_lengths, np.nan),
+    )

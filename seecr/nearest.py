@@ -1,0 +1,143 @@
+"""The nearest poses that tensions within limits can hold, where wanted ones cannot be held.
+
+Least position^2 + (length x rotation)^2 subject to balance, W(q) tau = -w(q), and limits: a
+sequence of projections on the linearised balance (Gauss-Newton), each the same small problem as
+a distribution of tensions, with the change of the pose among its unknowns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seecr.distribution import balanced, distribute
+from seecr.joints import pose_of_values, values_of_pose
+from seecr.pose import Array, pose_add
+from seecr.robot import Robot
+
+Balance = Callable[[Array, NDArray[np.intp]], tuple[Array, Array]]
+"""Balance at poses (k, 7) of some rows: matrices (k, d, m) and loads (k, d), A tau = load."""
+
+_ROUNDS = 200
+# A pose this near to the limit is held with something to spare: tensions, relative to the load.
+_INSIDE = 1e-6
+# Weight of a tension of one load, as a displacement over the robot's length: next to none.
+_WEIGHT = 1e-3
+# Largest step, difference for derivatives, and steps that end the search, over the length.
+_LARGEST, _DIFFERENCE, _ENOUGH = 0.3, 1e-5, 1e-6
+# Balance that ends it, of the load; steps that do not fall by this are halved, down to this.
+_TIGHT, _FALLS, _SLOWEST = 1e-9, 0.7, 0.02
+
+
+def nearest(
+    robot: Robot,
+    wanted: Array,
+    balance: Balance,
+    low: Array,
+    high: Array,
+    scale: Array,
+    fix_position: bool = False,
+) -> tuple[Array, NDArray[np.bool_]]:
+    """The nearest poses that can be held, and whether any were found.
+
+    Args:
+        robot: as described.
+        wanted: (n, 7).
+        balance: what holds at a pose.
+        low, high: (m,) limits [N].
+        scale: (n,) [N] load.
+        fix_position: the position is kept, only the orientation gives way.
+
+    Returns:
+        (n, 7) and (n,) bool.
+    """
+    inside = _INSIDE * scale[:, None]
+    least = np.minimum(low + inside, 0.5 * (low + np.minimum(high, 1e300)))
+    most = np.maximum(high - inside, least)
+    values = values_of_pose(robot, wanted)[0] if robot.joints else None
+    # how far each coordinate may go from its wanted value: rotations times the length
+    free = np.full(robot.n_dof, np.inf)
+    if fix_position:
+        free[~robot.hinges] = 0.0
+    return _Way(robot, wanted, values, balance, least, most, scale, free).run()
+
+
+@dataclass(frozen=True, eq=False)
+class _Way:
+    """The search for n poses; ``away`` (n, d) is how far each is from its wanted one [m]."""
+
+    robot: Robot
+    wanted: Array
+    values: Array | None
+    balance: Balance
+    least: Array
+    most: Array
+    scale: Array
+    free: Array
+
+    def run(self) -> tuple[Array, NDArray[np.bool_]]:
+        n, length = len(self.wanted), self.robot.length
+        rows, away = np.arange(n), np.zeros((n, self.robot.n_dof))
+        before, share = np.full(n, np.inf), np.ones(n)
+        found = np.zeros(n, dtype=bool)
+        each = zip(*self.balance(self.wanted, rows), self.least, self.most, strict=True)
+        tensions = np.stack([balanced(*one)[0] for one in each])
+        for _ in range(_ROUNDS):
+            step, change, left, possible = self._step(away[rows], tensions[rows], rows)
+            size = np.linalg.norm(step, axis=1)
+            done = possible & (left <= _TIGHT * self.scale[rows]) & (size <= _ENOUGH * length)
+            # curvature that the linearised balance does not see can make whole steps go to and fro
+            slower = np.maximum(0.5 * share[rows], _SLOWEST)
+            share[rows] = np.where(size > _FALLS * before[rows], slower, share[rows])
+            before[rows] = size
+            part = np.minimum(share[rows], _LARGEST * length / np.maximum(size, 1e-300))
+            part = np.where(possible, part, 0.0)[:, None]
+            away[rows] += part * step
+            tensions[rows] += part * change
+            found[rows[done]] = True
+            rows = rows[possible & ~done]
+            if len(rows) == 0:
+                break
+        return self._placed(away, np.arange(n)), found
+
+    def _step(
+        self, away: Array, tensions: Array, rows: NDArray[np.intp]
+    ) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+        """Steps of way and tensions, what is out of balance [N], whether there is a step."""
+        k, m = tensions.shape
+        matrix, load = self.balance(self._placed(away, rows), rows)
+        rates = self._rates(away, tensions, rows)
+        left = np.einsum("ndm,nm->nd", matrix, tensions) - load
+        # unknowns: tensions, scaled to next to nothing, and the whole way from the wanted pose
+        unit = (_WEIGHT * self.robot.length / self.scale[rows])[:, None]
+        whole = np.concatenate([matrix / unit[:, None], rates], axis=2)
+        low, high = (
+            np.concatenate([one[rows] * unit, np.tile(sign * self.free, (k, 1))], axis=1)
+            for one, sign in ((self.least, -1.0), (self.most, 1.0))
+        )
+        aim = load + np.einsum("ndk,nk->nd", rates, away)
+        answer, possible = distribute(whole, aim, np.zeros(low.shape[1]), low, high)
+        return answer[:, m:] - away, answer[:, :m] / unit - tensions, np.abs(left).max(1), possible
+
+    def _placed(self, away: Array, rows: NDArray[np.intp]) -> Array:
+        """Poses (k, 7) so far from the wanted ones of rows."""
+        change = away * np.where(self.robot.hinges, 1.0 / self.robot.length, 1.0)
+        if self.values is None:
+            return pose_add(self.wanted[rows], change)
+        return pose_of_values(self.robot, self.values[rows] + change)[0]
+
+    def _rates(self, away: Array, tensions: Array, rows: NDArray[np.intp]) -> Array:
+        """Derivatives (k, d, d) of what is out of balance by the way, the tensions kept."""
+        d, step = away.shape[1], _DIFFERENCE * self.robot.length
+        out = np.empty((len(away), d, d))
+        for k in range(d):
+            sides = []
+            for sign in (1.0, -1.0):
+                moved = away + sign * step * np.eye(d)[k]
+                matrix, load = self.balance(self._placed(moved, rows), rows)
+                sides.append(np.einsum("ndm,nm->nd", matrix, tensions) - load)
+            out[..., k] = (sides[0] - sides[1]) / (2.0 * step)
+        return out

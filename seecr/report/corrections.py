@@ -1,0 +1,92 @@
+"""The files of a correction: commands that are read again, and what they lead to."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from seecr.command_file import CommandFile
+from seecr.inverse import Correction
+
+__all__ = ["corrected_csv", "corrected_toml", "document_of"]
+
+_WANT = ("want_x_m", "want_y_m", "want_z_m", "want_qw", "want_qx", "want_qy", "want_qz")
+_WRENCH = [
+    f"{kind}_{axis}_{unit}" for kind, unit in (("force", "N"), ("moment", "Nm")) for axis in "xyz"
+]
+
+
+def corrected_csv(found: Correction, wanted: CommandFile) -> str:
+    """The poses wanted and the lengths to tell, one row per pose that has an answer.
+
+    Numbers have all their digits: a length rounded to a micrometre misses by as much.
+
+    Args:
+        found: the correction.
+        wanted: the list that it is of: its runs, times, temperatures and loads go along.
+    """
+    given, n = wanted.commands, len(wanted.commands)
+    columns: dict[str, Any] = {}
+    if len(set(wanted.run)) > 1:
+        columns["run"] = wanted.run
+    if given.time is not None:
+        columns["t_s"] = given.time
+    if given.temperature is not None:
+        columns["temperature_C"] = given.temperature
+    columns |= dict(zip(_WANT, found.wanted.T, strict=True))
+    columns |= {f"length_{k + 1}_m": one for k, one in enumerate(found.lengths.T)}
+    if given.loads is not None:
+        columns["payload_kg"] = given.loads.mass
+        columns |= dict(zip(_WRENCH, given.loads.wrench.T, strict=True))
+        if np.isfinite(given.loads.centre).all():
+            centres = zip("xyz", given.loads.centre.T, strict=True)
+            columns |= {f"payload_{axis}_m": one for axis, one in centres}
+    rows = [",".join(_cell(one[i]) for one in columns.values()) for i in range(n) if found.found[i]]
+    return "\n".join([",".join(columns), *rows]) + "\n"
+
+
+def corrected_toml(wanted: CommandFile) -> str:
+    """What says how the lengths are meant."""
+    lines = [
+        "# length_i is what winch i is told, counted as the plain model counts",
+        'lengths = "told"',
+    ]
+    stands = wanted.commands.stands
+    if stands is not None and stands.any():
+        lines.append('start = "first_row"')
+    return "\n".join(lines) + "\n"
+
+
+def document_of(found: Correction) -> dict[str, Any]:
+    """``correction.json``."""
+    left = found.left
+    return {
+        "robot": found.robot.name,
+        "cables": found.robot.cable_names,
+        "poses": len(found.wanted),
+        "reached": int(found.reached.sum()),
+        "not_held": int((~found.held).sum()),
+        "without_answer": int((~(found.found & found.solution.converged)).sum()),
+        "rows": [
+            {
+                "wanted": found.wanted[i],
+                "aimed": found.aimed[i] if found.found[i] else None,
+                "lengths_m": found.lengths[i],
+                "held": bool(found.held[i]),
+                "reached": bool(found.reached[i]),
+                "left_m": left[i, :3],
+                "left_rad": left[i, 3:],
+                "tensions_N": found.solution.tensions[i],
+                "status": found.solution.status[i].name.lower() if found.found[i] else "no_answer",
+            }
+            for i in range(len(found.wanted))
+        ],
+    }
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, str):
+        quoted = '"' + value.replace('"', '""') + '"'
+        return quoted if any(mark in value for mark in ',"#') else value
+    return repr(float(value) + 0.0)

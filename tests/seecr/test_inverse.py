@@ -1,0 +1,150 @@
+"""Commands that correct: what is left at the wanted poses, and what cannot be held."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from seecr.commands import Commands, play
+from seecr.effects import Term, catalogue
+from seecr.effects.base import layout_of
+from seecr.errors import InputError
+from seecr.inverse import correct
+from seecr.mjcf import load_robot
+from seecr.pose import pose_add
+from seecr.robot import Robot
+from seecr.shipped import model_path
+from seecr.told import unplay
+from seecr.workspace import balance_equations, feasible
+
+TENSION_ONLY = {"tracker_frame", "tracker_target", "tracker_scale", "tension_scale"}
+
+
+def robot_named(name: str) -> Robot:
+    return load_robot(model_path(name))
+
+
+def line(n: int = 12, first: float = 0.33, last: float = 0.47, z: float = 0.15) -> np.ndarray:
+    poses = np.zeros((n, 7))
+    poses[:, 0], poses[:, 1], poses[:, 2] = np.linspace(first, last, n), 0.25, z
+    poses[:, 3] = 1.0
+    return poses
+
+
+def typical(robot: Robot, effect: type) -> Term:
+    """An effect of a plausible size."""
+    layout = layout_of(effect, robot)
+    size = np.where(layout.shape, layout.null, layout.null + 0.7 * layout.scale)
+    return Term(layout, np.clip(size, layout.lower, layout.upper))
+
+
+@pytest.mark.parametrize("name", [k for k in catalogue() if k not in TENSION_ONLY])
+def test_every_effect_is_corrected(name: str) -> None:
+    robot = robot_named("demobot_off_centre")
+    commands = Commands(line(), time=5.0 * np.arange(12), temperature=np.linspace(18, 25, 12))
+    found = correct(robot, commands, effects=[typical(robot, catalogue()[name])])
+    assert found.reached.all()
+    assert np.abs(found.left[:, :3]).max() < 1e-10 and np.abs(found.left[:, 3:]).max() < 1e-9
+
+
+def test_many_effects_with_a_memory_are_corrected_together() -> None:
+    robot = robot_named("demobot_cogiro")
+    names = ("pulley_radius", "drum_gain", "drum_eccentricity", "backlash", "hysteresis", "creep",
+             "exit_friction", "cable_weight", "frame_compliance", "gravity_tilt")  # fmt: skip
+    effects = [typical(robot, catalogue()[name]) for name in names]
+    there = line(8, 0.2, 0.6)
+    commands = Commands(np.concatenate([there, there[::-1]]), time=3.0 * np.arange(16))
+    found = correct(robot, commands, effects=effects)
+    assert found.reached.all()
+    assert np.abs(found.left[:, :3]).max() < 1e-6
+
+
+def test_tensions_stay_within_limits_and_near_their_aim() -> None:
+    robot = robot_named("demobot_cogiro")
+    low, high = 0.3, 3.0
+    least = correct(robot, line(), lowest=low, highest=high)
+    middle = correct(robot, line(), lowest=low, highest=high, aim="middle")
+    for found in (least, middle):
+        assert found.reached.all()
+        pulls = found.solution.tensions
+        assert pulls.min() > low - 1e-8 and pulls.max() < high + 1e-8
+    assert np.all(
+        np.linalg.norm(least.solution.tensions, axis=1)
+        < np.linalg.norm(middle.solution.tensions, axis=1)
+    )
+
+
+def test_the_parallel_robot_holds_what_its_workspace_says() -> None:
+    robot, poses = robot_named("demobot_parallel"), line(24, 0.17, 0.63, 0.1)
+    found = correct(robot, poses, prefer="position")
+    np.testing.assert_array_equal(found.held, feasible(robot, poses))
+    np.testing.assert_array_equal(found.reached, found.held)
+    # the others come to their positions by tilting
+    assert found.found.all() and found.solution.converged.all()
+    assert np.abs(found.left[:, :3]).max() < 1e-9
+    tilt = np.degrees(np.linalg.norm(found.left[~found.held, 3:], axis=1))
+    assert tilt.max() == pytest.approx(34.97, abs=0.01)
+    text = str(found)
+    assert f"{int(found.held.sum())} of 24 poses reached" in text
+    assert f"{int((~found.held).sum())} cannot be held: no tensions within the limits" in text
+
+
+@pytest.mark.parametrize("x", [0.2, 0.29])
+def test_the_nearest_pose_is_the_nearest(x: float) -> None:
+    robot = robot_named("demobot_parallel")
+    want = np.array([x, 0.25, 0.1, 1, 0, 0, 0])
+    found = correct(robot, want)
+    assert not found.held[0] and found.found[0] and found.solution.converged[0]
+    unit = np.repeat([1.0, robot.length], 3)
+    ours = np.sum((unit * found.left[0]) ** 2)
+
+    def out_of_balance(v: np.ndarray) -> np.ndarray:
+        matrix, load = balance_equations(robot, pose_add(want, v[:6] / unit)[None])
+        return np.asarray(matrix[0] @ v[6:] - load[0])
+
+    start = np.r_[np.zeros(6), np.full(8, 0.7)]
+    best = minimize(
+        lambda v: 1e3 * np.sum(v[:6] ** 2), start, bounds=[(None, None)] * 6 + [(0, None)] * 8,
+        constraints={"type": "eq", "fun": out_of_balance}, method="SLSQP",
+        options={"maxiter": 500, "ftol": 1e-14},
+    )  # fmt: skip
+    assert np.abs(out_of_balance(best.x)).max() < 1e-6
+    assert ours == pytest.approx(np.sum(best.x[:6] ** 2), rel=1e-3)
+
+
+def test_a_robot_with_too_few_cables_keeps_the_position() -> None:
+    robot = robot_named("planar_two_cable")
+    want = robot.reference_pose + np.array([0.1, 0, 0.05, 0, 0, 0, 0])
+    found = correct(robot, want, prefer="position")
+    assert not found.held[0] and found.found[0] and found.solution.converged[0]
+    assert np.abs(found.left[0, :3]).max() < 1e-9 and np.abs(found.left[0, 4]) > 0.05
+
+
+def test_what_nothing_holds_has_no_numbers() -> None:
+    robot = robot_named("demobot_cogiro")
+    found = correct(robot, line(2), lowest=10.0, highest=10.1)
+    assert not found.found.any() and np.isnan(found.lengths).all()
+    assert "2 of them have no pose near that can be held either" in str(found)
+
+
+def test_the_inverse_of_play_is_played_back() -> None:
+    random = np.random.default_rng(0)
+    wanted = np.cumsum(random.normal(size=(40, 3)), axis=0)
+    wanted[7], starts = wanted[6], np.zeros(40, dtype=bool)
+    starts[[0, 20]] = True
+    half = np.array([0.1, 0.5, 2.0])
+    told = unplay(wanted, starts, half)
+    before = np.roll(told, 1, axis=0)
+    before[starts] = 0.0
+    np.testing.assert_allclose(play(told, starts, half, before[None]), wanted, atol=1e-12)
+
+
+def test_what_cannot_be_asked_is_said() -> None:
+    robot = robot_named("demobot_cogiro")
+    with pytest.raises(InputError, match="prefer must be one of pose, position, got 'both'"):
+        correct(robot, line(), prefer="both")
+    with pytest.raises(InputError, match=r"correct needs wanted poses \(n, 7\); got lengths"):
+        correct(robot, Commands(line(), lengths=np.ones((12, 8))))
+    with pytest.raises(InputError, match="aim must have 12 rows, got 3"):
+        correct(robot, line(), aim=np.ones((3, 8)))
