@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from seecr.compiled.jit import jit
+from seecr.compiled.jit import jit, jit_inner
 
 
 @jit
@@ -27,7 +27,7 @@ def cholesky(a, shift, out):
     return True
 
 
-@jit
+@jit_inner
 def solve_factored(factor, b, out):
     n = factor.shape[0]
     for i in range(n):
@@ -43,7 +43,7 @@ def solve_factored(factor, b, out):
         out[i] = total * inverse
 
 
-@jit
+@jit_inner
 def eliminate(a, b, out):
     """Solve a general small system by elimination with row pivots; ``a`` is spent."""
     n = a.shape[0]
@@ -68,7 +68,7 @@ def eliminate(a, b, out):
         out[i] /= a[i, i]
 
 
-@jit
+@jit_inner
 def solve_3x3(a, b, out):
     """Solve a 3x3 system by Cramer's rule."""
     c00 = a[1, 1] * a[2, 2] - a[1, 2] * a[2, 1]
@@ -86,7 +86,7 @@ def solve_3x3(a, b, out):
     out[2] = (c02 * b[0] + c12 * b[1] + c22 * b[2]) / det
 
 
-@jit
+@jit_inner
 def largest_diagonal(a):
     """Largest diagonal entry by size."""
     top = 0.0
@@ -95,7 +95,7 @@ def largest_diagonal(a):
     return top
 
 
-@jit
+@jit_inner
 def norm(v):
     total = 0.0
     for k in range(v.shape[0]):
@@ -103,13 +103,13 @@ def norm(v):
     return math.sqrt(total)
 
 
-@jit
+@jit_inner
 def copy_vector(values, out):
     for k in range(values.shape[0]):
         out[k] = values[k]
 
 
-@jit
+@jit_inner
 def copy_rows(values, out):
     for i in range(values.shape[0]):
         for k in range(values.shape[1]):

@@ -14,19 +14,19 @@ import numpy as np
 
 from seecr.compiled.catenary import catenary_span
 from seecr.compiled.columns import CREEP, EA, RADIUS, REST, WEIGHT
-from seecr.compiled.jit import jit
+from seecr.compiled.jit import jit, jit_inner
 from seecr.compiled.pulley import pulley_geometry
 
 # Halvings and steps that bring a bracket to rounding; most widenings of one.
 _STEPS, _WIDER = 200, 2000
 
 
-@jit
+@jit_inner
 def _inside(guess, low, high):
     return guess if low < guess < high else 0.5 * (low + high)
 
 
-@jit
+@jit_inner
 def _vertical_pull(h, rise, w, length, ea, v):
     """Vertical pull [N] at the lower end of a cable that spans ``rise``, from a guess."""
     low, high, reach = v, v, w * length + h
@@ -91,7 +91,7 @@ def bracketed_pull(across, rise, w, length, ea):
     return math.exp(u), v
 
 
-@jit
+@jit_inner
 def guess_by_brackets(row, across, rise, unknown):
     """A start for :func:`solve_catenary`: exact, but for what is in series with the catenary."""
     length = row[REST] * (1.0 + row[CREEP])

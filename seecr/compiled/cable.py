@@ -26,7 +26,7 @@ from seecr.compiled.columns import (
     WEIGHT,
     WINCH_TENSION,
 )
-from seecr.compiled.jit import jit
+from seecr.compiled.jit import jit, jit_inner
 from seecr.compiled.law import straight_law, strain_of_tension, winch_tension
 from seecr.compiled.pulley import length_in_plane, pulley_geometry
 from seecr.compiled.yielding import along, lift_slope, lowered, soften
@@ -73,7 +73,7 @@ def cable_pull(row, start, move, up, guess, work, force, stiffness, gradient, st
     return True
 
 
-@jit
+@jit_inner
 def _fixed_pull(row, start, move, up, guess, work, force, stiffness, gradient, state):
     """See cable_pull; of a cable whose exit point is where it is."""
     if row[WEIGHT] > 0.0:
@@ -83,7 +83,7 @@ def _fixed_pull(row, start, move, up, guess, work, force, stiffness, gradient, s
     return _straight_pull(row, start, move, force, stiffness, gradient, state)
 
 
-@jit
+@jit_inner
 def _straight_pull(row, start, move, force, stiffness, gradient, state):
     before2, growth, now2 = 0.0, 0.0, 0.0
     for k in range(3):
@@ -105,7 +105,7 @@ def _straight_pull(row, start, move, force, stiffness, gradient, state):
     return True
 
 
-@jit
+@jit_inner
 def _plane(row, start, move, up, out):
     """Plane of a cable: out = horizontal direction (3,) away from A; returns across, rise."""
     rise = 0.0
@@ -128,7 +128,7 @@ def _plane(row, start, move, up, out):
     return across, rise
 
 
-@jit
+@jit_inner
 def _lift(row, across, rise, e, up, f, k2, g2, force, stiffness, gradient):
     """From the cable's plane to the base frame: f = force, k2 = stiffness, g2 = gradient."""
     # turning the plane about the vertical through A: stiffness -f_across/across, sideways
@@ -148,7 +148,7 @@ def _lift(row, across, rise, e, up, f, k2, g2, force, stiffness, gradient):
             )
 
 
-@jit
+@jit_inner
 def _pulley_pull(row, start, move, up, work, force, stiffness, gradient, state):
     e, f, k2, g2 = work[0], work[1], work[2], work[3]
     across, rise = _plane(row, start, move, up, e)
@@ -165,7 +165,7 @@ def _pulley_pull(row, start, move, up, work, force, stiffness, gradient, state):
     return True
 
 
-@jit
+@jit_inner
 def _catenary_pull(row, start, move, up, guess, work, force, stiffness, gradient, state):
     e, f, k2, g2 = work[0], work[1], work[2], work[3]
     across, rise = _plane(row, start, move, up, e)

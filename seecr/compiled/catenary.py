@@ -19,7 +19,7 @@ from seecr.compiled.columns import (
     WEIGHT,
     WINCH_SIDE,
 )
-from seecr.compiled.jit import jit
+from seecr.compiled.jit import jit, jit_inner
 from seecr.compiled.law import strain_of_tension, winch_tension
 from seecr.compiled.pulley import pulley_geometry
 
@@ -54,7 +54,7 @@ def catenary_span(h, v, w, length, ea):
     return x, z, xh, xv, zv, xl, zl
 
 
-@jit
+@jit_inner
 def _change_of_sine(v, top, h, w, length):
     """(top/T_top - v/T_low)/w, from (a T_b - b T_a) = h^2 (a^2 - b^2)/(a T_b + b T_a)."""
     t_low, t_top = math.sqrt(h * h + v * v), math.sqrt(h * h + top * top)
@@ -64,7 +64,7 @@ def _change_of_sine(v, top, h, w, length):
     return (top / t_top - v / t_low) / w
 
 
-@jit
+@jit_inner
 def _other_stretch(row, tension):
     """Unstretched length [m] that all but the catenary's own T/EA would add, and its slope.
 
@@ -83,7 +83,7 @@ def _other_stretch(row, tension):
     return stretch / grown, (rate - stretch / (grown * ea)) / grown
 
 
-@jit
+@jit_inner
 def _catenary_equations(row, unknown, across, rise, error, jacobian):
     """Where the catenary over its pulley ends, against where it should, with derivatives.
 
@@ -115,7 +115,7 @@ def _catenary_equations(row, unknown, across, rise, error, jacobian):
     return t
 
 
-@jit
+@jit_inner
 def _first_guess(row, across, rise, unknown):
     """Jonkman's start for a catenary (NREL/CP-500-45891, 2009, eqs 2-46, 2-47)."""
     w = row[WEIGHT]
@@ -143,12 +143,12 @@ def _first_guess(row, across, rise, unknown):
     unknown[2] = length
 
 
-@jit
+@jit_inner
 def _size(error, length):
     return max(abs(error[0]), abs(error[1]), abs(error[2])) / length
 
 
-@jit
+@jit_inner
 def solve_catenary(row, across, rise, unknown, error, jacobian, work):
     """Find the pull of a catenary with the given span; True when found to rounding.
 

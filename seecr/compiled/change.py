@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from seecr.compiled.algebra import copy_vector
 from seecr.compiled.columns import N_LOAD, N_STATE, TENSION, UP
-from seecr.compiled.jit import jit
+from seecr.compiled.jit import jit, jit_inner
 from seecr.compiled.joints import place_joints
 from seecr.compiled.platform import N_READY, N_WORK, evaluate, prepare
 
 
-@jit
+@jit_inner
 def _pull(cables, ready, load, pose, deviation, current, length, guess, out, spare):
     """Gradient and states of a few cables, into ``out``; False where a law has no solution."""
     hessian, slopes, work, keep = spare
@@ -57,18 +58,17 @@ def change_at_rest(
             loaded = loaded or plus_load[r, c] != minus_load[r, c]
         if count == 0 and not loaded:
             continue
-        place[:] = deviation[r]
+        copy_vector(deviation[r], place)
         if screws.shape[1] > 0:
             place_joints(screws[r], values[r], length, poses[r], place, current)
         for sign in (1.0, -1.0):
             whole, source = (plus, plus_load) if sign > 0.0 else (minus, minus_load)
-            load[:] = source[r]
-            if not loaded:
-                # cancels: all but the vertical, which the cables need
-                load[:UP] = 0.0
+            # a load that stays cancels: all but the vertical, which the cables need
+            for c in range(N_LOAD):
+                load[c] = source[r, c] if loaded or c >= UP else 0.0
             for k in range(count):
-                some[k] = whole[r, which[k]]
-                starts[k] = guess[r, which[k]]
+                copy_vector(whole[r, which[k]], some[k])
+                copy_vector(guess[r, which[k]], starts[k])
             if not _pull(
                 some[:count], ready, load, poses[r], place, current, length, starts, out, spare
             ):
@@ -92,10 +92,11 @@ def change_of_each_cable(
     spare = (np.zeros((d, d)), np.zeros((1, d)), np.empty((N_WORK, 6)), np.zeros((1, 3)))
     place, none = np.empty(7), np.zeros(N_LOAD)
     for r in range(n):
-        place[:] = deviation[r]
+        copy_vector(deviation[r], place)
         if screws.shape[1] > 0:
             place_joints(screws[r], values[r], length, poses[r], place, current)
-        none[UP:] = load[r, UP:]
+        for c in range(UP, N_LOAD):
+            none[c] = load[r, c]
         for i in range(m):
             for sign in (1.0, -1.0):
                 one = plus[r, i : i + 1] if sign > 0.0 else minus[r, i : i + 1]

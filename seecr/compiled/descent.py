@@ -8,7 +8,7 @@ import numpy as np
 
 from seecr.compiled.algebra import cholesky, copy_rows, copy_vector, largest_diagonal, norm
 from seecr.compiled.columns import EA, N_STATE
-from seecr.compiled.jit import jit
+from seecr.compiled.jit import jit, jit_inner
 from seecr.compiled.joints import place_joints
 from seecr.compiled.outcomes import (
     CABLE_LAW,
@@ -45,7 +45,7 @@ MOST_TURNS = 3.0
 STIFF, STAGE = 2000.0, 10.0
 
 
-@jit
+@jit_inner
 def make_space(m, n, joints):
     """Scratch of a descent: made once for a batch."""
     return (
@@ -55,7 +55,7 @@ def make_space(m, n, joints):
     )  # fmt: skip
 
 
-@jit
+@jit_inner
 def solve_one(
     cables, load, pose, screws, start, start_values, length, scale, radius, reach, limit,
     guess, gradient, hessian, states, slopes, deviation, values, enough, space,
@@ -171,7 +171,7 @@ def solve_one(
         advance(deviation, values, step, length, screws, pose, trial, trial_values, current)
 
 
-@jit
+@jit_inner
 def solve_in_stages(
     cables, load, pose, screws, start, start_values, length, scale, radius, reach, limit,
     guess, gradient, hessian, states, slopes, deviation, values, softened, staged, space,

@@ -6,7 +6,7 @@ joint is the outermost, as in MJCF.
 
 from __future__ import annotations
 
-from seecr.compiled.jit import jit
+from seecr.compiled.jit import jit, jit_inner
 from seecr.compiled.rotation import quaternion_product, rotated_less, turned
 
 
@@ -43,7 +43,7 @@ def place_joints(screws, values, length, origin, deviation, current):
     deviation[3], deviation[4], deviation[5], deviation[6] = w, x, y, z
 
 
-@jit
+@jit_inner
 def joint_columns(current, x, y, z, per, columns):
     """Motion (n, 6) of the platform origin, now at x, y, z, by the joints in scaled steps."""
     for j in range(current.shape[0]):
@@ -59,7 +59,7 @@ def joint_columns(current, x, y, z, per, columns):
         columns[j, 3], columns[j, 4], columns[j, 5] = a, b, c
 
 
-@jit
+@jit_inner
 def onto_joints(g, h, columns, per, gradient, hessian):
     """From the platform's own gradient and stiffness to those of its joints.
 

@@ -37,7 +37,7 @@ from seecr.compiled.columns import (
     WINCH_SIDE,
     WINCH_TENSION,
 )
-from seecr.compiled.jit import jit
+from seecr.compiled.jit import jit, jit_inner
 
 # A softening cable keeps this part of its stiffness.
 LEAST = 0.01
@@ -61,7 +61,7 @@ def dahl(row, strain):
     return z, slope
 
 
-@jit
+@jit_inner
 def _polynomial(ea, q, c, strain):
     """Tension and slope of EA (eps + q eps^2 + c eps^3), kept from losing its stiffness.
 
@@ -87,7 +87,7 @@ def _polynomial(ea, q, c, strain):
     return ea * share, ea * slope
 
 
-@jit
+@jit_inner
 def tension_of_strain(row, strain):
     """Tension [N], its slope dT/d eps [N] and the hysteretic part of it, at strain >= 0."""
     ea = row[EA]
@@ -120,7 +120,7 @@ def winch_tension(row, tension):
     return stuck, 0.0
 
 
-@jit
+@jit_inner
 def is_linear(row):
     """Whether the straight law has a closed form."""
     return (
@@ -133,7 +133,7 @@ def is_linear(row):
     )
 
 
-@jit
+@jit_inner
 def series_length(row, strain):
     """Stretch [m] that goes with a strain, and its slope, tension and tension slope."""
     tension, slope, z = tension_of_strain(row, strain)
@@ -147,7 +147,7 @@ def series_length(row, strain):
     return length, rate, tension, slope, z
 
 
-@jit
+@jit_inner
 def straight_law(row, stretch, state):
     """Tension and dT/dL of a straight cable stretched by ``stretch`` [m]; fills ``state``.
 
@@ -183,7 +183,7 @@ def straight_law(row, stretch, state):
     return tension, slope / rate
 
 
-@jit
+@jit_inner
 def _solve_strain(row, stretch, guess):
     """Strain at which the series has the given stretch: Newton kept inside a bracket."""
     low, high = 0.0, max(2.0 * guess, 1e-6)
@@ -210,7 +210,7 @@ def _solve_strain(row, stretch, guess):
     return strain
 
 
-@jit
+@jit_inner
 def strain_of_tension(row, tension):
     """Strain at which the cable itself pulls with a tension: Newton kept inside a bracket.
 

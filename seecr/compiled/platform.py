@@ -41,7 +41,7 @@ from seecr.compiled.columns import (
     WINCH_SIDE,
     WINCH_TENSION,
 )
-from seecr.compiled.jit import jit
+from seecr.compiled.jit import jit, jit_inner
 from seecr.compiled.joints import joint_columns, onto_joints, place_joints
 from seecr.compiled.law import is_linear
 from seecr.compiled.rotation import rotated_less
@@ -56,7 +56,7 @@ N_READY = 9
 N_WORK = 34
 
 
-@jit
+@jit_inner
 def prepare(cables, load, pose, ready):
     """Fill ``ready`` (m + 1, N_READY) with what stays as the platform moves from a command."""
     m = cables.shape[0]
@@ -83,7 +83,7 @@ def prepare(cables, load, pose, ready):
     ready[m, START], ready[m, START + 1], ready[m, START + 2] = pose[0], pose[1], pose[2]
 
 
-@jit
+@jit_inner
 def _linear_pull(cables, ready, i, stretch, states):
     """Tension [N] of a linear spring; fills its state."""
     elastic = stretch - cables[i, REST] * cables[i, CREEP]
@@ -95,7 +95,7 @@ def _linear_pull(cables, ready, i, stretch, states):
     return tension
 
 
-@jit
+@jit_inner
 def _add_point(ax, ay, az, fx, fy, fz, per, gradient, hessian):
     """Add a force on a platform point: to the gradient, and what bending its path adds.
 
@@ -117,7 +117,7 @@ def _add_point(ax, ay, az, fx, fy, fz, per, gradient, hessian):
     hessian[5, 4] -= 0.5 * (fy * az + fz * ay)
 
 
-@jit
+@jit_inner
 def _other_pull(cables, ready, load, i, dx, dy, dz, guess, work, states):
     """What a cable that is no linear spring does; see cable_pull. Fills work[12:19]."""
     start, move = work[14], work[15]
@@ -130,7 +130,7 @@ def _other_pull(cables, ready, load, i, dx, dy, dz, guess, work, states):
     )  # fmt: skip
 
 
-@jit
+@jit_inner
 def _evaluate(
     cables, ready, load, deviation, length, guess, gradient, hessian, states, slopes, work
 ):
@@ -229,7 +229,7 @@ def _evaluate(
     return np.nan if has_moment(load) else energy
 
 
-@jit
+@jit_inner
 def evaluate(
     cables, ready, load, deviation, current, length, guess, gradient, hessian, states, slopes, work
 ):
@@ -291,7 +291,7 @@ def evaluate_batch(
         )  # fmt: skip
 
 
-@jit
+@jit_inner
 def has_moment(load):
     """Whether an external moment acts: it has no potential."""
     k = EXTERNAL_MOMENT

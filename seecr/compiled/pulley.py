@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from seecr.compiled.columns import EXIT, N_COLUMNS, RADIUS
-from seecr.compiled.jit import jit
+from seecr.compiled.jit import jit, jit_inner
 
 
 @jit
@@ -42,7 +42,7 @@ def geometric_length(row, anchor, up):
     return pulley_geometry(across, rise, row[RADIUS])[0]
 
 
-@jit
+@jit_inner
 def length_in_plane(row, across, rise):
     """Straight length over the pulley from the plane's coordinates [m]."""
     if row[RADIUS] == 0.0:

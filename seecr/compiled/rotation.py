@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from seecr.compiled.jit import jit
+from seecr.compiled.jit import jit, jit_inner
 
 
 @jit
@@ -17,7 +17,7 @@ def rotated_less(w, x, y, z, a, b, c):
     )
 
 
-@jit
+@jit_inner
 def quaternion_product(a, b, c, d, w, x, y, z):
     return (
         a * w - b * x - c * y - d * z,

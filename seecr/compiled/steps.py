@@ -15,7 +15,7 @@ from seecr.compiled.algebra import (
     solve_factored,
 )
 from seecr.compiled.columns import EXTERNAL_MOMENT, GAP, RADIUS, REST, SLACK, TENSION
-from seecr.compiled.jit import jit
+from seecr.compiled.jit import jit, jit_inner
 from seecr.compiled.joints import place_joints
 from seecr.compiled.outcomes import IDLE, SINGULAR, SINGULAR_PART, UNSTABLE
 from seecr.compiled.platform import add_skew, evaluate, has_moment, prepare
@@ -32,7 +32,7 @@ def residual_size(gradient):
     return math.sqrt(max(force, torque))
 
 
-@jit
+@jit_inner
 def advance(deviation, values, step, length, screws, pose, trial, trial_values, current):
     """The state one step on."""
     if screws.shape[0] == 0:
@@ -48,7 +48,7 @@ def advance(deviation, values, step, length, screws, pose, trial, trial_values, 
     place_joints(screws, trial_values, length, pose, trial, current)
 
 
-@jit
+@jit_inner
 def newton_step(gradient, hessian, shift, radius, load, current, length, factor, step):
     """Solve (H + shift I) step = -gradient, shift the least that makes H definite.
 
@@ -77,7 +77,7 @@ def newton_step(gradient, hessian, shift, radius, load, current, length, factor,
     return shift
 
 
-@jit
+@jit_inner
 def mirrored_step(gradient, hessian, radius, step):
     """Newton's step with every stiffness taken by size: from saddles away, elsewhere on.
 
@@ -102,7 +102,7 @@ def mirrored_step(gradient, hessian, radius, step):
             step[k] *= radius / span
 
 
-@jit
+@jit_inner
 def escape(hessian, top, radius, step):
     """Softest direction, as a step; UNSTABLE where it is downhill, SINGULAR where it is flat."""
     eigenvalues, vectors = np.linalg.eigh(hessian)
@@ -111,13 +111,13 @@ def escape(hessian, top, radius, step):
     return UNSTABLE if eigenvalues[0] < -SINGULAR_PART * top else SINGULAR
 
 
-@jit
+@jit_inner
 def is_idle(states, i, scale):
     """Whether the tension of a cable is mere rounding: it is as long as its rest length."""
     return states[i, SLACK] == 0.0 and states[i, TENSION] < IDLE * scale
 
 
-@jit
+@jit_inner
 def holds_without_idle(cables, load, pose, deviation, length, guess, states, scale, space):
     """Whether the equilibrium is stable without the cables whose tension is mere rounding.
 
@@ -143,7 +143,7 @@ def holds_without_idle(cables, load, pose, deviation, length, guess, states, sca
     return cholesky(hessian, -SINGULAR_PART * largest_diagonal(hessian), factor)
 
 
-@jit
+@jit_inner
 def turns_about_moment(load, current, length, step):
     """Full turns about the axis of the external moment that a step makes."""
     mx, my, mz = load[EXTERNAL_MOMENT], load[EXTERNAL_MOMENT + 1], load[EXTERNAL_MOMENT + 2]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from seecr.compiled.algebra import copy_vector
 from seecr.compiled.columns import (
     CREEP,
     CREEP_PART,
@@ -26,11 +27,11 @@ from seecr.compiled.columns import (
     WINCH_TENSION,
 )
 from seecr.compiled.descent import make_space, solve_in_stages
-from seecr.compiled.jit import jit
+from seecr.compiled.jit import jit, jit_inner
 from seecr.compiled.law import strain_of_tension
 
 
-@jit
+@jit_inner
 def _shares(span):
     """What a load linear in time leaves of itself after ``span`` time constants.
 
@@ -69,8 +70,8 @@ def walk_in_order(
             first[:] = 0.0
         else:
             # as far from its command as it was before
-            start[:] = deviation[k - 1]
-            first[:] = values[k - 1]
+            copy_vector(deviation[k - 1], start)
+            copy_vector(values[k - 1], first)
         for i in range(m):
             row = cables[k, i]
             amplitude[i], friction[i] = row[HYSTERESIS], row[FRICTION]

@@ -13,23 +13,23 @@ where p(move) is the pull of the cable from an exit point that has not been lift
 
 from __future__ import annotations
 
-from seecr.compiled.jit import jit
+from seecr.compiled.jit import jit_inner
 
 
-@jit
+@jit_inner
 def along(up, vector):
     """Component of a vector (3,) along the vertical."""
     return up[0] * vector[0] + up[1] * vector[1] + up[2] * vector[2]
 
 
-@jit
+@jit_inner
 def lowered(move, lift, up, out):
     """``out`` = how far the anchor point has moved as seen from the lifted exit point."""
     for k in range(3):
         out[k] = move[k] - lift * up[k]
 
 
-@jit
+@jit_inner
 def lift_slope(more, up, stiffness):
     """Slope of the equation of the lift."""
     total = 0.0
@@ -38,7 +38,7 @@ def lift_slope(more, up, stiffness):
     return 1.0 + more * total
 
 
-@jit
+@jit_inner
 def soften(more, up, stiffness, gradient, column):
     """Stiffness (3, 3) and gradient (3,) of a cable with its yielding exit point, in place.
 
