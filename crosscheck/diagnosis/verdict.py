@@ -101,7 +101,7 @@ def _at_its_best(problem: Problem, base: Fit, factor: Array) -> tuple[Fit, Notes
 
 
 def _with_derivatives(problem: Problem, base: Fit) -> Fit:
-    return replace(base, jacobian=free_derivatives(problem, base.state))
+    return replace(base, derive=lambda: free_derivatives(problem, base.state))
 
 
 def no_verdict(problem: Problem, base: Fit, notes: Sequence[str], refusal: Refusal) -> Diagnosis:

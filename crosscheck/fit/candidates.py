@@ -154,9 +154,7 @@ def fit_candidate(
     layout, starts = screened.layout, screened.starts
     assert starts is not None
     best: Fit | None = None
-    for vector in starts.vectors:
-        if best is not None and best.chi2 < _WHITE * trials.noise_scale**2 * len(best.state.white):
-            break  # it leaves noise: no other start does better
+    for vector in starts:
         try:
             found = trials.refit(
                 base.terms.with_term(Term(layout, vector)), base.state,
@@ -167,6 +165,8 @@ def fit_candidate(
         if found.valid and (best is None or found.chi2 < best.chi2):
             best = found
             hopeless = min(hopeless, 2.0 * best.chi2)
+            if best.chi2 < _WHITE * trials.noise_scale**2 * len(best.state.white):
+                break  # it leaves noise: no other start does better
     if best is None:
         return Candidate(layout, starts=starts, why_not=Reason(Why.UNSOLVED))
     return judged(trials, best, base, screened)
@@ -196,5 +196,11 @@ def null_fit(problem: Problem, terms: Terms, factor: Array, refit: bool) -> Fit:
     state = evaluate(problem, terms, factor)
     p = len(terms)
     status = FitStatus.SOLVED if state.valid else FitStatus.UNSOLVED_AT_VALUES
-    blank = np.zeros((len(state.white), p))
-    return Fit(state, blank, np.zeros((p, p)), np.zeros(p, dtype=bool), status, 0)
+    return Fit(
+        state,
+        lambda: np.zeros((len(state.white), p)),
+        lambda _nothing: np.zeros((p, p)),
+        np.zeros(p, dtype=bool),
+        status,
+        0,
+    )

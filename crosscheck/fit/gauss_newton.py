@@ -8,6 +8,7 @@ Fixed values stay as they are; values measured independently are readings like t
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
@@ -48,10 +49,13 @@ class FitStatus(Enum):
 class Fit:
     """Fitted terms and what the data say of their parameters.
 
+    Of most fits of a search only the values are asked for: derivatives take longer than they do,
+    and wait until somebody asks.
+
     Attributes:
         state: the model at its best values.
-        jacobian: (N, p) whitened derivatives by z; 0 for fixed values.
-        covariance: (p, p) of the values in their units; inf on the diagonal where unseen.
+        derive: gives ``jacobian``.
+        spread: gives ``covariance`` from it.
         at_bound: (p,) bool parameters that ended on a bound.
         status: whether the rows were solved.
         iterations: Gauss-Newton steps.
@@ -59,8 +63,8 @@ class Fit:
     """
 
     state: State
-    jacobian: Array
-    covariance: Array
+    derive: Callable[[], Array]
+    spread: Callable[[Array], Array]
     at_bound: NDArray[np.bool_]
     status: FitStatus
     iterations: int
@@ -80,6 +84,16 @@ class Fit:
     def chi2(self) -> float:
         """Sum of squared whitened residuals."""
         return self.state.chi2
+
+    @cached_property
+    def jacobian(self) -> Array:
+        """(N, p) whitened derivatives by z; 0 for fixed values."""
+        return self.derive()
+
+    @cached_property
+    def covariance(self) -> Array:
+        """(p, p) of the values in their units; inf on the diagonal where unseen."""
+        return self.spread(self.jacobian)
 
     @cached_property
     def span(self) -> Array:
@@ -139,20 +153,38 @@ def fit(
         return _invalid(state, p, FitStatus.UNSOLVED_AT_START)
     fixed = terms.knowledge.fixed
     descent = _Descent(problem, factor, ~fixed if free is None else free & ~fixed, quick)
-    state, count, settled = descent.run(state, iterations if p else 0, hopeless)
-    jacobian = descent.jacobian(state) if p else np.zeros((len(state.white), 0))
+    end = descent.run(state, iterations if p else 0, hopeless)
+    state = end.state
     found = state.terms
     at_bound = ((found.vector <= found.lower) | (found.vector >= found.upper)) & ~fixed
+    return Fit(
+        state,
+        lambda: descent.jacobian(state) if end.jacobian is None else end.jacobian,
+        lambda rates: _spread(rates, found, descent.free & ~at_bound),
+        at_bound,
+        FitStatus.SOLVED,
+        end.count,
+        end.settled,
+    )
+
+
+def _spread(jacobian: Array, found: Terms, moved: NDArray[np.bool_]) -> Array:
+    """Covariance (p, p) of the values by what was read and what is known; 0 where fixed."""
     whole = np.concatenate([jacobian, known_readings(found)[0]])
-    covariance = _covariance(whole, found.scale, descent.free & ~at_bound)
-    covariance[fixed] = 0.0
-    return Fit(state, jacobian, covariance, at_bound, FitStatus.SOLVED, count, settled)
+    covariance = _covariance(whole, found.scale, moved)
+    covariance[found.knowledge.fixed] = 0.0
+    return covariance
 
 
 def _invalid(state: State, p: int, status: FitStatus) -> Fit:
-    empty = np.zeros((len(state.white), p))
-    unknown = np.full((p, p), np.inf)
-    return Fit(state, empty, unknown, np.zeros(p, dtype=bool), status, 0)
+    return Fit(
+        state,
+        lambda: np.zeros((len(state.white), p)),
+        lambda _nothing: np.full((p, p), np.inf),
+        np.zeros(p, dtype=bool),
+        status,
+        0,
+    )
 
 
 def _corrected(jacobian: Array, before: State, after: State) -> Array:
@@ -171,6 +203,21 @@ def _objective(state: State) -> float:
 
 
 @dataclass(frozen=True, eq=False)
+class _End:
+    """Where a descent ended.
+
+    Attributes:
+        state: the best. jacobian: there, if it is known already.
+        count: steps it took. settled: whether there was nothing left to gain.
+    """
+
+    state: State
+    jacobian: Array | None
+    count: int
+    settled: bool
+
+
+@dataclass(frozen=True, eq=False)
 class _Descent:
     """Damped Gauss-Newton on a problem; ``free`` (p,) parameters move."""
 
@@ -183,8 +230,8 @@ class _Descent:
         """(N, p) whitened derivatives by z."""
         return free_derivatives(self.problem, state, frozen=self.quick)
 
-    def run(self, state: State, iterations: int, hopeless: float) -> tuple[State, int, bool]:
-        """The best state, the steps it took, and whether there was nothing left to gain."""
+    def run(self, state: State, iterations: int, hopeless: float) -> _End:
+        """Down to the best state."""
         damping, count, stale = 1e-3, 0, 0
         jacobian = np.zeros((0, len(state.terms)))
         while count < iterations:
@@ -194,7 +241,7 @@ class _Descent:
             after, damping, gain = self.step(state, jacobian, damping)
             if after is None:
                 if stale == 0:
-                    return state, count, True
+                    return _End(state, jacobian, count, True)
                 stale = 0  # not the derivatives' last word: they are of an earlier step
                 continue
             # derivatives cost much more than a trial: they serve again where steps go well
@@ -206,10 +253,10 @@ class _Descent:
             state = after
             lost = state.chi2 > (hopeless if count >= _FEW else _FAR * hopeless)
             if gain < _GAIN:
-                return state, count, True
+                return _End(state, None, count, True)
             if count >= _FEW_FAR and lost:
                 break
-        return state, count, iterations == 0
+        return _End(state, None, count, iterations == 0)
 
     def step(
         self, state: State, jacobian: Array, damping: float

@@ -9,7 +9,9 @@ equation error, in place of the output error.)
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +51,7 @@ class Starts:
 
     Attributes:
         vectors: starting values, the most promising first.
+        balanced: gives further ones, or None: those that balance the forces, which take a while.
         gain: linearised fall of chi2 of the best. directions: that the data see.
         shapes: about how many shapes were tried for it.
         seen: whether any reading moves by more than a trace of its noise.
@@ -59,6 +62,14 @@ class Starts:
     directions: int
     shapes: float
     seen: bool
+    balanced: Callable[[], Array | None] | None = None
+
+    def __iter__(self) -> Iterator[Array]:
+        """The starting values in the order in which to try them."""
+        yield from self.vectors
+        further = None if self.balanced is None else self.balanced()
+        if further is not None:
+            yield further
 
 
 def starts_of(problem: Problem, base: Fit, layout: Layout, factor: Array) -> Starts:
@@ -87,12 +98,13 @@ def starts_of(problem: Problem, base: Fit, layout: Layout, factor: Array) -> Sta
         vectors = [vectors[0], np.where(layout.shape, inside, inside + 0.5 * layout.scale)]
     elif len(shapes) == 1:
         vectors = vectors[:1]
+    balanced = None
     if int(np.sum(~layout.shape)) > 1 and _some_slack(base):
-        balanced = equation_start(problem, base.state, layout, layout.start(scored[0][3]), factor)
-        vectors += [] if balanced is None else [balanced]
+        start = layout.start(scored[0][3])
+        balanced = partial(equation_start, problem, base.state, layout, start, factor)
     # neighbouring shapes are alike: about every third is one more chance of its own
     gain, directions = scored[0][:2]
-    return Starts(tuple(vectors), gain, directions, max(1.0, len(shapes) / 3.0), seen)
+    return Starts(tuple(vectors), gain, directions, max(1.0, len(shapes) / 3.0), seen, balanced)
 
 
 def _some_slack(base: Fit) -> bool:

@@ -102,9 +102,12 @@ class LinearToy:
         normal = x.T @ x + np.eye(x.shape[1]) / PRIOR_SIZES**2
         z = np.linalg.solve(normal, x.T @ y)
         found = terms.with_vector(terms.null + z * terms.scale)
-        covariance = np.linalg.inv(normal) * np.outer(terms.scale, terms.scale)
         at_bound = np.zeros(len(terms), dtype=bool)
-        return Fit(self.state(problem, found), x, covariance, at_bound, FitStatus.SOLVED, 1)
+        covariance = np.linalg.inv(normal) * np.outer(terms.scale, terms.scale)
+        return Fit(
+            self.state(problem, found), lambda: x, lambda _x: covariance, at_bound,
+            FitStatus.SOLVED, 1,
+        )  # fmt: skip
 
     def starts(self, problem: Problem, base: Fit, layout: Layout, factor: Array) -> Starts:
         """What an effect promises beside a model."""

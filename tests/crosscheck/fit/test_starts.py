@@ -40,11 +40,11 @@ def test_it_leads_where_the_derivative_at_null_does_not(case) -> None:
     layout = layout_named(problem, "cable_length_offset")
     trials = Trials(problem, factor)
     screened = screen(trials, base, layout)
-    assert screened.starts is not None and len(screened.starts.vectors) == 2
-    derivative, balanced = screened.starts.vectors
+    assert screened.starts is not None
+    derivative, balanced = screened.starts
     reached = []
     for start in (derivative, balanced):
-        one = replace(screened, starts=replace(screened.starts, vectors=(start,)))
+        one = replace(screened, starts=replace(screened.starts, vectors=(start,), balanced=None))
         reached.append(fit_candidate(trials, base, one).fit)
     assert all(found is not None for found in reached)
     noise = len(base.state.white)
