@@ -11,8 +11,10 @@ to check what a user's effect leaves, and to tell what a change of it asks to be
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from copy import copy
 from dataclasses import dataclass, field, fields
 from enum import Enum
+from functools import lru_cache
 from types import MappingProxyType
 from typing import Any
 
@@ -238,6 +240,12 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
 """What effects can edit in a setup, by name."""
 
 
+@lru_cache(maxsize=16)
+def _plain_values(robot: Robot, rows: int) -> Mapping[str, Any]:
+    """Plain values of all quantities: fits make thousands of setups of the same robot."""
+    return {name: item.plain_of(robot, rows) for name, item in QUANTITIES.items()}
+
+
 def plain_setup(robot: Robot, commands: Commands, wrench: Array | None = None) -> Setup:
     """The setup of the paper's plain robot for commands of n rows.
 
@@ -247,9 +255,8 @@ def plain_setup(robot: Robot, commands: Commands, wrench: Array | None = None) -
         wrench: (6,) or (n, 6) external wrench besides that of the commands' loads; none by default.
     """
     n = len(commands)
-    setup = Setup(
-        robot, commands, **{name: item.plain_of(robot, n) for name, item in QUANTITIES.items()}
-    )
+    plain = _plain_values(robot, n)
+    setup = Setup(robot, commands, **{name: copy(value) for name, value in plain.items()})
     if commands.loads is not None:
         setup.wrench = commands.loads.wrench.copy()
     if wrench is not None:
