@@ -117,7 +117,7 @@ def _worst(problem: Problem, state: State, way: Travel) -> Iterator[WorstRow]:
 
 def _unsolved(problem: Problem, state: State) -> Iterator[UnsolvedRow]:
     prediction, data = state.prediction, problem.data
-    rows = np.flatnonzero(~prediction.solved)
+    rows = np.flatnonzero(~prediction.solved & data.read)
     if len(rows) == 0:
         return
     status = prediction.solution().status

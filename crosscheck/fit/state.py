@@ -91,7 +91,7 @@ def _on_measured_branch(problem: Problem, state: State) -> State:
     data, at = problem.data, state.prediction
     if data.quat_wxyz is None or at.has_history or at.setup.laws or problem.robot.joints:
         return state
-    size = np.nanmean(np.where(problem.measured, state.table, np.nan) ** 2, axis=1)
+    size = np.nansum(state.table**2, axis=1) / np.maximum(problem.measured.sum(axis=1), 1)
     whole = np.isfinite(data.position).all(axis=1) & np.isfinite(data.quat_wxyz).all(axis=1)
     rows = np.flatnonzero(problem.use & whole & ((size > _FAR_OFF) | ~at.solved))
     if len(rows) == 0 or len(rows) > _FEW_ROWS * problem.use.sum():

@@ -151,7 +151,7 @@ def _pose(found: Comparison, k: int) -> str:
     if missing:
         return head + f"\nNo equilibrium to compare with: {plain(missing[0])}."
     if not found.problem.use[k]:
-        return head + "\nLeft out, see the notes."
+        return head + words.unused(data, k)
     names, units = channels(found.problem)
     rows = [
         (name, short(in_unit(unit)[0] * float(found.state.raw[k, c])), in_unit(unit)[1])

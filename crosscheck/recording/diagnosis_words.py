@@ -111,7 +111,7 @@ def pose_words(stages: list[Stage], shown: Misfit, k: int) -> str:
     data = shown.problem.data
     head = f"## Pose {k + 1} of {data.n_rows}\nline {int(data.line[k])}, run {plain(data.run[k])}\n"
     if not shown.problem.use[k]:
-        return head + "\nLeft out, see the notes."
+        return head + words.unused(data, k)
     ends = stages if len(stages) < 2 else [stages[0], stages[-1]]
     rows = []
     for kind in shown.kinds:

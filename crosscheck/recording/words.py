@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from crosscheck.measurements.data import Measurements
 from seecr.pose import Array, pose_difference, rxyz_from_quat
 from seecr.recording.plots import DEG, MM
 
@@ -31,6 +32,13 @@ real one would."""
 _NOTHING = "No pose whose differences mean anything: see the findings."
 _LINES = "Lines are SEECR, dots MuJoCo."
 _CROSSES = "Crosses are SEECR, the dots on them MuJoCo."
+
+
+def unused(data: Measurements, k: int) -> str:
+    """Why nothing is shown of a row that does not count."""
+    if data.read[k]:
+        return "\nLeft out, see the notes."
+    return "\nA way point: gone through, not compared."
 
 
 def read_me(

@@ -115,6 +115,9 @@ def facts(problem: Problem) -> list[tuple[str, str]]:
     rows = f"{int(problem.use.sum())}"
     if not problem.use.all():
         rows += f" of {data.n_rows}"
+    ways = int((~data.read).sum())
+    if ways:
+        rows += f", {ways} way point" + "s" * (ways > 1)
     return [
         ("robot", f"{problem.robot.name}, {problem.robot.n_cables} cables"),
         ("data", data.path.name),

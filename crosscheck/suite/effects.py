@@ -25,14 +25,17 @@ from crosscheck.twin.measure import measure
 from crosscheck.twin.robot import TRUE_EFFECTS
 from crosscheck.twin.trajectory import trajectory
 from seecr.commands import Commands
-from seecr.effects import Term
+from seecr.effects import Effect, Term
 from seecr.experiment import Experiment
+from seecr.loads import Loads
 from seecr.mjcf import load_robot
 from seecr.pose import Array
 from seecr.robot import Robot
 from seecr.shipped import model_path
 
 GROUP, PREFIX = "effects", "effect-"
+LOADS = "known_loads"
+"""In an effect's place: payloads and wrenches, other ones in each row."""
 ROBOTS = ("demobot_cogiro", "demobot_parallel")
 
 # Both are exact but for rounding, so they agree as plain robots do: [m], [rad], [N].
@@ -83,7 +86,7 @@ class EffectCase:
 
     Attributes:
         model: MJCF of the robot as described.
-        effect: one of ``TRUE_EFFECTS``.
+        effect: one of ``TRUE_EFFECTS``, or ``LOADS``.
         seed: of the effect's size.
     """
 
@@ -114,6 +117,28 @@ class EffectCase:
     def commands(self) -> Commands:
         """Two sweeps to and fro about the reference pose, and a change of temperature."""
         return _robot_and_commands(self.model)[1]
+
+    @property
+    def loads(self) -> Loads | None:
+        """Of the rows, where they are what is looked at: at the platform's own centre, or not."""
+        if self.effect != LOADS:
+            return None
+        robot, n = self.robot, len(self)
+        random = np.random.default_rng(self.seed)
+        centre = robot.length * random.uniform(-0.5, 0.5, (n, 3))
+        centre[::2] = np.nan
+        push = robot.weight * random.uniform(-0.1, 0.1, (n, 6))
+        return Loads.of(
+            n,
+            mass=robot.mass * random.uniform(0.0, 0.5, n),
+            centre=centre,
+            wrench=push * np.repeat([1.0, 0.5 * robot.length], 3),
+        )
+
+    @property
+    def effects(self) -> list[Effect]:
+        """The effect with its values, if it is one."""
+        return [] if self.effect == LOADS else [self.term.effect()]
 
     @property
     def term(self) -> Term:
@@ -188,23 +213,24 @@ class EffectResult:
 
 
 def effect_cases(robots: Sequence[str | Path] = ROBOTS, seed: int = 0) -> list[EffectCase]:
-    """All effects on robots, their sizes drawn from a seed.
+    """All effects and known loads on robots, their sizes drawn from a seed.
 
     Args:
         robots: names of shipped models, or MJCF files.
         seed: of the sizes.
     """
     paths = [robot if isinstance(robot, Path) else model_path(robot) for robot in robots]
-    return [EffectCase(path, effect, seed) for path in paths for effect in TRUE_EFFECTS]
+    names = (*TRUE_EFFECTS, LOADS)
+    return [EffectCase(path, effect, seed) for path in paths for effect in names]
 
 
 def run_effect(case: EffectCase) -> EffectResult:
     """Settle one effect in MuJoCo, solve it with seecr, compare the readings."""
     began = time.perf_counter()
-    experiment = Experiment(case.robot, case.commands)
-    effects = [case.term.effect()]
-    ours, plain = experiment.predict(effects), experiment.predict()
-    truth = measure(case.robot, case.commands, effects, segments=_SEGMENTS, waypoints=_WAYPOINTS)
+    plain = Experiment(case.robot, case.commands).predict()
+    commands = replace(case.commands, loads=case.loads)
+    ours = Experiment(case.robot, commands).predict(case.effects)
+    truth = measure(case.robot, commands, case.effects, segments=_SEGMENTS, waypoints=_WAYPOINTS)
     position_m, orientation_rad = gap(_seen(truth), _seen(ours.readings))
     moved = np.linalg.norm(ours.readings.position - plain.readings.position, axis=1)
     return EffectResult(

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from crosscheck.suite.agreement import QUANTITIES
-from crosscheck.suite.effects import ORIENTATION_RAD, POSITION_M, TENSION_N, Counterpart
+from crosscheck.suite.effects import LOADS, ORIENTATION_RAD, POSITION_M, TENSION_N, Counterpart
 from crosscheck.suite.outcome import Outcome
 from crosscheck.suite.verdicts import FINDINGS, PoseFinding, Verdict
 
@@ -194,7 +194,8 @@ EFFECT_HEADS = [
 def effects_line(results: Sequence[EffectResult]) -> str:
     """How many effects agree, with what, the worst differences, and those that do not agree."""
     robots = {result.case.model for result in results}
-    effects = {result.case.effect for result in results}
+    effects = {result.case.effect for result in results} - {LOADS}
+    loads = " and known loads" if any(result.case.effect == LOADS for result in results) else ""
     bad = [result.case.name for result in results if result.outcome is not Outcome.AGREE]
     verdict = "all agree"
     if bad:
@@ -203,7 +204,7 @@ def effects_line(results: Sequence[EffectResult]) -> str:
     orientation = max(result.worst[1] for result in results)
     tension = max(result.worst[2] for result in results)
     return (
-        f"{count(len(effects), 'effect')} on {count(len(robots), 'robot')} against "
+        f"{count(len(effects), 'effect')}{loads} on {count(len(robots), 'robot')} against "
         f"{_counterparts(results)}: {verdict}; worst {worst.worst[0]:.1e} m "
         f"({worst.case.name}), {orientation:.1e} rad, {tension:.1e} N."
     )
@@ -212,7 +213,8 @@ def effects_line(results: Sequence[EffectResult]) -> str:
 def _counterparts(results: Sequence[EffectResult]) -> str:
     """How many effects stand against what, in words."""
     kinds = {
-        kind: {r.case.effect for r in results if r.case.against is kind} for kind in Counterpart
+        kind: {r.case.effect for r in results if r.case.against is kind} - {LOADS}
+        for kind in Counterpart
     }
     parts = [f"{kind.value} ({len(names)})" for kind, names in kinds.items() if names]
     return " and ".join(parts)

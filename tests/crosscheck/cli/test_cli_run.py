@@ -204,7 +204,7 @@ def test_an_effect_without_rest_ends_3(tmp_path, monkeypatch):
 
 def test_effects_are_a_group_of_the_shipped_robots(tmp_path):
     lines = run("--list", "--case", "effects").stdout.splitlines()
-    assert len(lines) == 2 * len(TRUE_EFFECTS)
+    assert len(lines) == 2 * (len(TRUE_EFFECTS) + 1)  # and known loads
     assert all(line.startswith("effect-demobot_") for line in lines)
     assert EFFECT in run("--list").stdout
     assert "effect-" not in run("--list", "--robot", PLANAR).stdout

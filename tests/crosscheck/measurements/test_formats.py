@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,8 +10,10 @@ import numpy as np
 import pytest
 from random_robots import random_robot
 
+from crosscheck.measurements.columns import know_columns
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import load_commands, load_measurements
+from crosscheck.measurements.table import Table
 from crosscheck.measurements.write import write_measurements
 from seecr.errors import InputFileError
 from seecr.loads import Loads
@@ -285,3 +288,36 @@ def test_mistakes_get_one_sentence_with_their_place(write: Write, robot: Robot, 
         load_measurements(path, robot)
     assert str(caught.value).startswith(f"{path}: ") and "\n" not in str(caught.value)
     assert caught.value.exit_status == 2
+
+
+# ---------------------------------------------------------------- the reference
+
+REFERENCE = (Path(__file__).resolve().parents[3] / "docs" / "formats.md").read_text(
+    encoding="utf-8"
+)
+
+
+def block(language: str) -> str:
+    return REFERENCE.partition(f"```{language}\n")[2].partition("```")[0]
+
+
+def test_the_reference_s_examples_are_read(write: Write, robot: Robot):
+    data = load_measurements(write(block("csv"), toml=block("toml")), robot)
+    assert data.read.tolist() == [True, False, True] and data.stands.all()
+    assert data.sigma.position_m == 3e-5 and data.sigma.length_m == 1e-4
+    assert data.loads is not None and data.loads.mass.tolist() == [0.0, 0.0, 0.2]
+    assert data.unused_columns == () and data.angle_mask.all()
+
+
+def test_the_reference_s_columns_and_units_are_known():
+    rows = [row.split("|") for row in REFERENCE.splitlines() if row.startswith("| `")]
+    assert len(rows) == 13
+    for _, columns, _, units, _ in rows:
+        names = [name for name in re.findall(r"`([^`]+)`", columns) for name in name.split()]
+        table = Table(Path("a.csv"), tuple(names), np.array([2]), 1, [["1"]] * len(names))
+        if not {"cmd_qw", "cmd_rx_deg", "meas_qw", "length_1_m"} & set(names):
+            assert know_columns(table, M).unused == ()
+        for unit in re.findall(r"_(\w+)", units):
+            quantity = names[0].rpartition("_")[0]
+            column = Table(Path("a.csv"), (f"{quantity}_{unit}",), np.array([2]), 1, [["1"]])
+            assert know_columns(column, M).known[quantity].unit.suffix == unit

@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 
 from crosscheck.suite import words
-from crosscheck.suite.effects import Counterpart, EffectCase, EffectResult, _number, effect_cases
+from crosscheck.suite.effects import (
+    LOADS,
+    Counterpart,
+    EffectCase,
+    EffectResult,
+    _number,
+    effect_cases,
+)
 from crosscheck.suite.outcome import Outcome
 from crosscheck.twin.hidden import CONTAINED
 from crosscheck.twin.robot import TRUE_EFFECTS
@@ -28,7 +35,7 @@ def good() -> EffectResult:
 
 def test_every_effect_is_a_case_of_each_robot():
     cases = effect_cases(("demobot_parallel", PARALLEL), seed=3)
-    assert [case.effect for case in cases] == 2 * list(TRUE_EFFECTS)
+    assert [case.effect for case in cases] == 2 * [*TRUE_EFFECTS, LOADS]
     assert {case.seed for case in cases} == {3}
     assert cases[0].name == f"effect-demobot_parallel-{TRUE_EFFECTS[0]}"
 
