@@ -1,7 +1,7 @@
 # The tasks of this repository; `make` lists them. They use .venv, which `make setup` makes.
 BIN := .venv/bin
 
-.PHONY: help setup quick test bench docs suite ci
+.PHONY: help setup quick test sweep bench docs suite ci
 
 help: ## list the tasks
 	@sed -n 's/^\([a-z]*\): .*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 8
@@ -15,10 +15,13 @@ quick: ## while working: lint, format, types, and the tests that take less than 
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/python -m pytest -m 'not slow and not benchmark'
+	$(BIN)/python -m pytest -m 'not slow'
 
 test: ## all tests
 	$(BIN)/python -m pytest
+
+sweep: ## more cases of what the tests hold
+	$(BIN)/python -m pytest -m sweep
 
 bench: ## how fast it is, one process at a time
 	$(BIN)/python -m pytest -m benchmark -n 0 -s

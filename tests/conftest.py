@@ -6,20 +6,26 @@ import importlib.util
 import os
 from pathlib import Path
 
+# BLAS on several threads, in several workers, takes longer; set before NumPy is imported
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import pytest
 from stale import forget_stale
+from warm import compile_all
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
     """Forget what was compiled from older sources, before any worker starts to use it.
 
-    Each compiled function has one signature: two workers that compile it at once write the same.
+    And compile all where there are workers: each would do so for itself.
     """
     if hasattr(session.config, "workerinput"):
         return
     spec = importlib.util.find_spec("seecr")
     assert spec is not None and spec.origin is not None
     forget_stale(Path(spec.origin).parent)
+    if getattr(session.config.option, "numprocesses", None):
+        compile_all()
 
 
 @pytest.fixture(scope="session")

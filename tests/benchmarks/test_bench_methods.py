@@ -14,7 +14,7 @@ from seecr.equilibrium import METHODS
 from seecr.pose import pose_difference
 from seecr.shipped import CABLES, model_path
 
-pytestmark = pytest.mark.benchmark
+pytestmark = [pytest.mark.benchmark, pytest.mark.slow]
 
 # A SciPy answer this close to Newton's [m] is the same equilibrium.
 SAME = 1e-6

@@ -59,8 +59,8 @@ def result_of(name: str) -> Result:
 
 
 NAMES = [
-    "Measurements", "Comparison", "Diagnosis", "Addition", "Calibrated", "Plan", "Twin",
-    "CaseResult", "Run",
+    "Measurements", "Comparison", "Diagnosis", "Addition",
+    pytest.param("Calibrated", marks=pytest.mark.slow), "Plan", "Twin", "CaseResult", "Run",
 ]  # fmt: skip
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 from made_data import COGIRO, SIGMA, measured, term
 
-from crosscheck.calibration.calibrate import calibrate
+from crosscheck.calibration.calibrate import Calibration, calibrate
 from crosscheck.calibration.leave_out import surprise_of, without
 from crosscheck.calibration.linearised import Linear
 from crosscheck.calibration.registration import registered
@@ -41,11 +42,15 @@ def problem_of(data: Measurements) -> Problem:
     return ready.problem
 
 
+@cache
+def calibrated() -> Calibration:
+    """From many small errors."""
+    return calibrate(problem_of(measured(ROBOT, hidden(), points=14)))
+
+
 @pytest.mark.slow
 def test_many_small_errors_are_fitted_together_and_predict_elsewhere() -> None:
-    terms = hidden()
-    data = measured(ROBOT, terms, points=14)
-    found = calibrate(problem_of(data))
+    terms, found = hidden(), calibrated()
     before, after = (r["position_rms_m"] for r in (found.before, found.after))
     assert before is not None and after is not None and SIGMA.position_m is not None
     assert before > 20 * after
@@ -61,8 +66,7 @@ def test_many_small_errors_are_fitted_together_and_predict_elsewhere() -> None:
 
 @pytest.mark.slow
 def test_covariance_covers_what_the_data_see() -> None:
-    terms = hidden()
-    found = calibrate(problem_of(measured(ROBOT, terms, points=14)))
+    found = calibrated()
     at = found.terms.labels.index(("pulley_radius", "radius_m"))
     error = float(np.sqrt(found.covariance[at, at]))
     assert 0.0 < error < 0.004

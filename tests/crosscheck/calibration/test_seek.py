@@ -13,6 +13,8 @@ from crosscheck.fit.reasons import DiagnosisVerdict
 from seecr.effects import Term, Terms
 from seecr.mjcf import load_robot
 
+pytestmark = pytest.mark.slow
+
 ROBOT = load_robot(COGIRO)
 
 

@@ -1,6 +1,7 @@
 """Twins with MuJoCo as the truth: the hidden effect is named, and only that.
 
-A sample that fits into a test run; ``scripts/score_twins.py`` goes through all effects and seeds.
+A sample that fits into a test run; ``pytest -m sweep`` has a few more, and
+``scripts/score_twins.py`` goes through all effects and seeds.
 """
 
 from __future__ import annotations
@@ -24,7 +25,6 @@ CASES = [
     ("demobot_parallel", 3, ("backlash",)),
     ("demobot_cogiro", 4, ("exit_point_error",)),
     ("demobot_parallel", 5, ("frame_compliance",)),
-    ("demobot_parallel", 6, ("centre_of_mass", "gravity_tilt")),
     ("demobot_cogiro", 7, ()),
     ("demobot_parallel", 8, ()),
 ]
@@ -33,8 +33,10 @@ CASES = [
 # Two effects drawn by the seed, which were once taken for something else.
 PAIRS = [
     ("demobot_cogiro", 2010),  # a pulley and a mass: the mass's equal was not named
-    ("demobot_parallel", 2027),  # lengths and creep: the fit of the lengths ended in a hollow
-    ("demobot_parallel", 2053),  # a centre of mass and lengths, a thousand times the noise
+    # lengths and creep: the fit of the lengths ended in a hollow
+    pytest.param("demobot_parallel", 2027, marks=pytest.mark.sweep),
+    # a centre of mass and lengths, a thousand times the noise
+    pytest.param("demobot_parallel", 2053, marks=pytest.mark.sweep),
 ]
 
 

@@ -1,25 +1,20 @@
-"""Real robots' measurements, through the command line; see the sources in docs/diagnosis.md."""
+"""Real robots' measurements; see the sources in docs/diagnosis.md."""
 
 from __future__ import annotations
 
-import json
 import re
 from pathlib import Path
 from typing import Any
 
 import pytest
-from made_data import run
+
+from crosscheck.diagnosis.verdict import diagnose
 
 pytestmark = pytest.mark.slow
 
 
-def diagnosed(folder: Path, out: Path) -> dict[str, Any]:
-    result = run(
-        "diagnose", folder / "robot.xml", folder / "measured.csv", "--out", out, "--no-recording"
-    )
-    assert result.exit_code == 0, result.output
-    found: dict[str, Any] = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
-    return found
+def diagnosed(folder: Path) -> dict[str, Any]:
+    return diagnose(folder / "robot.xml", folder / "measured.csv").as_json()
 
 
 def named(found: dict[str, Any]) -> list[str]:
@@ -29,9 +24,9 @@ def named(found: dict[str, Any]) -> list[str]:
 # One test per robot: a diagnosis that several tests share would be made again by every worker.
 
 
-def test_irma(shared_data: Path, tmp_path: Path) -> None:
+def test_irma(shared_data: Path) -> None:
     """An under-actuated robot: angles and tensions, no positions; sheaves left out of its XML."""
-    found = diagnosed(shared_data / "real" / "irma4u", tmp_path)
+    found = diagnosed(shared_data / "real" / "irma4u")
     the_tension_mismatch_is_mass_or_scale_and_the_advice_is_to_weigh(found)
     a_common_scale_of_the_lengths_takes_the_place_of_the_sheaves(found)
     # the platform's yaw drifts by 5 degrees, which no effect does: no clean bill
@@ -55,9 +50,9 @@ def a_common_scale_of_the_lengths_takes_the_place_of_the_sheaves(found: dict[str
     assert -0.06 < found["missing"][1]["parameters"]["factor"]["value"] < -0.01
 
 
-def test_hangprinter(shared_data: Path, tmp_path: Path) -> None:
+def test_hangprinter(shared_data: Path) -> None:
     """Four lines whose lengths were commanded; anchors roughly known, one row wrong."""
-    found = diagnosed(shared_data / "real" / "hangprinter", tmp_path)
+    found = diagnosed(shared_data / "real" / "hangprinter")
     it_is_explained_to_under_3_mm_on_rows_left_out(found)
     anchors_and_spools_are_named(found)
     notes = " ".join(found["notes"])

@@ -1,0 +1,30 @@
+"""Everything compiled, or loaded if it was before: a minute, or a second."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import seecr
+from seecr.commands import Commands
+from seecr.experiment import Experiment
+from seecr.sensitivity import sensitivities
+
+# What a walk, a change of all and a change of each cable are needed for.
+EFFECTS = {
+    "hysteresis": {"amplitude_N": 0.1, "stretch_m": 1e-3},
+    "pulley_radius": {"radius_m": 0.01},
+    "cable_length_offset": {},
+}
+
+
+def compile_all() -> None:
+    """Solve, predict and derive a little: each compiled function has one signature."""
+    robot = seecr.load_robot(seecr.model_path("planar_vertical"))
+    poses = np.tile(robot.reference_pose, (2, 1))
+    wrench = np.array([0.0, 0.0, 0.0, 0.0, 1e-6, 0.0])
+    seecr.solve(robot, poses, wrench=wrench)
+    commands = Commands(poses, run=np.zeros(2, dtype=int), time=np.array([0.0, 1.0]))
+    experiment = Experiment(robot, commands)
+    for name, values in EFFECTS.items():
+        terms = seecr.Terms([seecr.Term.of(robot, name, **values)])
+        sensitivities(experiment, terms, experiment.predict(terms.effects))
