@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from crosscheck.diagnosis.verdict import diagnose
     from crosscheck.errors import CrosscheckError
     from crosscheck.fit.reasons import DiagnosisVerdict
+    from crosscheck.fit.tolerance import Tolerance
     from crosscheck.measurements.data import Measurements, Sigma
     from crosscheck.measurements.read import load_commands, load_measurements
     from crosscheck.measurements.write import write_measurements
@@ -46,6 +47,7 @@ _WHERE = {
     "Plan": "planning.result",
     "Run": "suite.run",
     "Sigma": "measurements.data",
+    "Tolerance": "fit.tolerance",
     "Twin": "twin.make",
     "add_effect": "add",
     "add_effects": "add",
@@ -73,6 +75,7 @@ __all__ = [
     "Plan",
     "Run",
     "Sigma",
+    "Tolerance",
     "Twin",
     "add_effect",
     "add_effects",

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -25,6 +26,7 @@ __all__ = [
     "in_unit",
     "of_columns",
     "parameter_name",
+    "parse_kind",
     "parse_quantity",
     "short",
     "with_error",
@@ -121,18 +123,33 @@ def parse_quantity(label: str, kind: str, text: str) -> float:
     Raises:
         CrosscheckError: no number above zero with a unit of that kind.
     """
-    units = {name: u for u in UNITS if u.si == SI[kind] for name in (u.suffix, *u.also)}
-    words = f"{label}: expected a number with its unit ({', '.join(units)}) such as {EXAMPLE[kind]}"
+    return parse_kind(label, (kind,), text)[1]
+
+
+def parse_kind(label: str, kinds: Sequence[str], text: str) -> tuple[str, float]:
+    """A positive number with the unit of one of some kinds: which kind, and the number in SI.
+
+    Raises:
+        CrosscheckError: no number above zero with a unit of those kinds.
+    """
+    units = {
+        name: (kind, unit)
+        for kind in kinds for unit in UNITS if unit.si == SI[kind]
+        for name in (unit.suffix, *unit.also)
+    }  # fmt: skip
+    examples = " or ".join(EXAMPLE[kind] for kind in kinds)
+    words = f"{label}: expected a number with its unit ({', '.join(units)}) such as {examples}"
     match = _NUMBER.fullmatch(text)
     if match is None:
         raise CrosscheckError(f"{words}, got {text!r}")
-    value, unit = float(match.group(1)), match.group(2)
-    if unit not in units:
-        got = f"unit {unit!r}" if unit else "no unit"
+    value, name = float(match.group(1)), match.group(2)
+    if name not in units:
+        got = f"unit {name!r}" if name else "no unit"
         raise CrosscheckError(f"{words}, got {got} in {text!r}")
     if not (value > 0 and math.isfinite(value)):
         raise CrosscheckError(f"{label}: expected more than zero, got {text!r}")
-    return units[unit].to_si(value)
+    kind, unit = units[name]
+    return kind, unit.to_si(value)
 
 
 def short(value: float | None, digits: int = 3) -> str:

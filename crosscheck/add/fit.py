@@ -102,7 +102,8 @@ def _added(
     problem, notes = ready.problem, [*said, *ready.all_notes]
     if ready.refusal is not None:
         kind = UnsolvedError if ready.refusal.unsolved else CrosscheckError
-        raise kind(f"{data.path}: {ready.refusal}; {' + '.join(names)} was not fitted")
+        why = f"{ready.refusal}; {' + '.join(names)} was not fitted: {ready.refusal.remedy}"
+        raise kind(f"{data.path}: {why}")
     for layout in layouts:
         _refuse(problem, layout)
     progress(f"fitting {' + '.join(names)}", 0.0)

@@ -153,7 +153,8 @@ def calibrate(
     ready = prepare(robot, data, terms, considered(only, exclude))
     if ready.refusal is not None:
         kind = UnsolvedError if ready.refusal.unsolved else CrosscheckError
-        raise kind(f"{data.path}: {ready.refusal}; nothing was fitted")
+        why = f"{ready.refusal}; nothing was fitted: {ready.refusal.remedy}"
+        raise kind(f"{data.path}: {why}")
     # BLAS on several threads takes longer for matrices as narrow as these
     with threadpool_limits(limits=1, user_api="blas"):
         found = calibrated(ready.problem, terms, progress)

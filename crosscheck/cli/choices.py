@@ -29,6 +29,16 @@ exclude_option = click.option(
 )
 """``--exclude EFFECT,...``, given to the command as ``exclude``; see :func:`listed`."""
 
+tolerance_option = click.option(
+    "--tolerance",
+    "tolerances",
+    multiple=True,
+    metavar="0.1mm",
+    help="What is left beyond noise counts as missing from this size on (rms, such as 0.1mm, "
+    "0.05deg or 1N); may be repeated.  [default: half the noise]",
+)
+"""``--tolerance 0.1mm``, given to the command as ``tolerances``, a tuple of texts."""
+
 
 def listed(texts: Sequence[str]) -> list[str]:
     """Words of an option that may be repeated and holds several, separated by commas."""

@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from crosscheck.cli.choices import exclude_option, listed, only_option, sigma_option
+from crosscheck.cli.choices import (
+    exclude_option,
+    listed,
+    only_option,
+    sigma_option,
+    tolerance_option,
+)
 from seecr.cli.options import FILE, json_option, out_option, progress_share
 
 if TYPE_CHECKING:
@@ -24,6 +30,7 @@ if TYPE_CHECKING:
 @only_option
 @exclude_option
 @sigma_option
+@tolerance_option
 @click.option(
     "--model-out", type=FILE, metavar="M.toml", help="Write the model with what is missing added."
 )
@@ -43,6 +50,7 @@ def command(
     only: tuple[str, ...],
     exclude: tuple[str, ...],
     sigmas: tuple[str, ...],
+    tolerances: tuple[str, ...],
     model_out: Path | None,
     fail_on: tuple[str, ...],
     no_recording: bool,
@@ -58,7 +66,7 @@ def command(
     Exit status: 0 with a verdict, or none for want of data; 1 a verdict of --fail-on, 2 bad input,
     3 rows without an equilibrium.
     """
-    from crosscheck import DiagnosisVerdict, diagnose, load_measurements
+    from crosscheck import DiagnosisVerdict, Tolerance, diagnose, load_measurements
     from crosscheck.files import json_text, staged, write_text
     from crosscheck.given import considered
     from crosscheck.measurements.stated import with_stated
@@ -66,6 +74,7 @@ def command(
     from seecr import load_model, load_robot, new_model
 
     gates = [DiagnosisVerdict.named(word) for word in listed(fail_on)]
+    tolerance = Tolerance.parsed(tolerances)
     considered(listed(only), listed(exclude))  # a wrong name is told before any file is read
     machine = load_robot(robot)
     measured = with_stated(load_measurements(data, machine), sigmas)
@@ -73,8 +82,9 @@ def command(
     with staged(out) as folder:
         with progress_share("diagnosing") as progress:
             found = diagnose(
-                machine, measured, own, progress, only=listed(only), exclude=listed(exclude)
-            )
+                machine, measured, own, progress, only=listed(only), exclude=listed(exclude),
+                tolerance=tolerance,
+            )  # fmt: skip
         text = json_text(found.as_json())
         write_text(folder / "diagnosis.json", text + "\n")
         write_report(found, folder / "diagnosis.html")

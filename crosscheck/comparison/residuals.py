@@ -61,6 +61,7 @@ def compare(robot: GivenRobot, data: GivenData, model: GivenModel = ()) -> Compa
         whiteness=whiteness(problem, state.white, 0) if some else None,
         unsolved=tuple(_unsolved(problem, state)),
         notes=tuple(dict.fromkeys(notes)),
+        refusal=ready.refusal,
     )
 
 

@@ -16,6 +16,7 @@ from crosscheck.comparison.quantities import QuantityKind, channels
 from crosscheck.comparison.travel import Travel
 from crosscheck.fit.noise import Whiteness
 from crosscheck.fit.problem import BY_NAME, KINDS, Problem, Rms
+from crosscheck.fit.reasons import Refusal
 from crosscheck.fit.state import State
 from crosscheck.units import short
 from seecr.effects import Terms
@@ -125,6 +126,7 @@ class Comparison(Result):
         whiteness: is what is left noise; None where nothing could be compared.
         unsolved: rows that the model has no equilibrium for.
         notes: what was assumed, estimated or left out.
+        refusal: why the data are too little for a verdict; None where they are not.
     """
 
     problem: Problem
@@ -141,6 +143,7 @@ class Comparison(Result):
     whiteness: Whiteness | None
     unsolved: tuple[UnsolvedRow, ...]
     notes: tuple[str, ...]
+    refusal: Refusal | None = None
 
     @property
     def terms(self) -> Terms:
@@ -150,7 +153,9 @@ class Comparison(Result):
     @property
     def is_noise(self) -> bool:
         """Whether nothing speaks against what is left being noise of the stated size."""
-        return self.whiteness is not None and self.whiteness.is_noise
+        if self.whiteness is None or self.refusal is not None:
+            return False
+        return self.whiteness.is_noise
 
     @property
     def converged(self) -> bool:
@@ -177,6 +182,8 @@ class Comparison(Result):
         if w is None:
             why = f": {self.unsolved[0].why}" if self.unsolved else ""
             return f"Nothing could be compared{why}."
+        if w.is_noise and self.refusal is not None:
+            return f"No verdict: {self.refusal}; {self.refusal.remedy}."
         if w.is_noise:
             times = f"{w.scale:.2f} times the stated one"
             return f"Model and data agree: what is left is noise ({times})."

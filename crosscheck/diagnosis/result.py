@@ -15,6 +15,7 @@ from crosscheck.files import plain
 from crosscheck.fit.noise import Whiteness
 from crosscheck.fit.problem import Rms
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Refusal
+from crosscheck.fit.tolerance import LeftOver
 from crosscheck.fit.words import rms_words, value_lines, value_records
 from seecr.effects import Term, Terms
 from seecr.effects.base import Layout
@@ -130,6 +131,7 @@ class Diagnosis(Result):
         whiteness: of what is left.
         where: what the unexplained part goes with, the strongest first.
         refusal: why there is no verdict; None where there is one.
+        left: what is left beyond noise, and whether it matters; None without a verdict.
     """
 
     verdict: DiagnosisVerdict
@@ -146,6 +148,7 @@ class Diagnosis(Result):
     whiteness: Whiteness | None = None
     where: tuple[Association, ...] = ()
     refusal: Refusal | None = None
+    left: LeftOver | None = None
 
     @property
     def converged(self) -> bool:
@@ -164,6 +167,8 @@ class Diagnosis(Result):
             out.append(f"as it stands: {rms_words(self.before)}")
             out += [line for found in self.missing for line in found.lines()]
             out.append(f"noise alone: {rms_words(self.floor)}")
+        if self.left is not None:
+            out.append(f"left beyond noise: {self.left.words}")
         out += [f"note: {note}" for note in self.notes]
         return [*out, *(f"next: {line}" for line in self.measure_next)]
 
@@ -186,6 +191,7 @@ class Diagnosis(Result):
                 "after": self.after,
                 "held_out": self.held_out,
                 "noise_floor": self.floor,
+                "left_over": self.left,
                 "candidates": [candidate.as_json() for candidate in self.candidates],
                 "measure_next": self.measure_next,
                 "residual": None if self.whiteness is None else asdict(self.whiteness),

@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from crosscheck.comparison.associations import Association, associations
 from crosscheck.diagnosis.advice import check_of, measure_next
+from crosscheck.diagnosis.importance import weighed
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect, NotListed
 from crosscheck.diagnosis.rivals import rivals_of
 from crosscheck.diagnosis.search import Search, search
@@ -23,6 +24,7 @@ from crosscheck.fit.prepare import Prepared, Progress, noise_floor, outlying_row
 from crosscheck.fit.problem import Problem, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Refusal, Unfit, Why
 from crosscheck.fit.smooth import beyond_smooth
+from crosscheck.fit.tolerance import HALF_THE_NOISE, Tolerance
 from crosscheck.given import GivenModel, GivenRobot, considered, model_of, robot_of
 from crosscheck.measurements.read import GivenData, measurements_of
 from seecr.effects import Terms
@@ -47,6 +49,7 @@ def diagnose(
     *,
     only: Iterable[str] = (),
     exclude: Iterable[str] = (),
+    tolerance: Tolerance = HALF_THE_NOISE,
 ) -> Diagnosis:
     """Find the effects that a model misses.
 
@@ -57,6 +60,7 @@ def diagnose(
         progress: called with what is being done and the part of it that is done.
         only: names of the effects that may be missing; all of the catalogue without.
         exclude: names of effects that are not considered.
+        tolerance: from where on what is left beyond noise counts as missing.
 
     Raises:
         SeecrError: a file that cannot be read, or is of another robot.
@@ -68,7 +72,8 @@ def diagnose(
     # processors from the compiled loop
     with threadpool_limits(limits=1, user_api="blas"):
         ready = prepare(robot, data, terms, considered(only, exclude))
-        return _diagnosed(ready, terms, said, progress)
+        found = _diagnosed(ready, terms, said, progress)
+    return weighed(found, ready.problem, tolerance)
 
 
 Notes = tuple[str, ...]
@@ -116,6 +121,7 @@ def no_verdict(problem: Problem, base: Fit, notes: Sequence[str], refusal: Refus
         after=nothing,
         held_out=nothing,
         floor=noise_floor(problem),
+        measure_next=(refusal.remedy,),
         notes=tuple(notes),
         refusal=refusal,
     )

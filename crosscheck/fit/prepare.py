@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from crosscheck.fit.fitness import refusal_of
 from crosscheck.fit.held_out import blocks_note
 from crosscheck.fit.noise import estimate_sigma
 from crosscheck.fit.problem import Problem, Rms, rms_by_kind
@@ -20,10 +21,6 @@ from seecr.robot import Robot
 Progress = Callable[[str, float], None]
 """Called with what is being done and the part of it that is done, 0 to 1."""
 
-# More rows than this part without an answer, and the data are not fit for a verdict.
-_LOST = 0.05
-# Fewer readings than this say nothing.
-_LEAST_READINGS = 6
 # Rows that stick out by this many robust deviations, alone, are outliers.
 _OUTLIER = 6.0
 _MOST_OUTLIERS = 0.05
@@ -70,7 +67,8 @@ def prepare(
     problem = _solved_rows(problem, plain)
     problem, estimates = estimate_sigma(problem, problem.residuals(plain.readings))
     notes = (*data.notes, *problem.left_out, *estimates)
-    return Prepared(problem, notes, blocks_note(problem), _refusal(problem))
+    refusal = refusal_of(problem, plain.pose[:, :3], data.sigma)
+    return Prepared(problem, notes, blocks_note(problem), refusal)
 
 
 def _solved_rows(problem: Problem, plain: Prediction) -> Problem:
@@ -83,26 +81,6 @@ def _solved_rows(problem: Problem, plain: Prediction) -> Problem:
             lines = problem.data.places(rows & problem.use)
             problem = problem.without(rows, f"lines {lines} left out: {words}")
     return problem
-
-
-def _refusal(problem: Problem) -> Refusal | None:
-    n, readings = int(problem.data.read.sum()), problem.n_readings
-    lost = n - int(problem.use.sum())
-    checks = (
-        (lost > max(_LOST * n, 1), Unfit.NO_EQUILIBRIUM),
-        (readings < _LEAST_READINGS, Unfit.FEW_READINGS),
-        (_constant_commands(problem), Unfit.CONSTANT_COMMANDS),
-    )
-    return next((Refusal(unfit, n, lost, readings) for bad, unfit in checks if bad), None)
-
-
-def _constant_commands(problem: Problem) -> bool:
-    commands = problem.experiment.commands
-    table = commands.pose if commands.lengths is None else commands.lengths
-    if commands.loads is not None:
-        table = np.concatenate([table, commands.loads.kinds[:, None]], axis=1)
-    table = table[problem.use]
-    return len(table) > 1 and bool(np.all(np.ptp(table, axis=0) == 0))
 
 
 def noise_floor(problem: Problem, state: State | None = None, scale: float = 1.0) -> Rms:

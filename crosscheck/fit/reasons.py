@@ -89,8 +89,31 @@ class Unfit(Enum):
     NO_READINGS = "the data hold no readings"
     NO_EQUILIBRIUM = "{lost} of {rows} rows have no equilibrium to compare with; see the notes"
     FEW_READINGS = "only {readings} readings are left"
+    FEW_POSES = "only {rows} poses were measured, counting a pause once: too few to tell effects"
     CONSTANT_COMMANDS = "all commands are the same: nothing tells effects apart"
+    FROZEN_READINGS = "all readings are the same though the commands differ"
+    CONTRADICTION = (
+        "readings contradict each other: lines {lines} have the same command and are far apart, "
+        "and they are not alone"
+    )
     UNSOLVED_MODEL = "rows could not be solved with the model's values"
+
+
+_MORE_POSES = (
+    "add poses spread over the workspace, tilted ones too, in three runs or more; crosscheck plan "
+    "says which show most"
+)
+_REMEDIES = {
+    Unfit.NO_READINGS: "add readings: positions, angles or tensions of each pose",
+    Unfit.NO_EQUILIBRIUM: "check the commands of the rows named in the notes, and the robot's file",
+    Unfit.FEW_READINGS: _MORE_POSES,
+    Unfit.FEW_POSES: _MORE_POSES,
+    Unfit.CONSTANT_COMMANDS: _MORE_POSES,
+    Unfit.FROZEN_READINGS: "check that the tracker followed the platform, and read the poses again",
+    Unfit.CONTRADICTION: "read these poses again, leave out the wrong rows, or, where the tracker "
+    "or the winches were set up anew in between, give each set-up a file of its own",
+    Unfit.UNSOLVED_MODEL: "check the model's values and the robot's file",
+}
 
 
 @dataclass(frozen=True)
@@ -100,12 +123,19 @@ class Refusal:
     Attributes:
         unfit: what is the matter.
         rows: of the data. lost: those without an equilibrium. readings: that are left.
+        lines: of the file that show it.
     """
 
     unfit: Unfit
     rows: int = 0
     lost: int = 0
     readings: int = 0
+    lines: str = ""
+
+    @property
+    def remedy(self) -> str:
+        """What to do about it."""
+        return _REMEDIES[self.unfit]
 
     @property
     def unsolved(self) -> bool:
@@ -115,7 +145,9 @@ class Refusal:
         return self.unfit in (Unfit.NO_EQUILIBRIUM, Unfit.UNSOLVED_MODEL)
 
     def __str__(self) -> str:
-        return self.unfit.value.format(rows=self.rows, lost=self.lost, readings=self.readings)
+        return self.unfit.value.format(
+            rows=self.rows, lost=self.lost, readings=self.readings, lines=self.lines
+        )
 
 
 class DiagnosisVerdict(StrEnum):

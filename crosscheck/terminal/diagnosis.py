@@ -32,6 +32,8 @@ def print_diagnosis(found: Diagnosis, out: Path, console: Console | None = None)
         say(console, f"note: {note}", "dim")
     if found.verdict is not DiagnosisVerdict.NO_VERDICT:
         console.print(_way(found))
+        if found.left is not None:
+            say(console, f"left beyond noise: {found.left.words}", "dim")
         for finding in found.missing:
             _print_finding(console, finding)
         _print_candidates(console, found)

@@ -83,6 +83,8 @@ def test_from_the_command_line(tmp_path: Path) -> None:
     for command in ("diagnose", "calibrate"):
         words = refused(command, xml, data, "--only", "puley_radius", "--model", model)
         assert "no effect 'puley_radius'; known, nearest first: pulley_radius" in words
+    words = refused("diagnose", xml, data, "--tolerance", "0.1kg")
+    assert "got unit 'kg' in '0.1kg'" in words and "0.5mm or 0.2deg or 1N" in words
     for command in (("compare",), ("diagnose",), ("calibrate",), ("add", "stiffness")):
         words = refused(*command, xml, data, "--sigma", "position=1N", "--model", model)
         assert "got unit 'N' in '1N'" in words

@@ -1,0 +1,123 @@
+"""Importance beside significance: how large is what is left beyond noise, and does it matter?
+
+Many rows show structure that is a few hundredths of the noise. It counts as missing where it
+matters: above a tolerance that the user states, else above half the noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from crosscheck.errors import CrosscheckError
+from crosscheck.fit.problem import KINDS, Problem, Rms
+from crosscheck.fit.words import rms_words
+from crosscheck.units import SI, parse_kind
+
+__all__ = ["HALF_THE_NOISE", "LeftOver", "Tolerance", "doubt_of", "left_over"]
+
+# What is smaller than this part of the noise does not matter, where nobody says what does.
+_PART = 0.5
+# The size of the noise is known to so many standard errors of the mean square.
+_DOUBT = 2.0
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """How large an error that noise does not explain has to be to matter; rms, by kind.
+
+    Attributes:
+        position_m, orientation_rad, tension_N: None where half the noise is the limit.
+    """
+
+    position_m: float | None = None
+    orientation_rad: float | None = None
+    tension_N: float | None = None
+
+    @classmethod
+    def parsed(cls, texts: Iterable[str]) -> Tolerance:
+        """From quantities such as ``0.1mm``, ``0.05deg`` and ``1N``; the unit says the kind.
+
+        Raises:
+            CrosscheckError: no quantity, one in another unit, or two of a kind.
+        """
+        values: dict[str, float] = {}
+        for text in texts:
+            kind, value = parse_kind("--tolerance", ("position", "orientation", "tension"), text)
+            key = f"{kind}_{SI[kind]}"
+            if key in values:
+                raise CrosscheckError(f"--tolerance {text}: another one for the {kind} was given")
+            values[key] = value
+        return cls(**values)
+
+
+HALF_THE_NOISE = Tolerance()
+"""What matters where nobody says it."""
+
+
+@dataclass(frozen=True)
+class LeftOver:
+    """What a model leaves that noise does not explain.
+
+    Attributes:
+        size: its rms by kind, keys as in :class:`crosscheck.fit.problem.Kind`; 0 where noise
+            explains all, None where nothing was read.
+        limit: from where on it matters.
+        important: whether it does, for some kind.
+    """
+
+    size: Rms
+    limit: Rms
+    important: bool
+
+    @property
+    def words(self) -> str:
+        """How large it is and what would matter, in a few words."""
+        return f"{rms_words(self.size)} (what matters: {rms_words(self.limit)})"
+
+    def as_json(self) -> dict[str, Any]:
+        """``left_over`` of ``diagnosis.json``, SI."""
+        return {"size": self.size, "tolerance": self.limit, "important": self.important}
+
+
+def left_over(
+    rms: Rms, noise: Rms, tolerance: Tolerance, doubt: Mapping[str, float] | None = None
+) -> LeftOver:
+    """What errors are beyond the noise, and whether that matters.
+
+    Args:
+        rms: of what the model leaves, by kind. noise: what noise alone would leave.
+        tolerance: what the user said.
+        doubt: by kind, the relative standard error of a mean square of noise; see
+            :func:`doubt_of`. What chance may add to the noise does not count as important.
+    """
+    size: Rms = {}
+    limit: Rms = {}
+    important = False
+    for kind in KINDS:
+        error, floor = rms.get(kind.key), noise.get(kind.key)
+        if error is None or floor is None:
+            size[kind.key] = limit[kind.key] = None
+            continue
+        said = getattr(tolerance, kind.sigma)
+        most = _PART * floor if said is None else float(said)
+        beyond = error**2 - floor**2
+        chance = _DOUBT * (doubt or {}).get(kind.key, 0.0) * floor**2
+        size[kind.key], limit[kind.key] = float(np.sqrt(max(beyond, 0.0))), most
+        important = important or beyond - chance > most**2
+    return LeftOver(size, limit, important)
+
+
+def doubt_of(problem: Problem, correlation: float = 0.0) -> dict[str, float]:
+    """By kind, the relative standard error of the mean square of its noise.
+
+    Of n readings, sqrt(2/n); along a run with the correlation rho from one to the next they
+    count for n (1 - rho^2)/(1 + rho^2) (Bartlett 1946).
+    """
+    rho2 = float(np.clip(correlation, 0.0, 0.98)) ** 2
+    counts = {kind.key: int(problem.counted[:, kind.columns].sum()) for kind in KINDS}
+    part = (1.0 - rho2) / (1.0 + rho2)
+    return {key: float(np.sqrt(2.0 / (part * n))) for key, n in counts.items() if n}

@@ -1,0 +1,114 @@
+"""Data that cannot carry a verdict get none, with the reason and what to do."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from made_data import case, refused, run
+from made_diagnoses import SIGMA, readings, robot
+
+from crosscheck.calibration.result import calibrate
+from crosscheck.diagnosis.verdict import diagnose
+from crosscheck.errors import CrosscheckError
+from crosscheck.fit.prepare import prepare
+from crosscheck.fit.reasons import DiagnosisVerdict, Unfit
+from crosscheck.measurements.data import Measurements, Sigma
+from seecr.effects import Terms
+
+
+@pytest.fixture(scope="module")
+def data() -> Measurements:
+    return readings(radius_m=0.01)
+
+
+def unfit(data: Measurements) -> Unfit | None:
+    refusal = prepare(robot(), data, Terms()).refusal
+    return None if refusal is None else refusal.unfit
+
+
+def with_position(data: Measurements, position: np.ndarray) -> Measurements:
+    return replace(data, position=position)
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 5])
+def test_two_to_five_rows_carry_no_verdict(data: Measurements, count: int) -> None:
+    few = data.rows(slice(0, count))
+    found = diagnose(robot(), few)
+    assert found.verdict is DiagnosisVerdict.NO_VERDICT and found.converged
+    assert f"only {count} poses were measured" in found.sentence
+    assert "add poses spread over the workspace" in found.measure_next[0]
+    with pytest.raises(CrosscheckError, match=f"only {count} poses .* add poses spread") as error:
+        calibrate(robot(), few)
+    assert error.value.exit_status == 2
+
+
+def test_a_pause_counts_once_and_a_way_back_again(data: Measurements) -> None:
+    assert unfit(data.rows(slice(0, 6))) is None
+    assert unfit(data.rows(np.repeat(np.arange(5), 10))) is Unfit.FEW_POSES
+    assert unfit(data.rows([0, 1, 2, 1, 0, 1, 2, 1])) is None
+
+
+def test_rows_that_are_all_alike_carry_no_verdict(data: Measurements) -> None:
+    assert unfit(data.rows(np.zeros(20, dtype=int))) is Unfit.CONSTANT_COMMANDS
+    assert data.quat_wxyz is not None
+    frozen = replace(
+        data, position=np.tile(data.position[:1], (data.n_rows, 1)),
+        quat_wxyz=np.tile(data.quat_wxyz[:1], (data.n_rows, 1)),
+        tensions=np.tile(data.tensions[:1], (data.n_rows, 1)),
+    )  # fmt: skip
+    assert unfit(frozen) is Unfit.FROZEN_READINGS
+    assert unfit(replace(frozen, tensions=data.tensions)) is None
+
+
+def twice(data: Measurements, off: float) -> Measurements:
+    """Each row read twice without motion in between, the second time off by so much."""
+    both = data.rows(np.repeat(np.arange(data.n_rows), 2))
+    shift = np.where(np.arange(both.n_rows) % 2, off, 0.0)
+    return with_position(both, both.position + shift[:, None] * [0.0, 0.0, 1.0])
+
+
+def test_readings_at_rest_that_are_far_apart_contradict_each_other(data: Measurements) -> None:
+    assert SIGMA.position_m is not None
+    assert unfit(twice(data, 3.0 * SIGMA.position_m)) is None
+    apart = twice(data, 40.0 * SIGMA.position_m)
+    assert unfit(apart) is Unfit.CONTRADICTION
+    found = diagnose(robot(), apart)
+    assert found.verdict is DiagnosisVerdict.NO_VERDICT
+    assert "readings contradict each other: lines " in found.sentence
+    assert "read these poses again" in found.measure_next[0]
+    # noise that nobody stated may be that large
+    assert unfit(replace(apart, sigma=Sigma())) is None
+
+
+def test_one_row_in_ten_may_be_far_off(data: Measurements) -> None:
+    both = twice(data, 0.0)
+    position = both.position.copy()
+    position[1::20, 2] += 0.1
+    assert unfit(with_position(both, position)) is None
+
+
+def test_two_runs_that_do_not_agree_contradict_each_other(data: Measurements) -> None:
+    n = data.n_rows
+    both = data.rows(np.tile(np.arange(n), 2))
+    names = np.concatenate([data.run, [f"{name} again" for name in data.run]])
+    both = replace(both, run=names, sigma=Sigma())
+    shift = np.repeat([0.0, 1.0], n)[:, None] * [1.0, 0.0, 0.0]
+    # a tracker that was moved by a little is something to find, by a part of the way it is not
+    assert unfit(with_position(both, both.position + 1e-3 * shift)) is None
+    assert unfit(with_position(both, both.position + 0.3 * shift)) is Unfit.CONTRADICTION
+
+
+def test_from_the_command_line(tmp_path: Path) -> None:
+    xml, data = case(tmp_path, points=3)
+    lines = data.read_text().splitlines()
+    data.write_text("\n".join(lines[:5]) + "\n")
+    done = run("diagnose", xml, data, "--out", tmp_path / "out", "--no-recording")
+    assert done.exit_code == 0 and "no_verdict: No verdict: only 4 poses" in done.stdout
+    assert "next: add poses spread over the workspace" in done.stdout
+    done = run("compare", xml, data, "--out", tmp_path / "out", "--no-recording")
+    assert "No verdict: only 4 poses were measured" in done.stdout and "agree" not in done.stdout
+    words = refused("calibrate", xml, data, "--model", tmp_path / "m.toml")
+    assert "only 4 poses were measured" in words and not (tmp_path / "m.toml").exists()
