@@ -7,7 +7,7 @@ from typing import Any
 
 from crosscheck.fit.noise import Whiteness
 from crosscheck.fit.problem import Rms
-from crosscheck.fit.words import rms_words, value_lines, value_records
+from crosscheck.fit.words import fitted_lines, fitted_records, rms_words
 from crosscheck.model.write import Fitted
 from seecr.effects import Terms
 from seecr.result import Record, Result
@@ -70,19 +70,13 @@ class Addition(Result):
             f"{self.name} {worth} on runs left out: {left[0]} before, {left[1]} with it",
             f"on all rows: {rms_words(self.before)} before, {rms_words(self.after)} with it",
         ]
-        for one in self.fitted:
-            values = value_lines(one.term.layout, one.term.vector, one.stderr, one.at_bound)
-            out += [f"{one.term.name}: {line}" for line in values]
+        out += fitted_lines(self.fitted)
         out += [f"warning: {warning}" for warning in self.warnings]
         return [*out, *(f"note: {note}" for note in self.notes)]
 
     def records(self) -> list[Record]:
         """A record for each parameter of the new model: value and standard error, SI."""
-        return [
-            record
-            for one in self.fitted
-            for record in value_records(one.term.layout, one.term.vector, one.stderr, one.at_bound)
-        ]
+        return fitted_records(self.fitted)
 
     def as_json(self) -> dict[str, Any]:
         """The content of ``add.json``, in SI."""

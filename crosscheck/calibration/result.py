@@ -14,7 +14,7 @@ from crosscheck.calibration.calibrate import calibrate as calibrated
 from crosscheck.errors import CrosscheckError, UnsolvedError
 from crosscheck.fit.prepare import Progress, prepare
 from crosscheck.fit.problem import KINDS, Rms, kinds_read
-from crosscheck.fit.words import rms_words, value_lines, value_records
+from crosscheck.fit.words import fitted_lines, fitted_records, rms_words
 from crosscheck.given import GivenModel, GivenRobot, considered, model_of, robot_of
 from crosscheck.measurements.read import GivenData, measurements_of
 from crosscheck.model.write import Fitted
@@ -93,19 +93,11 @@ class Calibrated(Result):
 
     def value_lines(self) -> list[str]:
         """A line for each parameter, its standard error beside it."""
-        return [
-            f"{one.term.name}: {line}"
-            for one in self.fitted
-            for line in value_lines(one.term.layout, one.term.vector, one.stderr, one.at_bound)
-        ]
+        return fitted_lines(self.fitted)
 
     def records(self) -> Sequence[Record]:
         """A record for each parameter: value and standard error, SI."""
-        return [
-            record
-            for one in self.fitted
-            for record in value_records(one.term.layout, one.term.vector, one.stderr, one.at_bound)
-        ]
+        return fitted_records(self.fitted)
 
     def as_json(self) -> dict[str, Any]:
         """The content of ``calibration.json``, in SI."""

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.fit.problem import KINDS, Rms
+from crosscheck.model.write import Fitted
 from crosscheck.units import in_unit, parameter_name, short
 from seecr.effects.base import Layout
 from seecr.pose import Array
@@ -61,3 +62,21 @@ def value_records(
             "unit": unit,
             "at_bound": bool(bound),
         }
+
+
+def fitted_lines(fitted: Iterable[Fitted]) -> list[str]:
+    """A line for each parameter of effects that were fitted together, under their names."""
+    return [
+        f"{one.term.name}: {line}"
+        for one in fitted
+        for line in value_lines(one.term.layout, one.term.vector, one.stderr, one.at_bound)
+    ]
+
+
+def fitted_records(fitted: Iterable[Fitted]) -> list[Record]:
+    """A record for each of their parameters: value and standard error, SI."""
+    return [
+        record
+        for one in fitted
+        for record in value_records(one.term.layout, one.term.vector, one.stderr, one.at_bound)
+    ]

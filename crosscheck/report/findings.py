@@ -57,11 +57,6 @@ class FindingCard:
         """Of its table of parameters."""
         return 1 if len(self.parameters) <= _ONE_COLUMN else 2
 
-    @property
-    def doubts(self) -> int:
-        """How many parameters have flags."""
-        return sum(1 for row in self.parameters if row.flags)
-
 
 def finding_card(found: Diagnosis, finding: MissingEffect) -> FindingCard:
     """A finding as the page shows it."""
