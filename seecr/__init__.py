@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from seecr.experiment import Experiment, Prediction, predict
     from seecr.inverse import Correction, correct
     from seecr.loads import Loads
+    from seecr.maps import Workspace, boundary, default_axes, workspace_map
     from seecr.mjcf import load_robot
     from seecr.model import Model, load_model, new_model
     from seecr.planar import bar_tilt, midline_point, solution_manifold
@@ -49,7 +50,7 @@ if TYPE_CHECKING:
     from seecr.setup import Setup
     from seecr.shipped import model_names, model_path
     from seecr.solution import Solution, Status
-    from seecr.workspace import Zone, feasible, slack_zones
+    from seecr.workspace import Zone, feasible, slack_zones, tension_margin
 
 __version__ = "0.1.0"
 
@@ -65,6 +66,7 @@ _MODULES = {
     "experiment": ("Experiment", "Prediction", "predict"),
     "loads": ("Loads",),
     "inverse": ("Correction", "correct"),
+    "maps": ("Workspace", "boundary", "default_axes", "workspace_map"),
     "mjcf": ("load_robot",),
     "model": ("Model", "load_model", "new_model"),
     "planar": ("bar_tilt", "midline_point", "solution_manifold"),
@@ -73,7 +75,7 @@ _MODULES = {
     "setup": ("Setup",),
     "solution": ("Solution", "Status"),
     "shipped": ("model_names", "model_path"),
-    "workspace": ("Zone", "feasible", "slack_zones"),
+    "workspace": ("Zone", "feasible", "slack_zones", "tension_margin"),
 }  # fmt: skip
 _WHERE = {name: module for module, names in _MODULES.items() for name in names}
 
@@ -99,10 +101,13 @@ __all__ = [
     "Status",
     "Term",
     "Terms",
+    "Workspace",
     "Zone",
     "bar_tilt",
+    "boundary",
     "catalogue",
     "correct",
+    "default_axes",
     "effect_named",
     "feasible",
     "layout_of",
@@ -118,6 +123,8 @@ __all__ = [
     "slack_zones",
     "solution_manifold",
     "solve",
+    "tension_margin",
+    "workspace_map",
 ]
 
 

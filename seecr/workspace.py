@@ -19,6 +19,7 @@ from seecr.joints import motion_columns, values_of_pose
 from seecr.pose import Array, quat_rotate, transform_points
 from seecr.robot import Robot
 from seecr.solution import Solution
+from seecr.threads import in_parts
 
 # Part of the load that may stay unbalanced: rounding of the tensions found.
 _BALANCED = 1e-9
@@ -59,7 +60,112 @@ def feasible(
     Returns:
         (n,) bool.
     """
-    return unbalanced(robot, poses, wrench=wrench, lowest=lowest, highest=highest) < _BALANCED
+    margin = tension_margin(robot, poses, wrench=wrench, lowest=lowest, highest=highest)
+    return np.asarray(margin >= -_BALANCED * load_scale(robot))
+
+
+def tension_margin(
+    robot: Robot,
+    poses: ArrayLike,
+    *,
+    wrench: ArrayLike | None = None,
+    wrenches: ArrayLike | None = None,
+    lowest: ArrayLike = 0.0,
+    highest: ArrayLike = np.inf,
+) -> Array:
+    """How far inside their bounds all tensions can stay that balance the load [N].
+
+    Exact: the largest t with lowest + t <= tau <= highest - t and W tau + w_e = 0; below zero
+    where the load cannot be balanced. Infinite where cables can be tightened without end.
+
+    Args:
+        robot: whose mass, centre of mass and gravity are the load.
+        poses: (n, 7) or (7,), where the platform really is.
+        wrench: (6,) or (n, 6) external force [N] at the platform origin and moment [N m].
+        wrenches: (k, 6) instead: a set of which each must be balanced, and so can all between
+            them; the least margin counts.
+        lowest: (m,) or one [N], not negative.
+        highest: (m,) or one [N]; infinite for none.
+
+    Returns:
+        (n,) [N]; minus infinity where W has no inverse, or too few cables, and the load is out
+        of what the cables can pull.
+    """
+    from seecr.compiled.margin import margins_at, margins_of  # takes a while to import
+
+    places = np.ascontiguousarray(_poses(poses))
+    low, high = tension_limits(robot, lowest, highest)
+    if wrench is not None:
+        wrench = _wrench(wrench, len(places))
+    out = np.full(len(places), np.nan)
+    scale = load_scale(robot)
+    if robot.n_cables < robot.n_dof:
+        pass
+    elif robot.joints or (wrench is not None and np.ndim(wrench) == 2):
+        matrices, loads = _loads(robot, places, wrench, wrenches)
+        in_parts(
+            lambda part: margins_of(matrices[part], loads[part], low, high, scale, out[part]),
+            len(places),
+        )
+    else:
+        some = np.zeros((1, 6)) if wrenches is None else _wrenches(wrenches)
+        some = some if wrench is None else some + _wrenches(wrench)
+        in_parts(
+            lambda part: margins_at(
+                places[part], robot.exit_points, robot.anchor_points, robot.centre_of_mass,
+                robot.mass * robot.gravity, some, low, high, robot.length, scale, out[part],
+            ),
+            len(places),
+        )  # fmt: skip
+    odd = np.flatnonzero(np.isnan(out))
+    if len(odd):
+        out[odd] = _by_search(*_loads(robot, places[odd], _rows(wrench, odd), wrenches), low, high)
+    return out
+
+
+def load_scale(robot: Robot) -> float:
+    """Load [N] that rounding is measured against: the weight, or a thousandth of E S."""
+    return robot.weight or 1e-3 * float(np.max(robot.ea))
+
+
+def _loads(
+    robot: Robot, poses: Array, wrench: ArrayLike | None, wrenches: ArrayLike | None
+) -> tuple[Array, Array]:
+    """Equations of balance for every wrench of a set: (n, d, m) and (n, k, d)."""
+    matrix, load = balance_equations(robot, poses, wrench)
+    if wrenches is None:
+        return np.ascontiguousarray(matrix), load[:, None]
+    every = [balance_equations(robot, poses, one)[1] for one in _wrenches(wrenches)]
+    at_rest = balance_equations(robot, poses)[1]
+    return np.ascontiguousarray(matrix), np.stack(every, axis=1) + (load - at_rest)[:, None]
+
+
+def _by_search(matrices: Array, loads: Array, low: Array, high: Array) -> Array:
+    """Margins (n,) where W has no inverse: zero where a search finds tensions, else none."""
+    return np.array(
+        [
+            0.0 if all(balanced(w, load, low, high)[1] < _BALANCED for load in some) else -np.inf
+            for w, some in zip(matrices, loads, strict=True)
+        ]
+    )
+
+
+def _wrench(value: ArrayLike, n: int) -> Array:
+    wrench = np.asarray(value, float)
+    if wrench.shape not in ((6,), (n, 6)) or not np.all(np.isfinite(wrench)):
+        raise InputError(f"wrench must be (6,) or ({n}, 6) finite numbers, got {wrench.shape}")
+    return wrench
+
+
+def _wrenches(values: ArrayLike) -> Array:
+    some = np.atleast_2d(np.asarray(values, float))
+    if some.ndim != 2 or some.shape[1] != 6 or not np.all(np.isfinite(some)):
+        raise InputError(f"wrenches must be (k, 6) finite numbers [N, N m], got {np.shape(values)}")
+    return some
+
+
+def _rows(wrench: ArrayLike | None, rows: NDArray[np.intp]) -> ArrayLike | None:
+    return wrench if wrench is None or np.ndim(wrench) < 2 else np.asarray(wrench)[rows]
 
 
 def unbalanced(
@@ -109,9 +215,7 @@ def balance_equations(
 ) -> tuple[Array, Array]:
     """Equations of balance W tau = load, (n, d, m) and (n, d), torques over the length."""
     n = len(poses)
-    outer = np.zeros(6) if wrench is None else np.asarray(wrench, float)
-    if outer.shape not in ((6,), (n, 6)) or not np.all(np.isfinite(outer)):
-        raise InputError(f"wrench must be (6,) or ({n}, 6) finite numbers, got {outer.shape}")
+    outer = np.zeros(6) if wrench is None else _wrench(wrench, n)
     weight = robot.mass * robot.gravity
     arm = quat_rotate(poses[:, 3:], robot.centre_of_mass)
     load = outer + np.concatenate([np.tile(weight, (n, 1)), np.cross(arm, weight)], axis=1)

@@ -11,6 +11,7 @@ from seecr.cli.group import LazyGroup
 COMMANDS: dict[str, tuple[str, str]] = {
     "pose": ("pose", "Where the platform rests at one command, and how each cable pulls."),
     "sweep": ("sweep", "The same for many commands: a line, a grid, a file."),
+    "map": ("workspace", "Workspaces: where the platform can be held, and where it comes to."),
     "correct": ("correct", "What to tell the winches so that the platform comes to wanted poses."),
 }
 

@@ -14,6 +14,9 @@ import click
 from seecr.cli.options import FILE
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from seecr import Model, Robot
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -83,3 +86,28 @@ def model_at(given: Path | None, robot: Robot) -> Model | None:
     from seecr import load_model
 
     return None if given is None else load_model(given, robot)
+
+
+def axis_of(text: str) -> NDArray[np.float64]:
+    """One axis of a grid: FIRST:LAST:COUNT or one number.
+
+    Raises:
+        InputError: it is neither.
+    """
+    import numpy as np
+
+    from seecr import InputError
+
+    parts = text.split(":")
+    try:
+        if len(parts) == 1:
+            return np.array([float(text)])
+        first, last, count = float(parts[0]), float(parts[1]), int(parts[2])
+        if len(parts) != 3 or count < 1:
+            raise ValueError
+    except (ValueError, IndexError):
+        raise InputError(
+            f"--grid: expected FIRST:LAST:COUNT with a count above zero, or one number [m], "
+            f"got {text!r}"
+        ) from None
+    return np.linspace(first, last, count)

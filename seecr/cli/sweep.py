@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from seecr.cli.arguments import NumbersCommand, model_at, robot_at, robot_options
+from seecr.cli.arguments import NumbersCommand, axis_of, model_at, robot_at, robot_options
 from seecr.cli.options import FILE, json_option, out_option
 
 if TYPE_CHECKING:
@@ -154,28 +154,7 @@ def _along(robot: Robot, given: dict[str, Any]) -> NDArray[np.float64]:
     if given["line"]:
         places = np.linspace(given["line"][:3], given["line"][3:], given["count"])
     else:
-        axes = [_axis(text) for text in given["grid"]]
+        axes = [axis_of(text) for text in given["grid"]]
         places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     turned = given["turned"] or robot.reference_pose[3:]
     return commanded_poses(np.column_stack([places, np.tile(turned, (len(places), 1))]))
-
-
-def _axis(text: str) -> NDArray[np.float64]:
-    """One axis of a grid."""
-    import numpy as np
-
-    from seecr import InputError
-
-    parts = text.split(":")
-    try:
-        if len(parts) == 1:
-            return np.array([float(text)])
-        first, last, count = float(parts[0]), float(parts[1]), int(parts[2])
-        if len(parts) != 3 or count < 1:
-            raise ValueError
-    except (ValueError, IndexError):
-        raise InputError(
-            f"--grid: expected FIRST:LAST:COUNT with a count above zero, or one number [m], "
-            f"got {text!r}"
-        ) from None
-    return np.linspace(first, last, count)

@@ -8,11 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from seecr.errors import InputError
+from seecr.maps import Workspace
 from seecr.pose import Array
 from seecr.solution import Solution
 
-__all__ = ["figure", "sweep_figure"]
+__all__ = ["figure", "map_figure", "sweep_figure"]
 
 # Okabe and Ito (2008), "Color Universal Design".
 COLOURS = (
@@ -144,3 +147,100 @@ def _slack(ax: Any, solution: Solution, at: Array, mark: dict[str, Any]) -> None
     ax.set_ylabel("slack cables")
     ax.set_ylim(-0.3, solution.robot.n_cables + 0.3)
     ax.yaxis.get_major_locator().set_params(integer=True)
+
+
+def map_figure(path: Path, found: Workspace, most: int = 4) -> None:
+    """Slices of a workspace: what can be held, slack cables, deviation and tilt at rest.
+
+    Args:
+        path: the file.
+        found: the workspace, with two or three axes of more than one value.
+        most: slices drawn; they lie across the last axis, or that with one value.
+
+    Raises:
+        InputError: a grid that goes along fewer than two axes.
+    """
+    lengths = [len(axis) for axis in found.axes]
+    if sum(n > 1 for n in lengths) < 2:
+        raise InputError("a figure of a map needs at least two axes with more than one value")
+    across = 2 if min(lengths) > 1 else int(np.argmin(lengths))
+    wide, high = (k for k in range(3) if k != across)
+    picked = np.unique(np.linspace(0, lengths[across] - 1, most + 2).round().astype(int)[1:-1])
+    panels = [_held_panel]
+    if np.any(found.rests):
+        panels += [_slack_panel, _away_panel, _turn_panel]
+    size = (0.9 + 2.9 * len(picked), 0.5 + 2.3 * len(panels))
+    extents = 1e3 * found.axes[wide], 1e3 * found.axes[high]
+    with figure(path, len(panels), len(picked), sharex=True, sharey=True, figsize=size) as axes:
+        for row, panel in zip(axes, panels, strict=True):
+            number = np.arange(found.margin.size).reshape(lengths)
+            slices = [np.take(number, k, across) for k in picked]
+            shown = panel(found, row, *extents, slices)
+            row[0].figure.colorbar(shown, ax=list(row), **_bar_of(panel, found))
+            row[0].set_ylabel(f"{'xyz'[high]} [mm]")
+        for k, ax in zip(picked, axes[0], strict=True):
+            ax.set_title(f"{'xyz'[across]} = {1e3 * found.axes[across][k]:.4g} mm")
+        for ax in axes[-1]:
+            ax.set_xlabel(f"{'xyz'[wide]} [mm]")
+
+
+Slices = list[NDArray[np.intp]]
+
+
+def _bar_of(panel: Any, found: Workspace) -> dict[str, Any]:
+    words = {
+        _held_panel: "tension margin [N]", _slack_panel: "slack cables",
+        _away_panel: "off its command [mm]", _turn_panel: "turned [°]",
+    }  # fmt: skip
+    more = {"ticks": np.arange(found.robot.n_cables + 1)} if panel is _slack_panel else {}
+    return {"label": words[panel], "shrink": 0.9, **more}
+
+
+def _held_panel(found: Workspace, row: Any, x: Array, y: Array, slices: Slices) -> Any:
+    """The margin where poses can be held, with the workspace's boundary."""
+    flat = np.where(found.feasible, found.margin, np.nan).ravel()
+    finite = flat[np.isfinite(flat)]
+    # margins of poses far below the exit points grow without end and would hide the others
+    top = float(np.quantile(finite, 0.95)) if len(finite) else 1.0
+    return _colours(row, x, y, [flat[k] for k in slices], 0.0, top or 1.0)
+
+
+def _slack_panel(found: Workspace, row: Any, x: Array, y: Array, slices: Slices) -> Any:
+    import matplotlib
+
+    count = np.where(found.rests, found.slack, np.nan).ravel()
+    m = found.robot.n_cables
+    steps = matplotlib.colormaps["viridis_r"].resampled(m + 1)
+    return _colours(row, x, y, [count[k] for k in slices], -0.5, m + 0.5, steps, found, slices)
+
+
+def _away_panel(found: Workspace, row: Any, x: Array, y: Array, slices: Slices) -> Any:
+    away = 1e3 * np.linalg.norm(found.deviation, axis=-1).ravel()
+    return _colours(row, x, y, [away[k] for k in slices], 0.0, _top(away), None, found, slices)
+
+
+def _turn_panel(found: Workspace, row: Any, x: Array, y: Array, slices: Slices) -> Any:
+    turn = np.degrees(np.linalg.norm(found.rotation, axis=-1)).ravel()
+    return _colours(row, x, y, [turn[k] for k in slices], 0.0, _top(turn), None, found, slices)
+
+
+def _top(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.quantile(known, 0.95)) or 1.0 if len(known) else 1.0
+
+
+def _colours(
+    row: Any, x: Array, y: Array, values: list[Array], low: float, high: float,
+    colours: Any = None, found: Workspace | None = None, slices: Slices | None = None,
+) -> Any:  # fmt: skip
+    """Coloured cells of each slice; with the workspace's boundary over them where it is given."""
+    shown = None
+    for k, (ax, value) in enumerate(zip(row, values, strict=True)):
+        shown = ax.pcolormesh(x, y, value.T, vmin=low, vmax=high, cmap=colours, shading="nearest")
+        if found is not None and slices is not None:
+            inside = np.clip(found.margin.ravel()[slices[k]].T, -1e3, 1e3)
+            if inside.min() < 0.0 < inside.max():
+                ax.contour(x, y, inside, levels=[0.0], colors="#D55E00", linewidths=1.2)
+        ax.set_aspect("equal")
+        ax.grid(False)
+    return shown

@@ -110,3 +110,14 @@ def test_correct_writes_commands_that_every_command_reads(tmp_path: Path) -> Non
     lost = run(*args, "--lowest", "50", "--highest", "51", "--out", tmp_path / "lost")
     assert lost.exit_code == 3
     assert "2 cannot be held: no tensions within the limits" in lost.stdout
+
+
+def test_map_writes_its_files_or_says_why_not(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    grid = ["--grid", "0.3:0.5:3", "0.2:0.3:2", "0.1"]
+    result = run("map", "demobot_cogiro", *grid, "--out", out, "--json")
+    assert result.exit_code == 0 and json.loads(result.stdout)["feasible"] == 6
+    assert {file.name for file in out.iterdir()} == {"map.json", "map.npz", "map.png", "map.rrd"}
+    lost = run("map", "demobot_cogiro", *grid, "--lowest", "90", "--out", tmp_path / "lost")
+    assert lost.exit_code == 2 and not (tmp_path / "lost").exists()
+    assert "no pose of the grid can be held: no tensions from 90 to inf N" in lost.stderr

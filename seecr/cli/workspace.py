@@ -1,0 +1,134 @@
+"""``seecr map``: workspaces on a grid."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from seecr.cli.arguments import NumbersCommand, axis_of, model_at, robot_at, robot_options
+from seecr.cli.options import json_option, out_option, progress_bar
+
+
+@click.command(
+    "map",
+    cls=NumbersCommand,
+    short_help="Workspaces: where the platform can be held, and where it comes to.",
+    epilog="""\b
+Examples:
+  seecr map demobot_cogiro
+  seecr map robot.xml --grid 0:0.8:81 0:0.5:51 0.1:0.3:3 --lowest 1 --highest 50
+  seecr map robot.xml --wrench 1 0 0 0 0 0 --wrench -1 0 0 0 0 0 --model model.toml
+""",
+)
+@robot_options
+@click.option(
+    "--grid",
+    nargs=3,
+    metavar="X Y Z",
+    help="Each FIRST:LAST:COUNT or one number [m].  [default: between the exit points]",
+)
+@click.option(
+    "--turned",
+    nargs=4,
+    type=float,
+    metavar="QW QX QY QZ",
+    help="Orientation of all poses.  [default: that of the reference pose]",
+)
+@click.option(
+    "--lowest",
+    type=float,
+    default=0.0,
+    show_default=True,
+    metavar="N",
+    help="Least tension of every cable [N].",
+)
+@click.option("--highest", type=float, metavar="N", help="Largest tension of every cable [N].")
+@click.option(
+    "--wrench",
+    "wrenches",
+    nargs=6,
+    type=float,
+    multiple=True,
+    metavar="FX FY FZ MX MY MZ",
+    help="It must be held under this too [N, N m]; several times for a set.",
+)
+@click.option("--no-elastic", is_flag=True, help="Only what can be held; quicker.")
+@click.option(
+    "--figure",
+    type=click.Choice(["png", "svg", "none"]),
+    default="png",
+    show_default=True,
+    help="Kind of the figure.",
+)
+@click.option("--no-recording", is_flag=True, help="Write no .rrd.")
+@out_option("seecr-map")
+@json_option
+def command(
+    robot: Path,
+    cable: str | None,
+    model: Path | None,
+    grid: tuple[str, ...] | None,
+    turned: tuple[float, ...] | None,
+    lowest: float,
+    highest: float | None,
+    wrenches: tuple[tuple[float, ...], ...],
+    no_elastic: bool,
+    figure: str,
+    no_recording: bool,
+    out: Path,
+    as_json: bool,
+) -> int:
+    """Show on a grid where tensions within limits hold the platform, and where it really comes to.
+
+    ROBOT is an MJCF file or the name of a shipped robot. The margin is how far inside their limits
+    all tensions can stay [N]; the elastic map says, at each command, how far off the platform
+    rests, how tilted, with how many slack cables and how stiff. Robots with fewer cables than
+    freedoms are mapped by position, their orientation solved.
+
+    Writes map.npz, map.json, a figure of slices and map.rrd.
+
+    \b
+    Exit status: 0 all well, 2 bad input, or no pose of the grid can be held.
+    """  # fmt: skip
+    import numpy as np
+
+    from seecr import InputError, default_axes, workspace_map
+    from seecr.files import json_text, staged, write_text
+    from seecr.report.figures import map_figure
+    from seecr.report.maps import document_of, write_arrays
+
+    machine = robot_at(robot, cable)
+    own = model_at(model, machine)
+    axes = [axis_of(text) for text in grid] if grid else list(default_axes(machine))
+    total = int(np.prod([len(axis) for axis in axes]))
+    with staged(out) as folder:
+        with progress_bar("mapping", total) as tell:
+            found = workspace_map(
+                machine, *axes, orientation=turned or None, lowest=lowest,
+                highest=np.inf if highest is None else highest, wrenches=wrenches or None,
+                effects=own or (), elastic=not no_elastic,
+                progress=lambda done: tell(done, ""),
+            )  # fmt: skip
+        if not np.any(found.feasible):
+            raise InputError(
+                f"no pose of the grid can be held: no tensions from {lowest:g} to "
+                f"{np.inf if highest is None else highest:g} N balance the load at any of "
+                f"{total} poses; expected another grid, orientation or wider limits"
+            )
+        text = json_text({"exit_status": 0, **document_of(found)})
+        write_text(folder / "map.json", text + "\n")
+        write_arrays(folder / "map.npz", found)
+        if figure != "none" and sum(len(axis) > 1 for axis in axes) > 1:
+            map_figure(folder / f"map.{figure}", found)
+        if not no_recording:
+            # takes a second or two to import
+            from seecr.recording.workspace import write_map_recording
+
+            write_map_recording(found, folder / "map.rrd")
+    if as_json:
+        click.echo(text)
+        return 0
+    for line in [*(own.notes if own else ()), *found.lines(), f"Results in {out}/"]:
+        click.echo(line)
+    return 0

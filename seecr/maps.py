@@ -1,0 +1,258 @@
+"""Workspaces on grids: where a platform can be held, and where an elastic robot really comes to.
+
+Grids are gone through in parts, so that a million poses need no more memory than their answers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from seecr.equilibrium import solve
+from seecr.errors import InputError
+from seecr.experiment import GivenEffects
+from seecr.inverse import correct
+from seecr.pose import Array
+from seecr.result import Record, Result
+from seecr.robot import Robot
+from seecr.starts import commanded_poses, finite
+from seecr.workspace import load_scale, tension_margin
+
+Progress = Callable[[int], None]
+"""Called with the number of poses done since the last call."""
+
+__all__ = ["Workspace", "boundary", "default_axes", "workspace_map"]
+
+# Poses at a time.
+_PART = 20_000
+# Default grid: values along an axis on which something can change.
+_VALUES, _FEW = 33, 13
+_NEVER = -1
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Workspace(Result):
+    """What holds at the poses of a grid, (nx, ny, nz) each, of one orientation.
+
+    Attributes:
+        robot: as described.
+        axes: the grid's x, y and z [m].
+        orientation: (4,) quaternion of all poses.
+        margin: [N] how far inside their limits all tensions can stay; below zero where the pose
+            cannot be held. For robots with fewer cables than freedoms zero where the position
+            can be held in some orientation, and minus infinity where not.
+        deviation: (..., 3) [m] from the command to where the elastic robot rests; NaN where it
+            does not; float32.
+        rotation: (..., 3) [rad] likewise.
+        slack: number of slack cables; -1 where it does not rest.
+        stiffness: [N/m] smallest eigenvalue, rotations by the robot's length.
+    """
+
+    robot: Robot
+    axes: tuple[Array, Array, Array]
+    orientation: Array
+    margin: Array
+    deviation: NDArray[np.float32]
+    rotation: NDArray[np.float32]
+    slack: NDArray[np.int8]
+    stiffness: NDArray[np.float32]
+
+    @property
+    def feasible(self) -> NDArray[np.bool_]:
+        """Where the pose can be held by tensions within the limits."""
+        return np.asarray(self.margin >= -1e-9 * load_scale(self.robot))
+
+    @property
+    def rests(self) -> NDArray[np.bool_]:
+        """Where the elastic robot comes to rest, if the elastic map was asked for."""
+        return np.asarray(self.slack != _NEVER)
+
+    @property
+    def cell(self) -> float:
+        """Size of a cell of the grid: [m^3], or [m^2] or [m] where an axis has one value."""
+        steps = [np.ptp(axis) / (len(axis) - 1) for axis in self.axes if len(axis) > 1]
+        return float(np.prod(steps))
+
+    def lines(self) -> list[str]:
+        """How much of the grid can be held, and how far off the elastic robot is there."""
+        n, held = self.margin.size, int(self.feasible.sum())
+        along = sum(len(axis) > 1 for axis in self.axes)
+        unit = {0: "", 1: " m", 2: " m^2", 3: " m^3"}[along]
+        size = f", {held * self.cell:.4g}{unit}" if along else ""
+        out = [f"{self.robot.name}: {held} of {n} poses can be held{size}"]
+        tightest = self.margin[self.feasible & np.isfinite(self.margin)]
+        if len(tightest) and tightest.max() > 0:
+            half = np.median(tightest)
+            out.append(
+                f"at half of them tensions can stay {half:.3g} N or more inside their limits"
+            )
+        rests = self.rests
+        if np.any(rests):
+            counts = self.slack[rests]
+            parts = [f"{int(np.sum(counts == k))} with {k}" for k in np.unique(counts)]
+            out.append(
+                f"elastic: at rest at {int(rests.sum())} commands; slack: {', '.join(parts)}"
+            )
+            where = rests & self.feasible
+            if np.any(where):
+                away = 1e3 * np.linalg.norm(self.deviation[where], axis=-1).max()
+                turn = np.degrees(np.linalg.norm(self.rotation[where], axis=-1).max())
+                out.append(f"where poses can be held, up to {away:.4g} mm and {turn:.4g} deg off")
+        return out
+
+    def records(self) -> list[Record]:
+        """One row per pose of the grid."""
+        places = np.stack(np.meshgrid(*self.axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        columns = {
+            **{f"{axis}_m": places[:, k] for k, axis in enumerate("xyz")},
+            "margin_N": self.margin.ravel(),
+            "feasible": self.feasible.ravel(),
+            "slack": self.slack.ravel(),
+            **{f"d{a}_m": self.deviation[..., k].ravel() for k, a in enumerate("xyz")},
+            **{f"r{a}_rad": self.rotation[..., k].ravel() for k, a in enumerate("xyz")},
+            "smallest_eigenvalue_N_per_m": self.stiffness.ravel(),
+        }
+        listed = {name: values.tolist() for name, values in columns.items()}
+        return [dict(zip(listed, row, strict=True)) for row in zip(*listed.values(), strict=True)]
+
+
+def default_axes(robot: Robot, values: int | None = None) -> tuple[Array, Array, Array]:
+    """A grid between the exit points, as far below the reference pose as they are above it."""
+    if values is None:
+        # robots with too few cables are solved for their orientation, which takes a while
+        values = _VALUES if robot.n_cables >= robot.n_dof else _FEW
+    points = np.concatenate([robot.exit_points, robot.reference_pose[None, :3]])
+    low, high = points.min(axis=0), points.max(axis=0)
+    mirrored = 2.0 * robot.reference_pose[:3] - high
+    down = np.abs(robot.up) > 0.5
+    low = np.where(down, np.minimum(low, mirrored), low)
+    return tuple(
+        np.linspace(a, b, values) if b - a > 1e-9 * robot.length else np.array([a])
+        for a, b in zip(low, high, strict=True)
+    )  # type: ignore[return-value]
+
+
+def workspace_map(
+    robot: Robot,
+    x: ArrayLike,
+    y: ArrayLike,
+    z: ArrayLike,
+    *,
+    orientation: ArrayLike | None = None,
+    lowest: ArrayLike = 0.0,
+    highest: ArrayLike = np.inf,
+    wrenches: ArrayLike | None = None,
+    effects: GivenEffects = (),
+    elastic: bool = True,
+    progress: Progress | None = None,
+) -> Workspace:
+    """The static-feasible and the elastic workspace on a grid of positions.
+
+    Args:
+        robot: as described.
+        x, y, z: (nx,), (ny,), (nz,) or numbers [m].
+        orientation: (4,) quaternion of all poses; that of the reference pose by default.
+        lowest, highest: (m,) or one [N], limits of the tensions for what can be held.
+        wrenches: (k, 6) set of external wrenches that it must be held under, each of them.
+        effects: of the elastic robot, besides; none may have a memory of rows before.
+        elastic: whether to solve where the elastic robot comes to rest.
+        progress: called as poses are done.
+
+    Raises:
+        InputError: an axis without values, an orientation that the joints do not allow.
+    """
+    axes = (_axis("x", x), _axis("y", y), _axis("z", z))
+    turned = robot.reference_pose[3:] if orientation is None else finite(orientation, "orientation")
+    shape = (len(axes[0]), len(axes[1]), len(axes[2]))
+    n = int(np.prod(shape))
+    margin, slack = np.empty(n), np.full(n, _NEVER, dtype=np.int8)
+    moved, stiffness = np.full((n, 6), np.nan, np.float32), np.full(n, np.nan, np.float32)
+    for first in range(0, n, _PART):
+        rows = np.arange(first, min(first + _PART, n))
+        index = np.unravel_index(rows, shape)
+        places = np.column_stack([axis[k] for axis, k in zip(axes, index, strict=True)])
+        poses = commanded_poses(np.column_stack([places, np.tile(turned, (len(rows), 1))]))
+        margin[rows] = _margins(robot, poses, lowest, highest, wrenches)
+        if elastic:
+            found = solve(robot, poses, effects=effects)
+            there = found.converged
+            moved[rows[there]] = found.deviation[there]
+            slack[rows[there]] = found.slack[there].sum(axis=1)
+            stiffness[rows] = np.where(there, found.smallest_eigenvalue, np.nan)
+        if progress is not None:
+            progress(len(rows))
+    return Workspace(
+        robot, axes, np.asarray(turned), margin.reshape(shape),
+        moved[:, :3].reshape(*shape, 3), moved[:, 3:].reshape(*shape, 3),
+        slack.reshape(shape), stiffness.reshape(shape),
+    )  # fmt: skip
+
+
+def _margins(
+    robot: Robot, poses: Array, lowest: ArrayLike, highest: ArrayLike, wrenches: ArrayLike | None
+) -> Array:
+    """Margins (n,) [N]; of robots with too few cables by position, the orientation solved."""
+    if robot.n_cables >= robot.n_dof:
+        return tension_margin(robot, poses, lowest=lowest, highest=highest, wrenches=wrenches)
+    if wrenches is not None:
+        raise InputError(
+            f"{robot.name} has fewer cables than freedoms: it holds no set of wrenches; "
+            "expected none"
+        )
+    found = correct(robot, poses, lowest=lowest, highest=highest, prefer="position")
+    kept = np.linalg.norm(found.aimed[:, :3] - poses[:, :3], axis=1) < 1e-6 * robot.length
+    return np.where(found.found & kept & found.solution.converged, 0.0, -np.inf)
+
+
+def _axis(name: str, values: ArrayLike) -> Array:
+    axis = np.atleast_1d(finite(values, name))
+    if axis.ndim != 1 or len(axis) == 0:
+        raise InputError(f"{name} must be one number or (k,) with k above zero, got {axis.shape}")
+    return axis
+
+
+def boundary(
+    robot: Robot,
+    inside: ArrayLike,
+    outside: ArrayLike,
+    *,
+    tolerance: float = 1e-4,
+    lowest: ArrayLike = 0.0,
+    highest: ArrayLike = np.inf,
+    wrenches: ArrayLike | None = None,
+) -> Array:
+    """Where the ways from poses that can be held to poses that cannot leave the workspace.
+
+    By bisection on straight ways of the position.
+
+    Args:
+        robot: as described.
+        inside, outside: (n, 7) poses, of the same orientation in each row.
+        tolerance: [m] within which the boundary is found.
+        lowest, highest, wrenches: as in :func:`seecr.tension_margin`.
+
+    Returns:
+        (n, 7), the last poses found that can be held.
+
+    Raises:
+        InputError: a pose that is not on the side it is said to be.
+    """
+    near, far = commanded_poses(inside, "inside"), commanded_poses(outside, "outside")
+
+    def held(poses: Array) -> NDArray[np.bool_]:
+        margins = tension_margin(robot, poses, lowest=lowest, highest=highest, wrenches=wrenches)
+        return np.asarray(margins >= 0.0)
+
+    if not held(near).all() or held(far).any():
+        raise InputError("boundary needs poses inside that can be held, and outside that cannot")
+    for _ in range(200):
+        if np.linalg.norm(far[:, :3] - near[:, :3], axis=1).max() <= tolerance:
+            break
+        middle = near.copy()
+        middle[:, :3] = 0.5 * (near[:, :3] + far[:, :3])
+        there = held(middle)[:, None]
+        near, far = np.where(there, middle, near), np.where(there, far, middle)
+    return near

@@ -1,0 +1,146 @@
+"""Margins against HiGHS, boundaries, maps on grids, robots with too few cables."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from random_robots import random_poses, random_robot
+from scipy.optimize import linprog
+
+from seecr.equilibrium import solve
+from seecr.errors import InputError
+from seecr.maps import boundary, default_axes, workspace_map
+from seecr.mjcf import load_robot
+from seecr.planar import bar_tilt
+from seecr.pose import quat_from_rotvec
+from seecr.recording.workspace import write_map_recording
+from seecr.report.figures import map_figure
+from seecr.robot import Robot
+from seecr.shipped import model_path
+from seecr.workspace import balance_equations, feasible, tension_margin, unbalanced
+
+NAMES = ["demobot_cogiro", "demobot_parallel", "demobot_off_centre", "planar_vertical"]
+
+
+def robot_named(name: str) -> Robot:
+    return load_robot(model_path(name))
+
+
+def some_poses(robot: Robot, n: int = 60) -> np.ndarray:
+    random = np.random.default_rng(1)
+    poses = np.tile(robot.reference_pose, (n, 1))
+    if robot.joints:
+        poses[:, [0, 2]] += random.uniform(-0.25, 0.25, (n, 2))
+        return poses
+    poses[:, :3] = random.uniform((0.05, 0.05, 0.05), (0.75, 0.45, 0.4), (n, 3))
+    poses[:, 3:] = quat_from_rotvec(0.1 * random.normal(size=(n, 3)))
+    return poses
+
+
+def margin_by_highs(matrix: np.ndarray, load: np.ndarray, low: float, high: float) -> float:
+    """max t with low + t <= tau <= high - t."""
+    d, m = matrix.shape
+    rows, right = [np.c_[-np.eye(m), np.ones(m)]], [np.full(m, -low)]
+    if np.isfinite(high):
+        rows.append(np.c_[np.eye(m), np.ones(m)])
+        right.append(np.full(m, high))
+    answer = linprog(
+        np.r_[np.zeros(m), -1.0], A_ub=np.concatenate(rows), b_ub=np.concatenate(right),
+        A_eq=np.c_[matrix, np.zeros(d)], b_eq=load, bounds=[(None, None)] * (m + 1),
+        method="highs",
+    )  # fmt: skip
+    return np.inf if answer.status == 3 else float(answer.x[-1])
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(("low", "high"), [(0.0, np.inf), (0.5, 6.0)])
+def test_margins_are_those_of_highs(name: str, low: float, high: float) -> None:
+    robot = robot_named(name)
+    poses = some_poses(robot)
+    margins = tension_margin(robot, poses, lowest=low, highest=high)
+    expected = [margin_by_highs(*each, low, high)
+                for each in zip(*balance_equations(robot, poses), strict=True)]  # fmt: skip
+    np.testing.assert_allclose(margins, expected, rtol=1e-7, atol=1e-9)
+    assert (margins > 0).any() and (margins < 0).any()
+    by_search = unbalanced(robot, poses, lowest=low, highest=high) < 1e-9
+    np.testing.assert_array_equal(feasible(robot, poses, lowest=low, highest=high), by_search)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_robots_of_any_number_of_cables(seed: int) -> None:
+    robot = random_robot(np.random.default_rng(seed), "free")
+    poses = random_poses(np.random.default_rng(seed), robot, 20)
+    margins = tension_margin(robot, poses, highest=50.0)
+    if robot.n_cables < robot.n_dof:
+        assert np.all(np.isneginf(margins))
+        return
+    matrices, loads = balance_equations(robot, poses)
+    for margin, matrix, load in zip(margins, matrices, loads, strict=True):
+        expected = margin_by_highs(matrix, load, 0.0, 50.0)
+        assert margin == pytest.approx(expected, rel=1e-6, abs=1e-8)
+
+
+def test_a_set_of_wrenches_has_the_least_margin() -> None:
+    robot = robot_named("demobot_cogiro")
+    poses = some_poses(robot, 20)
+    pushes = np.array([[0.3, 0, 0, 0, 0, 0], [-0.3, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0.01, 0]])
+    each = [tension_margin(robot, poses, wrench=one) for one in pushes]
+    np.testing.assert_allclose(
+        tension_margin(robot, poses, wrenches=pushes), np.min(each, axis=0), atol=1e-12
+    )
+    by_row = tension_margin(robot, poses, wrench=np.tile(pushes[0], (20, 1)))
+    np.testing.assert_allclose(by_row, each[0], atol=1e-12)
+
+
+def test_the_boundary_is_where_the_margin_vanishes() -> None:
+    robot = robot_named("demobot_parallel")
+    inside = np.array([[0.4, 0.25, 0.1, 1, 0, 0, 0]] * 2)
+    outside = inside.copy()
+    outside[:, 0] = [0.1, 0.7]
+    found = boundary(robot, inside, outside, tolerance=1e-9)
+    np.testing.assert_allclose(tension_margin(robot, found), 0.0, atol=1e-6)
+    assert found[0, 0] + found[1, 0] == pytest.approx(0.8, abs=1e-8)
+    with pytest.raises(InputError, match="boundary needs poses inside that can be held"):
+        boundary(robot, outside, inside)
+
+
+def test_a_map_is_what_each_pose_says(tmp_path: Path) -> None:
+    robot = robot_named("demobot_parallel")
+    axes = np.linspace(0.2, 0.6, 5), np.linspace(0.2, 0.3, 2), np.array([0.1, 0.2])
+    done: list[int] = []
+    found = workspace_map(robot, *axes, progress=done.append)
+    assert sum(done) == 20 and found.margin.shape == (5, 2, 2)
+    pose = np.array([[axes[0][1], axes[1][0], axes[2][1], 1, 0, 0, 0]])
+    alone = solve(robot, pose)
+    assert found.margin[1, 0, 1] == tension_margin(robot, pose)[0]
+    assert found.slack[1, 0, 1] == alone.slack.sum()
+    np.testing.assert_allclose(
+        found.deviation[1, 0, 1], alone.deviation[0, :3], rtol=1e-6, atol=1e-9
+    )
+    assert len(found.records()) == 20
+    assert f"{int(found.feasible.sum())} of 20 poses can be held" in str(found)
+    map_figure(tmp_path / "map.svg", found)
+    text = (tmp_path / "map.svg").read_text()
+    assert all(words in text for words in ("tension margin [N]", "slack cables", "x [mm]"))
+    write_map_recording(found, tmp_path / "map.rrd")
+    assert (tmp_path / "map.rrd").stat().st_size > 1000
+    with pytest.raises(InputError, match="at least two axes"):
+        map_figure(tmp_path / "no.png", workspace_map(robot, 0.4, 0.25, [0.1, 0.2], elastic=False))
+
+
+def test_too_few_cables_are_mapped_by_position() -> None:
+    robot = robot_named("planar_two_cable")
+    x, z = np.linspace(0.2, 0.8, 4), np.array([0.4, 0.6])
+    found = workspace_map(robot, x, 0.0, z, elastic=False)
+    assert found.feasible.all()
+    assert np.isfinite(bar_tilt([[0, 1], [1, 1]], [[0.2, 0.4]], 0.1)).all()
+    with pytest.raises(InputError, match="holds no set of wrenches"):
+        workspace_map(robot, x, 0.0, z, wrenches=[[1, 0, 0, 0, 0, 0]])
+
+
+def test_the_default_grid_lies_between_the_exit_points() -> None:
+    x, y, z = default_axes(robot_named("demobot_cogiro"), 3)
+    np.testing.assert_allclose([x[0], x[-1], y[0], y[-1], z[-1]], [0.04, 0.76, 0.04, 0.46, 0.485])
+    assert [len(axis) for axis in default_axes(robot_named("planar_vertical"), 3)] == [3, 1, 3]
