@@ -152,9 +152,9 @@ def twice(data: Measurements) -> list[str]:
     columns = [column for name, column in data.columns() if name != "run"]
     first: dict[tuple[object, ...], int] = {}
     pairs = []
-    for row, values in enumerate(zip(*columns, strict=True)):
-        if data.read[row]:
-            before = first.setdefault(values, row)
+    for row, (read, *values) in enumerate(zip(data.read.tolist(), *columns, strict=True)):
+        if read:
+            before = first.setdefault(tuple(values), row)
             if before != row:
                 pairs.append(f"{data.place(row)} as {data.place(before)}")
     if not pairs:

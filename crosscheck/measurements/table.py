@@ -220,6 +220,8 @@ def _check_cell_counts(
         if len(row) != n_columns:
             cells = "1 cell" if len(row) == 1 else f"{len(row)} cells"
             text = f"expected {n_columns} cells as in the header (line {header_line}), got {cells}"
+            if line == body[-1][0] and len(row) < n_columns:
+                text += "; it is the last line: is the file cut off?"
             if len(row) > n_columns:
                 text += (
                     "; a decimal comma splits a number in two: write 1.5, not 1,5, or put "

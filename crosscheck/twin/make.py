@@ -55,7 +55,7 @@ class Twin(Result):
         kept: (n,) bool, commands that were measured: those at which MuJoCo came to rest.
         hidden: the effects.
         answer: what the sealed file holds.
-        notes: what of the MJCF plays no part in the truth, a sentence or none.
+        notes: what of the MJCF plays no part in the truth, and what was said of the poses given.
     """
 
     robot: Robot
@@ -139,7 +139,7 @@ def make_twin(
         kept=made.at_rest,
         hidden=tuple(one for one, _ in made.alone),
         answer=_answer(made, robot, seed),
-        notes=_notes(robot_path),
+        notes=(*_notes(robot_path), *(() if given is None else given.notes)),
     )
     if out is not None:
         _write(twin, robot_path, Path(out))
