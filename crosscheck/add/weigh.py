@@ -22,6 +22,7 @@ from crosscheck.fit.systematic import moved_by_others
 from crosscheck.model.write import Fitted
 from seecr.effects import Terms
 from seecr.pose import Array
+from seecr.robot import Robot
 
 # A value this many plausible sizes from null deserves a second look.
 _IMPLAUSIBLE = 5.0
@@ -70,7 +71,7 @@ def weigh(
         from_nothing=distance,
         is_nothing=is_nothing(distance, count),
         whiteness=white,
-        warnings=tuple(_warnings(best, fitted, own)),
+        warnings=tuple(_warnings(problem.robot, best, fitted, own)),
         notes=tuple(dict.fromkeys(notes)),
     )
 
@@ -157,7 +158,9 @@ def _split(best: Fit, stderr: Array) -> tuple[Fitted, ...]:
     return tuple(Fitted(t, stderr[own], best.at_bound[own]) for t, own in parts)
 
 
-def _warnings(best: Fit, fitted: Sequence[Fitted], own: NDArray[np.bool_]) -> list[str]:
+def _warnings(
+    robot: Robot, best: Fit, fitted: Sequence[Fitted], own: NDArray[np.bool_]
+) -> list[str]:
     out = []
     for f in fitted:
         names = np.array(f.term.layout.names)
@@ -166,6 +169,10 @@ def _warnings(best: Fit, fitted: Sequence[Fitted], own: NDArray[np.bool_]) -> li
             out.append(f"{f.term.name}: {_some(names[stopped])} ended on a bound")
         if (unseen & ~stopped).any():
             out.append(f"{f.term.name}: {_some(names[unseen & ~stopped])} not seen by these data")
+        if not f.term.is_possible(robot):
+            out.append(
+                f"{f.term.name}: no robot can have these values, so something else acts like it"
+            )
         size = np.abs(f.term.sizes)
         large = (size > _IMPLAUSIBLE) & ~f.term.layout.shape
         if large.any():

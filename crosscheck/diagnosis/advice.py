@@ -26,20 +26,28 @@ _MOST_WAYS = 2
 
 
 def check_of(term: Term, robot: Robot) -> str:
-    """The effect's independent check, with what to expect: in mm, degrees and newtons."""
+    """The effect's independent check, with what to expect: in mm, degrees and newtons.
+
+    No number is given that no robot can have.
+    """
     layout = term.layout
+    if not term.is_possible(robot):
+        return (
+            f"{measured_directly(layout.name)}: no robot can have what fits these data best, so "
+            "something else acts like it"
+        )
     values: dict[str, Any] = {}
     for name, unit, value in zip(layout.names, layout.units, term.vector, strict=True):
-        short = parameter_name(name, unit)
-        values[short] = in_unit(unit)[0] * float(value)
-        if short == "weight":
-            values["weight_10m"] = 10.0 * float(value)
-    values["ea"] = float(np.mean(robot.ea)) * values.get("factor", 1.0)
+        values[parameter_name(name, unit)] = in_unit(unit)[0] * float(value)
     # of several alike, the one that stands out most
     size = np.abs(term.vector - layout.null) / layout.scale * ~layout.shape
     k = int(np.argmax(size))
     values["which"] = parameter_name(layout.names[k], layout.units[k])
     values["largest"] = in_unit(layout.units[k])[0] * float(term.vector[k])
+    for name, total in term.effect().totals(robot).items():
+        key = "total" if name == layout.names[k] and len(layout) > 1 else name
+        values[key] = in_unit(total.unit)[0] * total.value
+        values[f"{key}_nominal"] = in_unit(total.unit)[0] * total.nominal
     try:
         return layout.effect.advice.format(**values)
     except (KeyError, IndexError, ValueError):

@@ -8,7 +8,9 @@ from typing import ClassVar
 import numpy as np
 
 from seecr.effects.base import Effect, mean_length, of_length, parameter
+from seecr.effects.totals import Total
 from seecr.pose import Array, pose_add
+from seecr.robot import Robot
 from seecr.setup import Setup
 
 
@@ -24,13 +26,19 @@ class CableLengthOffset(Effect):
     title: ClassVar[str] = "constant error of each cable's length"
     advice: ClassVar[str] = (
         "measure each cable at the reference pose with a tape: expect the offsets found, the "
-        "largest {largest:+.1f} mm ({which})"
+        "largest {largest:+.1f} mm ({which}: {total:.1f} mm paid out, not {total_nominal:.1f})"
     )
 
     offset: Array = parameter("m", of_length(2e-3), size="cable")
 
     def edit_setup(self, setup: Setup) -> None:
         setup.extra_length += self.offset
+
+    def totals(self, robot: Robot) -> dict[str, Total]:
+        return {
+            f"offset_{i + 1}_m": Total(float(length + off), float(length), "m", lower=0.0)
+            for i, (length, off) in enumerate(zip(robot.rest_lengths, self.offset, strict=True))
+        }
 
 
 @dataclass(frozen=True, eq=False)

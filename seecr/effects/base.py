@@ -21,6 +21,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from seecr.effects.totals import Total
 from seecr.errors import InputError
 from seecr.pose import Array
 from seecr.robot import Robot
@@ -116,7 +117,7 @@ class Effect:
         parent: an effect that this one only makes sense beside or contains, or "".
         advice: how to measure it on its own; ``{name}`` is filled with a parameter in
             millimetres or degrees where those are its units, ``{largest}`` and ``{which}`` with
-            the parameter that is the most plausible sizes from null, ``{ea}`` with E S [N].
+            the parameter that is the most plausible sizes from null, and others by :meth:`totals`.
         renamed: of parameters in model files written before: each old key, and those that have
             its value now.
     """
@@ -134,6 +135,15 @@ class Effect:
 
     def edit_readings(self, readings: Readings, setup: Setup) -> None:
         """Change what the sensors report, in place."""
+
+    def totals(self, robot: Robot) -> dict[str, Total]:
+        """What a person would measure, where the parameters are differences or may be impossible.
+
+        By the names that ``advice`` has: ``{mass}`` and ``{mass_nominal}``. Those that are named
+        as a parameter is, such as ``offset_3_m``, are ``{total}`` and ``{total_nominal}`` where
+        that parameter is ``{which}``.
+        """
+        return {}
 
     @classmethod
     def shapes(cls, setup: Setup) -> list[dict[str, float]]:

@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from seecr.effects.base import Effect, mean_length, of_length, parameter
+from seecr.effects.totals import Total
 from seecr.pose import Array
 from seecr.robot import Robot
 from seecr.setup import Setup
@@ -23,6 +24,11 @@ def usual_stretch(robot: Robot) -> float:
     return usual_strain(robot) * mean_length(robot)
 
 
+def _heaviest(robot: Robot) -> float:
+    """Weight per metre [N/m] of a cable that is as heavy as the platform: none is."""
+    return robot.weight / mean_length(robot) if robot.weight > 0.0 else 1e5
+
+
 @dataclass(frozen=True, eq=False)
 class Stiffness(Effect):
     """All cables are stiffer than assumed by one factor: E S -> factor E S (paper, eq 10).
@@ -34,14 +40,18 @@ class Stiffness(Effect):
     place: ClassVar[str] = "cable"
     title: ClassVar[str] = "stiffness of all cables"
     advice: ClassVar[str] = (
-        "hang a known weight on a known length of cable: expect E S = {ea:.4g} N, {factor:.3f} "
-        "times what is stated"
+        "hang a known weight on a known length of cable: expect E S = {ea:.4g} N, not "
+        "{ea_nominal:.4g}"
     )
 
     factor: float = parameter("", 0.3, null=1.0, bounds=(0.02, 50.0))
 
     def edit_setup(self, setup: Setup) -> None:
         setup.ea = setup.ea * self.factor
+
+    def totals(self, robot: Robot) -> dict[str, Total]:
+        ea = float(np.mean(robot.ea))
+        return {"ea": Total(self.factor * ea, ea, "N", lower=0.0)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,13 +67,19 @@ class CableStiffness(Effect):
     parent: ClassVar[str] = "stiffness"
     advice: ClassVar[str] = (
         "hang a known weight on each cable: expect the factors found, {largest:.3f} ({which}) "
-        "the furthest off"
+        "the furthest off: E S = {total:.4g} N, not {total_nominal:.4g}"
     )
 
     factor: Array = parameter("", 0.2, null=1.0, bounds=(0.02, 50.0), size="cable")
 
     def edit_setup(self, setup: Setup) -> None:
         setup.ea = setup.ea * self.factor
+
+    def totals(self, robot: Robot) -> dict[str, Total]:
+        return {
+            f"factor_{i + 1}": Total(float(factor * ea), float(ea), "N", lower=0.0)
+            for i, (ea, factor) in enumerate(zip(robot.ea, self.factor, strict=True))
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +93,10 @@ class NonlinearElasticity(Effect):
     name: ClassVar[str] = "nonlinear_elasticity"
     place: ClassVar[str] = "cable"
     title: ClassVar[str] = "cables that stiffen as they stretch"
-    advice: ClassVar[str] = "pull a cable to several loads: expect the curve found"
+    advice: ClassVar[str] = (
+        "pull a cable to several loads: expect the curve found, E S = {slope:.4g} N at the usual "
+        "load, not {slope_nominal:.4g}"
+    )
 
     quadratic: float = parameter("", lambda r: 0.3 / usual_strain(r))
     cubic: float = parameter("", lambda r: 0.3 / usual_strain(r) ** 2)
@@ -85,6 +104,12 @@ class NonlinearElasticity(Effect):
     def edit_setup(self, setup: Setup) -> None:
         setup.quadratic = setup.quadratic + self.quadratic
         setup.cubic = setup.cubic + self.cubic
+
+    def totals(self, robot: Robot) -> dict[str, Total]:
+        # the slope of the tension where cables usually work: they do not push when pulled
+        strain, ea = usual_strain(robot), float(np.mean(robot.ea))
+        slope = 1.0 + 2.0 * self.quadratic * strain + 3.0 * self.cubic * strain**2
+        return {"slope": Total(slope * ea, ea, "N", lower=0.0)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,11 +145,18 @@ class CableWeight(Effect):
     advice: ClassVar[str] = "weigh ten metres of cable: expect {weight_10m:.2f} N"
 
     weight: float = parameter(
-        "N_per_m", lambda r: 0.02 * r.weight / mean_length(r), bounds=(0.0, 1e5)
+        "N_per_m", lambda r: 0.02 * r.weight / mean_length(r), bounds=(0.0, _heaviest)
     )
 
     def edit_setup(self, setup: Setup) -> None:
         setup.cable_weight = setup.cable_weight + self.weight
+
+    def totals(self, robot: Robot) -> dict[str, Total]:
+        heaviest = 0.5 * _heaviest(robot)
+        return {
+            "weight": Total(self.weight, 0.0, "N_per_m", upper=heaviest),
+            "weight_10m": Total(10.0 * self.weight, 0.0, "N", upper=10.0 * heaviest),
+        }
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,9 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from seecr.effects.base import Effect, of_length, parameter
+from seecr.effects.base import Effect, mean_length, of_length, parameter
+from seecr.effects.totals import Total
 from seecr.pose import Array
+from seecr.robot import Robot
 from seecr.setup import Setup
+
+# No sheave's radius is this part of the cables' length: they would hardly leave it.
+_WIDEST = 0.4
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,10 +30,14 @@ class PulleyRadius(Effect):
     title: ClassVar[str] = "pulleys with a radius"
     advice: ClassVar[str] = "measure a sheave with a caliper: expect a radius of {radius:.1f} mm"
 
-    radius: float = parameter("m", of_length(0.02), bounds=(0.0, 1e3))
+    radius: float = parameter("m", of_length(0.02), bounds=(0.0, of_length(0.5)))
 
     def edit_setup(self, setup: Setup) -> None:
         setup.pulley_radius = setup.pulley_radius + self.radius
+
+    def totals(self, robot: Robot) -> dict[str, Total]:
+        widest = _WIDEST * mean_length(robot)
+        return {"radius": Total(self.radius, 0.0, "m", upper=widest)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,13 +52,16 @@ class ExitPointError(Effect):
     title: ClassVar[str] = "exit points off where the model has them"
     advice: ClassVar[str] = (
         "survey the exit points with the tracker: expect the errors found, the largest "
-        "{largest:+.1f} mm ({which})"
+        "{largest:+.1f} mm ({which}: {total:.1f} mm, not {total_nominal:.1f})"
     )
 
     error: Array = parameter("m", of_length(2e-3), size="point")
 
     def edit_setup(self, setup: Setup) -> None:
         setup.exit_points = setup.exit_points + self.error.reshape(-1, 3)
+
+    def totals(self, robot: Robot) -> dict[str, Total]:
+        return _points(robot.exit_points, self.error)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,10 +76,22 @@ class AnchorPointError(Effect):
     title: ClassVar[str] = "anchor points off where the model has them"
     advice: ClassVar[str] = (
         "measure the platform's anchor points: expect the errors found, the largest "
-        "{largest:+.1f} mm ({which})"
+        "{largest:+.1f} mm ({which}: {total:.1f} mm, not {total_nominal:.1f})"
     )
 
     error: Array = parameter("m", of_length(2e-3), size="point")
 
     def edit_setup(self, setup: Setup) -> None:
         setup.anchor_points = setup.anchor_points + self.error.reshape(-1, 3)
+
+    def totals(self, robot: Robot) -> dict[str, Total]:
+        return _points(robot.anchor_points, self.error)
+
+
+def _points(nominal: Array, error: Array) -> dict[str, Total]:
+    """Coordinates (m, 3) of points, each under the name of its error."""
+    return {
+        f"error_{i + 1}_{axis}_m": Total(float(point[k] + off[k]), float(point[k]), "m")
+        for i, (point, off) in enumerate(zip(nominal, error.reshape(-1, 3), strict=True))
+        for k, axis in enumerate("xyz")
+    }

@@ -8,9 +8,14 @@ from typing import ClassVar
 import numpy as np
 
 from seecr.effects.base import Effect, parameter
+from seecr.effects.totals import Total
 from seecr.pose import Array, quat_from_rotvec, quat_rotate
 from seecr.robot import Robot
 from seecr.setup import Setup
+
+# No platform is lighter than this part of what its file says, nor has its centre of mass this
+# many of its own lengths outside of its anchor points.
+_LEAST_MASS, _FARTHEST = 0.05, 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,13 +25,17 @@ class PlatformMass(Effect):
     name: ClassVar[str] = "platform_mass"
     place: ClassVar[str] = "load"
     title: ClassVar[str] = "mass of the platform"
-    advice: ClassVar[str] = "weigh the platform: expect {added:+.3f} kg"
+    advice: ClassVar[str] = "weigh the platform: expect {mass:.4g} kg, not {mass_nominal:.4g}"
 
-    added: float = parameter("kg", lambda r: 0.1 * r.mass, bounds=(-1e6, 1e6))
+    added: float = parameter("kg", lambda r: 0.1 * r.mass, bounds=(lambda r: -0.99 * r.mass, 1e6))
 
     def edit_setup(self, setup: Setup) -> None:
         # a platform keeps a thousandth of its mass, whatever a search tries
         setup.mass = max(setup.mass + self.added, 1e-3 * setup.robot.mass)
+
+    def totals(self, robot: Robot) -> dict[str, Total]:
+        mass = robot.mass
+        return {"mass": Total(mass + self.added, mass, "kg", lower=_LEAST_MASS * mass)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,14 +49,24 @@ class CentreOfMass(Effect):
     place: ClassVar[str] = "load"
     title: ClassVar[str] = "centre of mass of the platform"
     advice: ClassVar[str] = (
-        "balance the platform on an edge: expect its centre off by "
-        "({shift_x:.1f}, {shift_y:.1f}, {shift_z:.1f}) mm"
+        "balance the platform on an edge: expect its centre at "
+        "({x:.1f}, {y:.1f}, {z:.1f}) mm of its frame, not "
+        "({x_nominal:.1f}, {y_nominal:.1f}, {z_nominal:.1f})"
     )
 
     shift: Array = parameter("m", lambda r: 0.1 * r.length, size="vector")
 
     def edit_setup(self, setup: Setup) -> None:
         setup.centre_of_mass = setup.centre_of_mass + self.shift
+
+    def totals(self, robot: Robot) -> dict[str, Total]:
+        far = _FARTHEST * robot.length
+        lower, upper = robot.anchor_points.min(axis=0) - far, robot.anchor_points.max(axis=0) + far
+        centre, moved = robot.centre_of_mass, robot.centre_of_mass + self.shift
+        return {
+            axis: Total(float(moved[k]), float(centre[k]), "m", float(lower[k]), float(upper[k]))
+            for k, axis in enumerate("xyz")
+        }
 
 
 @dataclass(frozen=True, eq=False)

@@ -105,6 +105,10 @@ class Term:
         """The effect itself."""
         return self.layout.build(self.vector)
 
+    def is_possible(self, robot: Robot) -> bool:
+        """Whether the robot can have it: no negative mass, no wheel larger than its cable."""
+        return all(total.possible for total in self.effect().totals(robot).values())
+
 
 def _place_of(layout: Layout, key: str) -> int:
     """The number of a parameter."""

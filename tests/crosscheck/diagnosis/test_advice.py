@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from linear_toy import toy
 from made_data import soft_cogiro, term
@@ -11,6 +12,7 @@ from crosscheck.comparison.quantities import QuantityKind
 from crosscheck.diagnosis.advice import check_of, measure_next, measured_directly
 from crosscheck.diagnosis.search import Search, search
 from crosscheck.fit.reasons import DiagnosisVerdict
+from seecr.effects import Term, catalogue, layout_of
 
 
 @pytest.fixture(scope="module")
@@ -65,3 +67,56 @@ def test_checks_say_what_to_expect_in_units_for_people() -> None:
     check = check_of(term(robot, "exit_point_error", error_3_y_m=0.004), robot)
     assert "error_3_y" in check and "4" in check
     assert measured_directly("platform_mass") == "weigh the platform"
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "expected"),
+    [
+        ("platform_mass", {"added_kg": 0.047}, "expect 0.447 kg, not 0.4"),
+        ("stiffness", {"factor": 0.5}, "expect E S = {half:.4g} N, not {ea:.4g}"),
+        ("cable_stiffness", {"factor_3": 0.5}, "E S = {half:.4g} N, not {ea:.4g}"),
+        ("centre_of_mass", {"shift_z_m": 0.01}, "at (0.0, 0.0, {z:.1f}) mm of its frame, not"),
+        ("cable_length_offset", {"offset_2_m": 0.01}, "(offset_2: {longer:.1f} mm paid out, not"),
+        ("exit_point_error", {"error_1_x_m": 0.004}, "(error_1_x: {x:.1f} mm, not"),
+        ("pulley_radius", {"radius_m": 0.0099}, "expect a radius of 9.9 mm"),
+        ("cable_weight", {"weight_N_per_m": 0.02}, "expect 0.20 N"),
+    ],
+)
+def test_checks_name_totals(effect: str, values: dict[str, float], expected: str) -> None:
+    robot = soft_cogiro()
+    ea = float(robot.ea[0])
+    words = expected.format(
+        ea=ea, half=0.5 * ea, z=1e3 * robot.centre_of_mass[2] + 10.0,
+        longer=1e3 * robot.rest_lengths[1] + 10.0, x=1e3 * robot.exit_points[0, 0] + 4.0,
+    )  # fmt: skip
+    assert words in check_of(term(robot, effect, **values), robot)
+
+
+@pytest.mark.parametrize(
+    ("effect", "values"),
+    [
+        ("platform_mass", {"added_kg": -8.8}),
+        ("platform_mass", {"added_kg": -0.4}),
+        ("cable_weight", {"weight_N_per_m": 11.9}),
+        ("pulley_radius", {"radius_m": 0.3}),
+        ("cable_length_offset", {"offset_2_m": -2.0}),
+        ("nonlinear_elasticity", {"quadratic": -1e6}),
+        ("centre_of_mass", {"shift_x_m": 3.0}),
+    ],
+)
+def test_nothing_impossible_is_ever_said(effect: str, values: dict[str, float]) -> None:
+    robot = soft_cogiro()
+    impossible = term(robot, effect, **values)
+    words = check_of(impossible, robot)
+    assert not impossible.is_possible(robot) and not any(c.isdigit() for c in words)
+    assert "no robot can have what fits these data best" in words
+
+
+def test_every_check_has_all_its_numbers() -> None:
+    """What a text names is there, for every effect of the catalogue."""
+    robot = soft_cogiro()
+    for effect in catalogue().values():
+        layout = layout_of(effect, robot)
+        some = Term(layout, np.clip(layout.null + 0.5 * layout.scale, layout.lower, layout.upper))
+        words = check_of(some, robot)
+        assert some.is_possible(robot) and "{" not in words, words

@@ -161,7 +161,7 @@ BAD = {
     "not finite": ("value = 0.01", "value = nan", r"radius_m: expected a number, got nan"),
     "out of bounds": (
         "value = 0.01", "value = -0.01",
-        r"line \d+: .* radius_m: -0.01 is out of bounds; expected 0 to 1000",
+        r"line \d+: .* radius_m: -0.01 is out of bounds; expected 0 to 0\.\d+$",
     ),
     "wrong unit": ('unit = "m"', 'unit = "mm"', r"radius_m: expected unit 'm', got 'mm'"),
     "bad error": ("stderr = 0.0001", "stderr = -1", r"stderr must be a number from 0 or"),
