@@ -110,7 +110,7 @@ class Commands:
         return self._kept[0][1]
 
     # of the last robot asked for: every trial of a fit asks again
-    _kept: list[tuple[Robot, Array]] = field(default_factory=list, repr=False)
+    _kept: list[tuple[Robot, Array]] = field(default_factory=list, repr=False, init=False)
 
 
 def play(

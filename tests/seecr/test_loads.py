@@ -221,3 +221,11 @@ def test_creep_knows_nothing_of_what_another_clock_saw() -> None:
         solved(Experiment(experiment.robot, alone), there).pose, abs=1e-10
     )
     assert np.abs(found.pose - solved(experiment, there).pose)[3:].max() > 1e-7
+
+
+def test_commands_with_other_poses_do_not_keep_the_lengths_of_the_old_ones() -> None:
+    experiment = experiment_of("demobot_cogiro")
+    robot, commands = experiment.robot, experiment.commands
+    before = commands.nominal_change(robot)
+    other = replace(commands, pose=commands.pose[::-1].copy())
+    assert np.array_equal(other.nominal_change(robot), before[::-1])
