@@ -30,6 +30,7 @@ docs: ## write the pages and pictures that are made from the sources
 	$(BIN)/python scripts/make_effects.py
 	$(BIN)/python scripts/make_api.py
 	$(BIN)/python scripts/draw_floors.py
+	$(BIN)/python scripts/make_paper.py
 
 suite: ## SEECR against MuJoCo, every case; results in crosscheck-results/
 	$(BIN)/crosscheck run

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from seecr.maps import Workspace, boundary, default_axes, workspace_map
     from seecr.mjcf import load_robot
     from seecr.model import Model, load_model, new_model
-    from seecr.planar import bar_tilt, midline_point, solution_manifold
+    from seecr.planar import BarRest, bar_equilibria, bar_tilt, midline_point, solution_manifold
     from seecr.robot import Joint, Robot
     from seecr.sensitivity import sensitivities
     from seecr.setup import Setup
@@ -69,7 +69,7 @@ _MODULES = {
     "maps": ("Workspace", "boundary", "default_axes", "workspace_map"),
     "mjcf": ("load_robot",),
     "model": ("Model", "load_model", "new_model"),
-    "planar": ("bar_tilt", "midline_point", "solution_manifold"),
+    "planar": ("BarRest", "bar_equilibria", "bar_tilt", "midline_point", "solution_manifold"),
     "robot": ("Joint", "Robot"),
     "sensitivity": ("sensitivities",),
     "setup": ("Setup",),
@@ -80,6 +80,7 @@ _MODULES = {
 _WHERE = {name: module for module, names in _MODULES.items() for name in names}
 
 __all__ = [
+    "BarRest",
     "Commands",
     "Correction",
     "Effect",
@@ -103,6 +104,7 @@ __all__ = [
     "Terms",
     "Workspace",
     "Zone",
+    "bar_equilibria",
     "bar_tilt",
     "boundary",
     "catalogue",

@@ -7,6 +7,8 @@ is minus the value of the hinge about +y.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -49,6 +51,50 @@ def bar_tilt(exit_points: ArrayLike, positions: ArrayLike, half_length: float = 
     flat = to_exit.reshape(-1, 2, 2)
     tilts = [_most_level(_roots(one, half_length), one, half_length) for one in flat]
     return np.array(tilts).reshape(places.shape[:-1])
+
+
+@dataclass(frozen=True)
+class BarRest:
+    """One way in which a bar on two inextensible cables is in balance.
+
+    Attributes:
+        theta: tilt [rad].
+        tensions: of both cables, in weights; below zero for one that would have to push.
+        stable: whether both pull and the bar stays: its one free motion raises its middle.
+    """
+
+    theta: float
+    tensions: tuple[float, float]
+    stable: bool
+
+
+def bar_equilibria(
+    exit_points: ArrayLike, position: ArrayLike, half_length: float
+) -> tuple[BarRest, ...]:
+    """All tilts at which a bar on two cables is in balance at a position, by tilt.
+
+    The roots of :func:`bar_equation`, whose quartic in exp(i theta) has two or four of them. The
+    paper speaks of a unique one; where there are more, several can be stable.
+
+    Args:
+        exit_points: (2, 2) [m].
+        position: (2,) [m] of the bar's middle.
+        half_length: h [m], above zero.
+
+    Raises:
+        InputError: shapes, a length that is not above zero.
+    """
+    if not (np.isfinite(half_length) and half_length > 0.0):
+        raise InputError(f"half_length must be above zero [m], got {half_length:g}")
+    place = np.asarray(position, float)
+    if place.shape != (2,):
+        raise InputError(f"position must be (2,), x y, got {place.shape}")
+    to_exit = _points(exit_points, 2) - place
+    found = []
+    for theta in np.sort(_roots(to_exit, half_length)):
+        tensions, stable = _balance(theta, to_exit, half_length)
+        found.append(BarRest(float(theta), tensions, stable))
+    return tuple(found)
 
 
 def solution_manifold(
@@ -176,7 +222,11 @@ def _most_level(theta: Array, to_exit: Array, h: float) -> float:
 
 
 def _rests(theta: float, to_exit: Array, h: float) -> bool:
-    """Whether both cables pull, and the bar's one free motion raises its middle.
+    return _balance(theta, to_exit, h)[1]
+
+
+def _balance(theta: float, to_exit: Array, h: float) -> tuple[tuple[float, float], bool]:
+    """Tensions in weights; whether both cables pull, and the bar's one free motion raises it.
 
     That motion leaves both cable lengths as they are; the second change of the energy along it
     is tension times second change of length, summed over the cables.
@@ -185,15 +235,19 @@ def _rests(theta: float, to_exit: Array, h: float) -> bool:
     cables = to_exit - arms
     lengths = np.linalg.norm(cables, axis=1)
     if np.any(lengths == 0.0):
-        return False
+        return (np.nan, np.nan), False
     u = cables / lengths[:, None]
-    # forces that cancel sideways and lift: tau_1 u_1x + tau_2 u_2x = 0
-    tension = np.array([u[1, 0], -u[0, 0]]) * np.sign(u[1, 0] - u[0, 0])
-    if np.any(tension < 0.0) or not tension @ u[:, 1] > 0.0:
-        return False
+    # forces that cancel sideways and lift the weight: tau_1 u_1x + tau_2 u_2x = 0
+    lift = _cross(u[0], u[1])
+    if lift == 0.0:
+        return (np.nan, np.nan), False
+    tension = np.array([-u[1, 0], u[0, 0]]) / lift
+    pair = (float(tension[0]), float(tension[1]))
+    if np.any(tension < 0.0):
+        return pair, False
     rows = np.column_stack([u, _cross(arms, u)])
     x, y, turn = np.cross(rows[0], rows[1])
     moves = np.array([x, y]) + turn * np.column_stack([-arms[:, 1], arms[:, 0]])
     sideways = np.sum(moves**2, axis=1) - np.sum(moves * u, axis=1) ** 2
     bending = sideways / lengths + turn**2 * np.sum(arms * u, axis=1)
-    return bool(tension @ bending > 0.0)
+    return pair, bool(tension @ bending > 0.0)

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from seecr.equilibrium import solve
 from seecr.errors import InputError
 from seecr.mjcf import load_robot
-from seecr.planar import bar_equation, bar_tilt, midline_point, solution_manifold
+from seecr.planar import bar_equation, bar_equilibria, bar_tilt, midline_point, solution_manifold
 from seecr.pose import transform_points
 from seecr.robot import Robot
 from seecr.shipped import model_path
@@ -301,3 +301,39 @@ def test_vertical_parallelogram_is_feasible_where_four_cables_stay_taut() -> Non
     four = answer.slack.sum(axis=1) == 0
     assert np.all(feasible(robot, poses)[four])
     assert not feasible(robot, poses)[:15].any() and np.all(feasible(planar("horizontal"), poses))
+
+
+def test_all_ways_of_a_bar_to_be_in_balance_are_found() -> None:
+    exits, here, h = np.array([[0.0, 1.0], [1.0, 1.0]]), np.array([0.3, 0.5]), 0.1
+    found = bar_equilibria(exits, here, h)
+    grid = np.linspace(-np.pi, np.pi, 20001)
+    values = bar_equation(grid, exits, here, h)
+    crossings = np.flatnonzero(np.diff(np.sign(values)) != 0)
+    np.testing.assert_allclose([one.theta for one in found], grid[crossings], atol=4e-4)
+    assert bar_tilt(exits, here, h) in [one.theta for one in found if one.stable]
+    for one in found:
+        ends = h * np.array([[-1.0], [1.0]]) * [np.cos(one.theta), np.sin(one.theta)]
+        unit = exits - here - ends
+        unit /= np.linalg.norm(unit, axis=1)[:, None]
+        np.testing.assert_allclose(np.asarray(one.tensions) @ unit, [0.0, 1.0], atol=1e-9)
+        torque = ends[:, 0] * unit[:, 1] - ends[:, 1] * unit[:, 0]
+        assert abs(np.asarray(one.tensions) @ torque) < 1e-9
+
+
+def test_the_papers_unique_tilt_is_not_unique_for_a_long_bar() -> None:
+    """A search over positions below the exit points finds bars with two stable tilts."""
+    exits, h = np.array([[0.0, 1.0], [1.0, 1.0]]), 0.35
+    stable = [
+        [one.theta for one in bar_equilibria(exits, np.array([x, y]), h) if one.stable]
+        for x in np.linspace(0.1, 0.5, 9)
+        for y in np.linspace(0.5, 0.98, 13)
+    ]
+    assert max(len(some) for some in stable) == 2
+    assert bar_equilibria(exits, np.array([0.5, 0.2]), h)[1].stable
+
+
+def test_bars_without_length_are_refused() -> None:
+    with pytest.raises(InputError, match="half_length must be above zero"):
+        bar_equilibria([[0, 1], [1, 1]], [0.5, 0.5], 0.0)
+    with pytest.raises(InputError, match=r"position must be \(2,\)"):
+        bar_equilibria([[0, 1], [1, 1]], [[0.5, 0.5]], 0.1)

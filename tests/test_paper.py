@@ -1,0 +1,35 @@
+"""The page of the paper's figures: its numbers are those computed now, its figures are there."""
+
+from __future__ import annotations
+
+import make_paper
+import numpy as np
+import pytest
+
+
+def test_the_numbers_of_the_page_are_current() -> None:
+    page = make_paper.PAGE.read_text(encoding="utf-8")
+    assert make_paper.with_table(page) == page, "run: python scripts/make_paper.py"
+
+
+def test_every_figure_is_on_the_page() -> None:
+    page = make_paper.PAGE.read_text(encoding="utf-8")
+    for name in make_paper.FIGURES:
+        assert f"pictures/paper/{name}.png" in page
+        assert (make_paper.PICTURES / f"{name}.png").exists()
+
+
+def test_what_the_paper_says_of_four_cables() -> None:
+    vertical, level = (make_paper.sweep(f"planar_{n}", 0.2) for n in ("vertical", "horizontal"))
+    counts = vertical.slack.sum(axis=1)
+    assert {0, 1, 2} == set(counts.tolist()) and np.all(np.diff(counts[:46]) <= 0)
+    np.testing.assert_allclose(level.deviation[:, 4], 0.0, atol=1e-9)
+    pairs = level.tensions.reshape(-1, 2, 2)
+    np.testing.assert_allclose(pairs[..., 0], pairs[..., 1], atol=1e-9)
+
+
+def test_what_the_paper_says_of_eight_cables() -> None:
+    parallel = make_paper.sweep("demobot_parallel", 0.1)
+    assert make_paper.tilt(parallel)[0] == pytest.approx(26.43, abs=0.01)
+    assert {0, 2, 4} == set(parallel.slack.sum(axis=1).tolist())
+    assert np.abs(make_paper.tilt(make_paper.sweep("demobot_cogiro", 0.1))).max() < 0.02
