@@ -141,7 +141,7 @@ def _along(path: Path, name: str, z: float, workspace: bool, tops: tuple[str, ..
                 way = np.array([exit_point, end])
                 colour, style = ("0.75", ":") if slack else (COLOURS[0], "-")
                 left.plot(way[:, 0], way[:, 2], style, lw=0.6, color=colour)
-            half = np.maximum(np.ptp(one.anchor_points, axis=0)[[0, 2]] / 2, 0.004)
+            half = np.maximum(np.ptp(one.anchor_points, axis=0)[[0, 2]] / 2, 0.018)
             corners = half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]])
             box = np.column_stack([corners[:, 0], 0 * corners[:, 0], corners[:, 1]])
             edge = transform_points(found.pose[k], box)

@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from seecr.maps import Workspace, boundary, default_axes, workspace_map
     from seecr.mjcf import load_robot
     from seecr.model import Model, load_model, new_model
+    from seecr.multiple import equilibria
     from seecr.planar import BarRest, bar_equilibria, bar_tilt, midline_point, solution_manifold
     from seecr.robot import Joint, Robot
     from seecr.sensitivity import sensitivities
@@ -69,6 +70,7 @@ _MODULES = {
     "maps": ("Workspace", "boundary", "default_axes", "workspace_map"),
     "mjcf": ("load_robot",),
     "model": ("Model", "load_model", "new_model"),
+    "multiple": ("equilibria",),
     "planar": ("BarRest", "bar_equilibria", "bar_tilt", "midline_point", "solution_manifold"),
     "robot": ("Joint", "Robot"),
     "sensitivity": ("sensitivities",),
@@ -111,6 +113,7 @@ __all__ = [
     "correct",
     "default_axes",
     "effect_named",
+    "equilibria",
     "feasible",
     "layout_of",
     "load_model",

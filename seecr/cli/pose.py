@@ -22,6 +22,7 @@ Examples:
 )
 @robot_options
 @click.argument("coordinates", nargs=-1, type=float, metavar="X Y Z [QW QX QY QZ]")
+@click.option("--alone", is_flag=True, help="Do not look for other equilibria.")
 @click.option("--out", type=FILE, metavar="DIR", help="Write pose.json there too.")
 @json_option
 def command(
@@ -29,6 +30,7 @@ def command(
     coordinates: tuple[float, ...],
     cable: str | None,
     model: Path | None,
+    alone: bool,
     out: Path | None,
     as_json: bool,
 ) -> int:
@@ -36,21 +38,25 @@ def command(
 
     ROBOT is an MJCF file or the name of a shipped robot. X Y Z are metres in the base frame, QW
     QX QY QZ a quaternion, scalar first; without one the orientation is that of the reference pose.
+    Other stable equilibria of the same command are looked for and listed by energy.
 
     \b
     Exit status: 0 at rest, 2 bad input, 3 no rest found.
     """
-    from seecr import InputError, solve
+    from seecr import InputError, equilibria, predict, solve
     from seecr.files import json_text, staged, write_text
     from seecr.report.rows import rows_of
-    from seecr.report.words import at_rest, cable_lines, pose_lines
+    from seecr.report.words import at_rest, cable_lines, other_lines, pose_lines, softest_words
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
     if len(coordinates) not in (3, 7):
         raise InputError(f"expected X Y Z or X Y Z QW QX QY QZ, got {len(coordinates)} numbers")
-    orientation = coordinates[3:] or machine.reference_pose[3:]
-    solution = solve(machine, [[*coordinates[:3], *orientation]], effects=own or ())
+    command = [*coordinates[:3], *(coordinates[3:] or machine.reference_pose[3:])]
+    solution = solve(machine, command, effects=own or ())
+    # effects with a memory lead to one rest alone, along their way
+    memory = own is not None and predict(machine, command, own).has_history
+    others = None if alone or memory else equilibria(machine, command, effects=own or ())
     status = 0 if at_rest(solution) else 3
     notes = list(own.notes) if own else []
     document = {
@@ -59,6 +65,8 @@ def command(
         "cables": machine.cable_names,
         **rows_of(solution)[0],
         "sentence": solution.sentence(0),
+        "softest_direction": softest_words(solution),
+        "equilibria": None if others is None else rows_of(others),
         "notes": notes,
     }
     if out is not None:
@@ -67,6 +75,7 @@ def command(
     if as_json:
         click.echo(json_text(document))
         return status
-    for line in [*notes, *pose_lines(solution), *cable_lines(solution)]:
+    lines = [*pose_lines(solution), *cable_lines(solution), *other_lines(solution, others)]
+    for line in [*notes, *lines]:
         click.echo(line)
     return status

@@ -1,0 +1,95 @@
+"""All stable equilibria of one command: where else it could rest with the same lengths."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.stats import qmc
+
+from seecr.equilibrium import solve
+from seecr.errors import InputError
+from seecr.experiment import GivenEffects
+from seecr.joints import pose_of_values
+from seecr.pose import Array, pose_difference
+from seecr.robot import Robot
+from seecr.solution import Solution
+from seecr.starts import commanded_poses
+
+# Starts at a time, and at most.
+_PART, _MOST = 256, 4096
+# Poses nearer than this [of the length] are one equilibrium.
+_ALIKE = 1e-5
+
+
+def equilibria(
+    robot: Robot, pose: ArrayLike, *, effects: GivenEffects = (), most: int = _MOST
+) -> Solution:
+    """The stable equilibria that one command has, by energy, the lowest first.
+
+    Descents from starts that fill position and orientation evenly (Sobol; Shoemake 1992 for
+    rotations) until equilibria that nobody has met have become unlikely: Boender and Rinnooy
+    Kan's rule (Mathematical Programming 37, 1987) expects fewer than w (w + 1)/(n - w - 2) more
+    after n descents that led to w of them. Whether the platform can get from one to another is
+    not asked.
+
+    Args:
+        robot: as described.
+        pose: (7,) commanded.
+        effects: a model, or effects with values, none of them with a memory.
+        most: starts, at most.
+
+    Returns:
+        a :class:`Solution` with one row for each; the command's own search may lead to any.
+
+    Raises:
+        InputError: more than one pose, effects with a memory.
+    """
+    command = commanded_poses(pose)
+    if len(command) != 1:
+        raise InputError(f"equilibria needs one commanded pose (7,), got {len(command)}")
+    sampler = qmc.Sobol(robot.n_dof, seed=0)
+    own = solve(robot, command, effects=effects)
+    poses, starts = own.pose[own.converged], [command[own.converged]]
+    count = len(poses)
+    for _ in range(0, most, _PART):
+        tried = _spread(robot, command[0], sampler.random(_PART))
+        found = solve(robot, np.repeat(command, _PART, axis=0), effects=effects, start=tried)
+        rests = found.pose[found.converged]
+        count += len(rests)
+        for row, start in zip(rests, tried[found.converged], strict=True):
+            if not _known(robot, row, poses):
+                poses = np.concatenate([poses, row[None]])
+                starts.append(start[None])
+        met = len(poses)
+        if count > met + 2 and met * (met + 1) / (count - met - 2) < 0.05:
+            break
+    if len(poses) == 0:
+        return own
+    first = np.concatenate(starts)
+    whole = solve(robot, np.repeat(command, len(first), axis=0), effects=effects, start=first)
+    order = np.argsort(whole.energy, kind="stable")
+    return solve(robot, np.repeat(command, len(first), axis=0), effects=effects, start=first[order])
+
+
+def _known(robot: Robot, pose: Array, among: Array) -> bool:
+    if len(among) == 0:
+        return False
+    apart = pose_difference(np.repeat(pose[None], len(among), axis=0), among)
+    apart[:, 3:] *= robot.length
+    return bool((np.linalg.norm(apart, axis=1) < _ALIKE * robot.length).any())
+
+
+def _spread(robot: Robot, command: Array, unit: Array) -> Array:
+    """Starts (n, 7) from numbers (n, d) in [0, 1): around the command, turned in every way."""
+    points = np.concatenate([robot.exit_points, command[None, :3]])
+    size = 0.5 * float(np.max(np.ptp(points, axis=0)))
+    if robot.joints:
+        reach = np.where(robot.hinges, np.pi, size)
+        return pose_of_values(robot, (2.0 * unit - 1.0) * reach)[0]
+    place = command[:3] + (2.0 * unit[:, :3] - 1.0) * size
+    a, b, c = unit[:, 3], 2.0 * np.pi * unit[:, 4], 2.0 * np.pi * unit[:, 5]
+    quat = np.stack([
+        np.sqrt(1.0 - a) * np.sin(b), np.sqrt(1.0 - a) * np.cos(b),
+        np.sqrt(a) * np.sin(c), np.sqrt(a) * np.cos(c),
+    ], axis=1)  # fmt: skip
+    return np.concatenate([place, quat], axis=1)
