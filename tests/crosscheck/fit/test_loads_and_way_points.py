@@ -70,16 +70,19 @@ def test_way_points_are_no_readings_and_no_loss() -> None:
     assert not np.any(problem.counted[2::4]) and np.all(problem.counted[1::4, :6])
     assert not any(rows[2::4].any() for rows in blocks_of(problem))
     # two of three rows being way points is no loss of rows
-    most = data.rows(np.flatnonzero(data.read)[:12])
+    most = data.rows(np.flatnonzero(data.read))
+    assert most.n_rows == 18
     quat, position = most.quat_wxyz, most.position.copy()
     assert quat is not None
-    quat[4:], position[4:] = np.nan, np.nan
+    quat[6:], position[6:] = np.nan, np.nan
     assert prepare(ROBOT, replace(most, position=position, quat_wxyz=quat), Terms()).refusal is None
 
 
 def test_one_pose_under_two_loads_is_no_constant_command() -> None:
-    data = carried().rows(np.zeros(4, dtype=int))
-    again = replace(data, loads=Loads.of(4, mass=np.array([0.0, 0.1, 0.0, 0.1])))
+    data = carried().rows(np.zeros(8, dtype=int))
+    noise = SIGMA.position_m * np.random.default_rng(1).standard_normal((8, 3))
+    data = replace(data, position=data.position + noise)
+    again = replace(data, loads=Loads.of(8, mass=np.tile([0.0, 0.1], 4)))
     refusals = [prepare(ROBOT, one, Terms()).refusal for one in (data, again)]
     assert refusals[0] is not None and refusals[0].unfit is Unfit.CONSTANT_COMMANDS
     assert refusals[1] is None
