@@ -21,8 +21,8 @@ from seecr.tables import Tables, take
 
 # Rounds of Newton's method; balance to this part of the load ends them.
 _ROUNDS, _BALANCED = 40, 1e-12
-# Step of a rest length for its derivative, relative to it.
-_STEP = 1e-7
+# Step of a rest length for its derivative, relative to the robot's length.
+_STEP = 1e-5
 # A slack cable is this much longer than the way it bridges: it needs a margin, not a value.
 _MARGIN = 2e-3
 # Below this part of the load a tension is none.
@@ -84,8 +84,8 @@ def hold(tables: Tables, aim: Array, low: Array, high: Array) -> Held:
         load = np.einsum("ndm,nm->nd", by_tension, tensions) - at.gradient
         wanted, possible = distribute(by_tension, load, aim[rows], low, high)
         step = wanted - tensions
-        # a plain cable's tension is linear in 1/l0
-        slope = -own * out.rest[rows] ** 2
+        # a plain cable's tension is linear in 1/l0: the slope over the step is exact
+        slope = -own * out.rest[rows] * (out.rest[rows] - _STEP * now.length)
         inverse = 1.0 / out.rest[rows] + step / slope
         inverse = np.clip(inverse * out.rest[rows], 0.5, 2.0) / out.rest[rows]
         going = possible & np.isfinite(inverse).all(axis=1)

@@ -186,7 +186,8 @@ class _Search:
         if len(lost):
             aimed[lost], found[lost] = self._nearest(lost, tables.scale, fix_position)
         commands = replace(self.given, pose=aimed)
-        lengths, prediction = self._lengths(commands)
+        there = self._held(commands)[0] if len(lost) else held
+        lengths, prediction = self._lengths(commands, there)
         lengths[~found] = np.nan
         solution = prediction.solution()
         return Correction(
@@ -226,9 +227,8 @@ class _Search:
             poses[again], found[again] = other._nearest(rows[again], scale, False)
         return poses, found
 
-    def _lengths(self, commands: Commands) -> tuple[Array, Prediction]:
-        """Lengths to tell, and what comes of them."""
-        held, _ = self._held(commands)
+    def _lengths(self, commands: Commands, held: Held) -> tuple[Array, Prediction]:
+        """Lengths to tell for rest lengths that hold, and what comes of them."""
         for _ in range(_ROUNDS):
             told = told_lengths(self.robot, commands, self.effects, held.rest)
             trial = replace(commands, lengths=told, told=True)
