@@ -15,6 +15,7 @@ import numpy as np
 from crosscheck.errors import CrosscheckError
 from crosscheck.fit.problem import KINDS, Problem, Rms
 from crosscheck.fit.words import rms_words
+from crosscheck.measurements.data import Sigma
 from crosscheck.units import SI, parse_kind
 
 __all__ = ["HALF_THE_NOISE", "LeftOver", "Tolerance", "doubt_of", "left_over"]
@@ -65,8 +66,8 @@ class LeftOver:
     Attributes:
         size: its rms by kind, keys as in :class:`crosscheck.fit.problem.Kind`; 0 where noise
             explains all, None where nothing was read.
-        limit: from where on it matters.
-        important: whether it does, for some kind.
+        limit: from where on it matters; None where nobody said it and the noise is not stated.
+        important: whether it does, for some kind with a limit.
     """
 
     size: Rms
@@ -74,9 +75,15 @@ class LeftOver:
     important: bool
 
     @property
+    def undecided(self) -> bool:
+        """Whether nothing says what would matter, for some kind that was read."""
+        return any(self.limit[key] is None for key, size in self.size.items() if size is not None)
+
+    @property
     def words(self) -> str:
         """How large it is and what would matter, in a few words."""
-        return f"{rms_words(self.size)} (what matters: {rms_words(self.limit)})"
+        matters = rms_words(self.limit) or "not stated, see --tolerance"
+        return f"{rms_words(self.size)} (what matters: {matters})"
 
     def as_json(self) -> dict[str, Any]:
         """``left_over`` of ``diagnosis.json``, SI."""
@@ -84,13 +91,19 @@ class LeftOver:
 
 
 def left_over(
-    rms: Rms, noise: Rms, tolerance: Tolerance, doubt: Mapping[str, float] | None = None
+    rms: Rms,
+    noise: Rms,
+    tolerance: Tolerance,
+    stated: Sigma,
+    doubt: Mapping[str, float] | None = None,
 ) -> LeftOver:
     """What errors are beyond the noise, and whether that matters.
 
     Args:
         rms: of what the model leaves, by kind. noise: what noise alone would leave.
         tolerance: what the user said.
+        stated: the noise that the user stated. Noise that was estimated holds some of what is
+            left, and half of it says nothing of what matters.
         doubt: by kind, the relative standard error of a mean square of noise; see
             :func:`doubt_of`. What chance may add to the noise does not count as important.
     """
@@ -103,11 +116,12 @@ def left_over(
             size[kind.key] = limit[kind.key] = None
             continue
         said = getattr(tolerance, kind.sigma)
-        most = _PART * floor if said is None else float(said)
+        known = getattr(stated, kind.sigma) is not None
+        most = said if said is not None else (_PART * floor if known else None)
         beyond = error**2 - floor**2
         chance = _DOUBT * (doubt or {}).get(kind.key, 0.0) * floor**2
         size[kind.key], limit[kind.key] = float(np.sqrt(max(beyond, 0.0))), most
-        important = important or beyond - chance > most**2
+        important = important or (most is not None and beyond - chance > most**2)
     return LeftOver(size, limit, important)
 
 
