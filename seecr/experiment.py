@@ -119,6 +119,8 @@ class Experiment:
     commands: Commands
     length_errors: Array | None = None
     _path: list[Path] = field(default_factory=list, repr=False)
+    # by identity of the commands: a plain setup holds them, so that no other takes their place
+    _plain: dict[int, Setup] = field(default_factory=dict, repr=False)
 
     @property
     def path(self) -> Path:
@@ -129,11 +131,11 @@ class Experiment:
 
     def with_length_errors(self, errors: Array | None) -> Experiment:
         """The same experiment with other errors of the paid-out lengths."""
-        return Experiment(self.robot, self.commands, errors, self._path)
+        return Experiment(self.robot, self.commands, errors, self._path, self._plain)
 
     def setup(self, effects: Sequence[Effect], commands: Commands | None = None) -> Setup:
         """The setup as the effects leave it."""
-        setup = plain_setup(self.robot, self.commands if commands is None else commands)
+        setup = self._plain_of(self.commands if commands is None else commands).copy()
         if self.length_errors is not None:
             rows = slice(None) if commands is None else self.path.source
             setup.extra_length += self.length_errors[rows]
@@ -144,6 +146,12 @@ class Experiment:
             path = self.path
             setup.commands = path.given_turning if commands is None else path.turning
         return setup
+
+    def _plain_of(self, commands: Commands) -> Setup:
+        """The plain setup of commands, which fits ask for thousands of times."""
+        if id(commands) not in self._plain:
+            self._plain[id(commands)] = plain_setup(self.robot, commands)
+        return self._plain[id(commands)]
 
     def predict(self, effects: Sequence[Effect] = (), near: Prediction | None = None) -> Prediction:
         """Solve all rows and read the sensors.
@@ -253,8 +261,14 @@ def read(effects: Sequence[Effect], setup: Setup, poses: Array, tensions: Array)
     """What the sensors report of poses (n, 7) and tensions (n, m)."""
     readings = Readings(poses[:, :3].copy(), poses[:, 3:].copy(), tensions.copy())
     for effect in effects:
-        edit_readings(effect, readings, setup)
+        if senses(type(effect)):
+            edit_readings(effect, readings, setup)
     return readings
+
+
+def senses(effect: type[Effect]) -> bool:
+    """Whether an effect edits readings."""
+    return effect.edit_readings is not Effect.edit_readings
 
 
 def _mend(tables: Tables, found: statics.Evaluation) -> statics.Evaluation:

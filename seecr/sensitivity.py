@@ -19,7 +19,7 @@ from seecr import statics
 from seecr.compiled.columns import STRAIN
 from seecr.effects.base import Effect, Readings
 from seecr.effects.terms import Terms
-from seecr.experiment import Experiment, Prediction, read
+from seecr.experiment import Experiment, Prediction, read, senses
 from seecr.joints import motion_columns
 from seecr.pose import Array, pose_add, quat_conjugate, quat_multiply, rotvec_from_quat
 from seecr.setup import QUANTITIES, History, Setup
@@ -95,23 +95,27 @@ class _ByWrench:
     terms: Terms
 
     @cached_property
-    def sensing(self) -> bool:
-        """Whether any term edits the readings."""
-        return any(t.layout.effect.edit_readings is not Effect.edit_readings for t in self.terms)
+    def sensing(self) -> list[Effect]:
+        """The effects that edit the readings."""
+        return [t.effect() for t in self.terms if senses(t.layout.effect)]
 
     @cached_property
     def read_rates(self) -> Array:
         """Derivative of the readings by pose and tensions, (n, 6 + m, 6 + m)."""
-        at, (n, width) = self.at, _shape(self.at)
+        own = [(t.name, *t.vector.tolist()) for t in self.terms if senses(t.layout.effect)]
+        return _kept(self.at, f"read_rates {own}", self._read_rates)
+
+    def _read_rates(self, at: Prediction) -> Array:
+        n, width = _shape(at)
         out = np.empty((n, width, width))
         for k in range(width):
             step = np.zeros(width)
-            step[k] = _READ * (self.at.tables.length if k < 3 else 1.0)
+            step[k] = _READ * (at.tables.length if k < 3 else 1.0)
             if k >= 6:
                 step[k] *= max(1.0, float(np.max(np.abs(at.tensions))))
             move, tension = np.tile(step[:6], (n, 1)), step[6:]
             ahead, behind = (
-                read(self.terms.effects, at.setup, pose_add(at.pose, s * move),
+                read(self.sensing, at.setup, pose_add(at.pose, s * move),
                      at.tensions + s * tension)
                 for s in (1.0, -1.0)
             )  # fmt: skip

@@ -224,6 +224,11 @@ class Setup:
         )  # fmt: skip
         return out
 
+    def copy(self) -> Setup:
+        """One that can be edited for itself."""
+        own = {name: _copied(getattr(self, name)) for name in QUANTITIES}
+        return Setup(self.robot, self.commands, laws=list(self.laws), **own)
+
     @property
     def has_history(self) -> bool:
         """Whether a row depends on the rows before it."""
@@ -232,6 +237,10 @@ class Setup:
             for name, item in QUANTITIES.items()
             if item.history is History.GIVES
         )
+
+
+def _copied(value: Any) -> Any:
+    return value.copy() if isinstance(value, np.ndarray) else value
 
 
 QUANTITIES: Mapping[str, Quantity] = MappingProxyType(

@@ -122,10 +122,10 @@ def settle(
         gain, before, damping, state = step
         setting.watch(state.chi2 / max(len(state.white), 1))
         weight = setting.weight_at(colour, state)
-        jacobian = scaled_derivatives(setting, state)
         if gain < max(_PART * before, _GAIN):
-            settled = True
+            settled = True  # so near that the derivatives are the same
             break
+        jacobian = scaled_derivatives(setting, state)
     return JointFit(state, jacobian, width, colour, weight, settled)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from crosscheck.calibration.field import UNKNOWN
 from crosscheck.calibration.probability import Classes
-from crosscheck.calibration.refits import NONE, Found
+from crosscheck.calibration.refits import Found
 from crosscheck.calibration.sets import Names
 from crosscheck.fit.reasons import DiagnosisVerdict
 
@@ -24,7 +24,7 @@ _FEW, _OPEN = 5, 1.0
 # A name is owed from this much ln evidence; what explains less may be chance.
 _OWED = 12.5
 # Runs left out may be this many times as far off as the fit expected.
-_SURPRISE = 2.0
+SURPRISE = 2.0
 # In a large set each effect must carry more than this part of what all explain: others may
 # imitate what is missing.
 _PART, _WORTH = 0.1, 25.0
@@ -45,7 +45,9 @@ class Judgement:
     undecided: float
 
 
-def judge(found: Found, classes: Classes, field_odds: float, surprise: float) -> Judgement:
+def judge(
+    found: Found, classes: Classes, field_odds: float, surprise: float, strange: bool = False
+) -> Judgement:
     """The verdict.
 
     Args:
@@ -53,9 +55,10 @@ def judge(found: Found, classes: Classes, field_odds: float, surprise: float) ->
         classes: probabilities.
         field_odds: ln odds of a smooth field beside the whole catalogue.
         surprise: of the worst run left out of the joint fit, a reading.
+        strange: what was taken for noise is none.
     """
-    best, undecided = found.best.names, classes.undecided
-    unknown = field_odds > UNKNOWN or surprise > _SURPRISE
+    best, undecided = found.best.names - found.always, classes.undecided
+    unknown = strange or field_odds > UNKNOWN or surprise > SURPRISE
     few = len(best) <= _FEW and undecided < _OPEN
     sure = sure_effects(found, classes, few)
     if unknown:  # known effects imitate it: none of them is sure
@@ -90,7 +93,9 @@ def worths(found: Found) -> dict[str, float]:
     best = found.best
     linear = found.scores.neighbours(best.names)
     base = found.scores.score(best.names)
-    return {name: _worth(found, linear, base, best.names - {name}) for name in best.names}
+    return {
+        name: _worth(found, linear, base, best.names - {name}) for name in best.names - found.always
+    }
 
 
 def _worth(found: Found, linear: dict[Names, float], base: float, rest: Names) -> float:
@@ -101,4 +106,4 @@ def _worth(found: Found, linear: dict[Names, float], base: float, rest: Names) -
 
 def explained(found: Found) -> float:
     """ln evidence of the best set over none at all."""
-    return found.best.score - found.refits[NONE].score
+    return found.best.score - found.none.score

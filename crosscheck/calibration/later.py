@@ -23,7 +23,7 @@ from seecr.effects.base import Layout
 from seecr.pose import Array
 
 # An effect joins where it gains this much evidence.
-_PAYS = 2.0
+PAYS = 2.0
 # Neighbouring shapes are alike: about every third is one more chance of its own.
 _ALIKE = 3.0
 
@@ -59,20 +59,7 @@ def _waits(problem: Problem, layout: Layout) -> bool:
     return bool(setup.has_history or np.any(setup.cable_weight))
 
 
-def worth_adding(setting: Setting, joint: JointFit, later: Sequence[Layout]) -> list[Term]:
-    """Effects that are worth it beside the joint fit, at their most promising shapes."""
-    found = _promising(setting, joint, later)
-    return [_inside(term) for term, gain in found if gain > _PAYS]
-
-
-def promising(setting: Setting, joint: JointFit, later: Sequence[Layout]) -> list[Term]:
-    """Effects at their most promising shapes; as they are in the fit where they are there."""
-    there = [joint.terms[a.name] for a in later if a.name in joint.terms]
-    absent = [a for a in later if a.name not in joint.terms]
-    return [_at_null(t) for t in there] + [t for t, _g in _promising(setting, joint, absent)]
-
-
-def _promising(
+def promising_beside(
     setting: Setting, joint: JointFit, later: Sequence[Layout]
 ) -> list[tuple[Term, float]]:
     """Each with the ln evidence that it gains, less what looking at many shapes costs."""
@@ -88,14 +75,14 @@ def _promising(
     return out
 
 
-def _at_null(term: Term) -> Term:
+def at_null(term: Term) -> Term:
     """An effect with its shape, its amplitudes null."""
     layout = term.layout
     held = layout.shape | term.knowledge.fixed
     return term.with_vector(np.where(held, term.vector, layout.null))
 
 
-def _inside(term: Term) -> Term:
+def inside(term: Term) -> Term:
     """A start off the bound, where history has a derivative on both sides."""
     layout = term.layout
     at_bound = (term.vector <= layout.lower) & ~layout.shape

@@ -29,6 +29,7 @@ class LeftOut:
         raw: (n, 6 + m) residuals, NaN in rows that do not count.
         rms: by kind of reading.
         chi2: (blocks,) whitened, of the readings in each block; readings: (blocks,) their number.
+        values: (blocks, p) parameters fitted without each block.
         surprise: (blocks,) chi2 in units of noise and of what the fit without the block did not
             know of it, a reading: about 1 where the model is right, however far it had to reach.
     """
@@ -37,6 +38,7 @@ class LeftOut:
     rms: Rms
     chi2: Array
     readings: Array
+    values: Array
     surprise: Array
 
 
@@ -48,16 +50,18 @@ def leave_out(setting: Setting, joint: JointFit) -> LeftOut:
     fitted = without(linear, np.zeros(len(linear.y), dtype=bool))
     raw = np.full(problem.measured.shape, np.nan)
     chi2, readings, surprise = (np.zeros(len(blocks)) for _ in range(3))
+    values = np.zeros((len(blocks), len(joint.z)))
     for b, rows in enumerate(blocks):
         mine = rows[problem.row_of]
         # what was measured independently belongs to no block
         absent = np.concatenate([mine, np.zeros(len(linear.y) - len(mine), dtype=bool)])
         moved = fitted - without(linear, absent)
+        values[b] = joint.terms.vector - moved * joint.terms.scale
         raw[rows] = (joint.state.raw + _unwhitened(setting, joint, joint.jacobian @ moved))[rows]
         left = _white(setting, joint, joint.state.white + joint.jacobian @ moved)[mine]
         chi2[b], readings[b] = float(left @ left), len(left)
         surprise[b] = surprise_of(linear, absent, left) / max(len(left), 1)
-    return LeftOut(raw, rms_by_kind(problem, raw), chi2, readings, surprise)
+    return LeftOut(raw, rms_by_kind(problem, raw), chi2, readings, values, surprise)
 
 
 def without(linear: Linear, rows: NDArray[np.bool_]) -> Array:

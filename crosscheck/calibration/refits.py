@@ -16,22 +16,21 @@ from crosscheck.calibration.catalogue import Catalogue, gram_about, widths_for
 from crosscheck.calibration.gram import Gram, averaged, best_widths, gram_of
 from crosscheck.calibration.joint import JointFit, Setting, settle
 from crosscheck.calibration.linearised import groups_of, linearised
-from crosscheck.calibration.sets import Names, Scores, explore, log_prior
+from crosscheck.calibration.priors import SHAPES
+from crosscheck.calibration.sets import Names, Scores, explore
 from crosscheck.fit.state import State, evaluate
 from seecr.effects import Term, Terms
 from seecr.pose import Array
 
-NONE: Names = frozenset()
 # Sets refitted about one linear model, and how much worse than the best they may be.
 _REFITTED, _WITHIN = 20, 12.0
 # Rounds of making the catalogue linear about the best set.
-_ROUNDS = 4
+ROUNDS = 4
 _STEPS = 12
 # A refit this much worse than its linear evidence may have ended in a hollow: it starts again.
 _HOLLOW = 8.0
 # Sets up to this size are tried from more starts, and without each of their members.
 _FEW = 5
-_SHAPES = 30.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,12 +57,21 @@ class Found:
         refits: exact ones, by set. best: the best of them.
         scores: linear ones about the best.
         settled: the best set stayed when the catalogue was made linear about it.
+        refit: fits a set exactly, or gives what was fitted; None where it cannot be solved.
+        always: effects that the model has, in every set: the smallest set there is.
     """
 
     refits: dict[Names, Refit]
     best: Refit
     scores: Scores
     settled: bool
+    refit: Callable[[Names], Refit | None]
+    always: Names = frozenset()
+
+    @property
+    def none(self) -> Refit:
+        """Nothing added."""
+        return self.refits[self.always]
 
 
 def compare_sets(
@@ -73,6 +81,8 @@ def compare_sets(
     plain: State,
     told: Callable[[str], None] = lambda _text: None,
     most: int = _REFITTED,
+    rounds: int = ROUNDS,
+    also: Names = frozenset(),
 ) -> Found:
     """Search the sets of effects, linear and exact in turn.
 
@@ -80,18 +90,24 @@ def compare_sets(
         setting: the data; noise and weights of the joint fit stay for all sets.
         joint: everything fitted together, about which the first linear model is.
         catalogue: effects that may be in a set.
-        plain: the model without any of them.
+        plain: the model as it stands; its effects are in every set.
         told: called with what is going on.
         most: sets to refit about one linear model.
+        rounds: of making the catalogue linear about the best set, at most.
+        also: a set to start from besides.
     """
     fixed = replace(setting, frozen=True, weight=joint.weight)
     refits: dict[Names, Refit] = {}
     best: Refit | None = None
     settled = False
-    scores = Scores(gram_about(fixed, joint, catalogue), len(catalogue.names))
-    for _ in range(_ROUNDS):
-        everything = frozenset(scores.gram.names)
-        starts = [NONE, everything] if best is None else [NONE, best.names]
+    always = frozenset(plain.terms.names)
+    of = len(set(catalogue.names) - always)
+    scores = Scores(gram_about(fixed, joint, catalogue), of, always)
+    for _ in range(rounds):
+        everything = frozenset(scores.gram.names) | always
+        starts = [always, everything, always | also]
+        if best is not None:
+            starts = [always, best.names]
         explore(scores, starts)
 
         def refit(some: Iterable[Names], scores: Scores = scores) -> Refit:
@@ -103,20 +119,29 @@ def compare_sets(
                         refits[names] = found
             return max(refits.values(), key=lambda r: r.score)
 
-        before, best = best, refit([NONE, *scores.best(most, _WITHIN)])
-        best = _dropped(best, refit)
+        before, best = best, refit([always, always | also, *scores.best(most, _WITHIN)])
+        best = _dropped(best, always, refit)
         if before is not None and before.names == best.names:
             settled = True
             break
-        scores = Scores(gram_about(fixed, best.joint, catalogue), len(catalogue.names))
+        scores = Scores(gram_about(fixed, best.joint, catalogue), of, always)
     assert best is not None
-    return Found(refits, best, scores, settled)
+
+    def later(names: Names) -> Refit | None:
+        if names not in refits:
+            found = _refitted(fixed, joint, catalogue, plain, scores, names)
+            if found is None:
+                return None
+            refits[names] = found
+        return refits[names]
+
+    return Found(refits, best, scores, settled, later, always)
 
 
-def _dropped(best: Refit, refit: Callable[[Iterable[Names]], Refit]) -> Refit:
+def _dropped(best: Refit, always: Names, refit: Callable[[Iterable[Names]], Refit]) -> Refit:
     """The best set, each of its members dropped in earnest, until none is one too many."""
-    while len(best.names) <= _FEW:
-        better = refit([best.names - {name} for name in sorted(best.names)])
+    while len(best.names - always) <= _FEW:
+        better = refit([best.names - {name} for name in sorted(best.names - always)])
         if better.names == best.names:
             break
         best = better
@@ -134,11 +159,11 @@ def _refitted(
     """A set fitted exactly from its linear values, and from null where that ends badly."""
     linear, widths = scores.score(names), scores.widths(names)
     found = _settled(setting, joint, plain, _linear_terms(catalogue, scores, names), widths)
-    best = None if found is None else _scored(setting, found, names, widths, scores.of)
-    if 0 < len(names) <= _FEW and (best is None or best.score < linear - _HOLLOW):
+    best = None if found is None else _scored(setting, found, names, widths, scores)
+    if 0 < len(names - scores.always) <= _FEW and (best is None or best.score < linear - _HOLLOW):
         terms = Terms(_inside(catalogue.start(name)) for name in names)
         again = _settled(setting, joint, plain, terms, widths)
-        other = None if again is None else _scored(setting, again, names, widths, scores.of)
+        other = None if again is None else _scored(setting, again, names, widths, scores)
         if other is not None and (best is None or other.score > best.score):
             best = other
     return best
@@ -159,7 +184,7 @@ def _linear_terms(catalogue: Catalogue, scores: Scores, names: Names) -> Terms:
         vector[own] = layout.null[own] + solved.values[first : first + count] * layout.scale[own]
         out.append(_inside(term.with_vector(np.clip(vector, layout.lower, layout.upper))))
         first += count
-    return Terms(out)
+    return Terms([*out, *(catalogue.start(name) for name in names if name not in solved.chosen)])
 
 
 def _inside(term: Term) -> Term:
@@ -179,18 +204,18 @@ def _settled(
 
 
 def _width(terms: Terms, widths: dict[str, float]) -> Array:
-    parts = [np.where(t.layout.shape, _SHAPES, widths[t.name]) for t in terms]
+    parts = [np.where(t.layout.shape, SHAPES, widths.get(t.name, 1.0)) for t in terms]
     return np.where(terms.knowledge.fixed, 0.0, np.concatenate([np.zeros(0), *parts]))
 
 
 def _scored(
-    setting: Setting, joint: JointFit, names: Names, widths: dict[str, float], of: int
+    setting: Setting, joint: JointFit, names: Names, widths: dict[str, float], scores: Scores
 ) -> Refit:
     """A fit with its evidence about its own optimum, averaged over widths."""
     gram = own_gram(setting, joint)
     inside = {n: widths[n] for n in gram.names}
     better = best_widths(gram, inside)
-    score = averaged(gram, better) + log_prior(len(names), of)
+    score = averaged(gram, better) + scores.log_prior(names)
     return Refit(names, joint, widths | better, score - 0.5 * joint.state.log_det)
 
 

@@ -6,20 +6,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crosscheck.calibration.calibrate import PLAIN, Calibration, Progress, calibrate
+from crosscheck.calibration.calibrate import PLAIN, Calibration, calibrate
 from crosscheck.calibration.catalogue import Catalogue
 from crosscheck.calibration.field import UNKNOWN, log_odds
-from crosscheck.calibration.judgement import Judgement, judge
-from crosscheck.calibration.later import layouts, promising
+from crosscheck.calibration.judgement import SURPRISE, Judgement, judge
+from crosscheck.calibration.later import layouts
 from crosscheck.calibration.probability import Classes, all_scores, probabilities
-from crosscheck.calibration.refits import Found, compare_sets
+from crosscheck.calibration.refits import ROUNDS, Found, compare_sets
+from crosscheck.calibration.stages import Progress
+from crosscheck.calibration.strange import is_strange
 from crosscheck.fit.problem import Problem, kinds_read
 from crosscheck.fit.state import evaluate
 from crosscheck.measurements.data import Sigma
 from seecr.effects import Term, Terms
 
 # Sets refitted about one linear model; fewer where something unknown leaves no hope of an end.
-_REFITTED, _REFITTED_UNKNOWN = 20, 6
+_REFITTED, _REFITTED_UNKNOWN = 20, 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,38 +30,60 @@ class Sought:
 
     Attributes:
         calibration: everything at once. found: the sets compared.
+        catalogue: effects with the values they start from.
         classes: probabilities. field_odds: ln odds of something smooth and unknown.
         judgement: the verdict.
     """
 
     calibration: Calibration
     found: Found
+    catalogue: Catalogue
     classes: Classes
     field_odds: float
     judgement: Judgement
 
 
-def seek(problem: Problem, stated: Sigma, progress: Progress = lambda _text, _part: None) -> Sought:
+def seek(
+    problem: Problem,
+    stated: Sigma,
+    terms: Terms = PLAIN,
+    progress: Progress = lambda _text, _part: None,
+    start: Terms = PLAIN,
+) -> Sought:
     """Fit everything at once, then compare sets of effects.
 
     Args:
         problem: readings, from :func:`crosscheck.fit.prepare.prepare`.
         stated: the noise that the user stated; what was estimated is missing in it.
+        terms: effects of the model as it stands; they are in every set.
         progress: called with what is being done and the part of it that is done.
+        start: effects with values from another search, to start the joint fit from.
     """
-    whole = calibrate(problem, PLAIN, lambda text, part: progress(text, 0.4 * part))
+    begin = Terms([*terms.without_any(start.names), *start])
+    whole = calibrate(problem, begin, lambda text, part: progress(text, 0.5 * part))
     setting, joint = whole.setting, whole.joint
-    every = all(getattr(stated, kind.sigma) is not None for kind in kinds_read(problem))
-    odds = log_odds(setting, joint, every)
-    at_once, later = layouts(problem)
-    catalogue = Catalogue(
-        Terms(Term(a, a.null) for a in at_once), Terms(promising(setting, joint, later))
-    )
-    plain = evaluate(problem, Terms(), setting.factor)
-    most = _REFITTED if odds < UNKNOWN else _REFITTED_UNKNOWN
-    found = compare_sets(
-        setting, joint, catalogue, plain, lambda text: progress(f"trying {text}", 0.7), most
-    )
-    classes = probabilities(all_scores(found), found.best.names, catalogue.names)
+    known = [k.name for k in kinds_read(problem) if getattr(stated, k.sigma) is not None]
+    odds = log_odds(setting, joint, len(known) == len(kinds_read(problem)))
+    strange = is_strange(setting, joint, known)
     surprise = float(np.max(whole.held_out.surprise, initial=0.0))
-    return Sought(whole, found, classes, odds, judge(found, classes, odds, surprise))
+    at_once, _later = layouts(problem)
+    nulls = (Term(a, a.null) for a in at_once if a.name not in terms)
+    here = Terms([*nulls, *(t for t in terms if t.name not in whole.later)])
+    catalogue = Catalogue(here, whole.later)
+    plain = evaluate(problem, terms, setting.factor)
+    unknown = strange or odds > UNKNOWN or surprise > SURPRISE
+    most, rounds = (_REFITTED_UNKNOWN, 1) if unknown else (_REFITTED, ROUNDS)
+    tried = 0
+
+    def told(text: str) -> None:
+        nonlocal tried
+        tried += 1
+        progress(f"trying {text}", 0.5 + 0.5 * tried / (tried + most))
+
+    also = frozenset(start.names)
+    found = compare_sets(setting, joint, catalogue, plain, told, most, rounds, also)
+    effects = [n for n in catalogue.names if n not in terms]
+    classes = probabilities(all_scores(found), found.best.names, effects)
+    strange = strange or is_strange(setting, found.best.joint, known)
+    said = judge(found, classes, odds, surprise, strange)
+    return Sought(whole, found, catalogue, classes, odds, said)

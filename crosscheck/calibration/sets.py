@@ -38,23 +38,30 @@ class Scores:
     Attributes:
         gram: of all effects.
         of: how many effects the prior counts.
+        always: effects that the model has: in every set, and not counted.
         solved: sets whose widths were looked for: score and widths.
         near: sets one effect away from those: score with the neighbour's widths.
     """
 
     gram: Gram
     of: int
+    always: Names = frozenset()
     solved: dict[Names, tuple[float, dict[str, float]]] = field(default_factory=dict)
     near: dict[Names, float] = field(default_factory=dict)
 
     def score(self, names: Names, start: dict[str, float] | None = None) -> float:
         """ln evidence of a set and ln prior."""
         if names not in self.solved:
-            widths = {n: (start or {}).get(n, self.middle(n)) for n in sorted(names)}
+            seen = sorted(names & self.gram.groups.keys())  # all but effects held by the model
+            widths = {n: (start or {}).get(n, self.middle(n)) for n in seen}
             widths = best_widths(self.gram, widths)
-            total = averaged(self.gram, widths) + log_prior(len(names), self.of)
+            total = averaged(self.gram, widths) + self.log_prior(names)
             self.solved[names] = (total, widths)
         return self.solved[names][0]
+
+    def log_prior(self, names: Names) -> float:
+        """ln chance of a set before the data."""
+        return log_prior(len(names - self.always), self.of)
 
     def widths(self, names: Names) -> dict[str, float]:
         """The best widths of a set's members."""
@@ -65,13 +72,13 @@ class Scores:
         """About the scores of sets with one effect more, one less or one other."""
         widths, base = self.widths(names), self.score(names)
         out = self._more(names, widths, base)
-        for name in names:
+        for name in names - self.always:
             rest = names - {name}
             fewer = {n: w for n, w in widths.items() if n != name}
             gain = self.gram.solved(widths).gain(name)
-            score = base - gain - log_prior(len(names), self.of) + log_prior(len(rest), self.of)
+            score = base - gain - self.log_prior(names) + self.log_prior(rest)
             out[rest] = score
-            if len(names) <= _LARGE:
+            if len(names - self.always) <= _LARGE:
                 out |= self._more(rest, fewer, score, but=name)
         return out
 
@@ -79,7 +86,8 @@ class Scores:
         self, names: Names, widths: dict[str, float], base: float, but: str = ""
     ) -> dict[Names, float]:
         solved = self.gram.solved(widths)
-        step = log_prior(len(names) + 1, self.of) - log_prior(len(names), self.of)
+        own = len(names - self.always)
+        step = log_prior(own + 1, self.of) - log_prior(own, self.of)
         others = [n for n in self.gram.names if n not in names and n != but]
         return {names | {n}: base + step + solved.gain(n) for n in others}
 
@@ -104,16 +112,16 @@ def explore(scores: Scores, starts: Iterable[Names]) -> Names:
 def thinned(scores: Scores, start: Names) -> Names:
     """A large set without the members that are worth least, down to a size to search from."""
     gram = scores.gram
-    widths = {n: scores.middle(n) for n in sorted(start)}
-    while len(widths) > _LARGE:
+    widths = {n: scores.middle(n) for n in sorted(start & gram.groups.keys())}
+    while len(widths) > _LARGE + len(scores.always):
         solved = gram.solved(widths)
         gains = {n: solved.gains(n) for n in widths}
-        name = min(gains, key=lambda n: float(np.max(gains[n])))
+        name = min(widths.keys() - scores.always, key=lambda n: float(np.max(gains[n])))
         if float(np.max(gains[name])) > _KEPT:
             break
         widths = {n: float(gram.groups[n].widths[np.argmax(g)]) for n, g in gains.items()}
         del widths[name]
-    return frozenset(widths)
+    return frozenset(widths) | (start & scores.always)
 
 
 def climb(scores: Scores, start: Names) -> Names:

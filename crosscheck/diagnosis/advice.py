@@ -54,6 +54,10 @@ def check_of(term: Term, robot: Robot) -> str:
         return layout.effect.advice
 
 
+_CALIBRATE = (
+    "crosscheck calibrate writes the model with all effects, each as far as the data know it; "
+    "which of them it is, only checks by hand can say"
+)
 # Many small errors at once look like an unknown one: no single effect is worth anything before the
 # others are in.
 _ALL_AT_ONCE = (
@@ -77,6 +81,8 @@ def measure_next(
             out += _to_separate(plan, options, effect, rival)
         if not effect.rivals:
             out.append(f"to confirm {effect.effect}: {effect.check}")
+    if verdict is DiagnosisVerdict.MANY_EFFECTS:
+        out.append(_CALIBRATE)
     if verdict is DiagnosisVerdict.UNKNOWN_EFFECT:
         out += [_to_find(where), _ALL_AT_ONCE]
     if verdict is DiagnosisVerdict.NO_EFFECT_MISSING:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.comparison.associations import Association
+from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.rivals import Rival
 from crosscheck.diagnosis.search import Search
 from crosscheck.files import plain
@@ -36,6 +37,7 @@ class MissingEffect:
         rms: errors with it and those before it added, by kind.
         held_out_rms: the same on runs left out.
         share: part of the unexplained chi2 (of runs left out) that it took away.
+        probability: that it, or an effect that cannot be told from it, is missing.
     """
 
     term: Term
@@ -46,6 +48,7 @@ class MissingEffect:
     rms: Rms
     held_out_rms: Rms
     share: float
+    probability: float
 
     @property
     def effect(self) -> str:
@@ -88,6 +91,7 @@ class MissingEffect:
                 name: {"value": value, "stderr": error, "at_bound": bool(bound)}
                 for name, value, error, bound in rows
             },
+            "probability": self.probability,
             "check": self.check,
             **self.rms,
             "held_out": self.held_out_rms,
@@ -132,6 +136,7 @@ class Diagnosis(Result):
         where: what the unexplained part goes with, the strongest first.
         refusal: why there is no verdict; None where there is one.
         left: what is left beyond noise, and whether it matters; None without a verdict.
+        chances: of every effect; None without a verdict.
     """
 
     verdict: DiagnosisVerdict
@@ -149,6 +154,7 @@ class Diagnosis(Result):
     where: tuple[Association, ...] = ()
     refusal: Refusal | None = None
     left: LeftOver | None = None
+    chances: Chances | None = None
 
     @property
     def converged(self) -> bool:
@@ -197,6 +203,7 @@ class Diagnosis(Result):
                 "residual": None if self.whiteness is None else asdict(self.whiteness),
                 "where": [found.as_json() for found in self.where],
                 "notes": self.notes,
+                **(self.chances.as_json() if self.chances is not None else {}),
             }
         )
         return document

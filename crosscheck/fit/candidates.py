@@ -46,6 +46,7 @@ class Candidate:
         p: chance of that drop where the effect is absent.
         why_not: the reason why it is no candidate or was not chosen; None where it may be.
         starts: where to start fitting it.
+        alone: the effect with the values it would need by itself, where it was not fitted.
     """
 
     layout: Layout
@@ -55,6 +56,7 @@ class Candidate:
     p: float = 1.0
     why_not: Reason | None = None
     starts: Starts | None = None
+    alone: Term | None = None
 
     @property
     def name(self) -> str:

@@ -77,8 +77,8 @@ def whiteness(problem: Problem, white: Array, parameters: int) -> Whiteness:
     table = as_table(problem, white)
     dof = max(len(white) - parameters, 1)
     chi2 = float(white @ white)
-    lag = agreement(table, _next_rows(problem))
-    near = agreement(table, _nearest_rows(problem))
+    lag = agreement(table, next_rows(problem))
+    near = agreement(table, nearest_rows(problem))
     return Whiteness(
         chi2=chi2,
         dof=dof,
@@ -136,14 +136,15 @@ def best_of(errors: float, tests: int) -> float:
     return -float(special.ndtri_exp(stats.norm.logsf(errors) + np.log(tests)))
 
 
-def _next_rows(problem: Problem) -> NDArray[np.int64]:
+def next_rows(problem: Problem) -> NDArray[np.int64]:
+    """Pairs (k, 2) of rows that follow one another in a run."""
     run, use = problem.data.run_index, problem.use
     rows = np.flatnonzero(use)
     together = run[rows[1:]] == run[rows[:-1]]
     return np.stack([rows[:-1][together], rows[1:][together]], axis=1)
 
 
-def _nearest_rows(problem: Problem) -> NDArray[np.int64]:
+def nearest_rows(problem: Problem) -> NDArray[np.int64]:
     """Each row with the row of nearest command that is not its neighbour in time."""
     commands = problem.experiment.commands
     rows = np.flatnonzero(problem.use)

@@ -32,6 +32,9 @@ class Why(Enum):
     NOT_PREDICTIVE = "does not predict runs left out any better"
     EXPLAINED_BETTER = "explained better by {by}"
     NOT_NEEDED = "not needed"
+    ALIKE = "cannot be told from {by}, which is listed"
+    NOT_NEEDED_BESIDE = "not needed beside {by} (probability {p:.2g})"
+    IMPROBABLE = "explains too little (probability {p:.2g})"
     IMITATES = "not sure: {parameters} parameters imitate much of what no effect explains"
     EXPLAINS_PART = "explains a part, but structure remains: not sure"
 

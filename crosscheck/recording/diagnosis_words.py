@@ -6,7 +6,7 @@ import numpy as np
 
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
 from crosscheck.diagnosis.steps import Stage, floor_of
-from crosscheck.diagnosis.verdict import percent
+from crosscheck.diagnosis.words import percent
 from crosscheck.fit.problem import rms_by_kind
 from crosscheck.recording import misfit, words
 from crosscheck.recording.misfit import Misfit

@@ -73,7 +73,7 @@ def _names(found: Diagnosis) -> list[str]:
     names += [rival.name for f in found.missing for rival in f.rivals]
     names += [
         row.effect
-        for row in found.candidates
+        for row in sorted(found.candidates, key=lambda row: -row.score)
         if not row.why_not.lacking and row.why_not.why is not Why.UNSEEN
     ]
     return list(dict.fromkeys(names))[: _FEW if found.missing else _MANY]

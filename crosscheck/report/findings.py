@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
-from crosscheck.diagnosis.verdict import percent
+from crosscheck.diagnosis.words import percent, probability_words
 from crosscheck.fit.words import rms_words
 from crosscheck.units import in_unit, parameter_name, short, with_error
 
@@ -51,6 +51,7 @@ class FindingCard:
     parameters: list[ParameterRow]
     correlations: list[str]
     errors: str
+    probability: str
 
     @property
     def columns(self) -> int:
@@ -78,6 +79,7 @@ def finding_card(found: Diagnosis, finding: MissingEffect) -> FindingCard:
         parameters=rows,
         correlations=_correlations(found, finding),
         errors=rms_words(finding.held_out_rms),
+        probability=probability_words(finding.probability),
     )
 
 

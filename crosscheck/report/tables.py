@@ -11,6 +11,7 @@ from crosscheck.comparison.associations import Association
 from crosscheck.diagnosis.order import Step
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import stages_of
+from crosscheck.diagnosis.words import probability_words
 from crosscheck.fit.candidates import Candidate
 from crosscheck.fit.evidence import FALSE_ALARM, p_value
 from crosscheck.fit.noise import POOR_FIT, STRUCTURED
@@ -108,7 +109,7 @@ class CandidateRow:
     Attributes:
         effect, title: its name, and in words. score: of the search.
         alone: part of the excess chi2 that it takes away by itself, 0 to 1; None if not tried.
-        needs: what it would take. why_not: the reason.
+        needs: what it would take. why_not: the reason. probability: in words, "" if not known.
     """
 
     effect: str
@@ -117,6 +118,7 @@ class CandidateRow:
     alone: float | None
     needs: str
     why_not: str
+    probability: str
 
 
 def candidate_rows(found: Diagnosis) -> list[CandidateRow]:
@@ -135,28 +137,32 @@ def candidate_rows(found: Diagnosis) -> list[CandidateRow]:
                 alone=_alone(found, candidate),
                 needs="" if candidate is None else _largest_parameter(candidate),
                 why_not=str(row.why_not),
+                probability=_probability(found, row.effect),
             )
         )
     return out
 
 
+def _probability(found: Diagnosis, effect: str) -> str:
+    if found.chances is None or effect not in found.chances.effect:
+        return ""
+    return probability_words(found.chances.effect[effect])
+
+
 def _alone(found: Diagnosis, candidate: Candidate | None) -> float | None:
     """Part of the excess chi2 that the effect takes away by itself, in sample, 0 to 1."""
-    if candidate is None or candidate.fit is None or found.search is None:
+    if candidate is None or found.search is None or (candidate.fit or candidate.alone) is None:
         return None
-    start = found.search.steps[0].fit
-    noise = len(start.state.white) * found.search.noise_scale**2
-    excess = start.chi2 - noise
-    if excess <= 0.0:
-        return None
-    return float(np.clip((start.chi2 - candidate.fit.chi2) / excess, 0.0, 1.0))
+    start = found.search.steps[0]
+    excess = start.whiteness.chi2 - start.whiteness.dof
+    return float(np.clip(candidate.drop / excess, 0.0, 1.0)) if excess > 0.0 else None
 
 
 def _largest_parameter(candidate: Candidate) -> str:
     """What it would take: the parameter that is largest in plausible sizes."""
-    if candidate.fit is None:
+    term = candidate.alone if candidate.fit is None else candidate.fit.terms[candidate.name]
+    if term is None:
         return ""
-    term = candidate.fit.terms[candidate.name]
     layout = term.layout
     size = np.where(layout.shape, 0.0, term.sizes)
     k = int(np.argmax(np.abs(size)))

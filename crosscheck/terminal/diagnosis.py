@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from crosscheck.diagnosis.result import MissingEffect
+from crosscheck.diagnosis.words import probability_words
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.terminal.lines import console_for, print_parameters, rms_table, say
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 _STYLE = {
     DiagnosisVerdict.NO_EFFECT_MISSING: "green",
     DiagnosisVerdict.EFFECTS_FOUND: "bold cyan",
+    DiagnosisVerdict.MANY_EFFECTS: "bold magenta",
     DiagnosisVerdict.UNKNOWN_EFFECT: "bold yellow",
     DiagnosisVerdict.NO_VERDICT: "bold red",
 }
@@ -51,7 +53,8 @@ def _way(found: Diagnosis) -> Table:
 
 
 def _print_finding(console: Console, finding: MissingEffect) -> None:
-    say(console, f"{finding.effect}: {finding.title}", "bold")
+    likely = probability_words(finding.probability)
+    say(console, f"{finding.effect}: {finding.title} (probability {likely})", "bold")
     print_parameters(
         console, finding.layout, finding.values, finding.stderr, finding.at_bound,
         _MOST_PARAMETERS, "diagnosis.json",

@@ -103,6 +103,10 @@ class Term:
 
     def effect(self) -> Effect:
         """The effect itself."""
+        return self._effect
+
+    @cached_property
+    def _effect(self) -> Effect:
         return self.layout.build(self.vector)
 
     def is_possible(self, robot: Robot) -> bool:
@@ -241,6 +245,11 @@ class Terms:
     def without(self, name: str) -> Terms:
         """All but that of an effect."""
         return Terms(term for term in self._terms if term.name != name)
+
+    def without_any(self, names: Iterable[str]) -> Terms:
+        """All but those of some effects."""
+        gone = set(names)
+        return Terms(term for term in self._terms if term.name not in gone)
 
     def only(self, names: Iterable[str]) -> Terms:
         """Those of some effects alone."""

@@ -6,7 +6,6 @@ import pytest
 from made_data import COGIRO, SIGMA, measured, term
 
 from crosscheck.calibration.judgement import judge
-from crosscheck.calibration.refits import NONE
 from crosscheck.calibration.search import Sought, seek
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.reasons import DiagnosisVerdict
@@ -29,7 +28,7 @@ def test_where_nothing_is_missing_nothing_is_named() -> None:
     found = sought([])
     assert found.judgement.verdict is DiagnosisVerdict.NO_EFFECT_MISSING
     assert found.judgement.sure == ()
-    assert found.found.best.names == NONE
+    assert found.found.best.names == frozenset()
     assert found.field_odds < 0.0
 
 

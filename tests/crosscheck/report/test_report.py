@@ -172,7 +172,7 @@ def test_text_from_users_stays_text() -> None:
     data = replace(old.data, path=Path(EVIL.replace("/", "")))
     problem = replace(old, robot=robot, data=data)
     search = replace(found.search, trials=replace(found.search.trials, problem=problem))
-    bad = NotListed(EVIL, EVIL, 0.0, Reason(Why.EXPLAINED_BETTER, by=(EVIL,)))
+    bad = NotListed(EVIL, EVIL, 0.0, Reason(Why.ALIKE, by=(EVIL,)))
     text = render(
         replace(
             found,

@@ -1,0 +1,28 @@
+"""How wide priors are, in plausible sizes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from crosscheck.calibration.registration import NAME as TRACKER
+from seecr.effects import Terms
+from seecr.effects.base import Layout
+from seecr.pose import Array
+
+# Of what has no plausible size: where the tracker stands, and shapes.
+FLAT, SHAPES = 300.0, 30.0
+# Of effects: more than 1 only where that is surely better.
+WIDER = (1.0, 3.0, 10.0)
+
+
+def widths_of(terms: Terms) -> Array:
+    """(p,) prior standard deviations in plausible sizes; 0 for values that are fixed."""
+    parts = [
+        np.where(t.layout.shape, SHAPES, FLAT if t.name == TRACKER else 1.0) for t in terms
+    ]  # fmt: skip
+    return np.where(terms.knowledge.fixed, 0.0, np.concatenate([np.zeros(0), *parts]))
+
+
+def wider(layout: Layout) -> Array:
+    """The prior widths that an effect may come to have."""
+    return np.array([FLAT] if layout.name == TRACKER else WIDER)

@@ -1,0 +1,165 @@
+"""The stages of a joint fit: all at once, late effects alone where that was poor, then beside."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from crosscheck.calibration.alone import fitted_alone
+from crosscheck.calibration.colour import WHITE, Colour
+from crosscheck.calibration.gram import best_widths, gram_of
+from crosscheck.calibration.joint import JointFit, Setting, settle, tempered
+from crosscheck.calibration.later import PAYS, at_null, inside, layouts, promising_beside
+from crosscheck.calibration.linearised import groups_of, linearised, unwhitened
+from crosscheck.calibration.priors import wider, widths_of
+from crosscheck.calibration.registration import NAME as TRACKER
+from crosscheck.calibration.registration import registered
+from crosscheck.calibration.restricted import estimate, log_evidence
+from crosscheck.fit.state import State, evaluate
+from seecr.effects import Term, Terms
+from seecr.effects.base import Layout
+
+Progress = Callable[[str, float], None]
+# Rounds of estimating the noise and fitting with it; it has settled within this part.
+_ROUNDS, _SETTLED, _STEPS = 4, 0.03, 8
+_SURE = 3.0
+# A joint fit that leaves noise so large beside the stated one, or going together like this along
+# runs, is no place to start effects with history from alone.
+_POOR, _ALIKE = 1.5, 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Everything:
+    """All effects that the data see fitted together.
+
+    Attributes:
+        setting: with rows' history taken as given, where effects with history are in.
+        joint: the fit.
+        later: all effects that join later, at their most promising shapes, amplitudes at null.
+    """
+
+    setting: Setting
+    joint: JointFit
+    later: Terms
+
+
+def fit_everything(setting: Setting, terms: Terms, progress: Progress) -> Everything:
+    """The joint fit, effects that join later among them."""
+    at_once, later = layouts(setting.problem)
+    progress("fitting all effects", 0.05)
+    start = start_of(setting, terms, Terms(Term(a, a.null) for a in at_once))
+    joint = with_noise(setting, tempered(setting, start, widths_of(start.terms), WHITE))
+    wanted = [a for a in later if a.name not in terms]
+    frozen = replace(setting, frozen=True)
+    if poor(joint):
+        progress("trying effects with history alone", 0.4)
+        joint = _from_alone(frozen, joint, start, terms, wanted)
+    progress("looking at effects with history", 0.6)
+    wanted = [a for a in wanted if a.name not in joint.terms]
+    looked = promising_beside(frozen, joint, wanted)
+    added = [inside(term) for term, gain in looked if gain > PAYS]
+    if added:
+        progress(f"fitting {', '.join(t.name for t in added)} too", 0.7)
+        joint = _joined(frozen, joint, start.terms, added)
+    if any(a.name in joint.terms for a in later):
+        setting = frozen
+    best = widened(setting, joint)
+    there = [at_null(best.terms[a.name]) for a in later if a.name in best.terms]
+    others = [term for term, _gain in looked if term.name not in best.terms]
+    return Everything(setting, best, Terms([*there, *others]))
+
+
+def poor(joint: JointFit) -> bool:
+    """Whether a joint fit leaves much more than the noise."""
+    return float(np.max(joint.colour.scale)) > _POOR or float(np.max(joint.colour.rho)) > _ALIKE
+
+
+def start_of(setting: Setting, terms: Terms, others: Terms) -> State:
+    """The model as it stands, the others at null, the tracker registered if it was not yet."""
+    problem = setting.problem
+    every = Terms([*terms, *(t for t in others if t.name not in terms)])
+    state = evaluate(problem, every, setting.factor)
+    frame = registered(problem, state.prediction)
+    if TRACKER in terms or TRACKER not in every or frame is None:
+        return state
+    turned = evaluate(problem, every.with_term(frame), setting.factor, state)
+    return turned if turned.valid and turned.chi2 < state.chi2 else state
+
+
+def with_noise(setting: Setting, joint: JointFit) -> JointFit:
+    """Estimate the noise and fit with it, until it stays."""
+    for _ in range(_ROUNDS):
+        before = joint.colour
+        colour = noise_of(setting, joint)
+        change = np.abs(np.log(colour.scale / before.scale)) + np.abs(colour.rho - before.rho)
+        joint = settle(setting, joint.state, joint.width, colour, _STEPS)
+        if float(np.max(change)) < _SETTLED:
+            break
+    return joint
+
+
+def noise_of(setting: Setting, joint: JointFit) -> Colour:
+    """The noise by the joint fit's marginal evidence."""
+    about = unwhitened(joint)
+    return estimate(setting.chain, joint.colour, joint.weight, about.x, about.y, about.width)
+
+
+def widened(setting: Setting, joint: JointFit) -> JointFit:
+    """The fit with wider priors for effects that are surely larger than plausible."""
+    linear = linearised(setting, joint)
+    groups = groups_of(joint, wider)
+    gram = gram_of(linear.x, linear.y, groups)
+    start = {name: float(group.widths[0]) for name, group in groups.items()}
+    width = joint.width.copy()
+    for name, wide in best_widths(gram, start, price=_SURE).items():
+        width[groups[name].columns] = wide
+    if np.array_equal(width, joint.width):
+        return joint
+    return with_noise(setting, settle(setting, joint.state, width, joint.colour))
+
+
+def _from_alone(
+    setting: Setting, joint: JointFit, start: State, terms: Terms, later: Sequence[Layout]
+) -> JointFit:
+    """The joint fit, or a better one that begins with a late effect fitted by itself."""
+    few = start.terms.only([*terms.names, TRACKER])
+    plain = settle(
+        setting, evaluate(setting.problem, few, setting.factor, start), widths_of(few), WHITE
+    )  # fmt: skip
+    found = [joint]
+    for alone in fitted_alone(setting, plain, later):
+        others = (t for t in start.terms if t.name not in alone.terms)
+        state = evaluate(
+            setting.problem, Terms([*alone.terms, *others]), setting.factor, alone.state
+        )
+        if state.valid:
+            fitted = tempered(setting, state, widths_of(state.terms), WHITE)
+            found.append(with_noise(setting, fitted))
+    return max(found, key=lambda j: worth(setting, j))
+
+
+def _joined(setting: Setting, joint: JointFit, first: Terms, added: list[Term]) -> JointFit:
+    """The fit with more effects: from where the others ended and, if that was poor, from afar."""
+    starts = [Terms([*joint.terms, *added])]
+    if float(np.max(joint.colour.scale)) > _POOR:
+        starts.append(Terms([*first, *added]))
+    found = [joint]
+    for k, terms in enumerate(starts):
+        state = evaluate(setting.problem, terms, setting.factor, joint.state)
+        if not state.valid:
+            continue
+        width = widths_of(terms)
+        if k == 0:
+            fitted = settle(setting, state, width, joint.colour)
+        else:
+            fitted = tempered(setting, state, width, WHITE)
+        found.append(with_noise(setting, fitted))
+    return max(found, key=lambda j: worth(setting, j))
+
+
+def worth(setting: Setting, joint: JointFit) -> float:
+    """ln evidence of a joint fit, by Laplace, with its own noise."""
+    about = unwhitened(joint)
+    return log_evidence(setting.chain, joint.colour, joint.weight, about.x, about.y, about.width)

@@ -1,0 +1,97 @@
+"""How probable it is that each effect is missing, as a diagnosis says it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from crosscheck.calibration.calibrate import Calibration
+from crosscheck.calibration.probability import Classes
+from crosscheck.calibration.search import Sought
+from crosscheck.fit.problem import KINDS, Rms, kinds_read
+
+
+@dataclass(frozen=True)
+class Together:
+    """What fitting the whole catalogue at once gives.
+
+    Attributes:
+        before, after, held_out: rms errors by kind: of the model as it stood, of the joint fit,
+            of that on runs left out.
+        scale, rho: of each kind of reading, the noise in units of the stated one, and its
+            correlation from one row of a run to the next.
+    """
+
+    before: Rms
+    after: Rms
+    held_out: Rms
+    scale: dict[str, float]
+    rho: dict[str, float]
+
+    def as_json(self) -> dict[str, Any]:
+        """The item ``calibrated`` of ``diagnosis.json``."""
+        return {
+            "before": self.before,
+            "after": self.after,
+            "held_out": self.held_out,
+            "noise": {"scale": self.scale, "correlation": self.rho},
+        }
+
+
+@dataclass(frozen=True)
+class Chances:
+    """Probabilities of the effects and of classes of equals.
+
+    Attributes:
+        effect: of each effect of the catalogue, that it is missing.
+        classes: members, the first of them the likeliest, and the probability that one of them
+            is missing; the most probable class first.
+        field: ln odds that something smooth is left which no effect of the catalogue explains;
+            None where no joint fit was made.
+        together: the joint fit; None where none was made.
+    """
+
+    effect: dict[str, float]
+    classes: tuple[tuple[tuple[str, ...], float], ...]
+    field: float | None
+    together: Together | None
+
+    def of(self, name: str) -> float:
+        """Probability that an effect or one of its class is missing."""
+        return next((p for members, p in self.classes if name in members), 0.0)
+
+    def as_json(self) -> dict[str, Any]:
+        """``catalogue``, ``classes``, ``calibrated`` and ``unknown`` of ``diagnosis.json``."""
+        place = {n: k for k, (members, _p) in enumerate(self.classes) for n in members}
+        return {
+            "catalogue": [
+                {"effect": name, "probability": p, "class": place[name]}
+                for name, p in sorted(self.effect.items(), key=lambda item: -item[1])
+            ],
+            "classes": [{"members": list(m), "probability": p} for m, p in self.classes],
+            **self._of_joint_fit(),
+        }
+
+    def _of_joint_fit(self) -> dict[str, Any]:
+        if self.together is None:
+            return {}
+        return {"unknown": {"log_odds": self.field}, "calibrated": self.together.as_json()}
+
+
+def chances_of(sought: Sought) -> Chances:
+    """The probabilities of compared sets."""
+    classes: Classes = sought.classes
+    pairs = zip(classes.members, classes.probability, strict=True)
+    return Chances(classes.effect, tuple(pairs), sought.field_odds, together_of(sought.calibration))
+
+
+def together_of(found: Calibration) -> Together:
+    """A calibration's errors and noise."""
+    kinds = {KINDS.index(kind): kind.name for kind in kinds_read(found.setting.problem)}
+    return Together(
+        found.before,
+        found.after,
+        found.held_out.rms,
+        {name: float(found.colour.scale[k]) for k, name in kinds.items()},
+        {name: float(found.colour.rho[k]) for k, name in kinds.items()},
+    )

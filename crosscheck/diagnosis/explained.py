@@ -1,0 +1,162 @@
+"""What sets of effects say where they explain the data: nothing, a few effects, or many."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from crosscheck.calibration.refits import Refit
+from crosscheck.calibration.search import Sought
+from crosscheck.calibration.sets import Names
+from crosscheck.diagnosis.advice import check_of, measure_next
+from crosscheck.diagnosis.chances import Chances, chances_of
+from crosscheck.diagnosis.result import Diagnosis, MissingEffect, NotListed
+from crosscheck.diagnosis.rivals import Rival
+from crosscheck.diagnosis.search import Search
+from crosscheck.diagnosis.small import share_of
+from crosscheck.diagnosis.way import fit_of, way_of
+from crosscheck.diagnosis.words import and_what_is_left, words_of
+from crosscheck.fit.candidates import Candidate
+from crosscheck.fit.prepare import noise_floor
+from crosscheck.fit.problem import KINDS, Rms, rms_by_kind
+from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
+from crosscheck.fit.words import rms_words
+from seecr.effects import catalogue
+
+# Noise of another size than stated by more than this part, or correlated by more, is told.
+_OTHER, _ALIKE = 0.25, 0.3
+
+
+def explained(sought: Sought, notes: Sequence[str]) -> Diagnosis:
+    """The diagnosis of compared sets that leave nothing unknown."""
+    verdict, problem = sought.judgement.verdict, sought.calibration.setting.problem
+    way = way_of(sought, frozenset(sought.judgement.sure))
+    chances = chances_of(sought)
+    missing = [_missing(sought, way, chances, name) for name in way.found]
+    return Diagnosis(
+        verdict=verdict,
+        sentence=_sentence(verdict, missing, way, chances),
+        missing=tuple(missing),
+        before=sought.calibration.before,
+        after=rms_by_kind(problem, way.last.fit.state.raw),
+        held_out=way.last.held_out.rms,
+        floor=_floor(sought),
+        candidates=tuple(_not_listed(way, chances)),
+        measure_next=tuple(measure_next(way, missing, verdict, ())),
+        notes=tuple(dict.fromkeys((*notes, *_noise_notes(sought, chances)))),
+        search=way,
+        whiteness=way.last.whiteness,
+        chances=chances,
+    )
+
+
+def _missing(sought: Sought, way: Search, chances: Chances, name: str) -> MissingEffect:
+    best = way.last.fit
+    term, part = best.terms[name], best.terms.part(name)
+    index = 1 + way.found.index(name)
+    before, step = way.steps[index - 1], way.steps[index]
+    return MissingEffect(
+        term=term,
+        stderr=best.stderr[part],
+        at_bound=best.at_bound[part],
+        rivals=tuple(_rivals(sought, frozenset(best.terms.names), name)),
+        check=check_of(term, way.problem.robot),
+        rms=rms_by_kind(way.problem, step.fit.state.raw),
+        held_out_rms=step.held_out.rms,
+        share=share_of(before, step),
+        probability=chances.of(name),
+    )
+
+
+def _rivals(sought: Sought, names: Names, name: str) -> list[Rival]:
+    """The other members of an effect's class, each with the model that has it instead."""
+    found = sought.found
+    members = next((m for m in sought.classes.members if name in m), (name,))
+    own = found.refit(names)
+    out = []
+    for other in members:
+        swapped = found.refit((names - {name}) | {other}) if other not in names else None
+        # one that contains another says nothing that the other does not
+        if swapped is None or own is None or catalogue()[other].parent in members:
+            continue
+        out.append(_rival(sought, own, swapped, other))
+    return sorted(out, key=lambda r: r.loss)
+
+
+def _rival(sought: Sought, own: Refit, swapped: Refit, other: str) -> Rival:
+    fit = fit_of(sought.calibration.setting, swapped.joint)
+    return Rival(other, fit, own.score - swapped.score)
+
+
+def _floor(sought: Sought) -> Rms:
+    """The rms errors that the noise as it was found would give."""
+    setting, joint = sought.calibration.setting, sought.calibration.joint
+    floor = noise_floor(setting.problem, joint.state)
+    scale = joint.colour.scale
+    return {
+        kind.key: None if floor[kind.key] is None else float(scale[k]) * (floor[kind.key] or 0.0)
+        for k, kind in enumerate(KINDS)
+    }
+
+
+def _noise_notes(sought: Sought, chances: Chances) -> list[str]:
+    """Noise that is not as it was stated, and lines that hardly count."""
+    out, together = [], chances.together
+    assert together is not None
+    for name, scale in together.scale.items():
+        rho = together.rho[name]
+        if abs(scale - 1.0) > _OTHER or rho > _ALIKE:
+            alike = f", correlated by {rho:.2f} from row to row of a run" if rho > _ALIKE else ""
+            out.append(f"noise of the {name}: {scale:.2f} times the assumed one{alike}")
+    rows = sought.calibration.outliers
+    if rows.any():
+        lines = sought.calibration.setting.problem.data.places(rows)
+        out.append(f"hardly counted, far from all the others: lines {lines}")
+    return out
+
+
+def _sentence(
+    verdict: DiagnosisVerdict, missing: Sequence[MissingEffect], way: Search, chances: Chances
+) -> str:
+    tried = len([c for c in way.steps[0].candidates if c.drop])
+    if verdict is DiagnosisVerdict.NO_EFFECT_MISSING:
+        return (
+            f"Model and data agree: what is left is noise, and none of {tried} effects tried "
+            "explains any of it."
+        )
+    if verdict is DiagnosisVerdict.EFFECTS_FOUND:
+        return and_what_is_left(words_of(missing), "what is left is noise", tried)
+    together = chances.together
+    assert together is not None
+    sure = ", ".join(m.effect for m in missing)
+    return (
+        f"No few effects explain the error, but all {tried} that were tried together do: from "
+        f"{rms_words(together.before)} to {rms_words(together.held_out)} on runs left out. "
+        + (f"Sure among them: {sure}." if sure else "None of them is sure by itself.")
+    )
+
+
+def _not_listed(way: Search, chances: Chances) -> list[NotListed]:
+    """Every effect that is not listed, the most probable first."""
+    root = way.steps[0]
+    rows = [
+        NotListed(
+            effect=c.name,
+            title=c.layout.effect.title,
+            score=c.evidence.log - root.evidence.log if c.evidence is not None else 0.0,
+            why_not=c.why_not or _why_not(way, chances, c),
+        )
+        for c in root.candidates
+        if c.name not in way.found
+    ]
+    return sorted(rows, key=lambda row: (-chances.effect.get(row.effect, 0.0), -row.score))
+
+
+def _why_not(way: Search, chances: Chances, c: Candidate) -> Reason:
+    p = chances.effect.get(c.name, 0.0)
+    for members, _p in chances.classes:
+        first = next((m for m in members if m in way.found), None)
+        if c.name in members and first is not None:
+            return Reason(Why.ALIKE, by=(first,))
+    if way.found:
+        return Reason(Why.NOT_NEEDED_BESIDE, p=p, by=way.found)
+    return Reason(Why.IMPROBABLE, p=p)

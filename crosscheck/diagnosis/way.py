@@ -1,0 +1,147 @@
+"""From compared sets to the way of a diagnosis: effects one by one, each model with its errors."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from crosscheck.calibration.calibrate import covariance
+from crosscheck.calibration.colour import whitened
+from crosscheck.calibration.gram import Gram
+from crosscheck.calibration.joint import JointFit, Setting
+from crosscheck.calibration.later import amplitudes
+from crosscheck.calibration.leave_out import leave_out
+from crosscheck.calibration.linearised import free_of, linearised
+from crosscheck.calibration.refits import Found, Refit
+from crosscheck.calibration.search import Sought
+from crosscheck.calibration.sets import Names
+from crosscheck.diagnosis.node import Node
+from crosscheck.diagnosis.order import Step
+from crosscheck.diagnosis.search import Search
+from crosscheck.fit.candidates import Candidate, Trials, candidates_for
+from crosscheck.fit.evidence import Evidence, p_value
+from crosscheck.fit.gauss_newton import Fit, FitStatus
+from crosscheck.fit.held_out import HeldOut
+from crosscheck.fit.noise import whiteness
+from crosscheck.fit.reasons import Reason, Why
+from seecr.effects import Term
+from seecr.pose import Array
+
+# A parameter that is not known better than this part of its prior width is not seen.
+_UNSEEN = 0.98
+
+
+def way_of(sought: Sought, names: Names) -> Search:
+    """The way to a set of effects, at each step the one that explains most.
+
+    Args:
+        sought: what was compared.
+        names: the effects to add to the model as it stands.
+    """
+    found, setting = sought.found, sought.calibration.setting
+    problem, factor = setting.problem, setting.factor
+    here, model = found.always, found.none
+    steps = [_step(setting, "", model)]
+    steps[0] = replace(steps[0], node=replace(steps[0].node, candidates=tuple(_tried(sought))))
+    todo = set(names - here)
+    while todo:
+        added = max(sorted(todo), key=lambda n: _score(found, here | {n}))
+        fitted = found.refit(here | {added})
+        if fitted is None:
+            break
+        here, todo = here | {added}, todo - {added}
+        steps.append(_step(setting, added, fitted))
+    return Search(Trials(problem, factor), tuple(steps), {})
+
+
+def _score(found: Found, names: Names) -> float:
+    return found.refits[names].score if names in found.refits else found.scores.score(names)
+
+
+def fit_of(setting: Setting, joint: JointFit) -> Fit:
+    """A joint fit as the fit that pages and recordings show; inf where the data see nothing."""
+    known = covariance(setting, joint)
+    error, scale = np.sqrt(np.diag(known)), joint.terms.scale
+    unseen = error > _UNSEEN * joint.width * scale
+    known[unseen, unseen] = np.inf
+    return Fit(
+        joint.state, lambda: joint.jacobian, lambda _jacobian: known, ~free_of(joint),
+        FitStatus.SOLVED, 0, joint.settled,
+    )  # fmt: skip
+
+
+def _step(setting: Setting, added: str, model: Refit) -> Step:
+    joint, problem = model.joint, setting.problem
+    fit = fit_of(setting, joint)
+    left = whitened(setting.chain, joint.colour, joint.weight, joint.state.white)
+    seen = directions(setting, joint)
+    evidence = Evidence(model.score, joint.state.chi2, seen)
+    out = leave_out(setting, joint)
+    held = HeldOut(out.raw, out.chi2, out.readings, out.values, out.rms, valid=True)
+    return Step(added, Node(fit, evidence, whiteness(problem, left, seen)), held)
+
+
+def directions(setting: Setting, joint: JointFit) -> int:
+    """How many directions of the parameters the data see rather than the prior."""
+    linear = linearised(setting, joint)
+    x = linear.x * linear.width
+    power = np.linalg.eigvalsh(x.T @ x) if x.shape[1] else np.zeros(0)
+    return int(np.sum(power > 1.0))
+
+
+def _tried(sought: Sought) -> list[Candidate]:
+    """Every effect beside the model as it stands, by linear algebra; the fit where there is one."""
+    found, setting = sought.found, sought.calibration.setting
+    out = []
+    for c in candidates_for(setting.problem):
+        if c.name in found.always:
+            continue
+        if c.why_not is not None:
+            out.append(c)
+        elif c.name not in found.scores.gram.groups:
+            out.append(c.refused(Reason(Why.UNSEEN)))
+        else:
+            out.append(_candidate(sought, c))
+    return out
+
+
+def _candidate(sought: Sought, c: Candidate) -> Candidate:
+    found, setting = sought.found, sought.calibration.setting
+    names = found.always | {c.name}
+    if names in found.refits:
+        score = found.refits[names].score - found.none.score
+    else:
+        score = found.scores.score(names) - found.scores.score(found.always)
+    score -= found.scores.log_prior(names) - found.scores.log_prior(found.always)
+    drop, seen = _drop(found.scores.gram, c.name)
+    p = p_value(drop, seen, found.scores.gram.groups[c.name].one_sided)
+    refit = found.refits.get(names)
+    base = sought.found.none
+    if refit is None:
+        c = replace(c, alone=_needed(sought, c.name))
+        evidence = Evidence(base.score + score, base.joint.state.chi2, seen)
+        return replace(c, evidence=evidence, drop=drop, p=p)
+    fit = fit_of(setting, refit.joint)
+    return replace(
+        c, fit=fit, evidence=Evidence(base.score + score, fit.chi2, seen), drop=drop, p=p
+    )
+
+
+def _needed(sought: Sought, name: str) -> Term:
+    """The values an effect would need by itself, in the linear model."""
+    term, group = sought.catalogue.start(name), sought.found.scores.gram.groups[name]
+    solved = sought.found.scores.gram.solved({name: float(group.widths[-1])})
+    own = np.flatnonzero(amplitudes(term))[: len(group.columns)]
+    values = term.vector.copy()
+    values[own] = term.layout.null[own] + solved.values * term.layout.scale[own]
+    return term.with_vector(np.clip(values, term.layout.lower, term.layout.upper))
+
+
+def _drop(gram: Gram, name: str) -> tuple[float, int]:
+    """Fall of chi2 with an effect alone in the linear model, and its directions."""
+    own = gram.groups[name].columns
+    power, axes = np.linalg.eigh(gram.normal[np.ix_(own, own)])
+    seen = power > 1e-2
+    along: Array = (axes.T @ gram.gradient[own])[seen] ** 2 / power[seen]
+    return float(along.sum()), max(1, int(seen.sum()))

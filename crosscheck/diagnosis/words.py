@@ -1,0 +1,39 @@
+"""The sentences of a diagnosis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from crosscheck.diagnosis.result import MissingEffect
+
+
+def words_of(missing: Sequence[MissingEffect]) -> str:
+    """What adding each effect does."""
+    return "; then ".join(_words_of(effect) for effect in missing)
+
+
+def and_what_is_left(text: str, left: str, tried: int) -> str:
+    """A sentence that says what was added, what is left then, and how many effects were tried."""
+    text = f"{text}; {left}"
+    return text[0].upper() + text[1:] + f". {tried} effects were tried."
+
+
+def _words_of(effect: MissingEffect) -> str:
+    names = ", ".join(rival.name for rival in effect.rivals)
+    alike = f" (or {names}, alike on these data)" if names else ""
+    return (
+        f"adding {effect.effect}{alike} removes {percent(effect.share)} of the unexplained error "
+        "on runs it was not fitted to"
+    )
+
+
+def probability_words(probability: float) -> str:
+    """A probability for people, of what is probable or not."""
+    if probability > 0.99:
+        return "> 99 %"
+    return "< 1 %" if probability < 0.01 else f"{100.0 * probability:.0f} %"
+
+
+def percent(share: float) -> str:
+    """A share for people; what is not all is not called all."""
+    return f"{min(100.0 * share, 99.9):.3g} %"

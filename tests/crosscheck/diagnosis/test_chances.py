@@ -1,0 +1,61 @@
+"""Probabilities of effects and of classes of equals, as a diagnosis says them."""
+
+from __future__ import annotations
+
+import made_diagnoses
+import pytest
+
+from crosscheck.diagnosis.chances import Chances, Together
+from crosscheck.diagnosis.result import Diagnosis
+from crosscheck.diagnosis.words import probability_words
+from crosscheck.fit.problem import Rms
+
+RMS: Rms = {"position_rms_m": 1e-3, "orientation_rms_rad": None, "tension_rms_N": None}
+
+
+def chances_of(found: Diagnosis) -> Chances:
+    assert found.chances is not None
+    return found.chances
+
+
+def test_what_is_found_is_probable_and_nothing_else_is() -> None:
+    chances = chances_of(made_diagnoses.pulleys())
+    assert chances.of("pulley_radius") > 0.99
+    assert made_diagnoses.pulleys().missing[0].probability == chances.of("pulley_radius")
+    others = [p for name, p in chances.effect.items() if name != "pulley_radius"]
+    assert max(others) < 0.3
+
+
+def test_where_nothing_is_missing_nothing_is_probable() -> None:
+    assert max(chances_of(made_diagnoses.nothing()).effect.values()) < 0.3
+
+
+def test_the_json_names_each_effect_once_with_its_class() -> None:
+    document = made_diagnoses.pulleys().as_json()
+    names = [row["effect"] for row in document["catalogue"]]
+    assert len(names) == len(set(names)) > 10
+    for row in document["catalogue"]:
+        assert row["effect"] in document["classes"][row["class"]]["members"]
+    assert document["missing"][0]["probability"] > 0.99
+    assert "calibrated" not in document  # the steps ended with noise
+
+
+def test_where_something_is_unknown_the_joint_fit_is_told() -> None:
+    document = made_diagnoses.unknown().as_json()
+    assert document["calibrated"]["before"] == document["before"]
+    assert set(document["calibrated"]["held_out"]) == set(document["before"])
+
+
+def test_a_class_has_the_probability_of_all_its_members() -> None:
+    together = Together(RMS, RMS, RMS, {"position": 1.0}, {"position": 0.0})
+    chances = Chances(
+        {"a": 0.5, "b": 0.45, "c": 0.1}, ((("a", "b"), 0.95), (("c",), 0.1)), -3.0, together
+    )
+    assert chances.of("b") == 0.95
+    assert chances.of("nobody") == 0.0
+    assert chances.as_json()["unknown"] == {"log_odds": -3.0}
+
+
+@pytest.mark.parametrize(("p", "words"), [(0.999, "> 99 %"), (0.001, "< 1 %"), (0.5, "50 %")])
+def test_probabilities_in_words(p: float, words: str) -> None:
+    assert probability_words(p) == words
