@@ -36,11 +36,11 @@ FLOORS = {
     "crosscheck.files": 21, "crosscheck.units": 21, "crosscheck.given": 21,
     "crosscheck.settle": 22, "crosscheck.measurements": 22, "crosscheck.model": 22,
     "crosscheck.twin": 23, "crosscheck.fit": 23,
-    "crosscheck.suite": 24, "crosscheck.comparison": 24, "crosscheck.planning": 24,
-    "crosscheck.calibration": 24,
-    "crosscheck.diagnosis": 25, "crosscheck.add": 25,
-    "crosscheck.terminal": 26, "crosscheck.report": 26, "crosscheck.recording": 26,
-    "crosscheck.cli": 27,
+    "crosscheck.suite": 24, "crosscheck.calibration": 24,
+    "crosscheck.comparison": 25, "crosscheck.planning": 25,
+    "crosscheck.diagnosis": 26, "crosscheck.add": 26,
+    "crosscheck.terminal": 27, "crosscheck.report": 27, "crosscheck.recording": 27,
+    "crosscheck.cli": 28,
 }  # fmt: skip
 
 # What stands against the floors today; each is to go, none is to come.

@@ -156,7 +156,10 @@ def _refitted(
     scores: Scores,
     names: Names,
 ) -> Refit | None:
-    """A set fitted exactly from its linear values, and from null where that ends badly."""
+    """A set fitted exactly from its linear values, and from null where that ends badly.
+
+    None where it cannot be solved, or where no robot can have its values (a negative mass).
+    """
     linear, widths = scores.score(names), scores.widths(names)
     found = _settled(setting, joint, plain, _linear_terms(catalogue, scores, names), widths)
     best = None if found is None else _scored(setting, found, names, widths, scores)
@@ -166,7 +169,9 @@ def _refitted(
         other = None if again is None else _scored(setting, again, names, widths, scores)
         if other is not None and (best is None or other.score > best.score):
             best = other
-    return best
+    robot = setting.problem.robot
+    possible = best is None or all(t.is_possible(robot) for t in best.joint.terms)
+    return best if possible or names == scores.always else None
 
 
 def _linear_terms(catalogue: Catalogue, scores: Scores, names: Names) -> Terms:

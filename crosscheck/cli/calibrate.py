@@ -52,8 +52,8 @@ def command(
     is worth what it predicts; which of its effects are real is what diagnose says.
 
     \b
-    Exit status: 0 written, 1 not written since runs left out are not predicted any better or the
-    fit did not settle, 2 bad input, 3 rows without an equilibrium.
+    Exit status: 0 written, 1 not written since runs left out are not predicted any better, 2 bad
+    input, 3 rows without an equilibrium, or a fit that did not settle.
     """
     from crosscheck import calibrate, load_measurements
     from crosscheck.given import considered
@@ -72,6 +72,8 @@ def command(
     if written:
         _write(found, old, machine, measured.path, model)
     _tell(found, model, written, out, as_json)
+    if not found.settled:
+        return 3
     return 0 if written else 1
 
 

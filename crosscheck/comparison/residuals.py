@@ -7,18 +7,22 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from crosscheck.comparison.associations import associations
+from crosscheck.comparison.coloured import Coloured, coloured_noise
 from crosscheck.comparison.quantities import channels
 from crosscheck.comparison.result import Comparison, Coordinate, Group, UnsolvedRow, WorstRow
 from crosscheck.comparison.travel import Travel, regions_of, travel
 from crosscheck.fit.noise import as_table, whiteness
 from crosscheck.fit.prepare import noise_floor, outlying_rows, prepare
-from crosscheck.fit.problem import Problem, rms_by_kind
+from crosscheck.fit.problem import Problem, kinds_read, rms_by_kind
 from crosscheck.fit.state import State, evaluate
 from crosscheck.given import GivenModel, GivenRobot, model_of, robot_of
 from crosscheck.measurements.data import Names
 from crosscheck.measurements.read import GivenData, measurements_of
+from seecr.pose import Array
 
 _MOST_WORST = 10
+# Fewer readings than this do not show how noise goes together.
+_LEAST_READINGS = 60
 
 
 def compare(robot: GivenRobot, data: GivenData, model: GivenModel = ()) -> Comparison:
@@ -46,6 +50,7 @@ def compare(robot: GivenRobot, data: GivenData, model: GivenModel = ()) -> Compa
     some = problem.n_readings > 0
     if some:
         notes += _outliers(problem, state)
+    white = whiteness(problem, state.white, 0) if some else None
     return Comparison(
         problem=problem,
         state=state,
@@ -58,11 +63,20 @@ def compare(robot: GivenRobot, data: GivenData, model: GivenModel = ()) -> Compa
         regions=tuple(_groups(problem, state, regions_of(problem, way.pose))),
         associations=tuple(associations(problem, state.white, state.prediction) if some else ()),
         worst=tuple(_worst(problem, state, way)),
-        whiteness=whiteness(problem, state.white, 0) if some else None,
+        whiteness=white,
+        coloured=_coloured(problem, state, factor) if white and not white.is_noise else None,
         unsolved=tuple(_unsolved(problem, state)),
         notes=tuple(dict.fromkeys(notes)),
         refusal=ready.refusal,
     )
+
+
+def _coloured(problem: Problem, state: State, factor: Array) -> Coloured | None:
+    if not state.valid or problem.n_readings < _LEAST_READINGS:
+        return None
+    given = problem.data.sigma
+    stated = [k.name for k in kinds_read(problem) if getattr(given, k.sigma) is not None]
+    return coloured_noise(problem, state, factor, stated)
 
 
 def _outliers(problem: Problem, state: State) -> list[str]:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.comparison.associations import Association
+from crosscheck.comparison.coloured import Coloured
 from crosscheck.comparison.quantities import QuantityKind, channels
 from crosscheck.comparison.travel import Travel
 from crosscheck.fit.noise import Whiteness
@@ -124,6 +125,8 @@ class Comparison(Result):
         associations: what the errors go with, the strongest first.
         worst: rows, the worst first.
         whiteness: is what is left noise; None where nothing could be compared.
+        coloured: what is left as noise that goes together along runs or holds rows far off; None
+            where it is white already, or no noise.
         unsolved: rows that the model has no equilibrium for.
         notes: what was assumed, estimated or left out.
         refusal: why the data are too little for a verdict; None where they are not.
@@ -141,6 +144,7 @@ class Comparison(Result):
     associations: tuple[Association, ...]
     worst: tuple[WorstRow, ...]
     whiteness: Whiteness | None
+    coloured: Coloured | None
     unsolved: tuple[UnsolvedRow, ...]
     notes: tuple[str, ...]
     refusal: Refusal | None = None
@@ -155,7 +159,7 @@ class Comparison(Result):
         """Whether nothing speaks against what is left being noise of the stated size."""
         if self.whiteness is None or self.refusal is not None:
             return False
-        return self.whiteness.is_noise
+        return self.whiteness.is_noise or self.coloured is not None
 
     @property
     def converged(self) -> bool:
@@ -182,11 +186,13 @@ class Comparison(Result):
         if w is None:
             why = f": {self.unsolved[0].why}" if self.unsolved else ""
             return f"Nothing could be compared{why}."
-        if w.is_noise and self.refusal is not None:
+        if (w.is_noise or self.coloured is not None) and self.refusal is not None:
             return f"No verdict: {self.refusal}; {self.refusal.remedy}."
         if w.is_noise:
             times = f"{w.scale:.2f} times the stated one"
             return f"Model and data agree: what is left is noise ({times})."
+        if self.coloured is not None:
+            return f"Model and data agree: what is left is noise ({self.coloured.words})."
         size = f"the errors are {w.scale:.3g} times the noise"
         if not w.structured:
             return (
@@ -242,6 +248,7 @@ class Comparison(Result):
             "rms": self.rms,
             "noise_floor": self.floor,
             "sigma": vars(problem.sigma),
+            "coloured_noise": None if self.coloured is None else vars(self.coloured),
             "residual": None if w is None else {**vars(w), "structured": w.structured},
             "coordinates": self.coordinates,
             "runs": self.runs,

@@ -1,0 +1,80 @@
+"""Noise that goes together along a run, or holds rows far off: noise all the same.
+
+A tracker's error is smooth in time. Its size and correlation come from their likelihood. Made
+white by them, what a model leaves is noise if it is of the size of noise, rows far off do not lie
+side by side, neighbours no longer agree, and a smooth field over the workspace explains nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+
+from crosscheck.calibration.colour import WHITE, chain_of
+from crosscheck.calibration.field import UNKNOWN, log_odds
+from crosscheck.calibration.joint import JointFit, Setting
+from crosscheck.calibration.restricted import estimate
+from crosscheck.calibration.robust import outliers, row_weights
+from crosscheck.calibration.strange import is_strange
+from crosscheck.fit.problem import KINDS, Problem, kinds_read
+from crosscheck.fit.state import State
+from seecr.effects import Terms
+from seecr.pose import Array
+
+# Noise larger than assumed by this is not as it was stated.
+_LARGER = 1.5
+
+
+@dataclass(frozen=True)
+class Coloured:
+    """Noise as it is, by kind of reading.
+
+    Attributes:
+        scale: its size in units of the assumed one.
+        rho: correlation from one row of a run to the next.
+        outliers: how many rows are far off.
+    """
+
+    scale: dict[str, float]
+    rho: dict[str, float]
+    outliers: int
+
+    @property
+    def words(self) -> str:
+        """The noise in a few words."""
+        sizes = ", ".join(
+            f"{name} {self.scale[name]:.2f} times the assumed one"
+            + (f" and correlated by {rho:.2f} from row to row" if rho > 0.05 else "")
+            for name, rho in self.rho.items()
+        )
+        return sizes + (f"; {self.outliers} rows far off" if self.outliers else "")
+
+
+def coloured_noise(
+    problem: Problem, state: State, factor: Array, stated: Collection[str]
+) -> Coloured | None:
+    """What is left as coloured noise; None where it is none.
+
+    Args:
+        problem: the data. state: the model on them. factor: :meth:`Problem.noise`.
+        stated: names of the kinds of reading whose noise was stated.
+    """
+    setting = Setting(problem, factor, chain_of(problem))
+    weight = row_weights(setting.chain, WHITE, state.white)
+    none, blank = np.zeros(0), np.zeros((len(state.white), 0))
+    colour = estimate(setting.chain, WHITE, weight, blank, state.white, none)
+    weight = row_weights(setting.chain, colour, state.white)
+    left = JointFit(state.of(Terms()), blank, none, colour, weight, settled=True)
+    kinds = {KINDS.index(kind): kind.name for kind in kinds_read(problem)}
+    larger = any(colour.scale[k] > _LARGER for k, name in kinds.items() if name in stated)
+    if larger or is_strange(setting, left, stated):
+        return None
+    if log_odds(setting, left, len(stated) == len(kinds)) > UNKNOWN:
+        return None
+    return Coloured(
+        {name: float(colour.scale[k]) for k, name in kinds.items()},
+        {name: float(colour.rho[k]) for k, name in kinds.items()},
+        int(outliers(setting.chain, weight, problem.data.n_rows).sum()),
+    )

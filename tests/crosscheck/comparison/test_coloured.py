@@ -1,0 +1,67 @@
+"""Noise that goes together is noise; what only looks like it is not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from made_data import COGIRO, SIGMA, measured
+
+from crosscheck.comparison.residuals import compare
+from crosscheck.comparison.result import Comparison
+from crosscheck.measurements.data import Measurements
+from seecr.mjcf import load_robot
+from seecr.pose import Array
+
+ROBOT = load_robot(COGIRO)
+POINTS = 12
+
+
+def data_of(change: Array) -> Measurements:
+    data = measured(ROBOT, points=POINTS, seed=5)
+    return replace(data, position=data.position + change)
+
+
+def compared(change: Array) -> Comparison:
+    return compare(ROBOT, data_of(change))
+
+
+def rows() -> int:
+    return measured(ROBOT, points=POINTS, seed=5).n_rows
+
+
+def drifting(rho: float, size: float) -> Array:
+    """AR(1) noise along all rows; that of the readings is added to it."""
+    rng = np.random.default_rng(3)
+    out = rng.normal(size=(rows(), 3))
+    for k in range(1, len(out)):
+        out[k] = rho * out[k - 1] + np.sqrt(1 - rho**2) * out[k]
+    return size * out
+
+
+def test_noise_that_goes_together_is_noise_and_is_told() -> None:
+    found = compared(drifting(0.9, 0.8 * SIGMA.position_m))
+    assert found.whiteness is not None and found.whiteness.structured
+    assert found.is_noise
+    assert found.coloured is not None and found.coloured.rho["position"] > 0.2
+    assert "correlated by" in found.sentence
+    assert found.as_json()["coloured_noise"]["rho"]["position"] > 0.2
+
+
+def test_the_same_several_times_larger_than_stated_is_not() -> None:
+    found = compared(drifting(0.9, 4.0 * SIGMA.position_m))
+    assert not found.is_noise and found.coloured is None
+
+
+def test_a_few_rows_far_off_are_noise_unless_they_lie_side_by_side() -> None:
+    apart, together = np.zeros((rows(), 3)), np.zeros((rows(), 3))
+    apart[5::23] += 40 * SIGMA.position_m
+    together[40 : 40 + len(apart[5::23])] += 40 * SIGMA.position_m
+    assert compared(apart).is_noise
+    assert "rows far off" in compared(apart).sentence
+    assert not compared(together).is_noise
+
+
+def test_white_noise_needs_no_colour() -> None:
+    found = compared(np.zeros((rows(), 3)))
+    assert found.is_noise and found.coloured is None
