@@ -24,6 +24,8 @@ from seecr.effects import catalogue
 
 # Noise of another size than stated by more than this part, or correlated by more, is told.
 _OTHER, _ALIKE = 0.25, 0.3
+# From this probability on an effect that is not listed is called probable.
+_PROBABLE = 0.5
 
 
 def explained(sought: Sought, notes: Sequence[str]) -> Diagnosis:
@@ -50,7 +52,8 @@ def explained(sought: Sought, notes: Sequence[str]) -> Diagnosis:
 
 
 def _missing(sought: Sought, way: Search, chances: Chances, name: str) -> MissingEffect:
-    best = way.last.fit
+    # where others are missing too that are not sure, values beside those are nearer to the truth
+    best = fit_of(sought.calibration.setting, sought.found.best.joint)
     term, part = best.terms[name], best.terms.part(name)
     index = 1 + way.found.index(name)
     before, step = way.steps[index - 1], way.steps[index]
@@ -58,7 +61,7 @@ def _missing(sought: Sought, way: Search, chances: Chances, name: str) -> Missin
         term=term,
         stderr=best.stderr[part],
         at_bound=best.at_bound[part],
-        rivals=tuple(_rivals(sought, frozenset(best.terms.names), name)),
+        rivals=tuple(_rivals(sought, frozenset(way.last.fit.terms.names), name)),
         check=check_of(term, way.problem.robot),
         rms=rms_by_kind(way.problem, step.fit.state.raw),
         held_out_rms=step.held_out.rms,
@@ -158,5 +161,6 @@ def _why_not(way: Search, chances: Chances, c: Candidate) -> Reason:
         if c.name in members and first is not None:
             return Reason(Why.ALIKE, by=(first,))
     if way.found:
-        return Reason(Why.NOT_NEEDED_BESIDE, p=p, by=way.found)
-    return Reason(Why.IMPROBABLE, p=p)
+        why = Why.CARRIES_LITTLE if p > _PROBABLE else Why.NOT_NEEDED_BESIDE
+        return Reason(why, p=p, by=way.found)
+    return Reason(Why.NOT_SURE if p > _PROBABLE else Why.IMPROBABLE, p=p)

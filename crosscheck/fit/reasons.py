@@ -34,6 +34,8 @@ class Why(Enum):
     NOT_NEEDED = "not needed"
     ALIKE = "cannot be told from {by}, which is listed"
     NOT_NEEDED_BESIDE = "not needed beside {by} (probability {p:.2g})"
+    CARRIES_LITTLE = "probable ({p:.2g}), but explains little beside {by}: not sure"
+    NOT_SURE = "probable ({p:.2g}), but not sure"
     IMPROBABLE = "explains too little (probability {p:.2g})"
     IMITATES = "not sure: {parameters} parameters imitate much of what no effect explains"
     EXPLAINS_PART = "explains a part, but structure remains: not sure"
