@@ -1,0 +1,43 @@
+"""``crosscheck effects``: the catalogue on the terminal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from seecr.cli.options import FILE, json_option
+
+
+@click.command(
+    short_help="The effects that a robot may have, and how to check each by hand.",
+    epilog="""\b
+Examples:
+  crosscheck effects
+  crosscheck effects pulley_radius --robot robot.xml
+""",
+)
+@click.argument("name", required=False)
+@click.option("--robot", type=FILE, metavar="ROBOT.xml", help="Plausible sizes for this robot.")
+@json_option
+def command(name: str | None, robot: Path | None, as_json: bool) -> int:
+    """List the effects of the catalogue, or describe one: formula, parameters, how to check it.
+
+    Effects of your own packages are among them and marked. With a robot the plausible size of each
+    parameter is that for it; diagnose and calibrate take it as the prior's standard deviation.
+    """
+    from crosscheck.files import json_text
+    from crosscheck.terminal import effect_record, print_effect, print_effects
+    from seecr import load_robot
+    from seecr.effects import catalogue, effect_named
+
+    machine = load_robot(robot) if robot is not None else None
+    chosen = [effect_named(name)] if name is not None else list(catalogue().values())
+    if as_json:
+        rows = [effect_record(effect, machine) for effect in chosen]
+        click.echo(json_text(rows[0] if name is not None else {"effects": rows}))
+    elif name is not None:
+        print_effect(chosen[0], machine)
+    else:
+        print_effects(chosen)
+    return 0

@@ -1,0 +1,50 @@
+"""``crosscheck effects``: the catalogue for people and for programs."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from made_data import COGIRO, run
+
+from seecr.effects import catalogue
+from seecr.effects.base import layout_of
+from seecr.mjcf import load_robot
+
+
+def test_all_effects_are_listed_with_their_place() -> None:
+    result = run("effects")
+    assert result.exit_code == 0, result.output
+    for name, effect in catalogue().items():
+        (line,) = [row for row in result.stdout.splitlines() if row.split()[:1] == [name]]
+        assert effect.place in line and effect.title in line
+
+
+def test_one_effect_has_its_formula_and_its_size_for_a_robot() -> None:
+    result = run("effects", "pulley_radius", "--robot", COGIRO)
+    assert result.exit_code == 0, result.output
+    assert "r (pi - psi)" in result.stdout
+    size = 1e3 * layout_of(catalogue()["pulley_radius"], load_robot(COGIRO)).scale[0]
+    assert f"plausible size {size:.3g} mm" in result.stdout
+    assert "check by hand: measure a sheave with a caliper" in result.stdout
+
+
+@pytest.mark.parametrize("name", list(catalogue()))
+def test_every_effect_can_be_described(name: str) -> None:
+    result = run("effects", name)
+    assert result.exit_code == 0, result.output
+    assert "{" not in result.stdout
+
+
+def test_for_programs() -> None:
+    every = json.loads(run("effects", "--json").stdout)["effects"]
+    assert [row["effect"] for row in every] == list(catalogue())
+    one = json.loads(run("effects", "drum_gain", "--robot", COGIRO, "--json").stdout)
+    assert len(one["parameters"]) == load_robot(COGIRO).n_cables
+    assert not one["own"]
+
+
+def test_an_unknown_name_names_the_nearest() -> None:
+    result = run("effects", "pully_radius")
+    assert result.exit_code == 2
+    assert "pulley_radius" in result.stderr and result.stderr.count("\n") == 1
