@@ -140,9 +140,21 @@ def _way_back(plan: Planned, data: Measurements) -> Iterator[Extension]:
 
 
 def _later(plan: Planned, data: Measurements) -> Iterator[Extension]:
-    if data.t_s is not None:
-        later = replace(data, t_s=data.t_s + float(np.ptp(data.t_s)) + _AN_HOUR, run=_named(data))
-        yield Extension(Adding.LATER, "repeat the poses an hour later", _after(plan, data, later))
+    """All again after an hour, on the clock of each file; what creeps goes by that."""
+    if data.t_s is None:
+        return
+    n = data.n_rows
+    order = np.argsort(np.tile(data.file, 2), kind="stable")
+    later, both = order >= n, data.rows(order % n)
+    shift = float(np.ptp(data.t_s)) + _AN_HOUR
+    both = replace(
+        both, run=np.where(later, _named(both), both.run), t_s=data.t_s[order % n] + later * shift
+    )
+    whole = _like(plan, both)
+    rest = whole.problem.only(later)
+    base = null_fit(rest, plan.base.terms, whole.factor, refit=False)
+    again = replace(whole, problem=rest, base=base)
+    yield Extension(Adding.LATER, "repeat the poses an hour later", again)
 
 
 def _named(data: Measurements) -> np.ndarray:
@@ -154,35 +166,6 @@ def _backwards(data: Measurements) -> Measurements:
     order = np.concatenate([np.flatnonzero(data.run == name)[::-1] for name in data.runs])
     turned = data.rows(order)
     return replace(turned, run=_named(turned), t_s=data.t_s)
-
-
-def _after(plan: Planned, first: Measurements, later: Measurements) -> Planned:
-    """Rows that come after the planned ones: what creeps goes by the clock through all."""
-    both = Measurements(
-        path=first.path,
-        n_cables=first.n_cables,
-        run=np.concatenate([first.run, later.run]),
-        line=np.concatenate([first.line, later.line]),
-        t_s=_stack(first.t_s, later.t_s),
-        command_pose=_stack(first.command_pose, later.command_pose),
-        command_lengths=_stack(first.command_lengths, later.command_lengths),
-        temperature_C=_stack(first.temperature_C, later.temperature_C),
-        told=first.told,
-        loads=_both(first.loads, later.loads),
-        stands=np.concatenate([first.stands, later.stands]),
-    )
-    whole = _like(plan, both)
-    rest = whole.problem.only(np.arange(both.n_rows) >= first.n_rows)
-    base = null_fit(rest, plan.base.terms, whole.factor, refit=False)
-    return replace(whole, problem=rest, base=base)
-
-
-def _stack(a: Array | None, b: Array | None) -> Array | None:
-    return None if a is None or b is None else np.concatenate([a, b])
-
-
-def _both(a: Loads | None, b: Loads | None) -> Loads | None:
-    return None if a is None or b is None else a.followed_by(b)
 
 
 def _more_poses(plan: Planned, _data: Measurements) -> Iterator[Extension]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from crosscheck.files import json_text
 from crosscheck.fit.candidates import Trials, null_fit, try_candidate
 from crosscheck.fit.problem import Problem
 from crosscheck.measurements.data import Sigma
+from crosscheck.measurements.together import together
 from crosscheck.planning.design import make_plan
 from crosscheck.planning.extensions import Adding, extensions, more_poses
 from crosscheck.planning.greedy import Wanted, chosen_poses
@@ -247,3 +249,20 @@ def test_what_tells_two_effects_of_a_model_apart_is_proposed_by_the_same_means(r
     words = {s.kind: s.words for s in make_plan(robot, few).suggestions}
     payload = next(s for s in found if s.kind is Adding.PAYLOAD)
     assert payload.words == words[Adding.PAYLOAD]
+
+
+def _later(robot, data):
+    sigma = replace(SIGMA, tension_N=0.05)
+    plan = planned(robot, data, sigma, Reads.whole(robot.n_cables, tensions=True))
+    return next(e.plan for e in extensions(plan) if e.kind is Adding.LATER)
+
+
+def test_an_hour_later_is_on_the_clock_of_each_file(robot, few):
+    """What creeps in one file knows nothing of the other's hours."""
+    days = [replace(few, path=Path(f"{day}.csv")) for day in ("monday", "tuesday")]
+    both = _later(robot, together(days))
+    assert both.problem.use.sum() == sum(day.n_rows for day in days)
+    creep = signals(both)[0]["creep"].columns
+    alone = np.concatenate([signals(_later(robot, day))[0]["creep"].columns for day in days])
+    assert np.abs(creep).max() > 1e-3
+    assert creep == pytest.approx(alone, rel=1e-6, abs=1e-9)
