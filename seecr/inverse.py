@@ -43,6 +43,8 @@ class Correction(Result):
         held: (n,) bool, the wanted pose can be held by tensions within the limits.
         found: (n,) bool, there is an answer: lengths for the wanted pose or the nearest.
         solution: where the platform rests with these lengths, certified.
+        commands: the lengths as commands that every function takes, with the runs, times,
+            temperatures and loads they are for.
     """
 
     robot: Robot
@@ -52,6 +54,7 @@ class Correction(Result):
     held: NDArray[np.bool_]
     found: NDArray[np.bool_]
     solution: Solution
+    commands: Commands
 
     @property
     def left(self) -> Array:
@@ -64,11 +67,6 @@ class Correction(Result):
         size = np.where(np.arange(6) < 3, 1.0, self.robot.length)
         near = np.abs(self.left * size).max(axis=1) < _REACHED
         return np.asarray(self.held & near & self.solution.converged)
-
-    @property
-    def commands(self) -> Commands:
-        """The lengths as commands that every function takes."""
-        return Commands(self.aimed, lengths=self.lengths, told=True)
 
     def lines(self) -> list[str]:
         """How many poses are reached, what is left, and what cannot be held."""
@@ -192,7 +190,7 @@ class _Search:
         solution = prediction.solution()
         return Correction(
             self.robot, self.given.pose, aimed, lengths, held.fine, found,
-            _without(solution, ~found),
+            _without(solution, ~found), replace(commands, lengths=lengths, told=True),
         )  # fmt: skip
 
     def _tables(self, commands: Commands) -> Tables:

@@ -10,9 +10,11 @@ from seecr.commands import Commands, play
 from seecr.effects import Term, catalogue
 from seecr.effects.base import layout_of
 from seecr.errors import InputError
+from seecr.experiment import predict
 from seecr.inverse import correct
+from seecr.loads import Loads
 from seecr.mjcf import load_robot
-from seecr.pose import pose_add
+from seecr.pose import pose_add, pose_difference
 from seecr.robot import Robot
 from seecr.shipped import model_path
 from seecr.told import unplay
@@ -58,6 +60,20 @@ def test_many_effects_with_a_memory_are_corrected_together() -> None:
     found = correct(robot, commands, effects=effects)
     assert found.reached.all()
     assert np.abs(found.left[:, :3]).max() < 1e-6
+
+
+def test_the_commands_keep_what_they_are_for() -> None:
+    robot = robot_named("demobot_cogiro")
+    n, names = 6, ("thermal_expansion", "hysteresis", "creep")
+    effects = [typical(robot, catalogue()[name]) for name in names]
+    wanted = Commands(
+        line(n), run=np.repeat([0, 1], 3), time=5.0 * np.arange(n),
+        temperature=np.linspace(15, 30, n), loads=Loads.of(n, mass=np.linspace(0, 0.2, n)),
+        stands=np.ones(n, dtype=bool),
+    )  # fmt: skip
+    found = correct(robot, wanted, effects=effects)
+    rests = predict(robot, found.commands, effects).pose
+    assert np.abs(pose_difference(rests, wanted.pose)[:, :3]).max() < 1e-6
 
 
 def test_tensions_stay_within_limits_and_near_their_aim() -> None:
