@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import click
-
-from seecr import __version__
-from seecr.cli.group import LazyGroup
+from seecr.cli.group import group_of
 
 # Command, module in crosscheck.cli that holds it as `command`, and its line in --help.
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -20,22 +17,11 @@ COMMANDS: dict[str, tuple[str, str]] = {
 }
 
 
-@click.group(
-    cls=LazyGroup,
-    package="crosscheck.cli",
-    table=COMMANDS,
-    invoke_without_command=True,
-    context_settings={"help_option_names": ["-h", "--help"]},
-    epilog="'crosscheck COMMAND --help' shows a command's options and examples.",
-)
-@click.version_option(__version__, prog_name="crosscheck")
-@click.pass_context
-def main(ctx: click.Context) -> None:
+@group_of("crosscheck.cli", COMMANDS)
+def main() -> None:
     """Hold the statics of a cable-driven parallel robot against MuJoCo and against measurements.
 
     \b
     Exit status: 0 all well, 1 a threshold exceeded, 2 bad input or usage,
     3 a solve did not converge.
     """
-    if ctx.invoked_subcommand is None:
-        click.echo(ctx.get_help())

@@ -11,10 +11,9 @@ from crosscheck.errors import CrosscheckError
 from crosscheck.files import Toml, read_toml
 from crosscheck.measurements.data import Sigma
 from crosscheck.units import EXAMPLE, parse_quantity
+from seecr.columns.beside import CHOICES, choice
 
 _SIGMAS = tuple(item.name for item in fields(Sigma))
-# What a key may say, the default first.
-_CHOICES = {"lengths": ("absolute", "told"), "start": ("reference", "first_row")}
 
 
 @dataclass(frozen=True)
@@ -44,14 +43,14 @@ def read_beside(path: Path) -> Beside:
     table = toml.content.get("sigma", {})
     if not isinstance(table, dict):
         raise toml.error("sigma must be a table, [sigma]", "sigma")
-    said = {key: _choice(toml, key) for key in _CHOICES}
+    said = {key: choice(toml, key) for key in CHOICES}
     sigma = Sigma(**{key: _sigma(toml, key, value) for key, value in table.items()})
     return Beside(sigma, said["lengths"] == "told", said["start"] == "first_row")
 
 
 def _check_names(toml: Toml) -> None:
     """Other names are the user's own; a misspelt one of ours must not be passed over."""
-    known = ["sigma", *_CHOICES]
+    known = ["sigma", *CHOICES]
     for name in toml.content:
         if name in _SIGMAS:
             raise toml.error(f"{name} stands outside [sigma]; put it under that", name)
@@ -61,14 +60,6 @@ def _check_names(toml: Toml) -> None:
             what = "table" if near[0] == "sigma" else "key"
             text = f"unknown {what} {shown.format(name)}; expected {shown.format(near[0])}"
             raise toml.error(text, name)
-
-
-def _choice(toml: Toml, key: str) -> str:
-    value = toml.content.get(key, _CHOICES[key][0])
-    if value not in _CHOICES[key]:
-        words = " or ".join(f'"{word}"' for word in _CHOICES[key])
-        raise toml.error(f"{key} must be {words}, got {value!r}", key)
-    return str(value)
 
 
 def _sigma(toml: Toml, key: str, value: object) -> float:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from crosscheck.measurements.columns import POSITION, Columns
 from crosscheck.measurements.data import Measurements
+from seecr.columns.known import POSITION, Columns
 from seecr.pose import Array, quat_conjugate, quat_multiply, rotvec_from_quat
 
 if TYPE_CHECKING:

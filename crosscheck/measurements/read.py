@@ -15,21 +15,17 @@ import numpy as np
 
 from crosscheck.given import GivenRobot, robot_of
 from crosscheck.measurements.beside import Beside, read_beside
-from crosscheck.measurements.columns import POSITION, Columns, know_columns
 from crosscheck.measurements.data import Measurements
-from crosscheck.measurements.loads import known_loads
 from crosscheck.measurements.notice import notice
-from crosscheck.measurements.poses import command_lengths, command_poses, measured_orientation
-from crosscheck.measurements.table import read_table
-from crosscheck.measurements.times import runs, times
 from crosscheck.measurements.together import together
-from seecr.pose import Array
+from seecr.columns.known import POSITION, Columns, know_columns
+from seecr.columns.loads import known_loads
+from seecr.columns.poses import command_lengths, command_poses, measured_orientation
+from seecr.columns.table import read_table
+from seecr.columns.times import runs, temperatures, times
 
 if TYPE_CHECKING:
     from seecr.robot import Robot
-
-_ABSOLUTE_ZERO_C = -273.15
-
 
 GivenData: TypeAlias = Measurements | str | Path | Sequence[str | Path]
 """Measurements, their file, or several files of one robot."""
@@ -101,7 +97,7 @@ def _open(path: str | Path, robot: Robot) -> Columns:
 
 def _load(columns: Columns, robot: Robot, sigma_path: str | Path | None) -> Measurements:
     run = runs(columns)
-    t_s, temperature = times(columns, run), _temperature(columns)
+    t_s, temperature = times(columns, run), temperatures(columns)
     lengths = command_lengths(columns, robot)
     pose = command_poses(columns, robot) if lengths is None else None
     position = columns.readings("meas", POSITION)
@@ -147,16 +143,3 @@ def _way_points(data: Measurements) -> list[str]:
         return []
     rows = "1 row has" if silent == 1 else f"{silent} rows have"
     return [f"{rows} a command but no reading: a way point, gone through and not compared."]
-
-
-def _temperature(columns: Columns) -> Array | None:
-    if "temperature" not in columns.known:
-        return None
-    # It acts on the cables in every row, so a gap cannot be passed over like a lost reading.
-    celsius = columns.numbers("temperature")
-    columns.refuse(
-        celsius < _ABSOLUTE_ZERO_C,
-        "temperature",
-        lambda row: f"expected a temperature above {_ABSOLUTE_ZERO_C} C, got {celsius[row]:g} C",
-    )
-    return celsius

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import click
-
-from seecr import __version__
-from seecr.cli.group import LazyGroup
+from seecr.cli.group import group_of
 
 # Command, module in seecr.cli that holds it as `command`, and its line in --help.
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -16,17 +13,8 @@ COMMANDS: dict[str, tuple[str, str]] = {
 }
 
 
-@click.group(
-    cls=LazyGroup,
-    package="seecr.cli",
-    table=COMMANDS,
-    invoke_without_command=True,
-    context_settings={"help_option_names": ["-h", "--help"]},
-    epilog="'seecr COMMAND --help' shows a command's options and examples.",
-)
-@click.version_option(__version__, prog_name="seecr")
-@click.pass_context
-def main(ctx: click.Context) -> None:
+@group_of("seecr.cli", COMMANDS)
+def main() -> None:
     """Statics of cable-driven parallel robots with elastic cables: where the platform rests.
 
     \b
@@ -34,5 +22,3 @@ def main(ctx: click.Context) -> None:
     Exit status: 0 all well, 1 a threshold exceeded, 2 bad input or usage,
     3 a solve did not converge.
     """
-    if ctx.invoked_subcommand is None:
-        click.echo(ctx.get_help())

@@ -53,6 +53,44 @@ def robot_options(function: F) -> F:
     return click.argument("robot", type=FILE, metavar="ROBOT")(function)
 
 
+def limit_options(function: F) -> F:
+    """``--lowest`` and ``--highest``, given as ``lowest`` and ``highest`` [N], None without."""
+    function = click.option(
+        "--highest", type=float, metavar="N", help="Largest tension of every cable [N]."
+    )(function)
+    return click.option(
+        "--lowest",
+        type=float,
+        default=0.0,
+        show_default=True,
+        metavar="N",
+        help="Least tension of every cable [N].",
+    )(function)
+
+
+def turned_option(of: str) -> Callable[[F], F]:
+    """``--turned``, the orientation ``of`` what it is said to be of, given as ``turned``."""
+    return click.option(
+        "--turned",
+        nargs=4,
+        type=float,
+        metavar="QW QX QY QZ",
+        help=f"Orientation of {of}.  [default: that of the reference pose]",
+    )
+
+
+def picture_options(function: F) -> F:
+    """``--figure`` and ``--no-recording``, given as ``figure`` and ``no_recording``."""
+    function = click.option("--no-recording", is_flag=True, help="Write no .rrd.")(function)
+    return click.option(
+        "--figure",
+        type=click.Choice(["png", "svg", "none"]),
+        default="png",
+        show_default=True,
+        help="Kind of the figure.",
+    )(function)
+
+
 def robot_at(given: Path, cable: str | None = None) -> Robot:
     """The robot of a file, or the shipped one of that name, with another cable if one is named.
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from seecr.cli.arguments import NumbersCommand, model_at, robot_at, robot_options
+from seecr.cli.arguments import NumbersCommand, limit_options, model_at, robot_at, robot_options
 from seecr.cli.options import FILE, json_option, out_option
 
 
@@ -22,15 +22,7 @@ Examples:
 )
 @robot_options
 @click.argument("poses", type=FILE, metavar="POSES.csv")
-@click.option(
-    "--lowest",
-    type=float,
-    default=0.0,
-    show_default=True,
-    metavar="N",
-    help="Least tension of every cable [N].",
-)
-@click.option("--highest", type=float, metavar="N", help="Largest tension of every cable [N].")
+@limit_options
 @click.option(
     "--aim",
     type=click.Choice(["minimum", "middle"]),
@@ -87,7 +79,7 @@ def command(
             prefer=prefer,
         )  # fmt: skip
         status = 0 if (found.found & found.solution.converged).all() else 3
-        notes = list(own.notes) if own else []
+        notes = [*(own.notes if own else ()), *wanted.notes]
         document = {"exit_status": status, "notes": notes, **document_of(found)}
         files = {
             "corrected.csv": corrected_csv(found, wanted),

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import inspect
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any, TypeAlias
 
 import click
 
-from seecr import SeecrError
+from seecr import SeecrError, __version__
 
 CommandTable: TypeAlias = Mapping[str, tuple[str, str]]
 
@@ -73,6 +74,35 @@ class LazyGroup(click.Group):
     def _run(self, *args: Any, **extra: Any) -> Any:
         # click's overloads tell its two modes apart by a literal that *args hides
         return super().main(*args, standalone_mode=False, **extra)  # type: ignore[call-overload]
+
+
+def group_of(package: str, table: CommandTable) -> Callable[[Callable[..., Any]], LazyGroup]:
+    """A decorator that makes a command line of a function whose docstring is its help.
+
+    Args:
+        package: where the commands' modules are, in the package that the command is called as.
+        table: as :class:`LazyGroup` takes it.
+    """
+    name = package.partition(".")[0]
+
+    def decorate(function: Callable[..., Any]) -> LazyGroup:
+        def show_help(ctx: click.Context) -> None:
+            if ctx.invoked_subcommand is None:
+                click.echo(ctx.get_help())
+
+        group = LazyGroup(
+            name,
+            package=package,
+            table=table,
+            callback=click.pass_context(show_help),
+            help=inspect.getdoc(function),
+            invoke_without_command=True,
+            context_settings={"help_option_names": ["-h", "--help"]},
+            epilog=f"'{name} COMMAND --help' shows a command's options and examples.",
+        )
+        return click.version_option(__version__, prog_name=name)(group)
+
+    return decorate
 
 
 def _usage_text(error: click.ClickException) -> str:

@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from seecr.cli.arguments import NumbersCommand, axis_of, model_at, robot_at, robot_options
+from seecr.cli.arguments import (
+    NumbersCommand,
+    axis_of,
+    model_at,
+    picture_options,
+    robot_at,
+    robot_options,
+    turned_option,
+)
 from seecr.cli.options import FILE, json_option, out_option
 
 if TYPE_CHECKING:
@@ -41,21 +49,8 @@ Examples:
     metavar="X Y Z",
     help="Each FIRST:LAST:COUNT or one number [m]; z goes fastest.",
 )
-@click.option(
-    "--turned",
-    nargs=4,
-    type=float,
-    metavar="QW QX QY QZ",
-    help="Orientation of --line and --grid.  [default: that of the reference pose]",
-)
-@click.option(
-    "--figure",
-    type=click.Choice(["png", "svg", "none"]),
-    default="png",
-    show_default=True,
-    help="Kind of the figure.",
-)
-@click.option("--no-recording", is_flag=True, help="Write no .rrd.")
+@turned_option("--line and --grid")
+@picture_options
 @out_option("seecr-sweep")
 @json_option
 def command(
@@ -88,13 +83,13 @@ def command(
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
-    commands, more = _commands(machine, poses, given)
+    commands, more, said = _commands(machine, poses, given)
     with staged(out) as folder:
         solution = solve(machine, commands, effects=own or ())
         commanded = commands.lengths is None
         rows = rows_of(solution, commands.lengths, more)
         status = 0 if at_rest(solution) else 3
-        notes = list(own.notes) if own else []
+        notes = [*(own.notes if own else ()), *said]
         document = {
             "exit_status": status,
             "robot": machine.name,
@@ -123,8 +118,8 @@ def command(
 
 def _commands(
     robot: Robot, poses: Path | None, given: dict[str, Any]
-) -> tuple[Commands, dict[str, Any]]:
-    """The commands, and what else their file says of each row."""
+) -> tuple[Commands, dict[str, Any], tuple[str, ...]]:
+    """The commands, what else their file says of each row, and notes on it."""
     from seecr import Commands, InputError
     from seecr.command_file import read_commands
 
@@ -133,7 +128,7 @@ def _commands(
         got = " and ".join([*(["POSES.csv"] if poses else []), *(f"--{w}" for w in ways)])
         raise InputError(f"expected one of POSES.csv, --line, --grid; got {got or 'none'}")
     if poses is None:
-        return Commands(_along(robot, given)), {}
+        return Commands(_along(robot, given)), {}, ()
     read = read_commands(poses, robot)
     more: dict[str, Any] = {}
     if len(set(read.run)) > 1:
@@ -142,7 +137,7 @@ def _commands(
         more["t_s"] = read.commands.time.tolist()
     if read.commands.temperature is not None:
         more["temperature_C"] = read.commands.temperature.tolist()
-    return read.commands, more
+    return read.commands, more, read.notes
 
 
 def _along(robot: Robot, given: dict[str, Any]) -> NDArray[np.float64]:

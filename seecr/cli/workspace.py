@@ -6,7 +6,16 @@ from pathlib import Path
 
 import click
 
-from seecr.cli.arguments import NumbersCommand, axis_of, model_at, robot_at, robot_options
+from seecr.cli.arguments import (
+    NumbersCommand,
+    axis_of,
+    limit_options,
+    model_at,
+    picture_options,
+    robot_at,
+    robot_options,
+    turned_option,
+)
 from seecr.cli.options import json_option, out_option, progress_bar
 
 
@@ -28,22 +37,8 @@ Examples:
     metavar="X Y Z",
     help="Each FIRST:LAST:COUNT or one number [m].  [default: between the exit points]",
 )
-@click.option(
-    "--turned",
-    nargs=4,
-    type=float,
-    metavar="QW QX QY QZ",
-    help="Orientation of all poses.  [default: that of the reference pose]",
-)
-@click.option(
-    "--lowest",
-    type=float,
-    default=0.0,
-    show_default=True,
-    metavar="N",
-    help="Least tension of every cable [N].",
-)
-@click.option("--highest", type=float, metavar="N", help="Largest tension of every cable [N].")
+@turned_option("all poses")
+@limit_options
 @click.option(
     "--wrench",
     "wrenches",
@@ -54,14 +49,7 @@ Examples:
     help="It must be held under this too [N, N m]; several times for a set.",
 )
 @click.option("--no-elastic", is_flag=True, help="Only what can be held; quicker.")
-@click.option(
-    "--figure",
-    type=click.Choice(["png", "svg", "none"]),
-    default="png",
-    show_default=True,
-    help="Kind of the figure.",
-)
-@click.option("--no-recording", is_flag=True, help="Write no .rrd.")
+@picture_options
 @out_option("seecr-map")
 @json_option
 def command(

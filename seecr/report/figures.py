@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -87,9 +87,6 @@ def _along(solution: Solution, commanded: bool) -> tuple[Array, str]:
         if one_way and moves[0] < 3:
             return 1e3 * solution.command[:, moves[0]], f"commanded {'xyz'[moves[0]]} [mm]"
     return np.arange(1.0, len(solution) + 1.0), "pose number"
-
-
-Panel = Callable[[Any, Solution, Array, dict[str, Any]], None]
 
 
 def _deviations(ax: Any, solution: Solution, at: Array, mark: dict[str, Any]) -> None:

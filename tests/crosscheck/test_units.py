@@ -11,15 +11,14 @@ from crosscheck.errors import CrosscheckError
 from crosscheck.units import (
     EXAMPLE,
     SI,
-    UNITS,
     chance,
     in_unit,
-    of_columns,
     parameter_name,
     parse_quantity,
     short,
     with_error,
 )
+from seecr.units import UNITS, of_columns
 
 
 def test_columns_of_millimetres_are_rounded_once() -> None:

@@ -28,7 +28,8 @@ def written(folder: Path, text: str) -> Path:
 
 
 def test_poses_in_any_unit_order_and_separator(tmp_path: Path, robot: Robot) -> None:
-    text = "# a note\nnote;cmd_z_mm;cmd_x_m;cmd_y_cm;cmd_ry_deg;t_s\nabc;100;0,4;25;90;1,5\n"
+    names = "note;cmd_z_mm;cmd_x_m;cmd_y_cm;cmd_ry_deg;cmd_rx_deg;cmd_rz_rad;t_s"
+    text = f"# a note\n{names}\nabc;100;0,4;25;90;0;0;1,5\n"
     read = read_commands(written(tmp_path, text), robot)
     half = np.sqrt(0.5)
     np.testing.assert_allclose(read.commands.pose, [[0.4, 0.25, 0.1, half, 0, half, 0]], atol=1e-15)
@@ -53,27 +54,34 @@ def test_a_planar_robot_needs_no_third_coordinate(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read.commands.pose, [[0.3, 0, 0.2, 1, 0, 0, 0]])
 
 
+def test_the_toml_beside_says_what_lengths_mean_and_where_runs_start(
+    tmp_path: Path, robot: Robot
+) -> None:
+    path = written(tmp_path, f"{LENGTHS}\n" + ",".join(["500"] * 8))
+    assert not read_commands(path, robot).commands.told
+    beside = path.with_suffix(".toml")
+    beside.write_text('lengths = "told"\nstart = "first_row"\n')
+    commands = read_commands(path, robot).commands
+    assert commands.told and commands.starts_here.tolist() == [True]
+    beside.write_text('start = "anywhere"\n')
+    with pytest.raises(InputFileError, match='line 1: start must be "reference" or "first_row"'):
+        read_commands(path, robot)
+
+
+# What is wrong with columns and cells is held by the tests of what reads measurements, which is
+# the same reader; these are of commands alone.
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "is empty; expected a CSV of commands"),
-        ("cmd_x_m,cmd_y_m,cmd_z_m\n", "has no rows below its header"),
-        ("a,b\n1,2\n", "no commands; expected a CSV of commands with a header row, such as cmd_x"),
-        ("cmd_x_m,cmd_y_m\n1,2\n", "positions half there; expected cmd_z too"),
-        ("cmd_x_ft,cmd_y_m,cmd_z_m\n1,2,3\n", "column cmd_x_ft: unknown unit 'ft'; expected cmd_x"),
-        ("cmd_x_m,cmd_y_m,cmd_z_m\n1,2,\n", "line 2, column cmd_z_m: expected a finite number, got "
-         "an empty cell"),
-        ("cmd_x_m,cmd_y_m,cmd_z_m\n1,2,nan\n", "expected a finite number, got 'nan'"),
-        ("cmd_x_m,cmd_y_m,cmd_z_m\n1,2\n", "line 2: expected 3 cells as in the header, got 2"),
-        ("cmd_x_m,cmd_x_mm,cmd_z_m\n1,2,3\n", "column cmd_x_mm: repeated column"),
-        ("cmd_x_m,cmd_y_m,cmd_z_m,cmd_qw,cmd_qx,cmd_qy,cmd_qz\n0,0,0,1,1,0,0\n",
-         "line 2, column cmd_qw: expected a unit quaternion, scalar first, got norm 1.41421"),
-        ("cmd_x_m,cmd_y_m,cmd_z_m,cmd_qw\n0,0,0,1\n", "quaternion half there; expected cmd_qx"),
-        ("length_1_m\n1\n", "lengths half there; expected length_2 length_3"),
+        ("a,b\n1,2\n", "line 1: no command; expected columns cmd_x_m cmd_y_m cmd_z_m, or length_1"),
+        ("cmd_x_m,cmd_y_m\n1,2\n", "commanded pose columns half there; expected cmd_x_m cmd_y_m "
+         "cmd_z_m, cmd_z_m missing"),
+        ("want_x_m,want_y_m,cmd_x_m,cmd_y_m,cmd_z_m\n0,0,0,0,0\n",
+         "wanted pose columns half there; expected want_x_m want_y_m want_z_m, want_z_m missing"),
+        ("want_qw,want_rx_deg,cmd_x_m\n1,0,0\n", "orientation twice, as want_qw and as want_rx_d"),
+        ("cmd_x_m,cmd_y_m,cmd_z_m\n1,2,nan\n", "line 2, column cmd_z_m: expected a number in "
+         "every row, got 'nan'"),
         (f"{LENGTHS}\n" + ",".join(["-1"] * 8), "column length_1_mm: expected a length above zero"),
-        ("run,cmd_x_m,cmd_y_m,cmd_z_m\na,0,0,0\nb,0,0,0\na,0,0,0\n", "line 4, column run: run 'a' "
-         "comes back"),
-        ("t_s,cmd_x_m,cmd_y_m,cmd_z_m\n1,0,0,0\n0,0,0,0\n", "line 3, column t_s: rows out of time"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_said_with_its_place(

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from random_robots import random_robot
 
-from crosscheck.measurements.columns import know_columns
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import load_commands, load_measurements
-from crosscheck.measurements.table import Table
 from crosscheck.measurements.write import write_measurements
+from seecr.columns.known import know_columns
+from seecr.columns.table import Table
 from seecr.errors import InputFileError
 from seecr.loads import Loads
 from seecr.pose import quat_from_rotvec, quat_multiply

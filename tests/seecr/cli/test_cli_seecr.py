@@ -53,7 +53,7 @@ def test_negative_numbers_are_coordinates() -> None:
         (["pose", "demobot_cogiro", *PLACE, "--model", "no.toml"], "no.toml: no such file"),
         (["pose", "planar_vertical", "0.4", "0.1", "0.2"], "off what its joints can reach"),
         (["sweep", "demobot_cogiro"], "expected one of POSES.csv, --line, --grid; got none"),
-        (["sweep", "demobot_cogiro", "no.csv"], "no.csv: no such file; expected a CSV of commands"),
+        (["sweep", "demobot_cogiro", "no.csv"], "no.csv: no such file; expected a CSV file in UTF"),
         (["sweep", "demobot_cogiro", "--grid", "0:1", "0", "0"], "--grid: expected FIRST:LAST:"),
         (["sweep", "demobot_cogiro", "--grid", "0:1:0", "0", "0"], "a count above zero"),
     ],

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from random_robots import random_robot
 
-from crosscheck.measurements.columns import Columns, know_columns
-from crosscheck.measurements.poses import command_lengths, command_poses, measured_orientation
-from crosscheck.measurements.table import Table, read_table
+from seecr.columns.known import Columns, know_columns
+from seecr.columns.poses import command_lengths, command_poses, measured_orientation
+from seecr.columns.table import Table, read_table
 from seecr.errors import InputFileError
 from seecr.pose import quat_from_rxyz
 from seecr.robot import Joint, Robot

@@ -1,13 +1,13 @@
-"""Poses and lengths in a file of measurements: as commanded, and how the platform was turned."""
+"""Poses and lengths in a file: as commanded, as wanted, and how the platform was turned."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-from crosscheck.measurements.columns import ANGLES, POSITION, QUATERNION, Columns
-from crosscheck.measurements.data import Mask
+from seecr.columns.known import ANGLES, POSITION, QUATERNION, Columns
 from seecr.joints import pose_of_values
 from seecr.pose import Array, quat_from_rxyz, rxyz_from_quat
 
@@ -46,54 +46,79 @@ def command_poses(columns: Columns, robot: Robot) -> Array:
     Raises:
         InputFileError: no command at all, or one that is half there.
     """
-    present = columns.present
-    if not present("cmd", POSITION + QUATERNION + ANGLES):
+    poses = poses_of(columns, robot, "cmd", "commanded")
+    if poses is None:
         raise columns.table.error(
             "no command; expected columns cmd_x_m cmd_y_m cmd_z_m, or length_1_m to "
             f"length_{robot.n_cables}_m{columns.near_misses()}"
         )
+    return poses
+
+
+def poses_of(columns: Columns, robot: Robot, prefix: str, word: str) -> Array | None:
+    """Poses (n, 7) of the columns of a prefix, called so in notes; None where there are none.
+
+    Raises:
+        InputFileError: a pose that is half there.
+    """
+    present = columns.present
+    if not present(prefix, POSITION + QUATERNION + ANGLES):
+        return None
     free, reference = _free_coordinates(robot), robot.reference_pose
-    position = _group(columns, POSITION, "m", free[:3], reference[:3])
-    if present("cmd", QUATERNION):
-        orientation = _quaternions(columns, "cmd", blank_is_nan=False)
-    elif present("cmd", ANGLES):
+    position = _group(columns, (prefix, word, "m"), POSITION, free[:3], reference[:3])
+    if present(prefix, QUATERNION):
+        orientation = _quaternions(columns, prefix, blank_is_nan=False)
+    elif present(prefix, ANGLES):
         rxyz = rxyz_from_quat(reference[3:])
-        orientation = quat_from_rxyz(_group(columns, ANGLES, "deg", free[3:], rxyz))
+        angles = _group(columns, (prefix, word, "deg"), ANGLES, free[3:], rxyz)
+        orientation = quat_from_rxyz(angles)
     else:
-        columns.notes.append("No commanded orientation: that of the reference pose is used.")
+        columns.notes.append(f"No {word} orientation: that of the reference pose is used.")
         orientation = np.tile(reference[3:], (columns.n_rows, 1))
     return np.concatenate([position, orientation], axis=1)
 
 
 def _group(
-    columns: Columns, parts: tuple[str, ...], unit: str, free: Mask, reference: Array
+    columns: Columns,
+    of: tuple[str, str, str],
+    parts: tuple[str, ...],
+    free: NDArray[np.bool_],
+    reference: Array,
 ) -> Array:
-    """Three coordinates or angles (n, 3); the reference pose's where they cannot change."""
-    absent = [k for k, part in enumerate(parts) if f"cmd_{part}" not in columns.known]
-    missing = [f"cmd_{parts[k]}_{unit}" for k in absent if free[k]]
+    """Three coordinates or angles (n, 3); the reference pose's where they cannot change.
+
+    Args:
+        columns: the file's.
+        of: the columns' prefix, the word for it, and a unit for errors.
+        parts: the coordinates' names.
+        free: (3,) which of them the robot can change. reference: (3,) the reference pose's.
+    """
+    prefix, word, unit = of
+    absent = [k for k, part in enumerate(parts) if f"{prefix}_{part}" not in columns.known]
+    missing = [f"{prefix}_{parts[k]}_{unit}" for k in absent if free[k]]
     if missing:
-        need = " ".join(f"cmd_{parts[k]}_{unit}" for k in range(3) if free[k])
-        raise columns.half_there("commanded pose", missing, need)
+        need = " ".join(f"{prefix}_{parts[k]}_{unit}" for k in range(3) if free[k])
+        raise columns.half_there(f"{word} pose", missing, need)
     if absent:
-        names = " ".join(f"cmd_{parts[k]}" for k in absent)
+        names = " ".join(f"{prefix}_{parts[k]}" for k in absent)
         columns.notes.append(
             f"No {names}: the robot cannot move there, the reference pose's value is used."
         )
     values = np.tile(np.asarray(reference, float), (columns.n_rows, 1))
     for k, part in enumerate(parts):
         if k not in absent:
-            values[:, k] = columns.numbers(f"cmd_{part}")
+            values[:, k] = columns.numbers(f"{prefix}_{part}")
     return values
 
 
-def _free_coordinates(robot: Robot) -> Mask:
+def _free_coordinates(robot: Robot) -> NDArray[np.bool_]:
     """Which of x y z rx ry rz of the platform can change at all, (6,): found by trying."""
     if not robot.joints:
         return np.ones(6, dtype=bool)
     values = np.random.default_rng(0).uniform(-0.5, 0.5, (8, len(robot.joints)))
     poses, _joints = pose_of_values(robot, values)
     moved = np.concatenate([poses[:, :3], rxyz_from_quat(poses[:, 3:])], axis=1)
-    free: Mask = np.ptp(moved, axis=0) > 1e-9
+    free: NDArray[np.bool_] = np.ptp(moved, axis=0) > 1e-9
     return free
 
 
@@ -112,7 +137,7 @@ def _quaternions(columns: Columns, prefix: str, *, blank_is_nan: bool) -> Array:
     return unit
 
 
-def _check_whole(columns: Columns, prefix: str, blank: Mask) -> None:
+def _check_whole(columns: Columns, prefix: str, blank: NDArray[np.bool_]) -> None:
     text = "quaternion half there; expected all four cells filled or all four empty"
     for k, part in enumerate(QUATERNION):
         alone = blank[:, k] & ~np.all(blank, axis=1)

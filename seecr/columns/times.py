@@ -1,4 +1,4 @@
-"""The runs of a file and its clock: names, seconds or times of day."""
+"""The runs of a file, its clock and its thermometer: names, seconds or times of day, Celsius."""
 
 from __future__ import annotations
 
@@ -7,18 +7,19 @@ from collections.abc import Sequence
 from datetime import datetime
 
 import numpy as np
+from numpy.typing import NDArray
 
-from crosscheck.measurements.columns import Columns
-from crosscheck.measurements.data import Names
-from crosscheck.measurements.table import show
+from seecr.columns.known import Columns
+from seecr.columns.table import show
 from seecr.errors import InputFileError
 from seecr.pose import Array
 
 # A date, and a time of day or none.
 _ISO = re.compile(r"\d{4}-?\d\d-?\d\d([T ]\d.*)?")
+_ABSOLUTE_ZERO_C = -273.15
 
 
-def runs(columns: Columns) -> Names:
+def runs(columns: Columns) -> NDArray[np.str_]:
     """Names of the runs (n,); "all" where the file has no such column.
 
     Raises:
@@ -49,7 +50,7 @@ def _run_came_back(columns: Columns, name: str, last: int, row: int) -> InputFil
     return columns.table.error(text, row=row, column="run")
 
 
-def times(columns: Columns, run: Names) -> Array | None:
+def times(columns: Columns, run: NDArray[np.str_]) -> Array | None:
     """Times (n,) [s], or None; times of day count from that of the first row.
 
     Raises:
@@ -71,6 +72,24 @@ def times(columns: Columns, run: Names) -> Array | None:
         ),
     )
     return t_s
+
+
+def temperatures(columns: Columns) -> Array | None:
+    """Temperatures (n,) [deg C], or None.
+
+    Raises:
+        InputFileError: a cell that is empty or no temperature.
+    """
+    if "temperature" not in columns.known:
+        return None
+    # It acts on the cables in every row, so a gap cannot be passed over like a lost reading.
+    celsius = columns.numbers("temperature")
+    columns.refuse(
+        celsius < _ABSOLUTE_ZERO_C,
+        "temperature",
+        lambda row: f"expected a temperature above {_ABSOLUTE_ZERO_C} C, got {celsius[row]:g} C",
+    )
+    return celsius
 
 
 def _shown(cells: Sequence[str], t_s: Array, row: int, of_day: bool) -> str:

@@ -6,7 +6,7 @@ import difflib
 import re
 from collections.abc import Sequence
 
-from crosscheck.measurements.table import show
+from seecr.columns.table import show
 
 # What others call a column, where the spelling is not close enough to be guessed from.
 _ALIASES = {"time": "t_s", "time_s": "t_s", "timestamp": "t_s", "temp_c": "temperature_C"}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from crosscheck.measurements.columns import POSITION, Columns
+from seecr.columns.known import POSITION, Columns
 from seecr.loads import Loads
 from seecr.pose import Array
 from seecr.robot import Robot

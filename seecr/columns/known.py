@@ -1,4 +1,4 @@
-"""What the columns of measurements mean: names, units, and which belong together.
+"""What the columns of commands and measurements mean: names, units, and which belong together.
 
 A name is a quantity and, after the last underscore, its unit: ``cmd_x_mm``, ``length_3_m``.
 Quaternions (``cmd_qw``) have no unit. Columns of other names are kept out and named as unused.
@@ -11,20 +11,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
-from crosscheck.measurements.data import Mask
-from crosscheck.measurements.names import meant_by, other_rotations, question, unused_note
-from crosscheck.measurements.table import Table, show
-from crosscheck.units import Unit, of_columns
+from seecr.columns.names import meant_by, other_rotations, question, unused_note
+from seecr.columns.table import Table, show
 from seecr.errors import InputFileError
 from seecr.pose import Array
+from seecr.units import Unit, of_columns
 
 POSITION = ("x", "y", "z")
 QUATERNION = ("qw", "qx", "qy", "qz")
 ANGLES = ("rx", "ry", "rz")
 
 _QUANTITY = re.compile(
-    r"(t|temperature|run|(?:cmd|meas)_(?:q[wxyz]|r?[xyz])|(?:length|tension)_\d+"
+    r"(t|temperature|run|(?:cmd|meas|want)_(?:q[wxyz]|r?[xyz])|(?:length|tension)_\d+"
     r"|payload(?:_[xyz])?|(?:force|moment)_[xyz])(?:_([^_]*))?"
 )
 # These begin many other names; only these endings are surely meant as a unit.
@@ -92,7 +92,7 @@ class Columns:
                     self.notes.append(f"Column {name} is empty: not measured.")
         return values
 
-    def refuse(self, wrong: Mask, quantity: str, text: Callable[[int], str]) -> None:
+    def refuse(self, wrong: NDArray[np.bool_], quantity: str, text: Callable[[int], str]) -> None:
         """Raise at the first row that is wrong (n,), if any."""
         if np.any(wrong):
             row = int(np.argmax(wrong))
@@ -224,7 +224,7 @@ def _absent(known: dict[str, Column], n_cables: int) -> list[str]:
 
 def _check_one_way(columns: Columns) -> None:
     table, known = columns.table, columns.known
-    for prefix in ("cmd", "meas"):
+    for prefix in ("cmd", "meas", "want"):
         quats, angles = columns.present(prefix, QUATERNION), columns.present(prefix, ANGLES)
         if quats and angles:
             a, b = (known[f"{prefix}_{p[0]}"].name for p in (quats, angles))

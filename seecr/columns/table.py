@@ -17,8 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.errors import CrosscheckError
-from seecr.errors import InputFileError
+from seecr.errors import InputFileError, MissingPackageError
 from seecr.files import read_bytes
 from seecr.pose import Array
 
@@ -235,7 +234,7 @@ def _read_parquet(path: Path) -> Table:
         import pyarrow
         from pyarrow import parquet
     except ImportError:
-        raise CrosscheckError(
+        raise MissingPackageError(
             f"{path}: is Parquet, which needs pyarrow; pip install pyarrow, or save it as CSV"
         ) from None
     try:

@@ -1,0 +1,69 @@
+"""The TOML beside the measurements: noise, and what is wrong with it."""
+
+from __future__ import annotations
+
+import pytest
+from measured_csv import POSE
+
+from crosscheck.measurements.data import Sigma
+from crosscheck.measurements.read import load_commands, load_measurements
+from seecr.errors import InputFileError
+
+
+def test_sigma_beside_the_data_or_named(csv_file, robot, tmp_path):
+    path = csv_file(POSE, "0,0,0,0")
+    (tmp_path / "measured.toml").write_text("[sigma]\nposition_m = 3e-5\nlength_m = 1\n")
+    (tmp_path / "other.toml").write_text("[sigma]\ntension_N = 2.5\n[mine]\nname = 'x'\n")
+    assert load_measurements(path, robot).sigma == Sigma(position_m=3e-5, length_m=1.0)
+    other = load_commands(path, robot, sigma_path=tmp_path / "other.toml")
+    assert other.sigma == Sigma(tension_N=2.5)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("[sigma]\nposition_m = \n", "measured.toml: is not TOML: .*line 2"),
+        (
+            "[sigma]\nposition_m = 0\n",
+            r'line 2: position_m must be a positive number \[m\] or a text such as "0.5mm", got 0;',
+        ),
+        (
+            "[sigma]\n\ntension_N = -1.5\n",
+            r'line 3: tension_N must be a positive number \[N\] or a text such as "1N", got -1.5',
+        ),
+        (
+            "[sigma]\nposition_m = '3 N'\n",
+            "line 2: position_m: expected a number with its unit .m, cm, mm, .*got unit 'N'",
+        ),
+        ("lengths = 'tolled'\n", "line 1: lengths must be .absolute. or .told., got 'tolled'"),
+        ("start = 3\n", "line 1: start must be .reference. or .first_row., got 3"),
+        ("lenghts = 'told'\n", "line 1: unknown key lenghts; expected lengths$"),
+        ("[sigma]\nposition_m = nan\n", "line 2: position_m must be .* got nan"),
+        ("[sigma]\nlength_m = inf\n", "got inf"),
+        ("[sigma]\nlength_m = true\n", "got True"),
+        (
+            "[sigma]\nposition_mm = 3\n",
+            "line 2: unknown key position_mm in .sigma.; known are position_m, ",
+        ),
+        ("[sigma]\norient_rad = 3\n", "known are orientation_rad, .*position_m"),
+        ("position_m = 3e-5\n", r"line 1: position_m stands outside \[sigma\]; put it under that"),
+        ("[Sigmas]\nposition_m = 3e-5\n", r"line 1: unknown table \[Sigmas\]; expected \[sigma\]"),
+        ("sigma = 3\n", r"line 1: sigma must be a table, \[sigma\]"),
+    ],
+)
+def test_mistakes_in_sigma(csv_file, robot, tmp_path, text, expected):
+    path = csv_file(POSE, "0,0,0,0")
+    (tmp_path / "measured.toml").write_text(text)
+    with pytest.raises(InputFileError, match=expected) as caught:
+        load_measurements(path, robot)
+    assert str(caught.value).startswith(f"{tmp_path / 'measured.toml'}: ")
+    assert "\n" not in str(caught.value)
+
+
+def test_named_sigma_must_exist_and_be_text(csv_file, robot, tmp_path):
+    path = csv_file(POSE, "0,0,0,0")
+    with pytest.raises(InputFileError, match=r"none\.toml: no such file; expected a TOML file"):
+        load_measurements(path, robot, sigma_path=tmp_path / "none.toml")
+    (tmp_path / "latin.toml").write_bytes(b"# \xe9\n")
+    with pytest.raises(InputFileError, match=r"is not UTF-8 \(byte number 3\)"):
+        load_measurements(path, robot, sigma_path=tmp_path / "latin.toml")
