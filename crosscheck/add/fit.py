@@ -104,6 +104,7 @@ def _added(
         kind = UnsolvedError if ready.refusal.unsolved else CrosscheckError
         why = f"{ready.refusal}; {' + '.join(names)} was not fitted: {ready.refusal.remedy}"
         raise kind(f"{data.path}: {why}")
+    terms = ready.terms
     for layout in layouts:
         _refuse(problem, layout)
     progress(f"fitting {' + '.join(names)}", 0.0)

@@ -11,9 +11,9 @@ from crosscheck.calibration.colour import whitened
 from crosscheck.calibration.gram import ColumnGroup, Gram, gram_of
 from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.later import added_columns, amplitudes, amplitudes_at_null
-from crosscheck.calibration.registration import NAME as TRACKER
 from crosscheck.calibration.worth import WIDTHS
 from crosscheck.fit.known import known_readings
+from crosscheck.fit.registration import NAME as TRACKER
 from crosscheck.fit.state import derivatives
 from seecr.effects import Term, Terms
 from seecr.effects.base import Layout

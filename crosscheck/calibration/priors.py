@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from crosscheck.calibration.registration import NAME as TRACKER
+from crosscheck.fit.registration import NAME as TRACKER
 from seecr.effects import Terms
 from seecr.effects.base import Layout
 from seecr.pose import Array

@@ -149,7 +149,7 @@ def calibrate(
         raise kind(f"{data.path}: {why}")
     # BLAS on several threads takes longer for matrices as narrow as these
     with threadpool_limits(limits=1, user_api="blas"):
-        found = calibrated(ready.problem, terms, progress)
+        found = calibrated(ready.problem, ready.terms, progress)
     return _result(found, terms, (*said, *ready.all_notes))
 
 

@@ -14,9 +14,9 @@ from crosscheck.calibration.joint import JointFit, Setting, settle, tempered
 from crosscheck.calibration.later import PAYS, at_null, inside, layouts, promising_beside
 from crosscheck.calibration.linearised import groups_of, linearised, unwhitened
 from crosscheck.calibration.priors import wider, widths_of
-from crosscheck.calibration.registration import NAME as TRACKER
-from crosscheck.calibration.registration import registered
 from crosscheck.calibration.restricted import estimate, log_evidence
+from crosscheck.fit.registration import NAME as TRACKER
+from crosscheck.fit.registration import registered
 from crosscheck.fit.state import State, evaluate
 from seecr.effects import Term, Terms
 from seecr.effects.base import Layout

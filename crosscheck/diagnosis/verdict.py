@@ -21,7 +21,6 @@ from crosscheck.fit.reasons import DiagnosisVerdict, Refusal, Unfit
 from crosscheck.fit.tolerance import HALF_THE_NOISE, Tolerance
 from crosscheck.given import GivenModel, GivenRobot, considered, model_of, robot_of
 from crosscheck.measurements.read import GivenData, measurements_of
-from seecr.effects import Terms
 
 
 def diagnose(
@@ -55,15 +54,15 @@ def diagnose(
     # processors from the compiled loop
     with threadpool_limits(limits=1, user_api="blas"):
         ready = prepare(robot, data, terms, considered(only, exclude))
-        found = _diagnosed(ready, terms, said, progress)
+        found = _diagnosed(ready, said, progress)
     return weighed(found, ready.problem, tolerance)
 
 
 Notes = tuple[str, ...]
 
 
-def _diagnosed(ready: Prepared, terms: Terms, said: Notes, progress: Progress) -> Diagnosis:
-    problem = ready.problem
+def _diagnosed(ready: Prepared, said: Notes, progress: Progress) -> Diagnosis:
+    problem, terms = ready.problem, ready.terms
     factor = problem.noise(problem.experiment.predict(terms.effects))
     base = null_fit(problem, terms, factor, refit=False)
     refusal = ready.refusal

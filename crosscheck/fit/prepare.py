@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from crosscheck.fit.fitness import refusal_of
+from crosscheck.fit.freed import freed
 from crosscheck.fit.held_out import blocks_note
 from crosscheck.fit.noise import estimate_sigma
 from crosscheck.fit.problem import Problem, Rms, rms_by_kind
@@ -32,12 +33,14 @@ class Prepared:
 
     Attributes:
         problem: without the rows that have no equilibrium, with all noise filled in.
+        terms: effects of the model, with those that the data leave free.
         notes: what was assumed, estimated or left out.
         blocks_note: how cross-validation would cut the data, where that is to be said.
         refusal: why nothing can be said of these data; None where something can.
     """
 
     problem: Problem
+    terms: Terms
     notes: tuple[str, ...]
     blocks_note: str
     refusal: Refusal | None
@@ -62,13 +65,21 @@ def prepare(
     every = np.ones(data.n_rows, dtype=bool)
     problem = Problem(robot, data, data.sigma, every, considered=considered)
     if not problem.measured.any():
-        return Prepared(problem, tuple(data.notes), "", Refusal(Unfit.NO_READINGS, data.n_rows))
+        return Prepared(
+            problem, terms, tuple(data.notes), "", Refusal(Unfit.NO_READINGS, data.n_rows)
+        )
     plain = problem.experiment.predict(terms.effects)
     problem = _solved_rows(problem, plain)
     problem, estimates = estimate_sigma(problem, problem.residuals(plain.readings))
-    notes = (*data.notes, *problem.left_out, *estimates)
+    terms, said = freed(problem, terms)
+    if said:
+        plain = problem.experiment.predict(terms.effects)
+        if estimates:  # what was left then was the frame's
+            known = replace(problem, sigma=data.sigma)
+            problem, estimates = estimate_sigma(known, problem.residuals(plain.readings))
+    notes = (*data.notes, *problem.left_out, *estimates, *said)
     refusal = refusal_of(problem, plain.pose[:, :3], data.sigma)
-    return Prepared(problem, notes, blocks_note(problem), refusal)
+    return Prepared(problem, terms, notes, blocks_note(problem), refusal)
 
 
 def _solved_rows(problem: Problem, plain: Prediction) -> Problem:

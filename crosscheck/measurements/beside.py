@@ -12,6 +12,7 @@ from crosscheck.files import Toml, read_toml
 from crosscheck.measurements.data import Sigma
 from crosscheck.units import EXAMPLE, parse_quantity
 from seecr.columns.beside import CHOICES, choice
+from seecr.effects import catalogue
 
 _SIGMAS = tuple(item.name for item in fields(Sigma))
 
@@ -24,11 +25,13 @@ class Beside:
         sigma: stated noise.
         told: ``lengths = "told"``: lengths are what the winches were told.
         stands: ``start = "first_row"``: runs start at their first row.
+        free: names of effects that every fit of these data fits too.
     """
 
     sigma: Sigma = field(default_factory=Sigma)
     told: bool = False
     stands: bool = False
+    free: tuple[str, ...] = ()
 
 
 def read_beside(path: Path) -> Beside:
@@ -45,12 +48,12 @@ def read_beside(path: Path) -> Beside:
         raise toml.error("sigma must be a table, [sigma]", "sigma")
     said = {key: choice(toml, key) for key in CHOICES}
     sigma = Sigma(**{key: _sigma(toml, key, value) for key, value in table.items()})
-    return Beside(sigma, said["lengths"] == "told", said["start"] == "first_row")
+    return Beside(sigma, said["lengths"] == "told", said["start"] == "first_row", _free(toml))
 
 
 def _check_names(toml: Toml) -> None:
     """Other names are the user's own; a misspelt one of ours must not be passed over."""
-    known = ["sigma", *CHOICES]
+    known = ["sigma", "free", *CHOICES]
     for name in toml.content:
         if name in _SIGMAS:
             raise toml.error(f"{name} stands outside [sigma]; put it under that", name)
@@ -60,6 +63,15 @@ def _check_names(toml: Toml) -> None:
             what = "table" if near[0] == "sigma" else "key"
             text = f"unknown {what} {shown.format(name)}; expected {shown.format(near[0])}"
             raise toml.error(text, name)
+
+
+def _free(toml: Toml) -> tuple[str, ...]:
+    names = toml.content.get("free", [])
+    sensing = [name for name, effect in catalogue().items() if effect.place == "sensing"]
+    if not isinstance(names, list) or not all(name in sensing for name in names):
+        text = f'free must be a list of some of {", ".join(sensing)}, such as ["tracker_frame"]'
+        raise toml.error(f"{text}, got {names!r}", "free")
+    return tuple(dict.fromkeys(names))
 
 
 def _sigma(toml: Toml, key: str, value: object) -> float:

@@ -87,6 +87,8 @@ class Measurements(Result):
         temperature_C: (n,) [deg C] or None.
         loads: what the platform carried, or None.
         stands: (n,) bool, rows whose run starts at its first row instead of the reference pose.
+        free: names of effects that every fit of these data fits too: how the tracker stands, where
+            that was found from the data.
         sigma: stated noise.
         sigma_ratio: (n, 4) noise of each row over that, by kind: each file has its own.
         files: their names, where they are several; file: (n,) number of each row's file.
@@ -112,6 +114,7 @@ class Measurements(Result):
     told: bool = False
     loads: Loads | None = None
     stands: Mask = _FILLED_IN
+    free: tuple[str, ...] = ()
     sigma: Sigma = field(default_factory=Sigma)
     sigma_ratio: Array = _FILLED_IN
     files: tuple[str, ...] = ()

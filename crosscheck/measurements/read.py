@@ -122,6 +122,7 @@ def _load(columns: Columns, robot: Robot, sigma_path: str | Path | None) -> Meas
         temperature_C=temperature,
         loads=known_loads(columns, robot),
         stands=np.full(columns.n_rows, beside.stands),
+        free=beside.free,
         sigma=beside.sigma,
         line=columns.table.line,
         unused_columns=columns.unused,

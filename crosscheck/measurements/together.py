@@ -37,6 +37,7 @@ def together(parts: Sequence[Measurements]) -> Measurements:
     pairs = zip(parts, names, strict=True)
     notes = [f"{name}: {note}" for part, name in pairs for note in part.notes]
     t_s, lost_times = _of_all("t_s", [part.t_s for part in parts], names)
+    free, one_for_all = _free(parts)
     warmth, lost_warmth = _of_all("temperature_C", [part.temperature_C for part in parts], names)
     quat, angles = _orientations(parts)
     whole = Measurements(
@@ -54,17 +55,28 @@ def together(parts: Sequence[Measurements]) -> Measurements:
         temperature_C=warmth,
         loads=_loads(parts),
         stands=np.concatenate([part.stands for part in parts]),
+        free=free,
         sigma=sigma,
         sigma_ratio=ratio,
         files=tuple(names),
         file=np.repeat(np.arange(len(parts)), [part.n_rows for part in parts]),
         line=np.concatenate([part.line for part in parts]),
         unused_columns=tuple(dict.fromkeys(name for part in parts for name in part.unused_columns)),
-        notes=(*notes, *said, *lost_times, *lost_warmth),
+        notes=(*notes, *said, *lost_times, *lost_warmth, *one_for_all),
     )
     # what a file repeats of itself is in its own notes already
     own = any(twice(part) for part in parts)
     return whole if own else whole.with_notes(twice(whole))
+
+
+def _free(parts: Sequence[Measurements]) -> tuple[tuple[str, ...], list[str]]:
+    """What any of the files leaves free, and what that takes for granted."""
+    free = tuple(dict.fromkeys(name for part in parts for name in part.free))
+    words = (
+        f"{' and '.join(free)} is free, but one for all files: right where the tracker stood still "
+        "between them; give files of other days one by one."
+    )
+    return free, [words] if free else []
 
 
 def _check_alike(parts: Sequence[Measurements]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 from crosscheck.files import write_texts
@@ -43,6 +44,7 @@ def _toml(data: Measurements) -> str:
     """The text that reading gives back exactly."""
     lines = ['lengths = "told"'] if data.told else []
     lines += ['start = "first_row"'] if data.stands.any() else []
+    lines += [f"free = {json.dumps(data.free)}"] if data.free else []
     lines += ["# one standard deviation of each kind of reading", "[sigma]"]
     for key, value in vars(data.sigma).items():
         if value is not None:

@@ -12,9 +12,9 @@ from made_data import COGIRO, SIGMA, measured, term
 from crosscheck.calibration.calibrate import Calibration, calibrate
 from crosscheck.calibration.leave_out import surprise_of, without
 from crosscheck.calibration.linearised import Linear
-from crosscheck.calibration.registration import registered
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.problem import Problem
+from crosscheck.fit.registration import registered
 from crosscheck.fit.state import evaluate
 from crosscheck.measurements.data import Measurements
 from seecr.effects import Terms

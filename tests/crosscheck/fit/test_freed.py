@@ -1,0 +1,73 @@
+"""A tracker that was aligned to the commands stays free in every fit of its data."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from made_data import measured, soft_cogiro, term
+
+import crosscheck
+from crosscheck.measurements.together import together
+from crosscheck.measurements.write import write_measurements
+from seecr.effects import Terms
+from seecr.errors import InputFileError
+
+ROBOT = soft_cogiro()
+FAR = {"shift_x_m": 0.4, "shift_z_m": -0.2, "rotation_z_rad": 0.7, "rotation_x_rad": 0.1}
+TARGET = {"shift_z_m": 0.02, "rotation_y_rad": 0.05}
+
+
+def far_away(*effects, free=("tracker_frame",)):
+    frame = term(ROBOT, "tracker_frame", **FAR)
+    return replace(measured(ROBOT, [frame, *effects], points=6), free=free)
+
+
+def test_what_is_left_does_not_depend_on_where_the_tracker_stands():
+    mass = term(ROBOT, "platform_mass", added_kg=0.6)
+    here = replace(measured(ROBOT, [mass], points=6), free=("tracker_frame",))
+    there, at_home = (crosscheck.compare(ROBOT, data) for data in (far_away(mass), here))
+    assert there.rms["position_rms_m"] == pytest.approx(at_home.rms["position_rms_m"], rel=0.02)
+    assert not there.is_noise
+    assert crosscheck.compare(ROBOT, far_away(mass), [mass]).is_noise
+    assert any("tracker_frame is free, as the TOML" in note for note in there.notes)
+
+
+def test_a_diagnosis_finds_what_is_missing_beside_the_frame_and_not_the_frame():
+    gain = term(ROBOT, "pulley_radius", radius_m=0.01)
+    target = term(ROBOT, "tracker_target", **TARGET)
+    free = ("tracker_frame", "tracker_target")
+    found = crosscheck.diagnose(ROBOT, far_away(gain, target, free=free))
+    assert [effect.effect for effect in found.missing] == ["pulley_radius"]
+    assert found.missing[0].values[0] == pytest.approx(0.01, abs=4 * found.missing[0].stderr[0])
+    assert found.verdict is crosscheck.DiagnosisVerdict.EFFECTS_FOUND
+
+
+def test_adding_fits_the_frame_too_and_a_fixed_one_stays():
+    found = crosscheck.add_effect(
+        ROBOT, far_away(term(ROBOT, "pulley_radius", radius_m=0.01)), "pulley_radius"
+    )
+    assert found.pays and found.terms.names == ("pulley_radius", "tracker_frame")
+    fixed = term(ROBOT, "tracker_frame", shift_x_m=0.39).fixed()
+    left = crosscheck.compare(ROBOT, far_away(), Terms([fixed]))
+    assert left.state.terms["tracker_frame"].vector == pytest.approx(fixed.vector)
+
+
+def test_files_say_it_and_several_have_one(tmp_path):
+    data = far_away()
+    write_measurements(tmp_path / "a.csv", data)
+    assert 'free = ["tracker_frame"]' in (tmp_path / "a.toml").read_text()
+    again = crosscheck.load_measurements(tmp_path / "a.csv", ROBOT)
+    assert again.free == ("tracker_frame",)
+    both = together([again, replace(data, path=tmp_path / "b.csv", free=())])
+    assert both.free == ("tracker_frame",)
+    assert any("one for all files" in note for note in both.notes)
+
+
+@pytest.mark.parametrize("said", ['["stiffness"]', '"tracker_frame"', "[1]"])
+def test_only_sensors_can_be_free(tmp_path, said):
+    write_measurements(tmp_path / "a.csv", measured(ROBOT, points=2))
+    (tmp_path / "a.toml").write_text(f"free = {said}\n")
+    expected = "a.toml: line 1: free must be a list of some of tracker_frame"
+    with pytest.raises(InputFileError, match=expected):
+        crosscheck.load_measurements(tmp_path / "a.csv", ROBOT)
