@@ -39,6 +39,7 @@ if TYPE_CHECKING:
         SeecrError,
     )
     from seecr.experiment import Experiment, Prediction, predict
+    from seecr.exported.export import Export, export
     from seecr.inverse import Correction, correct
     from seecr.loads import Loads
     from seecr.maps import Workspace, boundary, default_axes, workspace_map
@@ -65,6 +66,7 @@ _MODULES = {
     "equilibrium": ("solve",),
     "errors": ("InputError", "InputFileError", "MissingPackageError", "RobotError", "SeecrError"),
     "experiment": ("Experiment", "Prediction", "predict"),
+    "exported.export": ("Export", "export"),
     "loads": ("Loads",),
     "inverse": ("Correction", "correct"),
     "maps": ("Workspace", "boundary", "default_axes", "workspace_map"),
@@ -87,6 +89,7 @@ __all__ = [
     "Correction",
     "Effect",
     "Experiment",
+    "Export",
     "InputError",
     "InputFileError",
     "Joint",
@@ -114,6 +117,7 @@ __all__ = [
     "default_axes",
     "effect_named",
     "equilibria",
+    "export",
     "feasible",
     "layout_of",
     "load_model",

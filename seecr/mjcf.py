@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from seecr.errors import RobotError
-from seecr.pose import Array, quat_rotate
+from seecr.pose import Array, quat_rotate, quat_to_matrix
 from seecr.robot import Joint, Robot
 
 if TYPE_CHECKING:
@@ -55,6 +55,7 @@ def load_robot(path: str | Path) -> Robot:
         centre_of_mass=model.body_ipos[body].copy(),
         gravity=_gravity(model),
         reference_pose=reference_pose,
+        inertia=_inertia(model, body),
         joints=joints,
         cable_names=tuple(names),
         source=path,
@@ -147,6 +148,12 @@ def _gravity(model: mujoco.MjModel) -> Array:
     if model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY):
         return np.zeros(3)
     return np.array(model.opt.gravity)
+
+
+def _inertia(model: mujoco.MjModel, body: int) -> Array:
+    """Inertia (3, 3) [kg m^2] about the centre of mass, in the body's frame."""
+    axes = quat_to_matrix(model.body_iquat[body])
+    return np.asarray(axes @ np.diag(model.body_inertia[body]) @ axes.T)
 
 
 def _read_joints(model: mujoco.MjModel, body: int, path: Path) -> tuple[Joint, ...]:

@@ -49,6 +49,8 @@ class Robot:
         joints: in the order of the chain; empty for a free platform.
         cable_names: m names.
         source: the file it was read from.
+        inertia: of the platform about its centre of mass, in its frame, (3, 3) [kg m^2]; zero where
+            nobody said. No rest depends on it.
     """
 
     name: str
@@ -63,6 +65,7 @@ class Robot:
     joints: tuple[Joint, ...] = ()
     cable_names: tuple[str, ...] = ()
     source: Path | None = None
+    inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
 
     def __post_init__(self) -> None:
         m = np.shape(self.exit_points)[0]
@@ -74,6 +77,7 @@ class Robot:
             "centre_of_mass": (3,),
             "gravity": (3,),
             "reference_pose": (7,),
+            "inertia": (3, 3),
         }
         for name, shape in shapes.items():
             value = np.array(getattr(self, name), dtype=float)

@@ -10,6 +10,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "sweep": ("sweep", "The same for many commands: a line, a grid, a file."),
     "map": ("workspace", "Workspaces: where the platform can be held, and where it comes to."),
     "correct": ("correct", "What to tell the winches so that the platform comes to wanted poses."),
+    "export": ("export", "A calibrated robot as MJCF."),
 }
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -124,6 +124,19 @@ def model_at(given: Path | None, robot: Robot) -> Model | None:
     from seecr import load_model
 
     return None if given is None else load_model(given, robot)
+
+
+def pose_of(coordinates: Sequence[float], robot: Robot) -> list[float]:
+    """A pose (7,) from X Y Z or X Y Z QW QX QY QZ; turned as the reference pose without the last.
+
+    Raises:
+        InputError: another number of numbers.
+    """
+    from seecr import InputError
+
+    if len(coordinates) not in (3, 7):
+        raise InputError(f"expected X Y Z or X Y Z QW QX QY QZ, got {len(coordinates)} numbers")
+    return [*coordinates[:3], *(coordinates[3:] or robot.reference_pose[3:].tolist())]
 
 
 def axis_of(text: str) -> NDArray[np.float64]:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from seecr.cli.arguments import NumbersCommand, model_at, robot_at, robot_options
+from seecr.cli.arguments import NumbersCommand, model_at, pose_of, robot_at, robot_options
 from seecr.cli.options import FILE, json_option
 
 
@@ -43,16 +43,14 @@ def command(
     \b
     Exit status: 0 at rest, 2 bad input, 3 no rest found.
     """
-    from seecr import InputError, equilibria, predict, solve
+    from seecr import equilibria, predict, solve
     from seecr.files import json_text, staged, write_text
     from seecr.report.rows import rows_of
     from seecr.report.words import at_rest, cable_lines, other_lines, pose_lines, softest_words
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
-    if len(coordinates) not in (3, 7):
-        raise InputError(f"expected X Y Z or X Y Z QW QX QY QZ, got {len(coordinates)} numbers")
-    command = [*coordinates[:3], *(coordinates[3:] or machine.reference_pose[3:])]
+    command = pose_of(coordinates, machine)
     solution = solve(machine, command, effects=own or ())
     # effects with a memory lead to one rest alone, along their way
     memory = own is not None and predict(machine, command, own).has_history

@@ -5,10 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
 from seecr.cli import COMMANDS, main
+from seecr.mjcf import load_robot
+from seecr.shipped import model_path
 
 PLACE = ["0.17", "0.25", "0.1"]
 
@@ -32,6 +35,29 @@ def test_pose_prints_and_writes(tmp_path: Path) -> None:
     assert document["exit_status"] == 0 and len(document["tensions_N"]) == 8
     said = run("pose", "demobot_parallel", *PLACE, "--cable", "300", "--json")
     assert json.loads(said.stdout) == document
+
+
+def test_export_writes_a_description_and_what_mujoco_alone_reads(tmp_path: Path) -> None:
+    robot = load_robot(model_path("demobot_cogiro"))
+    model = tmp_path / "model.toml"
+    model.write_text(
+        'format = 1\n[[effect]]\nname = "pulley_radius"\n[effect.parameters]\nradius_m = 0.01\n'
+        '[[effect]]\nname = "stiffness"\n[effect.parameters]\nfactor = 1.1\n'
+    )
+    out = tmp_path / "out.xml"
+    result = run("export", "demobot_cogiro", out, "0.3", "0.2", "0.15", "--model", model)
+    assert result.exit_code == 0
+    assert result.stdout.splitlines()[1:] == [
+        "out.xml: stiffness", "out-mujoco.xml, for MuJoCo alone: pulley_radius too",
+    ]  # fmt: skip
+    np.testing.assert_allclose(load_robot(out).ea, 1.1 * robot.ea)
+    assert 'type="cylinder"' in (tmp_path / "out-mujoco.xml").read_text()
+    plain = run("export", "demobot_cogiro", tmp_path / "plain.xml", "--json")
+    said = json.loads(plain.stdout)
+    assert said["files"] == [str(tmp_path / "plain.xml")] and said["nowhere"] == {}
+    assert said["rest_lengths_m"] == pytest.approx(robot.rest_lengths)
+    nowhere = run("export", "demobot_cogiro", tmp_path / "no" / "out.xml")
+    assert nowhere.exit_code == 2 and "out.xml: cannot write the MJCF" in nowhere.stderr
 
 
 def test_negative_numbers_are_coordinates() -> None:

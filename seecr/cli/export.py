@@ -1,0 +1,64 @@
+"""``seecr export``: a calibrated robot as MJCF."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from seecr.cli.arguments import (
+    NumbersCommand,
+    model_at,
+    pose_of,
+    robot_at,
+    robot_options,
+)
+from seecr.cli.options import FILE, json_option
+
+
+@click.command(
+    cls=NumbersCommand,
+    short_help="A calibrated robot as MJCF.",
+    epilog="""\b
+Examples:
+  seecr export robot.xml calibrated.xml --model model.toml
+  seecr export robot.xml calibrated.xml 0.3 0.2 0.15 --model model.toml
+""",
+)
+@robot_options
+@click.argument("out", type=FILE, metavar="OUT.xml")
+@click.argument("coordinates", nargs=-1, type=float, metavar="[X Y Z [QW QX QY QZ]]")
+@json_option
+def command(
+    robot: Path,
+    out: Path,
+    coordinates: tuple[float, ...],
+    cable: str | None,
+    model: Path | None,
+    as_json: bool,
+) -> int:
+    """Write a robot with the effects of its model as MJCF, as far as MJCF can say them.
+
+    OUT.xml is a robot's description, which every command reads: given the same rest lengths,
+    MuJoCo comes to rest in it where seecr says. Pulleys, sag and the like take bodies that a
+    description has not: with them comes OUT-mujoco.xml, for MuJoCo alone, at the pose X Y Z (the
+    reference pose without one), with the rest as its keyframe. What is in no file is said.
+
+    \b
+    Exit status: 0 all well, 2 bad input, or a pose without rest.
+    """
+    from seecr import export
+    from seecr.files import json_text, write_texts
+
+    machine = robot_at(robot, cable)
+    own = model_at(model, machine)
+    found = export(machine, own or (), pose_of(coordinates, machine) if coordinates else None)
+    beside = out.with_name(f"{out.stem}-mujoco{out.suffix}")
+    files = {out: found.text} | ({beside: found.mujoco_text} if found.mujoco_text else {})
+    write_texts(files, "cannot write the MJCF")
+    if as_json:
+        click.echo(json_text({"files": [str(path) for path in files], **found.as_json()}))
+        return 0
+    for line in [*(own.notes if own else ()), *found.lines(out.name, beside.name)]:
+        click.echo(line)
+    return 0

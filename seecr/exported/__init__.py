@@ -1,0 +1,1 @@
+"""A calibrated robot as MJCF, and what of its model MJCF cannot say."""

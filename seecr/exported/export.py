@@ -1,0 +1,145 @@
+"""A robot with its model as MJCF: the description, and a file for MuJoCo alone where that lacks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from seecr.commands import Commands
+from seecr.effects import Effect
+from seecr.effects.checked import edit_setup
+from seecr.equilibrium import solve
+from seecr.errors import InputError
+from seecr.experiment import GivenEffects, effects_of
+from seecr.exported.bodies import SEGMENTS, bodies_text
+from seecr.exported.expressed import expressed
+from seecr.exported.scene import plain_text
+from seecr.robot import Robot
+from seecr.setup import Setup, plain_setup
+from seecr.solution import Solution
+from seecr.starts import commanded_poses
+
+
+@dataclass(frozen=True, eq=False)
+class Export:
+    """A robot's MJCF.
+
+    Attributes:
+        robot: with what a description can say of its model; rest lengths are those really paid
+            out at the reference pose.
+        text: its MJCF, which :func:`seecr.load_robot` reads.
+        mujoco_text: for MuJoCo alone, at the commanded pose: with pulleys, sag and the like. None
+            where ``text`` has all there is.
+        solution: where the platform rests in that file, its keyframe; None without one.
+        plain, bodies, lengths: names of the effects in ``text``, in ``mujoco_text`` besides, and
+            in the rest lengths of both.
+        nowhere: names of those in neither, and why.
+    """
+
+    robot: Robot
+    text: str
+    mujoco_text: str | None
+    solution: Solution | None
+    plain: tuple[str, ...]
+    bodies: tuple[str, ...]
+    lengths: tuple[str, ...]
+    nowhere: tuple[tuple[str, str], ...]
+
+    def lines(self, name: str = "the file", mujoco_name: str = "the file for MuJoCo") -> list[str]:
+        """What is in which file, and what is in none."""
+        return list(self._lines(name, mujoco_name))
+
+    def as_json(self) -> dict[str, Any]:
+        """Where each effect is, the rest lengths at the reference pose, and the rest exported."""
+        return {
+            "robot": self.robot.name,
+            "plain": self.plain,
+            "mujoco_alone": self.bodies,
+            "rest_lengths": self.lengths,
+            "nowhere": dict(self.nowhere),
+            "rest_lengths_m": self.robot.rest_lengths,
+            "pose": None if self.solution is None else self.solution.pose[0],
+        }
+
+    def _lines(self, name: str, mujoco_name: str) -> Iterator[str]:
+        yield f"{name}: {', '.join(self.plain) or 'the robot as it was'}"
+        if self.bodies:
+            yield f"{mujoco_name}, for MuJoCo alone: {', '.join(self.bodies)} too"
+        if "cable_weight" in self.bodies:
+            sheaves = "; they leave their pulleys as straight ones do"
+            yield (
+                f"  cables hang as {SEGMENTS} springs with masses between, not as catenaries"
+                + (sheaves if "pulley_radius" in self.bodies else "")
+            )
+        if self.lengths:
+            yield (
+                f"in the rest lengths of the reference pose, and nowhere else: "
+                f"{', '.join(self.lengths)}; elsewhere give the rest lengths that seecr tells"
+            )
+        for effect, why in self.nowhere:
+            yield f"in no file: {effect}; {why}"
+
+
+def export(robot: Robot, effects: GivenEffects = (), at: ArrayLike | None = None) -> Export:
+    """A robot with its model as MJCF, as far as MJCF can say it.
+
+    Given the same rest lengths, MuJoCo comes to rest where :func:`seecr.solve` says.
+
+    Args:
+        robot: as described.
+        effects: a model, or effects with values.
+        at: (7,) command that the file for MuJoCo alone is of; the reference pose by default.
+
+    Raises:
+        InputError: a pose that is none, or one where the platform has no rest.
+    """
+    said = expressed(robot, effects_of(effects))
+    plain = _edited(robot, robot.reference_pose[None], (*said.plain, *said.lengths))
+    described = replace(
+        robot, exit_points=plain.exit_points, anchor_points=plain.anchor_points, ea=plain.ea,
+        mass=plain.mass, centre_of_mass=plain.centre_of_mass, gravity=plain.gravity,
+        rest_lengths=plain.rest_lengths()[0],
+    )  # fmt: skip
+    mujoco_text, solution = None, None
+    if said.bodies:
+        mujoco_text, solution = _for_mujoco(
+            robot, (*said.plain, *said.bodies, *said.lengths),
+            robot.reference_pose[None] if at is None else commanded_poses(at),
+        )  # fmt: skip
+    comment = f"{robot.name} with {_names(said.plain) or 'no effect'}; written by seecr export"
+    plain_names, bodies, lengths = (
+        tuple(one.name for one in group) for group in (said.plain, said.bodies, said.lengths)
+    )
+    nowhere = tuple((one.name, why) for one, why in said.nowhere)
+    text = plain_text(described, comment)
+    return Export(described, text, mujoco_text, solution, plain_names, bodies, lengths, nowhere)
+
+
+def _for_mujoco(
+    robot: Robot, effects: tuple[Effect, ...], pose: np.ndarray
+) -> tuple[str, Solution]:
+    solution = solve(robot, pose, effects=effects)
+    if len(solution) != 1:
+        raise InputError(f"expected one pose to export at, got {len(solution)}")
+    if not solution.converged[0]:
+        raise InputError(
+            f"robot {robot.name}: no rest at the pose to export at: {solution.sentence(0)}; "
+            "expected another pose"
+        )
+    comment = f"{robot.name} with {_names(effects)}; for MuJoCo alone, written by seecr export"
+    return bodies_text(_edited(robot, pose, effects), solution, comment), solution
+
+
+def _edited(robot: Robot, pose: np.ndarray, effects: tuple[Effect, ...]) -> Setup:
+    setup = plain_setup(robot, Commands(pose))
+    for effect in effects:
+        edit_setup(effect, setup)
+    return setup
+
+
+def _names(effects: tuple[Effect, ...]) -> str:
+    return ", ".join(effect.name for effect in effects)

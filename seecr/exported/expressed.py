@@ -1,0 +1,90 @@
+"""Which effects of a model an MJCF file can express, found from what each of them edits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from seecr.commands import Commands
+from seecr.effects import Effect
+from seecr.effects.checked import edit_setup
+from seecr.experiment import senses
+from seecr.robot import Robot
+from seecr.setup import QUANTITIES, History, plain_setup
+
+# What a robot's description says itself, and what bodies and springs beyond it say.
+_PLAIN = frozenset(("exit_points", "anchor_points", "ea", "mass", "centre_of_mass", "gravity"))
+_BODIES = frozenset(
+    ("pulley_radius", "quadratic", "cubic", "winch_side", "compliance", "lift", "cable_weight",
+     "wrench")
+)  # fmt: skip
+_LENGTHS = frozenset(name for name, item in QUANTITIES.items() if item.paid_out)
+_PAST = frozenset(name for name, item in QUANTITIES.items() if item.history is not History.NONE)
+
+LENGTHS = "it acts on the way from commands to lengths, which is no part of the file"
+PAST = "it depends on the motion before"
+SENSED = "it changes what sensors read, not where the platform rests"
+LAW = "its cables pull by a law of its own"
+LIFTED_SHEAVE = "with pulleys the frame has to yield alike in all directions"
+
+
+@dataclass(frozen=True)
+class Expressed:
+    """Effects by where they can be said; those at their null values nowhere.
+
+    Attributes:
+        plain: in a robot's description, which :func:`seecr.load_robot` reads.
+        bodies: in a file for MuJoCo alone.
+        lengths: in the rest lengths that are given.
+        nowhere: (effect, why not).
+    """
+
+    plain: tuple[Effect, ...]
+    bodies: tuple[Effect, ...]
+    lengths: tuple[Effect, ...]
+    nowhere: tuple[tuple[Effect, str], ...]
+
+
+def expressed(robot: Robot, effects: Sequence[Effect]) -> Expressed:
+    """Sort effects by what MJCF can say of them."""
+    plain: list[Effect] = []
+    bodies: list[Effect] = []
+    lengths: list[Effect] = []
+    nowhere: list[tuple[Effect, str]] = []
+    for effect in effects:
+        edits, law = _edits(robot, effect)
+        if law:
+            nowhere.append((effect, LAW))
+        elif edits & _PAST:
+            nowhere.append((effect, PAST))
+        elif edits & _BODIES:
+            bodies.append(effect)
+        elif edits & _PLAIN:
+            plain.append(effect)
+        elif edits & _LENGTHS:
+            lengths.append(effect)
+        elif senses(type(effect)):
+            nowhere.append((effect, SENSED))
+    yields = [one for one in bodies if "lift" in _edits(robot, one)[0]]
+    if yields and any("pulley_radius" in _edits(robot, one)[0] for one in bodies):
+        nowhere += [(one, LIFTED_SHEAVE) for one in yields]
+        bodies = [one for one in bodies if one not in yields]
+    return Expressed(tuple(plain), tuple(bodies), tuple(lengths), tuple(nowhere))
+
+
+def _edits(robot: Robot, effect: Effect) -> tuple[set[str], bool]:
+    """Names of the quantities that an effect changes, and whether it adds a law."""
+    # the second pose is for effects that are silent at the first
+    poses = np.stack([robot.reference_pose, robot.reference_pose])
+    poses[1, :3] += 0.3 * robot.length
+    commands = Commands(poses, temperature=np.array([20.0, 35.0]))
+    plain, edited = plain_setup(robot, commands), plain_setup(robot, commands)
+    edit_setup(effect, edited)
+    names = {
+        name
+        for name in QUANTITIES
+        if not np.array_equal(getattr(plain, name), getattr(edited, name))
+    }
+    return names, bool(edited.laws)

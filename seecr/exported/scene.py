@@ -1,0 +1,133 @@
+"""MJCF of one platform on cables, as an XML tree: numbers with all their digits."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from seecr.pose import Array, quat_conjugate, quat_rotate
+from seecr.robot import Robot
+
+_PLATFORM_COLOUR, _CABLE_COLOUR = "0.13 0.35 0.62 1", "0.10 0.12 0.14 1"
+
+
+def numbers(*values: ArrayLike) -> str:
+    """Numbers as MJCF has them, none rounded."""
+    flat = np.concatenate([np.atleast_1d(np.asarray(value, float)) for value in values])
+    return " ".join(repr(float(value) + 0.0) for value in flat)
+
+
+def scene(robot: Robot, comment: str) -> tuple[ET.Element, ET.Element, ET.Element]:
+    """The root of a file, with its ``worldbody`` and the platform's body in it.
+
+    The platform stands at the reference pose, with its joints, mass and anchor points; sites are
+    named ``exit1`` and ``anchor1`` and on. Exit points and cables are left to the caller.
+
+    Args:
+        robot: what to write.
+        comment: a sentence at the top.
+    """
+    root = ET.Element("mujoco", model=robot.name)
+    root.append(ET.Comment(f" {comment.replace('--', '- -')} "))
+    ET.SubElement(root, "compiler", angle="radian")
+    ET.SubElement(root, "option", gravity=numbers(robot.gravity), integrator="discrete")
+    span = np.ptp(np.concatenate([robot.exit_points, robot.reference_pose[None, :3]]), axis=0)
+    middle = robot.exit_points.mean(axis=0)
+    extent = numbers(0.75 * np.linalg.norm(span))
+    ET.SubElement(root, "statistic", center=numbers(middle), extent=extent)
+    ET.SubElement(
+        ET.SubElement(root, "asset"), "texture", type="skybox", builtin="gradient",
+        rgb1="0.93 0.95 0.97", rgb2="0.6 0.68 0.76", width="64", height="384",
+    )  # fmt: skip
+    world = ET.SubElement(root, "worldbody")
+    ET.SubElement(world, "light", pos=numbers(middle + extent_up(robot)), dir=numbers(-robot.up))
+    return root, world, _platform(world, robot)
+
+
+def extent_up(robot: Robot) -> Array:
+    """Up (3,) [m], by as much as the exit points are apart."""
+    return float(np.linalg.norm(np.ptp(robot.exit_points, axis=0))) * robot.up
+
+
+def _platform(world: ET.Element, robot: Robot) -> ET.Element:
+    place, quat = robot.reference_pose[:3], robot.reference_pose[3:]
+    body = ET.SubElement(world, "body", name="platform", pos=numbers(place), quat=numbers(quat))
+    if not robot.joints:
+        ET.SubElement(body, "freejoint")
+    back = quat_conjugate(quat)
+    for joint in robot.joints:
+        ET.SubElement(
+            body, "joint", name=joint.name, type=joint.kind,
+            axis=numbers(quat_rotate(back, joint.axis)),
+            pos=numbers(quat_rotate(back, joint.point - place)),
+        )  # fmt: skip
+    turning = robot.inertia
+    if not np.any(turning):  # nobody said: MuJoCo needs some
+        turning = robot.mass * robot.length**2 * np.eye(3)
+    six = turning[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    ET.SubElement(
+        body, "inertial", pos=numbers(robot.centre_of_mass), mass=numbers(robot.mass),
+        fullinertia=numbers(six),
+    )  # fmt: skip
+    half = np.maximum(0.5 * np.ptp(robot.anchor_points, axis=0), 0.1 * robot.length)
+    middle = robot.anchor_points.mean(axis=0)
+    ET.SubElement(
+        body, "geom", type="box", pos=numbers(middle), size=numbers(half), contype="0",
+        conaffinity="0", mass="0", rgba=_PLATFORM_COLOUR,
+    )  # fmt: skip
+    for i, anchor in enumerate(robot.anchor_points, start=1):
+        ET.SubElement(body, "site", name=f"anchor{i}", pos=numbers(anchor), size=dot(robot))
+    return body
+
+
+def dot(robot: Robot) -> str:
+    """Size of sites that are only looks."""
+    return numbers(0.05 * robot.length)
+
+
+def cable(
+    tendons: ET.Element,
+    name: str,
+    path: Sequence[tuple[str, dict[str, str]]],
+    rest: float,
+    stiffness: Sequence[float],
+    width: float,
+) -> None:
+    """One spring that pulls and never pushes.
+
+    Args:
+        tendons: the file's ``tendon``.
+        name: of the cable.
+        path: elements that it goes through, with their attributes.
+        rest: its rest length [m].
+        stiffness: [N/m], and of the square and cube of its stretch where it is curved.
+        width: of its picture [m].
+    """
+    spatial = ET.SubElement(
+        tendons, "spatial", name=name, springlength=numbers(0.0, rest),
+        stiffness=numbers(*stiffness), width=numbers(width), rgba=_CABLE_COLOUR,
+    )  # fmt: skip
+    for tag, attributes in path:
+        ET.SubElement(spatial, tag, attributes)
+
+
+def text_of(root: ET.Element) -> str:
+    """The file."""
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode") + "\n"
+
+
+def plain_text(robot: Robot, comment: str) -> str:
+    """A robot's description, which :func:`seecr.load_robot` reads back to the last digit or two."""
+    root, world, _ = scene(robot, comment)
+    for i, point in enumerate(robot.exit_points, start=1):
+        ET.SubElement(world, "site", name=f"exit{i}", pos=numbers(point), size=dot(robot))
+    tendons = ET.SubElement(root, "tendon")
+    for i, name in enumerate(robot.cable_names):
+        rest = float(robot.rest_lengths[i])
+        path = [("site", {"site": f"{end}{i + 1}"}) for end in ("exit", "anchor")]
+        cable(tendons, name, path, rest, [float(robot.ea[i]) / rest], 0.01 * robot.length)
+    return text_of(root)

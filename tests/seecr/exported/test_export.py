@@ -1,0 +1,206 @@
+"""An exported robot rests in MuJoCo where seecr says, given the same rest lengths."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from crosscheck.settle.settler import Settler, settle_batch
+from seecr.effects import Term, Terms
+from seecr.equilibrium import solve
+from seecr.errors import InputError
+from seecr.exported.chain import hanging
+from seecr.exported.export import Export, export
+from seecr.mjcf import load_robot
+from seecr.pose import Array, pose_difference
+from seecr.robot import Robot
+from seecr.shipped import model_path
+
+COGIRO = load_robot(model_path("demobot_cogiro"))
+POSES = np.array([[0.3, 0.2, 0.15, 1, 0, 0, 0], [0.5, 0.3, 0.1, 0.995, 0, 0.0998749, 0]])
+POSES[:, 3:] /= np.linalg.norm(POSES[:, 3:], axis=1, keepdims=True)
+# Each case of the promise: MuJoCo within this part of the robot's size.
+NEAR = 1e-9
+
+PLAIN = {
+    "exit_point_error": {"error_2_x_m": 0.004, "error_5_z_m": -0.003},
+    "anchor_point_error": {"error_1_y_m": 0.001},
+    "cable_stiffness": {"factor_3": 1.2},
+    "platform_mass": {"added_kg": 0.05},
+    "centre_of_mass": {"shift_x_m": 0.003, "shift_z_m": -0.01},
+    "gravity_tilt": {"tilt_x_rad": 0.01},
+    "drum_gain": {"gain_4": 0.003},
+    "initial_pose_error": {"position_z_m": 0.002},
+}
+
+
+def term(robot: Robot, name: str, **values: float) -> Term:
+    return Term.of(robot, name, **values)
+
+
+@pytest.fixture(scope="module")
+def plain() -> tuple[Terms, Export]:
+    terms = Terms([term(COGIRO, name, **values) for name, values in PLAIN.items()])
+    return terms, export(COGIRO, terms)
+
+
+def test_a_description_rests_in_mujoco_where_seecr_says(
+    plain: tuple[Terms, Export], tmp_path: Path
+) -> None:
+    terms, exported = plain
+    path = tmp_path / "robot.xml"
+    path.write_text(exported.text)
+    said = solve(COGIRO, POSES, effects=terms)
+    found = settle_batch(Settler(path), POSES, said.rest_lengths)
+    assert found.settled.all() and said.converged.all()
+    away = pose_difference(found.pose, said.pose)
+    assert np.abs(away / np.repeat([1.0, 1.0 / COGIRO.length], 3)).max() < NEAR * COGIRO.length
+
+
+def test_a_description_is_read_back_as_it_was(plain: tuple[Terms, Export], tmp_path: Path) -> None:
+    path = tmp_path / "robot.xml"
+    for robot, text in (
+        (plain[1].robot, plain[1].text),
+        *((one, export(one).text) for one in (load_robot(model_path("planar_vertical")),)),
+    ):
+        path.write_text(text)
+        back = load_robot(path)
+        for name in ("exit_points", "anchor_points", "ea", "rest_lengths", "centre_of_mass",
+                     "gravity", "reference_pose", "mass", "inertia"):  # fmt: skip
+            np.testing.assert_allclose(getattr(back, name), getattr(robot, name), rtol=1e-14,
+                                       atol=1e-15)  # fmt: skip
+        assert back.cable_names == robot.cable_names and len(back.joints) == len(robot.joints)
+
+
+def forces(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
+    """What is unbalanced at rest: springs, weight and actuators."""
+    data.qvel[:], data.qacc[:] = 0.0, 0.0
+    mujoco.mj_fwdPosition(model, data)
+    mujoco.mj_fwdVelocity(model, data)
+    mujoco.mj_fwdActuation(model, data)
+    mujoco.mj_inverse(model, data)
+    return np.asarray(data.qfrc_actuator - data.qfrc_inverse)
+
+
+def polished(text: str, nudge: float) -> tuple[Array, float]:
+    """Pose (7,) at rest near the keyframe, after a nudge [m], and the least stiffness there."""
+    model = mujoco.MjModel.from_xml_string(text)
+    data, n, h = mujoco.MjData(model), model.nv, 1e-7
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_integratePos(model, data.qpos, nudge * np.eye(n)[0], 1.0)
+    for _ in range(12):
+        force, at = forces(model, data), data.qpos.copy()
+        slope = np.zeros((n, n))
+        for k in range(n):
+            for sign in (1.0, -1.0):
+                data.qpos[:] = at
+                mujoco.mj_integratePos(model, data.qpos, sign * h * np.eye(n)[k], 1.0)
+                slope[:, k] += sign * forces(model, data) / (2.0 * h)
+        data.qpos[:] = at
+        step = np.linalg.solve(-slope, force)
+        mujoco.mj_integratePos(model, data.qpos, step, 1.0)
+        if np.linalg.norm(step) < 1e-12:
+            break
+    forces(model, data)
+    body = data.body("platform")
+    least = np.linalg.eigvalsh(-0.5 * (slope + slope.T))[0]
+    return np.concatenate([body.xpos, body.xquat]), float(least)
+
+
+BODIES = [
+    {"pulley_radius": {"radius_m": 0.01}, "drum_gain": {"gain_4": 0.003}},
+    {"nonlinear_elasticity": {"quadratic": 3.0, "cubic": 5.0}},
+    {"winch_side_length": {"length_m": 0.3}},
+    {"frame_compliance": {"sideways_m_per_N": 1e-4, "upwards_m_per_N": 5e-5}},
+    {"external_wrench": {"force_x_N": 0.3, "force_y_N": -0.2, "moment_z_Nm": 0.01}},
+    {
+        "pulley_radius": {"radius_m": 0.01},
+        "winch_side_length": {"length_m": 0.3},
+        "frame_compliance": {"sideways_m_per_N": 1e-4, "upwards_m_per_N": 1e-4},
+        "nonlinear_elasticity": {"quadratic": 3.0},
+        "platform_mass": {"added_kg": 0.1},
+    },
+]
+
+
+@pytest.mark.parametrize("given", BODIES, ids=" ".join)
+def test_bodies_and_springs_rest_in_mujoco_where_seecr_says(given: dict[str, dict[str, float]]):
+    terms = [term(COGIRO, name, **values) for name, values in given.items()]
+    exported = export(COGIRO, terms, at=POSES[0])
+    assert exported.mujoco_text is not None and exported.solution is not None
+    pose, least = polished(exported.mujoco_text, 1e-5)
+    away = pose_difference(pose[None], exported.solution.pose)[0]
+    assert np.abs(away[:3]).max() < NEAR * COGIRO.length and np.abs(away[3:]).max() < NEAR
+    assert least > 0.0
+
+
+def test_a_planar_robot_keeps_its_joints() -> None:
+    robot = load_robot(model_path("planar_vertical"))
+    at = robot.reference_pose + np.array([0.05, 0, 0.03, 0, 0, 0, 0])
+    exported = export(robot, [term(robot, "pulley_radius", radius_m=0.01)], at)
+    assert exported.mujoco_text is not None and exported.solution is not None
+    pose = polished(exported.mujoco_text, 1e-5)[0]
+    away = pose_difference(pose[None], exported.solution.pose)[0]
+    assert np.abs(away).max() < NEAR * robot.length
+
+
+def test_chains_come_near_the_catenary_as_one_over_the_square_of_their_links(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    robot = load_robot(model_path("planar_two_cable"))
+    terms = [term(robot, "cable_weight", weight_N_per_m=0.1)]
+    away = []
+    for links in (6, 12):
+        monkeypatch.setattr("seecr.exported.bodies.SEGMENTS", links)
+        exported = export(robot, terms)
+        assert exported.mujoco_text is not None and exported.solution is not None
+        pose = polished(exported.mujoco_text, 0.0)[0]
+        away.append(np.linalg.norm(pose_difference(pose[None], exported.solution.pose)[0, :3]))
+    assert away[0] < 1e-4 and away[0] / away[1] == pytest.approx(4.0, rel=0.05)
+
+
+def test_a_hanging_chain_ends_where_it_should() -> None:
+    top, low = np.array([0.0, 0, 1]), np.array([0.5, 0, 0.2])
+    masses = hanging(top, low, 1.3, 100.0, np.array([0, 0, 0.5]), 20)
+    links = np.linalg.norm(np.diff(np.vstack([top, masses, low]), axis=0), axis=1)
+    assert masses.shape == (19, 3) and masses[:, 2].min() < 0.2
+    np.testing.assert_allclose(links, 1.3 / 20, rtol=0.01)
+
+
+def test_what_mjcf_cannot_say_is_said() -> None:
+    lines = export(
+        COGIRO,
+        [
+            term(COGIRO, "drum_gain", gain_1=0.01),
+            term(COGIRO, "drum_eccentricity", sine_1_m=0.001),
+            term(COGIRO, "thermal_expansion", expansion_1_per_K=1e-5),
+            term(COGIRO, "backlash", gap_m=0.001),
+            term(COGIRO, "hysteresis", amplitude_N=0.1),
+            term(COGIRO, "tracker_target", shift_z_m=0.1),
+            term(COGIRO, "stiffness", factor=1.1),
+            term(COGIRO, "creep"),
+        ],
+    ).lines("robot.xml")
+    assert lines == [
+        "robot.xml: stiffness",
+        "in the rest lengths of the reference pose, and nowhere else: drum_gain, "
+        "drum_eccentricity, thermal_expansion; elsewhere give the rest lengths that seecr tells",
+        "in no file: backlash; it depends on the motion before",
+        "in no file: hysteresis; it depends on the motion before",
+        "in no file: tracker_target; it changes what sensors read, not where the platform rests",
+    ]
+    both = [term(COGIRO, "pulley_radius", radius_m=0.01),
+            term(COGIRO, "frame_compliance", sideways_m_per_N=1e-4)]  # fmt: skip
+    assert export(COGIRO, both).nowhere == (
+        ("frame_compliance", "with pulleys the frame has to yield alike in all directions"),
+    )
+
+
+def test_a_pose_without_rest_is_one_sentence() -> None:
+    pulley = [term(COGIRO, "pulley_radius", radius_m=0.01),
+              term(COGIRO, "external_wrench", moment_z_Nm=1e3)]  # fmt: skip
+    with pytest.raises(InputError, match=r"no rest at the pose to export at: .*another pose"):
+        export(COGIRO, pulley)
