@@ -9,13 +9,14 @@ A test runs :func:`with_table` and goes red where the page is out of date.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from paper_search import METHODS, search
 
 from seecr.equilibrium import solve
 from seecr.mjcf import load_robot
@@ -29,7 +30,10 @@ from seecr.workspace import slack_zones, tension_margin
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE, PICTURES = ROOT / "docs" / "paper.md", ROOT / "docs" / "pictures" / "paper"
-_BEGIN, _END = "<!-- numbers -->", "<!-- end of numbers -->"
+_HEAD = "| figure | what | paper | here |"
+_COUNTS_HEAD = "| robot | method | fewest | median | most | left unbalanced |"
+# Unbalanced force over the weight beyond which a search has not found a rest.
+_BALANCED = 1e-6
 # One and two pairs of slack cables, as the paper colours them.
 _ZONES = {1: "#F0E442", 2: "#E69F00", 4: "#D55E00"}
 EXITS, HALF = np.array([[0.0, 1.0], [1.0, 1.0]]), 0.1
@@ -321,13 +325,49 @@ def _eight_cables() -> Iterator[tuple[str, str, str, str]]:
         yield "12", "… and deviation along z", "measured about −15 mm", sunk
 
 
-def with_table(page: str) -> str:
-    """The page with its table of numbers as computed now."""
-    head, _, rest = page.partition(_BEGIN)
-    _, _, tail = rest.partition(_END)
-    lines = ["| figure | what | paper | here |", "|---|---|---|---|"]
-    lines += ["| " + " | ".join(row) + " |" for row in rows()]
-    return f"{head}{_BEGIN}\n" + "\n".join(lines) + f"\n{_END}{tail}"
+@cache
+def counts(every: int = 2) -> list[tuple[str, str, list[int], int, int]]:
+    """Robot, method, evaluations at each pose of the sweeps, poses, and those left unbalanced.
+
+    Both heights and both cables, every so many poses.
+    """
+    out = []
+    for name in ("demobot_cogiro", "demobot_parallel"):
+        sweeps = [sweep(name, z, ea) for z in (0.1, 0.2) for ea in CABLES.values()]
+        for method in METHODS:
+            found = [search(robot(name, float(one.robot.ea[0])), one.command[::every], method)
+                     for one in sweeps]  # fmt: skip
+            calls = [int(call) for one in found for call in one.calls]
+            lost = sum(int((one.left > _BALANCED).sum()) for one in found)
+            out.append((name, method, calls, len(calls), lost))
+        ours = [int(call) for one in sweeps for call in one.iterations[::every]]
+        lost = sum(int((~one.converged[::every]).sum()) for one in sweeps)
+        out.append((name, "seecr", ours, len(ours), lost))
+    return out
+
+
+def count_rows() -> Iterator[tuple[str, ...]]:
+    """Robot, method, fewest, median and most evaluations, poses that are left unbalanced."""
+    for name, method, calls, n, lost in counts():
+        yield (
+            name, method, str(min(calls)), f"{np.median(calls):.0f}", str(max(calls)),
+            f"{lost} of {n}",
+        )  # fmt: skip
+
+
+def with_table(
+    page: str,
+    name: str = "numbers",
+    head: str = _HEAD,
+    made: Iterable[tuple[str, ...]] | None = None,
+) -> str:
+    """The page with a table of numbers as computed now: by default that of the figures."""
+    begin, end = f"<!-- {name} -->", f"<!-- end of {name} -->"
+    before, _, rest = page.partition(begin)
+    _, _, tail = rest.partition(end)
+    lines = [head, "|" + "---|" * (head.count("|") - 1)]
+    lines += ["| " + " | ".join(row) + " |" for row in (rows() if made is None else made)]
+    return f"{before}{begin}\n" + "\n".join(lines) + f"\n{end}{tail}"
 
 
 def main(arguments: list[str]) -> None:
@@ -337,7 +377,9 @@ def main(arguments: list[str]) -> None:
         for name, draw in FIGURES.items():
             draw(PICTURES / f"{name}.png")
             print(f"{name}.png")
-    PAGE.write_text(with_table(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    page = with_table(PAGE.read_text(encoding="utf-8"))
+    page = with_table(page, "counts", _COUNTS_HEAD, count_rows())
+    PAGE.write_text(page, encoding="utf-8")
     print(PAGE.name)
 
 

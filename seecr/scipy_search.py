@@ -75,7 +75,9 @@ def solve_with_scipy(
         _place(one, point, base, x)
         found.deviation[i], found.values[i] = point.deviation[0], point.values[0]
         found.count[i] = counter[0]
-        found.outcome[i] = _judge(one, point) if ok else GAVE_UP
+        # what balances is an answer, though SciPy may say that it could not come nearer
+        outcome = _judge(one, point)
+        found.outcome[i] = outcome if ok or outcome != STALLED else GAVE_UP
     return found
 
 

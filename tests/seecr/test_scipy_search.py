@@ -39,3 +39,13 @@ def test_a_search_that_is_cut_off_says_so() -> None:
     setup = plain_setup(robot, Commands(np.array([[0.3, 0.2, 0.1, 1.0, 0, 0, 0]])))
     found = solve_with_scipy(setup, assemble(setup), "least_squares", None, 1)
     assert found.outcome.tolist() == [GAVE_UP]
+
+
+def test_what_balances_is_an_answer_though_scipy_gives_up() -> None:
+    """fsolve says here that it makes no progress, at forces that balance to rounding."""
+    robot = robot_of("demobot_parallel")
+    pose = robot.reference_pose.copy()
+    pose[[0, 2]] = 0.49, 0.1
+    found = solve(robot, pose, method="fsolve")
+    assert found.status[0] is Status.CONVERGED and found.residual[0] < 1e-12
+    np.testing.assert_allclose(found.pose, solve(robot, pose).pose, atol=1e-9)
