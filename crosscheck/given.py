@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TypeAlias
@@ -12,7 +13,7 @@ from seecr.mjcf import load_robot
 from seecr.model import Model, load_model
 from seecr.robot import Robot
 
-__all__ = ["GivenModel", "GivenRobot", "considered", "model_of", "robot_of"]
+__all__ = ["GivenModel", "GivenRobot", "considered", "copy_robot", "model_of", "robot_of"]
 
 GivenRobot: TypeAlias = Robot | str | Path
 """A robot, or the path of its MJCF."""
@@ -42,6 +43,22 @@ def considered(only: Iterable[str] = (), exclude: Iterable[str] = ()) -> frozens
             f"{', '.join(left_out)}; leave one of them out"
         )
     return names
+
+
+def copy_robot(source: Path, copy: Path) -> None:
+    """Copy a robot's MJCF to where nothing of what may stand beside it is.
+
+    Raises:
+        CrosscheckError: it needs other files, so that the copy is no robot.
+    """
+    shutil.copyfile(source, copy)
+    try:
+        load_robot(copy)
+    except Exception:
+        raise CrosscheckError(
+            f"{source}: needs files beside it, which a case folder does not have; expected an "
+            "MJCF that stands alone"
+        ) from None
 
 
 def robot_of(given: GivenRobot) -> Robot:

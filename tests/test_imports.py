@@ -36,7 +36,7 @@ FLOORS = {
     "crosscheck.files": 21, "crosscheck.units": 21, "crosscheck.given": 21,
     "crosscheck.settle": 22, "crosscheck.measurements": 22, "crosscheck.model": 22,
     "crosscheck.twin": 23, "crosscheck.fit": 23,
-    "crosscheck.suite": 24, "crosscheck.calibration": 24,
+    "crosscheck.suite": 24, "crosscheck.calibration": 24, "crosscheck.importing": 24,
     "crosscheck.comparison": 25, "crosscheck.planning": 25,
     "crosscheck.diagnosis": 26, "crosscheck.add": 26,
     "crosscheck.terminal": 27, "crosscheck.report": 27, "crosscheck.recording": 27,

@@ -12,6 +12,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "plan": ("plan", "Before measuring: what planned poses will be able to show."),
     "add": ("add", "Fit an effect to measurements and add it to a model."),
     "calibrate": ("calibrate", "Fit all effects at once to measurements, for predicting."),
+    "import": ("importing", "Other people's recordings into measurements."),
     "effects": ("effects", "The catalogue of effects, and how to check each by hand."),
     "twin": ("twin", "Make measurements with a hidden effect, MuJoCo being the truth."),
 }

@@ -31,7 +31,7 @@ def registered(problem: Problem, at: Prediction) -> Term | None:
     turn = _turn(problem, at)
     places = (at.readings.position[whole], data.position[whole])
     if turn is None and whole.sum() >= 3:
-        turn = _turn_of_points(*places)
+        turn = turn_of_points(*places)
     if turn is None:
         return None
     shift = np.zeros(3)
@@ -58,7 +58,7 @@ def _turn(problem: Problem, at: Prediction) -> Array | None:
     return np.asarray(mean)
 
 
-def _turn_of_points(here: Array, there: Array) -> Array | None:
+def turn_of_points(here: Array, there: Array) -> Array | None:
     """The turn (4,) that brings points (k, 3) nearest to others; None where they are in line.
 
     By the eigenvector of Horn's matrix (Closed-form solution of absolute orientation, 1987).

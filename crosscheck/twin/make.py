@@ -6,7 +6,6 @@ have measured, and ``answer.sealed`` what the robot really had.
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -15,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.errors import CrosscheckError
 from crosscheck.files import staged, write_text
+from crosscheck.given import copy_robot
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import commands_of
 from crosscheck.measurements.write import write_measurements
@@ -166,8 +165,7 @@ def _answer(made: Measured, robot: Robot, seed: int) -> Answer:
 def _write(twin: Twin, robot_path: Path, out: Path) -> None:
     with staged(out) as folder:
         write_measurements(folder / "measured.csv", twin.measured)
-        shutil.copyfile(robot_path, folder / "robot.xml")
-        _check_alone(folder / "robot.xml", robot_path)
+        copy_robot(robot_path, folder / "robot.xml")
         write_text(folder / NAME, seal(twin.answer))
 
 
@@ -175,14 +173,3 @@ def _notes(path: Path) -> tuple[str, ...]:
     """What of the MJCF the truth leaves out: it is built anew from the robot's numbers."""
     found = hindrances(compile_model(path))
     return (ignored_note(path, found),) if found else ()
-
-
-def _check_alone(copy: Path, source: Path) -> None:
-    """A robot that needs other files would not be whole in the case folder."""
-    try:
-        load_robot(copy)
-    except Exception:
-        raise CrosscheckError(
-            f"{source}: needs files beside it, which a case folder does not have; expected an "
-            "MJCF that stands alone"
-        ) from None

@@ -1,0 +1,123 @@
+"""``crosscheck import``: other people's files into a case folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from seecr.cli.options import FILE, json_option, out_option
+
+
+@click.command(
+    short_help="Other people's recordings into measurements.",
+    epilog="""\b
+Examples:
+  crosscheck import motive take.csv --robot robot.xml --commands commands.csv --out case
+  crosscheck import vicon trial.csv --robot robot.xml --commands commands.csv
+      --markers platform:1,platform:2,platform:3
+  crosscheck import poses tracker.csv --robot robot.xml --commands commands.csv --clock 1.25
+""",
+)
+@click.argument("form", type=click.Choice(["motive", "vicon", "poses"]), metavar="FORMAT")
+@click.argument("files", type=FILE, nargs=-1, required=True, metavar="FILE...")
+@click.option("--robot", type=FILE, required=True, metavar="ROBOT.xml", help="Whose they are.")
+@click.option(
+    "--commands",
+    "logs",
+    type=FILE,
+    multiple=True,
+    required=True,
+    metavar="COMMANDS.csv",
+    help="What the robot was told, with t_s, or a row for each dwell; once for each FILE.",
+)
+@click.option("--body", metavar="NAME", help="The rigid body, where there are several.")
+@click.option("--markers", metavar="A,B,C", help="Markers that make the body, three or more.")
+@click.option(
+    "--shape",
+    type=FILE,
+    metavar="SHAPE.csv",
+    help="Where they sit in the platform's frame: name, x_mm, y_mm, z_mm.",
+)
+@click.option(
+    "--point",
+    "points",
+    multiple=True,
+    metavar="MARKER=X,Y,Z",
+    help="A marker (or its x,y,z in the tracker's frame) and its place in the base frame, in "
+    "metres, or a cable's name for its exit point; three or more align the frames.",
+)
+@click.option("--aligned", is_flag=True, help="The tracker's frame is the base frame already.")
+@click.option(
+    "--target",
+    metavar="X,Y,Z",
+    help="The body's origin in the platform's frame, in metres, its axes parallel to that.",
+)
+@click.option("--up", type=click.Choice(["y", "z"]), help="What is up in FILE.  [Motive: y]")
+@click.option("--unit", metavar="mm", help="Of lengths in a log whose columns do not say.")
+@click.option(
+    "--rotation",
+    metavar="KIND",
+    help="What three numbers of a rotation mean: vector, "
+    "or Euler angles in order, xyz about fixed and XYZ about moving axes.",
+)
+@click.option(
+    "--rest-for",
+    type=float,
+    metavar="S",
+    default=0.5,
+    show_default=True,
+    help="A dwell takes so long at least.",
+)
+@click.option("--rest-speed", metavar="1mm/s", help="At rest is slower.  [default: by the noise]")
+@click.option(
+    "--clock",
+    type=float,
+    metavar="S",
+    default=0.0,
+    help="What the tracker's clock shows more than that of the commands.",
+)
+@out_option("case")
+@json_option
+def command(
+    form: str,
+    files: tuple[Path, ...],
+    robot: Path,
+    logs: tuple[Path, ...],
+    out: Path,
+    as_json: bool,
+    **options: Any,
+) -> int:
+    """Make a case folder of recordings: dwells found, averaged and given their commands.
+
+    FORMAT is motive (CSV exports of OptiTrack), vicon (of Nexus) or poses (a plain log with the
+    columns t_s, x_mm, y_mm, z_mm, qw, qx, qy, qz). Units, axes and order come from the labels.
+
+    The tracker's frame is found roughly, from points that you name or from the commands. It has
+    then taken in a part of the error, so it stays free in every later fit (docs/formats.md).
+
+    \b
+    Writes into --out:
+      robot.xml        the robot as described
+      measured.csv     commands and readings, one row per dwell
+      measured.toml    the noise of the readings, and what stays free
+      dwells.csv       when each dwell was, its samples and their scatter
+      import.json      what was done
+    """
+    from crosscheck.files import json_text
+    from crosscheck.importing import Choices, import_case, write_case
+    from seecr import load_robot
+
+    machine = load_robot(robot)
+    choices = Choices.said(machine, **options)
+    found = import_case(form, files, machine, logs, choices)
+    write_case(found, robot, out)
+    if as_json:
+        click.echo(json_text({**found.as_json(), "folder": str(out)}))
+        return 0
+    for line in found.lines():
+        click.echo(line)
+    click.echo(f"written to {out}")
+    click.echo(f"next: crosscheck compare {out / 'robot.xml'} {out / 'measured.csv'}")
+    return 0

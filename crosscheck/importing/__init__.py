@@ -1,0 +1,8 @@
+"""Other people's files: exports of motion capture and logs, made into measurements."""
+
+from __future__ import annotations
+
+from crosscheck.importing.case import Imported, import_case, write_case
+from crosscheck.importing.choices import Choices
+
+__all__ = ["Choices", "Imported", "import_case", "write_case"]

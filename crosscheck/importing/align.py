@@ -1,0 +1,169 @@
+"""Where a tracker stands and how its body sits on the platform, roughly.
+
+What is logged is T_base_tracker^-1 T_platform T_target. Both transforms are found from points that
+the user names, or from the commands; then they have taken in a part of the model's error, and stay
+free in every later fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from crosscheck.errors import CrosscheckError
+from crosscheck.fit.registration import turn_of_points
+from crosscheck.importing.dwells import mean_rotation
+from seecr.pose import Array, quat_conjugate, quat_multiply, quat_rotate
+
+# What is left may be this part of the spread of the points, and of named points.
+_LEFT, _LEFT_OF_POINTS = 0.2, 0.05
+# Commands that are turned by less than this about their mean do not show where the target sits.
+_TURNED = np.radians(3.0)
+_ROUNDS = 10
+_NONE = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """How poses in the tracker's frame become poses of the platform in the base frame.
+
+    Attributes:
+        turn, shift: base = turn * tracker + shift.
+        target_turn, target_shift: of the body in the platform's frame.
+        how: what was done, in words. free: effects that later fits take as free.
+    """
+
+    turn: Array
+    shift: Array
+    target_turn: Array
+    target_shift: Array
+    how: str
+    free: tuple[str, ...]
+
+    def poses(self, position: Array, quat: Array | None) -> tuple[Array, Array | None]:
+        """Positions (n, 3) and quaternions (n, 4) of the platform; the body's where not read."""
+        place = quat_rotate(self.turn, position) + self.shift
+        if quat is None:
+            return place, None
+        turned = quat_multiply(quat_multiply(self.turn, quat), quat_conjugate(self.target_turn))
+        return place - quat_rotate(turned, self.target_shift), turned
+
+
+def as_they_are(target: Array | None) -> Frames:
+    """A tracker that is in the base frame already."""
+    shift = np.zeros(3) if target is None else target
+    return Frames(_NONE, np.zeros(3), _NONE, shift, "frames taken as they are", ())
+
+
+def by_points(names: Sequence[str], there: Array, here: Array) -> Frames:
+    """The tracker's frame from points (k, 3) that are known in it and in the base frame.
+
+    Raises:
+        CrosscheckError: fewer than three, in one line, or with other distances between them.
+    """
+    turn = turn_of_points(there, here) if len(names) >= 3 else None
+    if turn is None:
+        raise CrosscheckError(
+            f"the frames cannot be aligned by {len(names)} points ({', '.join(names)}): expected "
+            "three or more that are not in one line; name more with --point"
+        )
+    shift = here.mean(axis=0) - quat_rotate(turn, there).mean(axis=0)
+    left = np.linalg.norm(quat_rotate(turn, there) + shift - here, axis=1)
+    worst, spread = int(np.argmax(left)), _spread(here)
+    if left[worst] > _LEFT_OF_POINTS * spread:
+        raise CrosscheckError(
+            f"the frames cannot be aligned: point {names[worst]} is {left[worst]:.3g} m off "
+            f"where the others put it, over {spread:.3g} m of all; check its coordinates in "
+            "metres, and that both frames are right-handed"
+        )
+    how = f"tracker's frame from {len(names)} points, which fit to {1e3 * np.max(left):.2g} mm"
+    return Frames(turn, shift, _NONE, np.zeros(3), how, ("tracker_frame",))
+
+
+def to_commands(position: Array, quat: Array | None, told: Array, target: Array | None) -> Frames:
+    """The tracker's frame from commanded poses.
+
+    Args:
+        position, quat: (n, 3) [m] and (n, 4) or None, as tracked.
+        told: (n, 7) commanded.
+        target: (3,) [m] of the body's origin in the platform's frame, its axes parallel to the
+            platform's; None to find both too.
+
+    Raises:
+        CrosscheckError: commands in one line, or too much is left.
+    """
+    home = told[:, 3:]
+    shift = np.zeros(3) if target is None else target
+    tilted = _varies(home) if target is None else False
+    turn = None
+    for _ in range(_ROUNDS if tilted else 1):
+        turn = turn_of_points(position, told[:, :3] + quat_rotate(home, shift))
+        if turn is None:
+            raise CrosscheckError(
+                "the frames cannot be aligned: the commanded positions of the dwells lie in one "
+                "line, which shows no turn about it; name three points with --point"
+            )
+        if tilted:
+            shift = _target(quat_rotate(turn, position), told)
+    assert turn is not None
+    away = told[:, :3] + quat_rotate(home, shift) - quat_rotate(turn, position)
+    frames = Frames(turn, np.median(away, axis=0), _NONE, shift, "", ("tracker_frame",))
+    left = np.linalg.norm(away - frames.shift, axis=1)
+    _check(left, told)
+    how = (
+        f"tracker's frame aligned to the commands of {len(told)} dwells: "
+        f"{1e3 * float(np.sqrt(np.mean(left**2))):.3g} mm rms are left"
+    )
+    return with_target(replace(frames, how=how), quat, told, target)
+
+
+def with_target(frames: Frames, quat: Array | None, told: Array, target: Array | None) -> Frames:
+    """With the turn of the body on the platform, unless it is known; then its place is free too."""
+    if target is not None:
+        return replace(frames, target_shift=target)
+    free = (*frames.free, "tracker_target")
+    if quat is None:
+        return replace(frames, free=free)
+    base = quat_multiply(frames.turn, quat)
+    turn = mean_rotation(quat_multiply(quat_conjugate(told[:, 3:]), base))
+    angle = np.degrees(Rotation.from_quat(turn, scalar_first=True).magnitude())
+    how = f"{frames.how}; the body's axes turned by {angle:.3g} deg into the platform's"
+    return replace(frames, target_turn=turn, how=how, free=free)
+
+
+def place_of_target(frames: Frames, position: Array, told: Array) -> Frames:
+    """With the place of the body on the platform, in a frame of the tracker that is known."""
+    base = quat_rotate(frames.turn, position) + frames.shift
+    inside = quat_rotate(quat_conjugate(told[:, 3:]), base - told[:, :3])
+    return replace(frames, target_shift=np.median(inside, axis=0))
+
+
+def _target(base: Array, told: Array) -> Array:
+    """The place (3,) of the body by commands that are turned: base = p + R target - shift."""
+    n = len(told)
+    turned = np.stack([quat_rotate(told[:, 3:], np.tile(e, (n, 1))) for e in np.eye(3)], axis=2)
+    matrix = np.concatenate([np.tile(np.eye(3), (n, 1, 1)), turned], axis=2).reshape(3 * n, 6)
+    found = np.linalg.lstsq(matrix, (base - told[:, :3]).ravel(), rcond=1e-3)[0]
+    return np.asarray(found[3:])
+
+
+def _varies(quat: Array) -> bool:
+    turns = Rotation.from_quat(quat, scalar_first=True)
+    return bool(np.sqrt(np.mean((turns * turns.mean().inv()).magnitude() ** 2)) > _TURNED)
+
+
+def _spread(points: Array) -> float:
+    return float(np.sqrt(np.mean(np.sum((points - points.mean(axis=0)) ** 2, axis=1))))
+
+
+def _check(left: Array, told: Array) -> None:
+    rms, spread = float(np.sqrt(np.median(left**2))), _spread(told[:, :3])
+    if rms > _LEFT * spread:
+        raise CrosscheckError(
+            f"the frames cannot be aligned: {1e3 * rms:.3g} mm are left of commands that spread by "
+            f"{1e3 * spread:.3g} mm; expected the commands and the tracker's log of one recording; "
+            "are these of the same robot, and of one clock (--clock)?"
+        )

@@ -1,0 +1,249 @@
+"""From other people's files to a case folder that every command reads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from crosscheck.errors import CrosscheckError
+from crosscheck.files import json_text, staged, write_text
+from crosscheck.given import GivenRobot, copy_robot, robot_of
+from crosscheck.importing.align import (
+    Frames,
+    as_they_are,
+    by_points,
+    place_of_target,
+    to_commands,
+    with_target,
+)
+from crosscheck.importing.choices import Choices
+from crosscheck.importing.join import joined
+from crosscheck.importing.logged import Logged, numbers_of
+from crosscheck.importing.take import Take, take_of
+from crosscheck.measurements.data import Measurements, Sigma
+from crosscheck.measurements.read import load_commands
+from crosscheck.measurements.together import together
+from crosscheck.measurements.write import write_measurements
+from seecr.experiment import Experiment
+from seecr.pose import Array
+from seecr.result import Record, Result
+from seecr.robot import Robot
+
+# Recordings follow one another after so long [s].
+_BETWEEN = 60.0
+FILES = ("robot.xml", "measured.csv", "measured.toml", "dwells.csv", "import.json")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Imported(Result):
+    """What was made of the files.
+
+    Attributes:
+        robot: whose they are. measured: the dwells as measurements.
+        frames: how the tracker's poses became the platform's.
+        takes: the recordings. notes: what was done, for people.
+    """
+
+    robot: Robot
+    measured: Measurements
+    frames: Frames
+    takes: tuple[Take, ...]
+    notes: tuple[str, ...]
+
+    def lines(self) -> list[str]:
+        """How many dwells, and what was done."""
+        n = int(self.measured.read.sum())
+        return [f"{n} dwells of {self.robot.name}", *self.notes]
+
+    def records(self) -> list[Record]:
+        """A record for each dwell: when, how many samples, their scatter and the mean's error."""
+        return [
+            {
+                "file": take.stream.path.name,
+                "from_s": float(d.begin_s[k]),
+                "to_s": float(d.end_s[k]),
+                "from_line": int(take.stream.line[d.start[k]]),
+                "to_line": int(take.stream.line[d.stop[k] - 1]),
+                "samples": int(d.samples[k]),
+                "scatter_m": float(d.scatter_m[k]),
+                "scatter_rad": float(d.scatter_rad[k]),
+                "error_m": float(d.error_m[k]),
+                "error_rad": float(d.error_rad[k]),
+            }
+            for take in self.takes
+            for d in [take.dwells]
+            for k in take.used.tolist()
+        ]
+
+    def as_json(self) -> dict[str, Any]:
+        """The content of ``import.json``, SI."""
+        return {
+            "robot": self.robot.name,
+            "files": [str(take.stream.path) for take in self.takes],
+            "rows": self.measured.n_rows,
+            "dwells": int(self.measured.read.sum()),
+            "sigma": vars(self.measured.sigma),
+            "free": list(self.frames.free),
+            "tracker_to_base": {"quat_wxyz": self.frames.turn, "shift_m": self.frames.shift},
+            "body_on_platform": {
+                "quat_wxyz": self.frames.target_turn,
+                "shift_m": self.frames.target_shift,
+            },
+            "notes": list(self.notes),
+        }
+
+
+def import_case(
+    form: str,
+    files: Sequence[str | Path],
+    robot: GivenRobot,
+    commands: Sequence[str | Path],
+    choices: Choices | None = None,
+) -> Imported:
+    """Make measurements of recordings.
+
+    Args:
+        form: one of :data:`READERS`.
+        files: recordings of one tracker that stood still between them.
+        robot: whose they are, or its MJCF.
+        commands: of each recording a log of commands with times by the same clock, or one row
+            per dwell without times.
+        choices: what else the user says of the files.
+
+    Raises:
+        InputFileError, CrosscheckError: whatever is wrong with the files.
+    """
+    choices = choices or Choices()
+    robot = robot_of(robot)
+    if len(files) != len(commands):
+        raise CrosscheckError(
+            f"expected a log of commands for each of {len(files)} recordings, got {len(commands)}; "
+            "give --commands once for each file, in their order"
+        )
+    said: list[str] = []
+    takes = [
+        take_of(form, Path(file), robot, load_commands(log, robot), choices, said)
+        for file, log in zip(files, commands, strict=True)
+    ]
+    frames = _frames(robot, takes, choices)
+    parts = [_measured(take, frames, choices) for take in takes]
+    measured = _one([part for part, _noise in parts])
+    sigma = _sigma(takes, [noise for _part, noise in parts])
+    measured = replace(
+        measured, sigma=sigma, free=frames.free, stands=np.ones(measured.n_rows, dtype=bool)
+    )
+    return Imported(robot, measured, frames, tuple(takes), (*said, frames.how, _noise(sigma)))
+
+
+def write_case(found: Imported, robot_path: Path, out: Path) -> None:
+    """Write the case folder, whole or not at all."""
+    with staged(out) as folder:
+        write_measurements(folder / "measured.csv", found.measured)
+        copy_robot(robot_path, folder / "robot.xml")
+        rows = found.records()
+        lines = [",".join(rows[0])] + [",".join(_cell(v) for v in row.values()) for row in rows]
+        write_text(folder / "dwells.csv", "\n".join(lines) + "\n")
+        write_text(folder / "import.json", json_text(found.as_json()) + "\n")
+
+
+def _cell(value: object) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value).replace(",", " ")
+
+
+def _commanded(robot: Robot, log: Measurements) -> Array:
+    """Poses (n, 7) that were commanded, or that the plain model comes to where lengths were."""
+    if log.command_pose is not None:
+        return log.command_pose
+    return Experiment(robot, log.as_commands(robot)).predict(()).pose
+
+
+def _frames(robot: Robot, takes: Sequence[Take], choices: Choices) -> Frames:
+    position = np.concatenate([take.dwells.position[take.used] for take in takes])
+    quats = [take.dwells.quat_wxyz for take in takes]
+    turned = [q[take.used] for q, take in zip(quats, takes, strict=True) if q is not None]
+    quat = np.concatenate(turned) if len(turned) == len(takes) else None
+    told = np.concatenate(
+        [_commanded(robot, t.held.log.rows(t.held.row[t.number >= 0])) for t in takes]
+    )
+    # where markers sit on the platform was said
+    target = np.zeros(3) if choices.shape and choices.target is None else choices.target
+    if choices.aligned:
+        return as_they_are(target)
+    if not choices.points:
+        return to_commands(position, quat, told, target)
+    names = list(choices.points)
+    there = np.array([_place(takes[0].export, name) for name in names])
+    here = np.array([choices.points[name] for name in names])
+    frames = with_target(by_points(names, there, here), quat, told, target)
+    return frames if target is not None else place_of_target(frames, position, told)
+
+
+def _place(export: Logged, name: str) -> Array:
+    """A marker's mean place (3,) [m], or the numbers that stand in its stead."""
+    if name not in export.markers and name.count(",") == 2:
+        return numbers_of("--point", name)
+    return np.asarray(np.nanmean(export.marker(name), axis=0))
+
+
+def _measured(take: Take, frames: Frames, choices: Choices) -> tuple[Measurements, Array]:
+    rows, noise = joined(take.held, take.dwells, take.number, choices.clock)
+    number = take.number[: rows.n_rows]
+    there = number >= 0
+    used, quat = number[there], take.dwells.quat_wxyz
+    place, turn = frames.poses(take.dwells.position[used], None if quat is None else quat[used])
+    position = np.full((rows.n_rows, 3), np.nan)
+    position[there] = place
+    if turn is not None:
+        quat = np.full((rows.n_rows, 4), np.nan)
+        quat[there] = turn
+    return Measurements(
+        path=take.stream.path, n_cables=rows.n_cables, run=rows.run, t_s=rows.t_s,
+        command_pose=rows.command_pose, command_lengths=rows.command_lengths, told=rows.told,
+        position=position, quat_wxyz=quat, tensions=rows.tensions, loads=rows.loads,
+        temperature_C=rows.temperature_C,
+    ), noise  # fmt: skip
+
+
+def _one(parts: Sequence[Measurements]) -> Measurements:
+    """All recordings as one file, each beginning a while after the one before has ended."""
+    if len(parts) == 1:
+        return parts[0]
+    whole = together(parts)
+    assert whole.t_s is not None
+    t_s = whole.t_s.copy()
+    for k in range(1, len(parts)):
+        own = whole.file == k
+        t_s[own] += t_s[whole.file == k - 1][-1] + _BETWEEN - t_s[own][0]
+    one = np.zeros(whole.n_rows, dtype=np.int64)
+    return replace(whole, t_s=t_s, files=(), file=one, notes=())
+
+
+def _sigma(takes: Sequence[Take], tensions: Sequence[Array]) -> Sigma:
+    """The noise of means, over all dwells; None where there is none at all."""
+
+    def pooled(parts: Sequence[Array]) -> float | None:
+        every = np.concatenate(parts)
+        rms = float(np.sqrt(np.mean(every**2))) if len(every) else 0.0
+        return float(f"{rms:.3g}") if rms > 0.0 else None
+
+    return Sigma(
+        position_m=pooled([t.dwells.error_m[t.used] for t in takes]),
+        orientation_rad=pooled([t.dwells.error_rad[t.used] for t in takes]),
+        tension_N=pooled([noise[noise > 0.0] for noise in tensions]),
+    )
+
+
+def _noise(sigma: Sigma) -> str:
+    parts = []
+    if sigma.position_m:
+        parts.append(f"position {1e3 * sigma.position_m:.2g} mm")
+    if sigma.orientation_rad:
+        parts.append(f"orientation {np.degrees(sigma.orientation_rad):.2g} deg")
+    if sigma.tension_N:
+        parts.append(f"tension {sigma.tension_N:.2g} N")
+    words = ", ".join(parts) or "none: the samples of a dwell are all the same"
+    return f"noise of the means, by the means of parts of each dwell: {words}"

@@ -1,0 +1,80 @@
+"""What a user says of recordings beside the files themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from crosscheck.errors import CrosscheckError
+from crosscheck.importing.dwells import REST_FOR
+from crosscheck.importing.logged import numbers_of
+from crosscheck.importing.markers import read_shape
+from crosscheck.units import parse_quantity
+from seecr.pose import Array
+from seecr.robot import Robot
+
+
+@dataclass(frozen=True, eq=False)
+class Choices:
+    """What the user says of the files.
+
+    Attributes:
+        body: name of the rigid body, where there are several.
+        markers: names of three or more that make the body instead.
+        shape: [m] where markers sit in the platform's frame, by name.
+        points: markers, or places in the tracker's frame, with their places in the base frame.
+        aligned: the tracker's frame is the base frame.
+        target: (3,) [m] of the body's origin in the platform's frame, axes parallel to it.
+        up: axis that points up in the file, "y" or "z"; the program's own by default.
+        unit: of lengths, where a log's names have none.
+        rotation: what three numbers mean, :data:`crosscheck.importing.vicon.ROTATIONS`.
+        rest_for: [s]. rest_speed: [m/s]. clock: [s], the tracker's less the commands'.
+    """
+
+    body: str | None = None
+    markers: tuple[str, ...] = ()
+    shape: Mapping[str, Array] = field(default_factory=dict)
+    points: Mapping[str, Array] = field(default_factory=dict)
+    aligned: bool = False
+    target: Array | None = None
+    up: str | None = None
+    unit: str | None = None
+    rotation: str | None = None
+    rest_for: float = REST_FOR
+    rest_speed: float | None = None
+    clock: float = 0.0
+
+    @classmethod
+    def said(
+        cls, robot: Robot, *, markers: str | None, shape: Path | None, points: Sequence[str],
+        target: str | None, rest_speed: str | None, **others: Any,
+    ) -> Choices:  # fmt: skip
+        """Choices as people type them; see ``crosscheck import --help``.
+
+        Raises:
+            CrosscheckError, InputFileError: something else than that.
+        """
+        return cls(
+            markers=tuple(name.strip() for name in (markers or "").split(",") if name.strip()),
+            shape=read_shape(shape) if shape else {},
+            points=dict(_point(text, robot) for text in points),
+            target=numbers_of("--target", target) if target else None,
+            rest_speed=_speed(rest_speed) if rest_speed else None,
+            **others,
+        )
+
+
+def _point(text: str, robot: Robot) -> tuple[str, Array]:
+    """``MARKER=x,y,z``, or ``MARKER=CABLE`` for that cable's exit point."""
+    name, _, place = text.rpartition("=")
+    if place in robot.cable_names:
+        return name, robot.exit_points[robot.cable_names.index(place)]
+    return name, numbers_of(f"--point {text}", place)
+
+
+def _speed(text: str) -> float:
+    if not text.endswith("/s"):
+        raise CrosscheckError(f"--rest-speed: expected a speed such as 1mm/s, got {text!r}")
+    return parse_quantity("--rest-speed", "position", text.removesuffix("/s"))

@@ -1,0 +1,216 @@
+"""Where a stream rests, and what it reads there on average."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from crosscheck.importing.logged import Stream
+from seecr.pose import Array
+
+REST_FOR = 0.5
+"""A dwell takes so long at least [s]."""
+
+# Speeds are differences of means over so long before and after [s].
+_WINDOW = 0.1
+# At rest: slower than this many times the speed that noise feigns, or this part of the usual
+# speed on the way.
+_NOISE, _PART = 6.0, 0.01
+# Least samples of a dwell, and parts into which one is cut to see how sure its mean is.
+LEAST, _PARTS = 5, 5
+
+
+@dataclass(frozen=True, eq=False)
+class Dwells:
+    """Rests of a stream, in time order.
+
+    Attributes:
+        start, stop: (k,) first row of each in the stream, and the row after its last.
+        begin_s, end_s: (k,) [s].
+        samples: (k,) rows in which the body was seen.
+        position: (k, 3) [m] means. quat_wxyz: (k, 4) means as rotations, or None.
+        scatter_m, scatter_rad: (k,) standard deviation of single samples, by coordinate.
+        error_m, error_rad: (k,) standard error of the means: from means of parts, since
+            neighbouring samples go together.
+        speed: [m/s] slower than this was at rest.
+    """
+
+    start: NDArray[np.int64]
+    stop: NDArray[np.int64]
+    begin_s: Array
+    end_s: Array
+    samples: NDArray[np.int64]
+    position: Array
+    quat_wxyz: Array | None
+    scatter_m: Array
+    scatter_rad: Array
+    error_m: Array
+    error_rad: Array
+    speed: float
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+
+def find_dwells(
+    stream: Stream,
+    breaks: Array,
+    rest_for: float = REST_FOR,
+    rest_speed: float | None = None,
+    arm: float = 0.0,
+) -> Dwells:
+    """The rests of a stream.
+
+    Args:
+        stream: as logged.
+        breaks: [s] where a dwell ends at the latest, as another command begins.
+        rest_for: [s] of a dwell at least.
+        rest_speed: [m/s] slower is at rest; found from the stream by default.
+        arm: [m] by which turning counts as moving.
+
+    Raises:
+        InputFileError: nothing rests long enough, or for too few samples.
+    """
+    seen = stream.seen
+    if seen.sum() < LEAST:
+        raise stream.error(f"the body is seen in {seen.sum()} rows; expected at least {LEAST}")
+    step = float(np.median(np.diff(stream.t_s)))
+    if LEAST * step > rest_for:
+        raise stream.error(
+            f"expected at least {LEAST} samples in a dwell of {rest_for:g} s, got one every "
+            f"{step:.3g} s: a dwell of one sample cannot be averaged; log faster, give a longer "
+            "--rest-for, or, if each row is a resting pose already, write it as measurements",
+            row=1,
+        )
+    half = max(1, round(_WINDOW / step))
+    speed = np.hypot(
+        _speed(stream, stream.position, half), arm * _turning(stream, half)
+    )  # fmt: skip
+    limit = rest_speed or _limit(stream, speed, half, step)
+    bounds = _pieces(stream.t_s, speed < limit, breaks)
+    long = [(a, b) for a, b in bounds if stream.t_s[b - 1] - stream.t_s[a] >= rest_for]
+    good = [(a, b) for a, b in long if seen[a:b].sum() >= LEAST]
+    if not good:
+        raise stream.error(
+            f"nothing rests for {rest_for:g} s: the slowest tenth moves at "
+            f"{1e3 * np.nanpercentile(speed, 10):.3g} mm/s, at rest is below {1e3 * limit:.3g} "
+            "mm/s; expected poses that are held; give --rest-for or --rest-speed"
+        )
+    return _averaged(stream, good, limit)
+
+
+def _means(values: Array, half: int) -> tuple[Array, Array]:
+    """Means (n, k) of the ``half`` rows before each and after it; NaN where none was seen."""
+    there = np.isfinite(values)
+    start = np.zeros((1, values.shape[1]))
+    total = np.concatenate([start, np.cumsum(np.where(there, values, 0.0), axis=0)])
+    count = np.concatenate([start, np.cumsum(there, axis=0)])
+    n = len(values)
+    row = np.arange(n)
+
+    def mean(first: NDArray[np.int64], last: NDArray[np.int64]) -> Array:
+        first, last = np.clip(first, 0, n), np.clip(last, 0, n)
+        some = count[last] - count[first]
+        gaps = np.full(values.shape, np.nan)
+        return np.asarray(np.divide(total[last] - total[first], some, out=gaps, where=some > 0))
+
+    return mean(row - half, row), mean(row + 1, row + 1 + half)
+
+
+def _speed(stream: Stream, values: Array, half: int) -> Array:
+    """(n,) rate of change of columns (n, k); of the nearest whole window at the ends."""
+    before, after = _means(values, half)
+    times = np.where(np.isfinite(values[:, :1]), stream.t_s[:, None], np.nan)
+    early, late = _means(times, half)
+    out = np.linalg.norm(after - before, axis=1) / (late - early)[:, 0]
+    known = np.flatnonzero(np.isfinite(out))
+    if len(known):
+        out[: known[0]], out[known[-1] + 1 :] = out[known[0]], out[known[-1]]
+    return np.asarray(out)
+
+
+def _turning(stream: Stream, half: int) -> Array:
+    """(n,) rate of turning [rad/s]."""
+    if stream.quat_wxyz is None:
+        return np.zeros(len(stream.t_s))
+    quat = stream.quat_wxyz.copy()
+    seen = np.flatnonzero(np.isfinite(quat[:, 0]))
+    # q and -q are the same rotation: each takes the sign of the one before
+    flips = np.cumsum(np.einsum("ij,ij->i", quat[seen[1:]], quat[seen[:-1]]) < 0.0)
+    quat[seen[1:]] *= np.where(flips % 2, -1.0, 1.0)[:, None]
+    return 2.0 * _speed(stream, quat, half)
+
+
+def _limit(stream: Stream, speed: Array, half: int, step: float) -> float:
+    """[m/s] Slower is at rest: what noise feigns, or a small part of the speed on the way."""
+    bend = stream.position[2:] - 2.0 * stream.position[1:-1] + stream.position[:-2]
+    noise = float(np.nanmedian(np.linalg.norm(bend, axis=1))) / np.sqrt(6.0)
+    feigned = noise * np.sqrt(2.0 / half) / ((half + 1) * step)
+    return float(max(_NOISE * feigned, _PART * np.nanpercentile(speed, 95)))
+
+
+def _pieces(t_s: Array, still: NDArray[np.bool_], breaks: Array) -> list[tuple[int, int]]:
+    """(first row, row after the last) of each stretch at rest, cut at the breaks."""
+    edge = np.zeros(len(t_s) + 1, dtype=bool)
+    edge[1:-1] = still[1:] != still[:-1]
+    edge[np.searchsorted(t_s, breaks)] = True
+    edge[0] = edge[-1] = True
+    cuts = np.flatnonzero(edge)
+    return [(int(a), int(b)) for a, b in pairwise(cuts) if still[a]]
+
+
+def _averaged(stream: Stream, bounds: list[tuple[int, int]], limit: float) -> Dwells:
+    start, stop = np.array(bounds).T
+    seen = stream.seen
+    rows = [a + np.flatnonzero(seen[a:b]) for a, b in bounds]
+    quat = stream.quat_wxyz
+    mean = np.array([stream.position[k].mean(axis=0) for k in rows])
+    away = [stream.position[k] - m for k, m in zip(rows, mean, strict=True)]
+    turns = None if quat is None else [mean_rotation(quat[k]) for k in rows]
+    turned = [np.zeros((len(k), 3)) for k in rows]
+    if quat is not None and turns is not None:
+        turned = [_about(quat[k], turn) for k, turn in zip(rows, turns, strict=True)]
+    return Dwells(
+        start=start,
+        stop=stop,
+        begin_s=stream.t_s[start],
+        end_s=stream.t_s[stop - 1],
+        samples=np.array([len(k) for k in rows]),
+        position=mean,
+        quat_wxyz=None if turns is None else np.array(turns),
+        scatter_m=np.array([_rms(d) for d in away]),
+        scatter_rad=np.array([_rms(d) for d in turned]),
+        error_m=np.array([mean_error(d) for d in away]),
+        error_rad=np.array([mean_error(d) for d in turned]),
+        speed=limit,
+    )
+
+
+def mean_rotation(quat: Array) -> Array:
+    """The rotation (4,) in the middle of others (n, 4) (Markley et al. 2007, by SciPy)."""
+    return np.asarray(Rotation.from_quat(quat, scalar_first=True).mean().as_quat(scalar_first=True))
+
+
+def _about(quat: Array, mean: Array) -> Array:
+    """Rotation vectors (n, 3) [rad] of rotations about their mean."""
+    middle = Rotation.from_quat(mean, scalar_first=True)
+    return np.asarray((Rotation.from_quat(quat, scalar_first=True) * middle.inv()).as_rotvec())
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.sum(values**2) / (max(len(values) - 1, 1) * values.shape[1])))
+
+
+def mean_error(values: Array) -> float:
+    """Standard error of the mean of rows (n, k), by coordinate.
+
+    From the means of a few parts (batch means), so that samples which go together count for
+    fewer than they are.
+    """
+    parts = np.array_split(values, min(_PARTS, len(values)))
+    means = np.array([part.mean(axis=0) for part in parts])
+    return float(np.sqrt(np.mean(np.var(means, axis=0, ddof=1)) / len(parts)))

@@ -1,0 +1,127 @@
+"""Commands in time, and which dwell belongs to which."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.importing.dwells import Dwells
+from crosscheck.importing.logged import Stream
+from crosscheck.measurements.data import Measurements
+from seecr.errors import InputFileError
+from seecr.pose import Array
+
+_MOST_LINES = 6
+
+
+@dataclass(frozen=True, eq=False)
+class HeldCommands:
+    """Commands that were held, each from its first row on.
+
+    Attributes:
+        log: all rows. row: (k,) first row of each held command.
+        begin_s, end_s: (k,) [s] by the tracker's clock; None without times.
+        passed: rows of set points on the way between them.
+    """
+
+    log: Measurements
+    row: NDArray[np.int64]
+    begin_s: Array | None
+    end_s: Array | None
+    passed: int
+
+
+def held_commands(log: Measurements, rest_for: float, clock: float, end: float) -> HeldCommands:
+    """The commands of a log that were held for so long.
+
+    Args:
+        log: commands with times, or one row per pose without.
+        rest_for: [s] at least.
+        clock: [s] what the tracker's clock shows more than that of the commands.
+        end: [s] of the tracker's stream.
+    """
+    command = log.command_pose if log.command_lengths is None else log.command_lengths
+    assert command is not None
+    carried = np.zeros((log.n_rows, 1)) if log.loads is None else log.loads.mass[:, None]
+    told = np.concatenate([command, carried], axis=1)
+    changes = np.any(np.abs(np.diff(told, axis=0)) > 1e-9, axis=1)
+    if log.t_s is None:  # what is told twice in a row rests but once
+        return HeldCommands(log, np.concatenate([[0], 1 + np.flatnonzero(changes)]), None, None, 0)
+    changes |= log.run[1:] != log.run[:-1]
+    first = np.concatenate([[0], 1 + np.flatnonzero(changes)])
+    begin = log.t_s[first] + clock
+    stop = np.append(begin[1:], max(end, begin[-1]))
+    held = stop - begin >= rest_for
+    return HeldCommands(log, first[held], begin[held], stop[held], int((~held).sum()))
+
+
+def matched(stream: Stream, held: HeldCommands, dwells: Dwells) -> NDArray[np.int64]:
+    """The dwell of each held command, -1 for none.
+
+    Raises:
+        InputFileError: without times, when there are not as many dwells as commands; with times,
+            when none falls into a command.
+    """
+    if held.begin_s is None or held.end_s is None:
+        if len(dwells) != len(held.row):
+            raise stream.error(
+                f"rests {len(dwells)} times; expected the {len(held.row)} commands of "
+                f"{held.log.path.name}, which has no times to tell them by; add a column t_s "
+                "there, or change --rest-for or --rest-speed"
+            )
+        return np.arange(len(dwells))
+    middle = 0.5 * (dwells.begin_s + dwells.end_s)
+    number = np.searchsorted(held.begin_s, middle, side="right") - 1
+    inside = (number >= 0) & (middle <= held.end_s[np.maximum(number, 0)])
+    out = np.full(len(held.row), -1)
+    for k in np.argsort(dwells.end_s - dwells.begin_s, kind="stable"):  # the longest comes last
+        if inside[k]:
+            out[number[k]] = k
+    if np.all(out < 0):
+        raise InputFileError.at(
+            held.log.path,
+            f"commands from {held.begin_s[0]:.6g} to {held.end_s[-1]:.6g} s by the tracker's; "
+            f"{stream.path.name} rests from {dwells.begin_s[0]:.6g} to {dwells.end_s[-1]:.6g} s: "
+            "expected these to overlap; give what the tracker's clock shows more with --clock",
+        )
+    return out
+
+
+def joined(
+    held: HeldCommands, dwells: Dwells, number: NDArray[np.int64], clock: float
+) -> tuple[Measurements, Array]:
+    """The held commands as rows without poses yet, and the noise (k,) of averaged tensions.
+
+    Times are the dwells' middles; tensions are those of the log, averaged over each dwell.
+    """
+    last = int(np.flatnonzero(number >= 0)[-1]) + 1
+    rows = held.log.rows(held.row[:last])
+    number = number[:last]
+    middle = 0.5 * (dwells.begin_s + dwells.end_s)
+    if rows.t_s is None:
+        t_s = middle[number]
+    else:
+        t_s = np.where(number >= 0, middle[number], rows.t_s + clock)
+    tensions, error = np.full_like(rows.tensions, np.nan), np.zeros(last)
+    if held.log.t_s is not None:
+        clocked = held.log.t_s + clock
+        for row, k in enumerate(number):
+            if k >= 0:
+                some = (clocked >= dwells.begin_s[k]) & (clocked <= dwells.end_s[k])
+                tensions[row], error[row] = _average(held.log.tensions[some])
+    return replace(rows, t_s=t_s, tensions=tensions), error
+
+
+def _average(values: Array) -> tuple[Array, float]:
+    """Means (m,) of rows (n, m), NaN where nothing was read, and their usual standard error."""
+    there = np.isfinite(values)
+    count = there.sum(axis=0)
+    mean = np.divide(np.where(there, values, 0.0).sum(axis=0), count,
+                     out=np.full(values.shape[1], np.nan), where=count > 0)  # fmt: skip
+    several = count > 1
+    if not several.any():
+        return mean, 0.0
+    spread = np.nansum((values - mean) ** 2, axis=0)[several]
+    return mean, float(np.sqrt(np.mean(spread / (count[several] * (count[several] - 1)))))

@@ -1,0 +1,137 @@
+"""What a tracker logged, whoever's file it was: bodies and markers in time."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.errors import CrosscheckError
+from seecr.errors import InputFileError
+from seecr.pose import Array, quat_conjugate, quat_multiply, quat_rotate
+
+# Turns axes with Y up, as they are on screens, into axes with Z up: by 90 degrees about x.
+_UPRIGHT = np.array([np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0])
+_MOST_NAMED = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Stream:
+    """One body in time, in the tracker's frame.
+
+    Attributes:
+        path: the file. t_s: (n,) [s], growing. line: (n,) of the file.
+        position: (n, 3) [m], NaN where it was lost.
+        quat_wxyz: (n, 4), NaN where it was lost, or None.
+    """
+
+    path: Path
+    t_s: Array
+    line: NDArray[np.int64]
+    position: Array
+    quat_wxyz: Array | None = None
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """(n,) whether the body was seen, all of it."""
+        parts = [self.position] if self.quat_wxyz is None else [self.position, self.quat_wxyz]
+        return np.asarray(np.isfinite(np.concatenate(parts, axis=1)).all(axis=1))
+
+    def error(self, text: str, row: int | None = None) -> InputFileError:
+        """An error of the file, at a row counted from 0."""
+        return InputFileError.at(self.path, text, line=None if row is None else int(self.line[row]))
+
+
+@dataclass(frozen=True, eq=False)
+class Logged:
+    """All that a file holds.
+
+    Attributes:
+        path: the file. t_s: (n,) [s]. line: (n,) of the file.
+        bodies: by name, position (n, 3) [m] and quaternions (n, 4) or None.
+        markers: by name, positions (n, 3) [m].
+        up: the axis that points up in it, "y" or "z".
+        notes: what was done in reading it.
+    """
+
+    path: Path
+    t_s: Array
+    line: NDArray[np.int64]
+    bodies: Mapping[str, tuple[Array, Array | None]]
+    markers: Mapping[str, Array]
+    up: str = "z"
+    notes: tuple[str, ...] = ()
+
+    def upright(self) -> Logged:
+        """The same with Z up; a body that is not turned stays so."""
+        if self.up == "z":
+            return self
+        back = quat_conjugate(_UPRIGHT)
+
+        def turned(quat: Array | None) -> Array | None:
+            return None if quat is None else quat_multiply(quat_multiply(_UPRIGHT, quat), back)
+
+        return replace(
+            self,
+            bodies={k: (quat_rotate(_UPRIGHT, p), turned(q)) for k, (p, q) in self.bodies.items()},
+            markers={k: quat_rotate(_UPRIGHT, p) for k, p in self.markers.items()},
+            up="z",
+            notes=(*self.notes, "Y is up in the file: turned by 90 deg about x, so that Z is"),
+        )
+
+    def body(self, name: str | None) -> Stream:
+        """The named body, or the only one.
+
+        Raises:
+            InputFileError: none, several, or not that one.
+        """
+        found = list(self.bodies)
+        if name is None and len(found) == 1:
+            name = found[0]
+        if name is None:
+            what = f"{len(found)} rigid bodies ({_some(found)})" if found else "no rigid body"
+            todo = "name one with --body" if found else "name its markers with --markers"
+            raise InputFileError.at(self.path, f"expected one rigid body, got {what}; {todo}")
+        if name not in self.bodies:
+            raise self._unknown("rigid body", name, found)
+        return Stream(self.path, self.t_s, self.line, *self.bodies[name])
+
+    def marker(self, name: str) -> Array:
+        """The positions (n, 3) [m] of a marker.
+
+        Raises:
+            InputFileError: there is no such marker.
+        """
+        if name not in self.markers:
+            raise self._unknown("marker", name, self.markers)
+        return self.markers[name]
+
+    def _unknown(self, what: str, name: str, known: Iterable[str]) -> InputFileError:
+        near = difflib.get_close_matches(name, list(known), n=_MOST_NAMED, cutoff=0.0)
+        there = ", ".join(near) or "none"
+        text = f"has no {what} {name!r}; expected one of those it has, nearest first: {there}"
+        return InputFileError.at(self.path, text)
+
+
+def _some(names: list[str]) -> str:
+    more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
+    return ", ".join(names[:_MOST_NAMED]) + more
+
+
+def numbers_of(option: str, text: str, count: int = 3) -> Array:
+    """So many numbers (count,) between commas.
+
+    Raises:
+        CrosscheckError: other than that.
+    """
+    try:
+        values = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        values = np.zeros(0)
+    if len(values) != count or not np.isfinite(values).all():
+        raise CrosscheckError(f"{option}: expected {count} numbers such as 0.1,0,2.5, got {text!r}")
+    return values

@@ -1,0 +1,118 @@
+"""Plain logs of poses: one header row, a column of times, positions, and orientations or none."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from crosscheck.importing.logged import Logged
+from seecr.columns.table import Table, read_table
+from seecr.pose import Array
+from seecr.units import UNITS, Unit, of_columns
+
+_TIMES = re.compile(r"(t|time|timestamp)(?:_(\w+)|\s*\[(\w+)\])?", re.IGNORECASE)
+_LABEL = re.compile(
+    r"(?:meas_|pose_|pos_|position_)?(q[wxyz]|r[xyz]|t?[xyz])(?:_(\w+)|\s*\[(\w+)\]|\s*\((\w+)\))?",
+    re.IGNORECASE,
+)
+
+
+def read_poses(path: Path, unit: str | None = None) -> Logged:
+    """Read a log whose columns are t, x, y, z and qw, qx, qy, qz or rx, ry, rz with their units.
+
+    Args:
+        path: the file; names may have our prefix ``meas_`` and units as ours, ``x_mm`` or
+            ``x [mm]``. R = Rx(rx) Ry(ry) Rz(rz), as for all our columns.
+        unit: of lengths, where the names have none.
+
+    Raises:
+        InputFileError: no table, no times, no positions, an unknown unit, or times that jump back.
+    """
+    table = read_table(path)
+    found = _columns(table)
+    t_s = _times(table)
+    lacking = [axis for axis in "xyz" if axis not in found]
+    if lacking:
+        raise table.error(
+            f"expected columns of a pose such as x_mm y_mm z_mm, got no {', '.join(lacking)}; name "
+            "them so"
+        )
+    position = np.stack([_length(table, *found[axis], unit) for axis in "xyz"], axis=1)
+    return Logged(path, t_s, table.line, {path.stem: (position, _turns(table, found))}, {})
+
+
+def _columns(table: Table) -> dict[str, tuple[int, str]]:
+    """By quantity, the column and the unit in its name."""
+    out: dict[str, tuple[int, str]] = {}
+    for c, name in enumerate(table.names):
+        match = _LABEL.fullmatch(name)
+        if match:
+            quantity = match.group(1).lower().removeprefix("t")
+            if quantity in out:
+                first = table.names[out[quantity][0]]
+                text = f"expected one column for {quantity}, got {first} and {name}; rename one"
+                raise table.error(text)
+            out[quantity] = (c, match.group(2) or match.group(3) or match.group(4) or "")
+    return out
+
+
+def _times(table: Table) -> Array:
+    found = [(c, m) for c, name in enumerate(table.names) if (m := _TIMES.fullmatch(name))]
+    if len(found) != 1:
+        got = ", ".join(table.names[c] for c, _m in found) or "none"
+        raise table.error(f"expected one column of times such as t_s, got {got}; name it so")
+    column, match = found[0]
+    unit = _unit(table, column, "s", match.group(2) or match.group(3) or "s")
+    t_s = unit.to_si(table.numbers(column, blank_is_nan=False))
+    falls = np.flatnonzero(np.diff(t_s) <= 0.0)
+    if len(falls):
+        k = int(falls[0]) + 1
+        text = (
+            f"expected times that grow after {t_s[k - 1]:.9g} s, got {t_s[k]:.9g} s; are two "
+            "recordings in one file? Give them one by one"
+        )
+        raise table.error(text, row=k, column=table.names[column])
+    return t_s
+
+
+def _unit(table: Table, column: int, si: str, suffix: str) -> Unit:
+    known = {unit.suffix: unit for unit in UNITS if unit.si == si}
+    if suffix not in known:
+        got = repr(suffix) if suffix else "none"
+        text = f"expected a unit in the name of column {table.names[column]} ({', '.join(known)})"
+        more = " or --unit" if si == "m" else ""
+        raise table.error(f"{text}, got {got}; add it{more}", column=table.names[column])
+    return known[suffix]
+
+
+def _length(table: Table, column: int, suffix: str, unit: str | None) -> Array:
+    found = _unit(table, column, "m", suffix or unit or "")
+    return found.to_si(table.numbers(column, blank_is_nan=True))
+
+
+def _turns(table: Table, found: dict[str, tuple[int, str]]) -> Array | None:
+    quat, angles = ("qw", "qx", "qy", "qz"), ("rx", "ry", "rz")
+    for names in (quat, angles):
+        lacking = [name for name in names if name not in found]
+        if 0 < len(lacking) < len(names):
+            text = f"expected all of {', '.join(names)} or none, got no {', '.join(lacking)}"
+            raise table.error(text)
+    if "qw" in found:
+        values = np.stack([table.numbers(found[n][0], blank_is_nan=True) for n in quat], axis=1)
+        return np.asarray(values / np.linalg.norm(values, axis=1, keepdims=True))
+    if "rx" not in found:
+        return None
+    units = of_columns("rad")
+    columns = []
+    for name in angles:
+        column, suffix = found[name]
+        known = _unit(table, column, "rad", suffix) if suffix not in units else units[suffix]
+        columns.append(known.to_si(table.numbers(column, blank_is_nan=True)))
+    values = np.stack(columns, axis=1)
+    out = np.full((len(values), 4), np.nan)
+    seen = np.isfinite(values).all(axis=1)
+    out[seen] = Rotation.from_euler("XYZ", values[seen]).as_quat(scalar_first=True)
+    return out

@@ -1,0 +1,161 @@
+"""Files of other programs as rows of cells with their lines; blocks of numbers under labels."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.files import read_text
+from seecr.columns.table import show
+from seecr.errors import InputFileError
+from seecr.pose import Array
+
+Row = list[str]
+
+_SEPARATORS = (",", ";", "\t")
+_DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+(e[+-]?\d+)?", re.IGNORECASE)
+# First cells of the files of each program.
+VICON = ("segments", "trajectories", "devices", "joints", "model outputs")
+
+
+@dataclass(frozen=True, eq=False)
+class FileRows:
+    """A file's rows.
+
+    Attributes:
+        path: the file. cells: of each line, stripped; none for an empty one.
+    """
+
+    path: Path
+    cells: Sequence[Row]
+
+    @classmethod
+    def of(cls, path: Path, expected: str) -> FileRows:
+        """Read a file whose cells stand between commas, semicolons or tabs.
+
+        Raises:
+            InputFileError: missing, not UTF-8, empty, or a quotation mark without its partner.
+        """
+        lines = read_text(path, expected).split("\n")
+        if not any(line.strip() for line in lines):
+            raise InputFileError.at(path, f"is empty; {expected}")
+        head = "".join(lines[:20])
+        mark = max(_SEPARATORS, key=head.count)
+        reader = csv.reader((line.replace('"', "") if line.count('"') % 2 else line
+                             for line in lines), delimiter=mark)  # fmt: skip
+        cells = [[cell.strip() for cell in row] for row in reader]
+        if mark != ",":
+            cells = [
+                [c.replace(",", ".") if _DECIMAL_COMMA.fullmatch(c) else c for c in row]
+                for row in cells
+            ]
+        return cls(path, cells)
+
+    def error(self, text: str, row: int | None = None, column: str | None = None) -> InputFileError:
+        """An error at a row, counted from 0."""
+        line = None if row is None else row + 1
+        return InputFileError.at(self.path, text, line=line, column=column)
+
+    @property
+    def first(self) -> int:
+        """The first row that is not empty."""
+        return next(k for k, row in enumerate(self.cells) if any(row))
+
+    def taken_for(self) -> str:
+        """What kind of file this seems to be, and what to do with such; "" if it is not known."""
+        cell = self.cells[self.first][0].lower()
+        if cell == "format version":
+            return "; this is an export of Motive: crosscheck import motive"
+        if cell in VICON:
+            return "; this is an export of Vicon: crosscheck import vicon"
+        if any(name.startswith(("cmd_", "meas_")) for name in self.cells[self.first]):
+            return "; these are columns of a log: crosscheck import poses"
+        return ""
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """FileRows of numbers under a row of labels.
+
+    Attributes:
+        rows: the file. label_row: its row of labels. body: its rows of numbers.
+    """
+
+    rows: FileRows
+    label_row: int
+    body: range
+
+    @property
+    def labels(self) -> Row:
+        """The cells of the row of labels."""
+        return self.rows.cells[self.label_row]
+
+    @property
+    def line(self) -> NDArray[np.int64]:
+        """(n,) where each row of numbers stands in the file, from 1."""
+        return np.arange(self.body.start + 1, self.body.stop + 1)
+
+    def numbers(self, columns: Sequence[int]) -> Array:
+        """The numbers (n, k) of some columns; NaN in empty cells.
+
+        Raises:
+            InputFileError: a row too short, or a cell that holds no number.
+        """
+        out = np.empty((len(self.body), len(columns)))
+        for k, row in enumerate(self.body):
+            cells = self.rows.cells[row]
+            try:
+                out[k] = [float(cells[c]) if cells[c] else np.nan for c in columns]
+            except (IndexError, ValueError):
+                raise self._fault(row, columns) from None
+        return out
+
+    def _fault(self, row: int, columns: Sequence[int]) -> InputFileError:
+        cells = self.rows.cells[row]
+        if len(cells) <= max(columns):
+            text = (
+                f"expected {len(self.labels)} cells as in the row of labels (line "
+                f"{self.label_row + 1}), got {len(cells)}"
+            )
+            if row == self.body[-1]:
+                text += "; it is the last line: is the file cut off? Export it again"
+            return self.rows.error(text, row)
+        for c in columns:
+            try:
+                float(cells[c] or "nan")
+            except ValueError:
+                text = f"expected a number, got {show(cells[c])}; export the file again"
+                return self.rows.error(text, row, self.labels[c] or f"number {c + 1}")
+        raise AssertionError("a row without a fault")
+
+    def check_whole(self) -> None:
+        """Refuse a last row that is shorter than the others: the file was cut off."""
+        sizes = {len(self.rows.cells[row]) for row in self.body[:-1]}
+        last = len(self.rows.cells[self.body[-1]])
+        if sizes and last < min(sizes):
+            text = f"expected {min(sizes)} cells as in the rows before, got {last}"
+            raise self.rows.error(
+                f"{text}; it is the last line: is the file cut off? Export it again", self.body[-1]
+            )
+
+    def check_times(self, t_s: Array, label: str) -> None:
+        """Refuse times (n,) [s] that are missing or jump back."""
+        wrong = np.flatnonzero(~(np.diff(t_s, prepend=-np.inf) > 0.0))
+        if len(wrong) == 0:
+            return
+        k = int(wrong[0])
+        before = "" if k == 0 else f" after {t_s[k - 1]:.9g} s"
+        text = f"expected times that grow{before}, got {t_s[k]:.9g} s; are two recordings in one "
+        raise self.rows.error(f"{text}file? Export them one by one", self.body[k], label)
+
+
+def check_body(rows: FileRows, body: range, what: str) -> None:
+    """Refuse a block without rows."""
+    if len(body) == 0:
+        raise rows.error(f"has labels but no rows of {what}; is the file cut off?", body.start - 1)

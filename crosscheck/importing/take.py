@@ -1,0 +1,110 @@
+"""One recording: read, cut into dwells, each given its command."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.errors import CrosscheckError
+from crosscheck.importing.choices import Choices
+from crosscheck.importing.dwells import Dwells, find_dwells
+from crosscheck.importing.join import HeldCommands, held_commands, matched
+from crosscheck.importing.logged import Logged, Stream
+from crosscheck.importing.markers import body_of_markers
+from crosscheck.importing.motive import read_motive
+from crosscheck.importing.poses import read_poses
+from crosscheck.importing.vicon import read_vicon
+from crosscheck.measurements.data import Measurements
+from seecr.errors import InputError, InputFileError
+from seecr.joints import values_of_pose
+from seecr.robot import Robot
+
+READERS: Mapping[str, Callable[[Path, Choices], Logged]] = {
+    "motive": lambda path, choices: read_motive(path),
+    "vicon": lambda path, choices: read_vicon(
+        path, choices.rotation, bodies_too=not choices.markers
+    ),
+    "poses": lambda path, choices: read_poses(path, choices.unit),
+}
+"""Formats by name."""
+
+
+@dataclass(frozen=True, eq=False)
+class Take:
+    """One recording: its stream, the commands held in it, the dwells, and which is whose."""
+
+    stream: Stream
+    export: Logged
+    held: HeldCommands
+    dwells: Dwells
+    number: NDArray[np.int64]
+
+    @property
+    def used(self) -> NDArray[np.int64]:
+        """Dwells that belong to a command, in the order of these."""
+        return self.number[self.number >= 0]
+
+
+def take_of(
+    form: str, path: Path, robot: Robot, log: Measurements, choices: Choices, said: list[str]
+) -> Take:
+    _check_reachable(robot, log)
+    export = READERS[form](path, choices)
+    export = replace(export, up=choices.up or export.up).upright()
+    stream, fit = _stream(export, choices)
+    held = held_commands(log, choices.rest_for, choices.clock, float(stream.t_s[-1]))
+    if len(held.row) == 0:
+        raise CrosscheckError(
+            f"{log.path}: no command is held for {choices.rest_for:g} s; expected poses that are "
+            "held; give a shorter --rest-for"
+        )
+    breaks = np.zeros(0) if held.begin_s is None else held.begin_s
+    arm = float(np.sqrt(np.mean(np.sum(robot.anchor_points**2, axis=1))))
+    dwells = find_dwells(stream, breaks, choices.rest_for, choices.rest_speed, arm)
+    take = Take(stream, export, held, dwells, matched(stream, held, dwells))
+    said += [f"{path.name}: {note}" for note in (*export.notes, *fit, *_told(take))]
+    return take
+
+
+def _check_reachable(robot: Robot, log: Measurements) -> None:
+    if log.command_pose is None or not robot.joints:
+        return
+    try:
+        values_of_pose(robot, log.command_pose)
+    except InputError as error:
+        text = f"{error}; are these the commands of another robot?"
+        raise InputFileError.at(log.path, text) from None
+
+
+def _told(take: Take) -> list[str]:
+    dwells, used = take.dwells, take.used
+    n = dwells.samples[used]
+    out = [
+        f"{len(used)} dwells of {n.min()} to {n.max()} samples (slower than "
+        f"{1e3 * dwells.speed:.2g} mm/s), which scatter by "
+        f"{1e3 * float(np.sqrt(np.mean(dwells.scatter_m[used] ** 2))):.2g} mm"
+    ]
+    none = int((take.number < 0).sum())
+    rest = len(dwells) - len(used)
+    out += [f"{none} held commands without a dwell: gone through, not compared"] * (none > 0)
+    out += [f"{rest} shorter dwells of the same commands, or outside of all, left out"] * (rest > 0)
+    if take.held.passed:
+        out.append(f"{take.held.passed} set points on the way left out: the way counts as straight")
+    return out
+
+
+def _stream(export: Logged, choices: Choices) -> tuple[Stream, tuple[str, ...]]:
+    if not choices.markers:
+        return export.body(choices.body), ()
+    lacking = [name for name in choices.markers if choices.shape and name not in choices.shape]
+    if lacking:
+        raise CrosscheckError(
+            f"--shape has no place of {', '.join(lacking)}; expected a row for each of --markers"
+        )
+    shape = np.array([choices.shape[name] for name in choices.markers]) if choices.shape else None
+    stream, said = body_of_markers(export, list(choices.markers), shape)
+    return stream, (said,)

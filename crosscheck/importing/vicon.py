@@ -1,0 +1,166 @@
+"""CSV and text exports of Vicon's Nexus: blocks of segments and of trajectories.
+
+A block begins with its kind and its rate, then rows of names, labels and units; other blocks
+(devices, joints) are passed over. Time is frame over rate.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from crosscheck.importing.logged import Logged
+from crosscheck.importing.rows import VICON, Block, FileRows, check_body
+from seecr.pose import Array
+from seecr.units import of_columns
+
+_EXPECTED = "expected an export of Vicon, whose blocks begin with Segments or Trajectories"
+ROTATIONS = "vector, or the order of Euler angles such as xyz (about fixed axes) or XYZ (moving)"
+_PLACES = (("TX", "TY", "TZ"), ("X", "Y", "Z"))
+_QUATERNION, _THREE = ("RW", "RX", "RY", "RZ"), ("RX", "RY", "RZ")
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A block of an export: its kind, its rate [Hz], names above its columns, units, numbers."""
+
+    kind: str
+    rate: float
+    names: list[str]
+    units: list[str]
+    block: Block
+
+
+def read_vicon(path: Path, rotation: str | None = None, *, bodies_too: bool = True) -> Logged:
+    """Read an export of Nexus.
+
+    Args:
+        path: the file.
+        rotation: what three numbers of a rotation mean, :data:`ROTATIONS`; None where there are
+            none.
+        bodies_too: read segments; without them nobody asks what their rotations mean.
+
+    Raises:
+        InputFileError: another kind of file, broken rows, or rotations of unknown meaning.
+    """
+    rows = FileRows.of(path, _EXPECTED)
+    begins = rows.cells[rows.first][0]
+    if begins.lower() not in VICON:
+        raise rows.error(f"begins with {begins!r}; {_EXPECTED}{rows.taken_for()}", rows.first)
+    found = [block for block in _blocks(rows) if block.kind in ("segments", "trajectories")]
+    if not found:
+        raise rows.error("has no block Segments or Trajectories; export it with these", rows.first)
+    frames = [_frames(one) for one in found]
+    for one, frame in zip(found[1:], frames[1:], strict=True):
+        if not np.array_equal(frame, frames[0]):
+            text = f"expected the frames of the first block again, got {len(frame)} other ones"
+            raise rows.error(f"{text}; export the blocks one by one", one.block.body[0])
+    bodies: dict[str, tuple[Array, Array | None]] = {}
+    markers: dict[str, Array] = {}
+    for one in found:
+        for name, columns in _things(one).items():
+            place = next((p for p in _PLACES if set(p) <= set(columns)), None)
+            if place is None:
+                continue
+            position = _lengths(one, [columns[axis] for axis in place])
+            if one.kind == "trajectories":
+                markers[name] = position
+            elif bodies_too:
+                bodies[name] = (position, _rotations(one, columns, rotation))
+    t_s = frames[0] / found[0].rate
+    return Logged(path, t_s, found[0].block.line, bodies, markers)
+
+
+def _blocks(rows: FileRows) -> list[_Found]:
+    out = []
+    starts = [k for k, row in enumerate(rows.cells) if row and row[0] == "Frame"]
+    for top in starts:
+        if top < 3 or not any(rows.cells[top - 3]):
+            text = "expected a kind of block, its rate and its names above, got a header cut off"
+            raise rows.error(f"{text}; export it again", top)
+        kind, rate = rows.cells[top - 3][0].lower(), _rate(rows, top - 2)
+        end = top + 2
+        while end < len(rows.cells) and any(rows.cells[end]):
+            end += 1
+        body = range(top + 2, end)
+        check_body(rows, body, "frames")
+        block = Block(rows, top, body)
+        block.check_whole()
+        out.append(_Found(kind, rate, rows.cells[top - 1], rows.cells[top + 1], block))
+    return out
+
+
+def _rate(rows: FileRows, row: int) -> float:
+    cell = rows.cells[row][0] if rows.cells[row] else ""
+    try:
+        rate = float(cell)
+    except ValueError:
+        rate = math.nan
+    if not rate > 0.0:
+        raise rows.error(f"expected the rate of the block in Hz, got {cell!r}", row)
+    return rate
+
+
+def _frames(one: _Found) -> Array:
+    frames = one.block.numbers([0])[:, 0]
+    one.block.check_times(frames / one.rate, "Frame")
+    return frames
+
+
+def _things(one: _Found) -> dict[str, dict[str, int]]:
+    """By name, the column of each label; a name stands above the first of its columns."""
+    out: dict[str, dict[str, int]] = {}
+    name = ""
+    for c, label in enumerate(one.block.labels):
+        if c < 2:
+            continue
+        name = one.names[c] if c < len(one.names) and one.names[c] else name
+        out.setdefault(name, {})[label.upper()] = c
+    return out
+
+
+def _unit(one: _Found, column: int) -> str:
+    return one.units[column] if column < len(one.units) else ""
+
+
+def _lengths(one: _Found, columns: list[int]) -> Array:
+    units = of_columns("m")
+    unit = _unit(one, columns[0])
+    if unit not in units:
+        row = one.block.label_row + 1
+        text = f"expected a unit of length under the labels ({', '.join(units)}), got {unit!r}"
+        raise one.block.rows.error(text, row, one.block.labels[columns[0]])
+    return units[unit].to_si(one.block.numbers(columns))
+
+
+def _rotations(one: _Found, columns: dict[str, int], rotation: str | None) -> Array | None:
+    if set(_QUATERNION) <= set(columns):
+        quat = one.block.numbers([columns[axis] for axis in _QUATERNION])
+        return np.asarray(quat / np.linalg.norm(quat, axis=1, keepdims=True))
+    if not set(_THREE) <= set(columns):
+        return None
+    if rotation is None:
+        text = f"three numbers for a rotation may mean many things; expected --rotation {ROTATIONS}"
+        raise one.block.rows.error(text, one.block.label_row)
+    given = [columns[axis] for axis in _THREE]
+    unit = of_columns("rad").get(_unit(one, given[0]))
+    if unit is None:
+        text = f"expected deg or rad under the labels, got {_unit(one, given[0])!r}"
+        raise one.block.rows.error(text, one.block.label_row + 1)
+    angles = unit.to_si(one.block.numbers(given))
+    out = np.full((len(angles), 4), np.nan)
+    seen = np.isfinite(angles).all(axis=1)
+    out[seen] = rotations(angles[seen], rotation).as_quat(scalar_first=True)
+    return out
+
+
+def rotations(angles: Array, rotation: str) -> Rotation:
+    """Rotations of three numbers (n, 3) [rad] of a kind of :data:`ROTATIONS`."""
+    if rotation == "vector":
+        return Rotation.from_rotvec(angles)
+    order = ["xyz".index(axis) for axis in rotation.lower()]
+    return Rotation.from_euler(rotation, angles[:, order])

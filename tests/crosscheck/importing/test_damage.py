@@ -1,0 +1,238 @@
+"""What is typically wrong with recordings is said in one sentence: where, what, what to do."""
+
+from __future__ import annotations
+
+import re
+
+import made_recordings as made_of
+import numpy as np
+import pytest
+from made_data import refused, soft_cogiro, soft_xml
+
+from crosscheck.importing import import_case
+from crosscheck.importing.choices import Choices
+from seecr.errors import SeecrError
+from seecr.mjcf import load_robot
+from seecr.shipped import model_path
+
+ROBOT = soft_cogiro()
+POINTS = tuple(f"platform:points{i}" for i in (1, 2, 3))
+
+
+@pytest.fixture(scope="module")
+def made():
+    return made_of.recording(ROBOT)
+
+
+@pytest.fixture(scope="module")
+def files(made, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("recordings")
+    return {
+        "motive": made_of.motive_csv(folder / "take.csv", made),
+        "vicon": made_of.vicon_csv(folder / "trial.csv", made),
+        "poses": made_of.poses_csv(folder / "log.csv", made),
+        "commands": made_of.commands_csv(folder / "commands.csv", made),
+    }
+
+
+def lines_of(path):
+    return path.read_text().splitlines()
+
+
+def cell(lines, row, column, text):
+    """The line of a file, counted from 1, with another cell, counted from 1."""
+    cells = lines[row - 1].split(",")
+    cells[column - 1] = text
+    lines[row - 1] = ",".join(cells)
+    return lines
+
+
+DAMAGE = {
+    "a cut row": (
+        "motive", lambda x: [*x[:500], x[500][:40]],
+        r"line 501: expected 22 cells .*, got \d; it is the last line: is the file cut off\? Export"
+    ),
+    "cut between rows": (
+        "motive", lambda x: x[:500],
+        r"line 500: expected 2425 frames as the first line says, got 493; is the file cut off\?"
+    ),
+    "no number": (
+        "motive", lambda x: cell(x, 30, 7, "occluded"),
+        r"line 30, column X: expected a number, got 'occluded'; export the file again"
+    ),
+    "times that jump back": (
+        "motive", lambda x: [*x[:107], *x[57:]],
+        r"line 108, column Time \(Seconds\): expected times that grow after 1.98 s, got 1 s; are"
+    ),
+    "Euler angles": (
+        "motive", lambda x: [x[0].replace("Quaternion", "XYZ"), *x[1:]],
+        r"line 1: expected Rotation Type Quaternion, got 'XYZ'; export it again with quaternions"
+    ),
+    "inches": (
+        "motive", lambda x: [x[0].replace("Meters", "Inches"), *x[1:]],
+        r"line 1: expected Length Units Meters, Centimeters or Millimeters, got 'Inches'; export"
+    ),
+    "a local frame": (
+        "motive", lambda x: [x[0].replace("Global", "Local"), *x[1:]],
+        r"line 1: expected Coordinate Space Global, got 'Local'; export it again in global"
+    ),
+    "no header": ("motive", lambda x: x[7:], r"line 1: begins with '0'; expected a CSV export of"),
+    "labels cut off": ("motive", lambda x: x[:4], r"no row of labels that begins with Frame; is "),
+    "nothing but labels": ("motive", lambda x: x[:7], r"line 7: has labels but no rows of frames"),
+    "nothing": ("motive", lambda x: [""], r"take.csv: is empty; expected a CSV export of Motive"),
+    "Vicon's header": (
+        "motive", lambda x: ["Segments", "100", *x[7:]],
+        r"line 1: begins with 'Segments'; .* this is an export of Vicon: crosscheck import vicon"
+    ),
+    "Motive's header": (
+        "vicon", lambda x: ["Format Version,1.23,Take Name,a"],
+        r"line 1: begins with 'Format Version'; .* export of Motive: crosscheck import motive"
+    ),
+    "a log": (
+        "vicon", lambda x: ["t_s,meas_x_m", "0,1"],
+        r"line 1: begins with 't_s'; .* these are columns of a log: crosscheck import poses"
+    ),
+    "angles of unknown meaning": (
+        "vicon", lambda x: x,
+        r"line 14: three numbers for a rotation may mean many things; expected --rotation vector"
+    ),
+    "no rate": (
+        "vicon", lambda x: ["" if k == 11 else y for k, y in enumerate(x)],
+        r"line 12: expected the rate of the block in Hz, got ''"
+    ),
+    "no unit": (
+        "vicon", lambda x: [y.replace("mm", "") if k > 12 else y for k, y in enumerate(x)],
+        r"line 15, column TX: expected a unit of length under the labels"
+    ),
+    "frames that jump back": (
+        "vicon", lambda x: cell(x, 40, 1, "3"),
+        r"line 40, column Frame: expected times that grow after 0.48 s, got 0.06 s"
+    ),
+    "two columns of one quantity": (
+        "poses", lambda x: [x[0].replace("y_m", "tx_m"), *x[1:]],
+        r"line 1: expected one column for x, got x_m and tx_m; rename one"
+    ),
+    "half a quaternion": (
+        "poses", lambda x: [x[0].replace("qy", "spin"), *x[1:]],
+        r"line 1: expected all of qw, qx, qy, qz or none, got no qy"
+    ),
+    "no unit in a log": (
+        "poses", lambda x: [x[0].replace("y_m", "y"), *x[1:]],
+        r"line 1, column y: expected a unit in the name of column y \(m, cm, mm, um\), got none; "
+    ),
+    "no times": (
+        "poses", lambda x: [x[0].replace("time_s", "when"), *x[1:]],
+        r"line 1: expected one column of times such as t_s, got none; name it so"
+    ),
+    "a log that jumps back": (
+        "poses", lambda x: cell(x, 30, 1, "0.1"),
+        r"line 30, column time_s: expected times that grow after 0.54 s, got 0.1 s; are two"
+    ),
+    "a dwell of one sample": (
+        "poses", lambda x: [x[0], *x[1::50]],
+        r"line 3: expected at least 5 samples in a dwell of 0.5 s, got one every 1 s: a dwell of"
+    ),
+    "nothing at rest": (
+        "poses", lambda x: [x[0], *(f"{0.02 * k:.2f},{0.01 * k:.4f},0,0,1,0,0,0"
+                                    for k in range(500))],
+        r"nothing rests for 0.5 s: the slowest tenth moves at 500 mm/s, at rest is below"
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", DAMAGE)
+def test_damage_is_said_in_a_sentence(name, files, tmp_path):
+    form, harm, expected = DAMAGE[name]
+    broken = tmp_path / files[form].name
+    broken.write_text("\n".join(harm(lines_of(files[form]))) + "\n")
+    with pytest.raises(SeecrError) as caught:
+        import_case(form, [broken], ROBOT, [files["commands"]])
+    assert re.search(expected, str(caught.value)), caught.value
+    assert "\n" not in str(caught.value)
+
+
+def test_mixed_ends_of_lines_and_a_mark_at_the_beginning_do_no_harm(files, tmp_path):
+    ends = ("\n", "\r\n", "\r")
+    mixed = tmp_path / "mixed.csv"
+    lines = lines_of(files["motive"])
+    text = "\ufeff" + "".join(line + ends[k % 3] for k, line in enumerate(lines))
+    mixed.write_text(text, encoding="utf-8", newline="")
+    found = [
+        import_case("motive", [file], ROBOT, [files["commands"]]).measured
+        for file in (mixed, files["motive"])
+    ]
+    assert np.array_equal(found[0].position, found[1].position)
+
+
+def wrong(files, form="poses", commands=None, robot=ROBOT, **choices):
+    with pytest.raises(SeecrError) as caught:
+        import_case(form, [files[form]], robot, [commands or files["commands"]], Choices(**choices))
+    return str(caught.value)
+
+
+def test_frames_that_cannot_be_aligned(files, made, tmp_path):
+    lines = lines_of(files["commands"])
+    line, short = tmp_path / "line.csv", tmp_path / "short.csv"
+    line.write_text("\n".join([lines[0], *lines[1:4]]) + "\n")
+    rows = int(made_of.RATE * made.sent_s[3])
+    short.write_text("\n".join(lines_of(files["poses"])[:rows]) + "\n")
+    message = wrong({"poses": short}, commands=line)
+    assert "the commanded positions of the dwells lie in one line" in message
+    # the commands of another recording: the same poses in another order
+    other = tmp_path / "other.csv"
+    head = [row.split(",")[:2] for row in lines[1:]]
+    order = np.random.default_rng(0).permutation(len(head))
+    poses = [lines[1:][k].split(",")[2:] for k in order]
+    rows = [",".join([*a, *b]) for a, b in zip(head, poses, strict=True)]
+    other.write_text("\n".join([lines[0], *rows]) + "\n")
+    assert "the frames cannot be aligned: " in wrong(files, commands=other)
+    assert "of one clock (--clock)?" in wrong(files, clock=2.0)
+    assert "expected these to overlap; give what the tracker's clock" in wrong(files, clock=900.0)
+    two = {"0,0,0": np.zeros(3), "1,0,0": np.ones(3)}
+    assert "cannot be aligned by 2 points" in wrong(files, points=two)
+    three = {"0,0,0": np.zeros(3), "1,0,0": np.array([1.0, 0, 0]), "0,1,0": np.array([0, 2.0, 0])}
+    assert re.search(r"point .* is 2 m off where the others put it", wrong(files, points=three))
+
+
+def test_files_of_different_robots(files, tmp_path):
+    lengths = tmp_path / "lengths.csv"
+    lengths.write_text("t_s,length_1_m,length_2_m\n0,1,1\n2,1,1.1\n")
+    assert "lengths.csv" in wrong(files, commands=lengths)
+    other = load_robot(model_path("planar_vertical"))
+    assert "are these the commands of another robot?" in wrong(files, robot=other)
+    takes, logs = [files["motive"], files["motive"]], [files["commands"]]
+    with pytest.raises(SeecrError, match="a log of commands for each of 2 recordings, got 1"):
+        import_case("motive", takes, ROBOT, logs)
+
+
+def test_bodies_and_markers_that_are_not_there(files):
+    assert "has no rigid body 'drone'; expected one of" in wrong(files, "motive", body="drone")
+    message = wrong(files, "vicon", markers=("platform:points1", "pl:1", "x"))
+    assert "has no marker 'pl:1'; expected one of those it has, nearest first: " in message
+    message = wrong(files, "vicon", markers=POINTS[:2], rotation="vector")
+    assert "expected three markers or more that are seen at once, got 2 names" in message
+
+
+@pytest.mark.parametrize(
+    ("option", "text", "expected"),
+    [
+        ("--point", "a=1,2", r"--point a=1,2: expected 3 numbers such as 0.1,0,2.5, got '1,2'"),
+        ("--target", "here", r"--target: expected 3 numbers such as 0.1,0,2.5, got 'here'"),
+        ("--rest-speed", "1mm", r"--rest-speed: expected a speed such as 1mm/s, got '1mm'"),
+    ],
+)
+def test_options_that_say_something_else(option, text, expected, files, tmp_path):
+    xml = tmp_path / "robot.xml"
+    xml.write_text(soft_xml(), encoding="utf-8")
+    given = ["--robot", xml, "--commands", files["commands"], option, text]
+    assert re.search(expected, refused("import", "poses", files["poses"], *given))
+
+
+def test_the_command_line_says_it_in_one_line_and_writes_nothing(files, tmp_path):
+    xml, out = tmp_path / "robot.xml", tmp_path / "case"
+    xml.write_text(soft_xml(), encoding="utf-8")
+    message = refused(
+        "import", "vicon", files["motive"], "--robot", xml, "--commands", files["commands"],
+        "--out", out,
+    )  # fmt: skip
+    assert "crosscheck import motive" in message and not out.exists()

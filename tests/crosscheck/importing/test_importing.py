@@ -1,0 +1,215 @@
+"""Recordings of other programs, made with known truth, come out as that truth."""
+
+from __future__ import annotations
+
+import json
+
+import made_recordings as made_of
+import numpy as np
+import pytest
+from made_data import run, soft_cogiro, soft_xml, term
+
+import crosscheck
+from crosscheck.importing import import_case
+from crosscheck.importing.choices import Choices
+from crosscheck.importing.dwells import find_dwells, mean_error
+from crosscheck.importing.logged import Stream
+from seecr.pose import quat_rotate, rotvec_from_quat
+
+ROBOT = soft_cogiro()
+TRUE = [term(ROBOT, "pulley_radius", radius_m=0.01)]
+POINTS = tuple(f"platform:points{i}" for i in (1, 2, 3, 4))
+SHAPE = dict(zip(POINTS, made_of.MARKERS, strict=True))
+
+
+@pytest.fixture(scope="module")
+def made():
+    return made_of.recording(ROBOT, TRUE)
+
+
+@pytest.fixture(scope="module")
+def home():
+    return made_of.recording(ROBOT, TRUE, at_home=True)
+
+
+@pytest.fixture
+def commands(made, tmp_path):
+    return made_of.commands_csv(tmp_path / "commands.csv", made)
+
+
+def swallowed_nothing(found):
+    """With the true model noise is left, of the size that is stated; without it is not."""
+    measured = found.measured
+    good = crosscheck.compare(ROBOT, measured, TRUE)
+    assert good.is_noise and 0.85 < good.whiteness.scale < 1.2
+    assert not crosscheck.compare(ROBOT, measured).is_noise
+    assert set(measured.free) == {"tracker_frame", "tracker_target"}
+
+
+def has_the_noise_of_means(found, made, samples=60):
+    sigma = found.measured.sigma
+    assert sigma.position_m == pytest.approx(made_of.NOISE_M / np.sqrt(samples), rel=0.3)
+    assert found.measured.n_rows == made.truth.n_rows == int(found.measured.read.sum())
+
+
+FORMATS = {
+    "poses": ("poses", lambda p, m: made_of.poses_csv(p, m), Choices()),
+    "motive 1.22 in mm": (
+        "motive", lambda p, m: made_of.motive_csv(p, m, version="1.22", unit="Millimeters"),
+        Choices(),
+    ),
+    "motive 1.24 in cm, hidden at times": (
+        "motive",
+        lambda p, m: made_of.motive_csv(p, m, version="1.24", unit="Centimeters", hidden=9),
+        Choices(body="platform"),
+    ),
+    "motive 1.25": ("motive", lambda p, m: made_of.motive_csv(p, m, version="1.25"), Choices()),
+    "vicon, rotation vectors": (
+        "vicon", lambda p, m: made_of.vicon_csv(p, m), Choices(rotation="vector")
+    ),
+    "vicon, Euler angles, tabs": (
+        "vicon", lambda p, m: made_of.vicon_csv(p, m, sep="\t", rotation="XYZ"),
+        Choices(rotation="XYZ"),
+    ),
+    "vicon, quaternions, semicolons": (
+        "vicon", lambda p, m: made_of.vicon_csv(p, m, sep=";", rotation="quaternion"), Choices()
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_dwells_of_each_format_are_the_truth_but_for_noise(name, made, commands, tmp_path):
+    form, write, choices = FORMATS[name]
+    found = import_case(form, [write(tmp_path / "a.csv", made)], ROBOT, [commands], choices)
+    swallowed_nothing(found)
+    has_the_noise_of_means(found, made, samples=53 if "hidden" in name else 60)
+
+
+def test_markers_make_the_body(made, commands, tmp_path):
+    file = made_of.vicon_csv(tmp_path / "a.csv", made)
+    by_shape = import_case(
+        "vicon", [file], ROBOT, [commands],
+        Choices(markers=POINTS, shape=SHAPE),
+    )  # fmt: skip
+    # where they sit was said: only the tracker is free, and the body is the platform
+    assert by_shape.measured.free == ("tracker_frame",)
+    assert crosscheck.compare(ROBOT, by_shape.measured, TRUE).is_noise
+    swallowed_nothing(import_case("vicon", [file], ROBOT, [commands], Choices(markers=POINTS[:3])))
+
+
+def test_poses_in_the_base_frame_stay_what_they_are(home, tmp_path):
+    commands = made_of.commands_csv(tmp_path / "c.csv", home, clock=3.25)
+    found = import_case(
+        "poses", [made_of.poses_csv(tmp_path / "a.csv", home)], ROBOT, [commands],
+        Choices(aligned=True, clock=3.25),
+    )  # fmt: skip
+    data = found.measured
+    assert data.free == () and data.stands.all()
+    assert np.abs(data.position - home.truth.position).max() < 5 * data.sigma.position_m
+    off = rotvec_from_quat(
+        np.concatenate([data.quat_wxyz[:, :1], -data.quat_wxyz[:, 1:]], axis=1)
+    ) + rotvec_from_quat(home.truth.quat_wxyz)
+    assert np.abs(off).max() < 6 * data.sigma.orientation_rad
+    assert data.command_pose == pytest.approx(home.truth.command_pose, abs=1e-8)
+
+
+def test_frames_align_by_points_that_the_user_names(made, tmp_path):
+    here = np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.1], [0.0, 0.6, 0.2]])
+    back = made_of.TURN * [1, -1, -1, -1]
+    there = quat_rotate(back, here - made_of.SHIFT) + 1e-3 * np.eye(3)
+    points = {",".join(map(str, a)): b for a, b in zip(there, here, strict=True)}
+    commands = made_of.commands_csv(tmp_path / "c.csv", made, times=False)
+    log = made_of.poses_csv(tmp_path / "a.csv", made)
+    found = import_case("poses", [log], ROBOT, [commands], Choices(points=points))
+    assert found.measured.n_rows == 21  # three commands repeat the one before them
+    assert np.linalg.norm(found.frames.shift - made_of.SHIFT) < 0.01
+    assert np.linalg.norm(found.frames.target_shift - made_of.TARGET) < 0.01
+    swallowed_nothing(found)
+
+
+def test_positions_alone_and_level_commands(tmp_path):
+    made = made_of.recording(ROBOT, TRUE, level=True)
+    commands = made_of.commands_csv(tmp_path / "c.csv", made)
+    log = made_of.poses_csv(tmp_path / "a.csv", made, turned=False)
+    found = import_case("poses", [log], ROBOT, [commands])
+    assert found.measured.quat_wxyz is None and found.measured.sigma.orientation_rad is None
+    assert crosscheck.compare(ROBOT, found.measured, TRUE).is_noise
+
+
+def test_a_command_without_a_dwell_is_a_way_point(made, commands, tmp_path):
+    log = made_of.poses_csv(tmp_path / "a.csv", made)
+    lines = log.read_text().splitlines()
+    lost = (made.t_s > made.sent_s[4]) & (made.t_s < made.sent_s[5])
+    kept = [lines[0], *(line for line, out in zip(lines[1:], lost, strict=True) if not out)]
+    log.write_text("\n".join(kept) + "\n")
+    found = import_case("poses", [log], ROBOT, [commands])
+    assert np.flatnonzero(~found.measured.read).tolist() == [4]
+    assert any("1 held commands without a dwell" in note for note in found.notes)
+
+
+def test_a_dense_log_of_commands_with_tensions(made, tmp_path):
+    """Set points on the way are left out; tensions are averaged over the dwell."""
+    t = np.arange(0.0, made.t_s[-1], 0.1)
+    number = np.clip(np.searchsorted(made.sent_s, t, side="right") - 1, 0, None)
+    part = np.clip((t - made.sent_s[number]) / made_of.WAY_S, 0.0, 1.0)[:, None]
+    pose = made.truth.command_pose
+    told = pose[np.maximum(number - 1, 0)] * (1 - part) + pose[number] * part
+    told[:, 3:] /= np.linalg.norm(told[:, 3:], axis=1, keepdims=True)
+    wanted = [k for k in range(len(pose)) if k == 0 or np.any(pose[k] != pose[k - 1])]
+    pull = np.searchsorted(wanted, number, side="right") + 0.1 * np.random.default_rng(
+        0
+    ).standard_normal(len(t))
+    names = "t_s,cmd_x_m,cmd_y_m,cmd_z_m,cmd_qw,cmd_qx,cmd_qy,cmd_qz,tension_2_N"
+    rows = [",".join(f"{v:.9f}" for v in [a, *b, c]) for a, b, c in zip(t, told, pull, strict=True)]
+    dense = tmp_path / "dense.csv"
+    dense.write_text("\n".join([names, *rows]) + "\n")
+    log = made_of.poses_csv(tmp_path / "a.csv", made)
+    found = import_case("poses", [log], ROBOT, [dense])
+    data = found.measured
+    assert data.command_pose == pytest.approx(pose[wanted], abs=1e-8)
+    assert data.tensions[1:, 1] == pytest.approx(np.arange(2, len(wanted) + 1), abs=0.2)
+    assert 0.01 < data.sigma.tension_N < 0.06
+    assert any("set points on the way left out" in note for note in found.notes)
+
+
+def test_two_recordings_are_one_case(made, commands, tmp_path):
+    logs = [made_of.poses_csv(tmp_path / f"{day}.csv", made) for day in ("monday", "tuesday")]
+    data = import_case("poses", logs, ROBOT, [commands, commands]).measured
+    assert data.n_rows == 2 * made.truth.n_rows
+    assert data.run[0].startswith("monday.csv: ") and data.run[-1].startswith("tuesday.csv: ")
+    assert np.all(np.diff(data.t_s) > 0.0)
+
+
+def test_noise_that_goes_together_counts_for_less():
+    rng = np.random.default_rng(1)
+    white = rng.standard_normal((4000, 3))
+    alike = np.repeat(rng.standard_normal((40, 3)), 100, axis=0)
+    assert np.mean([mean_error(w) for w in np.split(white, 10)]) == pytest.approx(0.05, rel=0.2)
+    # forty of one hundred that are the same: the error is that of forty, not of four thousand
+    assert mean_error(alike) == pytest.approx(1 / np.sqrt(40), rel=0.5)
+
+
+def test_a_swing_that_dies_out_is_no_rest():
+    t = np.arange(0.0, 10.0, 0.01)
+    swing = 0.05 * np.exp(-t / 0.8) * np.cos(8.0 * t)
+    rng = np.random.default_rng(0)
+    position = np.stack([swing, 0 * t, 0 * t], axis=1) + 1e-5 * rng.standard_normal((len(t), 3))
+    dwells = find_dwells(Stream(None, t, np.arange(len(t)), position), np.zeros(0))
+    assert len(dwells) == 1 and 2.5 < dwells.begin_s[0] < 7.0
+    assert np.abs(dwells.position).max() < 1e-4
+
+
+def test_the_command_writes_a_case_and_names_the_next_one(made, commands, tmp_path):
+    xml, out = tmp_path / "robot.xml", tmp_path / "case"
+    xml.write_text(soft_xml(), encoding="utf-8")
+    take = made_of.motive_csv(tmp_path / "take.csv", made)
+    done = run("import", "motive", take, "--robot", xml, "--commands", commands, "--out", out)
+    assert done.exit_code == 0, done.output
+    assert f"next: crosscheck compare {out / 'robot.xml'} {out / 'measured.csv'}" in done.stdout
+    assert "24 dwells" in done.stdout and "are left" in done.stdout
+    data = crosscheck.load_measurements(out / "measured.csv", ROBOT)
+    assert set(data.free) == {"tracker_frame", "tracker_target"}
+    assert data.sigma.position_m is not None
+    assert len((out / "dwells.csv").read_text().splitlines()) == 25
+    assert json.loads((out / "import.json").read_text())["dwells"] == 24
+    assert crosscheck.compare(out / "robot.xml", out / "measured.csv", TRUE).is_noise
