@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import explain_figure_12
 import make_paper
 import numpy as np
 import paper_search
@@ -57,3 +58,28 @@ def test_what_the_paper_says_of_eight_cables() -> None:
     assert make_paper.tilt(parallel)[0] == pytest.approx(26.43, abs=0.01)
     assert {0, 2, 4} == set(parallel.slack.sum(axis=1).tolist())
     assert np.abs(make_paper.tilt(make_paper.sweep("demobot_cogiro", 0.1))).max() < 0.02
+
+
+def test_what_would_explain_figure_12() -> None:
+    """The rows of the page: three of them, remade; all takes minutes."""
+    plain = explain_figure_12.numbers([])
+    np.testing.assert_allclose(plain, [24.11, -7.01], atol=0.01)
+    low, placed, both = (
+        explain_figure_12.explain(names)
+        for names in (
+            ("centre_of_mass",),
+            ("initial_pose_error",),
+            ("centre_of_mass", "tracker_target"),
+        )
+    )
+    # less tilt and no sinking; sinking and no less tilt; both
+    assert low.numbers[0] < 22.5 and low.numbers[1] == pytest.approx(plain[1], abs=0.1)
+    assert placed.numbers[1] < -11 and placed.numbers[0] > plain[0]
+    assert both.explains and not low.explains and not placed.explains
+    page = make_paper.PAGE.read_text(encoding="utf-8")
+    for one in (low, placed, both):
+        assert "| " + " | ".join(one.row()) + " |" in page
+
+
+def test_a_size_that_is_no_use_stays_at_nothing() -> None:
+    assert explain_figure_12.explain(("gravity_tilt",)).size == 0.0
