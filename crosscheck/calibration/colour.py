@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.fit.problem import KINDS, Problem
+from crosscheck.fit.problem import KINDS, Problem, kinds_read
 from seecr.pose import Array
 
 # Readings far apart in time: nothing of the one before is left.
@@ -49,6 +49,14 @@ class Colour:
 
     scale: Array
     rho: Array
+
+    def by_kind(self, problem: Problem) -> tuple[dict[str, float], dict[str, float]]:
+        """Scale and rho by the name of each kind of reading that the data hold."""
+        kinds = {KINDS.index(kind): kind.name for kind in kinds_read(problem)}
+        return (
+            {name: float(self.scale[k]) for k, name in kinds.items()},
+            {name: float(self.rho[k]) for k, name in kinds.items()},
+        )
 
     def hotter(self, factor: float) -> Colour:
         """The same with larger deviations."""

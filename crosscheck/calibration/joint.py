@@ -26,6 +26,8 @@ TEMPERS = (100.0, 30.0, 10.0, 3.0, 1.0)
 _STEPS, _LAST = 4, 20
 # A step that gains less than this part of the objective, and less than this, is the last.
 _PART, _GAIN = 1e-3, 1e-2
+# Derivatives are kept for so many steps, of which each gains this part of what it promises.
+_KEPT, _KEPT_WORD = 3, 0.8
 # Most plausible sizes that a parameter of plausible size moves at once.
 _MOST = 5.0
 
@@ -85,6 +87,17 @@ class Setting:
         return row_weights(self.chain, colour, state.white) if self.weight is None else self.weight
 
 
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """A step that pays: its gain, that which was hoped for, the objective before, and where to."""
+
+    gain: float
+    hoped: float
+    before: float
+    damping: float
+    state: State
+
+
 def tempered(setting: Setting, start: State, width: Array, colour: Colour) -> JointFit:
     """Fit with the noise a hundred times its size, then less and less."""
     far = np.sqrt(start.chi2 / max(len(start.white), 1)) / float(np.min(colour.scale))
@@ -93,16 +106,25 @@ def tempered(setting: Setting, start: State, width: Array, colour: Colour) -> Jo
         if temper > max(far, 1.0):
             continue  # the model is nearer than that already
         steps = _LAST if temper == TEMPERS[-1] else _STEPS
-        state = start if joint is None else joint.state
-        joint = settle(setting, state, width, colour.hotter(temper), steps)
+        state, known = (start, None) if joint is None else (joint.state, joint.jacobian)
+        joint = settle(setting, state, width, colour.hotter(temper), steps, known)
     assert joint is not None
     return JointFit(joint.state, joint.jacobian, width, colour, joint.weight, joint.settled)
 
 
 def settle(
-    setting: Setting, state: State, width: Array, colour: Colour, steps: int = _LAST
+    setting: Setting,
+    state: State,
+    width: Array,
+    colour: Colour,
+    steps: int = _LAST,
+    jacobian: Array | None = None,
 ) -> JointFit:
     """Gauss-Newton steps until nothing is gained, or so many of them.
+
+    Derivatives cost much more than a step, so they are kept while steps gain what they promise;
+    the last ones are those of the fit's own values, or of values that a step no larger than the
+    last one is away.
 
     Args:
         setting: data and derivatives.
@@ -110,21 +132,27 @@ def settle(
         width: (p,) prior standard deviations of z; 0 holds a parameter.
         colour: the noise.
         steps: most of them.
+        jacobian: derivatives at the start, or so near that they are the same, where known.
     """
-    damping, settled = 1e-4, False
+    damping, settled, kept = 1e-4, False, 0
     weight = setting.weight_at(colour, state)
-    jacobian = scaled_derivatives(setting, state)
+    if jacobian is None:
+        jacobian = scaled_derivatives(setting, state)
     for _ in range(steps):
         step = _step(setting, state, jacobian, width, colour, weight, damping)
-        if step is None:
-            settled = True
-            break
-        gain, before, damping, state = step
-        setting.watch(state.chi2 / max(len(state.white), 1))
-        weight = setting.weight_at(colour, state)
-        if gain < max(_PART * before, _GAIN):
+        if step is not None:
+            damping, state = step.damping, step.state
+            setting.watch(state.chi2 / max(len(state.white), 1))
+            weight = setting.weight_at(colour, state)
+        little = step is None or step.gain < max(_PART * step.before, _GAIN)
+        if little and not kept:
             settled = True  # so near that the derivatives are the same
             break
+        if not little and kept < _KEPT and step is not None and step.gain > _KEPT_WORD * step.hoped:
+            kept += 1
+        else:
+            jacobian, kept = scaled_derivatives(setting, state), 0
+    if kept:
         jacobian = scaled_derivatives(setting, state)
     return JointFit(state, jacobian, width, colour, weight, settled)
 
@@ -137,8 +165,8 @@ def scaled_derivatives(setting: Setting, state: State) -> Array:
 def _step(
     setting: Setting, state: State, jacobian: Array, width: Array, colour: Colour,
     weight: Array, damping: float,
-) -> tuple[float, float, float, State] | None:  # fmt: skip
-    """Gain, objective before, damping and state of a step that pays; None where there is none."""
+) -> _Step | None:  # fmt: skip
+    """A step that pays; None where there is none."""
     terms = state.terms
     scale, lower, upper = terms.scale, terms.lower, terms.upper
     values, z = terms.vector, terms.sizes
@@ -173,7 +201,7 @@ def _step(
         trial = evaluate(setting.problem, terms.with_vector(moved), setting.factor, state)
         after = objective(trial) if trial.valid else np.inf
         if after < before:
-            return before - after, before, max(0.1 * damping, 1e-9), trial
+            return _Step(before - after, expected, before, max(0.1 * damping, 1e-9), trial)
         damping = max(10.0 * damping, 1e-4)
     return None
 

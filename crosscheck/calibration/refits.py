@@ -8,7 +8,7 @@ catalogue is made linear about the best of them again, until that stays.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -56,15 +56,14 @@ class Found:
     Attributes:
         refits: exact ones, by set. best: the best of them.
         scores: linear ones about the best.
-        settled: the best set stayed when the catalogue was made linear about it.
-        refit: fits a set exactly, or gives what was fitted; None where it cannot be solved.
+        refit: fits any set exactly, also one that was not compared; None where that has no
+            solution.
         always: effects that the model has, in every set: the smallest set there is.
     """
 
     refits: dict[Names, Refit]
     best: Refit
     scores: Scores
-    settled: bool
     refit: Callable[[Names], Refit | None]
     always: Names = frozenset()
 
@@ -82,7 +81,6 @@ def compare_sets(
     told: Callable[[str], None] = lambda _text: None,
     most: int = _REFITTED,
     rounds: int = ROUNDS,
-    also: Names = frozenset(),
 ) -> Found:
     """Search the sets of effects, linear and exact in turn.
 
@@ -94,84 +92,93 @@ def compare_sets(
         told: called with what is going on.
         most: sets to refit about one linear model.
         rounds: of making the catalogue linear about the best set, at most.
-        also: a set to start from besides.
     """
-    fixed = replace(setting, frozen=True, weight=joint.weight)
-    refits: dict[Names, Refit] = {}
-    best: Refit | None = None
-    settled = False
     always = frozenset(plain.terms.names)
     of = len(set(catalogue.names) - always)
+    fixed = replace(setting, frozen=True, weight=joint.weight)
+    exact = _Exact(fixed, joint, catalogue, plain, told)
     scores = Scores(gram_about(fixed, joint, catalogue), of, always)
-    for _ in range(rounds):
-        everything = frozenset(scores.gram.names) | always
-        starts = [always, everything, always | also]
-        if best is not None:
-            starts = [always, best.names]
-        explore(scores, starts)
-
-        def refit(some: Iterable[Names], scores: Scores = scores) -> Refit:
-            for names in some:
-                if names not in refits:
-                    told(" + ".join(sorted(names)) or "none")
-                    found = _refitted(fixed, joint, catalogue, plain, scores, names)
-                    if found is not None:
-                        refits[names] = found
-            return max(refits.values(), key=lambda r: r.score)
-
-        before, best = best, refit([always, always | also, *scores.best(most, _WITHIN)])
-        best = _dropped(best, always, refit)
-        if before is not None and before.names == best.names:
-            settled = True
+    begin, best = frozenset(scores.gram.names) | always, exact.best_of(scores, [always])
+    for k in range(rounds):
+        explore(scores, [always, begin])
+        before, best = best.names, exact.best_of(scores, [always, *scores.best(most, _WITHIN)])
+        best = exact.thinned(scores, best)
+        if k and before == best.names:
             break
+        begin = best.names
         scores = Scores(gram_about(fixed, best.joint, catalogue), of, always)
-    assert best is not None
-
-    def later(names: Names) -> Refit | None:
-        if names not in refits:
-            found = _refitted(fixed, joint, catalogue, plain, scores, names)
-            if found is None:
-                return None
-            refits[names] = found
-        return refits[names]
-
-    return Found(refits, best, scores, settled, later, always)
+    return Found(exact.possible, best, scores, lambda names: exact.fit(scores, names), always)
 
 
-def _dropped(best: Refit, always: Names, refit: Callable[[Iterable[Names]], Refit]) -> Refit:
-    """The best set, each of its members dropped in earnest, until none is one too many."""
-    while len(best.names - always) <= _FEW:
-        better = refit([best.names - {name} for name in sorted(best.names - always)])
-        if better.names == best.names:
-            break
-        best = better
-    return best
+@dataclass(eq=False)
+class _Exact:
+    """Sets fitted exactly, each once.
 
-
-def _refitted(
-    setting: Setting,
-    joint: JointFit,
-    catalogue: Catalogue,
-    plain: State,
-    scores: Scores,
-    names: Names,
-) -> Refit | None:
-    """A set fitted exactly from its linear values, and from null where that ends badly.
-
-    None where it cannot be solved, or where no robot can have its values (a negative mass).
+    Attributes:
+        setting, joint, catalogue, plain, told: as for :func:`compare_sets`.
+        fitted: by set; None where it could not be solved.
     """
-    linear, widths = scores.score(names), scores.widths(names)
-    found = _settled(setting, joint, plain, _linear_terms(catalogue, scores, names), widths)
-    best = None if found is None else _scored(setting, found, names, widths, scores)
-    if 0 < len(names - scores.always) <= _FEW and (best is None or best.score < linear - _HOLLOW):
-        terms = Terms(_inside(catalogue.start(name)) for name in names)
-        again = _settled(setting, joint, plain, terms, widths)
-        other = None if again is None else _scored(setting, again, names, widths, scores)
-        if other is not None and (best is None or other.score > best.score):
-            best = other
-    robot = setting.problem.robot
-    possible = best is None or all(t.is_possible(robot) for t in best.joint.terms)
-    return best if possible or names == scores.always else None
+
+    setting: Setting
+    joint: JointFit
+    catalogue: Catalogue
+    plain: State
+    told: Callable[[str], None]
+    fitted: dict[Names, Refit | None] = field(default_factory=dict)
+
+    @property
+    def possible(self) -> dict[Names, Refit]:
+        """Those with values that a robot can have (no negative mass); the model as it stands."""
+        robot, always = self.setting.problem.robot, frozenset(self.plain.terms.names)
+        return {
+            names: found
+            for names, found in self.fitted.items()
+            if found is not None
+            and (names == always or all(t.is_possible(robot) for t in found.joint.terms))
+        }
+
+    def best_of(self, scores: Scores, some: Iterable[Names]) -> Refit:
+        """The best of all that are fitted, these among them."""
+        for names in some:
+            self.fit(scores, names)
+        return max(self.possible.values(), key=lambda r: r.score)
+
+    def thinned(self, scores: Scores, best: Refit) -> Refit:
+        """The best set, each of its members dropped in earnest, until none is one too many."""
+        while len(own := best.names - scores.always) <= _FEW:
+            better = self.best_of(scores, [best.names - {name} for name in sorted(own)])
+            if better.names == best.names:
+                break
+            best = better
+        return best
+
+    def fit(self, scores: Scores, names: Names) -> Refit | None:
+        """A set fitted exactly; None where that has no solution."""
+        if names not in self.fitted:
+            self.told(" + ".join(sorted(names)) or "none")
+            self.fitted[names] = self._fit(scores, names)
+        return self.fitted[names]
+
+    def _fit(self, scores: Scores, names: Names) -> Refit | None:
+        """From its linear values, and from null where that ends badly."""
+        linear, widths = scores.score(names), scores.widths(names)
+        best = self._from(scores, names, _linear_terms(self.catalogue, scores, names), widths)
+        few = 0 < len(names - scores.always) <= _FEW
+        if few and (best is None or best.score < linear - _HOLLOW):
+            start = Terms(_inside(self.catalogue.start(name)) for name in names)
+            again = self._from(scores, names, start, widths)
+            if again is not None and (best is None or again.score > best.score):
+                best = again
+        return best
+
+    def _from(
+        self, scores: Scores, names: Names, start: Terms, widths: dict[str, float]
+    ) -> Refit | None:
+        state = evaluate(self.setting.problem, start, self.setting.factor, self.plain)
+        if not state.valid:
+            return None
+        found = settle(self.setting, state, _width(start, widths), self.joint.colour, _STEPS)
+        return _scored(self.setting, found, names, widths, scores)
 
 
 def _linear_terms(catalogue: Catalogue, scores: Scores, names: Names) -> Terms:
@@ -197,15 +204,6 @@ def _inside(term: Term) -> Term:
     layout = term.layout
     pressed = (term.vector <= layout.lower) & ~layout.shape & ~term.knowledge.fixed
     return term.with_vector(np.where(pressed, term.vector + 0.03 * layout.scale, term.vector))
-
-
-def _settled(
-    setting: Setting, joint: JointFit, plain: State, terms: Terms, widths: dict[str, float]
-) -> JointFit | None:
-    state = evaluate(setting.problem, terms, setting.factor, plain)
-    if not state.valid:
-        return None
-    return settle(setting, state, _width(terms, widths), joint.colour, _STEPS)
 
 
 def _width(terms: Terms, widths: dict[str, float]) -> Array:

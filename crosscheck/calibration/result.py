@@ -13,7 +13,7 @@ from crosscheck.calibration.calibrate import Calibration
 from crosscheck.calibration.calibrate import calibrate as calibrated
 from crosscheck.errors import CrosscheckError, UnsolvedError
 from crosscheck.fit.prepare import Progress, prepare
-from crosscheck.fit.problem import KINDS, Rms, kinds_read
+from crosscheck.fit.problem import Rms
 from crosscheck.fit.words import fitted_lines, fitted_records, rms_words
 from crosscheck.given import GivenModel, GivenRobot, considered, model_of, robot_of
 from crosscheck.measurements.read import GivenData, measurements_of
@@ -159,15 +159,15 @@ def _result(found: Calibration, before: Terms, notes: tuple[str, ...]) -> Calibr
     kept = {one.term.name for one in fitted}
     own = np.flatnonzero([name in kept for name, _key in found.terms.labels])
     data = found.setting.problem.data
-    kinds = {KINDS.index(kind): kind.name for kind in kinds_read(found.setting.problem)}
+    scale, rho = found.colour.by_kind(found.setting.problem)
     return Calibrated(
         fitted=fitted,
         covariance=covariance[np.ix_(own, own)],
         before=found.before,
         after=found.after,
         held_out=found.held_out.rms,
-        scale={name: float(found.colour.scale[k]) for k, name in kinds.items()},
-        rho={name: float(found.colour.rho[k]) for k, name in kinds.items()},
+        scale=scale,
+        rho=rho,
         outliers=tuple(int(line) for line in data.line[found.outliers]),
         settled=found.joint.settled,
         notes=notes,

@@ -48,7 +48,6 @@ def seek(
     stated: Sigma,
     terms: Terms = PLAIN,
     progress: Progress = lambda _text, _part: None,
-    start: Terms = PLAIN,
 ) -> Sought:
     """Fit everything at once, then compare sets of effects.
 
@@ -57,10 +56,8 @@ def seek(
         stated: the noise that the user stated; what was estimated is missing in it.
         terms: effects of the model as it stands; they are in every set.
         progress: called with what is being done and the part of it that is done.
-        start: effects with values from another search, to start the joint fit from.
     """
-    begin = Terms([*terms.without_any(start.names), *start])
-    whole = calibrate(problem, begin, lambda text, part: progress(text, 0.5 * part))
+    whole = calibrate(problem, terms, lambda text, part: progress(text, 0.5 * part))
     setting, joint = whole.setting, whole.joint
     known = [k.name for k in kinds_read(problem) if getattr(stated, k.sigma) is not None]
     odds = log_odds(setting, joint, len(known) == len(kinds_read(problem)))
@@ -80,8 +77,7 @@ def seek(
         tried += 1
         progress(f"trying {text}", 0.5 + 0.5 * tried / (tried + most))
 
-    also = frozenset(start.names)
-    found = compare_sets(setting, joint, catalogue, plain, told, most, rounds, also)
+    found = compare_sets(setting, joint, catalogue, plain, told, most, rounds)
     effects = [n for n in catalogue.names if n not in terms]
     classes = probabilities(all_scores(found), found.best.names, effects)
     strange = strange or is_strange(setting, found.best.joint, known)

@@ -94,7 +94,7 @@ def with_noise(setting: Setting, joint: JointFit) -> JointFit:
         before = joint.colour
         colour = noise_of(setting, joint)
         change = np.abs(np.log(colour.scale / before.scale)) + np.abs(colour.rho - before.rho)
-        joint = settle(setting, joint.state, joint.width, colour, _STEPS)
+        joint = settle(setting, joint.state, joint.width, colour, _STEPS, joint.jacobian)
         if float(np.max(change)) < _SETTLED:
             break
     return joint
@@ -117,7 +117,8 @@ def widened(setting: Setting, joint: JointFit) -> JointFit:
         width[groups[name].columns] = wide
     if np.array_equal(width, joint.width):
         return joint
-    return with_noise(setting, settle(setting, joint.state, width, joint.colour))
+    known = joint.jacobian
+    return with_noise(setting, settle(setting, joint.state, width, joint.colour, jacobian=known))
 
 
 def _from_alone(

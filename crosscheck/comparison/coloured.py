@@ -18,7 +18,7 @@ from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.restricted import estimate
 from crosscheck.calibration.robust import outliers, row_weights
 from crosscheck.calibration.strange import is_strange
-from crosscheck.fit.problem import KINDS, Problem, kinds_read
+from crosscheck.fit.problem import Problem
 from crosscheck.fit.state import State
 from seecr.effects import Terms
 from seecr.pose import Array
@@ -67,14 +67,12 @@ def coloured_noise(
     colour = estimate(setting.chain, WHITE, weight, blank, state.white, none)
     weight = row_weights(setting.chain, colour, state.white)
     left = JointFit(state.of(Terms()), blank, none, colour, weight, settled=True)
-    kinds = {KINDS.index(kind): kind.name for kind in kinds_read(problem)}
-    larger = any(colour.scale[k] > _LARGER for k, name in kinds.items() if name in stated)
+    scale, rho = colour.by_kind(problem)
+    larger = any(scale[name] > _LARGER for name in stated)
     if larger or is_strange(setting, left, stated):
         return None
-    if log_odds(setting, left, len(stated) == len(kinds)) > UNKNOWN:
+    if log_odds(setting, left, len(stated) == len(scale)) > UNKNOWN:
         return None
     return Coloured(
-        {name: float(colour.scale[k]) for k, name in kinds.items()},
-        {name: float(colour.rho[k]) for k, name in kinds.items()},
-        int(outliers(setting.chain, weight, problem.data.n_rows).sum()),
-    )
+        scale, rho, int(outliers(setting.chain, weight, problem.data.n_rows).sum())
+    )  # fmt: skip

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from crosscheck.calibration.calibrate import Calibration
-from crosscheck.calibration.probability import Classes
 from crosscheck.calibration.search import Sought
-from crosscheck.fit.problem import KINDS, Rms, kinds_read
+from crosscheck.fit.problem import Rms
 
 
 @dataclass(frozen=True)
@@ -80,18 +79,12 @@ class Chances:
 
 def chances_of(sought: Sought) -> Chances:
     """The probabilities of compared sets."""
-    classes: Classes = sought.classes
+    classes = sought.classes
     pairs = zip(classes.members, classes.probability, strict=True)
     return Chances(classes.effect, tuple(pairs), sought.field_odds, together_of(sought.calibration))
 
 
 def together_of(found: Calibration) -> Together:
     """A calibration's errors and noise."""
-    kinds = {KINDS.index(kind): kind.name for kind in kinds_read(found.setting.problem)}
-    return Together(
-        found.before,
-        found.after,
-        found.held_out.rms,
-        {name: float(found.colour.scale[k]) for k, name in kinds.items()},
-        {name: float(found.colour.rho[k]) for k, name in kinds.items()},
-    )
+    scale, rho = found.colour.by_kind(found.setting.problem)
+    return Together(found.before, found.after, found.held_out.rms, scale, rho)

@@ -7,14 +7,15 @@ from collections.abc import Sequence
 from crosscheck.calibration.refits import Refit
 from crosscheck.calibration.search import Sought
 from crosscheck.calibration.sets import Names
-from crosscheck.diagnosis.advice import check_of, measure_next
+from crosscheck.diagnosis.advice import check_of
 from crosscheck.diagnosis.chances import Chances, chances_of
+from crosscheck.diagnosis.listed import diagnosis_of, left_out
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect, NotListed
 from crosscheck.diagnosis.rivals import Rival
 from crosscheck.diagnosis.search import Search
 from crosscheck.diagnosis.small import share_of
 from crosscheck.diagnosis.way import fit_of, way_of
-from crosscheck.diagnosis.words import and_what_is_left, words_of
+from crosscheck.diagnosis.words import agreement, and_what_is_left, words_of
 from crosscheck.fit.candidates import Candidate
 from crosscheck.fit.prepare import noise_floor
 from crosscheck.fit.problem import KINDS, Rms, rms_by_kind
@@ -30,23 +31,19 @@ _PROBABLE = 0.5
 
 def explained(sought: Sought, notes: Sequence[str]) -> Diagnosis:
     """The diagnosis of compared sets that leave nothing unknown."""
-    verdict, problem = sought.judgement.verdict, sought.calibration.setting.problem
+    verdict = sought.judgement.verdict
     way = way_of(sought, frozenset(sought.judgement.sure))
     chances = chances_of(sought)
     missing = [_missing(sought, way, chances, name) for name in way.found]
-    return Diagnosis(
-        verdict=verdict,
-        sentence=_sentence(verdict, missing, way, chances),
-        missing=tuple(missing),
+    return diagnosis_of(
+        verdict,
+        _sentence(verdict, missing, way.tried, chances),
+        missing,
+        way,
         before=sought.calibration.before,
-        after=rms_by_kind(problem, way.last.fit.state.raw),
-        held_out=way.last.held_out.rms,
         floor=_floor(sought),
-        candidates=tuple(_not_listed(way, chances)),
-        measure_next=tuple(measure_next(way, missing, verdict, ())),
-        notes=tuple(dict.fromkeys((*notes, *_noise_notes(sought, chances)))),
-        search=way,
-        whiteness=way.last.whiteness,
+        candidates=_not_listed(way, chances),
+        notes=(*notes, *_noise_notes(sought, chances)),
         chances=chances,
     )
 
@@ -118,14 +115,10 @@ def _noise_notes(sought: Sought, chances: Chances) -> list[str]:
 
 
 def _sentence(
-    verdict: DiagnosisVerdict, missing: Sequence[MissingEffect], way: Search, chances: Chances
+    verdict: DiagnosisVerdict, missing: Sequence[MissingEffect], tried: int, chances: Chances
 ) -> str:
-    tried = len([c for c in way.steps[0].candidates if c.drop])
     if verdict is DiagnosisVerdict.NO_EFFECT_MISSING:
-        return (
-            f"Model and data agree: what is left is noise, and none of {tried} effects tried "
-            "explains any of it."
-        )
+        return agreement(tried)
     if verdict is DiagnosisVerdict.EFFECTS_FOUND:
         return and_what_is_left(words_of(missing), "what is left is noise", tried)
     together = chances.together
@@ -140,17 +133,7 @@ def _sentence(
 
 def _not_listed(way: Search, chances: Chances) -> list[NotListed]:
     """Every effect that is not listed, the most probable first."""
-    root = way.steps[0]
-    rows = [
-        NotListed(
-            effect=c.name,
-            title=c.layout.effect.title,
-            score=c.evidence.log - root.evidence.log if c.evidence is not None else 0.0,
-            why_not=c.why_not or _why_not(way, chances, c),
-        )
-        for c in root.candidates
-        if c.name not in way.found
-    ]
+    rows = left_out(way, way.found, lambda c: _why_not(way, chances, c))
     return sorted(rows, key=lambda row: (-chances.effect.get(row.effect, 0.0), -row.score))
 
 

@@ -83,6 +83,11 @@ class Search:
         return self.steps[0].fit.terms.names
 
     @property
+    def tried(self) -> int:
+        """How many effects were tried beside the model as it stood."""
+        return len([c for c in self.steps[0].candidates if c.fit is not None or c.drop])
+
+    @property
     def last(self) -> Step:
         """The model the search ended with."""
         return self.steps[-1]
@@ -155,7 +160,9 @@ def _grown(
     for k, node in enumerate(abreast):
 
         def tell(text: str, part: float, before: int = k) -> None:
-            progress(f"round {depth + 1}: {text}", (before + part) / len(abreast))
+            # how many rounds there are nobody knows: each takes half of what is left
+            share = 1.0 - 0.5**depth * (1.0 - 0.5 * (before + part) / len(abreast))
+            progress(f"round {depth + 1}: {text}", share)
 
         node = explored(trials, node, depth == 0, known, tell)
         seen = {**seen, node.names: node}
@@ -174,11 +181,11 @@ def _from_nearby(trials: Trials, nodes: Sequence[Node], progress: Progress) -> l
     again = []
     for node in ranked[:_AGAIN]:
         best = node.fit
-        for k in range(_TIMES):
+        for _ in range(_TIMES):
             terms = best.terms
             values = terms.vector + _AWAY * terms.scale * rng.normal(size=len(terms))
             near = terms.with_vector(np.clip(values, terms.lower, terms.upper))
-            progress("fitting again from values nearby", k / _TIMES)
+            progress("fitting again from values nearby", 0.5)
             found = trials.refit(near, best.state, iterations=_AGAIN_ITERATIONS, quick=True)
             if found.valid and found.chi2 < best.chi2:
                 best = found

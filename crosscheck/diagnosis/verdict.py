@@ -1,4 +1,4 @@
-"""Which effects are missing: prepare the data, compare sets of effects, say what is warranted."""
+"""Which effects are missing: by steps, and where those do not end with noise by sets of effects."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from crosscheck.diagnosis.explained import explained
 from crosscheck.diagnosis.importance import weighed
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.settled import settled
-from crosscheck.diagnosis.unexplained import by_steps, unexplained
+from crosscheck.diagnosis.stepwise import by_steps
+from crosscheck.diagnosis.unexplained import unexplained
 from crosscheck.fit.candidates import null_fit
 from crosscheck.fit.gauss_newton import Fit
 from crosscheck.fit.prepare import Prepared, Progress, noise_floor, prepare

@@ -18,6 +18,14 @@ def and_what_is_left(text: str, left: str, tried: int) -> str:
     return text[0].upper() + text[1:] + f". {tried} effects were tried."
 
 
+def agreement(tried: int) -> str:
+    """The sentence of a model that lacks nothing."""
+    return (
+        f"Model and data agree: what is left is noise, and none of {tried} effects tried "
+        "explains any of it."
+    )
+
+
 def _words_of(effect: MissingEffect) -> str:
     names = ", ".join(rival.name for rival in effect.rivals)
     alike = f" (or {names}, alike on these data)" if names else ""

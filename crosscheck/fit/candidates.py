@@ -25,6 +25,7 @@ from seecr.effects import Term, Terms, catalogue, layout_of
 from seecr.effects.base import Layout
 from seecr.errors import InputError
 from seecr.pose import Array
+from seecr.robot import Robot
 
 # Most Gauss-Newton steps of a trial; what is chosen is fitted to the end.
 _TRIAL_ITERATIONS = 12
@@ -155,7 +156,7 @@ def fit_candidate(
     """
     layout, starts = screened.layout, screened.starts
     assert starts is not None
-    best: Fit | None = None
+    best, impossible = None, False
     for vector in starts:
         try:
             found = trials.refit(
@@ -164,14 +165,23 @@ def fit_candidate(
             )  # fmt: skip
         except (InputError, np.linalg.LinAlgError):
             continue
-        if found.valid and (best is None or found.chi2 < best.chi2):
+        if found.valid and not _possible(trials.problem.robot, found, base):
+            impossible = True
+        elif found.valid and (best is None or found.chi2 < best.chi2):
             best = found
             hopeless = min(hopeless, 2.0 * best.chi2)
             if best.chi2 < _WHITE * trials.noise_scale**2 * len(best.state.white):
                 break  # it leaves noise: no other start does better
     if best is None:
-        return Candidate(layout, starts=starts, why_not=Reason(Why.UNSOLVED))
+        why = Why.IMPOSSIBLE if impossible else Why.UNSOLVED
+        return Candidate(layout, starts=starts, why_not=Reason(why))
     return judged(trials, best, base, screened)
+
+
+def _possible(robot: Robot, found: Fit, base: Fit) -> bool:
+    """Whether a robot can have the values (no negative mass); the model's own are its user's."""
+    own = {term.name for term in base.terms if not term.is_possible(robot)}
+    return all(term.name in own or term.is_possible(robot) for term in found.terms)
 
 
 def judged(trials: Trials, found: Fit, base: Fit, screened: Candidate) -> Candidate:

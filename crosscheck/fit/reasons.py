@@ -24,6 +24,7 @@ class Why(Enum):
     NEEDS_TENSIONS = "needs measured tensions"
     NOT_MOVED = "these commands do not move what it goes with"
     UNSEEN = "these data do not show it: no reading moves by its plausible size"
+    IMPOSSIBLE = "would need what no robot can have"
     UNSOLVED = "no fit: rows could not be solved with it"
     CHANCE = "chance explains it (p {p:.2g})"
     CHANCE_OVER_ALL = "chance explains it (p {p:.2g} over all tried)"

@@ -6,11 +6,15 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from time import monotonic
 from typing import Any, TypeVar
 
 import click
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+SECONDS_BETWEEN_LINES = 15.0
+"""How often work that takes long tells where it is, without a terminal."""
 
 FILE = click.Path(path_type=Path)
 """A file that the command itself opens, so that the error is its own."""
@@ -58,7 +62,7 @@ seed_option = click.option(
 
 @contextmanager
 def progress_bar(text: str, total: int) -> Iterator[Callable[[int, str], None]]:
-    """A progress bar on standard error if that is a terminal, else nothing.
+    """A progress bar on standard error; a line now and then where that is no terminal.
 
     Args:
         text: what is going on.
@@ -68,7 +72,7 @@ def progress_bar(text: str, total: int) -> Iterator[Callable[[int, str], None]]:
         a function to call with the steps done since the last call, and what is going on now.
     """
     if not sys.stderr.isatty():
-        yield lambda steps, now: None
+        yield _lines(text, total)
         return
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -88,9 +92,23 @@ def progress_bar(text: str, total: int) -> Iterator[Callable[[int, str], None]]:
         yield advance
 
 
+def _lines(text: str, total: int) -> Callable[[int, str], None]:
+    """Tells on standard error how far the work is, where it takes long."""
+    done, last = 0, monotonic()
+
+    def advance(steps: int, now: str) -> None:
+        nonlocal done, last
+        done += steps
+        if monotonic() - last >= SECONDS_BETWEEN_LINES:
+            last = monotonic()
+            click.echo(f"{text}: {100 * done // max(total, 1)} %{now and ', '}{now}", err=True)
+
+    return advance
+
+
 @contextmanager
 def progress_share(text: str) -> Iterator[Callable[[str, float], None]]:
-    """A progress bar for work that tells its share of a round done, on a terminal only.
+    """A progress bar for work that tells its share done; it never goes back.
 
     Args:
         text: what is going on.
@@ -98,12 +116,13 @@ def progress_share(text: str) -> Iterator[Callable[[str, float], None]]:
     Yields:
         a function to call with what is going on now and the share of it (0 to 1) that is done.
     """
-    done = [0]
+    done = 0
     with progress_bar(text, 100) as advance:
 
         def tell(now: str, share: float) -> None:
-            percent = int(100 * share)
-            advance(percent - done[0], now)
-            done[0] = percent
+            nonlocal done
+            percent = max(done, int(100 * share))
+            advance(percent - done, now)
+            done = percent
 
         yield tell

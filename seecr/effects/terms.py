@@ -246,11 +246,6 @@ class Terms:
         """All but that of an effect."""
         return Terms(term for term in self._terms if term.name != name)
 
-    def without_any(self, names: Iterable[str]) -> Terms:
-        """All but those of some effects."""
-        gone = set(names)
-        return Terms(term for term in self._terms if term.name not in gone)
-
     def only(self, names: Iterable[str]) -> Terms:
         """Those of some effects alone."""
         kept = set(names)

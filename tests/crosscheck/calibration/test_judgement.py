@@ -23,9 +23,7 @@ def found_of(scores: dict[str, float]) -> Found:
     best = max(refits.values(), key=lambda r: r.score)
     x = np.random.default_rng(0).normal(size=(20, len(NAMES)))
     groups = {n: ColumnGroup(np.array([k]), np.array([1.0])) for k, n in enumerate(NAMES)}
-    return Found(
-        refits, best, Scores(gram_of(x, 0.0 * x[:, 0], groups), len(NAMES)), True, refits.get
-    )
+    return Found(refits, best, Scores(gram_of(x, 0.0 * x[:, 0], groups), len(NAMES)), refits.get)
 
 
 def judged(scores: dict[str, float], odds: float = -5.0, surprise: float = 1.0) -> Judgement:

@@ -1,4 +1,4 @@
-"""What all commands share: their options, and progress on a terminal only."""
+"""What all commands share: their options, and progress."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from click.testing import CliRunner
 
 from crosscheck.cli.compare import command as compare_command
 from crosscheck.comparison.limits import RULES, option
+from seecr.cli import options
 from seecr.cli.options import json_option, out_option, progress_bar, progress_share
 
 
@@ -30,7 +31,20 @@ def test_every_limit_is_an_option_of_compare() -> None:
     assert {option(name) for name in RULES} <= names
 
 
-def test_progress_is_silent_where_nobody_looks(capsys: pytest.CaptureFixture[str]) -> None:
+def test_without_a_terminal_long_work_tells_where_it_is_and_never_goes_back(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(options, "SECONDS_BETWEEN_LINES", 0.0)
+    with progress_share("working") as tell:
+        for share in (0.25, 0.75, 0.5, 1.0):
+            tell("on it", share)
+    with progress_bar("working", 4) as advance:
+        advance(1, "")
+    lines = capsys.readouterr().err.splitlines()
+    assert lines == [f"working: {p} %, on it" for p in (25, 75, 75, 100)] + ["working: 25 %"]
+
+
+def test_short_work_says_nothing_without_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     with progress_bar("working", 3) as advance:
         advance(1, "still")
     with progress_share("working") as tell:

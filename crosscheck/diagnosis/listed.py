@@ -1,0 +1,140 @@
+"""What a search by steps has found, as a diagnosis lists it; and what it does not list, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from crosscheck.comparison.associations import Association
+from crosscheck.diagnosis.advice import check_of, measure_next
+from crosscheck.diagnosis.chances import Chances
+from crosscheck.diagnosis.node import SMALL
+from crosscheck.diagnosis.result import Diagnosis, MissingEffect, NotListed
+from crosscheck.diagnosis.rivals import Rival, rivals_of
+from crosscheck.diagnosis.search import Search
+from crosscheck.diagnosis.small import share_of
+from crosscheck.fit.candidates import Candidate
+from crosscheck.fit.problem import Rms, rms_by_kind
+from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
+
+
+def diagnosis_of(
+    verdict: DiagnosisVerdict,
+    sentence: str,
+    missing: Sequence[MissingEffect],
+    way: Search,
+    *,
+    before: Rms,
+    floor: Rms,
+    candidates: Sequence[NotListed],
+    notes: Sequence[str],
+    chances: Chances,
+    shown: Search | None = None,
+    where: tuple[Association, ...] = (),
+) -> Diagnosis:
+    """A diagnosis with a way of steps that leads to it.
+
+    Args:
+        verdict, sentence, missing, before, floor, candidates, notes, chances, where: as they
+            stand in the diagnosis.
+        way: from the model as it stands to what is kept.
+        shown: the way whose errors are shown, where the way itself leads to more than is listed.
+    """
+    last = (way if shown is None else shown).last
+    return Diagnosis(
+        verdict=verdict,
+        sentence=sentence,
+        missing=tuple(missing),
+        before=before,
+        after=rms_by_kind(way.problem, last.fit.state.raw),
+        held_out=last.held_out.rms,
+        floor=floor,
+        candidates=tuple(candidates),
+        measure_next=tuple(measure_next(way, missing, verdict, where)),
+        notes=tuple(dict.fromkeys(notes)),
+        search=way,
+        whiteness=way.last.whiteness,
+        where=where,
+        chances=chances,
+    )
+
+
+def missing_of(
+    found: Search, name: str, chances: Chances, rivals: Sequence[Rival] | None = None
+) -> MissingEffect:
+    """An effect that the search found, with what adding it does.
+
+    Args:
+        found: the search. name: of the effect.
+        chances: probabilities of all effects.
+        rivals: what cannot be told from it; looked for where not given.
+    """
+    best = found.last.fit
+    term, part = best.terms[name], best.terms.part(name)
+    index = 1 + found.found.index(name)
+    before, step = found.steps[index - 1], found.steps[index]
+    return MissingEffect(
+        term=term,
+        stderr=best.stderr[part] * found.last.whiteness.inflation,
+        at_bound=best.at_bound[part],
+        rivals=tuple(rivals_of(found, name) if rivals is None else rivals),
+        check=check_of(term, found.problem.robot),
+        rms=rms_by_kind(found.problem, step.fit.state.raw),
+        held_out_rms=step.held_out.rms,
+        share=share_of(before, step),
+        probability=chances.of(name),
+    )
+
+
+def not_listed(found: Search, listed: Sequence[str]) -> list[NotListed]:
+    """Every effect that was tried and is not listed, the nearest miss first."""
+
+    def why(c: Candidate) -> Reason:
+        return _later_reason(found, c.name) or _beaten_reason(found, c)
+
+    return sorted(left_out(found, listed, why), key=lambda row: -row.score)
+
+
+def left_out(
+    found: Search, listed: Sequence[str], why: Callable[[Candidate], Reason]
+) -> list[NotListed]:
+    """Every effect tried beside the model as it stood that is not listed.
+
+    Args:
+        found: the way of the search. listed: names.
+        why: the reason for a candidate that has none of its own.
+    """
+    start = found.steps[0]
+    return [
+        NotListed(
+            effect=c.name,
+            title=c.layout.effect.title,
+            score=c.evidence.log - start.evidence.log if c.evidence is not None else 0.0,
+            why_not=c.why_not or why(c),
+        )
+        for c in start.candidates
+        if c.name not in listed
+    ]
+
+
+def _beaten_reason(found: Search, c: Candidate) -> Reason:
+    """Why a candidate that explains something by itself is not listed."""
+    if found.last.whiteness.is_noise:
+        return Reason(Why.EXPLAINED_BETTER, by=found.found) if found.found else _NOT_NEEDED
+    if len(c.layout) > SMALL:
+        return Reason(Why.IMITATES, parameters=len(c.layout))
+    return Reason(Why.EXPLAINS_PART)
+
+
+_NOT_NEEDED = Reason(Why.NOT_NEEDED)
+
+
+def _later_reason(found: Search, name: str) -> Reason | None:
+    """Why it was not chosen later on, beside effects that were."""
+    if name in found.found:
+        return Reason(Why.EXPLAINS_PART)
+    for step in reversed(found.steps[1:]):
+        for c in step.candidates:
+            if c.name == name and c.why_not is not None:
+                return replace(c.why_not, beside=step.fit.terms.names)
+    return None

@@ -1,0 +1,81 @@
+"""The search by steps over measurements as they are: stale values, outliers, noise understated."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from crosscheck.diagnosis.search import Search, search
+from crosscheck.fit.candidates import Trials, null_fit
+from crosscheck.fit.gauss_newton import Fit
+from crosscheck.fit.known import free_derivatives
+from crosscheck.fit.noise import whiteness
+from crosscheck.fit.prepare import Progress, outlying_rows
+from crosscheck.fit.problem import Problem
+from seecr.pose import Array
+
+# The model's values are refitted before the search where that takes away so much chi2.
+_STALE_VALUES = 30.0
+# Noise up to this many times the stated one is noise that was stated too small.
+_UNDERSTATED = 3.0
+
+Notes = tuple[str, ...]
+
+
+def by_steps(
+    problem: Problem, base: Fit, factor: Array, progress: Progress
+) -> tuple[Search, Notes]:
+    """Effects added one at a time, and what was done to the data on the way."""
+    base, refitted = _at_its_best(problem, base, factor)
+    found = search(Trials(problem, factor), base, progress)
+    found, outliers = _without_outliers(found, base, progress)
+    found, larger = _with_larger_noise(found, progress)
+    return found, (*refitted, *outliers, *larger)
+
+
+def _at_its_best(problem: Problem, base: Fit, factor: Array) -> tuple[Fit, Notes]:
+    """The model to start from: its values come from other fits, and may settle on these data."""
+    if not base.terms:
+        return base, ()
+    refitted = null_fit(problem, base.terms, factor, refit=True)
+    if refitted.valid and refitted.chi2 < base.chi2 - _STALE_VALUES:
+        return refitted, ("the model's values were refitted to these data before the search",)
+    return _with_derivatives(problem, base), ()
+
+
+def _with_derivatives(problem: Problem, base: Fit) -> Fit:
+    return replace(base, derive=lambda: free_derivatives(problem, base.state))
+
+
+def _without_outliers(found: Search, base: Fit, progress: Progress) -> tuple[Search, Notes]:
+    """Search again without rows that stick out alone, if there are a few; name them."""
+    problem, state = found.problem, found.last.fit.state
+    rows = outlying_rows(problem, state)
+    if not rows.any():
+        return found, ()
+    lines = problem.data.places(rows)
+    word = "line" if rows.sum() == 1 else "lines"
+    note = f"{word} {lines} left out: outliers, far from all the others"
+    cleaned = problem.without(rows, note)
+    kept = ~rows[problem.row_of]
+    if whiteness(cleaned, state.white[kept], found.last.evidence.parameters).structured:
+        # nor are the others noise: rows that stick out are part of what is not explained
+        return found, ()
+    again = null_fit(cleaned, base.terms, found.factor, refit=False)
+    if base.terms:
+        again = _with_derivatives(cleaned, again)
+    better = search(replace(found.trials, problem=cleaned), again, progress)
+    if better.found != found.found:
+        with_all = ", ".join(found.found) or "nothing"
+        note += f" (with them the search finds {with_all})"
+    return better, (note,)
+
+
+def _with_larger_noise(found: Search, progress: Progress) -> tuple[Search, Notes]:
+    """Where what is left is white but too large, the noise was stated too small."""
+    last = found.last.whiteness
+    if last.is_noise or last.structured or last.scale > _UNDERSTATED or found.noise_scale != 1.0:
+        return found, ()
+    scale = last.scale
+    again = search(replace(found.trials, noise_scale=scale), found.steps[0].fit, progress, found)
+    note = f"what is left is white but {scale:.2f} times the stated noise: taken as the noise"
+    return again, (note,)
