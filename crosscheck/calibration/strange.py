@@ -38,7 +38,7 @@ def is_strange(setting: Setting, joint: JointFit, stated: Collection[str]) -> bo
     return (
         too_large(joint.colour, np.unique(setting.chain.kind), stated)
         or side_by_side(setting, joint)
-        or _goes_together(setting, joint)
+        or goes_together(setting, joint)
     )
 
 
@@ -69,7 +69,7 @@ def side_by_side(setting: Setting, joint: JointFit) -> bool:
     return False
 
 
-def _goes_together(setting: Setting, joint: JointFit) -> bool:
+def goes_together(setting: Setting, joint: JointFit) -> bool:
     """Whether residuals that were made white still agree with those nearby."""
     left = whitened(setting.chain, joint.colour, joint.weight, joint.state.white)
     return whiteness(setting.problem, left, 0).structured

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from made_data import COGIRO, SIGMA, measured, term
 
-from crosscheck.calibration.judgement import judge
+from crosscheck.calibration.judgement import Judgement, judge
 from crosscheck.calibration.search import Sought, seek
+from crosscheck.diagnosis.explained import explained
 from crosscheck.fit.prepare import prepare
-from crosscheck.fit.reasons import DiagnosisVerdict
+from crosscheck.fit.reasons import DiagnosisVerdict, Why
 from seecr.effects import Term, Terms
 from seecr.mjcf import load_robot
 
@@ -43,6 +46,22 @@ def test_two_effects_are_named_and_a_field_makes_the_verdict_unknown() -> None:
     assert min(found.classes.effect[t.name] for t in hidden) > 0.95
     values = found.found.best.joint.terms
     assert values["pulley_radius"].vector[0] == pytest.approx(0.006, rel=0.05)
+    assert_shown_as_many(found)
     unknown = judge(found.found, found.classes, 20.0, 1.0)
     assert unknown.verdict is DiagnosisVerdict.UNKNOWN_EFFECT
     assert judge(found.found, found.classes, -5.0, 9.0).verdict is DiagnosisVerdict.UNKNOWN_EFFECT
+
+
+def assert_shown_as_many(found: Sought) -> None:
+    """As it is told where only one of the two effects carries enough to be sure of."""
+    many = Judgement(DiagnosisVerdict.MANY_EFFECTS, ("pulley_radius",), 0.0)
+    said = explained(replace(found, judgement=many), [])
+    assert said.sentence.startswith("No few effects explain the error, but all ")
+    assert said.sentence.endswith("Sure among them: pulley_radius.")
+    (listed,) = said.missing
+    # beside all that are probable: without the tilt it would be far off
+    assert listed.values[0] == pytest.approx(0.006, rel=0.05)
+    (tilt,) = (one for one in said.candidates if one.effect == "gravity_tilt")
+    assert tilt.why_not.why is Why.CARRIES_LITTLE and tilt.why_not.by == ("pulley_radius",)
+    assert tilt.why_not.p > 0.95
+    assert any("crosscheck calibrate" in text for text in said.measure_next)

@@ -57,6 +57,18 @@ def test_neighbours_of_a_set_are_scored_as_those_sets_are() -> None:
             assert score > scores.score(names) - 3.0
 
 
+def test_what_the_model_has_is_in_every_set_and_no_guess() -> None:
+    gram, held = toy(0, (1, 2, 6)), frozenset({"e0"})
+    scores = Scores(gram, 7, held)
+    best = explore(scores, [held, frozenset(gram.names)])
+    assert all(held <= names for names in scores.solved)
+    whole = (names for names in every_set(gram) if held <= names)
+    assert scores.score(best) == pytest.approx(max(map(scores.score, whole)), abs=1e-6)
+    # chosen without a word of the data, the rest is a set of seven
+    assert scores.log_prior(held) == log_prior(0, 7)
+    assert scores.log_prior(best) == log_prior(len(best) - 1, 7)
+
+
 def test_prior_is_a_prior() -> None:
     whole = sum(np.exp(log_prior(k, 8)) * len(list(combinations(range(8), k))) for k in range(9))
     assert whole == pytest.approx(1.0)

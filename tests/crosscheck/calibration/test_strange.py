@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from made_data import COGIRO, measured
 
-from crosscheck.calibration.colour import Colour
-from crosscheck.calibration.strange import too_large
+from crosscheck.calibration.colour import WHITE, Colour, chain_of
+from crosscheck.calibration.joint import Setting, settle
+from crosscheck.calibration.strange import goes_together, too_large
+from crosscheck.fit.prepare import prepare
+from crosscheck.fit.state import evaluate
+from seecr.effects import Terms
+from seecr.mjcf import load_robot
 
 POSITION = np.array([0])
 
@@ -44,3 +50,17 @@ def test_estimated_noise_may_be_larger_where_it_goes_together(
 def test_kinds_that_were_not_read_do_not_count() -> None:
     colour = Colour(np.array([1.0, 9.0, 1.0]), np.zeros(3))
     assert not too_large(colour, POSITION, ["position", "orientation"])
+
+
+@pytest.mark.parametrize("pulled", [False, True])
+def test_residuals_that_agree_with_those_nearby_are_no_noise(pulled: bool) -> None:
+    robot = load_robot(COGIRO)
+    data = measured(robot, points=10)
+    if pulled:  # by a tenth of a millimetre, more and more to one side
+        assert data.command_pose is not None
+        data.position[:, 2] += 1e-3 * data.command_pose[:, 0] ** 2
+    problem = prepare(robot, data, Terms()).problem
+    factor = problem.noise(problem.experiment.predict(()))
+    setting = Setting(problem, factor, chain_of(problem))
+    joint = settle(setting, evaluate(problem, Terms(), factor), np.zeros(0), WHITE)
+    assert goes_together(setting, joint) is pulled

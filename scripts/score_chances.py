@@ -1,0 +1,236 @@
+"""Are probabilities of a diagnosis right as often as they say, and what is named by mistake?
+
+    python scripts/score_chances.py --twins 100 --json twins.jsonl     one to four effects
+    python scripts/score_chances.py --nulls 30 --json nulls.jsonl      none, of each kind of noise
+    python scripts/score_chances.py --summary twins.jsonl nulls.jsonl  the tables and the picture
+
+MuJoCo is the truth. Effects are drawn with sizes log-uniform from 0.3 to 10 times the size that
+is visible: that at which an effect alone, beside nothing, lowers chi2 by 25. The noise is white,
+goes together along runs (AR(1) of 0.8), has heavy tails (Student's t with three degrees of
+freedom, scaled to the same quartiles), or throws one row in ten far off; nobody tells the
+diagnosis which. A statement is a class of effects that these data cannot tell apart, with its
+probability; it is true where a hidden effect is in it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.diagnosis.verdict import diagnose
+from crosscheck.fit.problem import Problem
+from crosscheck.measurements.data import Measurements, Sigma
+from crosscheck.twin.hidden import choose, times
+from crosscheck.twin.lab import random_of, sweeps
+from crosscheck.twin.measure import Truth, measure
+from seecr.effects import Term
+from seecr.mjcf import load_robot
+from seecr.pose import quat_from_rotvec, quat_multiply
+from seecr.robot import Robot
+from seecr.shipped import model_path
+
+Array = NDArray[np.float64]
+ROBOTS = ("demobot_cogiro", "demobot_parallel")
+VISIBLE, SIZES, LARGEST = 25.0, (0.3, 10.0), 3.0
+# A name is owed where the effect lowers chi2 by so much beside the others.
+OWED = 25.0
+BINS = (0.0, 0.05, 0.2, 0.5, 0.8, 0.97, 1.0)
+
+
+def white(random: np.random.Generator, n: int, width: int, runs: NDArray[Any]) -> Array:
+    return random.standard_normal((n, width))
+
+
+def alike(random: np.random.Generator, n: int, width: int, runs: NDArray[Any]) -> Array:
+    """Goes together along runs."""
+    out = random.standard_normal((n, width))
+    for k in range(1, n):
+        if runs[k] == runs[k - 1]:
+            out[k] = 0.8 * out[k - 1] + 0.6 * out[k]
+    return out
+
+
+def tails(random: np.random.Generator, n: int, width: int, runs: NDArray[Any]) -> Array:
+    """Student's t of three, its quartiles those of a normal one."""
+    return random.standard_t(3, (n, width)) * (0.6745 / 0.7649)
+
+
+def outliers(random: np.random.Generator, n: int, width: int, runs: NDArray[Any]) -> Array:
+    """One row in ten is off by about ten times the noise."""
+    out = random.standard_normal((n, width))
+    far = random.choice(n, n // 10, replace=False)
+    out[far] += 10.0 * random.standard_normal((len(far), width))
+    return out
+
+
+NOISES: dict[str, Callable[..., Array]] = {
+    "white": white, "alike": alike, "tails": tails, "outliers": outliers,
+}  # fmt: skip
+
+
+def sigma_of(robot: Robot) -> Sigma:
+    """A good tracker: 6e-5 of the mean cable, 0.02 degrees."""
+    length = float(np.mean(robot.nominal_lengths(robot.reference_pose[None])))
+    return Sigma(position_m=6e-5 * length, orientation_rad=3.5e-4)
+
+
+def read(case: Measurements, truth: Truth, sigma: Sigma, noise: Array) -> Measurements:
+    """What a tracker reads of the rows that rest."""
+    assert sigma.position_m is not None and sigma.orientation_rad is not None
+    turn = quat_from_rotvec(sigma.orientation_rad * noise[:, 3:])
+    quat = quat_multiply(turn, truth.quat_wxyz)
+    quat *= np.where(quat[:, :1] < 0.0, -1.0, 1.0)
+    data = replace(
+        case, position=truth.position + sigma.position_m * noise[:, :3], quat_wxyz=quat,
+        sigma=sigma, angles_rad=None, position_mask=None, angle_mask=None, tension_mask=None,
+        line=None,
+    )  # fmt: skip
+    return data.rows(truth.at_rest)
+
+
+def signals(robot: Robot, data: Measurements, hidden: list[Term]) -> Array:
+    """(N, k) whitened change of the readings that each effect makes by itself, by SEECR."""
+    problem = Problem(robot, data, data.sigma, np.ones(data.n_rows, dtype=bool))
+    plain = problem.experiment.predict(())
+    factor = problem.noise(plain)
+    none = problem.whiten(factor, problem.residuals(plain.readings)[..., None])
+    out = [
+        problem.whiten(
+            factor,
+            problem.residuals(problem.experiment.predict([one.effect()]).readings)[..., None],
+        )
+        - none
+        for one in hidden
+    ]
+    return np.concatenate(out, axis=1) if out else np.zeros((len(none), 0))
+
+
+def beside(x: Array) -> Array:
+    """(k,) squared length of each column beside the others."""
+    if x.shape[1] < 2:
+        return np.sum(x**2, axis=0)
+    out = []
+    for k in range(x.shape[1]):
+        others = np.delete(x, k, axis=1)
+        q = np.linalg.qr(others)[0]
+        left = x[:, k] - q @ (q.T @ x[:, k])
+        out.append(float(left @ left))
+    return np.array(out)
+
+
+def make(seed: int, count: int, noise: str) -> tuple[Robot, Measurements, list[Term], Array]:
+    """Robot, measurements, what is hidden, and how much chi2 each owes beside the others."""
+    robot = load_robot(model_path(ROBOTS[seed % 2]))
+    random = random_of(seed, 5)
+    sigma = sigma_of(robot)
+    for extent in (0.75, 0.5, 0.35):
+        case = sweeps(robot, 18, extent, seed)
+        hidden = choose(robot, random_of(seed, 0), None, count)
+        # only what could be read decides how large effects are
+        exact = measure(robot, case.as_commands(robot), ())
+        data = read(case, exact, sigma, np.zeros((case.n_rows, 6)))
+        power = np.sum(signals(robot, data, hidden) ** 2, axis=0)
+        wanted = np.exp(random.uniform(*np.log(SIZES), len(hidden)))
+        grown = np.minimum(wanted * np.sqrt(VISIBLE / np.maximum(power, 1e-12)), LARGEST)
+        hidden = [times(one, f) for one, f in zip(hidden, grown, strict=True)]
+        truth = measure(robot, case.as_commands(robot), [one.effect() for one in hidden])
+        if np.mean(truth.at_rest) > 0.95:
+            break
+    made = NOISES[noise](random, case.n_rows, 6, case.run)
+    data = read(case, truth, sigma, made)
+    return robot, data, hidden, beside(signals(robot, data, hidden))
+
+
+def judged(seed: int, count: int, noise: str) -> dict[str, Any]:
+    """One twin made and diagnosed."""
+    robot, data, hidden, worth = make(seed, count, noise)
+    start = time.process_time()
+    found = diagnose(robot, data)
+    chances = found.chances
+    return {
+        "seed": seed,
+        "noise": noise,
+        "rows": data.n_rows,
+        "hidden": {one.name: float(w) for one, w in zip(hidden, worth, strict=True)},
+        "verdict": str(found.verdict),
+        "named": [[m.effect, *(r.name for r in m.rivals)] for m in found.missing],
+        "classes": [] if chances is None else [[list(m), p] for m, p in chances.classes],
+        "seconds": time.process_time() - start,
+    }
+
+
+def table(rows: list[dict[str, Any]]) -> list[str]:
+    """Reliability of the statements, Brier score, names and verdicts."""
+    said = [
+        (p, any(h in members for h in row["hidden"]))
+        for row in rows
+        for members, p in row["classes"]
+    ]
+    p, true = np.array([s[0] for s in said]), np.array([s[1] for s in said], dtype=float)
+    out = ["| said | statements | mean said | true |", "|---|---|---|---|"]
+    for low, high in pairwise(BINS):
+        some = (p >= low) & ((p < high) | (high == 1.0))
+        if some.any():
+            mean, part = p[some].mean(), true[some].mean()
+            out.append(f"| {low:.2f} to {high:.2f} | {some.sum()} | {mean:.3f} | {part:.3f} |")
+    if len(p):
+        out.append(f"Brier score {np.mean((p - true) ** 2):.4f} over {len(p)} statements")
+    named = [(names, row) for row in rows for names in row["named"]]
+    false = [(n, r) for n, r in named if not any(h in n for h in r["hidden"])]
+    owed = [(h, r) for r in rows for h, w in r["hidden"].items() if w >= OWED]
+    got = [1 for h, r in owed if any(h in names for names in r["named"])]
+    out.append(
+        f"{len(rows)} twins: {len(named)} names, {len(false)} false; of {len(owed)} effects that "
+        f"are owed a name {len(got)} have it"
+    )
+    for names, row in false:
+        out.append(f"false: seed {row['seed']} {row['noise']} {'/'.join(names)} {row['hidden']}")
+    for noise in NOISES:
+        some = [row for row in rows if row["noise"] == noise]
+        counts = Counter((len(row["hidden"]) > 0, row["verdict"]) for row in some)
+        for (any_, verdict), n in sorted(counts.items()):
+            out.append(f"{noise}, {'effects' if any_ else 'nothing'} hidden: {verdict} {n}")
+    spent = sorted(row["seconds"] for row in rows)
+    if spent:
+        out.append(f"CPU seconds: median {np.median(spent):.1f}, longest {spent[-1]:.1f}")
+    return out
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--twins", type=int, default=0, help="of one to four effects")
+    parser.add_argument("--nulls", type=int, default=0, help="of each kind of noise")
+    parser.add_argument("--first", type=int, default=0, help="seed of the first")
+    parser.add_argument("--json", type=Path, help="append a line for each twin there")
+    parser.add_argument("--summary", type=Path, nargs="*", default=[], help="files to sum up")
+    chosen = parser.parse_args()
+    names = list(NOISES)
+    seeds = range(chosen.first, chosen.first + chosen.twins)
+    todo = [(5000 + s, 1 + s % 4, names[(s // 4) % len(names)]) for s in seeds]
+    todo += [
+        (9000 + s, 0, noise)
+        for s in range(chosen.first, chosen.first + chosen.nulls)
+        for noise in names
+    ]
+    rows = [json.loads(line) for path in chosen.summary for line in path.read_text().splitlines()]
+    for one in todo:
+        rows.append(judged(*one))
+        print(json.dumps({k: v for k, v in rows[-1].items() if k != "classes"}), flush=True)
+        if chosen.json:
+            with chosen.json.open("a") as out:
+                out.write(json.dumps(rows[-1]) + "\n")
+    print("\n".join(table(rows)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,41 @@
+"""Effects that join late, fitted by themselves where everything else leaves more than noise."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from made_data import COGIRO, measured, term
+
+from crosscheck.calibration.alone import fitted_alone
+from crosscheck.calibration.colour import WHITE, chain_of
+from crosscheck.calibration.joint import JointFit, Setting, settle
+from crosscheck.calibration.later import layouts
+from crosscheck.fit.prepare import prepare
+from crosscheck.fit.state import evaluate
+from seecr.effects import Terms
+from seecr.mjcf import load_robot
+
+pytestmark = pytest.mark.slow
+ROBOT = load_robot(COGIRO)
+
+
+def alone(hidden: Terms) -> tuple[JointFit, list[JointFit]]:
+    problem = prepare(ROBOT, measured(ROBOT, hidden, points=6), Terms()).problem
+    factor = problem.noise(problem.experiment.predict(()))
+    setting = Setting(problem, factor, chain_of(problem), frozen=True)
+    plain = settle(setting, evaluate(problem, Terms(), factor), np.zeros(0), WHITE)
+    return plain, fitted_alone(setting, plain, layouts(problem)[1])
+
+
+def test_the_weight_of_cables_explains_nearly_all_by_itself() -> None:
+    hidden = Terms([term(ROBOT, "cable_weight", weight_N_per_m=0.2)])
+    plain, found = alone(hidden)
+    best = found[0]
+    assert best.terms.names == ("cable_weight",)
+    assert best.state.chi2 < 0.01 * plain.state.chi2
+    assert best.terms.vector[0] == pytest.approx(0.2, rel=0.02)
+
+
+def test_what_explains_less_than_half_is_not_taken_up() -> None:
+    _plain, found = alone(Terms([term(ROBOT, "gravity_tilt", tilt_x_rad=0.03)]))
+    assert found == []
