@@ -7,17 +7,17 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from seecr import statics
 from seecr.commands import Commands
 from seecr.effects.checked import edit_setup
 from seecr.errors import InputError
 from seecr.experiment import Experiment, GivenEffects, effects_of
+from seecr.multiple import other_rests
 from seecr.pose import Array
 from seecr.robot import Robot
+from seecr.search import solve_setup
 from seecr.setup import Setup, plain_setup
-from seecr.solution import Solution, certify
-from seecr.starts import commanded_poses, finite, start_of
-from seecr.tables import assemble
+from seecr.solution import Solution
+from seecr.starts import commanded_poses, finite
 
 METHODS = ("newton", "fsolve", "least_squares")
 
@@ -34,6 +34,7 @@ def solve(
     start: ArrayLike | None = None,
     max_iterations: int = 400,
     threads: int | None = None,
+    others: bool = False,
 ) -> Solution:
     """Find where the platform rests (paper, section III-B) for a batch of commands.
 
@@ -52,6 +53,8 @@ def solve(
         start: (n, 7) poses to start from instead of the commanded ones.
         max_iterations: most evaluations of the wrench, per pose and stage of stiffness.
         threads: one per processor by default.
+        others: look for the other stable equilibria of each command too, a tenth of a second or
+            more for each; they are then the solution's ``others``.
 
     Returns:
         a :class:`Solution`; look at ``status`` or ``converged`` before using a pose.
@@ -67,16 +70,22 @@ def solve(
     if gravity is not None:
         robot = replace(robot, gravity=_array(gravity, (3,), "gravity"))
     commands = _commands(robot, poses, rest_lengths)
-    setup = plain_setup(robot, commands, None if wrench is None else finite(wrench, "wrench"))
     acting = effects_of(effects)
-    for effect in acting:
-        edit_setup(effect, setup)
+    pushed = None if wrench is None else finite(wrench, "wrench")
+
+    def setup_of(rows: Commands, push: Array | None) -> Setup:
+        setup = plain_setup(robot, rows, push)
+        for effect in acting:
+            edit_setup(effect, setup)
+        return setup
+
+    setup = setup_of(commands, pushed)
     if setup.has_history or setup.laws:
-        if method != "newton" or start is not None or wrench is not None:
+        if method != "newton" or start is not None or wrench is not None or others:
             raise InputError(
                 "effects with history or with a law of their own are solved along the way; "
-                "expected no other method, no start, and external_wrench among the effects "
-                "instead of wrench"
+                "expected no other method, no start, no others, and external_wrench among the "
+                "effects instead of wrench"
             )
         return Experiment(robot, commands).predict(acting).solution()
     starts = None
@@ -84,26 +93,15 @@ def solve(
         starts = commanded_poses(start, "start")
         if len(starts) != len(commands):
             raise InputError(f"start must have {len(commands)} poses, got {len(starts)}")
-    return solve_setup(setup, method, starts, max_iterations, threads)
+    found = solve_setup(setup, method, starts, max_iterations, threads)
+    if not others:
+        return found
+    pushes = np.broadcast_to(np.zeros(6) if pushed is None else pushed, (len(commands), 6))
 
+    def repeated(i: int, n: int) -> Setup:
+        return setup_of(commands.rows(np.full(n, i)), pushes[i])
 
-def solve_setup(
-    setup: Setup,
-    method: str = "newton",
-    start: Array | None = None,
-    max_iterations: int = 400,
-    threads: int | None = None,
-) -> Solution:
-    """Like :func:`solve`, for a setup that effects may have edited; history is not followed."""
-    tables = assemble(setup)
-    first, values = start_of(setup.robot, tables, start)
-    if method == "newton":
-        found = statics.descend(tables, first, max_iterations, threads, values)
-    else:
-        from seecr.scipy_search import solve_with_scipy
-
-        found = solve_with_scipy(setup, tables, method, first, max_iterations, values)
-    return certify(setup.robot, tables, found)
+    return replace(found, others=other_rests(found, repeated))
 
 
 def _commands(

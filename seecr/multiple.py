@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import qmc
 
-from seecr.equilibrium import solve
+from seecr.commands import Commands
+from seecr.effects.checked import edit_setup
 from seecr.errors import InputError
-from seecr.experiment import GivenEffects
+from seecr.experiment import GivenEffects, effects_of
 from seecr.joints import pose_of_values
 from seecr.pose import Array, pose_difference
 from seecr.robot import Robot
+from seecr.search import solve_setup
+from seecr.setup import Setup, plain_setup
 from seecr.solution import Solution
 from seecr.starts import commanded_poses
 
@@ -42,18 +48,59 @@ def equilibria(
         a :class:`Solution` with one row for each; the command's own search may lead to any.
 
     Raises:
-        InputError: more than one pose, effects with a memory.
+        InputError: more than one pose, effects with a memory or a law of their own.
     """
     command = commanded_poses(pose)
     if len(command) != 1:
         raise InputError(f"equilibria needs one commanded pose (7,), got {len(command)}")
+    acting = effects_of(effects)
+
+    def repeated(n: int) -> Setup:
+        setup = plain_setup(robot, Commands(np.repeat(command, n, axis=0)))
+        for effect in acting:
+            edit_setup(effect, setup)
+        return setup
+
+    one = repeated(1)
+    if one.has_history or one.laws:
+        raise InputError(
+            "equilibria: effects with history or with a law of their own lead to one rest along "
+            "their way; expected none of these"
+        )
+    return _all_rests(solve_setup(one), repeated, most)
+
+
+def other_rests(
+    found: Solution, repeated: Callable[[int, int], Setup], most: int = _MOST
+) -> tuple[Solution, ...]:
+    """The other stable equilibria of each of n commands, by energy; none of one without rest.
+
+    Args:
+        found: where each of them rests.
+        repeated: (i, k) to a setup of k rows, all of them command i.
+        most: starts for each, at most.
+    """
+    out = []
+    for i in range(len(found)):
+        whole = _all_rests(found.rows([i]), partial(repeated, i), most)
+        other = [
+            k
+            for k in np.flatnonzero(whole.converged)
+            if not _known(found.robot, whole.pose[k], found.pose[i : i + 1])
+        ]
+        out.append(whole.rows(np.array(other, dtype=int)))
+    return tuple(out)
+
+
+def _all_rests(own: Solution, repeated: Callable[[int], Setup], most: int) -> Solution:
+    """All stable equilibria of one command, from where its own search led."""
+    robot, command = own.robot, own.command
     sampler = qmc.Sobol(robot.n_dof, seed=0)
-    own = solve(robot, command, effects=effects)
-    poses, starts = own.pose[own.converged], [command[own.converged]]
-    count = len(poses)
+    poses, starts = own.pose[own.converged], [own.pose[own.converged]]
+    count, many = len(poses), repeated(_PART)
     for _ in range(0, most, _PART):
         tried = _spread(robot, command[0], sampler.random(_PART))
-        found = solve(robot, np.repeat(command, _PART, axis=0), effects=effects, start=tried)
+        found = solve_setup(many, start=tried)
         rests = found.pose[found.converged]
         count += len(rests)
         for row, start in zip(rests, tried[found.converged], strict=True):
@@ -66,9 +113,8 @@ def equilibria(
     if len(poses) == 0:
         return own
     first = np.concatenate(starts)
-    whole = solve(robot, np.repeat(command, len(first), axis=0), effects=effects, start=first)
-    order = np.argsort(whole.energy, kind="stable")
-    return solve(robot, np.repeat(command, len(first), axis=0), effects=effects, start=first[order])
+    whole = solve_setup(repeated(len(first)), start=first)
+    return whole.rows(np.argsort(whole.energy, kind="stable"))
 
 
 def _known(robot: Robot, pose: Array, among: Array) -> bool:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from seecr import statics
 from seecr.compiled.columns import REST, TENSION
@@ -22,6 +23,7 @@ from seecr.compiled.outcomes import (
     TOLERANCE,
     UNSTABLE,
 )
+from seecr.inertia import mass_matrices
 from seecr.pose import Array, rotvec_from_quat
 from seecr.result import COORDINATES, Record, Result, named
 from seecr.robot import Robot
@@ -54,6 +56,14 @@ _OF_OUTCOME = {
 }
 
 
+_PER_ROW = (
+    "command", "pose", "deviation", "tensions", "slack", "rest_lengths", "iterations", "residual",
+    "energy", "status",
+)  # fmt: skip
+# A squared frequency below this part of the largest is rounding.
+_NO_FREQUENCY = 1e-12
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Solution(Result):
     """Answers of n poses, each with the certificate recomputed from the answer itself.
@@ -76,6 +86,7 @@ class Solution(Result):
         energy: (n,) [J] elastic energy less the work of the load since the commanded pose;
             nan where a law has none in closed form.
         status: (n,) of :class:`Status`.
+        others: the other stable equilibria of each command, where they were asked for.
     """
 
     robot: Robot
@@ -91,6 +102,7 @@ class Solution(Result):
     residual: Array
     energy: Array
     status: NDArray[np.object_]
+    others: tuple[Solution, ...] | None = None
 
     def __len__(self) -> int:
         return len(self.pose)
@@ -110,6 +122,50 @@ class Solution(Result):
         """
         unit = self._units()
         return statics.stiffness(self.tables, self.evaluation) * unit[:, None] * unit[None, :]
+
+    @cached_property
+    def modes(self) -> tuple[Array, Array]:
+        """Frequencies (n, d) [Hz] of small vibrations, rising, and their shapes (n, d, d).
+
+        Of the platform's inertia on the stiffness of massless cables without damping; zero along
+        directions that nothing resists, NaN where the platform would leave, or has no rest.
+        ``shapes[i, :, k]`` [m, rad] is the motion of ``frequencies[i, k]``, in the coordinates of
+        :attr:`stiffness`.
+
+        Raises:
+            InputError: nobody said what the platform's inertia is.
+        """
+        frequencies = np.full(self.stiffness.shape[:2], np.nan)
+        shapes = np.full(self.stiffness.shape, np.nan)
+        rows = np.flatnonzero(np.isfinite(self.stiffness).all(axis=(1, 2)))
+        if len(rows) == 0:
+            return frequencies, shapes
+        mass = mass_matrices(self.robot, take(self.tables, rows), self.pose[rows])
+        # K v = w^2 M v, made symmetric by the mass matrix's own factor
+        half = np.linalg.inv(np.linalg.cholesky(mass))
+        stiffness = self.stiffness[rows]
+        stiffness = 0.5 * (stiffness + stiffness.swapaxes(1, 2))
+        squares, vectors = np.linalg.eigh(half @ stiffness @ half.swapaxes(1, 2))
+        nothing = _NO_FREQUENCY * np.abs(squares).max(axis=1, keepdims=True)
+        squares = np.where(np.abs(squares) <= nothing, 0.0, squares)
+        with np.errstate(invalid="ignore"):
+            frequencies[rows] = np.sqrt(squares) / (2.0 * np.pi)
+        shapes[rows] = half.swapaxes(1, 2) @ vectors
+        return frequencies, shapes
+
+    @property
+    def frequencies(self) -> Array:
+        """Of small vibrations, (n, d) [Hz], rising; see :attr:`modes`."""
+        return self.modes[0]
+
+    def rows(self, index: ArrayLike) -> Solution:
+        """Some rows: numbers or a mask (n,)."""
+        at = np.arange(len(self))[np.asarray(index)]
+        values: dict[str, Any] = {name: getattr(self, name)[at] for name in _PER_ROW}
+        values["tables"] = take(self.tables, at)
+        values["evaluation"] = statics.take_evaluation(self.evaluation, at)
+        values["others"] = None if self.others is None else tuple(self.others[k] for k in at)
+        return replace(self, **values)
 
     @cached_property
     def _spectrum(self) -> tuple[Array, Array]:

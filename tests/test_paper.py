@@ -21,6 +21,7 @@ def test_every_figure_is_on_the_page() -> None:
         assert (make_paper.PICTURES / f"{name}.png").exists()
 
 
+@pytest.mark.slow
 def test_the_papers_counts_are_those_of_fsolve() -> None:
     counts = {(name[8:], method): (calls, lost) for name, method, calls, _, lost in
               make_paper.counts(23)}  # fmt: skip

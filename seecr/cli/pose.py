@@ -64,6 +64,7 @@ def command(
         **rows_of(solution)[0],
         "sentence": solution.sentence(0),
         "softest_direction": softest_words(solution),
+        "frequencies_Hz": solution.frequencies[0],
         "equilibria": None if others is None else rows_of(others),
         "notes": notes,
     }

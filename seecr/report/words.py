@@ -7,19 +7,24 @@ from collections.abc import Iterator
 import numpy as np
 
 from seecr.pose import Array, pose_difference, rxyz_from_quat
+from seecr.robot import Robot
 from seecr.solution import Solution, Status
 
 __all__ = [
     "at_rest",
     "cable_lines",
+    "direction_words",
     "other_lines",
     "pose_lines",
     "softest_words",
+    "stiffness_lines",
     "sweep_lines",
 ]
 
 # A part of a direction below this is not worth a word.
 _PART = 0.1
+# Part of the weight that shows how soft a pose is.
+_NUDGE = 0.01
 
 
 def pose_lines(solution: Solution, i: int = 0, commanded: bool = True) -> Iterator[str]:
@@ -44,8 +49,7 @@ def pose_lines(solution: Solution, i: int = 0, commanded: bool = True) -> Iterat
             f"{np.degrees(np.linalg.norm(away[3:])):.4g} deg"
             f" ({_three(np.degrees(away[3:]), '+.4f')} deg about x y z)"
         )
-    soft = solution.smallest_eigenvalue[i]
-    yield f"softest: {softest_words(solution, i)}, {soft:.4g} N/m"
+    yield from stiffness_lines(solution, i)
     yield f"forces balance to {solution.residual[i]:.1g} of the load"
 
 
@@ -60,9 +64,49 @@ def cable_lines(solution: Solution, i: int = 0) -> Iterator[str]:
         yield f"{name:<{wide}}  {tension:11.4f}  {rest:15.6f}{slack}"
 
 
+def stiffness_lines(solution: Solution, i: int = 0) -> Iterator[str]:
+    """How stiff pose i is where it is softest, and how it vibrates."""
+    soft, way = solution.smallest_eigenvalue[i], softest_words(solution, i)
+    if solution.status[i] is Status.SINGULAR:
+        yield f"free to {way}"
+    elif solution.status[i] is Status.UNSTABLE:
+        yield f"leaves this pose: {way}"
+    else:
+        yield f"softest: {way}, {soft:.4g} N/m{_nudged(solution, i)}"
+    frequencies, shapes = (part[i] for part in solution.modes)
+    known = [f"{value:.4g}" for value in frequencies if np.isfinite(value)]
+    if known:
+        first = direction_words(solution.robot, shapes[:, 0])
+        yield f"vibrates at {', '.join(known)} Hz without damping; the lowest: {first}"
+
+
+def _nudged(solution: Solution, i: int) -> str:
+    """What a hundredth of the weight does where pose i is softest."""
+    robot = solution.robot
+    step = _NUDGE * robot.weight / solution.smallest_eigenvalue[i] * solution.softest_direction[i]
+    if robot.weight == 0.0 or not np.isfinite(step).all():
+        return ""
+    whole = np.linalg.norm(step * _metre(robot))
+    moved = float(np.linalg.norm(step[~robot.hinges]))
+    turned = float(np.linalg.norm(step[robot.hinges]))
+    parts = [f"{1e3 * moved:.3g} mm"] if moved > _PART * whole else []
+    if turned * robot.length > _PART * whole:
+        parts.append(f"{np.degrees(turned):.3g} deg")
+    return f": a hundredth of the weight moves it {' and '.join(parts)}"
+
+
+def _metre(robot: Robot) -> Array:
+    return np.where(robot.hinges, robot.length, 1.0)
+
+
 def softest_words(solution: Solution, i: int = 0) -> str:
     """The direction in which pose i is softest, such as "turn about y"."""
-    robot, direction = solution.robot, solution.softest_direction[i].copy()
+    return direction_words(solution.robot, solution.softest_direction[i])
+
+
+def direction_words(robot: Robot, direction: Array) -> str:
+    """A direction (d,) [m, rad] in words, such as "turn about y"."""
+    direction = direction / np.linalg.norm(direction * _metre(robot))
     if not np.isfinite(direction).all():
         return "no direction"
     if robot.joints:
@@ -70,7 +114,7 @@ def softest_words(solution: Solution, i: int = 0) -> str:
         sizes = [
             (joint.name, abs(v) * (robot.length if turns else 1.0)) for joint, v, turns in parts
         ]
-        return "along " + " and ".join(name for name, size in sizes if size > _PART)
+        return "move along " + " and ".join(name for name, size in sizes if size > _PART)
     words = []
     for verb, part in (("move along", direction[:3]), ("turn about", robot.length * direction[3:])):
         size = float(np.linalg.norm(part))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from seecr.effects import Term
 from seecr.equilibrium import solve
 from seecr.errors import InputError
 from seecr.mjcf import load_robot
@@ -43,13 +44,34 @@ def test_the_tilted_command_with_two_rests() -> None:
     assert line.startswith("could also rest 15.7") and "slack: cable2 cable3 cable5 cable7" in line
 
 
+def test_solve_tells_the_others() -> None:
+    robot = load_robot(model_path("demobot_parallel"))
+    quat = np.array([0.943, 0.163, -0.288, -0.038])
+    tilted = np.array([0.351, 0.216, 0.109, *(quat / np.linalg.norm(quat))])
+    found = solve(robot, [tilted, robot.reference_pose], others=True)
+    assert found.others is not None
+    first, second = found.others
+    assert len(first) == 1 and len(second) == 0
+    assert first.energy[0] == pytest.approx(-0.01533, abs=1e-5)
+    np.testing.assert_array_equal(first.command[0], found.command[0])
+    assert solve(robot, tilted).others is None and found.rows([1]).others == (second,)
+    # under a force that holds it the other way round, with the same lengths
+    pushed = solve(robot, tilted, others=True, wrench=[0, 0, 0, 0, 0.05, 0])
+    assert pushed.others is not None and len(pushed.others) == 1
+    hysteresis = [Term.of(robot, "hysteresis", amplitude_N=0.1)]
+    with pytest.raises(InputError, match="expected no other method, no start, no others"):
+        solve(robot, tilted, effects=hysteresis, others=True)
+    with pytest.raises(InputError, match="lead to one rest along their way"):
+        equilibria(robot, tilted, effects=hysteresis)
+
+
 def test_a_robot_with_one_rest_says_so() -> None:
     robot = load_robot(model_path("planar_vertical"))
     found = equilibria(robot, robot.reference_pose)
     assert len(found) == 1
     own = solve(robot, robot.reference_pose)
     assert list(other_lines(own, found)) == ["no other stable equilibrium was found"]
-    assert softest_words(own).startswith("along ")
+    assert softest_words(own).startswith("move along ")
     free = load_robot(model_path("demobot_parallel"))
     assert softest_words(solve(free, free.reference_pose)).startswith(("turn about", "move along"))
 
