@@ -1,78 +1,102 @@
-"""``crosscheck plan``: what planned poses will be able to show."""
+"""``crosscheck plan``: what planned poses will be able to show, or which to measure."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
 from pathlib import Path
 
 import click
 
+from crosscheck.cli.choices import listed, sigma_option
 from seecr.cli.options import FILE, json_option, out_option, progress_share
 
 
 @click.command(
-    short_help="What planned poses will be able to show.",
+    short_help="What planned poses will be able to show, or which to measure.",
     epilog="""\b
 Examples:
-  crosscheck plan robot.xml poses.csv
-  crosscheck plan robot.xml poses.csv --position-sigma 0.1mm --tension-sigma 0.05N
+  crosscheck plan robot.xml --rows 40
+  crosscheck plan robot.xml poses.csv --reads position,tension --sigma position=0.1mm
 """,
 )
 @click.argument("robot", type=FILE, metavar="ROBOT.xml")
-@click.argument("poses", type=FILE, metavar="POSES.csv")
-@click.option("--position-sigma", metavar="0.03mm", help="Noise of each measured coordinate.")
-@click.option("--orientation-sigma", metavar="0.02deg", help="Noise of each measured angle.")
+@click.argument("poses", type=FILE, metavar="[POSES.csv]", required=False)
 @click.option(
-    "--tension-sigma", metavar="0.05N", help="Noise of tensions; without it none are recorded."
+    "--rows", type=click.IntRange(min=6), metavar="N", help="Choose so many poses, without a file."
+)
+@click.option(
+    "--reads",
+    multiple=True,
+    metavar="KIND,...",
+    help="What will be read, of position, orientation and tension.  [default: position,"
+    "orientation, and tension where its noise is stated]",
+)
+@sigma_option
+@click.option("--lowest", type=float, metavar="N", default=0.0, help="Tension of proposed poses.")
+@click.option("--highest", type=float, metavar="N", default=math.inf, help="The same, at most.")
+@click.option(
+    "--box",
+    metavar="X0,Y0,Z0,X1,Y1,Z1",
+    help="Where poses are chosen [m].  [default: inside the exit points]",
 )
 @out_option("crosscheck-plan")
 @json_option
 def command(
     robot: Path,
-    poses: Path,
-    position_sigma: str | None,
-    orientation_sigma: str | None,
-    tension_sigma: str | None,
+    poses: Path | None,
+    rows: int | None,
+    reads: tuple[str, ...],
+    sigmas: tuple[str, ...],
+    lowest: float,
+    highest: float,
+    box: str | None,
     out: Path,
     as_json: bool,
 ) -> int:
-    """Tell, before anyone measures, which effects POSES.csv would show and tell apart.
+    """Tell, before anyone measures, which effects poses would show and tell apart.
 
-    POSES.csv holds commands as a file of measurements does; readings in it are ignored. Noise
-    comes from the options, from [sigma] in the TOML beside it, or is that of a good tracker.
+    POSES.csv holds commands as a file of measurements does; readings in it are ignored. With
+    --rows the poses are chosen: where the robot holds still within the tensions, and those that
+    together show and tell apart most effects. Noise comes from --sigma, from [sigma] in the TOML
+    beside POSES.csv, or is that of good sensors.
 
     For each effect: the smallest size that would show; the smallest beside the effect that
-    imitates it best; what it could not be told from; and what to add: poses, a payload, tensions,
-    the way back. Writes plan.json.
+    imitates it best; what it could not be told from; and what to add: poses, a payload, way
+    points, tensions, the way back.
 
     \b
+    Writes into --out:
+      plan.json        all of it
+      poses.csv        with --rows: the poses, as a controller can take them
+      add-KIND.csv     the commands of each thing to add
     Exit status: 0 all well, 2 bad input, 3 poses without an equilibrium.
     """
-    from crosscheck import load_commands, make_plan
+    if (poses is None) == (rows is None):
+        got = "neither" if poses is None else "both"
+        raise click.UsageError(f"expected POSES.csv or --rows N, got {got}")
+    from crosscheck import Sigma, load_commands, make_plan
     from crosscheck.files import json_text, staged, write_text
+    from crosscheck.measurements.stated import stated
+    from crosscheck.planning import box_of, compose, write_plan
     from crosscheck.terminal import print_plan
-    from crosscheck.units import parse_quantity
     from seecr import load_robot
 
-    texts = {
-        "position_m": ("--position-sigma", "position", position_sigma),
-        "orientation_rad": ("--orientation-sigma", "orientation", orientation_sigma),
-        "tension_N": ("--tension-sigma", "tension", tension_sigma),
-    }
-    given = {
-        key: parse_quantity(label, kind, text)
-        for key, (label, kind, text) in texts.items()
-        if text is not None
-    }
     machine = load_robot(robot)
-    commands = load_commands(poses, machine)
+    kinds, limits = tuple(listed(reads)), (lowest, highest)
+    given = None if poses is None else load_commands(poses, machine)
+    sigma = stated(Sigma() if given is None else given.sigma, sigmas)
     with staged(out) as folder:
         with progress_share("planning") as progress:
-            plan = make_plan(machine, commands, replace(commands.sigma, **given), progress)
+            commands = given or compose(
+                machine, rows or 0, sigma=sigma, reads=kinds, limits=limits, progress=progress,
+                box=box_of(box) if box else None,
+            )  # fmt: skip
+            plan = make_plan(machine, commands, sigma, progress, reads=kinds, limits=limits)
         text = json_text({"exit_status": 0 if plan.converged else 3, **plan.as_json()})
         write_text(folder / "plan.json", text + "\n")
+        files = write_plan(plan, folder, chosen=given is None)
     if as_json:
         click.echo(text)
     else:
-        print_plan(plan, out)
+        print_plan(plan, out, files)
     return 0 if plan.converged else 3

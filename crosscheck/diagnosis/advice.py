@@ -13,7 +13,8 @@ from crosscheck.diagnosis.result import MissingEffect
 from crosscheck.diagnosis.rivals import Rival
 from crosscheck.diagnosis.search import Search
 from crosscheck.fit.reasons import DiagnosisVerdict
-from crosscheck.planning.extensions import Extension, extensions
+from crosscheck.planning.adding import Extension
+from crosscheck.planning.extensions import extensions
 from crosscheck.planning.planned import Planned, Reads
 from crosscheck.planning.proposer import Suggestion, telling_apart
 from crosscheck.units import in_unit, parameter_name

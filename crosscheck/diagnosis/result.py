@@ -18,6 +18,7 @@ from crosscheck.fit.problem import Rms
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Refusal
 from crosscheck.fit.tolerance import LeftOver
 from crosscheck.fit.words import rms_words, value_lines, value_records
+from crosscheck.planning.sight import Sight
 from seecr.effects import Term, Terms
 from seecr.effects.base import Layout
 from seecr.pose import Array
@@ -137,6 +138,7 @@ class Diagnosis(Result):
         refusal: why there is no verdict; None where there is one.
         left: what is left beyond noise, and whether it matters; None without a verdict.
         chances: of every effect; None without a verdict.
+        sight: what the data can show, and what not, whatever the verdict; None without one.
     """
 
     verdict: DiagnosisVerdict
@@ -155,6 +157,7 @@ class Diagnosis(Result):
     refusal: Refusal | None = None
     left: LeftOver | None = None
     chances: Chances | None = None
+    sight: Sight | None = None
 
     @property
     def converged(self) -> bool:
@@ -168,7 +171,8 @@ class Diagnosis(Result):
 
     def lines(self) -> list[str]:
         """The verdict, the error on its way down, and what to measure next."""
-        out = [f"{self.verdict.value}: {self.sentence}"]
+        out = [] if self.sight is None else self.sight.lines()
+        out.append(f"{self.verdict.value}: {self.sentence}")
         if self.refusal is None:
             out.append(f"as it stands: {rms_words(self.before)}")
             out += [line for found in self.missing for line in found.lines()]
@@ -192,6 +196,7 @@ class Diagnosis(Result):
             {
                 "verdict": self.verdict.value,
                 "sentence": self.sentence,
+                "can_show": self.sight,
                 "missing": [found.as_json() for found in self.missing],
                 "before": self.before,
                 "after": self.after,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
 
@@ -22,6 +23,8 @@ from crosscheck.fit.reasons import DiagnosisVerdict, Refusal, Unfit
 from crosscheck.fit.tolerance import HALF_THE_NOISE, Tolerance
 from crosscheck.given import GivenModel, GivenRobot, considered, model_of, robot_of
 from crosscheck.measurements.read import GivenData, measurements_of
+from crosscheck.planning.sight import sight_of
+from seecr.pose import Array
 
 
 def diagnose(
@@ -72,11 +75,21 @@ def _diagnosed(ready: Prepared, said: Notes, progress: Progress) -> Diagnosis:
     notes = (*said, *ready.all_notes)
     if refusal is not None:
         return no_verdict(problem, base, notes, refusal)
+    sight = sight_of(problem, base, factor)
+    found = _searched(ready, base, factor, notes, progress)
+    return replace(found, sight=sight)
+
+
+def _searched(
+    ready: Prepared, base: Fit, factor: Array, notes: Notes, progress: Progress
+) -> Diagnosis:
+    """The verdict of data that are fit for one."""
+    problem = ready.problem
     found, more = by_steps(problem, base, factor, _part(progress, 0.0, 0.5))
     if found.last.whiteness.is_noise:
         return settled(found, (*notes, *more))
     # no few effects one after the other, or noise that goes together: all at once, in sets
-    sought = seek(problem, problem.data.sigma, terms, _part(progress, 0.5, 1.0))
+    sought = seek(problem, problem.data.sigma, ready.terms, _part(progress, 0.5, 1.0))
     if sought.judgement.verdict is not DiagnosisVerdict.UNKNOWN_EFFECT:
         return explained(sought, notes)
     return unexplained(found, chances_of(sought), (*notes, *more))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -12,19 +12,23 @@ from crosscheck.fit.prepare import Progress
 from crosscheck.given import GivenRobot, robot_of
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import commands_of
+from crosscheck.planning.adding import NO_LIMITS, Limits
+from crosscheck.planning.detours import detours
 from crosscheck.planning.extensions import extensions
 from crosscheck.planning.greedy import Wanted
-from crosscheck.planning.planned import Planned, Reads, expected_sigma, near_slack, planned
+from crosscheck.planning.planned import (
+    Planned,
+    Reads,
+    expected_sigma,
+    kinds_of,
+    near_slack,
+    planned,
+)
 from crosscheck.planning.proposer import propose
 from crosscheck.planning.result import Plan, Visible
-from crosscheck.planning.visibility import (
-    EXACT,
-    Signal,
-    left_over,
-    needed,
-    signals,
-    signals_like,
-)
+from crosscheck.planning.sight import all_visible
+from crosscheck.planning.visibility import Signal, signals, signals_like
+from seecr.effects import Term, Terms, effect_named, layout_of
 from seecr.pose import Array
 
 
@@ -33,32 +37,46 @@ def make_plan(
     commands: Measurements | str | Path,
     sigma: Sigma | None = None,
     progress: Progress = lambda _text, _part: None,
+    *,
+    reads: Collection[str] = (),
+    limits: Limits = NO_LIMITS,
 ) -> Plan:
     """What planned commands will show of each effect.
 
     Args:
         robot: as described, or its MJCF.
         commands: planned poses or lengths, or their file; readings in it are ignored.
-        sigma: noise to expect; the commands' own by default. With a tension noise, tensions
-            count as recorded.
+        sigma: noise to expect; the commands' own by default.
         progress: called with what is being done and the part of it that is done.
+        reads: kinds of readings there will be, of "position", "orientation" and "tension"; by
+            default the pose, and tensions where their noise is stated.
+        limits: lowest and highest tension [N] of poses that are proposed.
+
+    Raises:
+        CrosscheckError: an unknown kind of reading.
     """
     robot = robot_of(robot)
     commands = commands_of(commands, robot)
-    full, assumed = expected_sigma(robot, sigma or commands.sigma)
-    reads = Reads.whole(robot.n_cables, tensions=full.tension_N is not None)
-    plan = planned(robot, commands, full, reads)
+    stated = sigma or commands.sigma
+    kinds = kinds_of(reads, stated)
+    read = Reads.of_kinds(robot.n_cables, kinds)
+    full, assumed = expected_sigma(robot, stated, kinds)
+    free = [layout_of(effect_named(name), robot) for name in commands.free]
+    plan = planned(robot, commands, full, read, Terms(Term(one, one.null) for one in free))
     notes = [*commands.notes, *assumed, *_unsolved(plan)]
     if not plan.problem.use.any():
         return Plan(plan, (), {}, ((), np.zeros((0, 0))), (), (), tuple(notes))
     progress("sensitivities", 0.1)
     own, missing = signals(plan)
-    effects = _all_visible(own)
+    effects = all_visible(own)
     progress("what could be added", 0.4)
     suggestions = propose(
-        list(extensions(plan)), own, _wanted(own, effects), lambda there: signals_like(there, own),
+        [*extensions(plan, limits), *detours(plan)],
+        own,
+        _wanted(own, effects),
+        lambda there: signals_like(there, own),
         lambda text, part: progress(text, 0.5 + 0.5 * part),
-    )  # fmt: skip
+    )
     names = robot.cable_names
     return Plan(
         planned=plan,
@@ -78,32 +96,6 @@ def _unsolved(plan: Planned) -> list[str]:
     lines = plan.problem.data.places(rows)
     status = plan.base.state.prediction.solution().status[rows[0]].value
     return [f"lines {lines} left out: {status}"]
-
-
-def _all_visible(own: Mapping[str, Signal]) -> dict[str, Visible]:
-    return {name: _visible(name, own) for name in own}
-
-
-def _visible(name: str, own: Mapping[str, Signal]) -> Visible:
-    g = own[name]
-    need = needed(g.directions, len(own))
-    power = g.power
-    left = {other: left_over(g, s) for other, s in own.items() if other != name}
-    twins = tuple(o for o, value in left.items() if power > 0 and value <= EXACT * power)
-    rest = {o: value for o, value in left.items() if o not in twins}
-    imitator = min(rest, key=lambda o: rest[o]) if rest else ""
-    least = rest[imitator] if imitator else power
-    confused: list[tuple[str, float]] = []
-    if power >= need:
-        near = sorted((value, o) for o, value in rest.items() if value < need)
-        confused = [(o, value) for value, o in near]
-    return Visible(
-        g, need, _size(need, power), _size(need, least), imitator, tuple(confused), twins
-    )
-
-
-def _size(need: float, power: float) -> float:
-    return float(np.sqrt(need / power)) if power > 0 else np.inf
 
 
 def _confusion(own: Mapping[str, Signal]) -> tuple[tuple[str, ...], Array]:

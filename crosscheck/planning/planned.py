@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from crosscheck.errors import CrosscheckError
 from crosscheck.fit.candidates import null_fit
 from crosscheck.fit.gauss_newton import Fit
 from crosscheck.fit.problem import Problem
@@ -17,12 +19,17 @@ from seecr.effects.base import Readings
 from seecr.experiment import Experiment
 from seecr.pose import Array, rxyz_from_quat
 from seecr.robot import Robot
+from seecr.workspace import load_scale
 
 # Noise of a good tracker over the mean cable length (30 micrometres on a DemoBot), of its angles,
 # and of load cells over the mean tension.
 _POSITION, _ORIENTATION_RAD, LOAD_CELL = 6e-5, 3.5e-4, 0.01
 # A cable stretched or loose by less than this part of the usual stretch may switch.
 _NEAR_SLACK = 0.05
+# No load cell is better than this [N].
+_LEAST_CELL = 1e-9
+READ = ("position", "orientation", "tension")
+"""Kinds of readings."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +58,27 @@ class Reads:
         every = np.full(3, pose)
         return cls(every, pose, np.zeros(3, dtype=bool), np.full(n_cables, tensions))
 
+    @classmethod
+    def of_kinds(cls, n_cables: int, kinds: Collection[str]) -> Reads:
+        """Whole positions, orientations, tensions: those that are named.
+
+        Raises:
+            CrosscheckError: another word, or none.
+        """
+        wrong = [kind for kind in kinds if kind not in READ]
+        if wrong or not kinds:
+            got = repr(wrong[0]) if wrong else "nothing"
+            raise CrosscheckError(f"--reads: expected some of {', '.join(READ)}, got {got}")
+        every = np.full(3, "position" in kinds)
+        tensions = np.full(n_cables, "tension" in kinds)
+        return cls(every, "orientation" in kinds, np.zeros(3, dtype=bool), tensions)
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Names of what is read."""
+        there = (self.position.any(), self.orientation or self.angles.any(), self.tensions.any())
+        return tuple(kind for kind, some in zip(READ, there, strict=True) if some)
+
     @property
     def whole_pose(self) -> bool:
         """Whether nothing of the pose is left to read."""
@@ -77,18 +105,40 @@ class Planned:
         return ~np.asarray(self.base.state.prediction.solved)
 
 
-def expected_sigma(robot: Robot, stated: Sigma) -> tuple[Sigma, tuple[str, ...]]:
-    """The noise to plan with: what is stated, else that of a good tracker; and what was assumed."""
+def kinds_of(reads: Collection[str], sigma: Sigma) -> tuple[str, ...]:
+    """The kinds that are named, or the pose, and tensions where their noise is stated."""
+    return tuple(reads) or (READ if sigma.tension_N is not None else READ[:2])
+
+
+def usual_cell(tension: float) -> float:
+    """The noise [N] of a load cell for usual tensions [N]."""
+    return float(f"{max(LOAD_CELL * tension, _LEAST_CELL):.1g}")
+
+
+def expected_sigma(
+    robot: Robot, stated: Sigma, kinds: Collection[str] = READ[:2]
+) -> tuple[Sigma, tuple[str, ...]]:
+    """The noise to plan with: what is stated, else that of good sensors; and what was assumed.
+
+    What is assumed of other kinds than those that are read is not said.
+    """
     length = float(np.mean(robot.nominal_lengths(robot.reference_pose[None])))
     notes = []
     sigma = stated
     if sigma.position_m is None:
         sigma = replace(sigma, position_m=float(f"{_POSITION * length:.1e}"))
-        notes.append(f"noise of positions is not stated: {1e3 * sigma.position_m:.3g} mm assumed")  # type: ignore[operator]
+        if "position" in kinds:
+            notes.append(
+                f"noise of positions is not stated: {1e3 * sigma.position_m:.3g} mm assumed"  # type: ignore[operator]
+            )
     if sigma.orientation_rad is None:
         sigma = replace(sigma, orientation_rad=_ORIENTATION_RAD)
         degrees = np.degrees(_ORIENTATION_RAD)
-        notes.append(f"noise of angles is not stated: {degrees:.2g} deg assumed")
+        if "orientation" in kinds:
+            notes.append(f"noise of angles is not stated: {degrees:.2g} deg assumed")
+    if sigma.tension_N is None and "tension" in kinds:
+        sigma = replace(sigma, tension_N=usual_cell(load_scale(robot) / robot.n_cables))
+        notes.append(f"noise of tensions is not stated: {sigma.tension_N:g} N assumed")
     return sigma, tuple(notes)
 
 

@@ -14,7 +14,8 @@ import numpy as np
 
 from crosscheck.fit.prepare import Progress
 from crosscheck.fit.state import derivatives
-from crosscheck.planning.extensions import Adding, Extension
+from crosscheck.measurements.data import Measurements
+from crosscheck.planning.adding import Adding, Extension
 from crosscheck.planning.greedy import Wanted, chosen_poses
 from crosscheck.planning.planned import Planned
 from crosscheck.planning.visibility import EXACT, Signal, joined, left_over
@@ -29,6 +30,8 @@ MORE_POSES = 6
 # Repeating everything doubles each signal: a proposal must do more than that, and bring it to
 # this part of what is needed.
 _GAINS, _NEAR = 2.5, 0.1
+# What is added to the same poses.
+_SENSORS = (Adding.TENSIONS, Adding.POSE)
 
 Signals = Mapping[str, Signal]
 
@@ -66,12 +69,14 @@ class Suggestion:
         kind: what is added. words: what to do.
         gains: what crosses what is needed, then what only comes nearer.
         poses: (k, 7) to add, for poses.
+        commands: what to command for it; None for sensors.
     """
 
     kind: Adding
     words: str
     gains: tuple[Gain, ...]
     poses: Array | None = None
+    commands: Measurements | None = None
 
     @property
     def reached(self) -> tuple[Gain, ...]:
@@ -113,7 +118,9 @@ def propose(
         if option.kind is Adding.POSES:
             out.append(_few_poses(option, own, there, wanted))
         else:
-            out.append(Suggestion(option.kind, option.words, _gains(own, there, wanted)))
+            told = option.plan.problem.data if option.kind not in _SENSORS else None
+            gains = _gains(own, there, wanted)
+            out.append(Suggestion(option.kind, option.words, gains, commands=told))
     useful = [s for s in out if s.gains]
     return tuple(sorted(useful, key=lambda s: (-len(s.reached), -len(s.gains))))
 
@@ -143,7 +150,8 @@ def _few_poses(
     few = {n: Signal(s.layout, s.shape, s.columns[some]) for n, s in there.items()}
     count = f"{len(rows)} poses" if len(rows) > 1 else "one pose"
     words = f"add the {count} listed below"
-    return Suggestion(Adding.POSES, words, _gains(own, few, open_), grid.poses[rows])
+    gains, told = _gains(own, few, open_), grid.plan.problem.data.rows(rows)
+    return Suggestion(Adding.POSES, words, gains, grid.poses[rows], told)
 
 
 def telling_apart(

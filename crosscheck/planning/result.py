@@ -175,6 +175,7 @@ class Plan(Result):
             "robot": problem.robot.name,
             "poses": str(problem.data.path),
             "rows": {"all": problem.data.n_rows, "used": int(problem.use.sum())},
+            "reads": list(self.planned.reads.kinds),
             "sigma": vars(problem.sigma),
             "level": LEVEL,
             "power": POWER,

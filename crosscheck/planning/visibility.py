@@ -17,7 +17,8 @@ from scipy import optimize, stats
 
 from crosscheck.fit import imitation
 from crosscheck.fit.candidates import candidates_for
-from crosscheck.fit.imitation import basis
+from crosscheck.fit.imitation import basis, beside
+from crosscheck.fit.known import free_derivatives
 from crosscheck.fit.reasons import Reason, Why
 from crosscheck.fit.starts import amplitude_columns
 from crosscheck.planning.planned import Planned
@@ -76,8 +77,11 @@ def signals(plan: Planned) -> tuple[dict[str, Signal], dict[str, Reason]]:
     """Signals of all effects of the catalogue, and why some have none."""
     found: dict[str, Signal] = {}
     missing: dict[str, Reason] = {}
+    span = _of_model(plan)
     for candidate in candidates_for(plan.problem):
         layout = candidate.layout
+        if layout.name in plan.base.terms:
+            continue
         if candidate.why_not is not None:
             missing[layout.name] = candidate.why_not
             continue
@@ -85,16 +89,22 @@ def signals(plan: Planned) -> tuple[dict[str, Signal], dict[str, Reason]]:
         if shape is None:
             missing[layout.name] = Reason(Why.NOT_MOVED)
             continue
-        found[layout.name] = Signal(layout, shape, _columns(plan, layout, shape))
+        found[layout.name] = Signal(layout, shape, beside(_columns(plan, layout, shape), span))
     return found, missing
 
 
 def signals_like(plan: Planned, like: Mapping[str, Signal]) -> dict[str, Signal]:
     """Signals of the same effects, of the same sizes, in another plan."""
+    span = _of_model(plan)
     return {
-        name: Signal(s.layout, s.shape, _columns(plan, s.layout, s.shape))
+        name: Signal(s.layout, s.shape, beside(_columns(plan, s.layout, s.shape), span))
         for name, s in like.items()
     }
+
+
+def _of_model(plan: Planned) -> Array:
+    """Basis (N, k) of what the model's own effects can imitate: they are fitted along."""
+    return basis(free_derivatives(plan.problem, plan.base.state))
 
 
 def _middle_shape(plan: Planned, layout: Layout) -> dict[str, float] | None:

@@ -62,6 +62,7 @@ def _context(found: Diagnosis) -> dict[str, Any]:
         "sentence": found.sentence,
         "before": rms_words(found.before),
         "floor": rms_words(found.floor),
+        "can_show": [] if found.sight is None else found.sight.lines(),
         "notes": list(found.notes),
         "measure_next": list(found.measure_next),
         "findings": [finding_card(found, finding) for finding in found.missing],

@@ -29,6 +29,8 @@ _MOST_CANDIDATES, _MOST_PARAMETERS = 6, 9
 def print_diagnosis(found: Diagnosis, out: Path, console: Console | None = None) -> None:
     """Print the verdict, the errors on the way, the parameters, and what to measure next."""
     console = console_for(console)
+    for line in found.sight.lines() if found.sight is not None else ():
+        say(console, line, "dim")
     say(console, f"{found.verdict}: {found.sentence}", _STYLE[found.verdict])
     for note in found.notes:
         say(console, f"note: {note}", "dim")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +17,10 @@ from seecr.pose import rotvec_from_quat
 _MOST_GAINS, _MOST_NAMES, _MOST_SLACK = 3, 4, 5
 
 
-def print_plan(plan: Plan, out: Path, console: Console | None = None) -> None:
-    """Print what will show, what cannot be told apart, and what to add."""
+def print_plan(
+    plan: Plan, out: Path, files: Sequence[str] = (), console: Console | None = None
+) -> None:
+    """Print what will show, what cannot be told apart, what to add, and the files of commands."""
     console = console_for(console)
     for note in plan.notes:
         say(console, f"note: {note}", "dim")
@@ -29,7 +32,8 @@ def print_plan(plan: Plan, out: Path, console: Console | None = None) -> None:
     say(console, plan.sentence, "bold")
     for suggestion in plan.suggestions:
         _print_suggestion(console, suggestion)
-    say(console, f"Results in {out}/", "dim")
+    more = f", commands in {', '.join(files)}" if files else ""
+    say(console, f"Results in {out}/{more}", "dim")
 
 
 def _table(plan: Plan) -> Table:

@@ -7,6 +7,8 @@ import json
 import pytest
 from made_data import case, refused, run
 
+from seecr.shipped import model_path
+
 
 @pytest.fixture(scope="module")
 def poses(tmp_path_factory):
@@ -44,8 +46,9 @@ def test_a_plan_says_what_shows_what_is_alike_and_what_to_add(poses, tmp_path):
 
 
 def test_json_and_stated_noise(poses, tmp_path):
-    options = ("--position-sigma", "0.1mm", "--orientation-sigma", "1mrad")
-    result = run("plan", *poses, *options, "--tension-sigma", "0.05N", "--json", "--out", tmp_path)
+    options = ("--sigma", "position=0.1mm", "--sigma", "orientation=1mrad")
+    tension = ("--sigma", "tension=0.05N")
+    result = run("plan", *poses, *options, *tension, "--json", "--out", tmp_path)
     document = json.loads(result.stdout)
     assert document == json.loads((tmp_path / "plan.json").read_text())
     assert document["sigma"]["position_m"] == pytest.approx(1e-4)
@@ -57,8 +60,34 @@ def test_json_and_stated_noise(poses, tmp_path):
 
 def test_noise_without_a_right_unit_is_refused(poses, tmp_path):
     out = tmp_path / "out"
-    text = refused("plan", *poses, "--position-sigma", "0.1", "--out", out)
-    assert "--position-sigma: expected a number with its unit" in text
-    assert "got unit 'mm'" in refused("plan", *poses, "--tension-sigma", "1mm", "--out", out)
+    text = refused("plan", *poses, "--sigma", "position=0.1", "--out", out)
+    assert "--sigma position: expected a number with its unit" in text
+    assert "got unit 'mm'" in refused("plan", *poses, "--sigma", "tension=1mm", "--out", out)
     assert "none.csv" in refused("plan", poses[0], tmp_path / "none.csv", "--out", out)
     assert not out.exists()
+
+
+def test_a_plan_from_nothing_but_a_robot(tmp_path):
+    xml = model_path("planar_vertical")
+    out, again = tmp_path / "plan", tmp_path / "again"
+    given = ("--reads", "position,tension", "--sigma", "tension=0.05N", "--highest", "60")
+    result = run("plan", xml, "--rows", 12, *given, "--out", out)
+    assert result.exit_code == 0, result.output
+    assert "commands in poses.csv" in result.stdout
+    document = json.loads((out / "plan.json").read_text())
+    assert document["reads"] == ["position", "tension"] and document["rows"]["used"] == 12
+    # what was written is read again, and shows the same
+    run("plan", xml, out / "poses.csv", *given, "--out", again)
+    same = json.loads((again / "plan.json").read_text())
+    assert same["sentence"] == document["sentence"]
+
+
+def test_what_is_asked_of_a_plan_wrongly_is_said(poses, tmp_path):
+    out = ("--out", tmp_path / "out")
+    assert "expected POSES.csv or --rows N, got both" in refused("plan", *poses, "--rows", 9, *out)
+    assert "got neither" in refused("plan", poses[0], *out)
+    text = refused("plan", *poses, "--reads", "position,colour", *out)
+    assert "--reads: expected some of position, orientation, tension, got 'colour'" in text
+    assert "--box: expected X0,Y0" in refused("plan", poses[0], "--rows", 9, "--box", "1,2", *out)
+    text = refused("plan", poses[0], "--rows", 9, "--highest", "0.1", *out)
+    assert "holds still at 0 of" in text and "ask for fewer --rows, wider tensions" in text

@@ -15,7 +15,8 @@ from crosscheck.fit.prepare import prepare
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.reasons import Unfit
 from crosscheck.measurements.data import Measurements, Sigma
-from crosscheck.planning.extensions import PAYLOAD, Adding, extensions
+from crosscheck.planning.adding import Adding
+from crosscheck.planning.extensions import PAYLOAD, extensions
 from crosscheck.planning.planned import Reads, planned
 from crosscheck.twin.trajectory import trajectory
 from seecr.effects import Terms

@@ -15,9 +15,11 @@ from crosscheck.fit.candidates import Trials, null_fit, try_candidate
 from crosscheck.fit.problem import Problem
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.together import together
+from crosscheck.planning.adding import Adding
 from crosscheck.planning.design import make_plan
-from crosscheck.planning.extensions import Adding, extensions, more_poses
+from crosscheck.planning.extensions import extensions
 from crosscheck.planning.greedy import Wanted, chosen_poses
+from crosscheck.planning.places import more_poses
 from crosscheck.planning.planned import Reads, near_slack, planned
 from crosscheck.planning.proposer import MORE_POSES, NEEDED, telling_apart
 from crosscheck.planning.visibility import joined, left_over, needed, signals, signals_like

@@ -65,11 +65,13 @@ def test_an_addition_tells_values_errors_and_what_was_written() -> None:
     assert why_not(added).endswith("it does not pay; --force adds it all the same")
 
 
-def test_a_diagnosis_begins_with_its_verdict() -> None:
+def test_a_diagnosis_begins_with_what_shows_and_then_its_verdict() -> None:
     screen, out = console()
     found = made.pulleys()
     print_diagnosis(found, Path("here"), screen)
     lines = out.getvalue().splitlines()
+    assert lines[0].startswith("These data would show ")
+    lines = lines[len(found.sight.lines()) :]
     assert lines[0] == f"effects_found: {found.sentence}"
     assert any(line.startswith("pulley_radius: ") for line in lines)
     assert any(line.startswith("not ") for line in lines) and lines[-1].startswith("Results in")

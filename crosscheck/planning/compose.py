@@ -1,0 +1,170 @@
+"""Poses to measure, from nothing but a robot: those that tell most, in runs."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.errors import CrosscheckError
+from crosscheck.fit.prepare import Progress
+from crosscheck.given import GivenRobot, robot_of
+from crosscheck.measurements.data import Measurements, Sigma
+from crosscheck.planning.adding import NO_LIMITS, Limits
+from crosscheck.planning.greedy import Wanted, chosen_poses
+from crosscheck.planning.places import held_within, tilted_grid, trustworthy
+from crosscheck.planning.planned import Planned, Reads, expected_sigma, kinds_of, planned
+from crosscheck.planning.sight import all_visible
+from crosscheck.planning.visibility import EXACT, Signal, left_over, signals
+from seecr.joints import pose_of_values
+from seecr.pose import Array
+from seecr.robot import Robot
+
+# Candidates along x, y, z, or so many random ones on joints, and most of them that are weighed.
+_GRID, _JOINT_POSES, _MOST = (6, 6, 4), 400, 240
+# Parts of the room between the exit points that are left free at the sides and at the top, and
+# how far joints turn [rad].
+_SIDE, _TOP, _TURN = 0.15, 0.15, 0.2
+# How far below home robots go whose exit points are all above, over the way above home.
+_BELOW = 0.25
+# An effect is to be told from so many others, those that are most like it.
+_RIVALS = 3
+# Rows of a run, and least runs: diagnoses leave one out after the other.
+_ROWS_A_RUN, _LEAST_RUNS = 12, 3
+
+
+def compose(
+    robot: GivenRobot,
+    rows: int,
+    *,
+    sigma: Sigma | None = None,
+    reads: Collection[str] = (),
+    limits: Limits = NO_LIMITS,
+    box: Array | None = None,
+    progress: Progress = lambda _text, _part: None,
+) -> Measurements:
+    """Choose poses to measure: those that together show and tell apart most effects.
+
+    Args:
+        robot: as described, or its MJCF.
+        rows: how many.
+        sigma: noise to expect; that of good sensors without.
+        reads: kinds of readings there will be; see :func:`make_plan`.
+        limits: lowest and highest tension [N].
+        box: (2, 3) [m] lowest and highest position; inside the exit points without.
+        progress: called with what is being done and the part of it that is done.
+
+    Returns:
+        commands, in runs that go from each pose to one nearby.
+
+    Raises:
+        CrosscheckError: too few poses at which the robot holds still within the limits.
+    """
+    robot = robot_of(robot)
+    progress("looking for poses", 0.0)
+    kinds = kinds_of(reads, sigma or Sigma())
+    full, _assumed = expected_sigma(robot, sigma or Sigma(), kinds)
+    poses = tried = _candidates(robot, box)
+    if robot.n_cables >= (len(robot.joints) or 6):  # fewer cables hold no pose, but rest near it
+        poses = held_within(robot, poses, limits)
+    plan = _usable(robot, poses, full, Reads.of_kinds(robot.n_cables, kinds), limits)
+    found = 0 if plan is None else plan.problem.data.n_rows
+    if plan is None or found < rows:
+        raise CrosscheckError(
+            f"robot {robot.name} holds still at {found} of {len(tried)} poses that were tried; "
+            f"expected {rows} or more; ask for fewer --rows, wider tensions, or another --box"
+        )
+    progress("sensitivities", 0.2)
+    there = signals(plan)[0]
+    nothing = {n: Signal(s.layout, s.shape, s.columns[:0]) for n, s in there.items()}
+    progress("choosing poses", 0.4)
+    chosen = chosen_poses(nothing, there, plan.problem.row_of, _wanted(there), rows)
+    pose = plan.problem.data.command_pose
+    assert pose is not None
+    pose = pose[sorted(chosen)]
+    pose = pose[_way(robot, pose)]
+    runs = max(_LEAST_RUNS, round(rows / _ROWS_A_RUN))
+    run = np.array([f"run {1 + k * runs // len(pose)}" for k in range(len(pose))])
+    return Measurements(
+        path=Path("poses.csv"), n_cables=robot.n_cables, run=run, command_pose=pose,
+        sigma=sigma or Sigma(),
+    )  # fmt: skip
+
+
+def _candidates(robot: Robot, box: Array | None) -> Array:
+    low, high = _room(robot) if box is None else box
+    if robot.joints:
+        slides = np.array([joint.kind == "slide" for joint in robot.joints])
+        axes = np.array([joint.axis for joint in robot.joints])
+        reach = np.where(slides, 0.5 * np.abs(axes @ (high - low)), _TURN)
+        middle = np.where(slides, axes @ (0.5 * (low + high) - robot.reference_pose[:3]), 0.0)
+        random = np.random.default_rng(0).uniform(-1.0, 1.0, (_JOINT_POSES, len(reach)))
+        return np.asarray(pose_of_values(robot, middle + reach * random)[0])
+    return tilted_grid(robot, low, high, _GRID)
+
+
+def _room(robot: Robot) -> tuple[Array, Array]:
+    """Inside the exit points; as low as these, or below home by a part of the way above it."""
+    low, high = robot.exit_points.min(axis=0), robot.exit_points.max(axis=0)
+    home, span = robot.reference_pose[:3], high - low
+    inner_low, inner_high = low + _SIDE * span, high - _SIDE * span
+    below = _BELOW * (high[2] - home[2])
+    inner_high[2] = high[2] - _TOP * (high[2] - min(low[2], home[2] - below))
+    inner_low[2] = low[2] + _SIDE * span[2] if low[2] < home[2] else home[2] - below
+    return np.minimum(inner_low, home), np.maximum(inner_high, home)
+
+
+def _usable(
+    robot: Robot, poses: Array, sigma: Sigma, reads: Reads, limits: Limits
+) -> Planned | None:
+    """The plan of those poses at which the plain robot rests, stiff and within the limits."""
+    if len(poses) == 0:
+        return None
+    every = _plan(robot, poses, sigma, reads)
+    tensions = every.base.state.prediction.tensions
+    good = trustworthy(every, every) if every.problem.use.any() else every.problem.use
+    good = good & (tensions <= limits[1]).all(axis=1) & (tensions >= limits[0]).all(axis=1)
+    kept = np.flatnonzero(good)
+    if len(kept) == 0:
+        return None
+    # spread over all of them: their order is that of the grid
+    kept = kept[np.unique(np.linspace(0, len(kept) - 1, min(_MOST, len(kept))).astype(int))]
+    return _plan(robot, poses[kept], sigma, reads)
+
+
+def _plan(robot: Robot, poses: Array, sigma: Sigma, reads: Reads) -> Planned:
+    run = np.array([f"pose {k + 1}" for k in range(len(poses))])
+    data = Measurements(
+        path=Path("poses.csv"), n_cables=robot.n_cables, run=run, command_pose=poses
+    )
+    return planned(robot, data, sigma, reads)
+
+
+def _wanted(there: dict[str, Signal]) -> list[Wanted]:
+    """Each effect that all poses together show, and those most like it."""
+    out = []
+    for name, found in all_visible(there).items():
+        if not found.visible:
+            continue
+        out.append(Wanted(name, "", 0.0, found.needed))
+        left = {
+            other: left_over(there[name], signal)
+            for other, signal in there.items()
+            if other != name and other not in found.twins
+        }
+        hard = [o for o in sorted(left, key=lambda o: left[o]) if left[o] > EXACT * found.needed]
+        out += [Wanted(name, other, 0.0, found.needed) for other in hard[:_RIVALS]]
+    return out
+
+
+def _way(robot: Robot, poses: Array) -> NDArray[np.int64]:
+    """An order in which each pose is followed by the nearest that is left."""
+    at, left, out = robot.reference_pose[:3], list(range(len(poses))), []
+    while left:
+        nearest = min(left, key=lambda k: float(np.linalg.norm(poses[k, :3] - at)))
+        left.remove(nearest)
+        out.append(nearest)
+        at = poses[nearest, :3]
+    return np.array(out)

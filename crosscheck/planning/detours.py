@@ -1,0 +1,80 @@
+"""Plans of their own that a robot's user can carry out besides: loads aside, poses from beyond."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from crosscheck.measurements.data import Measurements
+from crosscheck.planning.adding import Adding, Extension, like
+from crosscheck.planning.extensions import PAYLOAD, named_again
+from crosscheck.planning.planned import Planned
+from seecr.loads import Loads
+from seecr.pose import Array
+from seecr.workspace import feasible
+
+# A payload aside hangs so far off the centre of mass, over the widest distance of two anchor
+# points across; a way point lies so much of the way beyond a pose.
+_ASIDE, _BEYOND_POSE = 0.25, 0.5
+
+
+def detours(plan: Planned) -> Iterator[Extension]:
+    """A payload aside, and each pose again from beyond it."""
+    data = plan.problem.data.rows(plan.problem.use)
+    yield from _aside(plan, data)
+    yield from _way_points(plan, data)
+
+
+def _aside(plan: Planned, data: Measurements) -> Iterator[Extension]:
+    """A known payload off the centre of mass."""
+    robot = plan.problem.robot
+    if robot.mass <= 0.0 or data.loads is not None or robot.joints:
+        return
+    span, n = np.ptp(robot.anchor_points[:, :2], axis=0), data.n_rows
+    place = robot.centre_of_mass + _ASIDE * float(span.max()) * np.eye(3)[int(span.argmax())]
+    mass, where = PAYLOAD * robot.mass, ", ".join(f"{v:.3g}" for v in place)
+    there = Loads(np.full(n, mass), np.tile(place, (n, 1)), np.zeros((n, 6)))
+    yield Extension(
+        Adding.PAYLOAD_ASIDE,
+        f"repeat the poses with a known {mass:.2g} kg aside, at ({where}) m of the platform "
+        "(payload_kg, payload_x_m, payload_y_m, payload_z_m)",
+        like(plan, replace(data, loads=there, run=named_again(data))),
+    )
+
+
+def _way_points(plan: Planned, data: Measurements) -> Iterator[Extension]:
+    """Each pose again from beyond it: a row without readings before each that has some."""
+    beyond = _beyond(plan, data)
+    if beyond is None or data.command_pose is None:
+        return
+    n = data.n_rows
+    both = data.rows(np.repeat(np.arange(n), 2))
+    stops = np.tile([False, True], n)
+    gone_through = replace(
+        both,
+        run=named_again(both),
+        command_pose=np.stack([beyond, data.command_pose], axis=1).reshape(2 * n, 7),
+        # something is read at the stops and nothing between them; what, is the model's
+        position=np.where(stops[:, None], np.zeros(3), np.nan),
+        quat_wxyz=None,
+        angles_rad=np.full((2 * n, 3), np.nan),
+        tensions=np.full((2 * n, data.n_cables), np.nan),
+    )
+    words = "reach each pose again over a way point beyond it, so that it is come to from there"
+    yield Extension(Adding.WAY_POINTS, words, like(plan, gone_through))
+
+
+def _beyond(plan: Planned, data: Measurements) -> Array | None:
+    """Poses (n, 7) beyond each as it is come to, where the robot can hold; None where it cannot."""
+    robot = plan.problem.robot
+    if data.command_pose is None or robot.joints:
+        return None
+    pose = data.command_pose
+    same = np.concatenate([[False], data.run[1:] == data.run[:-1]])
+    before = np.where(same[:, None], np.roll(pose, 1, axis=0), robot.reference_pose)
+    beyond = pose.copy()
+    beyond[:, :3] += _BEYOND_POSE * (pose - before)[:, :3]
+    beyond = np.where(feasible(robot, beyond)[:, None], beyond, pose)
+    return None if np.array_equal(beyond, pose) else beyond

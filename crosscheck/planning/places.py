@@ -1,0 +1,122 @@
+"""Poses that could be measured: a grid with tilts, where the robot can hold still."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from crosscheck.fit.problem import Problem
+from crosscheck.measurements.data import Measurements
+from crosscheck.planning.adding import NO_LIMITS, Adding, Extension, Limits, like
+from crosscheck.planning.planned import Planned, near_slack
+from seecr.joints import pose_of_values, values_of_pose
+from seecr.pose import Array, quat_from_rotvec, quat_multiply
+from seecr.robot import Robot
+from seecr.workspace import feasible
+
+# Candidate poses: steps along x, y, z, and how far out of the planned region they go.
+_GRID, _BEYOND = (4, 3, 3), 0.25
+_TILT_RAD = np.radians(10.0)
+_TILTS = np.array(
+    [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1], [1, 1, 0], [0, 0, -1], [-1, 1, 0]]
+)
+_JOINT_POSES = 60
+# A pose with less than this part of the usual smallest stiffness is nearly free to move.
+_SOFT = 0.05
+
+
+def more_poses(plan: Planned, limits: Limits = NO_LIMITS) -> Extension | None:
+    """Poses in and around the planned region, some tilted, at which the robot can hold still."""
+    robot = plan.problem.robot
+    poses = held_within(robot, _jointed(plan) if robot.joints else _grid(plan), limits)
+    if len(poses) == 0:
+        return None
+    poses = poses[trustworthy(like(plan, commands_at(plan.problem, poses)), plan)]
+    if len(poses) == 0:
+        return None
+    found = like(plan, commands_at(plan.problem, poses))
+    return Extension(Adding.POSES, "add poses", found, poses)
+
+
+def held_within(robot: Robot, poses: Array, limits: Limits = NO_LIMITS) -> Array:
+    """Those of poses (n, 7) at which tensions within limits balance the load."""
+    return poses[feasible(robot, poses, lowest=limits[0], highest=limits[1])]
+
+
+def trustworthy(candidates: Planned, plan: Planned) -> np.ndarray:
+    """(n,) poses whose sensitivities can be relied on: solved, stiff, no cable about to switch."""
+    usual = plan.base.state.prediction.solution().smallest_eigenvalue[plan.problem.use]
+    own = candidates.base.state.prediction.solution().smallest_eigenvalue
+    good = candidates.problem.use & (own > _SOFT * float(np.median(usual)))
+    for row, _cable in near_slack(candidates):
+        good[row] = False
+    return np.asarray(good)
+
+
+def commands_at(problem: Problem, poses: Array) -> Measurements:
+    """Poses as rows, each a run of its own."""
+    data, n = problem.data, len(poses)
+    in_lengths = data.command_lengths is not None
+    return Measurements(
+        path=data.path,
+        n_cables=data.n_cables,
+        run=np.array([f"added {k + 1}" for k in range(n)]),
+        command_pose=None if in_lengths else poses,
+        command_lengths=problem.robot.commanded_lengths(poses) if in_lengths else None,
+        told=data.told,
+        t_s=None if data.t_s is None else data.t_s.max() + 60.0 * np.arange(1.0, n + 1.0),
+        temperature_C=None
+        if data.temperature_C is None
+        else np.full(n, float(np.mean(data.temperature_C))),
+    )
+
+
+def _planned_poses(plan: Planned) -> Array:
+    problem = plan.problem
+    pose = problem.data.command_pose
+    pose = plan.base.state.prediction.pose if pose is None else pose
+    return pose[problem.use]
+
+
+def _grid(plan: Planned) -> Array:
+    """Positions on a grid, each level and with two tilts."""
+    robot, pose = plan.problem.robot, _planned_poses(plan)
+    return tilted_grid(robot, *_box(robot, pose[:, :3]), _GRID)
+
+
+def tilted_grid(robot: Robot, low: Array, high: Array, steps: tuple[int, int, int]) -> Array:
+    """Positions on a grid of so many steps [m], each level and with two tilts, as poses (n, 7)."""
+    axes = [np.linspace(low[k], high[k], steps[k]) for k in range(3)]
+    place = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    n = len(place)
+    level = np.tile(robot.reference_pose[3:], (n, 1))
+    out = [np.concatenate([place, level], axis=1)]
+    for shift in (0, 3):
+        tilt = _TILT_RAD * _TILTS[(np.arange(n) + shift) % len(_TILTS)]
+        out.append(np.concatenate([place, quat_multiply(quat_from_rotvec(tilt), level)], axis=1))
+    return np.concatenate(out)
+
+
+def _box(robot: Robot, place: Array) -> tuple[Array, Array]:
+    """The planned region and somewhat more, inside the exit points."""
+    exits_low, exits_high = robot.exit_points.min(axis=0), robot.exit_points.max(axis=0)
+    low, high = place.min(axis=0), place.max(axis=0)
+    room = np.maximum(exits_high - exits_low, 0.2 * float(np.max(exits_high - exits_low)))
+    margin = _BEYOND * np.maximum(high - low, 0.2 * room)
+    inside = 0.1 * (exits_high - exits_low)
+    new_low, new_high = low - margin, high + margin
+    # sideways not beyond the exit points; upwards not into them
+    new_low[:2] = np.maximum(new_low[:2], np.minimum(exits_low[:2] + inside[:2], low[:2]))
+    new_high[:2] = np.minimum(new_high[:2], np.maximum(exits_high[:2] - inside[:2], high[:2]))
+    new_high[2] = min(new_high[2], max(exits_high[2] - 0.1 * room[2], high[2]))
+    return new_low, new_high
+
+
+def _jointed(plan: Planned) -> Array:
+    """Random joint values in and around the planned ones."""
+    robot = plan.problem.robot
+    values = values_of_pose(robot, _planned_poses(plan))[0]
+    low, high = values.min(axis=0), values.max(axis=0)
+    margin = _BEYOND * np.maximum(high - low, 0.2 * float(np.max(high - low)))
+    random = np.random.default_rng(0)
+    chosen = random.uniform(low - margin, high + margin, (_JOINT_POSES, len(low)))
+    return np.asarray(pose_of_values(robot, chosen)[0])

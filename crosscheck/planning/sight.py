@@ -1,0 +1,116 @@
+"""What data can show of each effect, whatever they turn out to say: before any verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from crosscheck.fit.gauss_newton import Fit
+from crosscheck.fit.problem import Problem
+from crosscheck.fit.reasons import Reason, Why
+from crosscheck.planning.planned import Planned, Reads
+from crosscheck.planning.result import Visible
+from crosscheck.planning.visibility import EXACT, Signal, left_over, needed, signals
+from seecr.pose import Array
+
+_MOST = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """What data can show.
+
+    Attributes:
+        effects: those that could be looked for. missing: those that cannot, and why.
+    """
+
+    effects: tuple[Visible, ...]
+    missing: Mapping[str, Reason]
+
+    @property
+    def hidden(self) -> tuple[str, ...]:
+        """Effects that would not show at a plausible size."""
+        return tuple(found.name for found in self.effects if not found.visible)
+
+    @property
+    def alike(self) -> dict[str, tuple[str, ...]]:
+        """Effects that others imitate, exactly or within the noise, and which do."""
+        return {
+            found.name: (*found.twins, *(name for name, _left in found.confused))
+            for found in self.effects
+            if found.visible and (found.twins or found.confused)
+        }
+
+    def lines(self) -> list[str]:
+        """The same as sentences: what shows, what does not, what cannot be told apart."""
+        total = len(self.effects) + len(self.missing)
+        seen = len(self.effects) - len(self.hidden)
+        out = [f"These data would show {seen} of {total} effects if they had a plausible size."]
+        lacking = _by_reason(self.missing)
+        if lacking or self.hidden:
+            small = [f"{', '.join(self.hidden)} (too small beside the noise)"] * bool(self.hidden)
+            out.append(f"They cannot show {'; '.join([*lacking, *small])}.")
+        pairs = [f"{name} from {' or '.join(others[:3])}" for name, others in self.alike.items()]
+        if pairs:
+            more = f"; and {len(pairs) - _MOST} more" if len(pairs) > _MOST else ""
+            out.append(f"They could not tell {'; '.join(pairs[:_MOST])}{more}.")
+        return out
+
+    def as_json(self) -> dict[str, Any]:
+        """``can_show`` of ``diagnosis.json``."""
+        return {
+            "visible": [found.name for found in self.effects if found.visible],
+            "not_visible": list(self.hidden),
+            "cannot_be_told_from": {name: list(others) for name, others in self.alike.items()},
+            "not_with_these_data": {name: why.words for name, why in self.missing.items()},
+        }
+
+
+def _by_reason(missing: Mapping[str, Reason]) -> list[str]:
+    """Effects that lack the same, together; what the user left out need not be said."""
+    words: dict[str, list[str]] = {}
+    for name, why in missing.items():
+        if why.why is not Why.EXCLUDED:
+            words.setdefault(why.words, []).append(name)
+    return [f"{', '.join(names)} ({why})" for why, names in words.items()]
+
+
+def sight_of(problem: Problem, base: Fit, factor: Array) -> Sight:
+    """What data can show beside a model.
+
+    Args:
+        problem: the data. base: the model on it. factor: noise factors.
+    """
+    found, missing = signals(Planned(problem, base, factor, Reads.of(problem.data)))
+    ranked = sorted(all_visible(found).values(), key=lambda one: one.factor)
+    return Sight(tuple(ranked), missing)
+
+
+def all_visible(own: Mapping[str, Signal]) -> dict[str, Visible]:
+    """What signals show of each effect, and which they leave alike."""
+    return {name: _visible(name, own) for name in own}
+
+
+def _visible(name: str, own: Mapping[str, Signal]) -> Visible:
+    g = own[name]
+    need = needed(g.directions, len(own))
+    power = g.power
+    left = {other: left_over(g, s) for other, s in own.items() if other != name}
+    twins = tuple(o for o, value in left.items() if power > 0 and value <= EXACT * power)
+    rest = {o: value for o, value in left.items() if o not in twins}
+    imitator = min(rest, key=lambda o: rest[o]) if rest else ""
+    least = rest[imitator] if imitator else power
+    confused: list[tuple[str, float]] = []
+    if power >= need:
+        near = sorted((value, o) for o, value in rest.items() if value < need)
+        confused = [(o, value) for value, o in near]
+    return Visible(
+        g, need, _size(need, power), _size(need, least), imitator, tuple(confused), twins
+    )
+
+
+def _size(need: float, power: float) -> float:
+    return float(np.sqrt(need / power)) if power > 0 else np.inf

@@ -1,0 +1,62 @@
+"""What a plan proposes, as files of commands that a controller can take."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from crosscheck.errors import CrosscheckError
+from crosscheck.measurements.data import Measurements
+from crosscheck.measurements.write import write_measurements
+from crosscheck.planning.result import Plan
+from seecr.pose import Array
+
+__all__ = ["box_of", "write_plan"]
+
+
+def write_plan(plan: Plan, folder: Path, chosen: bool) -> tuple[str, ...]:
+    """Write the commands of each thing to add, and those of the plan if it chose them.
+
+    Returns:
+        names of the files.
+    """
+    files = {"poses.csv": plan.planned.problem.data} if chosen else {}
+    for item in plan.suggestions:
+        if item.reached and item.commands is not None:
+            files[f"add-{item.kind.value}.csv"] = item.commands
+    for name, commands in files.items():
+        write_measurements(folder / name, _unread(commands))
+    return tuple(files)
+
+
+def _unread(data: Measurements) -> Measurements:
+    """Commands alone, and the loads that go with them."""
+    n, nothing = data.n_rows, np.zeros(3, dtype=bool)
+    return replace(
+        data,
+        position=np.full((n, 3), np.nan),
+        quat_wxyz=None,
+        angles_rad=np.full((n, 3), np.nan),
+        tensions=np.full((n, data.n_cables), np.nan),
+        position_mask=nothing,
+        angle_mask=nothing,
+        tension_mask=np.zeros(data.n_cables, dtype=bool),
+    )
+
+
+def box_of(text: str) -> Array:
+    """Lowest and highest position (2, 3) [m] of six numbers between commas.
+
+    Raises:
+        CrosscheckError: other than that.
+    """
+    try:
+        values = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        values = np.zeros(0)
+    if len(values) != 6 or not np.all(values[:3] <= values[3:]):
+        expected = "expected X0,Y0,Z0,X1,Y1,Z1 in metres, the lower corner first"
+        raise CrosscheckError(f"--box: {expected}, got {text!r}")
+    return values.reshape(2, 3)
