@@ -16,6 +16,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 HERE = Path(__file__).resolve().parent
 VECTRAN = 3000.0  # k_c = E S [N], the cable that the shipped files carry
 
@@ -60,6 +62,33 @@ PLANAR_HORIZONTAL: tuple[tuple[Vector, Vector], ...] = (
     ((0.657, 0.0, 0.486), (-0.0515, 0.0, 0.018)),
     ((0.76, 0.0, 0.486), (0.0515, 0.0, 0.018)),
 )
+# CoGiRo's kind, 15 x 11 x 6 m, in the middle of its floor; opposite cables by a half turn. How the
+# numbers are known: models/README.md.
+_LARGE_HALF: tuple[tuple[Vector, Vector], ...] = (
+    ((-7.2, -5.25, 5.5), (0.5, -0.5, -0.5)),
+    ((-7.3, -5.1, 5.5), (-0.5, 0.35, 0.5)),
+    ((-7.3, 5.25, 5.5), (-0.5, -0.3, -0.5)),
+    ((-7.2, 5.4, 5.5), (0.5, 0.35, 0.5)),
+)
+COGIRO_LARGE = tuple(
+    ((round(7.5 + s * a[0], 6), round(5.5 + s * a[1], 6), a[2]), (s * b[0], s * b[1], b[2]))
+    for s in (1, -1)
+    for a, b in _LARGE_HALF
+)
+# WireX, IPAnema3Design: frame 8 x 3.5 m, exit points at 3.25 and 0.25 m; the upper cables hold the
+# lower edge of a platform of 1.5 x 0.5 x 0.5 m, the lower cables its upper edge.
+IPANEMA: tuple[tuple[Vector, Vector], ...] = tuple(
+    ((4.0 + sx * 3.8, 1.75 + sy * 1.75, 3.25), (sx * 0.55, sy * 0.25, -0.25))
+    for sx, sy in ((-1, 1), (1, 1), (1, -1), (-1, -1))
+) + tuple(
+    ((4.0 + sx * 4.0, 1.75 + sy * 1.5, 0.25), (sx * 0.75, sy * 0.15, 0.25))
+    for sx, sy in ((-1, 1), (1, 1), (1, -1), (-1, -1))
+)
+# Four masts at the corners of a pitch, a camera that hangs as a point.
+CAMERA: tuple[tuple[Vector, Vector], ...] = tuple(
+    ((x, y, 25.0), (0.0, 0.0, 0.0))
+    for x, y in ((0.0, 0.0), (105.0, 0.0), (105.0, 68.0), (0.0, 68.0))
+)
 
 
 @dataclass(frozen=True)
@@ -78,6 +107,11 @@ class Model:
         bar: edge of the frame's square profile [m].
         cable_factors: stiffness of each cable over Vectran's; None for all alike.
         centre: of mass, in the platform frame [m].
+        translates: moves along x, y and z and never turns.
+        ea: k_c of its cables [N].
+        pull: what cables pull with at the reference pose [N], as near as balances the weight;
+            0 for rest lengths that are straight lengths.
+        looks: size of all that is only drawn, over DemoBot's.
     """
 
     name: str
@@ -91,6 +125,10 @@ class Model:
     bar: float = 0.02
     cable_factors: tuple[float, ...] | None = None
     centre: Vector = (0.0, 0.0, 0.0)
+    translates: bool = False
+    ea: float = VECTRAN
+    pull: float = 0.0
+    looks: float = 1.0
 
 
 MODELS = (
@@ -133,7 +171,64 @@ MODELS = (
         frame=(0.80, 0.0, 0.50),
         planar=True,
     ),
+    Model(
+        "cogiro_large",
+        "A suspended robot of CoGiRo's kind and size, eight crossed steel cables",
+        COGIRO_LARGE,
+        reference=(7.5, 5.5, 2.0),
+        box=(1.0, 1.0, 1.0),
+        frame=(15.0, 11.0, 6.0),
+        mass=100.0,
+        bar=0.3,
+        ea=7.0e5,
+        looks=12.0,
+    ),
+    Model(
+        "ipanema",
+        "A fully constrained robot of IPAnema 3's kind, eight cables under pretension",
+        IPANEMA,
+        reference=(4.0, 1.75, 1.75),
+        box=(1.5, 0.5, 0.5),
+        frame=(8.0, 3.5, 3.5),
+        mass=20.0,
+        bar=0.1,
+        ea=1.0e5,
+        pull=500.0,
+        looks=6.0,
+    ),
+    Model(
+        "camera",
+        "A camera on four cables above a pitch, which translates and never turns",
+        CAMERA,
+        reference=(52.5, 34.0, 10.0),
+        box=(0.5, 0.5, 0.5),
+        frame=(105.0, 68.0, 25.0),
+        mass=20.0,
+        bar=0.5,
+        translates=True,
+        ea=1.0e5,
+        looks=60.0,
+    ),
 )
+
+
+def pulls(model: Model) -> tuple[float, ...]:
+    """Tensions [N] that balance the weight at the reference pose, nearest to ``pull``.
+
+    Least squares, through the normal equations (Pott, Cable-Driven Parallel Robots, 2018, the
+    closed form); none where nothing pulls.
+    """
+    if not model.pull:
+        return (0.0,) * len(model.cables)
+    columns = []
+    for a, b in model.cables:
+        way = [p - t - q for p, t, q in zip(a, model.reference, b, strict=True)]
+        x, y, z = (w / math.hypot(*way) for w in way)
+        columns.append((x, y, z, b[1] * z - b[2] * y, b[2] * x - b[0] * z, b[0] * y - b[1] * x))
+    w = np.array(columns).T
+    left = np.array([0.0, 0.0, 9.81 * model.mass, 0.0, 0.0, 0.0]) - w.sum(axis=1) * model.pull
+    found = model.pull + np.linalg.lstsq(w, left, rcond=None)[0]
+    return tuple(round(float(value), 9) for value in found)
 
 
 def exact_spring(k_c: float, length: float) -> tuple[float, float]:
@@ -201,7 +296,11 @@ def _head(model: Model) -> Iterator[str]:
     yield '  <option gravity="0 0 -9.81" timestep="0.001" integrator="discrete"/>'
     extent = 0.75 * math.hypot(*model.frame)
     yield f'  <statistic center="{numbers(*_middle(model))}" extent="{numbers(round(extent, 3))}"/>'
-    yield from _LOOKS
+    dots = {"exit": 0.005, "anchor": 0.004}
+    for line in _LOOKS:
+        for name, size in dots.items():
+            line = line.replace(f"{{{name}}}", numbers(round(model.looks * size, 6)))
+        yield line
 
 
 _LOOKS = """\
@@ -224,8 +323,8 @@ _LOOKS = """\
   <default>
     <!-- geoms are looks only: no contact, no mass -->
     <geom contype="0" conaffinity="0" mass="0" group="1"/>
-    <default class="exit"><site size="0.005" rgba="0.85 0.16 0.14 1"/></default>
-    <default class="anchor"><site size="0.004" rgba="0.98 0.75 0.12 1"/></default>
+    <default class="exit"><site size="{exit}" rgba="0.85 0.16 0.14 1"/></default>
+    <default class="anchor"><site size="{anchor}" rgba="0.98 0.75 0.12 1"/></default>
   </default>""".splitlines()
 
 
@@ -245,7 +344,8 @@ def _surroundings(model: Model) -> Iterator[str]:
     lamp = [round(v, 3) for v in (x - 0.3, y - 0.5, above + 0.8)]
     yield f'    <light name="lamp" pos="{numbers(*lamp)}" dir="0.3 0.5 -1.8" cutoff="60"'
     yield '     diffuse="0.60 0.60 0.60" specular="0.2 0.2 0.2"/>'
-    yield f'    <geom name="floor" type="plane" pos="{numbers(x, y, 0.0)}" size="2 2 0.1"'
+    wide = "2 2" if model.looks == 1.0 else numbers(*(round(2.0 * max(x, y), 3),) * 2)
+    yield f'    <geom name="floor" type="plane" pos="{numbers(x, y, 0.0)}" size="{wide} 0.1"'
     yield '     material="floor"/>'
     yield f'    <camera name="front" {_camera(model, azimuth=90.0, elevation=-8.0)}/>'
     yield f'    <camera name="corner" {_camera(model, azimuth=112.0, elevation=-11.0)}/>'
@@ -290,7 +390,8 @@ def _bar(start: Vector, end: Vector, half: float) -> str:
 
 
 def _exit_points(model: Model) -> Iterator[str]:
-    yield from _brackets(model)
+    if model.looks == 1.0:
+        yield from _brackets(model)
     for i, (exit_point, _) in enumerate(model.cables, start=1):
         yield f'    <site name="A{i}" class="exit" pos="{numbers(*exit_point)}"/>'
 
@@ -320,6 +421,9 @@ def _platform(model: Model) -> Iterator[str]:
         yield '      <joint name="x" type="slide" axis="1 0 0"/>'
         yield '      <joint name="z" type="slide" axis="0 0 1"/>'
         yield '      <joint name="tilt" type="hinge" axis="0 1 0"/>'
+    elif model.translates:
+        for name, axis in (("x", "1 0 0"), ("y", "0 1 0"), ("z", "0 0 1")):
+            yield f'      <joint name="{name}" type="slide" axis="{axis}"/>'
     else:
         yield "      <freejoint/>"
     inertia = numbers(*box_inertia(model.mass, model.box))
@@ -349,11 +453,13 @@ def _anchor_pins(model: Model) -> Iterator[str]:
 def _tendons(model: Model) -> Iterator[str]:
     factors = model.cable_factors or (1.0,) * len(model.cables)
     yield "  <tendon>"
-    for i, (a, b) in enumerate(model.cables, start=1):
+    width = numbers(round(0.0012 * model.looks, 6))
+    for i, ((a, b), pull) in enumerate(zip(model.cables, pulls(model), strict=True), start=1):
         on_base = [t + p for t, p in zip(model.reference, b, strict=True)]
-        stiffness, rest = exact_spring(VECTRAN * factors[i - 1], math.dist(a, on_base))
+        k_c = model.ea * factors[i - 1]
+        stiffness, rest = exact_spring(k_c, math.dist(a, on_base) / (1.0 + pull / k_c))
         yield (
-            f'    <spatial name="cable{i}" width="0.0012" rgba="0.10 0.12 0.14 1" '
+            f'    <spatial name="cable{i}" width="{width}" rgba="0.10 0.12 0.14 1" '
             f'springlength="0 {rest!r}" stiffness="{stiffness!r}">'
         )
         yield f'      <site site="A{i}"/><site site="B{i}"/>'

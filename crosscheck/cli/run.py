@@ -124,9 +124,9 @@ def command(
 
 def _shipped(seed: int, patterns: Sequence[str]) -> list[Case | EffectCase]:
     """The selected pose cases and effects; the group's name stands for all its effects."""
-    from crosscheck.suite import GROUP, PREFIX, effect_cases, select, shipped_cases
+    from crosscheck.suite import GROUP, PREFIX, select, shipped_cases, shipped_effect_cases
 
-    every: list[Case | EffectCase] = [*shipped_cases(seed), *effect_cases(seed=seed)]
+    every: list[Case | EffectCase] = [*shipped_cases(seed), *shipped_effect_cases(seed)]
     return select(every, [f"{PREFIX}*" if name == GROUP else name for name in patterns])
 
 

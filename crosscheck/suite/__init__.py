@@ -3,7 +3,14 @@
 from __future__ import annotations
 
 from crosscheck.suite.cases import Case, select, shipped_cases, user_cases
-from crosscheck.suite.effects import GROUP, PREFIX, EffectCase, EffectResult, effect_cases
+from crosscheck.suite.effects import (
+    GROUP,
+    PREFIX,
+    EffectCase,
+    EffectResult,
+    effect_cases,
+    shipped_effect_cases,
+)
 from crosscheck.suite.junit import junit_xml
 from crosscheck.suite.outcome import Outcome
 from crosscheck.suite.results import CaseResult
@@ -29,6 +36,7 @@ __all__ = [
     "run_suite",
     "select",
     "shipped_cases",
+    "shipped_effect_cases",
     "summary_md",
     "thresholds_toml",
     "user_cases",

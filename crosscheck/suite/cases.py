@@ -46,6 +46,9 @@ _SWEEP_TURN = np.deg2rad(6.0)
 _PLANAR_HALF_WIDTH = 0.15
 _PLANAR_TURN = np.deg2rad(8.0)
 _PLANAR_HEIGHTS = (-0.3, -0.15, 0.2, 0.4)
+# Robots of another size and kind, each with fewer poses: a part of the random ones, of the sweeps.
+_OTHERS = ("cogiro_large", "ipanema", "camera")
+_FEWER = 8
 # Of the way from the reference position to the exit points that a user's robot is sent.
 _USER_REACH = 0.6
 _USER_TURN = np.deg2rad(10.0)
@@ -90,7 +93,7 @@ class Case:
 
 
 def shipped_cases(seed: int = 0, n_random: int = N_RANDOM) -> list[Case]:
-    """DemoBots along the paper's sweeps, turned and at random; planar robots; uneven ones."""
+    """DemoBots along the paper's sweeps, turned and at random; planar, uneven and other robots."""
     cases = []
     for robot, turn in (("cogiro", _COGIRO_TURN), ("parallel", 0.0)):
         path = model_path(f"demobot_{robot}")
@@ -107,6 +110,8 @@ def shipped_cases(seed: int = 0, n_random: int = N_RANDOM) -> list[Case]:
         cases += _planar_cases(robot)
     for robot, turn in (("uneven", 0.0), ("off_centre", _COGIRO_TURN)):
         cases += _own_cable_cases(robot, turn, seed, n_random)
+    for robot in _OTHERS:
+        cases += _other_cases(robot, seed, n_random)
     return cases
 
 
@@ -231,6 +236,20 @@ def _own_cable_cases(robot: str, turn: float, seed: int, n_random: int) -> list[
     random = demobot_random(_generator(seed, f"{stem}-random"), n_random // 2, turn)
     return [
         Case(f"{stem}-turned", path, path, None, "sweep", demobot_turned_sweep()),
+        Case(f"{stem}-random", path, path, None, "random", random, has_names=seed == 0),
+    ]
+
+
+def _other_cases(robot: str, seed: int, n_random: int) -> list[Case]:
+    """A robot of another size and kind, as any robot of a user's."""
+    from seecr.mjcf import load_robot
+
+    path, stem = model_path(robot), robot.replace("_", "-")
+    one = load_robot(path)
+    random = robot_random(one, _generator(seed, f"{stem}-random"), max(n_random // _FEWER, 1))
+    sweep = robot_sweep(one, N_SWEEP // 2)
+    return [
+        Case(f"{stem}-sweep", path, path, None, "sweep", sweep),
         Case(f"{stem}-random", path, path, None, "random", random, has_names=seed == 0),
     ]
 

@@ -17,7 +17,7 @@ from crosscheck.files import json_text
 from crosscheck.settle.model import ignored_note
 from crosscheck.suite.agreement import allowances, compare
 from crosscheck.suite.cases import Case, shipped_cases
-from crosscheck.suite.effects import EffectCase, EffectResult, effect_cases, run_effects
+from crosscheck.suite.effects import EffectCase, EffectResult, run_effects, shipped_effect_cases
 from crosscheck.suite.mujoco_robot import MujocoRobot
 from crosscheck.suite.outcome import Outcome
 from crosscheck.suite.pool import Pool
@@ -185,7 +185,7 @@ def run_suite(
         the results in the order of the cases.
     """
     began = time.perf_counter()
-    every: list[Case | EffectCase] = [*shipped_cases(seed), *effect_cases(seed=seed)]
+    every: list[Case | EffectCase] = [*shipped_cases(seed), *shipped_effect_cases(seed)]
     chosen = every if cases is None else cases
     if not isinstance(thresholds, Thresholds):
         thresholds = load_thresholds(thresholds)

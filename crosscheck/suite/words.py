@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from crosscheck.suite.agreement import QUANTITIES
-from crosscheck.suite.effects import LOADS, ORIENTATION_RAD, POSITION_M, TENSION_N, Counterpart
+from crosscheck.suite.effects import LOADS, ORIENTATION_RAD, POSITION_M, Counterpart
 from crosscheck.suite.outcome import Outcome
 from crosscheck.suite.verdicts import FINDINGS, PoseFinding, Verdict
 
@@ -193,7 +193,10 @@ EFFECT_HEADS = [
 
 def effects_line(results: Sequence[EffectResult]) -> str:
     """How many effects agree, with what, the worst differences, and those that do not agree."""
-    robots = {result.case.model for result in results}
+    every = [result.case.model for result in results]
+    robots = {model for model in every if every.count(model) > 1} or set(every)
+    alone = [f"{r.case.effect} on {r.case.model.stem}" for r in results
+             if r.case.model not in robots]  # fmt: skip
     effects = {result.case.effect for result in results} - {LOADS}
     loads = " and known loads" if any(result.case.effect == LOADS for result in results) else ""
     bad = [result.case.name for result in results if result.outcome is not Outcome.AGREE]
@@ -204,7 +207,8 @@ def effects_line(results: Sequence[EffectResult]) -> str:
     orientation = max(result.worst[1] for result in results)
     tension = max(result.worst[2] for result in results)
     return (
-        f"{count(len(effects), 'effect')}{loads} on {count(len(robots), 'robot')} against "
+        f"{count(len(effects), 'effect')}{loads} on {count(len(robots), 'robot')}"
+        f"{''.join(f', {name}' for name in alone)} against "
         f"{_counterparts(results)}: {verdict}; worst {worst.worst[0]:.1e} m "
         f"({worst.case.name}), {orientation:.1e} rad, {tension:.1e} N."
     )
@@ -236,7 +240,7 @@ def effect_text(result: EffectResult) -> str:
     position, orientation, tension = result.worst
     parts = [
         f"position {position:.1e} m, orientation {orientation:.1e} rad, tension {tension:.1e} N",
-        f"allowed {POSITION_M:.0e} m, {ORIENTATION_RAD:.0e} rad, {TENSION_N:.0e} N",
+        f"allowed {POSITION_M:.0e} m, {ORIENTATION_RAD:.0e} rad, {result.tension_limit:.0e} N",
         f"the effect moves a reading by {result.moved_m:.1e} m",
     ]
     if result.unsolved:

@@ -16,7 +16,10 @@ import pytest
 from scipy.optimize import linprog
 
 from seecr import shipped
+from seecr.equilibrium import solve
 from seecr.errors import InputError
+from seecr.mjcf import load_robot
+from seecr.model import load_model
 from seecr.shipped import CABLES, model_names, model_path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -25,6 +28,8 @@ PLANAR = ("planar_horizontal", "planar_two_cable", "planar_vertical")
 ROBOTS = (*DEMOBOTS, *PLANAR)
 # No robots of the paper's: without them an error that confuses cables would show nothing.
 UNEVEN = ("demobot_off_centre", "demobot_uneven")
+# Of another size and kind.
+OTHERS = ("camera", "cogiro_large", "ipanema")
 
 # Paper, Table II, typed from the page and not from the generator: A_i in the base frame | B_i in
 # the platform frame [m]. Cogiro's A4 stands here as it is printed.
@@ -222,6 +227,71 @@ def test_two_cable_bar_is_the_papers_table() -> None:
     assert sites(model, "B").tolist() == [[-0.1, 0, 0], [0.1, 0, 0]]
 
 
+# --- robots of another size and kind -----------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_others_hold_together(name: str) -> None:
+    model = compiled(name)
+    robot = load_robot(model_path(name))
+    box = model.geom("platform").size
+    assert model.body_mass.sum() == robot.mass  # looks weigh nothing
+    edges = 4.0 * box**2
+    inertia = robot.mass / 12 * (edges.sum() - edges)
+    np.testing.assert_allclose(np.diag(robot.inertia), inertia, rtol=1e-12)
+    assert np.all(np.abs(robot.anchor_points) <= box + 1e-12)
+    # all on the frame, and exit points apart
+    assert np.all(robot.exit_points >= 0.0) and robot.ea.min() == robot.ea.max()
+    assert len({tuple(point) for point in robot.exit_points}) == robot.n_cables
+    assert solve(robot, robot.reference_pose).converged[0]
+
+
+def test_opposite_cables_of_the_large_one_are_a_half_turn_apart() -> None:
+    robot = load_robot(model_path("cogiro_large"))
+    turn = np.array([-1.0, -1.0, 1.0])
+    middle = np.array([7.5, 5.5, 0.0])
+    there = (robot.exit_points[:4] - middle) * turn + middle
+    np.testing.assert_allclose(robot.exit_points[4:], there, atol=1e-12)
+    np.testing.assert_array_equal(robot.anchor_points[4:], robot.anchor_points[:4] * turn)
+    assert np.ptp(robot.exit_points, axis=0)[0] == pytest.approx(14.6)
+
+
+def test_the_large_ones_sag_is_beside_it() -> None:
+    robot = load_robot(model_path("cogiro_large"))
+    sag = load_model(model_path("cogiro_large").with_name("sag.toml"), robot)
+    assert sag.notes == () and sag.names == ("cable_weight",)
+    pose = robot.reference_pose - np.array([4.5, 0, 0, 0, 0, 0, 0])
+    plain, hanging = solve(robot, pose), solve(robot, pose, effects=sag)
+    moved = np.linalg.norm(plain.pose[0, :3] - hanging.pose[0, :3])
+    assert 0.5e-3 < moved < 2e-3
+    # half of each cable's weight hangs on the platform, which 100 kg carry
+    assert np.all(hanging.tensions > plain.tensions)
+
+
+def test_pretension_balances_the_weight_where_the_winches_were_zeroed() -> None:
+    robot = load_robot(model_path("ipanema"))
+    found = solve(robot, robot.reference_pose)
+    np.testing.assert_allclose(found.deviation[0], 0.0, atol=1e-12)
+    tensions = found.tensions[0]
+    assert tensions.mean() == pytest.approx(500.0, abs=1.0)
+    np.testing.assert_allclose(tensions[:4], tensions[0], rtol=1e-9)
+    # nearest: what is off 500 N makes no wrench of its own, W^T y for some y
+    ends = robot.reference_pose[:3] + robot.anchor_points
+    unit = robot.exit_points - ends
+    unit /= np.linalg.norm(unit, axis=1)[:, None]
+    wrench_matrix = np.vstack([unit.T, np.cross(robot.anchor_points, unit).T])
+    off = tensions - 500.0
+    rebuilt = wrench_matrix.T @ np.linalg.lstsq(wrench_matrix.T, off, rcond=None)[0]
+    np.testing.assert_allclose(rebuilt, off, atol=1e-6)
+
+
+def test_the_camera_never_turns() -> None:
+    robot = load_robot(model_path("camera"))
+    assert [joint.kind for joint in robot.joints] == ["slide"] * 3
+    found = solve(robot, [[20.0, 40.0, 12.0, 1, 0, 0, 0]])
+    assert found.converged[0] and not np.any(found.deviation[0, 3:])
+
+
 # --- in MuJoCo ---------------------------------------------------------------------------------
 
 
@@ -278,7 +348,7 @@ def test_cables_pull_and_never_push(name: str) -> None:
 
 
 def test_generator_reproduces_the_files(generator: Any) -> None:
-    assert {m.name for m in generator.MODELS} == {*ROBOTS, *UNEVEN}
+    assert {m.name for m in generator.MODELS} == {*ROBOTS, *UNEVEN, *OTHERS}
     for model in generator.MODELS:
         path = ROOT / "models" / model.name / f"{model.name}.xml"
         assert path.read_text(encoding="utf-8") == generator.write_mjcf(model)
@@ -316,7 +386,7 @@ def test_files_hold_exact_floats(name: str) -> None:
 
 
 def test_model_names_are_the_folders() -> None:
-    assert model_names() == tuple(sorted((*ROBOTS, *UNEVEN)))
+    assert model_names() == tuple(sorted((*ROBOTS, *UNEVEN, *OTHERS)))
 
 
 def test_unknown_model_lists_the_known_nearest_first() -> None:

@@ -16,6 +16,7 @@ from crosscheck.suite.effects import (
     EffectResult,
     _number,
     effect_cases,
+    shipped_effect_cases,
 )
 from crosscheck.suite.outcome import Outcome
 from crosscheck.twin.hidden import CONTAINED
@@ -38,6 +39,16 @@ def test_every_effect_is_a_case_of_each_robot():
     assert [case.effect for case in cases] == 2 * [*TRUE_EFFECTS, LOADS]
     assert {case.seed for case in cases} == {3}
     assert cases[0].name == f"effect-demobot_parallel-{TRUE_EFFECTS[0]}"
+
+
+def test_sag_is_run_where_it_is_large_and_tensions_go_with_the_weight(good):
+    *_, last = shipped_effect_cases(seed=2)
+    assert last.name == "effect-cogiro_large-cable_weight" and last.seed == 2
+    assert good.tension_limit == pytest.approx(1e-6)
+    heavy = replace(good, case=last)
+    assert heavy.tension_limit == pytest.approx(1e-6 * 100 / 0.4)
+    line = words.effects_line([good, good, heavy])
+    assert "on 1 robot, cable_weight on cogiro_large against" in line
 
 
 def test_the_seed_draws_the_size():

@@ -96,7 +96,7 @@ def test_shipped_cases_are_the_papers(shipped):
 
 def test_random_poses_lie_in_the_frame_and_crossed_cables_turn(shipped):
     for case in shipped:
-        if not case.name.endswith("-random"):
+        if not case.name.endswith("-random") or not case.model.stem.startswith("demobot"):
             continue
         assert np.all(case.poses[:, :3] > 0.0)
         assert np.all(case.poses[:, :3] < [0.8, 0.5, 0.45])
