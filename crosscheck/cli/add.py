@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from crosscheck.cli.choices import sigma_option
+from crosscheck.cli.following import after_fit
 from seecr.cli.options import FILE, json_option, progress_share
 
 if TYPE_CHECKING:
@@ -89,6 +90,8 @@ def command(
     if written:
         _write(found, old, machine, measured.path, model)
     _tell(found, old, model, written, out, as_json)
+    if not as_json:
+        click.echo(after_fit(found.whiteness.is_noise, written, robot, data, model))
     return 0 if written else 1
 
 

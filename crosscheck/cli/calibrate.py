@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from crosscheck.cli.choices import exclude_option, listed, only_option, sigma_option
+from crosscheck.cli.following import after_fit
 from seecr.cli.options import FILE, json_option, progress_share
 
 if TYPE_CHECKING:
@@ -72,6 +73,8 @@ def command(
     if written:
         _write(found, old, machine, measured.path, model)
     _tell(found, model, written, out, as_json)
+    if not as_json:
+        click.echo(after_fit(written, written, robot, data, model))
     if not found.settled:
         return 3
     return 0 if written else 1

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from crosscheck.cli.choices import sigma_option
+from crosscheck.cli.following import after_comparison
 from seecr.cli.options import FILE, json_option, out_option
 
 
@@ -97,4 +98,5 @@ def command(
     for note in own.notes if own else ():
         click.echo(f"note: {note}")
     print_comparison(found, exceeded, limits != Limits(), out)
+    click.echo(after_comparison(found, robot, data, model))
     return status

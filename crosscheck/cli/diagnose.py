@@ -14,6 +14,7 @@ from crosscheck.cli.choices import (
     sigma_option,
     tolerance_option,
 )
+from crosscheck.cli.following import after_diagnosis
 from seecr.cli.options import FILE, json_option, out_option, progress_share
 
 if TYPE_CHECKING:
@@ -101,6 +102,8 @@ def command(
         print_diagnosis(found, out)
     if note:
         click.echo(note, err=as_json)
+    if not as_json:
+        click.echo(after_diagnosis(found, robot, data, model, model_out, out))
     if found.verdict in gates:
         return 1
     return 0 if found.converged else 3

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from crosscheck.cli.following import following
 from seecr.cli.options import FILE, json_option
 
 
@@ -38,6 +39,9 @@ def command(name: str | None, robot: Path | None, as_json: bool) -> int:
         click.echo(json_text(rows[0] if name is not None else {"effects": rows}))
     elif name is not None:
         print_effect(chosen[0], machine)
+        given = (robot or "ROBOT.xml", "DATA.csv", "--model", "model.toml")
+        click.echo(following("crosscheck", "add", name, *given))
     else:
         print_effects(chosen)
+        click.echo(following("crosscheck", "effects", chosen[0].name, "--robot", "ROBOT.xml"))
     return 0

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from crosscheck.cli.following import following
 from seecr.cli.options import FILE, json_option, out_option
 
 
@@ -119,5 +120,5 @@ def command(
     for line in found.lines():
         click.echo(line)
     click.echo(f"written to {out}")
-    click.echo(f"next: crosscheck compare {out / 'robot.xml'} {out / 'measured.csv'}")
+    click.echo(following("crosscheck", "compare", out / "robot.xml", out / "measured.csv"))
     return 0

@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from crosscheck.cli.choices import listed, sigma_option
+from crosscheck.cli.following import after_plan
 from seecr.cli.options import FILE, json_option, out_option, progress_share
 
 
@@ -99,4 +100,5 @@ def command(
         click.echo(text)
     else:
         print_plan(plan, out, files)
+        click.echo(after_plan(robot, poses or out / "poses.csv"))
     return 0 if plan.converged else 3

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from crosscheck.cli.following import following
 from seecr.cli.options import (
     FILE,
     jobs_option,
@@ -164,11 +165,11 @@ def _run(
                 progress=lambda result: advance(len(result), result.case.name),
             )
         _write(run, folder)
-    _tell(run, out, as_json)
+    _tell(run, out, recordings, as_json)
     return run.outcome.exit_status
 
 
-def _tell(run: Run, out: Path, as_json: bool) -> None:
+def _tell(run: Run, out: Path, recordings: bool, as_json: bool) -> None:
     for note in run.notes:
         click.echo(f"note: {note}", err=True)
     if as_json:
@@ -179,6 +180,9 @@ def _tell(run: Run, out: Path, as_json: bool) -> None:
         from crosscheck.terminal import print_run
 
         print_run(run, out)
+        recorded = [result.case.name for result in run.results] if recordings else []
+        if recorded:
+            click.echo(following("rerun", out / f"{recorded[0]}.rrd"))
 
 
 def _record(result: CaseResult, folder: Path) -> str:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from crosscheck.cli.choices import sigma_option
+from crosscheck.cli.following import following
 from seecr.cli.options import FILE, json_option, out_option, progress_bar
 
 if TYPE_CHECKING:
@@ -134,12 +135,13 @@ def _tell(twin: Twin, out: Path, as_json: bool) -> None:
         f"{57.29577951 * sigma['orientation_rad']:.2g} deg"
     )
     click.echo(f"written to {out}: {', '.join(files)}")
-    click.echo(f"next: crosscheck diagnose {out / 'robot.xml'} {out / 'measured.csv'}")
     click.echo(f"what was hidden: crosscheck twin --open {out}")
+    click.echo(following("crosscheck", "diagnose", out / "robot.xml", out / "measured.csv"))
 
 
 def _open(path: Path, as_json: bool) -> int:
     from crosscheck.files import json_text
+    from crosscheck.terminal import parameter_lines
     from crosscheck.twin import unseal
 
     answer = unseal(path)
@@ -151,6 +153,8 @@ def _open(path: Path, as_json: bool) -> int:
     for name, values in answer.values.items():
         moves = answer.moves_over_noise[name]
         click.echo(f"{name}: moves readings by up to {moves.max:.3g} times their noise")
-        for parameter, value in values.items():
-            click.echo(f"  {parameter} = {value:.6g}")
+        for line in parameter_lines(name, values):
+            click.echo(f"  {line}")
+    case = path if path.is_dir() else path.parent
+    click.echo(following("crosscheck", "diagnose", case / "robot.xml", case / "measured.csv"))
     return 0

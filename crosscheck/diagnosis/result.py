@@ -180,7 +180,7 @@ class Diagnosis(Result):
         if self.left is not None:
             out.append(f"left beyond noise: {self.left.words}")
         out += [f"note: {note}" for note in self.notes]
-        return [*out, *(f"next: {line}" for line in self.measure_next)]
+        return [*out, *(f"measure next: {line}" for line in self.measure_next)]
 
     def records(self) -> list[Record]:
         """A record for each parameter of a missing effect: value and standard error, SI."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from crosscheck.fit.problem import KINDS, Rms
 from crosscheck.model.write import Fitted
-from crosscheck.units import in_unit, parameter_name, short
+from crosscheck.units import in_unit, parameter_name, short, with_error
 from seecr.effects.base import Layout
 from seecr.pose import Array
 from seecr.result import Record
@@ -32,6 +32,12 @@ def shown(value: float, unit: str) -> str:
     return f"{factor * value:.4g} {word}".strip()
 
 
+def belongs(key: str, name: str, unit: str) -> bool:
+    """Whether a parameter, such as ``gain_3``, is of an effect's field with that unit."""
+    stem = key.removesuffix(f"_{unit}") if unit else key
+    return stem == name or (stem.startswith(f"{name}_") and len(stem) > len(name) + 1)
+
+
 def value_lines(
     layout: Layout, values: Array, stderr: Array, at_bound: NDArray[np.bool_]
 ) -> Iterator[str]:
@@ -39,11 +45,19 @@ def value_lines(
     for name, unit, value, error, bound in zip(
         layout.names, layout.units, values, stderr, at_bound, strict=True
     ):
-        spread = f"+- {shown(error, unit)}" if np.isfinite(error) else "not seen by these data"
-        if error == 0.0:
-            spread = "(fixed)"
         stop = " (at its bound)" if bound else ""
-        yield f"{parameter_name(name, unit)} = {shown(value, unit)} {spread}{stop}"
+        yield f"{parameter_name(name, unit)} = {measured(value, error, unit)}{stop}"
+
+
+def measured(value: float, error: float, unit: str) -> str:
+    """A value with its standard error to the digits that are known, such as 8.369 ± 0.013 mm."""
+    if not np.isfinite(error):
+        return f"{shown(value, unit)} not seen by these data"
+    if error == 0.0:
+        return f"{shown(value, unit)} (fixed)"
+    factor, word = in_unit(unit)
+    number, spread = with_error(factor * value, factor * error)
+    return f"{number} ± {spread} {word}".strip()
 
 
 def value_records(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.fit.reasons import Reason
-from crosscheck.fit.words import shown
+from crosscheck.fit.words import belongs, shown
 from crosscheck.planning.planned import Planned
 from crosscheck.planning.proposer import Suggestion
 from crosscheck.planning.visibility import LEVEL, POWER, Signal
@@ -71,11 +71,11 @@ class Visible:
         parts = []
         for item in fields(effect):
             unit = item.metadata["unit"]
-            keys = [key for key in sizes if _belongs(key, item.name, unit)]
+            keys = [key for key in sizes if belongs(key, item.name, unit)]
             if not keys or item.metadata["shape"]:
                 continue
             null = float(item.metadata["null"])
-            start = f"{null:g} +- " if null else ""
+            start = f"{null:g} ± " if null else ""
             each = " each" if len(keys) > 1 else ""
             parts.append(f"{item.name} {start}{shown(sizes[keys[0]], unit)}{each}")
         return ", ".join(parts)
@@ -99,11 +99,6 @@ class Visible:
             "needed": self.needed,
             "shape": self.signal.shape,
         }
-
-
-def _belongs(key: str, name: str, unit: str) -> bool:
-    stem = key.removesuffix(f"_{unit}") if unit else key
-    return stem == name or (stem.startswith(f"{name}_") and len(stem) > len(name) + 1)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

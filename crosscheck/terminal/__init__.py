@@ -11,13 +11,19 @@ if TYPE_CHECKING:
     from crosscheck.terminal.calibration import print_calibration
     from crosscheck.terminal.comparison import print_comparison
     from crosscheck.terminal.diagnosis import print_diagnosis
-    from crosscheck.terminal.effects import effect_record, print_effect, print_effects
+    from crosscheck.terminal.effects import (
+        effect_record,
+        parameter_lines,
+        print_effect,
+        print_effects,
+    )
     from crosscheck.terminal.plan import print_plan
     from crosscheck.terminal.suite import print_run
 
 # Each imports what it prints: a command loads its own alone.
 _WHERE = {
     "effect_record": "effects",
+    "parameter_lines": "effects",
     "print_addition": "addition",
     "print_calibration": "calibration",
     "print_comparison": "comparison",
@@ -30,6 +36,7 @@ _WHERE = {
 
 __all__ = [
     "effect_record",
+    "parameter_lines",
     "print_addition",
     "print_calibration",
     "print_comparison",

@@ -48,7 +48,7 @@ def why_not(found: Addition) -> str:
     else:
         reason = (
             f"{found.name} does not predict runs left out any better (chi2 of a block falls by "
-            f"{mean:.3g} +- {error:.2g})"
+            f"{mean:.3g} ± {error:.2g})"
         )
     return f"{reason}: it does not pay; --force adds it all the same"
 

@@ -42,7 +42,7 @@ def print_diagnosis(found: Diagnosis, out: Path, console: Console | None = None)
             _print_finding(console, finding)
         _print_candidates(console, found)
     for line in found.measure_next:
-        say(console, f"next: {line}")
+        say(console, f"measure next: {line}")
     say(console, f"Results in {out}/ (open diagnosis.html)", "dim")
 
 

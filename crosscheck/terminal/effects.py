@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
 from rich.table import Table
 
+from crosscheck.fit.words import belongs, shown
 from crosscheck.terminal.lines import console_for, say
 from crosscheck.units import in_unit, parameter_name
-from seecr.effects import BUILT_IN, PLACES, Effect, layout_of
+from seecr.effects import BUILT_IN, PLACES, Effect, effect_named, layout_of
 from seecr.robot import Robot
 
 
@@ -43,11 +45,18 @@ def _parameters(effect: type[Effect], robot: Robot | None) -> list[dict[str, Any
     return [dict(zip(keys, row, strict=True)) for row in rows]
 
 
+def parameter_lines(name: str, values: Mapping[str, float]) -> list[str]:
+    """An effect's values by its parameters' names, SI, in the units that people read."""
+    own = [(f.name, f.metadata["unit"]) for f in fields(effect_named(name))]
+    out = []
+    for key, value in values.items():
+        unit = next(unit for field, unit in own if belongs(key, field, unit))
+        out.append(f"{parameter_name(key, unit)} = {shown(value, unit)}")
+    return out
+
+
 def print_effects(effects: list[type[Effect]]) -> None:
     """A table of effects: name, place, what each is."""
-
-    from crosscheck.terminal.lines import console_for, say
-
     console = console_for(None)
     table = Table(box=None, pad_edge=False)
     for heading in ("effect", "where", "what it is"):
@@ -58,7 +67,6 @@ def print_effects(effects: list[type[Effect]]) -> None:
                 own = "" if effect in BUILT_IN else " (own)"
                 table.add_row(effect.name, place, effect.title + own)
     console.print(table)
-    say(console, "crosscheck effects NAME says how it works and how to check it", "dim")
 
 
 def print_effect(effect: type[Effect], robot: Robot | None) -> None:

@@ -59,7 +59,7 @@ def test_an_addition_tells_values_errors_and_what_was_written() -> None:
     screen, out = console()
     print_addition(added, Path("m.toml"), True, screen)
     text = out.getvalue()
-    assert "  factor = 1.4 +- " in text or "  factor = 1.39" in text or "  factor = 1.40" in text
+    assert "  factor = 1.4 ± " in text or "  factor = 1.39" in text or "  factor = 1.40" in text
     assert "With stiffness, what is left is noise." in text
     assert text.endswith("Written to m.toml: stiffness\n")
     assert why_not(added).endswith("it does not pay; --force adds it all the same")

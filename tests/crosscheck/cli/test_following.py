@@ -1,0 +1,93 @@
+"""Each command ends by naming the next one, with its arguments: the story has no dead ends."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from made_data import case, run
+
+from crosscheck.cli.following import after_comparison, after_diagnosis, after_fit, following
+from crosscheck.fit.reasons import DiagnosisVerdict
+from crosscheck.fit.words import measured
+
+ONLY = ("--only", "pulley_radius")
+
+
+def last(result):
+    assert result.exit_code == 0, result.output
+    line = result.stdout.splitlines()[-1]
+    assert line.startswith("next: "), result.stdout
+    return shlex.split(line, comments=True)[1:]
+
+
+def test_from_a_plan_to_a_model_by_the_commands_that_each_names(tmp_path, monkeypatch):
+    """What a command says next is run as it is said, until nothing is missing."""
+    monkeypatch.chdir(tmp_path)
+    xml, data = case(Path(), {"pulley_radius": {"radius_m": 0.01}}, points=4)
+    planned = last(run("plan", xml, data))
+    assert planned == ["crosscheck", "diagnose", str(xml), str(data)]
+    told = last(run("compare", xml, data))
+    assert told == planned
+    told = last(run(*told[1:], *ONLY, "--no-recording"))
+    assert told[1:4] == ["add", "--all-from", "crosscheck-diagnosis/diagnosis.json"]
+    told = last(run(*told[1:]))
+    assert told == ["crosscheck", "compare", str(xml), str(data), "--model", "model.toml"]
+    told = last(run(*told[1:], "--no-recording"))
+    assert told == ["seecr", "correct", str(xml), str(data), "--model", "model.toml"]
+
+
+def test_the_catalogue_and_an_opened_twin_name_a_next_command():
+    assert last(run("effects"))[:2] == ["crosscheck", "effects"]
+    told = last(run("effects", "backlash"))
+    assert told == [
+        *["crosscheck", "add", "backlash", "ROBOT.xml", "DATA.csv", "--model", "model.toml"]
+    ]
+
+
+@pytest.mark.parametrize(
+    ("verdict", "missing", "model", "kept", "expected"),
+    [
+        ("effects_found", True, None, None, "add --all-from out/diagnosis.json R D"),
+        ("effects_found", True, "M", None, "add --all-from out/diagnosis.json R D --model M"),
+        ("effects_found", True, None, "N", "compare R D --model N"),
+        ("many_effects", True, None, None, "calibrate R D --model model.toml"),
+        ("no_effect_missing", False, None, None, "plan R D"),
+        ("no_effect_missing", False, "M", None, "correct R D --model M"),
+        ("unknown_effect", False, None, None, "plan R D"),
+        ("no_verdict", False, None, None, "plan R --rows 40"),
+    ],
+)
+def test_after_each_verdict(verdict, missing, model, kept, expected):
+    found = SimpleNamespace(verdict=DiagnosisVerdict(verdict), missing=("one",) * missing)
+    paths = [None if name is None else Path(name) for name in (model, kept)]
+    line = after_diagnosis(found, Path("R"), [Path("D")], *paths, Path("out"))
+    assert expected in line
+
+
+def test_names_with_blanks_are_quoted_and_all_files_named():
+    found = SimpleNamespace(is_noise=False)
+    line = after_comparison(found, Path("my robot.xml"), [Path("a.csv"), Path("b.csv")], None)
+    assert line == "next: crosscheck diagnose 'my robot.xml' a.csv b.csv"
+    noise = SimpleNamespace(is_noise=True)
+    assert "plan" in after_comparison(noise, Path("r.xml"), [Path("a.csv")], None)
+    line = after_fit(False, False, Path("r.xml"), [Path("a.csv")], Path("none.toml"))
+    assert line == "next: crosscheck diagnose r.xml a.csv"
+    assert following("a", 40) == "next: a 40"
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "unit", "words"),
+    [
+        (0.0083692, 1.31e-5, "m", "8.369 ± 0.013 mm"),
+        (-0.0029612, 5.1e-6, "m", "−2.9612 ± 0.0051 mm"),
+        (0.00894, 8.5e-5, "rad", "0.5122 ± 0.0049 deg"),
+        (1.4, 0.0234, "", "1.400 ± 0.023"),
+        (0.01, 0.0, "m", "10 mm (fixed)"),
+        (0.01, float("inf"), "m", "10 mm not seen by these data"),
+    ],
+)
+def test_digits_are_those_of_the_error(value, error, unit, words):
+    assert measured(value, error, unit) == words
