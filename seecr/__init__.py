@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from seecr.setup import Setup
     from seecr.shipped import model_names, model_path
     from seecr.solution import Solution, Status
+    from seecr.uncertainty import Spread, spread_of
     from seecr.workspace import Zone, feasible, slack_zones, tension_margin
 
 __version__ = "0.1.0"
@@ -79,6 +80,7 @@ _MODULES = {
     "setup": ("Setup",),
     "solution": ("Solution", "Status"),
     "shipped": ("model_names", "model_path"),
+    "uncertainty": ("Spread", "spread_of"),
     "workspace": ("Zone", "feasible", "slack_zones", "tension_margin"),
 }  # fmt: skip
 _WHERE = {name: module for module, names in _MODULES.items() for name in names}
@@ -104,6 +106,7 @@ __all__ = [
     "SeecrError",
     "Setup",
     "Solution",
+    "Spread",
     "Status",
     "Term",
     "Terms",
@@ -132,6 +135,7 @@ __all__ = [
     "slack_zones",
     "solution_manifold",
     "solve",
+    "spread_of",
     "tension_margin",
     "workspace_map",
 ]

@@ -26,7 +26,7 @@ FLOORS = {
     "seecr.effects": 5, "seecr.tables": 5, "seecr.cells": 6, "seecr.shifts": 6,
     "seecr.statics": 6, "seecr.inertia": 6, "seecr.model": 7,
     "seecr.scipy_search": 7, "seecr.solution": 7, "seecr.starts": 7,
-    "seecr.experiment": 8, "seecr.search": 8, "seecr.equilibrium": 10,
+    "seecr.experiment": 8, "seecr.uncertainty": 10, "seecr.search": 8, "seecr.equilibrium": 10,
     "seecr.planar": 9, "seecr.workspace": 9,
     "seecr.sensitivity": 9, "seecr.command_file": 5, "seecr.distribution": 7, "seecr.told": 9,
     "seecr.holding": 8, "seecr.nearest": 8, "seecr.inverse": 10, "seecr.maps": 11,

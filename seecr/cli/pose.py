@@ -43,7 +43,7 @@ def command(
     \b
     Exit status: 0 at rest, 2 bad input, 3 no rest found.
     """
-    from seecr import equilibria, predict, solve
+    from seecr import equilibria, predict, solve, spread_of
     from seecr.files import json_text, staged, write_text
     from seecr.report.rows import rows_of
     from seecr.report.words import at_rest, cable_lines, other_lines, pose_lines, softest_words
@@ -55,13 +55,14 @@ def command(
     # effects with a memory lead to one rest alone, along their way
     memory = own is not None and predict(machine, command, own).has_history
     others = None if alone or memory else equilibria(machine, command, effects=own or ())
+    spread = None if own is None else spread_of(machine, command, own)
     status = 0 if at_rest(solution) else 3
     notes = list(own.notes) if own else []
     document = {
         "exit_status": status,
         "robot": machine.name,
         "cables": machine.cable_names,
-        **rows_of(solution)[0],
+        **rows_of(solution, spread=spread)[0],
         "sentence": solution.sentence(0),
         "softest_direction": softest_words(solution),
         "frequencies_Hz": solution.frequencies[0],
@@ -74,7 +75,11 @@ def command(
     if as_json:
         click.echo(json_text(document))
         return status
-    lines = [*pose_lines(solution), *cable_lines(solution), *other_lines(solution, others)]
+    lines = [
+        *pose_lines(solution, spread=spread),
+        *cable_lines(solution, spread=spread),
+        *other_lines(solution, others),
+    ]
     for line in [*notes, *lines]:
         click.echo(line)
     return status

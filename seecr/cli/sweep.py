@@ -75,7 +75,7 @@ def command(
     \b
     Exit status: 0 all at rest, 2 bad input, 3 a pose without rest.
     """
-    from seecr import solve
+    from seecr import solve, spread_of
     from seecr.files import json_text, staged, write_text
     from seecr.report.figures import sweep_figure
     from seecr.report.rows import csv_text, rows_of
@@ -86,8 +86,9 @@ def command(
     commands, more, said = _commands(machine, poses, given)
     with staged(out) as folder:
         solution = solve(machine, commands, effects=own or ())
+        spread = None if own is None else spread_of(machine, commands, own)
         commanded = commands.lengths is None
-        rows = rows_of(solution, commands.lengths, more)
+        rows = rows_of(solution, commands.lengths, more, spread)
         status = 0 if at_rest(solution) else 3
         notes = [*(own.notes if own else ()), *said]
         document = {
@@ -111,7 +112,7 @@ def command(
     if as_json:
         click.echo(text)
         return status
-    for line in [*notes, *sweep_lines(solution, commanded), f"Results in {out}/"]:
+    for line in [*notes, *sweep_lines(solution, commanded, spread), f"Results in {out}/"]:
         click.echo(line)
     return status
 

@@ -12,6 +12,7 @@ import numpy as np
 from seecr.pose import Array
 from seecr.result import Record
 from seecr.solution import Solution
+from seecr.uncertainty import Spread
 
 __all__ = ["csv_text", "rows_of"]
 
@@ -22,6 +23,7 @@ def rows_of(
     solution: Solution,
     lengths: Array | None = None,
     more: Mapping[str, Sequence[Any]] | None = None,
+    spread: Spread | None = None,
 ) -> list[Record]:
     """One row per command, SI units.
 
@@ -29,6 +31,7 @@ def rows_of(
         solution: of n commands.
         lengths: (n, m) [m] that were commanded instead of poses.
         more: further values of each row, by name.
+        spread: one standard deviation of poses and tensions, where the model says so.
     """
     names = solution.robot.cable_names
     eigenvalues, extra = solution.smallest_eigenvalue, more or {}
@@ -47,9 +50,20 @@ def rows_of(
             "iterations": int(solution.iterations[i]),
             "residual": float(solution.residual[i]),
             "smallest_eigenvalue": float(eigenvalues[i]),
+            **_spread_of(spread, i),
         }
         for i in range(len(solution))
     ]
+
+
+def _spread_of(spread: Spread | None, i: int) -> Record:
+    if spread is None:
+        return {}
+    return {
+        "position_stderr_m": spread.position[i].tolist(),
+        "rotation_stderr_rad": spread.rotation[i].tolist(),
+        "tensions_stderr_N": spread.tensions[i].tolist(),
+    }
 
 
 def csv_text(rows: Sequence[Record]) -> str:
@@ -79,6 +93,10 @@ def _flat(row: Record) -> dict[str, str]:
         out |= _named("deviation_{}_m", "xyz", row["deviation_m"])
         out |= _named("rotation_{}_rad", "xyz", row["rotation_rad"])
     out |= _named("tension_{}_N", cables, row["tensions_N"])
+    if "position_stderr_m" in row:
+        out |= _named("pose_{}_stderr_m", "xyz", row["position_stderr_m"])
+        out |= _named("rotation_{}_stderr_rad", "xyz", row["rotation_stderr_rad"])
+        out |= _named("cable_{}_stderr_N", cables, row["tensions_stderr_N"])
     out |= {key: row[key] for key in ("status", "residual", "smallest_eigenvalue")}
     out["slack"] = " ".join(row["slack"])
     return {name: _cell(value) for name, value in out.items()}

@@ -9,6 +9,7 @@ import numpy as np
 from seecr.pose import Array, pose_difference, rxyz_from_quat
 from seecr.robot import Robot
 from seecr.solution import Solution, Status
+from seecr.uncertainty import Spread
 
 __all__ = [
     "at_rest",
@@ -27,13 +28,16 @@ _PART = 0.1
 _NUDGE = 0.01
 
 
-def pose_lines(solution: Solution, i: int = 0, commanded: bool = True) -> Iterator[str]:
+def pose_lines(
+    solution: Solution, i: int = 0, commanded: bool = True, spread: Spread | None = None
+) -> Iterator[str]:
     """Where pose i rests and how far that is from its command.
 
     Args:
         solution: the answers.
         i: which of them.
         commanded: whether a pose was commanded, and not lengths.
+        spread: how far the answers may be off, where the model says so.
     """
     yield f"{solution.robot.name}: {solution.sentence(i)}"
     pose, away = solution.pose[i], solution.deviation[i]
@@ -41,6 +45,12 @@ def pose_lines(solution: Solution, i: int = 0, commanded: bool = True) -> Iterat
         return
     angles = _three(np.degrees(rxyz_from_quat(pose[3:])), ".3f")
     yield f"rests at x y z {_three(1e3 * pose[:3], '.3f')} mm, turned rx ry rz {angles} deg"
+    if spread is not None:
+        turned = np.degrees(spread.rotation[i])
+        yield (
+            f"  ± {_three(1e3 * spread.position[i], '.4f')} mm, ± {_three(turned, '.4f')} deg "
+            "about x y z: one standard deviation, by what the model does not know"
+        )
     yield "  quaternion " + " ".join(f"{q + 0.0:.7f}" for q in np.round(pose[3:], 9))
     if commanded:
         yield (
@@ -53,15 +63,17 @@ def pose_lines(solution: Solution, i: int = 0, commanded: bool = True) -> Iterat
     yield f"forces balance to {solution.residual[i]:.1g} of the load"
 
 
-def cable_lines(solution: Solution, i: int = 0) -> Iterator[str]:
-    """One line per cable: tension, rest length, how far it is stretched."""
+def cable_lines(solution: Solution, i: int = 0, spread: Spread | None = None) -> Iterator[str]:
+    """One line per cable: tension and how far that may be off, rest length, whether it is slack."""
     robot = solution.robot
     wide = max(len("cable"), *(len(name) for name in robot.cable_names))
-    yield f"{'cable':<{wide}}  tension [N]  rest length [m]"
+    off = "" if spread is None else "      ± [N]"
+    yield f"{'cable':<{wide}}  tension [N]{off}  rest length [m]"
     for k, name in enumerate(robot.cable_names):
         slack = "  slack" if solution.slack[i, k] else ""
         tension, rest = solution.tensions[i, k] + 0.0, solution.rest_lengths[i, k]
-        yield f"{name:<{wide}}  {tension:11.4f}  {rest:15.6f}{slack}"
+        off = "" if spread is None else f"  {spread.tensions[i, k]:9.4f}"
+        yield f"{name:<{wide}}  {tension:11.4f}{off}  {rest:15.6f}{slack}"
 
 
 def stiffness_lines(solution: Solution, i: int = 0) -> Iterator[str]:
@@ -143,7 +155,9 @@ def other_lines(solution: Solution, others: Solution | None, i: int = 0) -> Iter
         )
 
 
-def sweep_lines(solution: Solution, commanded: bool = True) -> list[str]:
+def sweep_lines(
+    solution: Solution, commanded: bool = True, spread: Spread | None = None
+) -> list[str]:
     """A sweep in a few lines."""
     lines = solution.lines()
     if not commanded:
@@ -152,6 +166,16 @@ def sweep_lines(solution: Solution, commanded: bool = True) -> list[str]:
     if len(counts) and counts.max() > 0:
         parts = [f"{int(np.sum(counts == k))} with {k}" for k in np.unique(counts)]
         lines.append(f"poses by number of slack cables: {', '.join(parts)}")
+    if spread is not None and len(counts):
+        position, turned = (
+            float(np.nanmax(np.linalg.norm(part, axis=1)))
+            for part in (spread.position, spread.rotation)
+        )
+        lines.append(
+            f"off by up to ± {1e3 * position:.3g} mm and ± {np.degrees(turned):.3g} deg, "
+            f"± {np.nanmax(spread.tensions):.3g} N: one standard deviation, by what the model does "
+            "not know"
+        )
     return lines
 
 

@@ -1,0 +1,124 @@
+"""How far a calibrated model's predictions may be off, by the covariance that it keeps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from seecr.cells import Where
+from seecr.commands import Commands
+from seecr.experiment import Experiment, senses
+from seecr.files import read_text
+from seecr.model import Model
+from seecr.pose import Array
+from seecr.robot import Robot
+from seecr.sensitivity import sensitivities
+from seecr.starts import commanded_poses
+
+# An eigenvalue of a correlation this far below zero is no rounding of its six digits.
+_ROUNDED = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Spread:
+    """One standard deviation of where n commands lead, by what the model does not know.
+
+    To first order in the parameters, as the covariance itself is. NaN where a row has no rest.
+
+    Attributes:
+        position: (n, 3) [m]; rotation: (n, 3) [rad], rotation vector in the base frame.
+        tensions: (n, m) [N]; 0 of a slack cable.
+    """
+
+    position: Array
+    rotation: Array
+    tensions: Array
+
+
+def covariance_of(model: Model) -> Array | None:
+    """Covariance (p, p) of a model's values, each in its own unit; None where it keeps none.
+
+    The correlations of ``[calibration]`` times the standard errors that stand with the values.
+    What was added to the model later goes with nothing else.
+
+    Raises:
+        InputFileError: correlations that are none.
+    """
+    table = model.document.get("calibration")
+    if not isinstance(table, Mapping) or "correlation" not in table:
+        return None
+    labels = [f"{effect}.{key}" for effect, key in model.terms.labels]
+    names = [str(name) for name in table.get("parameters", [])]
+    kept = _correlations(model, names, table["correlation"])
+    stderr = np.concatenate([model.stderr[name] for name in model.terms.names])
+    out = np.eye(len(labels))
+    both = [(labels.index(name), k) for k, name in enumerate(names) if name in labels]
+    here, there = (np.array(part, dtype=int) for part in zip(*both, strict=True))
+    out[np.ix_(here, here)] = kept[np.ix_(there, there)]
+    known = np.where(np.isfinite(stderr), stderr, 0.0)
+    return np.asarray(out * np.outer(known, known))
+
+
+def _correlations(model: Model, names: list[str], rows: object) -> Array:
+    """The whole (k, k) from rows that end at the diagonal."""
+    out = np.eye(len(names))
+    try:
+        for k, row in enumerate(rows):  # type: ignore[arg-type, var-annotated]
+            out[k, : k + 1] = out[: k + 1, k] = np.asarray(row, float)
+        whole = len(rows) == len(names) > 0  # type: ignore[arg-type]
+        fine = whole and np.allclose(np.diag(out), 1.0) and np.abs(out).max() <= 1.0 + 1e-9
+        fine = bool(fine) and float(np.linalg.eigvalsh(out)[0]) > -_ROUNDED
+    except (TypeError, ValueError, IndexError):
+        fine = False
+    if not fine:
+        raise _file_of(model).error(
+            f"correlation: expected {len(names)} rows of numbers, one for each of parameters, each "
+            "up to its diagonal, which is 1; calibrate the model again",
+            key="correlation",
+        )
+    return out
+
+
+def _file_of(model: Model) -> Where:
+    """The file as it is, for the line of a mistake: reading has changed the document."""
+    if model.path is None:
+        return Where(Path("the model"), model.document.as_string())
+    return Where(model.path, read_text(model.path, "expected a model"))
+
+
+def spread_of(robot: Robot, commands: Commands | ArrayLike, model: Model) -> Spread | None:
+    """How far poses and tensions may be off; None where the model keeps no covariance.
+
+    What sensors read is not asked for: effects of sensing count for nothing.
+
+    Args:
+        robot: as described.
+        commands: poses (n, 7), or :class:`seecr.Commands`.
+        model: as ``crosscheck calibrate`` writes it.
+
+    Raises:
+        InputFileError: correlations in the model that are none.
+    """
+    covariance = covariance_of(model)
+    if covariance is None:
+        return None
+    if not isinstance(commands, Commands):
+        commands = Commands(commanded_poses(commands))
+    moving = [term.name for term in model.terms if not senses(term.layout.effect)]
+    terms = model.terms.only(moving)
+    columns = np.flatnonzero([effect in moving for effect, _key in model.terms.labels])
+    experiment = Experiment(robot, commands)
+    at = experiment.predict(terms.effects)
+    if len(columns):
+        slopes = sensitivities(experiment, terms, at)
+        part = covariance[np.ix_(columns, columns)]
+        squares = np.einsum("nip,pq,niq->ni", slopes, part, slopes)
+    else:
+        squares = np.zeros((len(commands), 6 + robot.n_cables))
+    found = np.sqrt(np.maximum(squares, 0.0))
+    found[~at.solved] = np.nan
+    return Spread(found[:, :3], found[:, 3:6], found[:, 6:])
