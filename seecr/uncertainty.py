@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from seecr.cells import Where
 from seecr.commands import Commands
+from seecr.effects import Terms
 from seecr.experiment import Experiment, senses
 from seecr.files import read_text
 from seecr.model import Model
@@ -32,11 +33,14 @@ class Spread:
     Attributes:
         position: (n, 3) [m]; rotation: (n, 3) [rad], rotation vector in the base frame.
         tensions: (n, m) [N]; 0 of a slack cable.
+        seen: (n, 6) [m, rad] the same of what the tracker would read. Where it stands against the
+            base frame is often all that a calibration does not know, and moves both together.
     """
 
     position: Array
     rotation: Array
     tensions: Array
+    seen: Array
 
 
 def covariance_of(model: Model) -> Array | None:
@@ -93,8 +97,6 @@ def _file_of(model: Model) -> Where:
 def spread_of(robot: Robot, commands: Commands | ArrayLike, model: Model) -> Spread | None:
     """How far poses and tensions may be off; None where the model keeps no covariance.
 
-    What sensors read is not asked for: effects of sensing count for nothing.
-
     Args:
         robot: as described.
         commands: poses (n, 7), or :class:`seecr.Commands`.
@@ -109,16 +111,22 @@ def spread_of(robot: Robot, commands: Commands | ArrayLike, model: Model) -> Spr
     if not isinstance(commands, Commands):
         commands = Commands(commanded_poses(commands))
     moving = [term.name for term in model.terms if not senses(term.layout.effect)]
-    terms = model.terms.only(moving)
     columns = np.flatnonzero([effect in moving for effect, _key in model.terms.labels])
     experiment = Experiment(robot, commands)
+    own = _spread(experiment, model.terms.only(moving), covariance[np.ix_(columns, columns)])
+    seen = own if len(moving) == len(model.terms.names) else _spread(
+        experiment, model.terms, covariance
+    )  # fmt: skip
+    return Spread(own[:, :3], own[:, 3:6], own[:, 6:], seen[:, :6])
+
+
+def _spread(experiment: Experiment, terms: Terms, covariance: Array) -> Array:
+    """Standard deviation (n, 6 + m) of readings, by the covariance (p, p) of the terms."""
     at = experiment.predict(terms.effects)
-    if len(columns):
+    out = np.zeros((len(experiment.commands), 6 + experiment.robot.n_cables))
+    if len(terms):
         slopes = sensitivities(experiment, terms, at)
-        part = covariance[np.ix_(columns, columns)]
-        squares = np.einsum("nip,pq,niq->ni", slopes, part, slopes)
-    else:
-        squares = np.zeros((len(commands), 6 + robot.n_cables))
-    found = np.sqrt(np.maximum(squares, 0.0))
-    found[~at.solved] = np.nan
-    return Spread(found[:, :3], found[:, 3:6], found[:, 6:])
+        squares = np.einsum("nip,pq,niq->ni", slopes, covariance, slopes)
+        out = np.sqrt(np.maximum(squares, 0.0))
+    out[~at.solved] = np.nan
+    return out

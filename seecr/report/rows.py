@@ -62,6 +62,7 @@ def _spread_of(spread: Spread | None, i: int) -> Record:
     return {
         "position_stderr_m": spread.position[i].tolist(),
         "rotation_stderr_rad": spread.rotation[i].tolist(),
+        "seen_stderr": spread.seen[i].tolist(),
         "tensions_stderr_N": spread.tensions[i].tolist(),
     }
 

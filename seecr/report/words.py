@@ -46,11 +46,7 @@ def pose_lines(
     angles = _three(np.degrees(rxyz_from_quat(pose[3:])), ".3f")
     yield f"rests at x y z {_three(1e3 * pose[:3], '.3f')} mm, turned rx ry rz {angles} deg"
     if spread is not None:
-        turned = np.degrees(spread.rotation[i])
-        yield (
-            f"  ± {_three(1e3 * spread.position[i], '.4f')} mm, ± {_three(turned, '.4f')} deg "
-            "about x y z: one standard deviation, by what the model does not know"
-        )
+        yield from _spread_lines(spread, i)
     yield "  quaternion " + " ".join(f"{q + 0.0:.7f}" for q in np.round(pose[3:], 9))
     if commanded:
         yield (
@@ -61,6 +57,19 @@ def pose_lines(
         )
     yield from stiffness_lines(solution, i)
     yield f"forces balance to {solution.residual[i]:.1g} of the load"
+
+
+def _spread_lines(spread: Spread, i: int) -> Iterator[str]:
+    seen = spread.seen[i]
+    own = np.concatenate([spread.position[i], spread.rotation[i]])
+    yield f"  {_off(own)}: one standard deviation, by what the model does not know"
+    if not np.allclose(seen, own, rtol=0.01):
+        yield f"  {_off(seen)} as the tracker of the calibration would read it"
+
+
+def _off(values: Array) -> str:
+    turned = _three(np.degrees(values[3:]), ".4f")
+    return f"± {_three(1e3 * values[:3], '.4f')} mm, ± {turned} deg about x y z"
 
 
 def cable_lines(solution: Solution, i: int = 0, spread: Spread | None = None) -> Iterator[str]:

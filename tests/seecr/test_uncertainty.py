@@ -80,6 +80,10 @@ def test_many_models_drawn_from_it_spread_as_said(tmp_path: Path) -> None:
     seen = np.concatenate([np.std(poses, axis=0), np.std(tensions, axis=0)], axis=1) / small
     seen_at_all = seen > 1e-3 * seen.max(axis=1, keepdims=True)
     np.testing.assert_allclose(said[seen_at_all], seen[seen_at_all], rtol=0.1)
+    # what the tracker reads hangs on its target too, which no pose does
+    target = np.sqrt(spread.position**2 + 0.01**2)
+    np.testing.assert_allclose(spread.seen[:, :3], target, rtol=1e-3)
+    np.testing.assert_allclose(spread.seen[:, 3:], spread.rotation, rtol=1e-3)
     # correlation counts: heavier and stiffer go together here, and the sag hardly changes
     apart = spread_of(ROBOT, POSES, model_of(tmp_path, MODEL.replace("[0.8, 1.0]", "[-0.8, 1.0]")))
     assert apart is not None and np.all(apart.position[:, 2] > 1.5 * spread.position[:, 2])
@@ -120,6 +124,7 @@ def test_it_is_printed_and_written(tmp_path: Path) -> None:
     assert spread is not None
     lines = list(pose_lines(found, spread=spread))
     assert lines[2].startswith("  ± 0.00") and lines[2].endswith("by what the model does not know")
+    assert lines[3].startswith("  ± 10.0") and lines[3].endswith("would read it")
     head, first = list(cable_lines(found, spread=spread))[:2]
     assert "± [N]" in head and f"{spread.tensions[0, 0]:.4f}" in first
     assert sweep_lines(found, spread=spread)[-1].startswith("off by up to ± 0.")
