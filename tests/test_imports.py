@@ -34,7 +34,7 @@ FLOORS = {
     "seecr.recording": 12,
     "seecr.report": 12, "seecr.cli": 13,
     "crosscheck.errors": 20,
-    "crosscheck.files": 21, "crosscheck.units": 21, "crosscheck.given": 21,
+    "crosscheck.files": 21, "crosscheck.made": 21, "crosscheck.units": 21, "crosscheck.given": 21,
     "crosscheck.settle": 22, "crosscheck.measurements": 22, "crosscheck.model": 22,
     "crosscheck.twin": 23, "crosscheck.fit": 23,
     "crosscheck.suite": 24, "crosscheck.calibration": 24, "crosscheck.importing": 24,

@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import shlex
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
+
+from seecr.cli.group import ARGUMENTS
+from seecr.cli.options import FILE
+
+if TYPE_CHECKING:
+    from crosscheck.made import Made
 
 sigma_option = click.option(
     "--sigma",
@@ -38,6 +48,34 @@ tolerance_option = click.option(
     "0.05deg or 1N); may be repeated.  [default: half the noise]",
 )
 """``--tolerance 0.1mm``, given to the command as ``tolerances``, a tuple of texts."""
+
+
+figures_option = click.option(
+    "--figures", type=FILE, metavar="DIR", help="Keep the page's figures there, as SVG and PNG."
+)
+"""``--figures DIR``, given to the command as ``figures``; see :func:`figures_in`."""
+
+
+@contextmanager
+def figures_in(folder: Path | None) -> Iterator[None]:
+    """Figures that are drawn meanwhile are kept there, if anywhere; all of them or none."""
+    from crosscheck.files import staged
+    from crosscheck.report import keeping
+
+    if folder is None:
+        yield
+        return
+    with staged(folder) as unfinished, keeping(unfinished):
+        yield
+
+
+def made_by(*files: Path | None) -> Made:
+    """How the command that is running came to its result, from these files."""
+    from crosscheck.made import Made
+
+    ctx = click.get_current_context()
+    words = [ctx.find_root().info_name or "crosscheck", *ctx.meta.get(ARGUMENTS, [])]
+    return Made.now(shlex.join(words), files)
 
 
 def listed(texts: Sequence[str]) -> list[str]:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from crosscheck.cli.choices import sigma_option
+from crosscheck.cli.choices import figures_in, figures_option, made_by, sigma_option
 from crosscheck.cli.following import after_comparison
 from seecr.cli.options import FILE, json_option, out_option
 
@@ -37,6 +37,7 @@ Examples:
     help='Limits from a file: max_position = "0.5mm" and so on; options go first.',
 )
 @sigma_option
+@figures_option
 @click.option("--no-recording", is_flag=True, help="Write no .rrd.")
 @out_option("crosscheck-comparison")
 @json_option
@@ -46,6 +47,7 @@ def command(
     model: Path | None,
     limits_file: Path | None,
     sigmas: tuple[str, ...],
+    figures: Path | None,
     no_recording: bool,
     out: Path,
     as_json: bool,
@@ -54,8 +56,8 @@ def command(
     """Show where a model is off, by how much, and whether what is left is noise.
 
     ROBOT.xml is the robot's MJCF, DATA.csv its measurements, with sigma in a TOML beside it.
-    Nothing is fitted: with the model's values as they are. Writes comparison.json and
-    comparison.rrd.
+    Nothing is fitted: with the model's values as they are. Writes comparison.json,
+    comparison.html and comparison.rrd.
 
     \b
     Limits make it a gate for continuous integration: on the rms over all rows and components,
@@ -66,6 +68,7 @@ def command(
     from crosscheck.comparison import Limits, check, load_limits, with_options
     from crosscheck.files import json_text, staged, write_text
     from crosscheck.measurements.stated import with_stated
+    from crosscheck.report import write_comparison_page
     from seecr import load_model, load_robot
 
     limits = with_options(load_limits(limits_file) if limits_file else Limits(), options)
@@ -76,7 +79,9 @@ def command(
         found = compare(machine, measured, own.terms if own else ())
         exceeded = check(limits, found)
         status = 1 if exceeded else (0 if found.converged else 3)
+        made = made_by(robot, *data, model)
         document = {
+            "made": made,
             "exit_status": status,
             "limits": {k: v for k, v in vars(limits).items() if v is not None},
             "exceeded": exceeded,
@@ -85,6 +90,8 @@ def command(
         }
         text = json_text(document)
         write_text(folder / "comparison.json", text + "\n")
+        with figures_in(figures):
+            write_comparison_page(found, folder / "comparison.html", made)
         if not no_recording:
             # takes a second or two to import
             from crosscheck.recording import write_comparison_recording

@@ -9,7 +9,10 @@ import click
 
 from crosscheck.cli.choices import (
     exclude_option,
+    figures_in,
+    figures_option,
     listed,
+    made_by,
     only_option,
     sigma_option,
     tolerance_option,
@@ -41,6 +44,7 @@ if TYPE_CHECKING:
     metavar="VERDICT,...",
     help="End 1 where the verdict is one of these, such as unknown_effect,no_verdict.",
 )
+@figures_option
 @click.option("--no-recording", is_flag=True, help="Write no .rrd.")
 @out_option("crosscheck-diagnosis")
 @json_option
@@ -54,6 +58,7 @@ def command(
     tolerances: tuple[str, ...],
     model_out: Path | None,
     fail_on: tuple[str, ...],
+    figures: Path | None,
     no_recording: bool,
     out: Path,
     as_json: bool,
@@ -86,9 +91,11 @@ def command(
                 machine, measured, own, progress, only=listed(only), exclude=listed(exclude),
                 tolerance=tolerance,
             )  # fmt: skip
-        text = json_text(found.as_json())
+        made = made_by(robot, *data, model)
+        text = json_text({"made": made, **found.as_json()})
         write_text(folder / "diagnosis.json", text + "\n")
-        write_report(found, folder / "diagnosis.html")
+        with figures_in(figures):
+            write_report(found, folder / "diagnosis.html", made)
         if not no_recording and found.search is not None:
             from crosscheck.recording import write_diagnosis_recording
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from crosscheck.cli.choices import listed, sigma_option
+from crosscheck.cli.choices import figures_in, figures_option, listed, made_by, sigma_option
 from crosscheck.cli.following import after_plan
 from seecr.cli.options import FILE, json_option, out_option, progress_share
 
@@ -40,6 +40,7 @@ Examples:
     metavar="X0,Y0,Z0,X1,Y1,Z1",
     help="Where poses are chosen [m].  [default: inside the exit points]",
 )
+@figures_option
 @out_option("crosscheck-plan")
 @json_option
 def command(
@@ -51,6 +52,7 @@ def command(
     lowest: float,
     highest: float,
     box: str | None,
+    figures: Path | None,
     out: Path,
     as_json: bool,
 ) -> int:
@@ -68,6 +70,7 @@ def command(
     \b
     Writes into --out:
       plan.json        all of it
+      plan.html        the same as a page
       poses.csv        with --rows: the poses, as a controller can take them
       add-KIND.csv     the commands of each thing to add
     Exit status: 0 all well, 2 bad input, 3 poses without an equilibrium.
@@ -79,6 +82,7 @@ def command(
     from crosscheck.files import json_text, staged, write_text
     from crosscheck.measurements.stated import stated
     from crosscheck.planning import box_of, compose, write_plan
+    from crosscheck.report import write_plan_page
     from crosscheck.terminal import print_plan
     from seecr import load_robot
 
@@ -93,12 +97,16 @@ def command(
                 box=box_of(box) if box else None,
             )  # fmt: skip
             plan = make_plan(machine, commands, sigma, progress, reads=kinds, limits=limits)
-        text = json_text({"exit_status": 0 if plan.converged else 3, **plan.as_json()})
+        made = made_by(robot, poses)
+        status = 0 if plan.converged else 3
+        text = json_text({"made": made, "exit_status": status, **plan.as_json()})
         write_text(folder / "plan.json", text + "\n")
+        with figures_in(figures):
+            write_plan_page(plan, folder / "plan.html", made)
         files = write_plan(plan, folder, chosen=given is None)
     if as_json:
         click.echo(text)
     else:
         print_plan(plan, out, files)
         click.echo(after_plan(robot, poses or out / "poses.csv"))
-    return 0 if plan.converged else 3
+    return status

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -17,6 +18,26 @@ from seecr.pose import Array
 _ARROW, _LARGEST = 0.13, 98.0
 # A side that is shorter than this part of the longest is flat.
 _FLAT = 0.02
+
+
+class Drawn(Protocol):
+    """A model that can be drawn: it has a name and a state."""
+
+    @property
+    def label(self) -> str:
+        """What it is, in words."""
+
+    @property
+    def state(self) -> State:
+        """The model on the data."""
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """One model by itself: ``label`` says which, ``state`` is it on the data."""
+
+    label: str
+    state: State
 
 
 @dataclass(frozen=True, eq=False)

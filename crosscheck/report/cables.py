@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from crosscheck.comparison.cable_space import cable_errors, cable_lengths
 from crosscheck.comparison.quantities import channels
 from crosscheck.comparison.travel import travel
-from crosscheck.diagnosis.steps import Stage
+from crosscheck.diagnosis.steps import Drawn
 from crosscheck.fit.problem import KINDS, TENSION, Problem
 from crosscheck.report.drawing import (
     AFTER,
@@ -56,7 +56,7 @@ class Wall:
     abscissae: list[tuple[str, Array]]
 
 
-def walls_of(problem: Problem, before: Stage, after: Stage) -> list[Wall]:
+def walls_of(problem: Problem, before: Drawn, after: Drawn) -> list[Wall]:
     """Cable lengths where the whole pose was read, else its readings; tensions where read."""
     raw = before.state.raw
     change = raw - after.state.raw

@@ -5,13 +5,17 @@ from __future__ import annotations
 import base64
 import html
 import io
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
+from pathlib import Path as FilePath
 from typing import Any
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
@@ -84,6 +88,30 @@ def grid(axes: Axes, axis: str = "both") -> None:
     axes.grid(True, axis=axis, color=FAINT, linewidth=0.7)  # type: ignore[arg-type]
 
 
+_folder: ContextVar[FilePath | None] = ContextVar("folder", default=None)
+
+
+@contextmanager
+def keeping(folder: FilePath | None) -> Iterator[None]:
+    """Figures that are drawn meanwhile are kept in a folder too, as SVG and PNG."""
+    token = _folder.set(folder)
+    try:
+        yield
+    finally:
+        _folder.reset(token)
+
+
+def _keep(figure: Figure, svg: bytes, words: str) -> None:
+    folder = _folder.get()
+    if folder is None:
+        return
+    name = re.sub(r"[^a-z0-9]+", "-", words.lower()).strip("-")
+    (folder / f"{name}.svg").write_bytes(svg)
+    FigureCanvasAgg(figure)
+    figure.savefig(folder / f"{name}.png", metadata={"Software": None})
+    FigureCanvasSVG(figure)
+
+
 def image(figure: Figure, words: str) -> str:
     """The figure as an element of the page, with nothing outside of it.
 
@@ -94,6 +122,7 @@ def image(figure: Figure, words: str) -> str:
     buffer = io.BytesIO()
     nothing = dict.fromkeys(("Date", "Creator", "Format", "Type"))
     figure.savefig(buffer, format="svg", metadata=nothing)
+    _keep(figure, buffer.getvalue(), words)
     text = base64.b64encode(buffer.getvalue()).decode("ascii")
     alt = html.escape(words, quote=True)
     return f'<img alt="{alt}" src="data:image/svg+xml;base64,{text}">'

@@ -13,6 +13,7 @@ from crosscheck.diagnosis.steps import shown_stages, stages_of
 from crosscheck.files import write_text
 from crosscheck.fit.problem import Problem, kinds_read
 from crosscheck.fit.words import rms_words
+from crosscheck.made import Made
 from crosscheck.report.cables import draw_wall, walls_of
 from crosscheck.report.confusion import confusion_of, draw_confusion
 from crosscheck.report.findings import finding_card
@@ -28,21 +29,31 @@ _NO_SEARCH: dict[str, Any] = {
 }  # fmt: skip
 
 
-def write_report(found: Diagnosis, path: str | Path) -> None:
+def write_report(found: Diagnosis, path: str | Path, made: Made | None = None) -> None:
     """Write a diagnosis as one self-contained page.
 
     Args:
         found: the diagnosis.
         path: the ``.html`` file; a temporary one takes its place when complete.
+        made: how it came about, for the page's foot.
 
     Raises:
         InputFileError: the file cannot be written.
     """
-    write_text(Path(path), render(found), failure="cannot write the report")
+    write_text(Path(path), render(found, made), failure="cannot write the report")
 
 
-def render(found: Diagnosis) -> str:
+def render(found: Diagnosis, made: Made | None = None) -> str:
     """The page's text."""
+    return page_of("report.html.jinja", made, **_context(found))
+
+
+def page_of(template: str, made: Made | None, **context: Any) -> str:
+    """A page's text.
+
+    Args:
+        template: its file. made: how it came about. context: what the template asks for.
+    """
     environment = Environment(
         loader=PackageLoader("crosscheck.report", "."),
         autoescape=True,
@@ -50,12 +61,12 @@ def render(found: Diagnosis) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return environment.get_template("report.html.jinja").render(**_context(found))
+    said = "" if made is None else made.words
+    return environment.get_template(template).render(version=__version__, made=said, **context)
 
 
 def _context(found: Diagnosis) -> dict[str, Any]:
     return {
-        "version": __version__,
         "verdict": found.verdict.value,
         "verdict_name": found.verdict.heading,
         "verdict_meaning": found.verdict.meaning,

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 
-from crosscheck.diagnosis.steps import Stage, drawn, magnification, views_of
+from crosscheck.diagnosis.steps import Drawn, drawn, magnification, views_of
 from crosscheck.fit.problem import POSITION, Kind, Problem, kinds_read
 from crosscheck.report.drawing import GREY, INK, MANY, blank, grid, image, styled
 from seecr.pose import Array
@@ -24,7 +24,7 @@ _MOST_ARROWS = 250
 _COLOURS = ListedColormap(colormaps["viridis_r"](np.linspace(0.12, 1.0, 128)))
 
 
-def failure_map(problem: Problem, before: Stage, after: Stage) -> str:
+def failure_map(problem: Problem, before: Drawn, after: Drawn) -> str:
     """Arrows of the position error and dots of the orientation error at each measured pose."""
     place = before.state.prediction.pose[:, :3]
     views = views_of(place[problem.use])
@@ -40,7 +40,8 @@ def failure_map(problem: Problem, before: Stage, after: Stage) -> str:
         )
         columns = panels.T if len(stages) == 1 else panels
         _draw(figure, columns, problem, stages, place, views)
-        return image(figure, "Where the model fails, before and after")
+        words = "Where the model fails" + (", before and after" if len(stages) > 1 else "")
+        return image(figure, words)
 
 
 def _height(place: Array, view: tuple[int, int], columns: int) -> float:
@@ -54,7 +55,7 @@ def _draw(
     figure: Figure,
     panels: Any,
     problem: Problem,
-    stages: list[Stage],
+    stages: list[Drawn],
     place: Array,
     views: list[tuple[int, int]],
 ) -> None:
@@ -76,7 +77,7 @@ def _draw(
         bar.outline.set_visible(False)
 
 
-def _title(stages: list[Stage], column: int, magnify: float) -> str:
+def _title(stages: list[Drawn], column: int, magnify: float) -> str:
     stage = stages[column]
     when = "" if len(stages) == 1 else ("before: ", "after: ")[column]
     names = [stage.label] if column == 0 else ["+ " + name for name in stage.state.terms.names]
@@ -90,7 +91,7 @@ def _coloured(problem: Problem) -> Kind | None:
     return read[0] if read else None
 
 
-def _top(problem: Problem, stage: Stage, kind: Kind) -> float:
+def _top(problem: Problem, stage: Drawn, kind: Kind) -> float:
     size = kind.sizes(problem, stage.state.raw) * kind.factor
     return max(float(np.nanpercentile(size, _LARGEST)), 1e-12)
 
@@ -98,7 +99,7 @@ def _top(problem: Problem, stage: Stage, kind: Kind) -> float:
 def _dots(
     axes: Axes,
     problem: Problem,
-    stage: Stage,
+    stage: Drawn,
     place: Array,
     view: tuple[int, int],
     kind: Kind | None,
@@ -120,7 +121,7 @@ def _dots(
 
 
 def _arrows(
-    axes: Axes, problem: Problem, stage: Stage, place: Array, view: tuple[int, int], magnify: float
+    axes: Axes, problem: Problem, stage: Drawn, place: Array, view: tuple[int, int], magnify: float
 ) -> None:
     error = np.where(problem.counted[:, POSITION], stage.state.raw[:, POSITION], 0.0)
     rows = np.flatnonzero(problem.use)[:: thinned(problem)]
@@ -149,7 +150,7 @@ def _frame(axes: Axes, place: Array, view: tuple[int, int]) -> None:
     grid(axes)
 
 
-def caption(problem: Problem, stage: Stage) -> str:
+def caption(problem: Problem, stage: Drawn) -> str:
     """What arrows and dots mean."""
     magnify, kind = magnification(problem, stage.state), _coloured(problem)
     parts = []

@@ -9,12 +9,13 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from crosscheck.planning.proposer import Gain, Suggestion
-from crosscheck.planning.result import Plan, Visible
+from crosscheck.planning.proposer import Suggestion
+from crosscheck.planning.result import Plan
+from crosscheck.planning.words import alike, gain_words
 from crosscheck.terminal.lines import console_for, say
 from seecr.pose import rotvec_from_quat
 
-_MOST_GAINS, _MOST_NAMES, _MOST_SLACK = 3, 4, 5
+_MOST_GAINS, _MOST_SLACK = 3, 5
 
 
 def print_plan(
@@ -47,16 +48,6 @@ def _table(plan: Plan) -> Table:
     return table
 
 
-def alike(found: Visible) -> str:
-    """Effects that it cannot be told from, exact ones first."""
-    names = [f"{name} (exactly)" for name in found.twins]
-    names += [name for name, _left in found.confused]
-    if not found.visible and not found.twins:
-        return "(a plausible size does not show)"
-    rest = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
-    return ", ".join(names[:_MOST_NAMES]) + rest
-
-
 def _print_slack(console: Console, plan: Plan) -> None:
     if not plan.slack:
         return
@@ -86,11 +77,3 @@ def _print_suggestion(console: Console, item: Suggestion) -> None:
             f"     ({x:.4g} {y:.4g} {z:.4g}) m, turned by ({turn[0]:.3g} {turn[1]:.3g} "
             f"{turn[2]:.3g}) deg",
         )
-
-
-def gain_words(gain: Gain) -> str:
-    """What a measurement would bring, with numbers."""
-    numbers = f"(signal now {gain.now:.2g}, then {gain.then:.2g}, needs {gain.needed:.2g})"
-    if gain.other:
-        return f"tells {gain.effect} from {gain.other} {numbers}"
-    return f"shows {gain.effect} {numbers}"

@@ -15,6 +15,8 @@ from seecr import SeecrError, __version__
 CommandTable: TypeAlias = Mapping[str, tuple[str, str]]
 
 BAD_INPUT = 2
+ARGUMENTS = "seecr.arguments"
+"""In a context's ``meta``: what the command line was called with, a list of words."""
 # As a shell counts what SIGINT and SIGPIPE end.
 _INTERRUPTED, _CUT_OFF = 130, 141
 
@@ -30,6 +32,16 @@ class LazyGroup(click.Group):
     def __init__(self, *args: Any, package: str, table: CommandTable, **extra: Any) -> None:
         super().__init__(*args, **extra)
         self.package, self.table = package, table
+
+    def make_context(
+        self, info_name: str | None, args: list[str], parent: click.Context | None = None,
+        **extra: Any,
+    ) -> click.Context:  # fmt: skip
+        """A context that remembers what the command line was called with."""
+        given = list(args)
+        ctx = super().make_context(info_name, args, parent, **extra)
+        ctx.meta[ARGUMENTS] = given
+        return ctx
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names in the order of the table."""

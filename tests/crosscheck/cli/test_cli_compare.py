@@ -27,7 +27,8 @@ def test_without_limits_it_reports_and_ends_0(stiff, tmp_path):
     for words in ("bias", "all rows", "noise alone", "run along_low_fwd", "travel +x", "region x"):
         assert words in result.stdout
     assert "mm" in result.stdout and "deg" in result.stdout
-    assert [f.name for f in (tmp_path / "out").iterdir()] == ["comparison.json"]
+    names = {file.name for file in (tmp_path / "out").iterdir()}
+    assert names == {"comparison.json", "comparison.html"}
     document = json.loads((tmp_path / "out" / "comparison.json").read_text())
     assert document["is_noise"] is False and document["exit_status"] == 0
     assert document["rows"] == {"all": 64, "compared": 64}

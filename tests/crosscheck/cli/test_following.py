@@ -12,6 +12,7 @@ from made_data import case, run
 from crosscheck.cli.following import after_comparison, after_diagnosis, after_fit, following
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.fit.words import measured
+from crosscheck.terminal import parameter_lines
 
 ONLY = ("--only", "pulley_radius")
 
@@ -91,3 +92,11 @@ def test_names_with_blanks_are_quoted_and_all_files_named():
 )
 def test_digits_are_those_of_the_error(value, error, unit, words):
     assert measured(value, error, unit) == words
+
+
+def test_what_a_twin_hid_is_in_the_units_of_a_diagnosis():
+    values = {"shift_x_m": 0.00836, "shift_y_m": -0.002}
+    lines = parameter_lines("centre_of_mass", values)
+    assert lines == ["shift_x = 8.36 mm", "shift_y = -2 mm"]
+    assert parameter_lines("gravity_tilt", {"tilt_x_rad": 0.00894}) == ["tilt_x = 0.5122 deg"]
+    assert parameter_lines("drum_gain", {"gain_3": 0.002}) == ["gain_3 = 0.002"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import html
 import io
 import re
 import xml.etree.ElementTree as ElementTree
@@ -14,6 +13,7 @@ import made_diagnoses as made
 import numpy as np
 import pytest
 from PIL import Image
+from written_pages import figures_of, text_of
 
 from crosscheck.diagnosis.result import Diagnosis, NotListed
 from crosscheck.diagnosis.steps import (
@@ -53,21 +53,6 @@ def page(name: str) -> str:
     if name not in _pages:
         _pages[name] = render(diagnosis(name))
     return _pages[name]
-
-
-_IMAGE = re.compile(r'<img [^>]*src="data:image/svg\+xml;base64,([^"]*)">')
-
-
-def figures_of(markup: str) -> list[str]:
-    """The SVG of each figure in a page or by itself."""
-    return [base64.b64decode(image).decode() for image in _IMAGE.findall(markup)]
-
-
-def text_of(markup: str) -> str:
-    """What a reader sees, in the page and in its figures."""
-    body = _IMAGE.sub(lambda image: base64.b64decode(image[1]).decode(), markup)
-    body = re.sub(r"<style.*?</style>|<defs.*?</defs>|<!--.*?-->", "", body, flags=re.DOTALL)
-    return " ".join(html.unescape(re.sub(r"<[^>]*>", " ", body)).split())
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,57 @@
+"""What made a result: version, command, day, and the files by their hashes."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+from seecr import __version__
+
+__all__ = ["Made"]
+
+# Of a SHA-256: more than files are ever mistaken by.
+_DIGITS = 16
+
+
+@dataclass(frozen=True)
+class Made:
+    """How a result came about.
+
+    Attributes:
+        version: of the software. command: as it was typed. date: of the day.
+        files: by name the first digits of the SHA-256 of what was read.
+    """
+
+    version: str
+    command: str
+    date: str
+    files: Mapping[str, str]
+
+    @classmethod
+    def now(cls, command: str, files: Iterable[Path | None]) -> Made:
+        """Today, of files and of the TOML beside each; those that are not there are left out."""
+        given = [file for file in files if file is not None]
+        beside = [file.with_suffix(".toml") for file in given]
+        hashes = {
+            file.name: hashlib.sha256(file.read_bytes()).hexdigest()[:_DIGITS]
+            for file in dict.fromkeys([*given, *beside])
+            if file.is_file()
+        }
+        return cls(__version__, command, date.today().isoformat(), hashes)
+
+    @property
+    def words(self) -> str:
+        """The same in a line."""
+        files = ", ".join(f"{name} {digits}" for name, digits in self.files.items())
+        return f"{self.command} · {self.date} · {files}"
+
+    def as_json(self) -> dict[str, Any]:
+        """``made`` in every result."""
+        return {
+            "version": self.version, "command": self.command, "date": self.date,
+            "sha256": dict(self.files),
+        }  # fmt: skip

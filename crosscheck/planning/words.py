@@ -1,0 +1,26 @@
+"""What a plan says, in words that terminal and page share."""
+
+from __future__ import annotations
+
+from crosscheck.planning.proposer import Gain
+from crosscheck.planning.result import Visible
+
+_MOST_NAMES = 4
+
+
+def alike(found: Visible) -> str:
+    """Effects that it cannot be told from, exact ones first."""
+    names = [f"{name} (exactly)" for name in found.twins]
+    names += [name for name, _left in found.confused]
+    if not found.visible and not found.twins:
+        return "(a plausible size does not show)"
+    rest = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
+    return ", ".join(names[:_MOST_NAMES]) + rest
+
+
+def gain_words(gain: Gain) -> str:
+    """What a measurement would bring, with numbers."""
+    numbers = f"(signal now {gain.now:.2g}, then {gain.then:.2g}, needs {gain.needed:.2g})"
+    if gain.other:
+        return f"tells {gain.effect} from {gain.other} {numbers}"
+    return f"shows {gain.effect} {numbers}"

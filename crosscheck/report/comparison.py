@@ -1,0 +1,108 @@
+"""``comparison.html``: where a model is off, as a page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from markupsafe import Markup
+
+from crosscheck.comparison.result import Comparison, Group
+from crosscheck.diagnosis.steps import Standing
+from crosscheck.files import write_text
+from crosscheck.fit.problem import KINDS, Rms
+from crosscheck.made import Made
+from crosscheck.report.cables import draw_wall, walls_of
+from crosscheck.report.page import facts, page_of
+from crosscheck.report.tables import association_block
+from crosscheck.report.where import caption, failure_map
+from crosscheck.units import in_unit, short
+
+_MOST = 5
+
+
+def write_comparison_page(found: Comparison, path: Path, made: Made | None = None) -> None:
+    """Write a comparison as one self-contained page.
+
+    Raises:
+        InputFileError: the file cannot be written.
+    """
+    write_text(path, render_comparison(found, made), failure="cannot write the page")
+
+
+def render_comparison(found: Comparison, made: Made | None = None) -> str:
+    """The page's text."""
+    problem, names = found.problem, list(found.terms.names)
+    kinds = [kind for kind in KINDS if found.rms.get(kind.key) is not None]
+    context: dict[str, Any] = {
+        "title": f"{problem.robot.name} · {problem.data.path.name}",
+        "model": f"SEECR with {', '.join(names)}" if names else "plain SEECR",
+        "agrees": found.is_noise,
+        "refused": found.refusal is not None or found.whiteness is None,
+        "sentence": found.sentence,
+        "facts": facts(problem),
+        "heads": [f"{kind.name} [{kind.unit}]" for kind in kinds],
+        "groups": _groups(found),
+        "coordinates": _coordinates(found),
+        "where": [association_block(a) for a in found.associations if a.significant][:_MOST],
+        "worst": _worst(found),
+        "unsolved": found.unsolved,
+        "notes": found.notes,
+        "map": "",
+        "walls": [],
+        "caption": "",
+    }
+    if found.coordinates:
+        stage = Standing(" + ".join(names) or "plain SEECR", found.state)
+        context["map"] = Markup(failure_map(problem, stage, stage))  # ours, escaped there
+        context["walls"] = [Markup(draw_wall(wall)) for wall in walls_of(problem, stage, stage)]
+        context["caption"] = caption(problem, stage)
+    return page_of("comparison.html.jinja", made, **context)
+
+
+def _cells(found: Comparison, rms: Rms) -> list[str]:
+    """The rms errors of those kinds that were read, in the units that people read."""
+    kinds = [kind for kind in KINDS if found.rms.get(kind.key) is not None]
+    values = [(kind.factor, rms.get(kind.key)) for kind in kinds]
+    return ["–" if value is None else short(factor * value) for factor, value in values]
+
+
+def _groups(found: Comparison) -> list[tuple[str, str, list[str]]]:
+    """Name, rows and errors: of all rows, of noise, and of every run, travel and region."""
+    out = [
+        ("all rows", str(int(found.problem.use.sum())), _cells(found, found.rms)),
+        ("noise alone", "", _cells(found, found.floor)),
+    ]
+    every: Sequence[tuple[str, Sequence[Group]]] = (
+        ("run", found.runs), ("travel", found.directions), ("region", found.regions),
+    )  # fmt: skip
+    for title, groups in every:
+        if len(groups) > 1:
+            out += [(f"{title} {g.name}", str(g.rows), _cells(found, g.rms)) for g in groups]
+    return out
+
+
+def _coordinates(found: Comparison) -> list[tuple[str, list[str], str, int]]:
+    """Name, bias, rms and largest error, unit, line of the largest."""
+    out = []
+    for row in found.coordinates:
+        factor, unit = in_unit(row.unit)
+        numbers = [short(factor * value) for value in (row.bias, row.rms, row.max)]
+        out.append((row.name, numbers, unit, row.line))
+    return out
+
+
+def _worst(found: Comparison) -> list[tuple[int, str, str, list[str], str]]:
+    """Line, run, place, errors by kind, and how many times the noise."""
+    kinds = [kind for kind in KINDS if found.rms.get(kind.key) is not None]
+    return [
+        (
+            row.line,
+            row.run,
+            found.place(row.row),
+            [short(kind.factor * float(found.errors_of(kind.name)[row.row])) for kind in kinds],
+            short(row.times_noise),
+        )
+        for row in found.worst
+    ]

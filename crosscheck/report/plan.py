@@ -1,0 +1,98 @@
+"""``plan.html``: what poses would show, as a page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+
+from crosscheck.files import write_text
+from crosscheck.made import Made
+from crosscheck.planning.result import Plan, Visible
+from crosscheck.planning.words import alike, gain_words
+from crosscheck.report.confusion import Confusion, draw_confusion
+from crosscheck.report.drawing import AFTER, BEFORE, INK, blank, grid, image, plain_log, styled
+from crosscheck.report.page import facts, page_of
+from seecr.pose import rotvec_from_quat
+
+_ROW = 0.19
+
+
+def write_plan_page(plan: Plan, path: Path, made: Made | None = None) -> None:
+    """Write a plan as one self-contained page.
+
+    Raises:
+        InputFileError: the file cannot be written.
+    """
+    write_text(path, render_plan(plan, made), failure="cannot write the page")
+
+
+def render_plan(plan: Plan, made: Made | None = None) -> str:
+    """The page's text."""
+    problem = plan.planned.problem
+    context: dict[str, Any] = {
+        "title": f"{problem.robot.name} · {problem.data.path.name}",
+        "sentence": plan.sentence,
+        "facts": facts(problem),
+        "effects": [_row(found) for found in plan.effects],
+        "missing": {name: why.words for name, why in plan.missing.items()},
+        "suggestions": [_suggestion(item) for item in plan.suggestions if item.reached],
+        "slack": plan.slack,
+        "notes": plan.notes,
+        "sizes": "",
+        "confusion": "",
+    }
+    if plan.effects:
+        context["sizes"] = Markup(draw_sizes(plan.effects))  # ours, escaped there
+        names, part = plan.confusion
+        seen = np.array([any(v.name == name and v.visible for v in plan.effects) for name in names])
+        if seen.sum() > 1:
+            kept = tuple(name for name, some in zip(names, seen, strict=True) if some)
+            matrix = Confusion(kept, 0, part[np.ix_(seen, seen)])
+            context["confusion"] = Markup(draw_confusion(matrix))
+    return page_of("plan.html.jinja", made, **context)
+
+
+def draw_sizes(effects: tuple[Visible, ...]) -> str:
+    """The smallest size that shows and that can be named, in plausible sizes, of each effect."""
+    shown = [found for found in effects if np.isfinite(found.factor)]
+    with styled():
+        figure = blank(_ROW * len(shown) + 0.9)
+        axes = figure.subplots()
+        place = np.arange(len(shown))[::-1]
+        factor = np.array([found.factor for found in shown])
+        named = np.array([np.nan if found.twins else found.identifiable for found in shown])
+        axes.hlines(place, factor, np.where(np.isfinite(named), named, factor), color=INK, lw=0.6)
+        axes.plot(factor, place, "o", color=AFTER, markersize=5, label="shows")
+        axes.plot(named, place, "D", color=BEFORE, markersize=4, label="can be named")
+        axes.axvline(1.0, color=INK, linewidth=0.8, linestyle=":")
+        axes.set_yticks(place, [found.name for found in shown])
+        axes.set_ylim(-0.7, len(shown) - 0.3)
+        plain_log(axes)
+        axes.set_xlabel("smallest size, in plausible sizes (dotted: a plausible one)")
+        axes.legend(loc="lower right")
+        grid(axes, "x")
+        return image(figure, "The smallest sizes that show")
+
+
+def _row(found: Visible) -> dict[str, Any]:
+    return {
+        "name": found.name,
+        "visible": found.visible,
+        "shows": found.words(found.factor),
+        "named": "–" if found.twins else found.words(found.identifiable),
+        "alike": alike(found),
+    }
+
+
+def _suggestion(item: Any) -> dict[str, Any]:
+    """What to add, what it brings, and its poses as people read them."""
+    poses = []
+    for pose in item.poses if item.poses is not None else ():
+        turn = np.degrees(rotvec_from_quat(pose[3:]))
+        poses.append([*(f"{v:.4g}" for v in pose[:3]), *(f"{v:.3g}" for v in turn)])
+    return {
+        "words": item.words, "gains": [gain_words(gain) for gain in item.reached], "poses": poses,
+    }  # fmt: skip
