@@ -10,7 +10,7 @@ import numpy as np
 
 from seecr.compiled.algebra import copy_vector
 from seecr.compiled.columns import N_LOAD, N_STATE, TENSION, UP
-from seecr.compiled.jit import jit, jit_inner
+from seecr.compiled.jit import jit_allocating, jit_inner
 from seecr.compiled.joints import place_joints
 from seecr.compiled.platform import N_READY, N_WORK, evaluate, prepare
 
@@ -32,7 +32,7 @@ def _pull(cables, ready, load, pose, deviation, current, length, guess, out, spa
     return energy != np.inf
 
 
-@jit
+@jit_allocating
 def change_at_rest(
     plus, minus, plus_load, minus_load, poses, screws, deviation, values, length, guess,
     gradient, tension,
@@ -42,7 +42,7 @@ def change_at_rest(
     d = gradient.shape[1]
     ready, current = np.zeros((m + 1, N_READY)), np.zeros((screws.shape[1], 7))
     out = (np.zeros(d), np.zeros((m, N_STATE)))
-    spare = (np.zeros((d, d)), np.zeros((m, d)), np.empty((N_WORK, 6)), np.zeros((m, 3)))
+    spare = (np.zeros((d, d)), np.zeros((m, d)), np.empty((N_WORK + m, 6)), np.zeros((m, 3)))
     some, starts = np.empty((m, width)), np.empty((m, 3))
     which, place, load = np.empty(m, np.int64), np.empty(7), np.zeros(N_LOAD)
     for r in range(n):
@@ -80,7 +80,7 @@ def change_at_rest(
                 tension[r, which[k]] += sign * out[1][k, TENSION]
 
 
-@jit
+@jit_allocating
 def change_of_each_cable(
     plus, minus, load, poses, screws, deviation, values, length, guess, gradient, tension
 ):
@@ -89,7 +89,7 @@ def change_of_each_cable(
     d = gradient.shape[2]
     ready, current = np.zeros((2, N_READY)), np.zeros((screws.shape[1], 7))
     out = (np.zeros(d), np.zeros((1, N_STATE)))
-    spare = (np.zeros((d, d)), np.zeros((1, d)), np.empty((N_WORK, 6)), np.zeros((1, 3)))
+    spare = (np.zeros((d, d)), np.zeros((1, d)), np.empty((N_WORK + m, 6)), np.zeros((1, 3)))
     place, none = np.empty(7), np.zeros(N_LOAD)
     for r in range(n):
         copy_vector(deviation[r], place)

@@ -8,7 +8,7 @@ import numpy as np
 
 from seecr.compiled.algebra import cholesky, copy_rows, copy_vector, largest_diagonal, norm
 from seecr.compiled.columns import EA, N_STATE
-from seecr.compiled.jit import jit, jit_inner
+from seecr.compiled.jit import jit_allocating, jit_inner
 from seecr.compiled.joints import place_joints
 from seecr.compiled.outcomes import (
     CABLE_LAW,
@@ -45,13 +45,13 @@ MOST_TURNS = 3.0
 STIFF, STAGE = 2000.0, 10.0
 
 
-@jit_inner
+@jit_allocating
 def make_space(m, n, joints):
     """Scratch of a descent: made once for a batch."""
     return (
         np.zeros(n), np.zeros((n, n)), np.zeros(7), np.zeros(n), np.zeros(n), np.zeros((n, n)),
         np.zeros((m, N_STATE)), np.zeros((m, n)), np.zeros((m, 3)), np.zeros((joints, 7)),
-        np.zeros((N_WORK, 6)), np.zeros((m + 1, N_READY)),
+        np.zeros((N_WORK + m, 6)), np.zeros((m + 1, N_READY)),
     )  # fmt: skip
 
 
@@ -171,7 +171,7 @@ def solve_one(
         advance(deviation, values, step, length, screws, pose, trial, trial_values, current)
 
 
-@jit_inner
+@jit_allocating
 def solve_in_stages(
     cables, load, pose, screws, start, start_values, length, scale, radius, reach, limit,
     guess, gradient, hessian, states, slopes, deviation, values, softened, staged, space,
@@ -207,7 +207,7 @@ def solve_in_stages(
         factor *= STAGE
 
 
-@jit
+@jit_allocating
 def solve_batch(
     cables, load, poses, screws, starts, start_values, length, scale, radius, reach, limit,
     outcome, count, residual, gradient, hessian, states, slopes, deviation, values, guess, staged,

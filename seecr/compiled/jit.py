@@ -4,11 +4,21 @@ from __future__ import annotations
 
 from numba import njit
 
-jit = njit(cache=True, nogil=True, error_model="numpy")
-"""Decorator of compiled functions. A division by zero gives inf or nan, as NumPy's does."""
+_COMMON = {"cache": True, "nogil": True, "error_model": "numpy"}
+# Numba counts who uses an array at every call and slice, atomically. A call here takes as long as
+# the physics in it, so that counting took three quarters of the time; what makes no array, and
+# gets its own from a caller that holds them, need not count.
+_UNCOUNTED = {**_COMMON, "_nrt": False}
+
+jit = njit(**_UNCOUNTED)  # type: ignore[call-overload]
+"""Decorator of compiled functions. A division by zero gives inf or nan, as NumPy's does. They
+cannot make arrays: compiling such a one fails."""
 
 jit_inner = njit(  # type: ignore[call-overload]
-    cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True
+    **_UNCOUNTED, no_cpython_wrapper=True, no_cfunc_wrapper=True
 )
 """The same for those that only compiled functions call: a fifth of the time of compiling went
 into ways for Python to call them."""
+
+jit_allocating = njit(**_COMMON, _nrt=True)  # type: ignore[call-overload]
+"""The same for those that make arrays: said, since what is not is taken from the caller."""

@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from seecr.compiled.algebra import eliminate
-from seecr.compiled.jit import jit
+from seecr.compiled.jit import jit, jit_allocating
 from seecr.compiled.rotation import rotated_less
 
 # A matrix is singular where a pivot of its factor falls below this part of the largest.
@@ -104,7 +104,7 @@ def _rows(particular, null, low, high, top, a, b):
     return count
 
 
-@jit
+@jit_allocating
 def _largest_least(a, b, count, r, scale):
     """max over nu of min_i (a_i nu + b_i) by the dual simplex; nan where it does not end."""
     k = r + 1
@@ -151,7 +151,7 @@ def _largest_least(a, b, count, r, scale):
     return np.nan
 
 
-@jit
+@jit_allocating
 def _space(d, m):
     """Room to work in, for any number of poses."""
     rows = m - d + 1 + 2 * m
@@ -177,7 +177,7 @@ def _least_margin(matrix, loads, low, high, scale, space):
     return np.inf if least > 0.5 * _TOP * scale else least
 
 
-@jit
+@jit_allocating
 def margins_of(matrices, loads, low, high, scale, out):
     """Margins (n,) of matrices (n, d, m) and loads (n, k, d): the least of k loads counts."""
     space = _space(*matrices.shape[1:])
@@ -185,7 +185,7 @@ def margins_of(matrices, loads, low, high, scale, out):
         out[r] = _least_margin(matrices[r], loads[r], low, high, scale, space)
 
 
-@jit
+@jit_allocating
 def margins_at(poses, exits, anchors, centre, weight, wrenches, low, high, length, scale, out):
     """Margins (n,) of a free platform at poses (n, 7); wrenches (k, 6) besides its weight."""
     m = len(exits)

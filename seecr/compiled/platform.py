@@ -41,7 +41,7 @@ from seecr.compiled.columns import (
     WINCH_SIDE,
     WINCH_TENSION,
 )
-from seecr.compiled.jit import jit, jit_inner
+from seecr.compiled.jit import jit, jit_allocating, jit_inner
 from seecr.compiled.joints import joint_columns, onto_joints, place_joints
 from seecr.compiled.law import is_linear
 from seecr.compiled.rotation import rotated_less
@@ -52,7 +52,7 @@ from seecr.compiled.rotation import rotated_less
 # else 0.
 ARM, START, BEFORE, YIELD, RATE = 0, 3, 6, 7, 8
 N_READY = 9
-# Rows of scratch that evaluate needs.
+# Rows of scratch that evaluate needs, and one more for each cable.
 N_WORK = 34
 
 
@@ -247,7 +247,7 @@ def evaluate(
         hessian: (d, d) [N/m], filled: the stiffness; under a moment its symmetric part.
         states: (m, N_STATE), filled.
         slopes: (m, d) [N/m], derivative of the tensions, filled.
-        work: (N_WORK, 6) scratch.
+        work: (N_WORK + m, 6) scratch.
 
     Returns:
         energy [J]; nan where a law has none in closed form; inf where a cable's own
@@ -258,7 +258,7 @@ def evaluate(
         return _evaluate(
             cables, ready, load, deviation, length, guess, gradient, hessian, states, slopes, work
         )
-    columns, g, h, own = work[19:25], work[25], work[26:32], np.empty((m, 6))
+    columns, g, h, own = work[19:25], work[25], work[26:32], work[N_WORK:]
     x = ready[m, START] + deviation[0]
     y, z = ready[m, START + 1] + deviation[1], ready[m, START + 2] + deviation[2]
     energy = _evaluate(cables, ready, load, deviation, length, guess, g, h, states, own, work)
@@ -272,14 +272,14 @@ def evaluate(
     return energy
 
 
-@jit
+@jit_allocating
 def evaluate_batch(
     cables, load, poses, screws, deviation, values, length,
     gradient, hessian, states, slopes, energy, guess,
 ):  # fmt: skip
     """Wrench and stiffness at given deviations; all outputs are filled."""
-    work = np.empty((N_WORK, 6))
-    ready = np.zeros((cables.shape[1] + 1, N_READY))
+    m = cables.shape[1]
+    work, ready = np.empty((N_WORK + m, 6)), np.zeros((m + 1, N_READY))
     current = np.zeros((screws.shape[1], 7))
     for i in range(poses.shape[0]):
         prepare(cables[i], load[i], poses[i], ready)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from seecr.compiled.algebra import cholesky, solve_factored
-from seecr.compiled.jit import jit
+from seecr.compiled.jit import jit, jit_allocating
 
 FOUND, NONE, UNDECIDED = 0, 1, 2
 # Most steps, most halvings of one, what of a balance may be left relative to its load, and how
@@ -47,7 +47,7 @@ def _unbalanced(matrix, load, tension, left):
     return most
 
 
-@jit
+@jit_allocating
 def _newton_step(matrix, low, high, tension, left, damping, step):
     """The step of the dual that balances if the cables inside their limits stay inside."""
     d, m = matrix.shape
@@ -100,7 +100,7 @@ def _none_balance(matrix, load, low, high, most_ever, dual):
     return most < -_PROVEN * size
 
 
-@jit
+@jit_allocating
 def project(matrix, load, aim, low, high, tension):
     """min |tension - aim|^2 with A tension = load, low <= tension <= high; whether there are any.
 
@@ -154,7 +154,7 @@ def project(matrix, load, aim, low, high, tension):
     return UNDECIDED
 
 
-@jit
+@jit_allocating
 def project_batch(matrix, load, aim, low, high, tension, outcome):
     """:func:`project` for n poses: (n, d, m), (n, d), (n, m) each; fills tension and outcome."""
     for r in range(matrix.shape[0]):

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from seecr.compiled.columns import EXIT, N_COLUMNS, RADIUS
-from seecr.compiled.jit import jit, jit_inner
+from seecr.compiled.jit import jit, jit_allocating, jit_inner
 
 
 @jit
@@ -50,7 +50,7 @@ def length_in_plane(row, across, rise):
     return pulley_geometry(across, rise, row[RADIUS])[0]
 
 
-@jit
+@jit_allocating
 def lengths_at(poses, anchors, exits, radii, up, out):
     """Straight lengths over the pulleys (n, m) [m] of cables at poses (n, 7)."""
     row, anchor = np.zeros(N_COLUMNS), np.empty(3)

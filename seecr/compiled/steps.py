@@ -15,7 +15,7 @@ from seecr.compiled.algebra import (
     solve_factored,
 )
 from seecr.compiled.columns import EXTERNAL_MOMENT, GAP, RADIUS, REST, SLACK, TENSION
-from seecr.compiled.jit import jit, jit_inner
+from seecr.compiled.jit import jit, jit_allocating, jit_inner
 from seecr.compiled.joints import place_joints
 from seecr.compiled.outcomes import IDLE, SINGULAR, SINGULAR_PART, UNSTABLE
 from seecr.compiled.platform import add_skew, evaluate, has_moment, prepare
@@ -77,7 +77,7 @@ def newton_step(gradient, hessian, shift, radius, load, current, length, factor,
     return shift
 
 
-@jit_inner
+@jit_allocating
 def mirrored_step(gradient, hessian, radius, step):
     """Newton's step with every stiffness taken by size: from saddles away, elsewhere on.
 
@@ -102,7 +102,7 @@ def mirrored_step(gradient, hessian, radius, step):
             step[k] *= radius / span
 
 
-@jit_inner
+@jit_allocating
 def escape(hessian, top, radius, step):
     """Softest direction, as a step; UNSTABLE where it is downhill, SINGULAR where it is flat."""
     eigenvalues, vectors = np.linalg.eigh(hessian)
@@ -117,7 +117,7 @@ def is_idle(states, i, scale):
     return states[i, SLACK] == 0.0 and states[i, TENSION] < IDLE * scale
 
 
-@jit_inner
+@jit_allocating
 def holds_without_idle(cables, load, pose, deviation, length, guess, states, scale, space):
     """Whether the equilibrium is stable without the cables whose tension is mere rounding.
 

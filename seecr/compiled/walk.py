@@ -27,7 +27,7 @@ from seecr.compiled.columns import (
     WINCH_TENSION,
 )
 from seecr.compiled.descent import make_space, solve_in_stages
-from seecr.compiled.jit import jit, jit_inner
+from seecr.compiled.jit import jit_allocating, jit_inner
 from seecr.compiled.law import strain_of_tension
 
 
@@ -45,7 +45,7 @@ def _shares(span):
     return mean - np.exp(-span), 1.0 - mean
 
 
-@jit
+@jit_allocating
 def walk_in_order(
     cables, load, poses, screws, length, scale, radius, reach, limit, fresh, elapsed, outcome,
     count, residual, gradient, hessian, states, slopes, deviation, values, guess,
