@@ -170,7 +170,7 @@ def change(plus: Tables, minus: Tables, at: Evaluation) -> tuple[Array, Array]:
         at: where the platform is; nothing is solved.
     """
     n, m = plus.cables.shape[:2]
-    gradient, tension = np.zeros((n, plus.n_dof)), np.zeros((n, m))
+    gradient, tension = np.empty((n, plus.n_dof)), np.empty((n, m))
 
     def run(part: slice) -> None:
         change_at_rest(
@@ -190,7 +190,7 @@ def change_by_cable(plus: Tables, minus: Tables, at: Evaluation) -> tuple[Array,
     of its own at once. The load is taken to be the same in both.
     """
     n, m = plus.cables.shape[:2]
-    gradient, tension = np.zeros((n, m, plus.n_dof)), np.zeros((n, m))
+    gradient, tension = np.empty((n, m, plus.n_dof)), np.empty((n, m))
 
     def run(part: slice) -> None:
         change_of_each_cable(

@@ -1,7 +1,8 @@
 """What a change of the tables does at fixed poses, evaluated for the changed cables alone.
 
 A parameter mostly changes a few cables. The others pull the same before and after, so only
-those whose rows differ are evaluated: both times, and subtracted.
+those whose rows differ are evaluated: both times, and subtracted. What they pull is asked of
+:func:`seecr.compiled.cable.cable_pull`; nothing is solved, so no stiffness is put together.
 """
 
 from __future__ import annotations
@@ -9,27 +10,111 @@ from __future__ import annotations
 import numpy as np
 
 from seecr.compiled.algebra import copy_vector
-from seecr.compiled.columns import N_LOAD, N_STATE, TENSION, UP
+from seecr.compiled.cable import cable_pull
+from seecr.compiled.columns import (
+    ANCHOR,
+    CENTRE_OF_MASS,
+    EXTERNAL_FORCE,
+    EXTERNAL_MOMENT,
+    FORCE_OF_WEIGHT,
+    N_STATE,
+    TENSION,
+    UP,
+)
 from seecr.compiled.jit import jit_allocating, jit_inner
-from seecr.compiled.joints import place_joints
-from seecr.compiled.platform import N_READY, N_WORK, evaluate, prepare
+from seecr.compiled.joints import joint_columns, onto_joints_gradient, place_joints
+from seecr.compiled.platform import N_WORK
+from seecr.compiled.rotation import rotated_less
+
+
+@jit_allocating
+def _make_space(joints):
+    """Scratch: made once for a batch."""
+    return (
+        np.empty(7), np.zeros((joints, 7)), np.empty((joints, 6)), np.empty(3), np.empty(3),
+        np.empty(3), np.empty(3), np.empty((3, 3)), np.empty(3), np.empty(N_STATE),
+        np.empty((N_WORK, 6)), np.empty(6),
+    )  # fmt: skip
 
 
 @jit_inner
-def _pull(cables, ready, load, pose, deviation, current, length, guess, out, spare):
-    """Gradient and states of a few cables, into ``out``; False where a law has no solution."""
-    hessian, slopes, work, keep = spare
-    gradient, states = out
-    k = cables.shape[0]
-    prepare(cables, load, pose, ready[: k + 1])
-    for i in range(k):
-        for j in range(3):
-            keep[i, j] = guess[i, j]
-    energy = evaluate(
-        cables, ready[: k + 1], load, deviation, current, length, keep[:k], gradient, hessian,
-        states[:k], slopes[:k], work,
-    )  # fmt: skip
-    return energy != np.inf
+def _differ(a, b):
+    differ = False
+    for c in range(a.shape[0]):
+        differ = differ or a[c] != b[c]
+    return differ
+
+
+@jit_inner
+def _place(screws, values, length, pose, deviation, space):
+    """Fill the space with where the platform is, and its joints."""
+    place, current, columns = space[0], space[1], space[2]
+    copy_vector(deviation, place)
+    if screws.shape[0] > 0:
+        place_joints(screws, values, length, pose, place, current)
+        x, y, z = pose[0] + place[0], pose[1] + place[1], pose[2] + place[2]
+        joint_columns(current, x, y, z, 1.0 / length, columns)
+
+
+@jit_inner
+def _moved_arm(point, pose, place):
+    """Arm (3,) of a platform point at the commanded pose, and its change to where it is."""
+    a, b, c = point[0], point[1], point[2]
+    dx, dy, dz = rotated_less(pose[3], pose[4], pose[5], pose[6], a, b, c)
+    a, b, c = a + dx, b + dy, c + dz
+    dx, dy, dz = rotated_less(place[3], place[4], place[5], place[6], a, b, c)
+    return a, b, c, dx, dy, dz
+
+
+@jit_inner
+def _take_force(ax, ay, az, fx, fy, fz, per, gradient):
+    """Take a force on a platform point, its arm given, from the gradient (6,)."""
+    gradient[0] -= fx
+    gradient[1] -= fy
+    gradient[2] -= fz
+    gradient[3] -= (ay * fz - az * fy) * per
+    gradient[4] -= (az * fx - ax * fz) * per
+    gradient[5] -= (ax * fy - ay * fx) * per
+
+
+@jit_inner
+def _add_pull(sign, row, pose, up, per, guess, space):
+    """Add what a cable does to the gradient (6,), times a sign; returns that of its tension."""
+    place, _current, _columns, start, move, keep, force, stiffness, slope, state, work, gradient = (
+        space
+    )
+    a, b, c, dx, dy, dz = _moved_arm(row[ANCHOR : ANCHOR + 3], pose, place)
+    start[0], start[1], start[2] = pose[0] + a, pose[1] + b, pose[2] + c
+    move[0], move[1], move[2] = place[0] + dx, place[1] + dy, place[2] + dz
+    copy_vector(guess, keep)
+    if not cable_pull(row, start, move, up, keep, work, force, stiffness, slope, state):
+        gradient[0] = np.nan
+        return np.nan
+    fx, fy, fz = sign * force[0], sign * force[1], sign * force[2]
+    _take_force(a + dx, b + dy, c + dz, fx, fy, fz, per, gradient)
+    return sign * state[TENSION]
+
+
+@jit_inner
+def _add_load(sign, load, pose, per, space):
+    """The same of the weight and the external wrench."""
+    place, gradient = space[0], space[11]
+    a, b, c, dx, dy, dz = _moved_arm(load[CENTRE_OF_MASS : CENTRE_OF_MASS + 3], pose, place)
+    fx, fy, fz = load[FORCE_OF_WEIGHT], load[FORCE_OF_WEIGHT + 1], load[FORCE_OF_WEIGHT + 2]
+    _take_force(a + dx, b + dy, c + dz, sign * fx, sign * fy, sign * fz, per, gradient)
+    for k in range(3):
+        gradient[k] -= sign * load[EXTERNAL_FORCE + k]
+        gradient[3 + k] -= sign * load[EXTERNAL_MOMENT + k] * per
+
+
+@jit_inner
+def _put_gradient(space, out):
+    """The gathered gradient, as a platform on joints feels it, into ``out`` (d,)."""
+    columns, gradient = space[2], space[11]
+    if columns.shape[0] == 0:
+        copy_vector(gradient, out)
+    else:
+        onto_joints_gradient(gradient, columns, out)
 
 
 @jit_allocating
@@ -37,75 +122,45 @@ def change_at_rest(
     plus, minus, plus_load, minus_load, poses, screws, deviation, values, length, guess,
     gradient, tension,
 ):  # fmt: skip
-    """Gradient (n, d) and tensions (n, m) of ``plus`` less ``minus``; NaN where unsolved."""
-    n, m, width = plus.shape
-    d = gradient.shape[1]
-    ready, current = np.zeros((m + 1, N_READY)), np.zeros((screws.shape[1], 7))
-    out = (np.zeros(d), np.zeros((m, N_STATE)))
-    spare = (np.zeros((d, d)), np.zeros((m, d)), np.empty((N_WORK + m, 6)), np.zeros((m, 3)))
-    some, starts = np.empty((m, width)), np.empty((m, 3))
-    which, place, load = np.empty(m, np.int64), np.empty(7), np.zeros(N_LOAD)
+    """Gradient (n, d) and tensions (n, m) of ``plus`` less ``minus``; NaN where unsolved.
+
+    All outputs are filled.
+    """
+    n, m = plus.shape[:2]
+    space, per = _make_space(screws.shape[1]), 1.0 / length
     for r in range(n):
-        count = 0
+        space[11][:] = 0.0
+        _place(screws[r], values[r], length, poses[r], deviation[r], space)
+        up, down = plus_load[r, UP:], minus_load[r, UP:]
+        turned = _differ(up, down)
         for i in range(m):
-            for c in range(width):
-                if plus[r, i, c] != minus[r, i, c]:
-                    which[count] = i
-                    count += 1
-                    break
-        loaded = False
-        for c in range(N_LOAD):
-            loaded = loaded or plus_load[r, c] != minus_load[r, c]
-        if count == 0 and not loaded:
-            continue
-        copy_vector(deviation[r], place)
-        if screws.shape[1] > 0:
-            place_joints(screws[r], values[r], length, poses[r], place, current)
-        for sign in (1.0, -1.0):
-            whole, source = (plus, plus_load) if sign > 0.0 else (minus, minus_load)
-            # a load that stays cancels: all but the vertical, which the cables need
-            for c in range(N_LOAD):
-                load[c] = source[r, c] if loaded or c >= UP else 0.0
-            for k in range(count):
-                copy_vector(whole[r, which[k]], some[k])
-                copy_vector(guess[r, which[k]], starts[k])
-            if not _pull(
-                some[:count], ready, load, poses[r], place, current, length, starts, out, spare
-            ):
-                gradient[r] = np.nan
-                continue
-            for k in range(d):
-                gradient[r, k] += sign * out[0][k]
-            for k in range(count):
-                tension[r, which[k]] += sign * out[1][k, TENSION]
+            tension[r, i] = 0.0
+            if turned or _differ(plus[r, i], minus[r, i]):
+                ahead = _add_pull(1.0, plus[r, i], poses[r], up, per, guess[r, i], space)
+                behind = _add_pull(-1.0, minus[r, i], poses[r], down, per, guess[r, i], space)
+                tension[r, i] = ahead + behind
+        if _differ(plus_load[r], minus_load[r]):
+            _add_load(1.0, plus_load[r], poses[r], per, space)
+            _add_load(-1.0, minus_load[r], poses[r], per, space)
+        _put_gradient(space, gradient[r])
 
 
 @jit_allocating
 def change_of_each_cable(
     plus, minus, load, poses, screws, deviation, values, length, guess, gradient, tension
 ):
-    """The same cable by cable: gradient (n, m, d), each cable's own tension (n, m)."""
+    """The same cable by cable: gradient (n, m, d), each cable's own tension (n, m).
+
+    The load is taken to be the same in both.
+    """
     n, m = plus.shape[:2]
-    d = gradient.shape[2]
-    ready, current = np.zeros((2, N_READY)), np.zeros((screws.shape[1], 7))
-    out = (np.zeros(d), np.zeros((1, N_STATE)))
-    spare = (np.zeros((d, d)), np.zeros((1, d)), np.empty((N_WORK + m, 6)), np.zeros((1, 3)))
-    place, none = np.empty(7), np.zeros(N_LOAD)
+    space, per = _make_space(screws.shape[1]), 1.0 / length
     for r in range(n):
-        copy_vector(deviation[r], place)
-        if screws.shape[1] > 0:
-            place_joints(screws[r], values[r], length, poses[r], place, current)
-        for c in range(UP, N_LOAD):
-            none[c] = load[r, c]
+        _place(screws[r], values[r], length, poses[r], deviation[r], space)
+        up = load[r, UP:]
         for i in range(m):
-            for sign in (1.0, -1.0):
-                one = plus[r, i : i + 1] if sign > 0.0 else minus[r, i : i + 1]
-                if not _pull(
-                    one, ready, none, poses[r], place, current, length, guess[r, i : i + 1], out,
-                    spare,
-                ):  # fmt: skip
-                    gradient[r, i] = np.nan
-                    continue
-                for k in range(d):
-                    gradient[r, i, k] += sign * out[0][k]
-                tension[r, i] += sign * out[1][0, TENSION]
+            space[11][:] = 0.0
+            ahead = _add_pull(1.0, plus[r, i], poses[r], up, per, guess[r, i], space)
+            behind = _add_pull(-1.0, minus[r, i], poses[r], up, per, guess[r, i], space)
+            tension[r, i] = ahead + behind
+            _put_gradient(space, gradient[r, i])

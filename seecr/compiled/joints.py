@@ -60,17 +60,24 @@ def joint_columns(current, x, y, z, per, columns):
 
 
 @jit_inner
+def onto_joints_gradient(g, columns, gradient):
+    """From the platform's own gradient (6,) to that of its joints (d,)."""
+    for j in range(gradient.shape[0]):
+        total = 0.0
+        for k in range(6):
+            total += g[k] * columns[j, k]
+        gradient[j] = total
+
+
+@jit_inner
 def onto_joints(g, h, columns, per, gradient, hessian):
     """From the platform's own gradient and stiffness to those of its joints.
 
     Joint j moves on with each hinge i further out: the origin's motion v_j turns by a_i x v_j,
     and the rotation vector of both has half of a_i x a_j to second order.
     """
+    onto_joints_gradient(g, columns, gradient)
     for j in range(gradient.shape[0]):
-        total = 0.0
-        for k in range(6):
-            total += g[k] * columns[j, k]
-        gradient[j] = total
         vx, vy, vz = columns[j, 0], columns[j, 1], columns[j, 2]
         ux, uy, uz = 0.5 * columns[j, 3], 0.5 * columns[j, 4], 0.5 * columns[j, 5]
         for i in range(j + 1):

@@ -125,3 +125,14 @@ def test_a_row_that_is_free_to_move_gives_finite_numbers() -> None:
     found = sensitivities(experiment, Terms([Term(layout, layout.null)]), at)
     assert np.all(np.isfinite(found))
     assert np.abs(found[:, 3:6]).max() < 1e-6 and found[0, 2, 0] > 0  # stiffer: higher
+
+
+def test_the_planes_of_hanging_cables_tilt_with_gravity() -> None:
+    """No cable's own numbers change then, and still every cable pulls another way."""
+    experiment = experiment_of("demobot_cogiro")
+    rng = np.random.default_rng(3)
+    names = ("gravity_tilt", "cable_weight")
+    terms = Terms(random_term(rng, experiment, name) for name in names)
+    at = experiment.predict(terms.effects)
+    worst, whose = worst_mismatch(experiment, terms, sensitivities(experiment, terms, at))
+    assert worst < 1e-4, whose

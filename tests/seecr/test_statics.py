@@ -93,7 +93,7 @@ def test_slack_is_longer_than_its_way_or_pulls_no_more_than_rounding() -> None:
 
 
 def test_compiled_functions_fill_what_they_are_given() -> None:
-    """The batch calls lend them arrays; a row that is left out stays as it was."""
+    """Whatever was in the arrays that the batch calls lend them."""
     tables, at = solved("demobot_cogiro")
     n, m = tables.cables.shape[:2]
     gradient, tension = np.full((n, 6), 3.0), np.full((n, m), 4.0)
@@ -101,8 +101,8 @@ def test_compiled_functions_fill_what_they_are_given() -> None:
         tables.cables, tables.cables, tables.load, tables.load, tables.poses, tables.screws,
         at.deviation, at.values, tables.length, at.guess, gradient, tension,
     )  # fmt: skip
-    assert np.all(gradient == 3.0) and np.all(tension == 4.0)
-    each, own = np.zeros((n, m, 6)), np.zeros((n, m))
+    assert np.all(gradient == 0.0) and np.all(tension == 0.0)
+    each, own = np.full((n, m, 6), 3.0), np.full((n, m), 4.0)
     change_of_each_cable(
         tables.cables, tables.cables, tables.load, tables.poses, tables.screws, at.deviation,
         at.values, tables.length, at.guess, each, own,
