@@ -1,4 +1,4 @@
-"""A rigid body from three or more markers, frame by frame (Kabsch, by SciPy's align_vectors)."""
+"""A rigid body from three or more markers, frame by frame."""
 
 from __future__ import annotations
 
@@ -74,14 +74,27 @@ def _fitted(points: Array, seen: NDArray[np.bool_], shape: Array) -> tuple[Array
     n = len(points)
     position, quat = np.full((n, 3), np.nan), np.full((n, 4), np.nan)
     misfit = np.full(n, np.nan)
-    for k in np.flatnonzero(seen.sum(axis=1) >= 3):
-        here, there = shape[seen[k]], points[k, seen[k]]
-        middle, centre = here.mean(axis=0), there.mean(axis=0)
-        turn, left = Rotation.align_vectors(there - centre, here - middle)
-        position[k] = centre - turn.apply(middle)
-        quat[k] = turn.as_quat(scalar_first=True)
-        misfit[k] = left / np.sqrt(len(here))
+    for which in np.unique(seen[seen.sum(axis=1) >= 3], axis=0):
+        rows = np.flatnonzero((seen == which).all(axis=1))
+        here, there = shape[which], points[np.ix_(rows, np.flatnonzero(which))]
+        middle, centre = here.mean(axis=0), there.mean(axis=1)
+        turn = aligning(here - middle, there - centre[:, None])
+        position[rows] = centre - turn @ middle
+        quat[rows] = Rotation.from_matrix(turn).as_quat(scalar_first=True)
+        left = there - centre[:, None] - (here - middle) @ turn.transpose(0, 2, 1)
+        misfit[rows] = np.sqrt(np.mean(np.sum(left**2, axis=2), axis=1))
     return position, quat, misfit
+
+
+def aligning(here: Array, there: Array) -> Array:
+    """Rotations (n, 3, 3) that bring points (k, 3) nearest to others (n, k, 3), both about 0.
+
+    SciPy's ``align_vectors`` for all frames at once, which takes a hundredth of the time (Kabsch
+    1976, with the sign of Umeyama 1991 against reflections).
+    """
+    u, _s, vt = np.linalg.svd(np.einsum("nki,kj->nij", there, here))
+    u[:, :, 2] *= np.linalg.det(u @ vt)[:, None]
+    return np.asarray(u @ vt)
 
 
 def read_shape(path: Path) -> dict[str, Array]:

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import made_recordings as made_of
 import numpy as np
 import pytest
 from made_data import run, soft_cogiro, soft_xml, term
+from scipy.spatial.transform import Rotation
 
 import crosscheck
 from crosscheck.importing import import_case
 from crosscheck.importing.choices import Choices
 from crosscheck.importing.dwells import find_dwells, mean_error
-from crosscheck.importing.logged import Stream
+from crosscheck.importing.logged import Logged, Stream
+from crosscheck.importing.markers import aligning, body_of_markers
 from seecr.pose import quat_rotate, rotvec_from_quat
 
 ROBOT = soft_cogiro()
@@ -95,6 +98,29 @@ def test_markers_make_the_body(made, commands, tmp_path):
     assert by_shape.measured.free == ("tracker_frame",)
     assert crosscheck.compare(ROBOT, by_shape.measured, TRUE).is_noise
     swallowed_nothing(import_case("vicon", [file], ROBOT, [commands], Choices(markers=POINTS[:3])))
+
+
+@pytest.mark.parametrize("count", [3, 5])
+def test_all_frames_are_aligned_as_scipy_aligns_one(count):
+    rng = np.random.default_rng(count)
+    here, there = rng.normal(size=(count, 3)), rng.normal(size=(20, count, 3))
+    found = aligning(here, there)
+    for turn, points in zip(found, there, strict=True):
+        expected = Rotation.align_vectors(points, here)[0].as_matrix()
+        assert turn == pytest.approx(expected, abs=1e-9)
+
+
+def test_markers_that_swap_or_hide_are_frames_lost(made):
+    export = Logged(None, made.t_s, np.arange(len(made.t_s)), {}, {})
+    points = made.markers.copy()
+    points[10, [0, 1]] = points[10, [1, 0]]
+    points[20, :2] = np.nan
+    points[30, 0] = np.nan  # three are left
+    names = ["a", "b", "c", "d"]
+    export = replace(export, markers=dict(zip(names, points.transpose(1, 0, 2), strict=True)))
+    body, said = body_of_markers(export, names, made_of.MARKERS)
+    assert np.flatnonzero(~body.seen).tolist() == [10, 20]
+    assert said.endswith(f"2 of {len(points)} frames lost")
 
 
 def test_poses_in_the_base_frame_stay_what_they_are(home, tmp_path):
