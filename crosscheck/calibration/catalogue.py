@@ -54,7 +54,17 @@ def widths_for(layout: Layout) -> Array:
 
 def gram_about(setting: Setting, joint: JointFit, catalogue: Catalogue) -> Gram:
     """Normal equations of the whole catalogue about a fit of some of it."""
-    columns, z = catalogue_columns(setting, joint, catalogue)
+    return gram_with(setting, joint, catalogue, *catalogue_columns(setting, joint, catalogue))
+
+
+def gram_with(
+    setting: Setting,
+    joint: JointFit,
+    catalogue: Catalogue,
+    columns: Mapping[str, Array],
+    z: Mapping[str, Array],
+) -> Gram:
+    """The same with columns that are known; see :func:`catalogue_columns`."""
     groups, first = {}, 0
     for name, x in columns.items():
         count = x.shape[1]

@@ -21,7 +21,7 @@ from crosscheck.fit.problem import Problem
 from seecr.pose import Array
 
 _DEGREE = 3
-_WIDTHS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
+FIELD_WIDTHS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 # Spread of ln(true sigma/stated sigma) where it was stated.
 _STATED = 0.35
 # ln odds above which something unknown is there.
@@ -69,9 +69,9 @@ def log_odds(setting: Setting, joint: JointFit, stated: bool = True) -> float:
         return total - (0.5 * float(np.sum((off / _STATED) ** 2)) if stated else 0.0)
 
     without = score(1e-9, joint.colour)
-    tried = [score(width, joint.colour) for width in _WIDTHS]
-    widths = np.full(x.shape[1], _WIDTHS[int(np.argmax(tried))])
+    tried = [score(width, joint.colour) for width in FIELD_WIDTHS]
+    widths = np.full(x.shape[1], FIELD_WIDTHS[int(np.argmax(tried))])
     widths[: int(free.sum())] = about.width[free]
     better = estimate(setting.chain, joint.colour, joint.weight, x, about.y, widths)
-    found = [max(score(w, better), t) for w, t in zip(_WIDTHS, tried, strict=True)]
+    found = [max(score(w, better), t) for w, t in zip(FIELD_WIDTHS, tried, strict=True)]
     return float(special.logsumexp(found) - np.log(len(found)) - without)

@@ -48,6 +48,14 @@ def all_scores(found: Found) -> dict[Names, float]:
 
 def probabilities(scores: Mapping[Names, float], best: Names, effects: Iterable[str]) -> Classes:
     """Probabilities of effects and classes: sums over sets."""
+    effects = list(effects)
+    return of_classes(scores, effects, _classes(scores, best, effects))
+
+
+def of_classes(
+    scores: Mapping[Names, float], effects: Iterable[str], members: Iterable[tuple[str, ...]]
+) -> Classes:
+    """Probabilities of effects and of given classes of them."""
     names = list(scores)
     logs = np.array([scores[n] for n in names])
     share = np.exp(logs - special.logsumexp(logs))
@@ -56,7 +64,6 @@ def probabilities(scores: Mapping[Names, float], best: Names, effects: Iterable[
         wanted = set(some)
         return float(sum(p for n, p in zip(names, share, strict=True) if wanted & n))
 
-    members = _classes(scores, best, list(effects))
     order = sorted(members, key=lambda c: -chance(c))
     return Classes({e: chance([e]) for e in effects}, order, [chance(c) for c in order])
 

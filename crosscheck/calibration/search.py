@@ -11,11 +11,13 @@ from crosscheck.calibration.catalogue import Catalogue
 from crosscheck.calibration.field import UNKNOWN, log_odds
 from crosscheck.calibration.judgement import SURPRISE, Judgement, judge
 from crosscheck.calibration.later import layouts
+from crosscheck.calibration.linearised import free_of
 from crosscheck.calibration.probability import Classes, all_scores, probabilities
 from crosscheck.calibration.refits import ROUNDS, Found, compare_sets
 from crosscheck.calibration.stages import Progress
 from crosscheck.calibration.strange import is_strange
-from crosscheck.fit.problem import Problem, kinds_read
+from crosscheck.calibration.unseen import shown_from
+from crosscheck.fit.problem import Problem, Rms, kinds_read
 from crosscheck.fit.state import evaluate
 from crosscheck.measurements.data import Sigma
 from seecr.effects import Term, Terms
@@ -32,6 +34,7 @@ class Sought:
         calibration: everything at once. found: the sets compared.
         catalogue: effects with the values they start from.
         classes: probabilities. field_odds: ln odds of something smooth and unknown.
+        shown: the size by kind of reading from which on that would show.
         judgement: the verdict.
     """
 
@@ -40,6 +43,7 @@ class Sought:
     catalogue: Catalogue
     classes: Classes
     field_odds: float
+    shown: Rms | None
     judgement: Judgement
 
 
@@ -82,4 +86,6 @@ def seek(
     classes = probabilities(all_scores(found), found.best.names, effects)
     strange = strange or is_strange(setting, found.best.joint, known)
     said = judge(found, classes, odds, surprise, strange)
-    return Sought(whole, found, catalogue, classes, odds, said)
+    free = free_of(joint)
+    shown = shown_from(setting, joint, joint.jacobian * free, joint.width * free)
+    return Sought(whole, found, catalogue, classes, odds, shown, said)

@@ -8,6 +8,7 @@ from typing import Any
 from crosscheck.calibration.calibrate import Calibration
 from crosscheck.calibration.search import Sought
 from crosscheck.fit.problem import Rms
+from crosscheck.fit.words import rms_words
 
 
 @dataclass(frozen=True)
@@ -48,12 +49,25 @@ class Chances:
         field: ln odds that something smooth is left which no effect of the catalogue explains;
             None where no joint fit was made.
         together: the joint fit; None where none was made.
+        shown: rms size by kind of reading from which on a smooth effect that nobody knows would
+            show beside the catalogue; None where it could hide at any size.
     """
 
     effect: dict[str, float]
     classes: tuple[tuple[tuple[str, ...], float], ...]
     field: float | None
     together: Together | None
+    shown: Rms | None = None
+
+    @property
+    def words(self) -> str:
+        """What these data can show of effects that nobody knows, a sentence."""
+        if self.shown is None:
+            return "these data could not show an unknown effect of any size: the catalogue fits all"
+        return (
+            f"an unknown effect that is smooth over the workspace would have shown from about "
+            f"{rms_words(self.shown)} rms on"
+        )
 
     def of(self, name: str) -> float:
         """Probability that an effect or one of its class is missing."""
@@ -68,20 +82,17 @@ class Chances:
                 for name, p in sorted(self.effect.items(), key=lambda item: -item[1])
             ],
             "classes": [{"members": list(m), "probability": p} for m, p in self.classes],
-            **self._of_joint_fit(),
+            "unknown": {"log_odds": self.field, "shown_from": self.shown},
+            **({} if self.together is None else {"calibrated": self.together.as_json()}),
         }
-
-    def _of_joint_fit(self) -> dict[str, Any]:
-        if self.together is None:
-            return {}
-        return {"unknown": {"log_odds": self.field}, "calibrated": self.together.as_json()}
 
 
 def chances_of(sought: Sought) -> Chances:
     """The probabilities of compared sets."""
     classes = sought.classes
     pairs = zip(classes.members, classes.probability, strict=True)
-    return Chances(classes.effect, tuple(pairs), sought.field_odds, together_of(sought.calibration))
+    together = together_of(sought.calibration)
+    return Chances(classes.effect, tuple(pairs), sought.field_odds, together, sought.shown)
 
 
 def together_of(found: Calibration) -> Together:

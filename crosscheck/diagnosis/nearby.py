@@ -9,17 +9,23 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from crosscheck.calibration.catalogue import Catalogue, gram_about
+import numpy as np
+
+from crosscheck.calibration.catalogue import Catalogue, catalogue_columns, gram_with
 from crosscheck.calibration.colour import WHITE, chain_of
 from crosscheck.calibration.joint import JointFit, Setting, settle
 from crosscheck.calibration.later import at_null, layouts, promising_beside
-from crosscheck.calibration.priors import widths_of
-from crosscheck.calibration.probability import Classes, probabilities
-from crosscheck.calibration.sets import Scores, explore
+from crosscheck.calibration.priors import FLAT, widths_of
+from crosscheck.calibration.probability import of_classes
+from crosscheck.calibration.sets import Names, Scores, explore
+from crosscheck.calibration.unseen import shown_from
 from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.search import Search
+from crosscheck.fit.problem import Rms
+from crosscheck.fit.registration import NAME as TRACKER
 from crosscheck.fit.state import evaluate
 from seecr.effects import Term, Terms
+from seecr.pose import Array
 
 # Steps to settle the final model with plausible sizes as priors.
 _STEPS = 4
@@ -40,10 +46,38 @@ def chances_near(found: Search, alike: Mapping[str, Sequence[str]]) -> Chances:
     catalogue = _catalogue(setting, joint)
     always, names = frozenset(found.base), frozenset(fit.terms.names)
     effects = [n for n in catalogue.names if n not in always]
-    scores = Scores(gram_about(setting, joint, catalogue), len(effects), always)
+    columns, z = catalogue_columns(setting, joint, catalogue)
+    gram = gram_with(setting, joint, catalogue, columns, z)
+    scores = Scores(gram, len(effects), always)
     explore(scores, [always, names])
     every = scores.near | {n: s for n, (s, _w) in scores.solved.items()}
-    return _with_equals(probabilities(every, names, effects), alike)
+    every |= _refitted(found, scores, names)
+    shown = shown_from(setting, joint, *_all_of(columns))
+    return _with_equals(every, effects, alike, shown)
+
+
+def _refitted(found: Search, scores: Scores, last: Names) -> dict[Names, float]:
+    """Scores of the sets that the search fitted in earnest, beside that of its last model.
+
+    Linear algebra about one model says little of one with another effect in its place.
+    """
+    base = scores.score(last) - found.last.evidence.log - scores.log_prior(last)
+    out: dict[Names, float] = {}
+    for (names, name), (_chi2, fit) in found.known.items():
+        every = names | {name}
+        if fit.valid and every != last:
+            score = base + found.trials.evidence(fit).log + scores.log_prior(every)
+            out[every] = max(score, out.get(every, -np.inf))
+    return out
+
+
+def _all_of(columns: Mapping[str, Array]) -> tuple[Array, Array]:
+    """Columns (N, p) of all effects, and prior widths (p,): plausible, or none for the tracker."""
+    width = {name: FLAT if name == TRACKER else 1.0 for name in columns}
+    return (
+        np.concatenate(list(columns.values()), axis=1),
+        np.concatenate([np.full(x.shape[1], width[name]) for name, x in columns.items()]),
+    )
 
 
 def _catalogue(setting: Setting, joint: JointFit) -> Catalogue:
@@ -59,15 +93,19 @@ def _catalogue(setting: Setting, joint: JointFit) -> Catalogue:
     )
 
 
-def _with_equals(classes: Classes, alike: Mapping[str, Sequence[str]]) -> Chances:
+def _with_equals(
+    scores: Mapping[Names, float],
+    effects: Sequence[str],
+    alike: Mapping[str, Sequence[str]],
+    shown: Rms | None,
+) -> Chances:
     """The classes as refits know them: equals share the probability that one of them is missing."""
-    effect = dict(classes.effect)
-    out = []
-    for name, others in alike.items():
-        members = (name, *others)
-        probability = min(1.0, sum(effect.get(m, 0.0) for m in members))
-        out.append((members, probability))
-        effect.update({m: probability / len(members) for m in members if m in effect})
-    known = {m for members, _p in out for m in members}
-    out += [((name,), p) for name, p in effect.items() if name not in known]
-    return Chances(effect, tuple(sorted(out, key=lambda c: -c[1])), None, None)
+    classes = [(name, *others) for name, others in alike.items()]
+    known = {member for members in classes for member in members}
+    alone = [(name,) for name in effects if name not in known]
+    found = of_classes(scores, effects, [*classes, *alone])
+    pairs = dict(zip(found.members, found.probability, strict=True))
+    effect = dict(found.effect)
+    for members in classes:
+        effect.update({m: pairs[members] / len(members) for m in members if m in effect})
+    return Chances(effect, tuple(pairs.items()), None, None, shown)

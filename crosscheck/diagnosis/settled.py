@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
+from crosscheck.calibration.judgement import SURE
+from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.listed import diagnosis_of, missing_of, not_listed
 from crosscheck.diagnosis.nearby import chances_near
-from crosscheck.diagnosis.result import Diagnosis
-from crosscheck.diagnosis.rivals import rivals_of
+from crosscheck.diagnosis.result import Diagnosis, NotListed
+from crosscheck.diagnosis.rivals import Rival, rivals_of
 from crosscheck.diagnosis.search import Search
 from crosscheck.diagnosis.words import agreement, and_what_is_left, words_of
 from crosscheck.fit.prepare import noise_floor
 from crosscheck.fit.problem import rms_by_kind
-from crosscheck.fit.reasons import DiagnosisVerdict
+from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 
 
 def settled(found: Search, notes: Sequence[str]) -> Diagnosis:
     """The diagnosis of a search whose last model leaves noise."""
-    rivals = {name: rivals_of(found, name) for name in found.found}
+    rivals = _all_rivals(found)
     chances = chances_near(found, {n: [r.name for r in some] for n, some in rivals.items()})
-    missing = [missing_of(found, name, chances, rivals[name]) for name in found.found]
-    verdict, sentence = DiagnosisVerdict.NO_EFFECT_MISSING, agreement(found.tried)
+    way = _sure_part(found, chances)
+    if way is not found:
+        rivals = _all_rivals(way)
+    missing = [missing_of(way, name, chances, rivals[name]) for name in way.found]
+    hints = {name: chances.of(name) for name in found.found if name not in way.found}
+    verdict, sentence = DiagnosisVerdict.NO_EFFECT_MISSING, agreement(found.tried, hints)
     if missing:
         verdict = DiagnosisVerdict.EFFECTS_FOUND
         sentence = and_what_is_left(words_of(missing), "what is left is noise", found.tried)
@@ -28,10 +35,32 @@ def settled(found: Search, notes: Sequence[str]) -> Diagnosis:
         verdict,
         sentence,
         missing,
-        found,
+        way,
         before=rms_by_kind(found.problem, found.steps[0].fit.state.raw),
         floor=noise_floor(found.problem, found.last.fit.state, found.noise_scale),
-        candidates=not_listed(found, found.found),
+        candidates=_with_hints(not_listed(way, way.found), hints),
         notes=notes,
         chances=chances,
     )
+
+
+def _all_rivals(found: Search) -> dict[str, list[Rival]]:
+    return {name: rivals_of(found, name) for name in found.found}
+
+
+def _sure_part(found: Search, chances: Chances) -> Search:
+    """The way without its last effects that are not sure, where noise is left without them too."""
+    way = found
+    while way.found and chances.of(way.found[-1]) < SURE and way.steps[-2].whiteness.is_noise:
+        way = replace(way, steps=way.steps[:-1])
+    return way
+
+
+def _with_hints(rows: Sequence[NotListed], hints: Mapping[str, float]) -> list[NotListed]:
+    """What the search found and is not sure of says so."""
+    return [
+        replace(row, why_not=Reason(Why.NOT_SURE, p=hints[row.effect]))
+        if row.effect in hints
+        else row
+        for row in rows
+    ]

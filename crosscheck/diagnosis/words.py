@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from crosscheck.diagnosis.result import MissingEffect
 
@@ -18,11 +18,22 @@ def and_what_is_left(text: str, left: str, tried: int) -> str:
     return text[0].upper() + text[1:] + f". {tried} effects were tried."
 
 
-def agreement(tried: int) -> str:
-    """The sentence of a model that lacks nothing."""
+def agreement(tried: int, hints: Mapping[str, float] | None = None) -> str:
+    """The sentence of a model that lacks nothing that is sure.
+
+    Args:
+        tried: how many effects were.
+        hints: effects that explain a little, with their probabilities.
+    """
+    if not hints:
+        return (
+            f"Model and data agree: what is left is noise, and none of {tried} effects tried "
+            "explains any of it."
+        )
+    some = ", ".join(f"{name} ({probability_words(p)})" for name, p in hints.items())
     return (
-        f"Model and data agree: what is left is noise, and none of {tried} effects tried "
-        "explains any of it."
+        f"Model and data agree: what is left is noise; of {tried} effects tried there is a hint of "
+        f"{some}, too weak to be sure."
     )
 
 

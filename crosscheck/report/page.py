@@ -101,7 +101,7 @@ def _of_search(found: Diagnosis) -> dict[str, Any]:
     walls = [draw_wall(wall) for wall in walls_of(problem, before, last)]
     return {
         "title": f"{problem.robot.name} · {problem.data.path.name}",
-        "facts": facts(problem),
+        "facts": [*facts(problem), *unknown_facts(found)],
         "figures": {key: Markup(text) for key, text in figures.items()},  # ours, escaped there
         "walls": [Markup(text) for text in walls],
         "twins": confusion.twins if confusion is not None else [],
@@ -110,6 +110,16 @@ def _of_search(found: Diagnosis) -> dict[str, Any]:
         "unsure": not all(stage.listed for stage in stages_of(found)),
         "added": [n for n in last.state.terms.names if n not in found.search.base],
     }
+
+
+def unknown_facts(found: Diagnosis) -> list[tuple[str, str]]:
+    """How large what is left is, and what could not have been seen."""
+    out = [] if found.left is None else [("left beyond noise", found.left.words)]
+    if found.chances is not None:
+        shown = found.chances.shown
+        words = "at no size" if shown is None else f"from {rms_words(shown)} rms on"
+        out.append(("a smooth unknown effect shows", words))
+    return out
 
 
 def facts(problem: Problem) -> list[tuple[str, str]]:

@@ -53,7 +53,7 @@ def test_a_class_has_the_probability_of_all_its_members() -> None:
     )
     assert chances.of("b") == 0.95
     assert chances.of("nobody") == 0.0
-    assert chances.as_json()["unknown"] == {"log_odds": -3.0}
+    assert chances.as_json()["unknown"] == {"log_odds": -3.0, "shown_from": None}
 
 
 @pytest.mark.parametrize(("p", "words"), [(0.999, "> 99 %"), (0.001, "< 1 %"), (0.5, "50 %")])

@@ -1,0 +1,81 @@
+"""How large an effect that no catalogue holds would have to be for these data to show it.
+
+Smooth fields over the workspace are drawn, each of one size in units of the noise. What effects
+imitate of them is lost; what is left earns evidence, more with its size. The size at which nine
+in ten of them would be called unknown is what the data can show.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import linalg, special
+
+from crosscheck.calibration.colour import whitened
+from crosscheck.calibration.field import FIELD_WIDTHS, UNKNOWN, field_columns
+from crosscheck.calibration.joint import JointFit, Setting
+from crosscheck.fit.noise import as_table
+from crosscheck.fit.problem import Rms, rms_by_kind
+from seecr.pose import Array
+
+# Fields drawn, how many of them are to be seen, and sizes in units of the noise that are tried.
+_DRAWN, _SEEN = 100, 0.9
+_SIZES = np.geomspace(0.03, 300.0, 81)
+
+
+def shown_from(setting: Setting, joint: JointFit, columns: Array, width: Array) -> Rms | None:
+    """The rms size by kind of reading from which on a smooth unknown effect is seen.
+
+    Args:
+        setting, joint: a fit and its noise.
+        columns: (N, p) derivatives by z of all effects that may imitate it, in units of the
+            stated noise.
+        width: (p,) prior standard deviations of z.
+
+    Returns:
+        rms errors that nine in ten such effects show from; None where they hide at any size.
+    """
+    problem = setting.problem
+    field = field_columns(problem, joint.state.prediction.pose[:, :3])
+    random = np.random.default_rng(0)
+    drawn = random.standard_normal((field.shape[1], _DRAWN))
+    drawn /= np.sqrt(np.mean((field @ drawn) ** 2, axis=0))
+    normal = _left(setting, joint, field, columns, width)
+    power, axes = np.linalg.eigh(normal)
+    power = np.maximum(power, 0.0)
+    signal = power[:, None] * (axes.T @ drawn)
+    noise = np.sqrt(power)[:, None] * random.standard_normal(signal.shape)
+    for size in _SIZES:
+        if np.quantile(_log_odds(power, size * signal + noise), 1.0 - _SEEN) > UNKNOWN:
+            return _by_kind(setting, size * (field @ drawn))
+    return None
+
+
+def _left(setting: Setting, joint: JointFit, field: Array, columns: Array, width: Array) -> Array:
+    """(k, k) normal matrix of the field's coefficients beside the effects."""
+
+    def white(values: Array) -> Array:
+        return whitened(setting.chain, joint.colour, joint.weight, values)
+
+    x, f = white(columns * width), white(field)
+    factor = linalg.cho_factor(x.T @ x + np.eye(x.shape[1]), check_finite=False)
+    cross = x.T @ f
+    return np.asarray(f.T @ f - cross.T @ linalg.cho_solve(factor, cross, check_finite=False))
+
+
+def _log_odds(power: Array, along: Array) -> Array:
+    """(draws,) ln evidence with a field less that without, averaged over its width."""
+    square = np.asarray(FIELD_WIDTHS)[:, None, None] ** 2
+    grown = 1.0 + square * power[:, None]
+    gains = 0.5 * np.sum(square * along**2 / grown - np.log(grown), axis=1)
+    return np.asarray(special.logsumexp(gains, axis=0) - np.log(len(gains)))
+
+
+def _by_kind(setting: Setting, white: Array) -> Rms:
+    """Middle rms by kind of fields (N, draws) in units of the stated noise."""
+    problem = setting.problem
+    sigma = np.broadcast_to(problem.reading_sigma, problem.measured.shape)
+    every = [rms_by_kind(problem, sigma * as_table(problem, one)) for one in white.T]
+    return {
+        key: None if every[0][key] is None else float(np.median([rms[key] for rms in every]))
+        for key in every[0]
+    }
