@@ -29,11 +29,12 @@ from numpy.typing import NDArray
 
 from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.fit.problem import Problem
+from crosscheck.fit.state import derivatives, evaluate
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.twin.hidden import choose, times
 from crosscheck.twin.lab import random_of, sweeps
 from crosscheck.twin.measure import Truth, measure
-from seecr.effects import Term
+from seecr.effects import Term, Terms
 from seecr.mjcf import load_robot
 from seecr.pose import quat_from_rotvec, quat_multiply
 from seecr.robot import Robot
@@ -115,20 +116,27 @@ def signals(robot: Robot, data: Measurements, hidden: list[Term]) -> Array:
     return np.concatenate(out, axis=1) if out else np.zeros((len(none), 0))
 
 
-def beside(x: Array) -> Array:
-    """(k,) squared length of each column beside the others."""
-    if x.shape[1] < 2:
-        return np.sum(x**2, axis=0)
+def beside(robot: Robot, data: Measurements, hidden: list[Term]) -> list[float]:
+    """What each effect takes off chi2 that no values of the others could."""
+    if not hidden:
+        return []
+    problem = Problem(robot, data, data.sigma, np.ones(data.n_rows, dtype=bool))
+    terms = Terms(hidden)
+    factor = problem.noise(problem.experiment.predict(()))
+    rates = derivatives(problem, evaluate(problem, terms, factor)) * terms.scale
     out = []
-    for k in range(x.shape[1]):
-        others = np.delete(x, k, axis=1)
-        q = np.linalg.qr(others)[0]
-        left = x[:, k] - q @ (q.T @ x[:, k])
+    for one, signal in zip(hidden, signals(robot, data, hidden).T, strict=True):
+        others = np.concatenate(
+            [rates[:, ~terms.own(one.name)], 1e-6 * np.eye(len(signal))[:, :1]], axis=1
+        )
+        u, power, _ = np.linalg.svd(others, full_matrices=False)
+        q = u[:, power > 1e-3]
+        left = signal - q @ (q.T @ signal)
         out.append(float(left @ left))
-    return np.array(out)
+    return out
 
 
-def make(seed: int, count: int, noise: str) -> tuple[Robot, Measurements, list[Term], Array]:
+def make(seed: int, count: int, noise: str) -> tuple[Robot, Measurements, list[Term], list[float]]:
     """Robot, measurements, what is hidden, and how much chi2 each owes beside the others."""
     robot = load_robot(model_path(ROBOTS[seed % 2]))
     random = random_of(seed, 5)
@@ -148,7 +156,7 @@ def make(seed: int, count: int, noise: str) -> tuple[Robot, Measurements, list[T
             break
     made = NOISES[noise](random, case.n_rows, 6, case.run)
     data = read(case, truth, sigma, made)
-    return robot, data, hidden, beside(signals(robot, data, hidden))
+    return robot, data, hidden, beside(robot, data, hidden)
 
 
 def judged(seed: int, count: int, noise: str) -> dict[str, Any]:

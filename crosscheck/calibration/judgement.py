@@ -19,8 +19,9 @@ from crosscheck.fit.reasons import DiagnosisVerdict
 
 # An effect is sure from this probability of it or its equals.
 SURE = 0.95
-# Sets up to this size are a diagnosis; at most this many classes may be open.
-_FEW, _OPEN = 5, 1.0
+# Sets up to this size are a diagnosis; at most this many classes may be open, or so many where
+# every member of the set is sure.
+_FEW, _OPEN, _OPEN_BESIDE = 5, 1.0, 2.0
 # A name is owed from this much ln evidence; what explains less may be chance.
 _OWED = 12.5
 # Runs left out may be this many times as far off as the fit expected.
@@ -61,6 +62,9 @@ def judge(
     unknown = strange or field_odds > UNKNOWN or surprise > SURPRISE
     few = len(best) <= _FEW and undecided < _OPEN
     sure = sure_effects(found, classes, few)
+    if not few and len(best) <= _FEW and undecided < _OPEN_BESIDE:
+        every = sure_effects(found, classes, True)
+        few, sure = (True, every) if set(every) == best else (few, sure)
     if unknown:  # known effects imitate it: none of them is sure
         return Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, (), undecided)
     if not sure and undecided < _OPEN and explained(found) < _OWED:
