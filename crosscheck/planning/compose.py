@@ -31,6 +31,8 @@ _SIDE, _TOP, _TURN = 0.15, 0.15, 0.2
 _BELOW = 0.25
 # An effect is to be told from so many others, those that are most like it.
 _RIVALS = 3
+# Candidates that each step of the choice tries.
+_SAMPLE = 40
 # Rows of a run, and least runs: diagnoses leave one out after the other.
 _ROWS_A_RUN, _LEAST_RUNS = 12, 3
 
@@ -80,7 +82,7 @@ def compose(
     there = signals(plan)[0]
     nothing = {n: Signal(s.layout, s.shape, s.columns[:0]) for n, s in there.items()}
     progress("choosing poses", 0.4)
-    chosen = chosen_poses(nothing, there, plan.problem.row_of, _wanted(there), rows)
+    chosen = chosen_poses(nothing, there, plan.problem.row_of, _wanted(there), rows, _SAMPLE)
     pose = plan.problem.data.command_pose
     assert pose is not None
     pose = pose[sorted(chosen)]

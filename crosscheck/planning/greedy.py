@@ -40,6 +40,7 @@ def chosen_poses(
     row_of: NDArray[np.integer],
     pairs: Sequence[Wanted],
     most: int,
+    sample: int | None = None,
 ) -> list[int]:
     """Rows of the candidate poses to add, the best first.
 
@@ -49,6 +50,8 @@ def chosen_poses(
         row_of: (N,) candidate that each of those readings belongs to.
         pairs: what is not shown or told apart so far.
         most: poses to choose.
+        sample: try so many candidates in each step, drawn anew; all without. Nearly as good, and
+            that much faster (Mirzasoleiman et al. 2015, Lazier than lazy greedy).
     """
     if not pairs:
         return []
@@ -61,15 +64,18 @@ def chosen_poses(
     total = _gram(whole)
     chosen: list[int] = []
     score = _scores(total[None], part, pairs)[0]
+    random = np.random.default_rng(0)
     for _ in range(min(most, len(candidates))):
-        scores = _scores(total[None] + grams, part, pairs)
         # once each: a pose measured again tells nothing new
-        scores[np.isin(candidates, chosen)] = -np.inf
+        left = np.flatnonzero(~np.isin(candidates, chosen))
+        if sample is not None and len(left) > sample:
+            left = random.choice(left, sample, replace=False)
+        scores = _scores(total[None] + grams[left], part, pairs)
         best = int(np.argmax(scores))
         if not scores[best] > score * (1.0 + 1e-6):
             break
-        chosen.append(int(candidates[best]))
-        total, score = total + grams[best], float(scores[best])
+        chosen.append(int(candidates[left[best]]))
+        total, score = total + grams[left[best]], float(scores[best])
     return chosen
 
 
