@@ -18,6 +18,7 @@ import numpy as np
 from seecr import statics
 from seecr.compiled.columns import STRAIN
 from seecr.effects.base import Effect, Readings
+from seecr.effects.checked import is_built_in
 from seecr.effects.terms import Terms
 from seecr.experiment import Experiment, Prediction, read, senses
 from seecr.joints import motion_columns
@@ -106,21 +107,28 @@ class _ByWrench:
         return _kept(self.at, f"read_rates {own}", self._read_rates)
 
     def _read_rates(self, at: Prediction) -> Array:
+        step = np.full(_shape(at)[1], _READ)
+        step[:3] *= at.tables.length
+        step[6:] *= max(1.0, float(np.max(np.abs(at.tensions))))
+        each = np.diag(step)
+        # our own sensors look at a row's readings alone: all steps are rows of one batch
+        together = all(is_built_in(type(effect)) for effect in self.sensing)
+        parts = [each] if together else [one[None] for one in each]
+        return np.concatenate([self._differences(at, part) for part in parts], axis=2) / step
+
+    def _differences(self, at: Prediction, steps: Array) -> Array:
+        """Half of what steps (k, 6 + m) ahead and back change of the readings, (n, 6 + m, k)."""
         n, width = _shape(at)
-        out = np.empty((n, width, width))
-        for k in range(width):
-            step = np.zeros(width)
-            step[k] = _READ * (at.tables.length if k < 3 else 1.0)
-            if k >= 6:
-                step[k] *= max(1.0, float(np.max(np.abs(at.tensions))))
-            move, tension = np.tile(step[:6], (n, 1)), step[6:]
-            ahead, behind = (
-                read(self.sensing, at.setup, pose_add(at.pose, s * move),
-                     at.tensions + s * tension)
-                for s in (1.0, -1.0)
-            )  # fmt: skip
-            out[..., k] = readings_difference(ahead, behind) / (2.0 * step[k])
-        return out
+        k = len(steps)
+        change = np.repeat(steps, n, axis=0)
+        pose, tensions = np.tile(at.pose, (k, 1)), np.tile(at.tensions, (k, 1))
+        ahead, behind = (
+            read(self.sensing, at.setup, pose_add(pose, s * change[:, :6]),
+                 tensions + s * change[:, 6:])
+            for s in (1.0, -1.0)
+        )  # fmt: skip
+        whole = 0.5 * readings_difference(ahead, behind).reshape(k, n, width)
+        return np.moveaxis(whole, 0, 2)
 
     @property
     def inverse(self) -> Array:

@@ -23,7 +23,6 @@ import numpy as np
 from seecr.commands import Commands, play
 from seecr.compiled import columns
 from seecr.errors import InputError
-from seecr.loads import Loads
 from seecr.pose import Array
 from seecr.robot import Robot
 
@@ -206,7 +205,10 @@ class Setup:
 
     def carried(self) -> tuple[Array, Array]:
         """Mass (n,) [kg] and centre of mass (n, 3) [m] of the platform with its known payloads."""
-        loads = self.commands.loads or Loads.of(len(self.commands))
+        loads = self.commands.loads
+        if loads is None:
+            n = len(self.commands)
+            return np.full(n, self.mass), np.tile(self.centre_of_mass, (n, 1))
         total = self.mass + loads.mass
         # the lever from the platform's own centre: exactly that centre where nothing is said
         lever = np.where(np.isnan(loads.centre), 0.0, loads.centre - self.centre_of_mass)

@@ -91,7 +91,7 @@ def assemble(setup: Setup, strains: Array | None = None) -> Tables:
         poses=poses,
         screws=_screws_of(robot, poses.tobytes(), n),
         length=robot.length,
-        scale=_load_scale(setup),
+        scale=_load_scale(setup, mass),
         reach=3.0 * (rest.max(axis=1) + np.abs(gap).max(axis=1)),
         n_dof=robot.n_dof,
     )
@@ -125,9 +125,9 @@ def _hanging(setup: Setup) -> Array:
     return -setup.gravity / g
 
 
-def _load_scale(setup: Setup) -> Array:
-    """Load [N] of each pose: weight, external force and moment over the robot's length."""
-    weight = setup.carried()[0] * np.linalg.norm(setup.gravity)
+def _load_scale(setup: Setup, mass: Array) -> Array:
+    """Load [N] of each pose: weight of masses (n,), external force, moment over the length."""
+    weight = mass * np.linalg.norm(setup.gravity)
     force = np.linalg.norm(setup.wrench[:, :3], axis=1)
     moment = np.linalg.norm(setup.wrench[:, 3:], axis=1) / setup.robot.length
     scale = weight + force + moment
