@@ -8,7 +8,7 @@ Rows with history are the exception: their walk is repeated with each parameter 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -25,7 +25,7 @@ from seecr.joints import motion_columns
 from seecr.pose import Array, pose_add, quat_conjugate, quat_multiply, rotvec_from_quat
 from seecr.setup import QUANTITIES, History, Setup
 from seecr.shifts import Shift, blocks_of_cables, positions, shifted
-from seecr.tables import Tables, assemble
+from seecr.tables import Tables, assemble, reassembled
 
 # Differencing step of a walk that is repeated, in plausible sizes of a parameter.
 _WALK = 1e-4
@@ -81,10 +81,43 @@ def _shape(at: Prediction) -> tuple[int, int]:
     return n, 6 + m
 
 
-# Quantities that do not reach the statics through the rest lengths alone.
-_OTHER_THAN_LENGTHS = [name for name, item in QUANTITIES.items() if not item.paid_out]
+# Quantities that reach the statics through the rest lengths alone.
+_PAID_OUT = {name for name, item in QUANTITIES.items() if item.paid_out}
 # Quantities whose change asks for the whole way to be solved again.
-_OF_HISTORY = [name for name, item in QUANTITIES.items() if item.history is not History.NONE]
+_OF_HISTORY = {name for name, item in QUANTITIES.items() if item.history is not History.NONE}
+
+
+@dataclass(frozen=True, eq=False)
+class _Sides:
+    """Setups with a parameter shifted up and down, and the names of what differs between them."""
+
+    plus: Setup
+    minus: Setup
+    differing: frozenset[str]
+
+    @property
+    def of_history(self) -> bool:
+        """Whether the whole way is to be solved again."""
+        return not self.differing.isdisjoint(_OF_HISTORY)
+
+    @property
+    def of_lengths(self) -> bool:
+        """Whether the cables are longer or shorter, and nothing else."""
+        return self.differing <= _PAID_OUT and not (self.plus.laws or self.minus.laws)
+
+    def longer(self, apart: Any) -> Array:
+        """Rest lengths (n, m) of plus less those of minus, per unit of ``apart``."""
+        return np.asarray((self.plus.rest_lengths() - self.minus.rest_lengths()) / apart)
+
+    def tables(self, at: Prediction) -> tuple[Tables, Tables]:
+        """Of both, which differ from those of a prediction by what differs between them."""
+        both = (self.plus, self.minus)
+        if self.plus.laws or self.minus.laws:
+            strains = at.found.states[..., STRAIN]
+            ahead, behind = (assemble(one, strains).with_past(at.tables) for one in both)
+        else:
+            ahead, behind = (reassembled(at.tables, one, self.differing) for one in both)
+        return ahead, behind
 
 
 @dataclass(eq=False)
@@ -114,7 +147,8 @@ class _ByWrench:
         # our own sensors look at a row's readings alone: all steps are rows of one batch
         together = all(is_built_in(type(effect)) for effect in self.sensing)
         parts = [each] if together else [one[None] for one in each]
-        return np.concatenate([self._differences(at, part) for part in parts], axis=2) / step
+        rates = np.concatenate([self._differences(at, part) for part in parts], axis=2)
+        return np.asarray(rates / step)
 
     def _differences(self, at: Prediction, steps: Array) -> Array:
         """Half of what steps (k, 6 + m) ahead and back change of the readings, (n, 6 + m, k)."""
@@ -127,8 +161,7 @@ class _ByWrench:
                  tensions + s * change[:, 6:])
             for s in (1.0, -1.0)
         )  # fmt: skip
-        whole = 0.5 * readings_difference(ahead, behind).reshape(k, n, width)
-        return np.moveaxis(whole, 0, 2)
+        return np.moveaxis(0.5 * readings_difference(ahead, behind).reshape(k, n, width), 0, 2)
 
     @property
     def inverse(self) -> Array:
@@ -143,11 +176,10 @@ class _ByWrench:
         n, width = _shape(self.at)
         change = np.zeros((n, width))
         if shift.physical:
-            plus = self.experiment.setup(shift.plus.effects)
-            minus = self.experiment.setup(shift.minus.effects)
-            if _differ(plus, minus, _OF_HISTORY):
+            sides = self._sides(shift)
+            if sides.of_history:
                 return _difference(self.experiment, shift, self.at)
-            change = self._physical(plus, minus, shift.apart)
+            change = self._physical(sides, shift.apart)
         if shift.sensing:
             return self._read(shift, change, shift.apart)
         return (self.read_rates @ change[..., None])[..., 0] if self.sensing else change
@@ -156,30 +188,24 @@ class _ByWrench:
         """Derivatives (n, 6 + m, m) by what each cable has of its own, shifted together."""
         if shift.sensing:
             return None
-        plus = self.experiment.setup(shift.plus.effects)
-        minus = self.experiment.setup(shift.minus.effects)
-        if _differ(plus, minus, _OF_HISTORY):
+        sides = self._sides(shift)
+        if sides.of_history:
             return None
-        if _differ_by_length_only(plus, minus):
-            longer = (plus.rest_lengths() - minus.rest_lengths()) / shift.apart
-            change = self.by_length * longer[:, None, :]
+        if sides.of_lengths:
+            change = self.by_length * sides.longer(shift.apart)[:, None, :]
         else:
-            ahead, behind = self._tables(plus, minus)
-            change = _response_by_cable(self.at, ahead, behind, shift.apart)
+            change = _response_by_cable(self.at, *sides.tables(self.at), shift.apart)
         return np.asarray(self.read_rates @ change if self.sensing else change)
 
-    def _physical(self, plus: Setup, minus: Setup, apart: float) -> Array:
-        if _differ_by_length_only(plus, minus):
-            longer = (plus.rest_lengths() - minus.rest_lengths()) / apart
-            return (self.by_length @ longer[..., None])[..., 0]
-        return _response(self.at, *self._tables(plus, minus), apart, self.inverse)
+    def _sides(self, shift: Shift) -> _Sides:
+        plus = self.experiment.setup(shift.plus.effects)
+        minus = self.experiment.setup(shift.minus.effects)
+        return _Sides(plus, minus, plus.differs(minus))
 
-    def _tables(self, plus: Setup, minus: Setup) -> tuple[Tables, Tables]:
-        strains = self.at.found.states[..., STRAIN]
-        ahead, behind = assemble(plus, strains), assemble(minus, strains)
-        if self.at.has_history:
-            ahead, behind = (tables.with_past(self.at.tables) for tables in (ahead, behind))
-        return ahead, behind
+    def _physical(self, sides: _Sides, apart: float) -> Array:
+        if sides.of_lengths:
+            return (self.by_length @ sides.longer(apart)[..., None])[..., 0]
+        return _response(self.at, *sides.tables(self.at), apart, self.inverse)
 
     def _read(self, shift: Shift, change: Array, apart: float) -> Array:
         at, half = self.at, 0.5 * apart
@@ -196,20 +222,6 @@ def _kept(at: Prediction, name: str, make: Callable[[Prediction], Array]) -> Arr
     if name not in at.kept:
         at.kept[name] = make(at)
     return at.kept[name]
-
-
-def _differ(a: Setup, b: Setup, names: Iterable[str]) -> bool:
-    for name in names:
-        mine, other = getattr(a, name), getattr(b, name)
-        if np.shape(mine) != np.shape(other) or np.any(mine != other):
-            return True
-    return False
-
-
-def _differ_by_length_only(a: Setup, b: Setup) -> bool:
-    if a.laws or b.laws:
-        return False
-    return not _differ(a, b, _OTHER_THAN_LENGTHS)
 
 
 def _response(at: Prediction, plus: Tables, minus: Tables, apart: float, inverse: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -74,38 +75,60 @@ def assemble(setup: Setup, strains: Array | None = None) -> Tables:
     robot = setup.robot
     poses = np.ascontiguousarray(setup.commands.pose)
     n, m = len(poses), robot.n_cables
-    rest = setup.rest_lengths()
-    gap = setup.geometric_lengths(poses) - rest
     cables, load = np.zeros((n, m, N_COLUMNS)), np.zeros((n, N_LOAD))
-    cables[..., REST], cables[..., GAP] = rest, gap
-    mass, centre = setup.carried()
-    load[:, FORCE_OF_WEIGHT : FORCE_OF_WEIGHT + 3] = mass[:, None] * setup.gravity
-    load[:, CENTRE_OF_MASS : CENTRE_OF_MASS + 3] = centre
-    load[:, UP : UP + 3] = _hanging(setup)
-    _write_quantities(setup, cables, load)
+    _write(setup, QUANTITIES, cables, load)
     if setup.laws:
         _linearise(setup, np.zeros((n, m)) if strains is None else strains, cables)
+    rest, gap = cables[..., REST], cables[..., GAP]
     return Tables(
         cables=cables,
         load=load,
         poses=poses,
         screws=_screws_of(robot, poses.tobytes(), n),
         length=robot.length,
-        scale=_load_scale(setup, mass),
+        scale=_load_scale(setup),
         reach=3.0 * (rest.max(axis=1) + np.abs(gap).max(axis=1)),
         n_dof=robot.n_dof,
     )
 
 
-def _write_quantities(setup: Setup, cables: Array, load: Array) -> None:
-    """The quantities that the compiled loop uses as they are, where their fields say."""
-    for name, item in QUANTITIES.items():
+def reassembled(tables: Tables, setup: Setup, names: Collection[str]) -> Tables:
+    """Tables with some of their quantities as in a setup of the same rows, without users' laws.
+
+    What is left of the rows before stays, and so does what a search measures against
+    (``scale``, ``reach``): they are for differences at rest.
+    """
+    cables, load = tables.cables.copy(), tables.load.copy()
+    _write(setup, names, cables, load)
+    return replace(tables, cables=cables, load=load)
+
+
+# Quantities that go into more than their own column: into lengths, into weight and vertical.
+_OF_LENGTHS = {"exit_points", "anchor_points", "pulley_radius"} | {
+    name for name, item in QUANTITIES.items() if item.paid_out
+}
+_OF_LOAD = {"mass", "centre_of_mass", "gravity", "pulley_radius", "lift"}
+
+
+def _write(setup: Setup, names: Collection[str], cables: Array, load: Array) -> None:
+    """Write some quantities, and what is made of them, where the compiled loop reads it."""
+    for name in names:
+        item = QUANTITIES[name]
         value = np.asarray(getattr(setup, name))
         if item.column is not None:
             per_cable = value if item.shape[-1] == 3 else value[..., None]
             cables[..., item.column : item.column + per_cable.shape[-1]] = per_cable
         if item.entry is not None:
             load[:, item.entry : item.entry + value.shape[-1]] = value
+    if not _OF_LENGTHS.isdisjoint(names):
+        rest = setup.rest_lengths()
+        cables[..., REST] = rest
+        cables[..., GAP] = setup.geometric_lengths(setup.commands.pose) - rest
+    if not _OF_LOAD.isdisjoint(names):
+        mass, centre = setup.carried()
+        load[:, FORCE_OF_WEIGHT : FORCE_OF_WEIGHT + 3] = mass[:, None] * setup.gravity
+        load[:, CENTRE_OF_MASS : CENTRE_OF_MASS + 3] = centre
+        load[:, UP : UP + 3] = _hanging(setup)
 
 
 def _linearise(setup: Setup, strains: Array, cables: Array) -> None:
@@ -125,9 +148,9 @@ def _hanging(setup: Setup) -> Array:
     return -setup.gravity / g
 
 
-def _load_scale(setup: Setup, mass: Array) -> Array:
-    """Load [N] of each pose: weight of masses (n,), external force, moment over the length."""
-    weight = mass * np.linalg.norm(setup.gravity)
+def _load_scale(setup: Setup) -> Array:
+    """Load [N] of each pose: weight, external force and moment over the robot's length."""
+    weight = setup.carried()[0] * np.linalg.norm(setup.gravity)
     force = np.linalg.norm(setup.wrench[:, :3], axis=1)
     moment = np.linalg.norm(setup.wrench[:, 3:], axis=1) / setup.robot.length
     scale = weight + force + moment

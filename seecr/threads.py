@@ -27,8 +27,9 @@ def processors() -> int:
 
 def in_parts(run: Callable[[slice], None], n: int, threads: int | None = None) -> None:
     """Run a job on n rows, in as many parts as there are threads and rows enough for them."""
-    most = processors() if threads is None else threads
-    count = max(1, min(most, n // _CHUNK))
+    count = max(1, n // _CHUNK)
+    if count > 1:  # asking the system takes longer than a few rows
+        count = min(count, processors() if threads is None else threads)
     edges = [n * k // count for k in range(count + 1)]
     run_parts(run, [slice(a, b) for a, b in pairwise(edges)])
 
