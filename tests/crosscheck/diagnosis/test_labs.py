@@ -24,7 +24,7 @@ from seecr.mjcf import load_robot
 
 # Nothing missing in heavy tails; one effect beside outliers, positions alone; a memory through
 # slackness; four at once.
-IN_CI = ("B03", "B05", "B06", "B08")
+IN_CI = ("B03", "B05", "B06", "B08", "B17", "B18")
 CASES = [
     pytest.param(name, marks=[] if name in IN_CI else [pytest.mark.sweep])
     for name in (f"B{k:02d}" for k in range(1, 19))
