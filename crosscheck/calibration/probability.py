@@ -13,6 +13,10 @@ from crosscheck.calibration.sets import Names
 
 # Effects whose exchange costs less evidence than this are equals.
 EQUAL = 3.0
+# A small effect (of up to so many parameters) with one more costs about so much evidence though it
+# explains the same: a frame that yields alike in all directions is a cable behind the exit point,
+# and has two numbers.
+SMALL, _ONE_MORE = 3, 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,10 +50,33 @@ def all_scores(found: Found) -> dict[Names, float]:
     return out
 
 
-def probabilities(scores: Mapping[Names, float], best: Names, effects: Iterable[str]) -> Classes:
-    """Probabilities of effects and classes: sums over sets."""
+def are_equals(loss: float, own: int, other: int) -> bool:
+    """Whether an effect of ``other`` parameters in place of one of ``own`` explains as well.
+
+    Args:
+        loss: evidence lost by the exchange.
+        own, other: numbers of parameters.
+    """
+    more = max(0, other - own) if other <= SMALL else 0
+    return loss < EQUAL + _ONE_MORE * more
+
+
+def probabilities(
+    scores: Mapping[Names, float],
+    best: Names,
+    effects: Iterable[str],
+    sizes: Mapping[str, int] | None = None,
+) -> Classes:
+    """Probabilities of effects and classes: sums over sets.
+
+    Args:
+        scores: ln evidence and prior of each set.
+        best: the best of them.
+        effects: all that may be missing.
+        sizes: how many parameters each has; one where not given.
+    """
     effects = list(effects)
-    return of_classes(scores, effects, _classes(scores, best, effects))
+    return of_classes(scores, effects, _classes(scores, best, effects, sizes or {}))
 
 
 def of_classes(
@@ -69,14 +96,16 @@ def of_classes(
 
 
 def _classes(
-    scores: Mapping[Names, float], best: Names, effects: list[str]
+    scores: Mapping[Names, float], best: Names, effects: list[str], sizes: Mapping[str, int]
 ) -> list[tuple[str, ...]]:
     """Members of the best set with what could stand in their place; the others by themselves."""
     together = {e: {e} for e in effects}
     for names, score in scores.items():
         gone, come = best - names, names - best
-        if len(gone) == 1 and len(come) == 1 and score > scores[best] - EQUAL:
-            (a,), (b,) = gone, come
+        if len(gone) != 1 or len(come) != 1:
+            continue
+        (a,), (b,) = gone, come
+        if are_equals(scores[best] - score, sizes.get(a, 1), sizes.get(b, 1)):
             joined = together[a] | together[b]
             for e in joined:
                 together[e] = joined

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from crosscheck.calibration.probability import SMALL
 from crosscheck.comparison.associations import Association
 from crosscheck.diagnosis.advice import check_of, measure_next
 from crosscheck.diagnosis.chances import Chances
-from crosscheck.diagnosis.node import SMALL
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect, NotListed
 from crosscheck.diagnosis.rivals import Rival, rivals_of
 from crosscheck.diagnosis.search import Search

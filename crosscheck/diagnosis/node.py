@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from crosscheck.calibration.probability import SMALL
 from crosscheck.fit.candidates import Candidate, Trials, fit_candidate, judged, screen
 from crosscheck.fit.evidence import FALSE_ALARM, Evidence
 from crosscheck.fit.gauss_newton import Fit
@@ -18,8 +19,6 @@ from crosscheck.fit.reasons import Reason, Why
 LEAST_GAIN = 3.0
 # An effect that takes away less than this part of what noise does not explain is no cause.
 LEAST_PART = 0.25
-# Most parameters of a small effect.
-SMALL = 3
 # Candidates fitted beside a model after the first round, and small ones among them.
 _FITTED, _FITTED_SMALL = 7, 2
 # Beside a model that leaves noise, an effect is only fitted if chance explains what its

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from crosscheck.diagnosis.node import SMALL
+from crosscheck.calibration.probability import EQUAL, are_equals
 from crosscheck.diagnosis.search import Search
 from crosscheck.fit.candidates import Candidate, try_candidate
 from crosscheck.fit.gauss_newton import Fit
@@ -13,11 +13,6 @@ from crosscheck.fit.imitation import basis, beside, imitated
 from seecr.effects import catalogue
 from seecr.effects.base import Layout
 
-# Models whose log evidence differs by less explain equally well.
-EQUAL = 3.0
-# A small effect with a parameter more costs about so much evidence though it explains the same: a
-# frame that yields alike in all directions is a cable behind the exit point, and has two numbers.
-_ONE_MORE = 3.0
 # An effect that can imitate less than this part of another's signal is not refitted for it.
 _LIKELY = 0.9
 # A rival that leaves this much more chi2 has been told apart, whatever its evidence.
@@ -75,8 +70,7 @@ def _rival(found: Search, candidate: Candidate, without: Fit, own: int) -> Rival
     left = final.whiteness.inflation**2
     loss = (final.evidence.log - trials.evidence(best).log) / left
     worse = (best.chi2 - final.fit.chi2) / trials.noise_scale**2 / left
-    more = max(0, len(candidate.layout) - own) if len(candidate.layout) <= SMALL else 0
-    alike = -EQUAL < loss < EQUAL + _ONE_MORE * more and worse < _TOLD_APART
+    alike = loss > -EQUAL and are_equals(loss, own, len(candidate.layout)) and worse < _TOLD_APART
     return Rival(candidate.name, best, loss) if alike else None
 
 

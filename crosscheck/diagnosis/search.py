@@ -17,10 +17,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from crosscheck.calibration.probability import SMALL
 from crosscheck.diagnosis.node import (
     LEAST_GAIN,
     LEAST_PART,
-    SMALL,
     Known,
     Names,
     Node,

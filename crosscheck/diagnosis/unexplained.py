@@ -12,10 +12,10 @@ from itertools import takewhile
 
 import numpy as np
 
+from crosscheck.calibration.probability import SMALL
 from crosscheck.comparison.associations import Association, associations
 from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.listed import diagnosis_of, missing_of, not_listed
-from crosscheck.diagnosis.node import SMALL
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
 from crosscheck.diagnosis.search import Search
 from crosscheck.diagnosis.small import is_plausible, share_of, small_effects_alone

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -45,6 +46,14 @@ def test_a_hint_of_an_effect_is_not_named() -> None:
 def test_one_effect_beyond_doubt() -> None:
     said = judged({"": -900.0, "a": 0.0, "ab": -3.0})
     assert (said.verdict, said.sure) == (DiagnosisVerdict.EFFECTS_FOUND, ("a",))
+
+
+def test_sure_effects_are_a_diagnosis_though_many_others_stay_open() -> None:
+    some = [*"cdefg", *map("".join, combinations("cdefg", 2))]
+    hints = {"ab" + x: -0.1 for x in some}
+    said = judged({"": -900.0, "a": -300.0, "b": -500.0, "ab": 0.0, **hints})
+    assert 1.0 < said.undecided < 2.0
+    assert (said.verdict, said.sure) == (DiagnosisVerdict.EFFECTS_FOUND, ("a", "b"))
 
 
 def test_equals_share_their_certainty() -> None:

@@ -100,6 +100,19 @@ def test_probabilities_are_sums_over_sets_and_equals_are_one_class() -> None:
     assert found.undecided == pytest.approx(0.25 / total)
 
 
+@pytest.mark.parametrize(("loss", "own", "other", "equal"), [
+    (2.9, 1, 1, True), (3.1, 1, 1, False),
+    (5.9, 2, 3, True),  # the third parameter costs that much by itself
+    (3.1, 3, 2, False), (5.9, 1, 8, False),  # a large group has to be as good as it is
+])  # fmt: skip
+def test_equals_may_cost_what_their_parameters_do(
+    loss: float, own: int, other: int, equal: bool
+) -> None:
+    scores = {NONE: -50.0, frozenset({"a"}): 0.0, frozenset({"b"}): -loss}
+    found = probabilities(scores, frozenset({"a"}), "ab", {"a": own, "b": other})
+    assert (found.members[0] == ("a", "b")) is equal
+
+
 def test_a_cubic_has_its_monomials_and_a_flat_axis_has_none() -> None:
     rng = np.random.default_rng(2)
     place = rng.uniform(size=(50, 3))
