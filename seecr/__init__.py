@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     )
     from seecr.experiment import Experiment, Prediction, predict
     from seecr.exported.export import Export, export
+    from seecr.following import Jump
     from seecr.inverse import Correction, correct
     from seecr.loads import Loads
     from seecr.maps import Workspace, boundary, default_axes, workspace_map
@@ -68,6 +69,7 @@ _MODULES = {
     "errors": ("InputError", "InputFileError", "MissingPackageError", "RobotError", "SeecrError"),
     "experiment": ("Experiment", "Prediction", "predict"),
     "exported.export": ("Export", "export"),
+    "following": ("Jump",),
     "loads": ("Loads",),
     "inverse": ("Correction", "correct"),
     "maps": ("Workspace", "boundary", "default_axes", "workspace_map"),
@@ -95,6 +97,7 @@ __all__ = [
     "InputError",
     "InputFileError",
     "Joint",
+    "Jump",
     "Knowledge",
     "Loads",
     "MissingPackageError",

@@ -11,6 +11,7 @@ from seecr.commands import Commands
 from seecr.effects.checked import edit_setup
 from seecr.errors import InputError
 from seecr.experiment import Experiment, GivenEffects, effects_of
+from seecr.following import follow_commands
 from seecr.multiple import other_rests
 from seecr.pose import Array
 from seecr.robot import Robot
@@ -35,6 +36,7 @@ def solve(
     max_iterations: int = 400,
     threads: int | None = None,
     others: bool = False,
+    follow: bool = False,
 ) -> Solution:
     """Find where the platform rests (paper, section III-B) for a batch of commands.
 
@@ -55,6 +57,9 @@ def solve(
         threads: one per processor by default.
         others: look for the other stable equilibria of each command too, a tenth of a second or
             more for each; they are then the solution's ``others``.
+        follow: go from the reference pose along the commanded way, run by run, from rest to rest,
+            instead of searching from each command; where a rest ends on the way, and where the
+            platform jumps to, are the solution's ``jumps``.
 
     Returns:
         a :class:`Solution`; look at ``status`` or ``converged`` before using a pose.
@@ -81,11 +86,11 @@ def solve(
 
     setup = setup_of(commands, pushed)
     if setup.has_history or setup.laws:
-        if method != "newton" or start is not None or wrench is not None or others:
+        if method != "newton" or start is not None or wrench is not None or others or follow:
             raise InputError(
                 "effects with history or with a law of their own are solved along the way; "
-                "expected no other method, no start, no others, and external_wrench among the "
-                "effects instead of wrench"
+                "expected no other method, no start, no others, no follow, and external_wrench "
+                "among the effects instead of wrench"
             )
         return Experiment(robot, commands).predict(acting).solution()
     starts = None
@@ -93,10 +98,18 @@ def solve(
         starts = commanded_poses(start, "start")
         if len(starts) != len(commands):
             raise InputError(f"start must have {len(commands)} poses, got {len(starts)}")
-    found = solve_setup(setup, method, starts, max_iterations, threads)
+    pushes = np.broadcast_to(np.zeros(6) if pushed is None else pushed, (len(commands), 6))
+    if follow:
+        if method != "newton" or start is not None:
+            raise InputError(
+                "follow goes from the reference pose downhill; expected no other method and no "
+                "start"
+            )
+        found = follow_commands(robot, commands, lambda way, row: setup_of(way, pushes[row]))
+    else:
+        found = solve_setup(setup, method, starts, max_iterations, threads)
     if not others:
         return found
-    pushes = np.broadcast_to(np.zeros(6) if pushed is None else pushed, (len(commands), 6))
 
     def repeated(i: int, n: int) -> Setup:
         return setup_of(commands.rows(np.full(n, i)), pushes[i])

@@ -52,15 +52,18 @@ def values_of_pose(robot: Robot, poses: Array) -> tuple[Array, Array]:
         InputError: a pose that the joints cannot reach.
     """
     poses = np.atleast_2d(np.asarray(poses, float))
-    values = np.zeros((len(poses), len(robot.joints)))
+    values, before = np.zeros((len(poses), len(robot.joints))), np.inf
     for _ in range(50):
         reached, screws = pose_of_values(robot, values)
         miss = pose_difference(poses, reached)
         columns = motion_columns(screws, reached[:, :3])
         step = np.einsum("nkd,nd->nk", np.linalg.pinv(columns), miss)
         values = values + step
-        if np.all(np.abs(step) < 1e-14 * (1.0 + np.abs(values))):
+        size = float(np.max(np.abs(step) / (1.0 + np.abs(values)), initial=0.0))
+        # so near to the end steps that do not fall are rounding
+        if size < 1e-14 or 0.5 * before <= size < 1e-12:
             break
+        before = size
     reached, screws = pose_of_values(robot, values)
     miss = np.abs(pose_difference(poses, reached)) / np.repeat([robot.length, 1.0], 3)
     if np.any(miss > _OFF_MANIFOLD):

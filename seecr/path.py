@@ -72,13 +72,23 @@ class Path:
         return turning(self.robot, self.given)
 
 
-def path_of(robot: Robot, commands: Commands) -> Path:
-    """The waypoints of commands: straight from the reference pose, straight between rows."""
+def path_of(robot: Robot, commands: Commands, waypoints: float | None = None) -> Path:
+    """The waypoints of commands: straight from the reference pose, straight between rows.
+
+    Args:
+        robot: as described.
+        commands: n rows.
+        waypoints: [of the robot's length] by which what is commanded moves between them at most;
+            a few for each row by default.
+    """
     n = len(commands)
     ways, fresh = _ways(robot, commands), commands.starts
     # a way begins with a waypoint of its own where a run starts, or with another load
     begins = fresh.copy() if commands.loads is None else fresh | commands.loads.changes
-    steps = np.where(commands.starts_here, 0, np.where(fresh, _APPROACH, _BETWEEN))
+    steps = np.where(fresh, _APPROACH, _BETWEEN)
+    if waypoints is not None:
+        steps = np.ceil(_moved(ways, commands) / waypoints).astype(int).clip(1)
+    steps = np.where(commands.starts_here, 0, steps)
     source = np.repeat(np.arange(n), steps + begins)
     rows = np.cumsum(steps + begins) - 1
     step = np.arange(len(source)) - (rows - steps)[source]
@@ -107,6 +117,16 @@ def path_of(robot: Robot, commands: Commands) -> Path:
         clock=None if commands.clock is None else commands.clock[source],
     )
     return Path(robot, commands, whole, rows, source, first, elapsed)
+
+
+def _moved(ways: _Ways, commands: Commands) -> Array:
+    """How far what is commanded moves on the way to each row, (n,), over the robot's length."""
+    robot = ways.robot
+    if commands.lengths is not None:
+        last = commands.before(commands.lengths, robot.rest_lengths)
+        return np.asarray(np.abs(commands.lengths - last).max(axis=1) / robot.length)
+    hinges = robot.hinges
+    return np.asarray(np.linalg.norm(ways.change / np.where(hinges, 1.0, robot.length), axis=1))
 
 
 def _since(commands: Commands) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,6 +28,9 @@ from seecr.pose import Array, rotvec_from_quat
 from seecr.result import COORDINATES, Record, Result, named
 from seecr.robot import Robot
 from seecr.tables import Tables, take
+
+if TYPE_CHECKING:
+    from seecr.following import Jump
 
 
 class Status(Enum):
@@ -87,6 +90,7 @@ class Solution(Result):
             nan where a law has none in closed form.
         status: (n,) of :class:`Status`.
         others: the other stable equilibria of each command, where they were asked for.
+        jumps: on the way to each command, where it was followed.
     """
 
     robot: Robot
@@ -103,6 +107,7 @@ class Solution(Result):
     energy: Array
     status: NDArray[np.object_]
     others: tuple[Solution, ...] | None = None
+    jumps: tuple[tuple[Jump, ...], ...] | None = None
 
     def __len__(self) -> int:
         return len(self.pose)
@@ -164,7 +169,9 @@ class Solution(Result):
         values: dict[str, Any] = {name: getattr(self, name)[at] for name in _PER_ROW}
         values["tables"] = take(self.tables, at)
         values["evaluation"] = statics.take_evaluation(self.evaluation, at)
-        values["others"] = None if self.others is None else tuple(self.others[k] for k in at)
+        for name in ("others", "jumps"):
+            whole = getattr(self, name)
+            values[name] = None if whole is None else tuple(whole[k] for k in at)
         return replace(self, **values)
 
     @cached_property

@@ -49,6 +49,11 @@ Examples:
     metavar="X Y Z",
     help="Each FIRST:LAST:COUNT or one number [m]; z goes fastest.",
 )
+@click.option(
+    "--follow",
+    is_flag=True,
+    help="Go from the reference pose along the commanded way, and tell where the platform jumps.",
+)
 @turned_option("--line and --grid")
 @picture_options
 @out_option("seecr-sweep")
@@ -58,6 +63,7 @@ def command(
     poses: Path | None,
     cable: str | None,
     model: Path | None,
+    follow: bool,
     figure: str,
     no_recording: bool,
     out: Path,
@@ -68,7 +74,8 @@ def command(
 
     ROBOT is an MJCF file or the name of a shipped robot. POSES.csv holds commands as a file of
     measurements does: cmd_x_m ... or length_1_m ..., with run, t_s and temperature_C for effects
-    that depend on them; or poses come from --line or --grid.
+    that depend on them; or poses come from --line or --grid. Each command is solved for itself
+    unless --follow or a model with a memory has them solved along the way.
 
     Writes sweep.json, sweep.csv, a figure and sweep.rrd.
 
@@ -79,13 +86,13 @@ def command(
     from seecr.files import json_text, staged, write_text
     from seecr.report.figures import sweep_figure
     from seecr.report.rows import csv_text, rows_of
-    from seecr.report.words import at_rest, sweep_lines
+    from seecr.report.words import at_rest, jump_lines, sweep_lines
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
     commands, more, said = _commands(machine, poses, given)
     with staged(out) as folder:
-        solution = solve(machine, commands, effects=own or ())
+        solution = solve(machine, commands, effects=own or (), follow=follow)
         spread = None if own is None else spread_of(machine, commands, own)
         commanded = commands.lengths is None
         rows = rows_of(solution, commands.lengths, more, spread)
@@ -112,7 +119,8 @@ def command(
     if as_json:
         click.echo(text)
         return status
-    for line in [*notes, *sweep_lines(solution, commanded, spread), f"Results in {out}/"]:
+    lines = [*sweep_lines(solution, commanded, spread), *jump_lines(solution)]
+    for line in [*notes, *lines, f"Results in {out}/"]:
         click.echo(line)
     return status
 

@@ -50,10 +50,28 @@ def rows_of(
             "iterations": int(solution.iterations[i]),
             "residual": float(solution.residual[i]),
             "smallest_eigenvalue": float(eigenvalues[i]),
+            **_jumps_of(solution, i),
             **_spread_of(spread, i),
         }
         for i in range(len(solution))
     ]
+
+
+def _jumps_of(solution: Solution, i: int) -> Record:
+    if solution.jumps is None:
+        return {}
+    return {
+        "jumps": [
+            {
+                "command": jump.command.tolist(),
+                "before": jump.before.tolist(),
+                "after": jump.after.tolist(),
+                "energy_J": jump.energy,
+                "certain": jump.certain,
+            }
+            for jump in solution.jumps[i]
+        ]
+    }
 
 
 def _spread_of(spread: Spread | None, i: int) -> Record:

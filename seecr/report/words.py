@@ -15,6 +15,7 @@ __all__ = [
     "at_rest",
     "cable_lines",
     "direction_words",
+    "jump_lines",
     "other_lines",
     "pose_lines",
     "softest_words",
@@ -162,6 +163,26 @@ def other_lines(solution: Solution, others: Solution | None, i: int = 0) -> Iter
             f"{1e3 * (others.energy[k] - solution.energy[i]):+.4g} mJ, "
             f"slack: {' '.join(slack) or 'none'}"
         )
+
+
+def jump_lines(solution: Solution) -> Iterator[str]:
+    """Where the platform jumps on the way that was followed."""
+    if solution.jumps is None:
+        return
+    if not any(solution.jumps):
+        yield "followed from the reference pose: the platform jumps nowhere on the way"
+    for i, jumps in enumerate(solution.jumps):
+        for jump in jumps:
+            at = f"on the way to pose {i}, at command {_three(1e3 * jump.command[:3], '.1f')} mm"
+            if not np.isfinite(jump.after).all():
+                yield f"{at}: its rest ends, and nothing holds it then"
+                continue
+            moved, turned = np.linalg.norm(jump.size[:3]), np.linalg.norm(jump.size[3:])
+            sure = "" if jump.certain else "; where it lands depends on damping"
+            yield (
+                f"{at}: its rest ends and it jumps by {1e3 * moved:.4g} mm and "
+                f"{np.degrees(turned):.4g} deg, {1e3 * jump.energy:.3g} mJ set free{sure}"
+            )
 
 
 def sweep_lines(
