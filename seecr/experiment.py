@@ -70,7 +70,9 @@ class Prediction(Result):
     @property
     def pose(self) -> Array:
         """(n, 7) where the platform rests."""
-        return statics.platform_poses(self.tables, self.found.deviation)
+        if "pose" not in self.kept:
+            self.kept["pose"] = statics.platform_poses(self.tables, self.found.deviation)
+        return self.kept["pose"]
 
     @property
     def slack(self) -> NDArray[np.bool_]:

@@ -23,9 +23,8 @@ from seecr.effects.terms import Terms
 from seecr.experiment import Experiment, Prediction, read, senses
 from seecr.joints import motion_columns
 from seecr.pose import Array, pose_add, quat_conjugate, quat_multiply, rotvec_from_quat
-from seecr.setup import QUANTITIES, History, Setup
-from seecr.shifts import Shift, blocks_of_cables, positions, shifted
-from seecr.tables import Tables, assemble, reassembled
+from seecr.shifts import Shift, Sides, blocks_of_cables, positions, shifted
+from seecr.tables import Tables
 
 # Differencing step of a walk that is repeated, in plausible sizes of a parameter.
 _WALK = 1e-4
@@ -79,45 +78,6 @@ def length_sensitivities(at: Prediction) -> Array:
 def _shape(at: Prediction) -> tuple[int, int]:
     n, m = at.tables.cables.shape[:2]
     return n, 6 + m
-
-
-# Quantities that reach the statics through the rest lengths alone.
-_PAID_OUT = {name for name, item in QUANTITIES.items() if item.paid_out}
-# Quantities whose change asks for the whole way to be solved again.
-_OF_HISTORY = {name for name, item in QUANTITIES.items() if item.history is not History.NONE}
-
-
-@dataclass(frozen=True, eq=False)
-class _Sides:
-    """Setups with a parameter shifted up and down, and the names of what differs between them."""
-
-    plus: Setup
-    minus: Setup
-    differing: frozenset[str]
-
-    @property
-    def of_history(self) -> bool:
-        """Whether the whole way is to be solved again."""
-        return not self.differing.isdisjoint(_OF_HISTORY)
-
-    @property
-    def of_lengths(self) -> bool:
-        """Whether the cables are longer or shorter, and nothing else."""
-        return self.differing <= _PAID_OUT and not (self.plus.laws or self.minus.laws)
-
-    def longer(self, apart: Any) -> Array:
-        """Rest lengths (n, m) of plus less those of minus, per unit of ``apart``."""
-        return np.asarray((self.plus.rest_lengths() - self.minus.rest_lengths()) / apart)
-
-    def tables(self, at: Prediction) -> tuple[Tables, Tables]:
-        """Of both, which differ from those of a prediction by what differs between them."""
-        both = (self.plus, self.minus)
-        if self.plus.laws or self.minus.laws:
-            strains = at.found.states[..., STRAIN]
-            ahead, behind = (assemble(one, strains).with_past(at.tables) for one in both)
-        else:
-            ahead, behind = (reassembled(at.tables, one, self.differing) for one in both)
-        return ahead, behind
 
 
 @dataclass(eq=False)
@@ -194,27 +154,33 @@ class _ByWrench:
         if sides.of_lengths:
             change = self.by_length * sides.longer(shift.apart)[:, None, :]
         else:
-            change = _response_by_cable(self.at, *sides.tables(self.at), shift.apart)
+            change = _response_by_cable(self.at, *self._tables(sides), shift.apart)
         return np.asarray(self.read_rates @ change if self.sensing else change)
 
-    def _sides(self, shift: Shift) -> _Sides:
+    def _sides(self, shift: Shift) -> Sides:
         plus = self.experiment.setup(shift.plus.effects)
         minus = self.experiment.setup(shift.minus.effects)
-        return _Sides(plus, minus, plus.differs(minus))
+        return Sides(plus, minus, plus.differs(minus))
 
-    def _physical(self, sides: _Sides, apart: float) -> Array:
+    def _tables(self, sides: Sides) -> tuple[Tables, Tables]:
+        return sides.tables(self.at.tables, self.at.found.states[..., STRAIN])
+
+    def _physical(self, sides: Sides, apart: float) -> Array:
         if sides.of_lengths:
             return (self.by_length @ sides.longer(apart)[..., None])[..., 0]
-        return _response(self.at, *sides.tables(self.at), apart, self.inverse)
+        return _response(self.at, *self._tables(sides), apart, self.inverse)
 
     def _read(self, shift: Shift, change: Array, apart: float) -> Array:
-        at, half = self.at, 0.5 * apart
-        move, tension = half * change[:, :6], half * change[:, 6:]
-        ahead = read(shift.plus.effects, at.setup, pose_add(at.pose, move), at.tensions + tension)
-        behind = read(
-            shift.minus.effects, at.setup, pose_add(at.pose, -move), at.tensions - tension
-        )
-        return readings_difference(ahead, behind) / apart
+        at = self.at
+
+        def seen(side: Terms, sign: float) -> Readings:
+            if not shift.physical:
+                return read(side.effects, at.setup, at.pose, at.tensions)
+            step = (0.5 * sign * apart) * change
+            moved = pose_add(at.pose, step[:, :6])
+            return read(side.effects, at.setup, moved, at.tensions + step[:, 6:])
+
+        return readings_difference(seen(shift.plus, 1.0), seen(shift.minus, -1.0)) / apart
 
 
 def _kept(at: Prediction, name: str, make: Callable[[Prediction], Array]) -> Array:

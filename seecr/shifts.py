@@ -13,9 +13,16 @@ from seecr.effects.base import Effect, Layout
 from seecr.effects.checked import is_built_in
 from seecr.effects.terms import Term, Terms
 from seecr.pose import Array
+from seecr.setup import QUANTITIES, History, Setup
+from seecr.tables import Tables, assemble, reassembled
 
 # Steps, in plausible sizes of a parameter.
 _CENTRAL, _ONE_SIDED = 1e-4, 1e-5
+
+# Quantities that reach the statics through the rest lengths alone.
+_PAID_OUT = {name for name, item in QUANTITIES.items() if item.paid_out}
+# Quantities whose change asks for the whole way to be solved again.
+_OF_HISTORY = {name for name, item in QUANTITIES.items() if item.history is not History.NONE}
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +46,38 @@ class Shift:
     def sensing(self) -> bool:
         """Whether the shifted effect edits the readings."""
         return self.layout.effect.edit_readings is not Effect.edit_readings
+
+
+@dataclass(frozen=True, eq=False)
+class Sides:
+    """Setups with a parameter shifted up and down, and the names of what differs between them."""
+
+    plus: Setup
+    minus: Setup
+    differing: frozenset[str]
+
+    @property
+    def of_history(self) -> bool:
+        """Whether the whole way is to be solved again."""
+        return not self.differing.isdisjoint(_OF_HISTORY)
+
+    @property
+    def of_lengths(self) -> bool:
+        """Whether the cables are longer or shorter, and nothing else."""
+        return self.differing <= _PAID_OUT and not (self.plus.laws or self.minus.laws)
+
+    def longer(self, apart: Any) -> Array:
+        """Rest lengths (n, m) of plus less those of minus, per unit of ``apart``."""
+        return np.asarray((self.plus.rest_lengths() - self.minus.rest_lengths()) / apart)
+
+    def tables(self, base: Tables, strains: Array) -> tuple[Tables, Tables]:
+        """Of both, as those of neither shift with what differs; strains are for users' laws."""
+        both = (self.plus, self.minus)
+        if self.plus.laws or self.minus.laws:
+            ahead, behind = (assemble(one, strains).with_past(base) for one in both)
+        else:
+            ahead, behind = (reassembled(base, one, self.differing) for one in both)
+        return ahead, behind
 
 
 def shifted(terms: Terms, term: Term, k: Any, part: float | None = None) -> Shift:

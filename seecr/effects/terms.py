@@ -240,7 +240,12 @@ class Terms:
 
     def with_term(self, term: Term) -> Terms:
         """These and one more, in place of that of the same name if there is one."""
-        return Terms([*self.without(term.name), term])
+        if term.name not in self:
+            return Terms([*self._terms, term])
+        # fits shift one parameter after the other: what is in order stays so
+        other = Terms.__new__(Terms)
+        other._terms = tuple(term if one.name == term.name else one for one in self._terms)
+        return other
 
     def without(self, name: str) -> Terms:
         """All but that of an effect."""
