@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from seecr.mjcf import load_robot
     from seecr.model import Model, load_model, new_model
     from seecr.multiple import equilibria
+    from seecr.passes import Barrier, barriers
     from seecr.planar import BarRest, bar_equilibria, bar_tilt, midline_point, solution_manifold
     from seecr.robot import Joint, Robot
     from seecr.sensitivity import sensitivities
@@ -60,6 +61,7 @@ __version__ = "0.1.0"
 
 # Imported when first used: the compiled loop and MuJoCo take a while to load.
 _MODULES = {
+    "passes": ("Barrier", "barriers"),
     "commands": ("Commands",),
     "effects": (
         "Effect", "Knowledge", "Readings", "Term", "Terms", "catalogue", "effect_named",
@@ -89,6 +91,7 @@ _WHERE = {name: module for module, names in _MODULES.items() for name in names}
 
 __all__ = [
     "BarRest",
+    "Barrier",
     "Commands",
     "Correction",
     "Effect",
@@ -117,6 +120,7 @@ __all__ = [
     "Zone",
     "bar_equilibria",
     "bar_tilt",
+    "barriers",
     "boundary",
     "catalogue",
     "correct",

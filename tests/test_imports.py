@@ -30,7 +30,7 @@ FLOORS = {
     "seecr.planar": 9, "seecr.workspace": 9,
     "seecr.sensitivity": 9, "seecr.command_file": 5, "seecr.distribution": 7, "seecr.told": 9,
     "seecr.holding": 8, "seecr.nearest": 8, "seecr.inverse": 10, "seecr.maps": 11,
-    "seecr.multiple": 9, "seecr.following": 8, "seecr.exported": 11,
+    "seecr.multiple": 9, "seecr.following": 8, "seecr.passes": 9, "seecr.exported": 11,
     "seecr.recording": 12,
     "seecr.report": 12, "seecr.cli": 13,
     "crosscheck.errors": 20,

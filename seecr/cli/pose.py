@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from seecr.cli.arguments import NumbersCommand, model_at, pose_of, robot_at, robot_options
 from seecr.cli.options import FILE, json_option
+
+if TYPE_CHECKING:
+    from seecr import Barrier
 
 
 @click.command(
@@ -38,15 +42,23 @@ def command(
 
     ROBOT is an MJCF file or the name of a shipped robot. X Y Z are metres in the base frame, QW
     QX QY QZ a quaternion, scalar first; without one the orientation is that of the reference pose.
-    Other stable equilibria of the same command are looked for and listed by energy.
+    Other stable equilibria of the same command are looked for and listed by energy, with what it
+    takes to get there.
 
     \b
     Exit status: 0 at rest, 2 bad input, 3 no rest found.
     """
-    from seecr import equilibria, predict, solve, spread_of
+    from seecr import barriers, equilibria, predict, solve, spread_of
     from seecr.files import json_text, staged, write_text
     from seecr.report.rows import rows_of
-    from seecr.report.words import at_rest, cable_lines, other_lines, pose_lines, softest_words
+    from seecr.report.words import (
+        at_rest,
+        cable_lines,
+        elsewhere,
+        other_lines,
+        pose_lines,
+        softest_words,
+    )
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
@@ -55,6 +67,9 @@ def command(
     # effects with a memory lead to one rest alone, along their way
     memory = own is not None and predict(machine, command, own).has_history
     others = None if alone or memory else equilibria(machine, command, effects=own or ())
+    passes: tuple[Barrier, ...] = ()
+    if others is not None and solution.converged[0]:
+        passes = barriers(solution, others.rows(elsewhere(solution, others)))
     spread = None if own is None else spread_of(machine, command, own)
     status = 0 if at_rest(solution) else 3
     notes = list(own.notes) if own else []
@@ -67,6 +82,16 @@ def command(
         "softest_direction": softest_words(solution),
         "frequencies_Hz": solution.frequencies[0],
         "equilibria": None if others is None else rows_of(others),
+        "barriers": [
+            {
+                "energy_J": way.energy,
+                "back_J": way.back,
+                "pose": way.pose,
+                "exact": way.exact,
+                "twisted": way.twisted,
+            }
+            for way in passes
+        ],
         "notes": notes,
     }
     if out is not None:
@@ -78,7 +103,7 @@ def command(
     lines = [
         *pose_lines(solution, spread=spread),
         *cable_lines(solution, spread=spread),
-        *other_lines(solution, others),
+        *other_lines(solution, others, passes),
     ]
     for line in [*notes, *lines]:
         click.echo(line)

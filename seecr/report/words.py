@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
+from seecr.passes import Barrier
 from seecr.pose import Array, pose_difference, rxyz_from_quat
 from seecr.robot import Robot
 from seecr.solution import Solution, Status
@@ -15,6 +17,7 @@ __all__ = [
     "at_rest",
     "cable_lines",
     "direction_words",
+    "elsewhere",
     "jump_lines",
     "other_lines",
     "pose_lines",
@@ -146,23 +149,45 @@ def direction_words(robot: Robot, direction: Array) -> str:
     return ", ".join(words)
 
 
-def other_lines(solution: Solution, others: Solution | None, i: int = 0) -> Iterator[str]:
-    """Where else the platform could rest; by how much its energy would be higher there."""
-    if others is None:
-        return
+def elsewhere(solution: Solution, others: Solution, i: int = 0) -> NDArray[np.intp]:
+    """Which of some equilibria are others than where command i rests."""
     gaps = pose_difference(others.pose, np.repeat(solution.pose[i : i + 1], len(others), axis=0))
     apart = np.linalg.norm(gaps[:, :3], axis=1) / solution.robot.length
-    away = np.flatnonzero(np.maximum(apart, np.linalg.norm(gaps[:, 3:], axis=1)) > 1e-6)
+    return np.flatnonzero(np.maximum(apart, np.linalg.norm(gaps[:, 3:], axis=1)) > 1e-6)
+
+
+def other_lines(
+    solution: Solution, others: Solution | None, passes: Sequence[Barrier] = (), i: int = 0
+) -> Iterator[str]:
+    """Where else the platform could rest; by how much its energy would be higher there.
+
+    Args:
+        solution: where it rests.
+        others: the equilibria of command i.
+        passes: what is between it and each that is elsewhere, where somebody looked.
+        i: which command.
+    """
+    if others is None:
+        return
+    away = elsewhere(solution, others, i)
     if len(away) == 0:
         yield "no other stable equilibrium was found"
-    for k in away:
+    for n, k in enumerate(away):
+        gap = pose_difference(others.pose[k], solution.pose[i])
         slack = [n for n, s in zip(solution.robot.cable_names, others.slack[k], strict=True) if s]
-        yield (
-            f"could also rest {1e3 * np.linalg.norm(gaps[k, :3]):.4g} mm and "
-            f"{np.degrees(np.linalg.norm(gaps[k, 3:])):.4g} deg away, "
+        line = (
+            f"could also rest {1e3 * np.linalg.norm(gap[:3]):.4g} mm and "
+            f"{np.degrees(np.linalg.norm(gap[3:])):.4g} deg away, "
             f"{1e3 * (others.energy[k] - solution.energy[i]):+.4g} mJ, "
             f"slack: {' '.join(slack) or 'none'}"
         )
+        yield f"{line}; {_pass_words(passes[n])}" if passes else line
+
+
+def _pass_words(way: Barrier) -> str:
+    least = "" if way.exact else "at most "
+    twisted = "twisted" if way.twisted else "reachable"
+    return f"{twisted}, {least}{1e3 * way.energy:.3g} mJ to get there, {1e3 * way.back:.3g} back"
 
 
 def jump_lines(solution: Solution) -> Iterator[str]:
