@@ -73,8 +73,8 @@ def distribute(
     from seecr.compiled.projection import FOUND, UNDECIDED, project_batch  # slow to import
 
     n, _, m = matrices.shape
-    rows = [np.ascontiguousarray(np.broadcast_to(one, (n, m))) for one in (aim, low, high)]
-    whole, load = np.ascontiguousarray(matrices), np.ascontiguousarray(loads)
+    rows = [np.array(np.broadcast_to(one, (n, m)), order="C") for one in (aim, low, high)]
+    whole, load = np.array(matrices, order="C"), np.array(loads, order="C")
     tensions, outcome = np.zeros((n, m)), np.zeros(n, dtype=np.int64)
 
     def run(part: slice) -> None:

@@ -221,7 +221,7 @@ class Setup:
 
         out = np.empty((len(poses), self.robot.n_cables))
         lengths_at(
-            np.ascontiguousarray(poses, dtype=float), self.anchor_points, self.exit_points,
+            np.array(poses, dtype=float, order="C"), self.anchor_points, self.exit_points,
             self.pulley_radius, self.robot.up, out,
         )  # fmt: skip
         return out

@@ -96,7 +96,7 @@ def descend(
         return out
     n, m = tables.cables.shape[:2]
     out = Evaluation.empty(n, m, tables.n_dof)
-    starts = out.deviation.copy() if start is None else np.ascontiguousarray(start)
+    starts = np.array(out.deviation if start is None else start, order="C")
     first = np.zeros((n, tables.n_dof)) if start_values is None else start_values
     if guess is not None:
         out.guess[:] = guess

@@ -73,7 +73,7 @@ def assemble(setup: Setup, strains: Array | None = None) -> Tables:
         strains: (n, m) about which users' laws are linearised; zero by default.
     """
     robot = setup.robot
-    poses = np.ascontiguousarray(setup.commands.pose)
+    poses = np.array(setup.commands.pose, order="C")  # of our own: see seecr.compiled.jit
     n, m = len(poses), robot.n_cables
     cables, load = np.zeros((n, m, N_COLUMNS)), np.zeros((n, N_LOAD))
     _write(setup, QUANTITIES, cables, load)

@@ -93,7 +93,7 @@ def tension_margin(
     """
     from seecr.compiled.margin import margins_at, margins_of  # takes a while to import
 
-    places = np.ascontiguousarray(_poses(poses))
+    places = np.array(_poses(poses), order="C")
     low, high = tension_limits(robot, lowest, highest)
     if wrench is not None:
         wrench = _wrench(wrench, len(places))
@@ -134,10 +134,10 @@ def _loads(
     """Equations of balance for every wrench of a set: (n, d, m) and (n, k, d)."""
     matrix, load = balance_equations(robot, poses, wrench)
     if wrenches is None:
-        return np.ascontiguousarray(matrix), load[:, None]
+        return np.array(matrix, order="C"), load[:, None]
     every = [balance_equations(robot, poses, one)[1] for one in _wrenches(wrenches)]
     at_rest = balance_equations(robot, poses)[1]
-    return np.ascontiguousarray(matrix), np.stack(every, axis=1) + (load - at_rest)[:, None]
+    return np.array(matrix, order="C"), np.stack(every, axis=1) + (load - at_rest)[:, None]
 
 
 def _by_search(matrices: Array, loads: Array, low: Array, high: Array) -> Array:

@@ -12,7 +12,8 @@ _UNCOUNTED = {**_COMMON, "_nrt": False}
 
 jit = njit(**_UNCOUNTED)  # type: ignore[call-overload]
 """Decorator of compiled functions. A division by zero gives inf or nan, as NumPy's does. They
-cannot make arrays: compiling such a one fails."""
+cannot make arrays: compiling such a one fails. Callers hand over arrays that may be written to:
+Numba compiles everything once more for those that may not."""
 
 jit_inner = njit(  # type: ignore[call-overload]
     **_UNCOUNTED, no_cpython_wrapper=True, no_cfunc_wrapper=True

@@ -7,9 +7,13 @@ import pytest
 from effect_cases import experiment_of
 
 from seecr import statics
+from seecr.commands import Commands
 from seecr.compiled.change import change_at_rest, change_of_each_cable
 from seecr.compiled.columns import COMPLIANCE, EA, N_COLUMNS, OF_THE_PAST, REST, SLACK, TENSION
+from seecr.compiled.descent import solve_batch
 from seecr.compiled.outcomes import CONVERGED
+from seecr.compiled.pulley import lengths_at
+from seecr.experiment import Experiment
 from seecr.tables import Tables, assemble, take
 
 KINDS = ("demobot_cogiro", "demobot_parallel", "planar_vertical")
@@ -82,6 +86,18 @@ def test_a_past_is_taken_over_and_nothing_else_is() -> None:
     past = np.isin(np.arange(N_COLUMNS), OF_THE_PAST)
     assert np.all(mixed.cables[..., past] == 7.0)
     assert np.array_equal(mixed.cables[..., ~past], tables.cables[..., ~past])
+
+
+def test_poses_that_may_not_be_written_to_have_nothing_compiled_again() -> None:
+    """It would take half a minute; commands are often such."""
+    experiment = experiment_of("demobot_cogiro")
+    poses = experiment.commands.pose.copy()
+    poses.flags.writeable = False
+    setup = Experiment(experiment.robot, Commands(poses)).setup([])
+    solved("demobot_cogiro")
+    known = len(lengths_at.signatures), len(solve_batch.signatures)
+    statics.descend(assemble(setup))
+    assert (len(lengths_at.signatures), len(solve_batch.signatures)) == known
 
 
 def test_slack_is_longer_than_its_way_or_pulls_no_more_than_rounding() -> None:
