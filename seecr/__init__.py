@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 from seecr.lazy import lazily
 
 if TYPE_CHECKING:
+    from seecr.chances import held_chance, kept_chance
     from seecr.commands import Commands
     from seecr.effects import (
         Effect,
@@ -62,6 +63,7 @@ __version__ = "0.1.0"
 # Imported when first used: the compiled loop and MuJoCo take a while to load.
 _MODULES = {
     "passes": ("Barrier", "barriers"),
+    "chances": ("held_chance", "kept_chance"),
     "commands": ("Commands",),
     "effects": (
         "Effect", "Knowledge", "Readings", "Term", "Terms", "catalogue", "effect_named",
@@ -129,6 +131,8 @@ __all__ = [
     "equilibria",
     "export",
     "feasible",
+    "held_chance",
+    "kept_chance",
     "layout_of",
     "load_model",
     "load_robot",

@@ -67,6 +67,22 @@ def covariance_of(model: Model) -> Array | None:
     return np.asarray(out * np.outer(known, known))
 
 
+def moving_covariance(model: Model) -> tuple[Terms, Array] | None:
+    """The effects that move the platform, all but sensors', with the covariance (p, p) of theirs.
+
+    None where the model keeps no covariance.
+
+    Raises:
+        InputFileError: correlations that are none.
+    """
+    whole = covariance_of(model)
+    if whole is None:
+        return None
+    moving = [term.name for term in model.terms if not senses(term.layout.effect)]
+    columns = np.flatnonzero([effect in moving for effect, _key in model.terms.labels])
+    return model.terms.only(moving), whole[np.ix_(columns, columns)]
+
+
 def _correlations(model: Model, names: list[str], rows: object) -> Array:
     """The whole (k, k) from rows that end at the diagonal."""
     out = np.eye(len(names))
@@ -105,18 +121,16 @@ def spread_of(robot: Robot, commands: Commands | ArrayLike, model: Model) -> Spr
     Raises:
         InputFileError: correlations in the model that are none.
     """
-    covariance = covariance_of(model)
-    if covariance is None:
+    whole, known = covariance_of(model), moving_covariance(model)
+    if whole is None or known is None:
         return None
     if not isinstance(commands, Commands):
         commands = Commands(commanded_poses(commands))
-    moving = [term.name for term in model.terms if not senses(term.layout.effect)]
-    columns = np.flatnonzero([effect in moving for effect, _key in model.terms.labels])
+    terms, covariance = known
     experiment = Experiment(robot, commands)
-    own = _spread(experiment, model.terms.only(moving), covariance[np.ix_(columns, columns)])
-    seen = own if len(moving) == len(model.terms.names) else _spread(
-        experiment, model.terms, covariance
-    )  # fmt: skip
+    own = _spread(experiment, terms, covariance)
+    all_move = len(terms.names) == len(model.terms.names)
+    seen = own if all_move else _spread(experiment, model.terms, whole)
     return Spread(own[:, :3], own[:, 3:6], own[:, 6:], seen[:, :6])
 
 

@@ -91,7 +91,7 @@ def tension_margin(
         (n,) [N]; minus infinity where W has no inverse, or too few cables, and the load is out
         of what the cables can pull.
     """
-    from seecr.compiled.margin import margins_at, margins_of  # takes a while to import
+    from seecr.compiled.margin import margins_at  # takes a while to import
 
     places = np.array(_poses(poses), order="C")
     low, high = tension_limits(robot, lowest, highest)
@@ -102,11 +102,7 @@ def tension_margin(
     if robot.n_cables < robot.n_dof:
         pass
     elif robot.joints or (wrench is not None and np.ndim(wrench) == 2):
-        matrices, loads = _loads(robot, places, wrench, wrenches)
-        in_parts(
-            lambda part: margins_of(matrices[part], loads[part], low, high, scale, out[part]),
-            len(places),
-        )
+        return margins_from(*_loads(robot, places, wrench, wrenches), low, high, scale)
     else:
         some = np.zeros((1, 6)) if wrenches is None else _wrenches(wrenches)
         some = some if wrench is None else some + _wrenches(wrench)
@@ -120,6 +116,28 @@ def tension_margin(
     odd = np.flatnonzero(np.isnan(out))
     if len(odd):
         out[odd] = _by_search(*_loads(robot, places[odd], _rows(wrench, odd), wrenches), low, high)
+    return out
+
+
+def margins_from(matrices: Array, loads: Array, low: Array, high: Array, scale: float) -> Array:
+    """Margins (n,) [N] of balances A tau = load, (n, d, m) and for each of a set (n, k, d).
+
+    Args:
+        matrices, loads: [N], torques over the robot's length.
+        low, high: (m,) [N].
+        scale: [N] load that rounding is measured against.
+    """
+    from seecr.compiled.margin import margins_of  # takes a while to import
+
+    matrices, out = np.ascontiguousarray(matrices), np.full(len(matrices), np.nan)
+    if matrices.shape[2] >= matrices.shape[1]:
+        in_parts(
+            lambda part: margins_of(matrices[part], loads[part], low, high, scale, out[part]),
+            len(out),
+        )
+    odd = np.flatnonzero(np.isnan(out))
+    if len(odd):
+        out[odd] = _by_search(matrices[odd], loads[odd], low, high)
     return out
 
 

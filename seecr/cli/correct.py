@@ -55,7 +55,8 @@ def command(
 
     ROBOT is an MJCF file or the name of a shipped robot, POSES.csv a list of commands: the poses
     wanted. Elasticity and all effects of the model are taken into account; tensions stay within
-    the limits. A pose that cannot be held is replaced by the nearest one that can.
+    the limits. A pose that cannot be held is replaced by the nearest one that can. Where the model
+    keeps a covariance, correction.json says of each row how likely its tensions stay within them.
 
     Writes corrected.csv and corrected.toml, which every command reads as commands, and
     correction.json. Poses without any answer are left out of corrected.csv.
@@ -64,10 +65,10 @@ def command(
     Exit status: 0 all poses reached or replaced by the nearest, 2 bad input,
     3 a pose without an answer.
     """  # fmt: skip
-    from seecr import correct
+    from seecr import correct, kept_chance
     from seecr.command_file import read_commands
     from seecr.files import json_text, staged, write_texts
-    from seecr.report.corrections import corrected_csv, corrected_toml, document_of
+    from seecr.report.corrections import chance_lines, corrected_csv, corrected_toml, document_of
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
@@ -78,9 +79,11 @@ def command(
             machine, wanted.commands, effects=own or (), lowest=lowest, highest=limits, aim=aim,
             prefer=prefer,
         )  # fmt: skip
+        within = {"lowest": lowest, "highest": limits}
+        kept = None if own is None else kept_chance(machine, found.commands, own, **within)
         status = 0 if (found.found & found.solution.converged).all() else 3
         notes = [*(own.notes if own else ()), *wanted.notes]
-        document = {"exit_status": status, "notes": notes, **document_of(found)}
+        document = {"exit_status": status, "notes": notes, **document_of(found, kept)}
         files = {
             "corrected.csv": corrected_csv(found, wanted),
             "corrected.toml": corrected_toml(wanted),
@@ -90,6 +93,6 @@ def command(
     if as_json:
         click.echo(json_text(document))
         return status
-    for line in [*notes, *found.lines(), f"Results in {out}/"]:
+    for line in [*notes, *found.lines(), *chance_lines(found, kept), f"Results in {out}/"]:
         click.echo(line)
     return status

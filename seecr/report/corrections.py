@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from seecr.command_file import CommandFile
 from seecr.inverse import Correction
+from seecr.pose import Array
 
-__all__ = ["corrected_csv", "corrected_toml", "document_of"]
+__all__ = ["chance_lines", "corrected_csv", "corrected_toml", "document_of"]
 
 _WANT = ("want_x_m", "want_y_m", "want_z_m", "want_qw", "want_qx", "want_qy", "want_qz")
 _WRENCH = [
     f"{kind}_{axis}_{unit}" for kind, unit in (("force", "N"), ("moment", "Nm")) for axis in "xyz"
 ]
+
+# Below this a reader should look.
+_LIKELY = 0.95
 
 
 def corrected_csv(found: Correction, wanted: CommandFile) -> str:
@@ -58,8 +63,25 @@ def corrected_toml(wanted: CommandFile) -> str:
     return "\n".join(lines) + "\n"
 
 
-def document_of(found: Correction) -> dict[str, Any]:
-    """``correction.json``."""
+def chance_lines(found: Correction, kept: Array | None) -> Iterator[str]:
+    """How likely tensions stay within their limits, where the model says so.
+
+    Args:
+        found: the correction.
+        kept: (n,) probability of each row.
+    """
+    if kept is None or not np.isfinite(kept).any():
+        return
+    worst = int(np.nanargmin(kept))
+    many = int(np.sum(kept[np.isfinite(kept)] < _LIKELY))
+    yield (
+        f"tensions stay within the limits with probability {np.nanmin(kept):.2f} at row {worst}, "
+        f"the least; below {_LIKELY:g} at {many} of {len(found.wanted)}"
+    )
+
+
+def document_of(found: Correction, kept: Array | None = None) -> dict[str, Any]:
+    """``correction.json``; ``kept`` (n,) is how likely tensions stay within their limits."""
     left = found.left
     return {
         "robot": found.robot.name,
@@ -77,6 +99,7 @@ def document_of(found: Correction) -> dict[str, Any]:
                 "reached": bool(found.reached[i]),
                 "left_m": left[i, :3],
                 "left_rad": left[i, 3:],
+                "within_limits_probability": None if kept is None else kept[i],
                 "tensions_N": found.solution.tensions[i],
                 "status": found.solution.status[i].name.lower() if found.found[i] else "no_answer",
             }

@@ -1,0 +1,169 @@
+"""Probabilities by what a calibrated model does not know: that poses hold, and tensions keep."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.stats import norm, qmc
+
+from seecr.commands import Commands
+from seecr.distribution import tension_limits
+from seecr.effects import Terms
+from seecr.effects.base import Effect
+from seecr.errors import InputError
+from seecr.experiment import Experiment, effects_of
+from seecr.holding import balance_of
+from seecr.model import Model
+from seecr.pose import Array
+from seecr.robot import Robot
+from seecr.sensitivity import sensitivities
+from seecr.starts import commanded_poses
+from seecr.tables import assemble
+from seecr.uncertainty import moving_covariance
+from seecr.workspace import load_scale, margins_from
+
+__all__ = ["held_chance", "kept_chance", "margins_with"]
+
+# Draws of the parameters: for tensions, which follow linearly; for poses, first and at most. Where
+# the first all agree, and are this many standard deviations from the limit, the rest is left out.
+_LINEAR, _FIRST, _DRAWS, _SURE = 4096, 16, 256, 6.0
+# Rows at a time.
+_PART = 64
+
+
+def kept_chance(
+    robot: Robot,
+    commands: Commands,
+    model: Model,
+    *,
+    lowest: ArrayLike = 0.0,
+    highest: ArrayLike = np.inf,
+) -> Array | None:
+    """The probability that all tensions stay within limits, with what the model does not know.
+
+    Tensions to first order in the parameters. A cable that pulls and would go slack leaves a limit
+    of zero; one that is slack stays so.
+
+    Args:
+        robot: as described.
+        commands: n rows, such as those of a correction; NaN in lengths where there are none.
+        model: as ``crosscheck calibrate`` writes it.
+        lowest, highest: (m,) or one [N].
+
+    Returns:
+        (n,), NaN where a row has no rest; None where the model keeps no covariance.
+    """
+    known = moving_covariance(model)
+    if known is None:
+        return None
+    terms, covariance = known
+    low, high = tension_limits(robot, lowest, highest)
+    lost: NDArray[np.bool_] = np.zeros(len(commands), dtype=bool)
+    if commands.lengths is not None:
+        lost |= np.isnan(commands.lengths).any(axis=1)
+        plain = robot.commanded_lengths(commands.pose)
+        lengths = np.where(lost[:, None], plain, commands.lengths)
+        commands = replace(commands, lengths=lengths)
+    experiment = Experiment(robot, commands)
+    at = experiment.predict(terms.effects)
+    drawn = _drawn(covariance, _LINEAR)
+    out = np.ones(len(commands))
+    room = 1e-9 * load_scale(robot)
+    slopes = np.zeros((len(out), robot.n_cables, 0))
+    if len(terms):
+        slopes = sensitivities(experiment, terms, at)[:, 6:]
+    for first in range(0, len(out), _PART):
+        rows = slice(first, first + _PART)
+        tensions = at.tensions[rows, None] + np.einsum("nmp,kp->nkm", slopes[rows], drawn)
+        kept = (tensions >= low - room) & (tensions <= high + room)
+        out[rows] = kept.all(axis=2).mean(axis=1)
+    out[lost | ~at.solved] = np.nan
+    return out
+
+
+def held_chance(
+    robot: Robot,
+    poses: ArrayLike,
+    model: Model,
+    *,
+    lowest: ArrayLike = 0.0,
+    highest: ArrayLike = np.inf,
+    wrenches: ArrayLike | None = None,
+) -> Array | None:
+    """The probability that poses can be held within limits, with what the model does not know.
+
+    The part of 256 models drawn from its covariance that hold them; of 16, where these are all far
+    on one side.
+
+    Args:
+        robot: as described.
+        poses: (n, 7).
+        model: as ``crosscheck calibrate`` writes it.
+        lowest, highest, wrenches: as in :func:`seecr.tension_margin`.
+
+    Returns:
+        (n,); None where the model keeps no covariance.
+    """
+    known = moving_covariance(model)
+    if known is None:
+        return None
+    terms, covariance = known
+    places, limits = commanded_poses(poses), (lowest, highest, wrenches)
+    vectors = terms.vector + _drawn(covariance, _DRAWS)
+    edge = -1e-9 * load_scale(robot)
+
+    def held(rows: Array, some: Array) -> Array:
+        drawn = [terms.with_vector(one).effects for one in some]
+        return np.stack([margins_with(robot, rows, one, *limits) for one in drawn])
+
+    first = held(places, vectors[:_FIRST])
+    out = np.asarray((first >= edge).mean(axis=0))
+    # limits of no end, or poses out of all reach, are far from any
+    finite = np.where(np.isfinite(first), first, np.nan)
+    far = np.abs(np.nanmean(finite, axis=0)) > _SURE * np.nanstd(finite, axis=0)
+    far |= ~np.isfinite(first).all(axis=0)
+    near = np.flatnonzero(~(far & np.isin(out, (0.0, 1.0))))
+    if len(near):
+        rest = held(places[near], vectors[_FIRST:])
+        count = (first[:, near] >= edge).sum(axis=0) + (rest >= edge).sum(axis=0)
+        out[near] = count / _DRAWS
+    return out
+
+
+def margins_with(
+    robot: Robot,
+    poses: Array,
+    effects: list[Effect] | Terms,
+    lowest: ArrayLike = 0.0,
+    highest: ArrayLike = np.inf,
+    wrenches: ArrayLike | None = None,
+) -> Array:
+    """Margins (n,) [N] as :func:`seecr.tension_margin`, of a robot with effects at poses (n, 7).
+
+    Raises:
+        InputError: a set of wrenches for a robot on joints.
+    """
+    low, high = tension_limits(robot, lowest, highest)
+    told = Commands(poses, lengths=robot.commanded_lengths(poses), told=True)
+    tables = assemble(Experiment(robot, told).setup(effects_of(effects)))
+    matrices, load = balance_of(tables, low)
+    # of -W tau = w: the signs are those of the gradient
+    loads = load[:, None]
+    if wrenches is not None:
+        if robot.joints:
+            raise InputError(f"{robot.name} stands on joints: expected no set of wrenches")
+        unit = np.where(robot.hinges, 1.0 / robot.length, 1.0)
+        loads = loads + np.atleast_2d(np.asarray(wrenches, float)) * unit
+    return margins_from(matrices, np.ascontiguousarray(loads), low, high, load_scale(robot))
+
+
+def _drawn(covariance: Array, count: int) -> Array:
+    """Evenly spread draws (count, p) of a normal distribution about zero."""
+    if len(covariance) == 0:
+        return np.zeros((count, 0))
+    values, vectors = np.linalg.eigh(covariance)
+    unit = qmc.Sobol(len(covariance), seed=0).random(count)
+    drawn = norm.ppf(np.clip(unit, 1e-9, 1.0 - 1e-9))
+    return np.asarray(drawn * np.sqrt(np.maximum(values, 0.0)) @ vectors.T)

@@ -1,0 +1,105 @@
+"""Probabilities by a model's covariance, against models drawn from it and solved one by one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from seecr.chances import held_chance, kept_chance, margins_with
+from seecr.effects import Terms
+from seecr.equilibrium import solve
+from seecr.inverse import correct
+from seecr.mjcf import load_robot
+from seecr.model import Model, load_model
+from seecr.report.corrections import chance_lines, document_of
+from seecr.shipped import model_path
+from seecr.solution import Solution
+from seecr.workspace import tension_margin
+
+ROBOT = load_robot(model_path("demobot_cogiro"))
+POSES = np.array([[0.3, 0.2, 0.1, 1, 0, 0, 0], [0.5, 0.3, 0.2, 1, 0, 0, 0]])
+MODEL = """format = 1
+[[effect]]
+name = "platform_mass"
+[effect.parameters]
+added_kg = { value = 0.05, stderr = 0.02 }
+[[effect]]
+name = "stiffness"
+[effect.parameters]
+factor = { value = 0.9, stderr = 0.01 }
+[[effect]]
+name = "centre_of_mass"
+[effect.parameters]
+shift_x_m = { value = 0.0, stderr = 0.002 }
+shift_y_m = { value = 0.0, stderr = 0.002 }
+shift_z_m = { value = 0.0, stderr = 0.002 }
+"""
+KEPT = """[calibration]
+parameters = ["platform_mass.added_kg", "stiffness.factor"]
+correlation = [[1.0], [0.5, 1.0]]
+"""
+
+
+def model_of(folder: Path, text: str = MODEL + KEPT) -> Model:
+    path = folder / "model.toml"
+    path.write_text(text)
+    return load_model(path, ROBOT)
+
+
+def drawn(model: Model, n: int) -> list[Terms]:
+    sizes = np.array([np.concatenate([model.stderr[name] for name in model.terms.names])])
+    labels = [effect for effect, _key in model.terms.labels]
+    correlation = np.eye(len(labels))
+    a, b = labels.index("platform_mass"), labels.index("stiffness")
+    correlation[a, b] = correlation[b, a] = 0.5
+    covariance = correlation * sizes.T * sizes
+    vectors = np.random.default_rng(1).multivariate_normal(model.terms.vector, covariance, n)
+    return [model.terms.with_vector(one) for one in vectors]
+
+
+def test_tensions_keep_their_limits_as_often_as_drawn_models_say(tmp_path: Path) -> None:
+    model = model_of(tmp_path)
+    found = correct(ROBOT, POSES, effects=model, lowest=0.2)
+    # as narrow as half of the models allow
+    highest = 1.01 * found.solution.tensions.max()
+    said = kept_chance(ROBOT, found.commands, model, lowest=0.2, highest=highest)
+    assert said is not None
+    seen = []
+    for terms in drawn(model, 200):
+        rests: Solution = solve(ROBOT, found.commands, effects=terms)
+        inside = (rests.tensions >= 0.2 - 1e-9) & (rests.tensions <= highest + 1e-9)
+        seen.append(inside.all(axis=1))
+    np.testing.assert_allclose(said, np.mean(seen, axis=0), atol=0.08)
+    assert 0.02 < said.min() < 0.9
+    (line,) = chance_lines(found, said)
+    assert line.startswith(f"tensions stay within the limits with probability {said.min():.2f}")
+    assert document_of(found, said)["rows"][1]["within_limits_probability"] == said[1]
+    assert list(chance_lines(found, None)) == []
+
+
+def test_poses_are_held_as_often_as_drawn_models_say(tmp_path: Path) -> None:
+    model = model_of(tmp_path)
+    # towards the edge of what can be held
+    poses = np.tile(POSES[0], (9, 1))
+    poses[:, 0] = np.linspace(0.02, 0.12, 9)
+    said = held_chance(ROBOT, poses, model, lowest=0.02)
+    assert said is not None
+    seen = [margins_with(ROBOT, poses, terms, 0.02) >= 0.0 for terms in drawn(model, 200)]
+    np.testing.assert_allclose(said, np.mean(seen, axis=0), atol=0.08)
+    assert said.min() < 0.05 and said.max() == 1.0 and np.any((said > 0.1) & (said < 0.9))
+
+
+def test_without_effects_margins_are_those_of_the_plain_robot() -> None:
+    pushes = [[0.3, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0.01, 0]]
+    for more in (None, pushes):
+        own = margins_with(ROBOT, POSES, [], 0.1, 6.0, more)
+        expected = tension_margin(ROBOT, POSES, lowest=0.1, highest=6.0, wrenches=more)
+        np.testing.assert_allclose(own, expected, rtol=1e-6)
+
+
+def test_a_model_without_covariance_says_nothing(tmp_path: Path) -> None:
+    model = model_of(tmp_path, MODEL)
+    found = correct(ROBOT, POSES, effects=model)
+    assert kept_chance(ROBOT, found.commands, model) is None
+    assert held_chance(ROBOT, POSES, model) is None
