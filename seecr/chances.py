@@ -10,10 +10,8 @@ from scipy.stats import norm, qmc
 
 from seecr.commands import Commands
 from seecr.distribution import tension_limits
-from seecr.effects import Terms
-from seecr.effects.base import Effect
 from seecr.errors import InputError
-from seecr.experiment import Experiment, effects_of
+from seecr.experiment import Experiment, GivenEffects, effects_of
 from seecr.holding import balance_of
 from seecr.model import Model
 from seecr.pose import Array
@@ -24,7 +22,7 @@ from seecr.tables import assemble
 from seecr.uncertainty import moving_covariance
 from seecr.workspace import load_scale, margins_from
 
-__all__ = ["held_chance", "kept_chance", "margins_with"]
+__all__ = ["asked_chance", "held_chance", "kept_chance", "margins_with"]
 
 # Draws of the parameters: for tensions, which follow linearly; for poses, first and at most. Where
 # the first all agree, and are this many standard deviations from the limit, the rest is left out.
@@ -105,10 +103,18 @@ def held_chance(
 
     Returns:
         (n,); None where the model keeps no covariance.
+
+    Raises:
+        InputError: fewer cables than freedoms.
     """
     known = moving_covariance(model)
     if known is None:
         return None
+    if robot.n_cables < robot.n_dof:
+        raise InputError(
+            f"{robot.name} has fewer cables than freedoms: it holds no poses; "
+            "expected a map without probabilities"
+        )
     terms, covariance = known
     places, limits = commanded_poses(poses), (lowest, highest, wrenches)
     vectors = terms.vector + _drawn(covariance, _DRAWS)
@@ -132,10 +138,30 @@ def held_chance(
     return out
 
 
+def asked_chance(
+    robot: Robot, poses: Array, model: GivenEffects, lowest: ArrayLike, highest: ArrayLike,
+    wrenches: ArrayLike | None,
+) -> Array:  # fmt: skip
+    """As :func:`held_chance`, of what has to be a model with a covariance.
+
+    Raises:
+        InputError: it is none.
+    """
+    found = None
+    if isinstance(model, Model):
+        found = held_chance(robot, poses, model, lowest=lowest, highest=highest, wrenches=wrenches)
+    if found is None:
+        raise InputError(
+            "how likely poses can be held is said by a model that keeps its covariance; expected "
+            "one that crosscheck calibrate wrote"
+        )
+    return found
+
+
 def margins_with(
     robot: Robot,
     poses: Array,
-    effects: list[Effect] | Terms,
+    effects: GivenEffects,
     lowest: ArrayLike = 0.0,
     highest: ArrayLike = np.inf,
     wrenches: ArrayLike | None = None,

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seecr.chances import asked_chance, margins_with
 from seecr.equilibrium import solve
 from seecr.errors import InputError
-from seecr.experiment import GivenEffects
+from seecr.experiment import GivenEffects, effects_of
 from seecr.inverse import correct
 from seecr.pose import Array
 from seecr.result import Record, Result
@@ -49,6 +50,8 @@ class Workspace(Result):
         rotation: (..., 3) [rad] likewise.
         slack: number of slack cables; -1 where it does not rest.
         stiffness: [N/m] smallest eigenvalue, rotations by the robot's length.
+        chance: the probability that the pose can be held, by what the model does not know; float32;
+            None where the model keeps no covariance, or there is none.
     """
 
     robot: Robot
@@ -59,6 +62,19 @@ class Workspace(Result):
     rotation: NDArray[np.float32]
     slack: NDArray[np.int8]
     stiffness: NDArray[np.float32]
+    chance: NDArray[np.float32] | None = None
+
+    def likely(self, at_least: float) -> NDArray[np.bool_]:
+        """Where the pose can be held with a probability of at least that.
+
+        Raises:
+            InputError: a map without probabilities, or a number that is none.
+        """
+        if not 0.0 < at_least <= 1.0:
+            raise InputError(f"a probability must be above 0 and at most 1, got {at_least:g}")
+        if self.chance is None:
+            raise InputError("this map has no probabilities; expected one made with chance=True")
+        return np.asarray(self.chance >= at_least)
 
     @property
     def feasible(self) -> NDArray[np.bool_]:
@@ -76,13 +92,16 @@ class Workspace(Result):
         steps = [np.ptp(axis) / (len(axis) - 1) for axis in self.axes if len(axis) > 1]
         return float(np.prod(steps))
 
+    def size_words(self, poses: int) -> str:
+        """The size of so many poses of the grid, for people."""
+        along = sum(len(axis) > 1 for axis in self.axes)
+        unit = {1: " m", 2: " m^2", 3: " m^3"}.get(along)
+        return "" if unit is None else f", {poses * self.cell:.4g}{unit}"
+
     def lines(self) -> list[str]:
         """How much of the grid can be held, and how far off the elastic robot is there."""
         n, held = self.margin.size, int(self.feasible.sum())
-        along = sum(len(axis) > 1 for axis in self.axes)
-        unit = {0: "", 1: " m", 2: " m^2", 3: " m^3"}[along]
-        size = f", {held * self.cell:.4g}{unit}" if along else ""
-        out = [f"{self.robot.name}: {held} of {n} poses can be held{size}"]
+        out = [f"{self.robot.name}: {held} of {n} poses can be held{self.size_words(held)}"]
         tightest = self.margin[self.feasible & np.isfinite(self.margin)]
         if len(tightest) and tightest.max() > 0:
             half = np.median(tightest)
@@ -110,6 +129,7 @@ class Workspace(Result):
             **{f"{axis}_m": places[:, k] for k, axis in enumerate("xyz")},
             "margin_N": self.margin.ravel(),
             "feasible": self.feasible.ravel(),
+            **({} if self.chance is None else {"probability": self.chance.ravel()}),
             "slack": self.slack.ravel(),
             **{f"d{a}_m": self.deviation[..., k].ravel() for k, a in enumerate("xyz")},
             **{f"r{a}_rad": self.rotation[..., k].ravel() for k, a in enumerate("xyz")},
@@ -147,6 +167,7 @@ def workspace_map(
     wrenches: ArrayLike | None = None,
     effects: GivenEffects = (),
     elastic: bool = True,
+    chance: bool = False,
     progress: Progress | None = None,
 ) -> Workspace:
     """The static-feasible and the elastic workspace on a grid of positions.
@@ -157,25 +178,33 @@ def workspace_map(
         orientation: (4,) quaternion of all poses; that of the reference pose by default.
         lowest, highest: (m,) or one [N], limits of the tensions for what can be held.
         wrenches: (k, 6) set of external wrenches that it must be held under, each of them.
-        effects: of the elastic robot, besides; none may have a memory of rows before.
+        effects: of the robot, besides; none may have a memory of rows before. With a model that
+            keeps its covariance, and as many cables as freedoms, each pose has its ``chance`` too,
+            if asked for.
         elastic: whether to solve where the elastic robot comes to rest.
+        chance: whether to find how likely each pose can be held; takes a millisecond or so a pose
+            near the edge.
         progress: called as poses are done.
 
     Raises:
-        InputError: an axis without values, an orientation that the joints do not allow.
+        InputError: an axis without values, an orientation that the joints do not allow; a chance
+            asked of something without a covariance.
     """
     axes = (_axis("x", x), _axis("y", y), _axis("z", z))
     turned = robot.reference_pose[3:] if orientation is None else finite(orientation, "orientation")
     shape = (len(axes[0]), len(axes[1]), len(axes[2]))
     n = int(np.prod(shape))
     margin, slack = np.empty(n), np.full(n, _NEVER, dtype=np.int8)
+    likely = np.empty(n, np.float32) if chance else None
     moved, stiffness = np.full((n, 6), np.nan, np.float32), np.full(n, np.nan, np.float32)
     for first in range(0, n, _PART):
         rows = np.arange(first, min(first + _PART, n))
         index = np.unravel_index(rows, shape)
         places = np.column_stack([axis[k] for axis, k in zip(axes, index, strict=True)])
         poses = commanded_poses(np.column_stack([places, np.tile(turned, (len(rows), 1))]))
-        margin[rows] = _margins(robot, poses, lowest, highest, wrenches)
+        margin[rows] = _margins(robot, poses, lowest, highest, wrenches, effects)
+        if likely is not None:
+            likely[rows] = asked_chance(robot, poses, effects, lowest, highest, wrenches)
         if elastic:
             found = solve(robot, poses, effects=effects)
             there = found.converged
@@ -188,21 +217,27 @@ def workspace_map(
         robot, axes, np.asarray(turned), margin.reshape(shape),
         moved[:, :3].reshape(*shape, 3), moved[:, 3:].reshape(*shape, 3),
         slack.reshape(shape), stiffness.reshape(shape),
+        None if likely is None else likely.reshape(shape),
     )  # fmt: skip
 
 
 def _margins(
-    robot: Robot, poses: Array, lowest: ArrayLike, highest: ArrayLike, wrenches: ArrayLike | None
-) -> Array:
+    robot: Robot, poses: Array, lowest: ArrayLike, highest: ArrayLike,
+    wrenches: ArrayLike | None, effects: GivenEffects,
+) -> Array:  # fmt: skip
     """Margins (n,) [N]; of robots with too few cables by position, the orientation solved."""
+    acting = effects_of(effects)
     if robot.n_cables >= robot.n_dof:
+        if acting:
+            return margins_with(robot, poses, acting, lowest, highest, wrenches)
         return tension_margin(robot, poses, lowest=lowest, highest=highest, wrenches=wrenches)
     if wrenches is not None:
         raise InputError(
             f"{robot.name} has fewer cables than freedoms: it holds no set of wrenches; "
             "expected none"
         )
-    found = correct(robot, poses, lowest=lowest, highest=highest, prefer="position")
+    limits = {"lowest": lowest, "highest": highest}
+    found = correct(robot, poses, effects=acting, prefer="position", **limits)
     kept = np.linalg.norm(found.aimed[:, :3] - poses[:, :3], axis=1) < 1e-6 * robot.length
     return np.where(found.found & kept & found.solution.converged, 0.0, -np.inf)
 

@@ -27,6 +27,7 @@ from seecr.cli.options import json_option, out_option, progress_bar
 Examples:
   seecr map demobot_cogiro
   seecr map robot.xml --grid 0:0.8:81 0:0.5:51 0.1:0.3:3 --lowest 1 --highest 50
+  seecr map robot.xml --model model.toml --lowest 1 --at-least 0.95
   seecr map robot.xml --wrench 1 0 0 0 0 0 --wrench -1 0 0 0 0 0 --model model.toml
 """,
 )
@@ -48,6 +49,12 @@ Examples:
     metavar="FX FY FZ MX MY MZ",
     help="It must be held under this too [N, N m]; several times for a set.",
 )
+@click.option(
+    "--at-least",
+    type=click.FloatRange(0.0, 1.0, min_open=True),
+    metavar="P",
+    help="Also where poses can be held with that probability, by the model's covariance.",
+)
 @click.option("--no-elastic", is_flag=True, help="Only what can be held; quicker.")
 @picture_options
 @out_option("seecr-map")
@@ -61,6 +68,7 @@ def command(
     lowest: float,
     highest: float | None,
     wrenches: tuple[tuple[float, ...], ...],
+    at_least: float | None,
     no_elastic: bool,
     figure: str,
     no_recording: bool,
@@ -72,7 +80,8 @@ def command(
     ROBOT is an MJCF file or the name of a shipped robot. The margin is how far inside their limits
     all tensions can stay [N]; the elastic map says, at each command, how far off the platform
     rests, how tilted, with how many slack cables and how stiff. Robots with fewer cables than
-    freedoms are mapped by position, their orientation solved.
+    freedoms are mapped by position, their orientation solved. With --at-least and a calibrated
+    model, each pose has the probability that it can be held.
 
     Writes map.npz, map.json, a figure of slices and map.rrd.
 
@@ -84,7 +93,7 @@ def command(
     from seecr import InputError, default_axes, workspace_map
     from seecr.files import json_text, staged, write_text
     from seecr.report.figures import map_figure
-    from seecr.report.maps import document_of, write_arrays
+    from seecr.report.maps import document_of, likely_lines, write_arrays
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
@@ -95,7 +104,7 @@ def command(
             found = workspace_map(
                 machine, *axes, orientation=turned or None, lowest=lowest,
                 highest=np.inf if highest is None else highest, wrenches=wrenches or None,
-                effects=own or (), elastic=not no_elastic,
+                effects=own or (), elastic=not no_elastic, chance=at_least is not None,
                 progress=lambda done: tell(done, ""),
             )  # fmt: skip
         if not np.any(found.feasible):
@@ -104,7 +113,7 @@ def command(
                 f"{np.inf if highest is None else highest:g} N balance the load at any of "
                 f"{total} poses; expected another grid, orientation or wider limits"
             )
-        text = json_text({"exit_status": 0, **document_of(found)})
+        text = json_text({"exit_status": 0, **document_of(found, at_least)})
         write_text(folder / "map.json", text + "\n")
         write_arrays(folder / "map.npz", found)
         if figure != "none" and sum(len(axis) > 1 for axis in axes) > 1:
@@ -117,6 +126,7 @@ def command(
     if as_json:
         click.echo(text)
         return 0
-    for line in [*(own.notes if own else ()), *found.lines(), f"Results in {out}/"]:
+    lines = [*found.lines(), *likely_lines(found, at_least)]
+    for line in [*(own.notes if own else ()), *lines, f"Results in {out}/"]:
         click.echo(line)
     return 0

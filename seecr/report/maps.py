@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +11,30 @@ import numpy as np
 from seecr.files import written
 from seecr.maps import Workspace
 
-__all__ = ["document_of", "write_arrays"]
+__all__ = ["document_of", "likely_lines", "write_arrays"]
 
 
-def document_of(found: Workspace) -> dict[str, Any]:
-    """``map.json``: how much of the grid can be held, and the worst of the elastic robot there."""
+def likely_lines(found: Workspace, at_least: float | None) -> Iterator[str]:
+    """How much of the grid can be held with a probability of at least that."""
+    if at_least is not None:
+        poses = int(found.likely(at_least).sum())
+        yield (
+            f"with a probability of {at_least:g} or more {poses} poses can be held"
+            f"{found.size_words(poses)}"
+        )
+
+
+def document_of(found: Workspace, at_least: float | None = None) -> dict[str, Any]:
+    """``map.json``: how much of the grid can be held, and the worst of the elastic robot there.
+
+    Args:
+        found: the map.
+        at_least: a probability with which poses are to be held, of a map that has them.
+    """
+    likely = None
+    if at_least is not None:
+        poses = int(found.likely(at_least).sum())
+        likely = {"at_least": at_least, "poses": poses, "size": poses * found.cell}
     where = found.rests & found.feasible
     worst = {
         "deviation_m": np.linalg.norm(found.deviation[where], axis=-1),
@@ -29,6 +49,7 @@ def document_of(found: Workspace) -> dict[str, Any]:
         "feasible": int(found.feasible.sum()),
         "cell": found.cell,
         "size_feasible": float(found.feasible.sum() * found.cell),
+        "likely": likely,
         "rests": int(found.rests.sum()),
         "slack": {str(k): int(np.sum(counts == k)) for k in np.unique(counts)},
         "worst_where_feasible": {
@@ -41,8 +62,12 @@ def write_arrays(path: Path, found: Workspace) -> None:
     """``map.npz``: axes, and everything that holds at the poses, (nx, ny, nz) each."""
     x, y, z = found.axes
     with written(path) as (part,), part.open("wb") as file:
+        likely: dict[str, Any] = {}
+        if found.chance is not None:
+            likely["probability"] = found.chance
         np.savez_compressed(
-            file, x_m=x, y_m=y, z_m=z, orientation=found.orientation, margin_N=found.margin,
+            file, **likely, x_m=x, y_m=y, z_m=z, orientation=found.orientation,
+            margin_N=found.margin,
             feasible=found.feasible, deviation_m=found.deviation, rotation_rad=found.rotation,
             slack=found.slack, smallest_eigenvalue_N_per_m=found.stiffness,
         )  # fmt: skip

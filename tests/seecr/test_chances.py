@@ -5,14 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from seecr.chances import held_chance, kept_chance, margins_with
 from seecr.effects import Terms
 from seecr.equilibrium import solve
+from seecr.errors import InputError
 from seecr.inverse import correct
+from seecr.maps import workspace_map
 from seecr.mjcf import load_robot
 from seecr.model import Model, load_model
 from seecr.report.corrections import chance_lines, document_of
+from seecr.report.maps import document_of as map_document
+from seecr.report.maps import likely_lines, write_arrays
 from seecr.shipped import model_path
 from seecr.solution import Solution
 from seecr.workspace import tension_margin
@@ -103,3 +108,39 @@ def test_a_model_without_covariance_says_nothing(tmp_path: Path) -> None:
     found = correct(ROBOT, POSES, effects=model)
     assert kept_chance(ROBOT, found.commands, model) is None
     assert held_chance(ROBOT, POSES, model) is None
+
+
+def test_a_map_has_the_probabilities_of_its_poses(tmp_path: Path) -> None:
+    model, x = model_of(tmp_path), np.linspace(0.02, 0.12, 6)
+    found = workspace_map(
+        ROBOT, x, 0.2, 0.1, effects=model, lowest=0.02, elastic=False, chance=True
+    )
+    poses = np.tile(POSES[0], (6, 1))
+    poses[:, 0] = x
+    assert found.chance is not None
+    expected = held_chance(ROBOT, poses, model, lowest=0.02)
+    np.testing.assert_allclose(found.chance.ravel(), expected, atol=1e-6)
+    # margins are those of the robot that the model describes
+    np.testing.assert_allclose(found.margin.ravel(), margins_with(ROBOT, poses, model, 0.02))
+    sure = int(found.likely(0.95).sum())
+    assert 0 < sure < int(found.likely(0.05).sum())
+    (line,) = likely_lines(found, 0.95)
+    expected_line = f"with a probability of 0.95 or more {sure} poses can be held, "
+    assert line == f"{expected_line}{0.02 * sure:.4g} m"
+    assert map_document(found, 0.95)["likely"]["size"] == pytest.approx(0.02 * sure)
+    write_arrays(tmp_path / "map.npz", found)
+    with np.load(tmp_path / "map.npz") as kept:
+        np.testing.assert_array_equal(kept["probability"], found.chance)
+
+
+def test_maps_that_can_have_no_probabilities_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="by a model that keeps its covariance; expected one"):
+        workspace_map(ROBOT, 0.3, 0.2, 0.1, elastic=False, chance=True)
+    plain = workspace_map(ROBOT, 0.3, 0.2, 0.1, elastic=False)
+    with pytest.raises(InputError, match="this map has no probabilities"):
+        plain.likely(0.9)
+    with pytest.raises(InputError, match=r"above 0 and at most 1, got 1\.5"):
+        plain.likely(1.5)
+    two = load_robot(model_path("planar_two_cable"))
+    with pytest.raises(InputError, match="fewer cables than freedoms: it holds no poses"):
+        held_chance(two, two.reference_pose, model_of(tmp_path))
