@@ -26,8 +26,6 @@ TEMPERS = (100.0, 30.0, 10.0, 3.0, 1.0)
 _STEPS, _LAST = 4, 20
 # A step that gains less than this part of the objective, and less than this, is the last.
 _PART, _GAIN = 1e-3, 1e-2
-# Derivatives are kept for so many steps, of which each gains this part of what it promises.
-_KEPT, _KEPT_WORD = 3, 0.8
 # Most plausible sizes that a parameter of plausible size moves at once.
 _MOST = 5.0
 
@@ -89,10 +87,9 @@ class Setting:
 
 @dataclass(frozen=True, eq=False)
 class _Step:
-    """A step that pays: its gain, that which was hoped for, the objective before, and where to."""
+    """A step that pays: its gain, the objective before, and where it leads."""
 
     gain: float
-    hoped: float
     before: float
     damping: float
     state: State
@@ -122,10 +119,6 @@ def settle(
 ) -> JointFit:
     """Gauss-Newton steps until nothing is gained, or so many of them.
 
-    Derivatives cost much more than a step, so they are kept while steps gain what they promise;
-    the last ones are those of the fit's own values, or of values that a step no larger than the
-    last one is away.
-
     Args:
         setting: data and derivatives.
         state: where to start; must be valid.
@@ -134,25 +127,21 @@ def settle(
         steps: most of them.
         jacobian: derivatives at the start, or so near that they are the same, where known.
     """
-    damping, settled, kept = 1e-4, False, 0
+    damping, settled = 1e-4, False
     weight = setting.weight_at(colour, state)
     if jacobian is None:
         jacobian = scaled_derivatives(setting, state)
     for _ in range(steps):
         step = _step(setting, state, jacobian, width, colour, weight, damping)
-        if step is not None:
-            damping, state = step.damping, step.state
-            setting.watch(state.chi2 / max(len(state.white), 1))
-            weight = setting.weight_at(colour, state)
-        little = step is None or step.gain < max(_PART * step.before, _GAIN)
-        if little and not kept:
+        if step is None:
+            settled = True
+            break
+        damping, state = step.damping, step.state
+        setting.watch(state.chi2 / max(len(state.white), 1))
+        weight = setting.weight_at(colour, state)
+        if step.gain < max(_PART * step.before, _GAIN):
             settled = True  # so near that the derivatives are the same
             break
-        if not little and kept < _KEPT and step is not None and step.gain > _KEPT_WORD * step.hoped:
-            kept += 1
-        else:
-            jacobian, kept = scaled_derivatives(setting, state), 0
-    if kept:
         jacobian = scaled_derivatives(setting, state)
     return JointFit(state, jacobian, width, colour, weight, settled)
 
@@ -201,7 +190,7 @@ def _step(
         trial = evaluate(setting.problem, terms.with_vector(moved), setting.factor, state)
         after = objective(trial) if trial.valid else np.inf
         if after < before:
-            return _Step(before - after, expected, before, max(0.1 * damping, 1e-9), trial)
+            return _Step(before - after, before, max(0.1 * damping, 1e-9), trial)
         damping = max(10.0 * damping, 1e-4)
     return None
 
