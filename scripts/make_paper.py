@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 from paper_search import METHODS, search
+from paper_stiffness import HEAD, stiffness_rows
 
 from seecr.equilibrium import solve
 from seecr.mjcf import load_robot
@@ -379,6 +380,7 @@ def main(arguments: list[str]) -> None:
             print(f"{name}.png")
     page = with_table(PAGE.read_text(encoding="utf-8"))
     page = with_table(page, "counts", _COUNTS_HEAD, count_rows())
+    page = with_table(page, "stiffness", HEAD, stiffness_rows(sweep))
     PAGE.write_text(page, encoding="utf-8")
     print(PAGE.name)
 

@@ -6,6 +6,7 @@ import explain_figure_12
 import make_paper
 import numpy as np
 import paper_search
+import paper_stiffness
 import pytest
 
 
@@ -84,3 +85,20 @@ def test_what_would_explain_figure_12() -> None:
 
 def test_a_size_that_is_no_use_stays_at_nothing() -> None:
     assert explain_figure_12.explain(("gravity_tilt",)).size == 0.0
+
+
+def test_the_chosen_stiffness_is_argued_with_what_it_gives() -> None:
+    """The row of the choice is as computed now, and the worst search lies about the paper's 286."""
+    page = make_paper.PAGE.read_text(encoding="utf-8")
+    assert paper_stiffness.HEAD in page
+    (row,) = paper_stiffness.stiffness_rows(make_paper.sweep, [3000.0])
+    assert row[:5] == tuple(stated(page)["3000 N"][:5])
+    softer, chosen = (int(stated(page)[f"{n} N"][5].split(",")[0]) for n in (2000, 3000))
+    assert softer < 286 < chosen == int(row[5].split(",")[0])
+
+
+def stated(page: str) -> dict[str, list[str]]:
+    table = page.partition("<!-- stiffness -->")[2].partition("<!-- end")[0]
+    cells = [[cell.strip() for cell in line.strip("| ").split("|")]
+             for line in table.strip().splitlines()]  # fmt: skip
+    return {row[0]: row for row in cells}
