@@ -15,6 +15,7 @@ import numpy as np
 from crosscheck.calibration.catalogue import Catalogue, gram_about, widths_for
 from crosscheck.calibration.gram import Gram, averaged, best_widths, gram_of
 from crosscheck.calibration.joint import JointFit, Setting, settle
+from crosscheck.calibration.later import promising_beside
 from crosscheck.calibration.linearised import groups_of, linearised
 from crosscheck.calibration.priors import SHAPES
 from crosscheck.calibration.sets import Names, Scores, explore
@@ -107,6 +108,7 @@ def compare_sets(
             break
         begin = best.names
         scores = Scores(gram_about(fixed, best.joint, catalogue), of, always)
+    best = exact.swapped(scores, best)
     return Found(exact.possible, best, scores, lambda names: exact.fit(scores, names), always)
 
 
@@ -151,6 +153,25 @@ class _Exact:
                 break
             best = better
         return best
+
+    def swapped(self, scores: Scores, best: Refit) -> Refit:
+        """The best set, members exchanged for effects with a shape that promise about as much.
+
+        The linear model has them at one shape (a reference temperature, a time), which need not
+        be the one that explains what such a member does.
+        """
+        own = best.names - scores.always
+        shaped = [t.layout for t in self.catalogue.later if t.layout.shape.any()]
+        for name in sorted(own) if len(own) <= _FEW else ():
+            rest = self.fit(scores, best.names - {name})
+            if rest is None:
+                continue
+            least = best.score - rest.score - _HOLLOW
+            absent = [layout for layout in shaped if layout.name not in best.names]
+            for term, gain in promising_beside(self.setting, rest.joint, absent):
+                if gain > max(least, 0.0):
+                    self.fit(scores, rest.names | {term.name})
+        return self.best_of(scores, [])
 
     def fit(self, scores: Scores, names: Names) -> Refit | None:
         """A set fitted exactly; None where that has no solution."""
