@@ -105,7 +105,7 @@ def test_what_was_found_is_the_next_model() -> None:
 
 def test_a_diagnosis_reads_like_one() -> None:
     text = str(found())
-    assert text.startswith("effects_found: ")
+    assert text.startswith("These data would show ") and "\neffects_found: " in text
     assert "\n+ pulley_radius: " in text and "(on runs left out " in text
     assert "\nnoise alone: " in text and "    check: " in text
     (row,) = found().to_frame().to_pylist()

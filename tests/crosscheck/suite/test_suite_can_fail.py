@@ -27,7 +27,7 @@ from crosscheck.suite.mujoco_robot import MujocoRobot
 from crosscheck.suite.outcome import Outcome
 from crosscheck.suite.run import Run, run_suite
 from crosscheck.suite.thresholds import load_thresholds
-from seecr import equilibrium
+from seecr import search
 from seecr.compiled import columns
 from seecr.pose import quat_conjugate, quat_from_rotvec, quat_multiply
 from seecr.shipped import model_path
@@ -70,14 +70,14 @@ def tables(edit: Callable[[Any], None]) -> Callable[[Patch], None]:
     """SEECR's solver reads other tables: ``cables`` (n, m, columns) and ``load`` (n, columns)."""
 
     def plant(patch: Patch) -> None:
-        honest = equilibrium.assemble
+        honest = search.assemble
 
         def changed(*arguments: Any, **options: Any) -> Any:
             table = honest(*arguments, **options)
             edit(table)
             return table
 
-        patch.setattr(equilibrium, "assemble", changed)
+        patch.setattr(search, "assemble", changed)
 
     return plant
 
