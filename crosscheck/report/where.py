@@ -23,6 +23,9 @@ _MOST_ARROWS = 250
 # Viridis without its bright end, which would not be seen on white.
 _COLOURS = ListedColormap(colormaps["viridis_r"](np.linspace(0.12, 1.0, 128)))
 
+# A title of more letters than these does not fit above a panel: the effects are counted instead.
+_LONGEST = 48
+
 
 def failure_map(problem: Problem, before: Drawn, after: Drawn) -> str:
     """Arrows of the position error and dots of the orientation error at each measured pose."""
@@ -80,9 +83,11 @@ def _draw(
 def _title(stages: list[Drawn], column: int, magnify: float) -> str:
     stage = stages[column]
     when = "" if len(stages) == 1 else ("before: ", "after: ")[column]
-    names = [stage.label] if column == 0 else ["+ " + name for name in stage.state.terms.names]
+    names = stage.label if column == 0 else " ".join(f"+ {n}" for n in stage.state.terms.names)
+    if len(names) > _LONGEST:
+        names = f"with {len(stage.state.terms.names)} effects"
     scale = f"   (arrows drawn {drawn(magnify)})" if magnify and column == 0 else ""
-    return when + " ".join(names) + scale
+    return when + names + scale
 
 
 def _coloured(problem: Problem) -> Kind | None:
