@@ -7,10 +7,13 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TypeAlias
 
+import numpy as np
+
 from crosscheck.errors import CrosscheckError
 from seecr.effects import Term, Terms, catalogue, effect_named
 from seecr.mjcf import load_robot
 from seecr.model import Model, load_model
+from seecr.pose import Array
 from seecr.robot import Robot
 
 __all__ = ["GivenModel", "GivenRobot", "considered", "copy_robot", "model_of", "robot_of"]
@@ -80,3 +83,23 @@ def model_of(given: GivenModel, robot: Robot) -> tuple[Terms, tuple[str, ...]]:
     if isinstance(model, Model):
         return model.terms, model.notes
     return Terms(model), ()
+
+
+def numbers_of(option: str, text: str, count: int = 3, expected: str = "") -> Array:
+    """So many numbers (count,) between commas, as an option gives them.
+
+    Args:
+        option: its name. text: what was given. count: of the numbers.
+        expected: what is said of other input.
+
+    Raises:
+        CrosscheckError: other than that.
+    """
+    try:
+        values = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        values = np.zeros(0)
+    if len(values) != count or not np.isfinite(values).all():
+        expected = expected or f"{count} numbers such as 0.1,0,2.5"
+        raise CrosscheckError(f"{option}: expected {expected}, got {text!r}")
+    return values

@@ -13,6 +13,8 @@ import pytest
 from stale import forget_stale
 from warm import compile_all
 
+from seecr.cli import options
+
 
 def pytest_sessionstart(session: pytest.Session) -> None:
     """Forget what was compiled from older sources, before any worker starts to use it.
@@ -41,6 +43,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     second = [item for item in slow if files.index(item.path) % 2 == 1]
     middle = max(0, (len(items) + 1) // 2 - len(first))
     items[:] = [*first, *rest[:middle], *second, *rest[middle:]]
+
+
+@pytest.fixture(scope="session", autouse=True)
+def no_lines_of_progress() -> None:
+    """A busy machine adds none to what commands print: tests of other words read all of it."""
+    options.SECONDS_BETWEEN_LINES = float("inf")
 
 
 @pytest.fixture(scope="session")

@@ -60,11 +60,10 @@ def judge(
     """
     best, undecided = found.best.names - found.always, classes.undecided
     unknown = strange or field_odds > UNKNOWN or surprise > SURPRISE
-    few = len(best) <= _FEW and undecided < _OPEN
-    sure = sure_effects(found, classes, few)
-    if not few and len(best) <= _FEW and undecided < _OPEN_BESIDE:
-        every = sure_effects(found, classes, True)
-        few, sure = (True, every) if set(every) == best else (few, sure)
+    sure = sure_effects(found, classes, True)
+    few = len(best) <= _FEW and undecided < (_OPEN_BESIDE if set(sure) == best else _OPEN)
+    if not few:
+        sure = sure_effects(found, classes, False)
     if unknown:  # known effects imitate it: none of them is sure
         return Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, (), undecided)
     if not sure and undecided < _OPEN and explained(found) < _OWED:

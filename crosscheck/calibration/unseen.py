@@ -13,6 +13,7 @@ from scipy import linalg, special
 from crosscheck.calibration.colour import whitened
 from crosscheck.calibration.field import FIELD_WIDTHS, UNKNOWN, field_columns
 from crosscheck.calibration.joint import JointFit, Setting
+from crosscheck.calibration.worth import gains_along
 from crosscheck.fit.noise import as_table
 from crosscheck.fit.problem import Rms, rms_by_kind
 from seecr.pose import Array
@@ -64,9 +65,7 @@ def _left(setting: Setting, joint: JointFit, field: Array, columns: Array, width
 
 def _log_odds(power: Array, along: Array) -> Array:
     """(draws,) ln evidence with a field less that without, averaged over its width."""
-    square = np.asarray(FIELD_WIDTHS)[:, None, None] ** 2
-    grown = 1.0 + square * power[:, None]
-    gains = 0.5 * np.sum(square * along**2 / grown - np.log(grown), axis=1)
+    gains = gains_along(power, along, FIELD_WIDTHS)
     return np.asarray(special.logsumexp(gains, axis=0) - np.log(len(gains)))
 
 

@@ -34,14 +34,26 @@ def log_gains(normal: Array, gradient: Array, widths: ArrayLike, one_sided: bool
     """
     power, axes = np.linalg.eigh(normal)
     power = np.maximum(power, 0.0)
-    along = (axes.T @ gradient) ** 2
-    square = np.asarray(widths, float)[:, None] ** 2
-    grown = 1.0 + square * power
-    out = 0.5 * np.sum(square * along / grown - np.log(grown), axis=1)
+    out = gains_along(power, axes.T @ gradient, widths)
     if one_sided and len(gradient) == 1:
-        mean_over_error = float(gradient[0]) * np.sqrt(square / grown)[:, 0]
+        square = np.asarray(widths, float) ** 2
+        mean_over_error = float(gradient[0]) * np.sqrt(square / (1.0 + square * power[0]))
         out = out + np.log(2.0) + stats.norm.logcdf(mean_over_error)
-    return np.asarray(out)
+    return out
+
+
+def gains_along(power: Array, along: Array, widths: ArrayLike) -> Array:
+    """(k, ...) ln gain for each width, from the axes of the normal matrix.
+
+    Args:
+        power: (p,) its eigenvalues.
+        along: (p, ...) gradients along its axes, one or many.
+        widths: (k,) prior standard deviations of z.
+    """
+    shape = (len(power), *(1 for _ in along.shape[1:]))
+    square = (np.asarray(widths, float) ** 2).reshape(-1, *(1 for _ in shape))
+    grown = 1.0 + square * power.reshape(shape)
+    return np.asarray(0.5 * np.sum(square * along**2 / grown - np.log(grown), axis=1))
 
 
 def log_gain(

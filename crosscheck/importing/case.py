@@ -11,7 +11,7 @@ import numpy as np
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.files import json_text, staged, write_text
-from crosscheck.given import GivenRobot, copy_robot, robot_of
+from crosscheck.given import GivenRobot, copy_robot, numbers_of, robot_of
 from crosscheck.importing.align import (
     Frames,
     as_they_are,
@@ -22,7 +22,7 @@ from crosscheck.importing.align import (
 )
 from crosscheck.importing.choices import Choices
 from crosscheck.importing.join import joined
-from crosscheck.importing.logged import Logged, numbers_of
+from crosscheck.importing.logged import Logged
 from crosscheck.importing.take import Take, take_of
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import load_commands

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from crosscheck.errors import CrosscheckError
+from crosscheck.given import numbers_of
 from crosscheck.importing.dwells import REST_FOR
-from crosscheck.importing.logged import numbers_of
 from crosscheck.importing.markers import read_shape
 from crosscheck.units import parse_quantity
 from seecr.pose import Array

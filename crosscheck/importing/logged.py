@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.errors import CrosscheckError
 from seecr.errors import InputFileError
 from seecr.pose import Array, quat_conjugate, quat_multiply, quat_rotate
 
@@ -120,18 +119,3 @@ class Logged:
 def _some(names: list[str]) -> str:
     more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
     return ", ".join(names[:_MOST_NAMED]) + more
-
-
-def numbers_of(option: str, text: str, count: int = 3) -> Array:
-    """So many numbers (count,) between commas.
-
-    Raises:
-        CrosscheckError: other than that.
-    """
-    try:
-        values = np.array([float(part) for part in text.split(",")])
-    except ValueError:
-        values = np.zeros(0)
-    if len(values) != count or not np.isfinite(values).all():
-        raise CrosscheckError(f"{option}: expected {count} numbers such as 0.1,0,2.5, got {text!r}")
-    return values

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from crosscheck.errors import CrosscheckError
+from crosscheck.given import numbers_of
 from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.write import write_measurements
 from crosscheck.planning.result import Plan
@@ -52,11 +53,8 @@ def box_of(text: str) -> Array:
     Raises:
         CrosscheckError: other than that.
     """
-    try:
-        values = np.array([float(part) for part in text.split(",")])
-    except ValueError:
-        values = np.zeros(0)
-    if len(values) != 6 or not np.all(values[:3] <= values[3:]):
-        expected = "expected X0,Y0,Z0,X1,Y1,Z1 in metres, the lower corner first"
-        raise CrosscheckError(f"--box: {expected}, got {text!r}")
+    expected = "X0,Y0,Z0,X1,Y1,Z1 in metres, the lower corner first"
+    values = numbers_of("--box", text, 6, expected)
+    if not np.all(values[:3] <= values[3:]):
+        raise CrosscheckError(f"--box: expected {expected}, got {text!r}")
     return values.reshape(2, 3)
