@@ -8,7 +8,7 @@ help: ## list the tasks
 
 setup: ## a virtual environment with this checkout in it, and the hooks that run before a commit
 	python3 -m venv .venv
-	$(BIN)/pip install -q -e '.[test,dev]'
+	$(BIN)/pip install -q -e '.[test,dev,docs]'
 	if [ -d .git ]; then $(BIN)/pre-commit install; fi
 
 quick: ## while working: lint, format, types, and the tests that take less than a minute
@@ -26,11 +26,12 @@ sweep: ## more cases of what the tests hold
 bench: ## how fast it is, one process at a time
 	$(BIN)/python -m pytest -m benchmark -n 0 -s
 
-docs: ## write the pages and pictures that are made from the sources
+docs: ## write the pages and pictures made from the sources, and build the site: build/site/index.html
 	$(BIN)/python scripts/make_effects.py
 	$(BIN)/python scripts/make_api.py
 	$(BIN)/python scripts/draw_floors.py
 	$(BIN)/python scripts/make_paper.py
+	$(BIN)/python -m sphinx -q -W --keep-going -c docs -d build/read . build/site
 
 suite: ## SEECR against MuJoCo, every case; results in crosscheck-results/
 	$(BIN)/crosscheck run
