@@ -47,7 +47,7 @@ class Made:
     def words(self) -> str:
         """The same in a line."""
         files = ", ".join(f"{name} {digits}" for name, digits in self.files.items())
-        return f"{self.command} · {self.date} · {files}"
+        return " · ".join(part for part in (self.command, self.date, files) if part)
 
     def as_json(self) -> dict[str, Any]:
         """``made`` in every result."""

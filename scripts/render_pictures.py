@@ -26,7 +26,7 @@ from rerun.experimental import ViewerClient
 
 from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.recording import write_diagnosis_recording
-from crosscheck.report import write_report
+from crosscheck.report import write_page
 from crosscheck.suite.cases import select, shipped_cases
 from crosscheck.suite.run import run_case
 from crosscheck.suite.thresholds import load_thresholds
@@ -92,7 +92,7 @@ def diagnosed(folder: Path) -> Path:
     twin = make_twin(model_path("demobot_parallel"), _SEED)
     found = diagnose(twin.robot, twin.measured)
     write_diagnosis_recording(found, folder / "diagnosis.rrd")
-    write_report(found, folder / "diagnosis.html")
+    write_page(found, folder / "diagnosis.html")
     return folder / "diagnosis.html"
 
 

@@ -17,11 +17,13 @@ CHECKOUT = Path(__file__).resolve().parents[1]
 
 SOLVE = """
 import seecr
+from crosscheck.report.glossary import entries
 from seecr.shipped import model_path
 
 robot = seecr.load_robot(model_path("demobot_cogiro"))
 solution = seecr.solve(robot, [[0.4, 0.25, 0.1, 1, 0, 0, 0]])
 assert solution.converged.all(), solution.status
+assert entries(), "the glossary of the pages"
 print(seecr.__file__)
 """
 

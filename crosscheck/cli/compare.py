@@ -68,7 +68,7 @@ def command(
     from crosscheck.comparison import Limits, check, load_limits, with_options
     from crosscheck.files import json_text, staged, write_text
     from crosscheck.measurements.stated import with_stated
-    from crosscheck.report import write_comparison_page
+    from crosscheck.report import write_page
     from seecr import load_model, load_robot
 
     limits = with_options(load_limits(limits_file) if limits_file else Limits(), options)
@@ -91,7 +91,7 @@ def command(
         text = json_text(document)
         write_text(folder / "comparison.json", text + "\n")
         with figures_in(figures):
-            write_comparison_page(found, folder / "comparison.html", made)
+            write_page(found, folder / "comparison.html", made)
         if not no_recording:
             # takes a second or two to import
             from crosscheck.recording import write_comparison_recording

@@ -76,7 +76,7 @@ def command(
     from crosscheck.files import json_text, staged, write_text
     from crosscheck.given import considered
     from crosscheck.measurements.stated import with_stated
-    from crosscheck.report import write_report
+    from crosscheck.report import write_page
     from seecr import load_model, load_robot, new_model
 
     gates = [DiagnosisVerdict.named(word) for word in listed(fail_on)]
@@ -95,7 +95,7 @@ def command(
         text = json_text({"made": made, **found.as_json()})
         write_text(folder / "diagnosis.json", text + "\n")
         with figures_in(figures):
-            write_report(found, folder / "diagnosis.html", made)
+            write_page(found, folder / "diagnosis.html", made)
         if not no_recording and found.search is not None:
             from crosscheck.recording import write_diagnosis_recording
 

@@ -82,7 +82,7 @@ def command(
     from crosscheck.files import json_text, staged, write_text
     from crosscheck.measurements.stated import stated
     from crosscheck.planning import box_of, compose, write_plan
-    from crosscheck.report import write_plan_page
+    from crosscheck.report import write_page
     from crosscheck.terminal import print_plan
     from seecr import load_robot
 
@@ -102,7 +102,7 @@ def command(
         text = json_text({"made": made, "exit_status": status, **plan.as_json()})
         write_text(folder / "plan.json", text + "\n")
         with figures_in(figures):
-            write_plan_page(plan, folder / "plan.html", made)
+            write_page(plan, folder / "plan.html", made)
         files = write_plan(plan, folder, chosen=given is None)
     if as_json:
         click.echo(text)

@@ -18,6 +18,7 @@ from crosscheck.diagnosis.steps import Drawn
 from crosscheck.fit.problem import KINDS, TENSION, Problem
 from crosscheck.report.drawing import (
     AFTER,
+    BEFORE,
     INK,
     MANY,
     NOISE,
@@ -170,8 +171,9 @@ def _panel(axes: Axes, x: Array, wall: Wall, k: int) -> None:
     level = float(wall.noise[k])
     axes.axhspan(-2 * level, 2 * level, color=NOISE, linewidth=0, zorder=0)
     many = bool(np.isfinite(y).sum() > MANY)
-    dots(axes, x, y, 2.4 if many else 4.4, TINT, 0.6)
-    if np.any(model[np.isfinite(model)] != 0.0):
+    overlaid = bool(np.any(wall.predicted[np.isfinite(wall.predicted)] != 0.0))
+    dots(axes, x, y, 2.4 if many else 4.4, TINT if overlaid else BEFORE, 0.6)
+    if overlaid:
         dots(axes, x, model, 1.0 if many else 2.0, AFTER, 0.7)
     axes.axhline(0.0, color=INK, linewidth=0.5, zorder=1)
     if many:

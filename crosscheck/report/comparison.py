@@ -1,20 +1,17 @@
-"""``comparison.html``: where a model is off, as a page."""
+"""What stands on ``comparison.html``: where a model is off."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from markupsafe import Markup
 
 from crosscheck.comparison.result import Comparison, Group
 from crosscheck.diagnosis.steps import Standing
-from crosscheck.files import write_text
 from crosscheck.fit.problem import KINDS, Rms
-from crosscheck.made import Made
 from crosscheck.report.cables import draw_wall, walls_of
-from crosscheck.report.page import facts, page_of
+from crosscheck.report.page import facts, title_of
 from crosscheck.report.tables import association_block
 from crosscheck.report.where import caption, failure_map
 from crosscheck.units import in_unit, short
@@ -22,33 +19,29 @@ from crosscheck.units import in_unit, short
 _MOST = 5
 
 
-def write_comparison_page(found: Comparison, path: Path, made: Made | None = None) -> None:
-    """Write a comparison as one self-contained page.
-
-    Raises:
-        InputFileError: the file cannot be written.
-    """
-    write_text(path, render_comparison(found, made), failure="cannot write the page")
-
-
-def render_comparison(found: Comparison, made: Made | None = None) -> str:
-    """The page's text."""
+def comparison_context(found: Comparison) -> dict[str, Any]:
+    """What the template of a comparison asks for."""
     problem, names = found.problem, list(found.terms.names)
     kinds = [kind for kind in KINDS if found.rms.get(kind.key) is not None]
+    model = f"SEECR with {', '.join(names)}" if names else "plain SEECR"
+    verdict, words = _verdict(found)
     context: dict[str, Any] = {
-        "title": f"{problem.robot.name} · {problem.data.path.name}",
-        "model": f"SEECR with {', '.join(names)}" if names else "plain SEECR",
-        "agrees": found.is_noise,
-        "refused": found.refusal is not None or found.whiteness is None,
+        "page_title": f"Comparison: {title_of(problem)}",
+        "heading": f"Comparison of {title_of(problem)} with {model}",
+        "verdict": verdict,
+        "verdict_name": words,
+        "verdict_meaning": "",
         "sentence": found.sentence,
         "facts": facts(problem),
-        "heads": [f"{kind.name} [{kind.unit}]" for kind in kinds],
+        "heads": [f"#{kind.name} [{kind.unit}]" for kind in kinds],
         "groups": _groups(found),
         "coordinates": _coordinates(found),
         "where": [association_block(a) for a in found.associations if a.significant][:_MOST],
         "worst": _worst(found),
-        "unsolved": found.unsolved,
-        "notes": found.notes,
+        "notes": [
+            *(f"line {row.line}, run {row.run}: {row.why}" for row in found.unsolved),
+            *found.notes,
+        ],
         "map": "",
         "walls": [],
         "caption": "",
@@ -58,7 +51,16 @@ def render_comparison(found: Comparison, made: Made | None = None) -> str:
         context["map"] = Markup(failure_map(problem, stage, stage))  # ours, escaped there
         context["walls"] = [Markup(draw_wall(wall)) for wall in walls_of(problem, stage, stage)]
         context["caption"] = caption(problem, stage)
-    return page_of("comparison.html.jinja", made, **context)
+    return context
+
+
+def _verdict(found: Comparison) -> tuple[str, str]:
+    """Its colour, by the diagnosis' verdict that has the same one, and its words."""
+    if found.refusal is not None or found.whiteness is None:
+        return "no_verdict", "No verdict"
+    if found.is_noise:
+        return "no_effect_missing", "Model and data agree"
+    return "unknown_effect", "The model is off"
 
 
 def _cells(found: Comparison, rms: Rms) -> list[str]:

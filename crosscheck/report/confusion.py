@@ -124,7 +124,7 @@ def draw_confusion(confusion: Confusion) -> str:
                 if i != j and part[i, j] >= 0.005:
                     axes.text(
                         j, i, _words(part[i, j], k), ha="center", va="center",
-                        fontsize=7.5 if k <= _FEW else 5.5,
+                        fontsize=7.5 if k <= _FEW else 6.2,
                         color="white" if part[i, j] > 0.75 else INK,
                     )  # fmt: skip
         for a, b in confusion.twins:

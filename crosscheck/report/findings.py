@@ -54,6 +54,11 @@ class FindingCard:
     probability: str
 
     @property
+    def doubtful(self) -> bool:
+        """Whether a value of it is."""
+        return any(row.flags for row in self.parameters)
+
+    @property
     def columns(self) -> int:
         """Of its table of parameters."""
         return 1 if len(self.parameters) <= _ONE_COLUMN else 2

@@ -1,46 +1,45 @@
-"""``plan.html``: what poses would show, as a page."""
+"""What stands on ``plan.html``: what poses would show."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 
-from crosscheck.files import write_text
-from crosscheck.made import Made
 from crosscheck.planning.result import Plan, Visible
 from crosscheck.planning.words import alike, gain_words
 from crosscheck.report.confusion import Confusion, draw_confusion
 from crosscheck.report.drawing import AFTER, BEFORE, INK, blank, grid, image, plain_log, styled
-from crosscheck.report.page import facts, page_of
+from crosscheck.report.page import facts, title_of
+from crosscheck.units import short
 from seecr.pose import rotvec_from_quat
 
 _ROW = 0.19
 
 
-def write_plan_page(plan: Plan, path: Path, made: Made | None = None) -> None:
-    """Write a plan as one self-contained page.
-
-    Raises:
-        InputFileError: the file cannot be written.
-    """
-    write_text(path, render_plan(plan, made), failure="cannot write the page")
-
-
-def render_plan(plan: Plan, made: Made | None = None) -> str:
-    """The page's text."""
+def plan_context(plan: Plan) -> dict[str, Any]:
+    """What the template of a plan asks for."""
     problem = plan.planned.problem
     context: dict[str, Any] = {
-        "title": f"{problem.robot.name} · {problem.data.path.name}",
+        "page_title": f"Plan: {title_of(problem)}",
+        "heading": f"Plan of {title_of(problem)}",
+        "verdict": "plan",
+        "verdict_name": "What these poses would show",
+        "verdict_meaning": "",
         "sentence": plan.sentence,
         "facts": facts(problem),
         "effects": [_row(found) for found in plan.effects],
         "missing": {name: why.words for name, why in plan.missing.items()},
         "suggestions": [_suggestion(item) for item in plan.suggestions if item.reached],
-        "slack": plan.slack,
-        "notes": plan.notes,
+        "notes": [
+            *(
+                f"line {line}: {cable} is about to go slack or taut; what is said of such poses "
+                "is less sure"
+                for line, cable in plan.slack
+            ),
+            *plan.notes,
+        ],
         "sizes": "",
         "confusion": "",
     }
@@ -52,7 +51,7 @@ def render_plan(plan: Plan, made: Made | None = None) -> str:
             kept = tuple(name for name, some in zip(names, seen, strict=True) if some)
             matrix = Confusion(kept, 0, part[np.ix_(seen, seen)])
             context["confusion"] = Markup(draw_confusion(matrix))
-    return page_of("plan.html.jinja", made, **context)
+    return context
 
 
 def draw_sizes(effects: tuple[Visible, ...]) -> str:
@@ -72,7 +71,7 @@ def draw_sizes(effects: tuple[Visible, ...]) -> str:
         axes.set_ylim(-0.7, len(shown) - 0.3)
         plain_log(axes)
         axes.set_xlabel("smallest size, in plausible sizes (dotted: a plausible one)")
-        axes.legend(loc="lower right")
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
         grid(axes, "x")
         return image(figure, "The smallest sizes that show")
 
@@ -80,7 +79,7 @@ def draw_sizes(effects: tuple[Visible, ...]) -> str:
 def _row(found: Visible) -> dict[str, Any]:
     return {
         "name": found.name,
-        "visible": found.visible,
+        "factor": short(found.factor, 2),
         "shows": found.words(found.factor),
         "named": "–" if found.twins else found.words(found.identifiable),
         "alike": alike(found),

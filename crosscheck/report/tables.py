@@ -127,7 +127,7 @@ def candidate_rows(found: Diagnosis) -> list[CandidateRow]:
     if found.search is not None:
         by_name = {c.name: c for c in found.search.steps[0].candidates}
     out = []
-    for row in found.candidates:
+    for row in (row for row in found.candidates if not row.why_not.lacking):
         candidate = by_name.get(row.effect)
         out.append(
             CandidateRow(
@@ -141,6 +141,15 @@ def candidate_rows(found: Diagnosis) -> list[CandidateRow]:
             )
         )
     return out
+
+
+def untried(found: Diagnosis) -> list[tuple[str, list[str]]]:
+    """Reasons for which effects were no candidates, each with the effects."""
+    out: dict[str, list[str]] = {}
+    for row in found.candidates:
+        if row.why_not.lacking:
+            out.setdefault(str(row.why_not), []).append(row.effect)
+    return list(out.items())
 
 
 def _probability(found: Diagnosis, effect: str) -> str:

@@ -76,7 +76,7 @@ def _panel(axes: Axes, found: Diagnosis, stages: list[Stage], kind: Kind) -> Non
     )  # fmt: skip
     for row, (stage, value, runs) in enumerate(zip(stages, values, blocks, strict=True)):
         in_sample = _in_sample(found, stage, kind)
-        _bar(axes, row, stage, value, left)
+        (_point if logarithmic else _bar)(axes, row, stage, value)
         _runs(axes, row, runs)
         if stage.added and in_sample is not None:
             axes.plot(
@@ -107,10 +107,23 @@ def _in_sample(found: Diagnosis, stage: Stage, kind: Kind) -> float | None:
     return None if value is None else value * kind.factor
 
 
-def _bar(axes: Axes, row: int, stage: Stage, value: float, left: float) -> None:
-    colour = BEFORE if not stage.added else AFTER if stage.listed else UNSURE
+def _colour(stage: Stage) -> str:
+    return BEFORE if not stage.added else AFTER if stage.listed else UNSURE
+
+
+def _point(axes: Axes, row: int, stage: Stage, value: float) -> None:
+    """Where the axis has no zero to begin a bar at."""
+    colour = _colour(stage)
+    axes.plot(
+        value, row, marker="o", markersize=11, markeredgewidth=1.6, zorder=2,
+        markeredgecolor=colour, markerfacecolor=colour if stage.listed else "white",
+    )  # fmt: skip
+
+
+def _bar(axes: Axes, row: int, stage: Stage, value: float) -> None:
+    colour = _colour(stage)
     axes.barh(
-        row, value - left, left=left, height=0.52, zorder=2,
+        row, value, height=0.52, zorder=2,
         color=colour if stage.listed else "white", edgecolor=colour,
         hatch="" if stage.listed else "////", linewidth=0.8,
     )  # fmt: skip

@@ -17,5 +17,7 @@ def figures_of(markup: str) -> list[str]:
 def text_of(markup: str) -> str:
     """What a reader sees, in the page and in its figures."""
     body = _IMAGE.sub(lambda image: base64.b64decode(image[1]).decode(), markup)
-    body = re.sub(r"<style.*?</style>|<defs.*?</defs>|<!--.*?-->", "", body, flags=re.DOTALL)
+    body = re.sub(r"</?(a|b|button|code|small|span)\b[^>]*>", "", body)
+    hidden = r"<(script|style|defs|details)\b.*?</\1>|<!--.*?-->"
+    body = re.sub(hidden, "", body, flags=re.DOTALL)
     return " ".join(html.unescape(re.sub(r"<[^>]*>", " ", body)).split())

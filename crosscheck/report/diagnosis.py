@@ -1,0 +1,89 @@
+"""What stands on ``diagnosis.html``: verdict, figures and tables."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from markupsafe import Markup
+
+from crosscheck.diagnosis.result import Diagnosis
+from crosscheck.diagnosis.steps import shown_stages, stages_of
+from crosscheck.fit.words import rms_words
+from crosscheck.report.cables import draw_wall, walls_of
+from crosscheck.report.confusion import confusion_of, draw_confusion
+from crosscheck.report.drawing import AFTER, BEFORE, TINT
+from crosscheck.report.findings import finding_card
+from crosscheck.report.page import facts, title_of
+from crosscheck.report.tables import association_block, candidate_rows, checks, untried
+from crosscheck.report.waterfall import waterfall
+from crosscheck.report.where import caption, failure_map
+
+_NO_SEARCH: dict[str, Any] = {
+    "facts": [], "figures": dict.fromkeys(("waterfall", "map", "confusion"), ""),
+    "walls": [], "twins": [], "caption": "", "added": [], "tint": BEFORE, "together": False,
+    "unsure": False,
+}  # fmt: skip
+
+
+def diagnosis_context(found: Diagnosis) -> dict[str, Any]:
+    """What the template of a diagnosis asks for."""
+    of = f" of {title_of(found.search.problem)}" if found.search is not None else ""
+    return {
+        "page_title": f"{found.verdict.heading}{of}",
+        "heading": f"Diagnosis{of}",
+        "verdict": found.verdict.value,
+        "verdict_name": found.verdict.heading,
+        "verdict_meaning": found.verdict.meaning,
+        "sentence": found.sentence,
+        "before": rms_words(found.before),
+        "floor": rms_words(found.floor),
+        "can_show": [] if found.sight is None else found.sight.lines(),
+        "notes": list(found.notes),
+        "measure_next": list(found.measure_next),
+        "findings": [finding_card(found, finding) for finding in found.missing],
+        "candidates": candidate_rows(found),
+        "untried": untried(found),
+        "after": AFTER,
+        "checks": checks(found),
+        "where": [association_block(row) for row in found.where],
+        **_of_search(found),
+    }
+
+
+def _of_search(found: Diagnosis) -> dict[str, Any]:
+    """Facts and figures; empty where there was no search."""
+    if found.search is None:
+        return _NO_SEARCH
+    problem = found.search.problem
+    before, after = shown_stages(found)
+    # what the wall overlays is the last model, sure or not: it shows what was tried
+    last = stages_of(found)[-1]
+    confusion = confusion_of(found)
+    figures = {
+        "waterfall": waterfall(found),
+        "map": failure_map(problem, before, after),
+        "confusion": draw_confusion(confusion) if confusion is not None else "",
+    }
+    walls = [draw_wall(wall) for wall in walls_of(problem, before, last)]
+    added = [n for n in last.state.terms.names if n not in found.search.base]
+    return {
+        "facts": [*facts(problem), *_unknown_facts(found)],
+        "figures": {key: Markup(text) for key, text in figures.items()},  # ours, escaped there
+        "walls": [Markup(text) for text in walls],
+        "twins": confusion.twins if confusion is not None else [],
+        "caption": caption(problem, before),
+        "together": bool(problem.sigma.length_m),
+        "unsure": not all(stage.listed for stage in stages_of(found)),
+        "added": added,
+        "tint": TINT if added else BEFORE,
+    }
+
+
+def _unknown_facts(found: Diagnosis) -> list[tuple[str, str]]:
+    """How large what is left is, and what could not have been seen."""
+    out = [] if found.left is None else [("left beyond noise", found.left.words)]
+    if found.chances is not None:
+        shown = found.chances.shown
+        words = "at no size" if shown is None else f"from {rms_words(shown)} rms on"
+        out.append(("a smooth unknown effect shows", words))
+    return out
