@@ -10,10 +10,8 @@ import math
 import re
 from collections.abc import Sequence
 
-import numpy as np
-
 from crosscheck.errors import CrosscheckError
-from seecr.units import UNITS
+from seecr.units import UNITS, short, with_error
 
 __all__ = [
     "EXAMPLE",
@@ -35,8 +33,6 @@ EXAMPLE = {"position": "0.5mm", "orientation": "0.2deg", "tension": "1N", "lengt
 
 _SHOWN = {unit.si: unit for unit in UNITS if unit.shown}
 _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
-# Larger numbers are written with an exponent.
-_MOST_DIGITS = 6
 
 
 def in_unit(si: str) -> tuple[float, str]:
@@ -85,33 +81,6 @@ def parse_kind(label: str, kinds: Sequence[str], text: str) -> tuple[str, float]
         raise CrosscheckError(f"{label}: expected more than zero, got {text!r}")
     kind, unit = units[name]
     return kind, unit.to_si(value)
-
-
-def short(value: float | None, digits: int = 3) -> str:
-    """A number of so many digits, without an exponent where that is readable."""
-    if value is None or not np.isfinite(value):
-        return "–"
-    if value == 0.0:
-        return "0"
-    size = int(np.floor(np.log10(abs(value)))) + 1
-    if not -4 < size <= _MOST_DIGITS:
-        mantissa, power = f"{value:.{digits - 1}e}".split("e")
-        return f"{mantissa}e{int(power)}".replace("-", "−")
-    decimals = max(digits - size, 0)
-    return f"{value:.{decimals}f}".replace("-", "−")
-
-
-def with_error(value: float, error: float) -> tuple[str, str]:
-    """A value and its standard error, to two digits of the error."""
-    if not np.isfinite(error):
-        return short(value), "not seen"
-    if error <= 0.0:
-        return short(value, 6), "0"
-    decimals = 1 - int(np.floor(np.log10(error)))
-    if decimals > 9 or abs(value) >= 10.0**_MOST_DIGITS:
-        return short(value, 6), short(error, 2)
-    decimals = max(decimals, 0)
-    return f"{value:.{decimals}f}".replace("-", "−"), f"{error:.{decimals}f}"
 
 
 def chance(p: float) -> str:

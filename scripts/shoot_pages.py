@@ -17,10 +17,10 @@ import browser
 
 from crosscheck.comparison import compare
 from crosscheck.diagnosis.verdict import diagnose
-from crosscheck.made import Made
 from crosscheck.planning import make_plan
 from crosscheck.report import write_page
 from crosscheck.twin.make import Twin, make_twin
+from seecr.made import Made
 from seecr.shipped import model_path
 
 WIDTHS = (1280, 390)

@@ -1,4 +1,7 @@
-"""Units: as files spell them, as people type and read them, and what they are in SI."""
+"""Units: as files spell them, as people type and read them, and what they are in SI.
+
+People read numbers in the units of this table, with no more digits than are known.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +9,16 @@ import math
 from dataclasses import dataclass
 from typing import TypeVar
 
+import numpy as np
+
 from seecr.pose import Array
 
-__all__ = ["UNITS", "Unit", "of_columns"]
+__all__ = ["UNITS", "Unit", "of_columns", "short", "with_error"]
 
 Numbers = TypeVar("Numbers", float, Array)
+
+# Larger numbers are written with an exponent.
+_MOST_DIGITS = 6
 
 
 @dataclass(frozen=True)
@@ -69,3 +77,30 @@ UNITS = (
 def of_columns(si: str) -> dict[str, Unit]:
     """Units, by suffix, of columns of measurements that hold a quantity of this SI unit."""
     return {unit.suffix: unit for unit in UNITS if unit.si == si and unit.column}
+
+
+def short(value: float | None, digits: int = 3) -> str:
+    """A number of so many digits, without an exponent where that is readable."""
+    if value is None or not np.isfinite(value):
+        return "–"
+    if value == 0.0:
+        return "0"
+    size = int(np.floor(np.log10(abs(value)))) + 1
+    if not -4 < size <= _MOST_DIGITS:
+        mantissa, power = f"{value:.{digits - 1}e}".split("e")
+        return f"{mantissa}e{int(power)}".replace("-", "−")
+    decimals = max(digits - size, 0)
+    return f"{value:.{decimals}f}".replace("-", "−")
+
+
+def with_error(value: float, error: float) -> tuple[str, str]:
+    """A value and its standard error, to two digits of the error."""
+    if not np.isfinite(error):
+        return short(value), "not seen"
+    if error <= 0.0:
+        return short(value, 6), "0"
+    decimals = 1 - int(np.floor(np.log10(error)))
+    if decimals > 9 or abs(value) >= 10.0**_MOST_DIGITS:
+        return short(value, 6), short(error, 2)
+    decimals = max(decimals, 0)
+    return f"{value:.{decimals}f}".replace("-", "−"), f"{error:.{decimals}f}"

@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[1]
 # A folder or file on its floor. crosscheck stands on seecr: a lower floor of the two is seecr's.
 FLOORS = {
     "seecr.errors": 0, "seecr.compiled": 0, "seecr.threads": 0, "seecr.lazy": 0,
-    "seecr.files": 1, "seecr.result": 1,
+    "seecr.files": 1, "seecr.result": 1, "seecr.made": 1,
     "seecr.shipped": 1, "seecr.pose": 1, "seecr.units": 2,
     "seecr.robot": 2, "seecr.loads": 2, "seecr.commands": 3, "seecr.joints": 3, "seecr.mjcf": 3,
     "seecr.columns": 4, "seecr.path": 4, "seecr.setup": 4, "seecr.fingerprint": 4,
@@ -35,7 +35,7 @@ FLOORS = {
     "seecr.recording": 13,
     "seecr.report": 13, "seecr.cli": 14,
     "crosscheck.errors": 20,
-    "crosscheck.files": 21, "crosscheck.made": 21, "crosscheck.units": 21, "crosscheck.given": 21,
+    "crosscheck.files": 21, "crosscheck.units": 21, "crosscheck.given": 21,
     "crosscheck.settle": 22, "crosscheck.measurements": 22, "crosscheck.model": 22,
     "crosscheck.twin": 23, "crosscheck.fit": 23,
     "crosscheck.suite": 24, "crosscheck.calibration": 24, "crosscheck.importing": 24,

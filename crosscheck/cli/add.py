@@ -10,11 +10,12 @@ import click
 
 from crosscheck.cli.choices import sigma_option
 from crosscheck.cli.following import after_fit
-from seecr.cli.options import FILE, json_option, progress_share
+from seecr.cli.options import FILE, json_option, made_by, progress_share
 
 if TYPE_CHECKING:
     from crosscheck import Addition
     from seecr import Model, Robot
+    from seecr.made import Made
 
 
 @click.command(
@@ -87,9 +88,10 @@ def command(
         else:
             found = add_effects(machine, measured, listed, old.terms, progress)
     written = found.pays or force
+    made = made_by(robot, *data, all_from, model)  # of the model as it was read
     if written:
         _write(found, old, machine, measured.path, model)
-    _tell(found, old, model, written, out, as_json)
+    _tell(found, old, model, written, made, out, as_json)
     if not as_json:
         click.echo(after_fit(found.whiteness.is_noise, written, robot, data, model))
     return 0 if written else 1
@@ -130,12 +132,13 @@ def _write(found: Addition, old: Model, robot: Robot, data: Path, path: Path) ->
 
 
 def _tell(
-    found: Addition, old: Model, model: Path, written: bool, out: Path | None, as_json: bool
-) -> None:
+    found: Addition, old: Model, model: Path, written: bool, made: Made, out: Path | None,
+    as_json: bool,
+) -> None:  # fmt: skip
     from crosscheck.files import json_text, staged, write_text
     from crosscheck.terminal import print_addition
 
-    document = {"written": written, "model": str(model), **found.as_json()}
+    document = {"made": made, "written": written, "model": str(model), **found.as_json()}
     text = json_text({**document, "model_notes": list(old.notes)})
     if out is not None:
         with staged(out) as folder:

@@ -9,11 +9,12 @@ import click
 
 from crosscheck.cli.choices import exclude_option, listed, only_option, sigma_option
 from crosscheck.cli.following import after_fit
-from seecr.cli.options import FILE, json_option, progress_share
+from seecr.cli.options import FILE, json_option, made_by, progress_share
 
 if TYPE_CHECKING:
     from crosscheck import Calibrated
     from seecr import Model, Robot
+    from seecr.made import Made
 
 
 @click.command(
@@ -70,9 +71,10 @@ def command(
             machine, measured, old, progress, only=listed(only), exclude=listed(exclude)
         )
     written = found.pays or (force and found.settled)
+    made = made_by(robot, *data, model)  # of the model as it was read
     if written:
         _write(found, old, machine, measured.path, model)
-    _tell(found, model, written, out, as_json)
+    _tell(found, model, written, made, out, as_json)
     if not as_json:
         click.echo(after_fit(written, written, robot, data, model))
     if not found.settled:
@@ -89,11 +91,13 @@ def _write(found: Calibrated, old: Model, robot: Robot, data: Path, path: Path) 
     save_model(path, renewed(new, robot))
 
 
-def _tell(found: Calibrated, model: Path, written: bool, out: Path | None, as_json: bool) -> None:
+def _tell(
+    found: Calibrated, model: Path, written: bool, made: Made, out: Path | None, as_json: bool
+) -> None:
     from crosscheck.files import json_text, staged, write_text
     from crosscheck.terminal import print_calibration
 
-    text = json_text({"written": written, "model": str(model), **found.as_json()})
+    text = json_text({"made": made, "written": written, "model": str(model), **found.as_json()})
     if out is not None:
         with staged(out) as folder:
             write_text(folder / "calibration.json", text + "\n")

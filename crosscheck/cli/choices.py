@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-from seecr.cli.group import ARGUMENTS
 from seecr.cli.options import FILE
-
-if TYPE_CHECKING:
-    from crosscheck.made import Made
 
 sigma_option = click.option(
     "--sigma",
@@ -67,15 +61,6 @@ def figures_in(folder: Path | None) -> Iterator[None]:
         return
     with staged(folder) as unfinished, keeping(unfinished):
         yield
-
-
-def made_by(*files: Path | None) -> Made:
-    """How the command that is running came to its result, from these files."""
-    from crosscheck.made import Made
-
-    ctx = click.get_current_context()
-    words = [ctx.find_root().info_name or "crosscheck", *ctx.meta.get(ARGUMENTS, [])]
-    return Made.now(shlex.join(words), files)
 
 
 def listed(texts: Sequence[str]) -> list[str]:

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import click
 
-from crosscheck.cli.choices import figures_in, figures_option, made_by, sigma_option
+from crosscheck.cli.choices import figures_in, figures_option, sigma_option
 from crosscheck.cli.following import after_comparison
-from seecr.cli.options import FILE, json_option, out_option
+from seecr.cli.options import FILE, json_option, made_by, out_option
 
 
 @click.command(

@@ -12,13 +12,12 @@ from crosscheck.cli.choices import (
     figures_in,
     figures_option,
     listed,
-    made_by,
     only_option,
     sigma_option,
     tolerance_option,
 )
 from crosscheck.cli.following import after_diagnosis
-from seecr.cli.options import FILE, json_option, out_option, progress_share
+from seecr.cli.options import FILE, json_option, made_by, out_option, progress_share
 
 if TYPE_CHECKING:
     from crosscheck import Diagnosis

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from crosscheck.cli.following import following
+from seecr.cli.following import following
 from seecr.cli.options import FILE, json_option
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from seecr.cli.following import following, given_with
 
 if TYPE_CHECKING:
     from crosscheck import Comparison, Diagnosis
@@ -14,24 +15,13 @@ _MODEL = "model.toml"
 # Rows that a plan chooses where nobody said how many.
 _ROWS = 40
 
-Words = tuple[object, ...]
-
-
-def following(*words: object) -> str:
-    """The line that names a command, as a shell takes it."""
-    return f"next: {shlex.join(str(word) for word in words)}"
-
-
-def _with(model: Path | None) -> Words:
-    return () if model is None else ("--model", model)
-
 
 def after_comparison(
     found: Comparison, robot: Path, data: Sequence[Path], model: Path | None
 ) -> str:
     """What is missing; where nothing is, what these data could not have shown, or using it."""
     if not found.is_noise:
-        return following("crosscheck", "diagnose", robot, *data, *_with(model))
+        return following("crosscheck", "diagnose", robot, *data, *given_with(None, model))
     if model is None:
         return following("crosscheck", "plan", robot, data[0])
     return following("seecr", "correct", robot, data[0], "--model", model)
@@ -62,7 +52,7 @@ def after_diagnosis(
 
 def after_fit(is_noise: bool, written: bool, robot: Path, data: Sequence[Path], model: Path) -> str:
     """Holding the new model against the data, or looking for what else is missing."""
-    there = _with(model) if written or model.exists() else ()
+    there = given_with(None, model) if written or model.exists() else ()
     verb = "compare" if is_noise and written else "diagnose"
     return following("crosscheck", verb, robot, *data, *there)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from crosscheck.cli.following import following
+from seecr.cli.following import following
 from seecr.cli.options import FILE, json_option, out_option
 
 

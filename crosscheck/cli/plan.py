@@ -7,9 +7,9 @@ from pathlib import Path
 
 import click
 
-from crosscheck.cli.choices import figures_in, figures_option, listed, made_by, sigma_option
+from crosscheck.cli.choices import figures_in, figures_option, listed, sigma_option
 from crosscheck.cli.following import after_plan
-from seecr.cli.options import FILE, json_option, out_option, progress_share
+from seecr.cli.options import FILE, json_option, made_by, out_option, progress_share
 
 
 @click.command(

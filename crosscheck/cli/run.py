@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from crosscheck.cli.following import following
+from seecr.cli.following import following
 from seecr.cli.options import (
     FILE,
     jobs_option,

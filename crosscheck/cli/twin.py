@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from crosscheck.cli.choices import sigma_option
-from crosscheck.cli.following import following
+from seecr.cli.following import following
 from seecr.cli.options import FILE, json_option, out_option, progress_bar
 
 if TYPE_CHECKING:

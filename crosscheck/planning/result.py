@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from crosscheck.fit.reasons import Reason
-from crosscheck.fit.words import belongs, shown
+from crosscheck.fit.words import belongs
 from crosscheck.planning.planned import Planned
 from crosscheck.planning.proposer import Suggestion
 from crosscheck.planning.visibility import LEVEL, POWER, Signal
+from crosscheck.units import in_unit, short
 from seecr.pose import Array
 from seecr.result import Record, Result
 
@@ -77,7 +78,9 @@ class Visible:
             null = float(item.metadata["null"])
             start = f"{null:g} ± " if null else ""
             each = " each" if len(keys) > 1 else ""
-            parts.append(f"{item.name} {start}{shown(sizes[keys[0]], unit)}{each}")
+            times, word = in_unit(unit)
+            size = short(times * sizes[keys[0]], 2)
+            parts.append(f"{item.name} {start}{size} {word}".strip() + each)
         return ", ".join(parts)
 
     def as_json(self) -> dict[str, Any]:

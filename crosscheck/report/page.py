@@ -7,10 +7,10 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from crosscheck.fit.problem import Problem, kinds_read
-from crosscheck.made import Made
 from crosscheck.report.glossary import with_glossary
 from crosscheck.units import short
 from seecr import __version__
+from seecr.made import Made
 
 
 def page_of(template: str, made: Made | None, **context: Any) -> str:

@@ -11,6 +11,7 @@ from rich.table import Table
 from crosscheck.add import Addition
 from crosscheck.fit.evidence import FALSE_ALARM
 from crosscheck.terminal.lines import console_for, print_parameters, rms_table, say
+from crosscheck.units import with_error
 
 _MOST = 12
 
@@ -48,7 +49,7 @@ def why_not(found: Addition) -> str:
     else:
         reason = (
             f"{found.name} does not predict runs left out any better (chi2 of a block falls by "
-            f"{mean:.3g} ± {error:.2g})"
+            f"{' ± '.join(with_error(mean, error))})"
         )
     return f"{reason}: it does not pay; --force adds it all the same"
 

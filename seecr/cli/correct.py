@@ -7,7 +7,8 @@ from pathlib import Path
 import click
 
 from seecr.cli.arguments import NumbersCommand, limit_options, model_at, robot_at, robot_options
-from seecr.cli.options import FILE, json_option, out_option
+from seecr.cli.following import following, given_with
+from seecr.cli.options import FILE, json_option, made_by, out_option
 
 
 @click.command(
@@ -83,7 +84,10 @@ def command(
         kept = None if own is None else kept_chance(machine, found.commands, own, **within)
         status = 0 if (found.found & found.solution.converged).all() else 3
         notes = [*(own.notes if own else ()), *wanted.notes]
-        document = {"exit_status": status, "notes": notes, **document_of(found, kept)}
+        made = made_by(machine.source, poses, model)
+        document = {
+            "made": made, "exit_status": status, "notes": notes, **document_of(found, kept)
+        }  # fmt: skip
         files = {
             "corrected.csv": corrected_csv(found, wanted),
             "corrected.toml": corrected_toml(wanted),
@@ -93,6 +97,8 @@ def command(
     if as_json:
         click.echo(json_text(document))
         return status
-    for line in [*notes, *found.lines(), *chance_lines(found, kept), f"Results in {out}/"]:
+    given = given_with(cable, model)
+    then = following("seecr", "sweep", robot, out / "corrected.csv", *given)
+    for line in [*notes, *found.lines(), *chance_lines(found, kept), f"Results in {out}/", then]:
         click.echo(line)
     return status

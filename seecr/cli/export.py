@@ -13,7 +13,8 @@ from seecr.cli.arguments import (
     robot_at,
     robot_options,
 )
-from seecr.cli.options import FILE, json_option
+from seecr.cli.following import following
+from seecr.cli.options import FILE, json_option, made_by
 
 
 @click.command(
@@ -57,8 +58,12 @@ def command(
     files = {out: found.text} | ({beside: found.mujoco_text} if found.mujoco_text else {})
     write_texts(files, "cannot write the MJCF")
     if as_json:
-        click.echo(json_text({"files": [str(path) for path in files], **found.as_json()}))
+        made = made_by(machine.source, model)
+        written = [str(path) for path in files]
+        click.echo(json_text({"made": made, "files": written, **found.as_json()}))
         return 0
-    for line in [*(own.notes if own else ()), *found.lines(out.name, beside.name)]:
+    place = [f"{value + 0.0:g}" for value in (coordinates or machine.reference_pose)[:3]]
+    then = following("seecr", "pose", out, *place)
+    for line in [*(own.notes if own else ()), *found.lines(out.name, beside.name), then]:
         click.echo(line)
     return 0

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from time import monotonic
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
+
+from seecr.cli.group import ARGUMENTS
+
+if TYPE_CHECKING:
+    from seecr.made import Made
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -58,6 +64,15 @@ seed_option = click.option(
     help="Of the random numbers.",
 )
 """``--seed N``, given to the command as ``seed``."""
+
+
+def made_by(*files: Path | None) -> Made:
+    """How the command that is running came to its result, from these files."""
+    from seecr.made import Made
+
+    ctx = click.get_current_context()
+    words = [ctx.find_root().info_name or "seecr", *ctx.meta.get(ARGUMENTS, [])]
+    return Made.now(shlex.join(words), files)
 
 
 @contextmanager

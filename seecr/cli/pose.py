@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import click
 
 from seecr.cli.arguments import NumbersCommand, model_at, pose_of, robot_at, robot_options
-from seecr.cli.options import FILE, json_option
+from seecr.cli.following import after_pose, given_with
+from seecr.cli.options import FILE, json_option, made_by
 
 if TYPE_CHECKING:
     from seecr import Barrier
@@ -74,6 +75,7 @@ def command(
     status = 0 if at_rest(solution) else 3
     notes = list(own.notes) if own else []
     document = {
+        "made": made_by(machine.source, model),
         "exit_status": status,
         "robot": machine.name,
         "cables": machine.cable_names,
@@ -104,6 +106,7 @@ def command(
         *pose_lines(solution, spread=spread),
         *cable_lines(solution, spread=spread),
         *other_lines(solution, others, passes),
+        after_pose(solution, robot, coordinates[3:], given_with(cable, model)),
     ]
     for line in [*notes, *lines]:
         click.echo(line)

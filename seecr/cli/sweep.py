@@ -16,7 +16,8 @@ from seecr.cli.arguments import (
     robot_options,
     turned_option,
 )
-from seecr.cli.options import FILE, json_option, out_option
+from seecr.cli.following import after_sweep, given_with
+from seecr.cli.options import FILE, json_option, made_by, out_option
 
 if TYPE_CHECKING:
     import numpy as np
@@ -99,6 +100,7 @@ def command(
         status = 0 if at_rest(solution) else 3
         notes = [*(own.notes if own else ()), *said]
         document = {
+            "made": made_by(machine.source, poses, model),
             "exit_status": status,
             "robot": machine.name,
             "cables": machine.cable_names,
@@ -120,7 +122,8 @@ def command(
         click.echo(text)
         return status
     lines = [*sweep_lines(solution, commanded, spread), *jump_lines(solution)]
-    for line in [*notes, *lines, f"Results in {out}/"]:
+    then = after_sweep(machine, commands, robot, poses, given_with(cable, model))
+    for line in [*notes, *lines, f"Results in {out}/", then]:
         click.echo(line)
     return status
 

@@ -16,7 +16,8 @@ from seecr.cli.arguments import (
     robot_options,
     turned_option,
 )
-from seecr.cli.options import json_option, out_option, progress_bar
+from seecr.cli.following import following
+from seecr.cli.options import json_option, made_by, out_option, progress_bar
 
 
 @click.command(
@@ -113,7 +114,10 @@ def command(
                 f"{np.inf if highest is None else highest:g} N balance the load at any of "
                 f"{total} poses; expected another grid, orientation or wider limits"
             )
-        text = json_text({"exit_status": 0, **document_of(found, at_least)})
+        text = json_text({
+            "made": made_by(machine.source, model), "exit_status": 0,
+            **document_of(found, at_least),
+        })  # fmt: skip
         write_text(folder / "map.json", text + "\n")
         write_arrays(folder / "map.npz", found)
         if figure != "none" and sum(len(axis) > 1 for axis in axes) > 1:
@@ -127,6 +131,9 @@ def command(
         click.echo(text)
         return 0
     lines = [*found.lines(), *likely_lines(found, at_least)]
-    for line in [*(own.notes if own else ()), *lines, f"Results in {out}/"]:
+    tensions = ("--lowest", lowest) if lowest else ()
+    most = () if highest is None else ("--highest", highest)
+    then = following("crosscheck", "plan", machine.source, "--rows", 40, *tensions, *most)
+    for line in [*(own.notes if own else ()), *lines, f"Results in {out}/", then]:
         click.echo(line)
     return 0

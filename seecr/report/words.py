@@ -12,6 +12,7 @@ from seecr.pose import Array, pose_difference, rxyz_from_quat
 from seecr.robot import Robot
 from seecr.solution import Solution, Status
 from seecr.uncertainty import Spread
+from seecr.units import short, with_error
 
 __all__ = [
     "at_rest",
@@ -47,8 +48,13 @@ def pose_lines(
     pose, away = solution.pose[i], solution.deviation[i]
     if not np.isfinite(pose).all():
         return
-    angles = _three(np.degrees(rxyz_from_quat(pose[3:])), ".3f")
-    yield f"rests at x y z {_three(1e3 * pose[:3], '.3f')} mm, turned rx ry rz {angles} deg"
+    place, angles = 1e3 * pose[:3], np.degrees(rxyz_from_quat(pose[3:]))
+    if spread is None:
+        at, turned = _three(place, ".3f"), _three(angles, ".3f")
+    else:
+        at = _known(place, 1e3 * spread.position[i])
+        turned = _known(angles, np.degrees(spread.rotation[i]))
+    yield f"rests at x y z {at} mm, turned rx ry rz {turned} deg"
     if spread is not None:
         yield from _spread_lines(spread, i)
     yield "  quaternion " + " ".join(f"{q + 0.0:.7f}" for q in np.round(pose[3:], 9))
@@ -72,8 +78,16 @@ def _spread_lines(spread: Spread, i: int) -> Iterator[str]:
 
 
 def _off(values: Array) -> str:
-    turned = _three(np.degrees(values[3:]), ".4f")
-    return f"± {_three(1e3 * values[:3], '.4f')} mm, ± {turned} deg about x y z"
+    moved, turned = (
+        ", ".join(short(value, 2) for value in part)
+        for part in (1e3 * values[:3], np.degrees(values[3:]))
+    )
+    return f"± {moved} mm, ± {turned} deg about x y z"
+
+
+def _known(values: Array, errors: Array) -> str:
+    """Three numbers with the digits that their standard errors leave them."""
+    return ", ".join(with_error(*pair)[0] for pair in zip(values + 0.0, errors, strict=True))
 
 
 def cable_lines(solution: Solution, i: int = 0, spread: Spread | None = None) -> Iterator[str]:
@@ -85,8 +99,11 @@ def cable_lines(solution: Solution, i: int = 0, spread: Spread | None = None) ->
     for k, name in enumerate(robot.cable_names):
         slack = "  slack" if solution.slack[i, k] else ""
         tension, rest = solution.tensions[i, k] + 0.0, solution.rest_lengths[i, k]
-        off = "" if spread is None else f"  {spread.tensions[i, k]:9.4f}"
-        yield f"{name:<{wide}}  {tension:11.4f}{off}  {rest:15.6f}{slack}"
+        shown, off = f"{tension:.4f}", ""
+        if spread is not None:
+            shown, error = with_error(tension, spread.tensions[i, k])
+            off = f"  {error:>9}"
+        yield f"{name:<{wide}}  {shown:>11}{off}  {rest:15.6f}{slack}"
 
 
 def stiffness_lines(solution: Solution, i: int = 0) -> Iterator[str]:
@@ -223,13 +240,13 @@ def sweep_lines(
         lines.append(f"poses by number of slack cables: {', '.join(parts)}")
     if spread is not None and len(counts):
         position, turned = (
-            float(np.nanmax(np.linalg.norm(part, axis=1)))
-            for part in (spread.position, spread.rotation)
+            short(factor * float(np.nanmax(np.linalg.norm(part, axis=1))), 2)
+            for factor, part in ((1e3, spread.position), (np.degrees(1.0), spread.rotation))
         )
+        pulls = short(float(np.nanmax(spread.tensions)), 2)
         lines.append(
-            f"off by up to ± {1e3 * position:.3g} mm and ± {np.degrees(turned):.3g} deg, "
-            f"± {np.nanmax(spread.tensions):.3g} N: one standard deviation, by what the model does "
-            "not know"
+            f"off by up to ± {position} mm and ± {turned} deg, ± {pulls} N: one standard "
+            "deviation, by what the model does not know"
         )
     return lines
 

@@ -18,6 +18,7 @@ from seecr.report.rows import csv_text, rows_of
 from seecr.report.words import cable_lines, pose_lines, sweep_lines
 from seecr.shipped import model_path
 from seecr.uncertainty import covariance_of, spread_of
+from seecr.units import with_error
 
 ROBOT = load_robot(model_path("demobot_cogiro"))
 POSES = np.array([[0.3, 0.2, 0.1, 1, 0, 0, 0], [0.5, 0.3, 0.2, 1, 0, 0, 0]])
@@ -124,9 +125,12 @@ def test_it_is_printed_and_written(tmp_path: Path) -> None:
     assert spread is not None
     lines = list(pose_lines(found, spread=spread))
     assert lines[2].startswith("  ± 0.00") and lines[2].endswith("by what the model does not know")
-    assert lines[3].startswith("  ± 10.0") and lines[3].endswith("would read it")
+    assert lines[3].startswith("  ± 10, ") and lines[3].endswith("would read it")
     head, first = list(cable_lines(found, spread=spread))[:2]
-    assert "± [N]" in head and f"{spread.tensions[0, 0]:.4f}" in first
+    value, error = with_error(found.tensions[0, 0], spread.tensions[0, 0])
+    assert "± [N]" in head and first.split()[1:3] == [value, error]
+    x, error = with_error(1e3 * found.pose[0, 0], 1e3 * spread.position[0, 0])
+    assert f"rests at x y z {x}, " in lines[1] and f"± {error}" in lines[2]
     assert sweep_lines(found, spread=spread)[-1].startswith("off by up to ± 0.")
     rows = rows_of(found, spread=spread)
     assert rows[1]["position_stderr_m"] == spread.position[1].tolist()

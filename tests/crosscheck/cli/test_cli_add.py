@@ -94,6 +94,7 @@ def test_json_and_out(both, tmp_path):
     result = add("pulley_radius", both, tmp_path / "m.toml", "--json", "--out", tmp_path / "o")
     document = json.loads(result.stdout)
     assert document == json.loads((tmp_path / "o" / "add.json").read_text())
+    assert set(document["made"]["sha256"]) == {"robot.xml", "measured.csv", "measured.toml"}
     assert document["written"] is True
     radius = document["effects"]["pulley_radius"]["radius_m"]
     assert radius["unit"] == "m" and radius["at_bound"] is False

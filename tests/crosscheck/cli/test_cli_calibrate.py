@@ -37,6 +37,7 @@ def test_all_at_once_the_error_falls_to_the_noise_and_the_model_can_be_used(
     assert result.exit_code == 0, result.output
     assert "on runs left out" in result.stdout and f"Written to {model}" in result.stdout
     found = json.loads((tmp_path / "out" / "calibration.json").read_text())
+    assert set(found["made"]["sha256"]) == {"robot.xml", "measured.csv", "measured.toml"}
     assert found["settled"] and found["improves_held_out"]
     assert found["before"]["position_rms_m"] > 10 * SIGMA.position_m
     assert found["held_out"]["position_rms_m"] < 1.5 * SIGMA.position_m

@@ -209,7 +209,7 @@ def test_poses_near_slack_are_flagged():
 def test_sizes_are_words_in_millimetres(plan):
     assert effect(plan, "pulley_radius").words(1.0).startswith("radius ")
     assert effect(plan, "pulley_radius").words(1.0).endswith(" mm")
-    assert effect(plan, "stiffness").words(1.0) == "factor 1 ± 0.3"
+    assert effect(plan, "stiffness").words(1.0) == "factor 1 ± 0.30"
     assert " deg each" in effect(plan, "tracker_frame").words(1.0)
     assert effect(plan, "hysteresis").words(1.0).endswith(" N")
     assert effect(plan, "stiffness").words(np.inf) == "none"

@@ -11,8 +11,8 @@ from made_data import case, run, term
 from written_pages import figures_of, text_of
 
 import crosscheck
-from crosscheck.made import Made
 from crosscheck.report.write import render
+from seecr.made import Made
 
 ONLY = {"pulley_radius": {"radius_m": 0.01}}
 

@@ -1,0 +1,87 @@
+"""Each command of seecr names the next one, which runs as it is said; each JSON says its making."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shlex
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from crosscheck.cli import main as crosscheck_main
+from seecr.cli import main as seecr_main
+from seecr.shipped import model_path
+
+QUIET = ("--figure", "none", "--no-recording")
+COGIRO = model_path("demobot_cogiro")
+
+
+def run(program: str, *args: object) -> Result:
+    main = {"seecr": seecr_main, "crosscheck": crosscheck_main}[program]
+    return CliRunner().invoke(main, [str(a) for a in args], prog_name=program)
+
+
+def following(result: Result) -> list[str]:
+    assert result.exit_code == 0, result.output
+    line = result.stdout.splitlines()[-1]
+    assert line.startswith("next: "), result.stdout
+    return shlex.split(line)[1:]
+
+
+def test_from_a_pose_to_a_workspace_to_a_plan(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    place = ("0.3", "0.2", "0.15")
+    told = following(run("seecr", "pose", "demobot_cogiro", *place, "--alone", "--cable", "3000"))
+    line = ["--line", "0.4", "0.25", "0.15", *place]
+    assert told == ["seecr", "sweep", "demobot_cogiro", *line, "--cable", "3000"]
+    told = following(run(*told, "--count", 2, *QUIET))
+    assert told == ["seecr", "map", "demobot_cogiro", "--cable", "3000"]
+    grid = ("--grid", "0.4", "0.25", "0.1:0.15:2", "--no-elastic", "--highest", "40")
+    told = following(run(*told, *grid, *QUIET))
+    assert told == ["crosscheck", "plan", str(COGIRO), "--rows", "40", "--highest", "40.0"]
+
+
+def test_from_wanted_poses_to_what_is_told_and_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("my poses.csv").write_text("cmd_x_m,cmd_y_m,cmd_z_m\n0.4,0.25,0.1\n0.42,0.25,0.1\n")
+    Path("m.toml").write_text("format = 1\n")
+    model = ["--model", "m.toml"]
+    told = following(run("seecr", "sweep", "demobot_cogiro", "my poses.csv", *model, *QUIET))
+    assert told == ["seecr", "correct", "demobot_cogiro", "my poses.csv", *model]
+    told = following(run(*told))
+    corrected = "seecr-correction/corrected.csv"
+    assert told == ["seecr", "sweep", "demobot_cogiro", corrected, *model]
+    told = following(run(*told, *QUIET))
+    assert told == ["crosscheck", "plan", str(COGIRO), corrected]
+    told = following(run("seecr", "export", "demobot_cogiro", "out.xml"))
+    assert told == ["seecr", "pose", "out.xml", "0.4", "0.25", "0.15"]
+    assert following(run(*told, "--alone"))[:3] == ["seecr", "map", "out.xml"]
+    for name in ("seecr-correction/correction.json", "seecr-sweep/sweep.json"):
+        made = json.loads(Path(name).read_text())["made"]
+        assert made["command"].startswith("seecr ") and "--model m.toml" in made["command"]
+        assert made["sha256"]["m.toml"] == hashlib.sha256(b"format = 1\n").hexdigest()[:16]
+        assert COGIRO.name in made["sha256"] and len(made["sha256"]) >= 3
+
+
+@pytest.mark.parametrize(
+    "args",
+    [
+        ("pose", "demobot_cogiro", "0.4", "0.25", "0.1", "--alone"),
+        ("map", "demobot_cogiro", "--grid", "0.4", "0.25", "0.1:0.15:2", "--no-elastic", *QUIET),
+        ("export", "demobot_cogiro", "out.xml"),
+    ],
+    ids=lambda args: args[0],
+)
+def test_each_json_says_how_it_was_made(
+    args: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    made = json.loads(run("seecr", *args, "--json").stdout)["made"]
+    assert made["command"] == shlex.join(["seecr", *args, "--json"])
+    assert list(made["sha256"]) == [COGIRO.name] and made["version"] and made["date"]
