@@ -27,6 +27,7 @@ bench: ## how fast it is, one process at a time
 	$(BIN)/python -m pytest -m benchmark -n 0 -s
 
 docs: ## write the pages and pictures made from the sources, and build the site: build/site/index.html
+	$(BIN)/python scripts/draw_effects.py
 	$(BIN)/python scripts/make_effects.py
 	$(BIN)/python scripts/make_api.py
 	$(BIN)/python scripts/draw_floors.py

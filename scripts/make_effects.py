@@ -8,6 +8,7 @@ A test runs :func:`with_tables` and goes red where a table is out of date.
 from __future__ import annotations
 
 import inspect
+import json
 import sys
 from dataclasses import fields
 from pathlib import Path
@@ -18,6 +19,7 @@ from seecr.effects import BUILT_IN, PLACES, Effect
 from seecr.setup import QUANTITIES, History
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "effects.md"
+NUMBERS = PAGE.parent / "pictures" / "effects" / "numbers.json"
 _SIZES = {"one": "", "cable": ", one per cable", "vector": ", x y z", "point": ", x y z per cable"}
 
 
@@ -36,7 +38,7 @@ def quantities() -> str:
 
 
 def effects() -> str:
-    """One Markdown table per place: name, parameters, and the effect's own docstring."""
+    """One Markdown table per place: name, parameters, own docstring; then their pictures."""
     lines = []
     for place in PLACES:
         lines += [f"### {place}", "", "| effect | parameters | what it is |", "|---|---|---|"]
@@ -44,6 +46,7 @@ def effects() -> str:
             if effect.place == place:
                 lines.append(f"| `{effect.name}` | {_parameters(effect)} | {_words(effect)} |")
         lines.append("")
+        lines += [_picture(effect) for effect in BUILT_IN if effect.place == place]
     return "\n".join(lines)
 
 
@@ -71,6 +74,18 @@ def _parameters(effect: type[Effect]) -> str:
             notes.append("shapes the others")
         parts.append(f"`{item.name}` ({'; '.join(notes)})")
     return "<br>".join(parts)
+
+
+def _picture(effect: type[Effect]) -> str:
+    """What it does to a sweep, drawn by draw_effects.py, and in words."""
+    found = json.loads(NUMBERS.read_text(encoding="utf-8"))[effect.name]
+    size = "at its plausible size" if found["times"] == 1 else "at ten times its plausible size"
+    kinds = (("position_mm", "mm"), ("orientation_deg", "°"), ("tension_N", "N"))
+    most = " and ".join(f"{found[k]:.2g} {unit}" for k, unit in kinds if k in found)
+    most = most.replace(" °", "°")
+    said = f"**`{effect.name}`** {size} on `{found['robot']}`: up to {most}."
+    drawn = f"pictures/effects/{effect.name}.svg"
+    return f"{said}\n\n![What {effect.name} does to a sweep along x]({drawn})\n"
 
 
 def _words(effect: type[Effect]) -> str:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
+import draw_effects
 import draw_floors
 import make_api
 import make_effects
@@ -42,6 +44,20 @@ def test_the_page_about_effects_is_current() -> None:
     assert make_effects.with_tables(page) == page, AGAIN
     assert all(f"| `{effect.name}` |" in page for effect in BUILT_IN)
     assert all(f"| `{name}` |" in page for name in QUANTITIES)
+
+
+def test_the_pictures_of_effects_are_current() -> None:
+    """By their numbers: drawn lines differ in the last digit from machine to machine."""
+    folder = draw_effects.FOLDER
+    drawn = json.loads(draw_effects.NUMBERS.read_text(encoding="utf-8"))
+    for name, now in draw_effects.numbers().items():
+        assert drawn[name].keys() == now.keys(), AGAIN
+        for key, value in now.items():
+            same = value == drawn[name][key]
+            assert same or value == pytest.approx(drawn[name][key], rel=2e-3, abs=1e-4), AGAIN
+    pictures = {path.stem: path.stat().st_size for path in folder.glob("*.svg")}
+    assert pictures.keys() == drawn.keys() == {effect.name for effect in BUILT_IN}
+    assert max(pictures.values()) < 30_000
 
 
 def test_the_page_of_public_names_is_current() -> None:
