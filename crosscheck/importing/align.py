@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.fit.registration import turn_of_points
-from crosscheck.importing.dwells import mean_rotation
+from crosscheck.measurements.dwells import mean_rotation
 from seecr.pose import Array, quat_conjugate, quat_multiply, quat_rotate
 
 # What is left may be this part of the spread of the points, and of named points.

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from crosscheck.importing.logged import Stream
+from crosscheck.measurements.dwells import mean_error, mean_rotation
 from seecr.pose import Array
 
 REST_FOR = 0.5
@@ -20,8 +21,8 @@ _WINDOW = 0.1
 # At rest: slower than this many times the speed that noise feigns, or this part of the usual
 # speed on the way.
 _NOISE, _PART = 6.0, 0.01
-# Least samples of a dwell, and parts into which one is cut to see how sure its mean is.
-LEAST, _PARTS = 5, 5
+# Least samples of a dwell.
+LEAST = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,11 +191,6 @@ def _averaged(stream: Stream, bounds: list[tuple[int, int]], limit: float) -> Dw
     )
 
 
-def mean_rotation(quat: Array) -> Array:
-    """The rotation (4,) in the middle of others (n, 4) (Markley et al. 2007, by SciPy)."""
-    return np.asarray(Rotation.from_quat(quat, scalar_first=True).mean().as_quat(scalar_first=True))
-
-
 def _about(quat: Array, mean: Array) -> Array:
     """Rotation vectors (n, 3) [rad] of rotations about their mean."""
     middle = Rotation.from_quat(mean, scalar_first=True)
@@ -203,14 +199,3 @@ def _about(quat: Array, mean: Array) -> Array:
 
 def _rms(values: Array) -> float:
     return float(np.sqrt(np.sum(values**2) / (max(len(values) - 1, 1) * values.shape[1])))
-
-
-def mean_error(values: Array) -> float:
-    """Standard error of the mean of rows (n, k), by coordinate.
-
-    From the means of a few parts (batch means), so that samples which go together count for
-    fewer than they are.
-    """
-    parts = np.array_split(values, min(_PARTS, len(values)))
-    means = np.array([part.mean(axis=0) for part in parts])
-    return float(np.sqrt(np.mean(np.var(means, axis=0, ddof=1)) / len(parts)))

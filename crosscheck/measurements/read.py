@@ -16,6 +16,7 @@ import numpy as np
 from crosscheck.given import GivenRobot, robot_of
 from crosscheck.measurements.beside import Beside, read_beside
 from crosscheck.measurements.data import Measurements
+from crosscheck.measurements.dwells import averaged_dwells
 from crosscheck.measurements.notice import notice
 from crosscheck.measurements.together import together
 from seecr.columns.known import POSITION, Columns, know_columns
@@ -81,8 +82,9 @@ def load_commands(
 
 
 def measurements_of(given: GivenData, robot: Robot) -> Measurements:
-    """The measurements, read if need be."""
-    return given if isinstance(given, Measurements) else load_measurements(given, robot)
+    """The measurements, read if need be, with the dwells of long logs averaged."""
+    whole = given if isinstance(given, Measurements) else load_measurements(given, robot)
+    return averaged_dwells(whole)
 
 
 def commands_of(given: Measurements | str | Path, robot: Robot) -> Measurements:

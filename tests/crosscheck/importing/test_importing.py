@@ -14,9 +14,10 @@ from scipy.spatial.transform import Rotation
 import crosscheck
 from crosscheck.importing import import_case
 from crosscheck.importing.choices import Choices
-from crosscheck.importing.dwells import find_dwells, mean_error
+from crosscheck.importing.dwells import find_dwells
 from crosscheck.importing.logged import Logged, Stream
 from crosscheck.importing.markers import aligning, body_of_markers
+from crosscheck.measurements.dwells import mean_error
 from seecr.pose import quat_rotate, rotvec_from_quat
 
 ROBOT = soft_cogiro()
