@@ -69,15 +69,17 @@ CHANGES = (lens, swaying_floor, rubbing, bumped_tracker, wavy_target)
 # The search takes longest where it is led furthest astray: those run in a sweep.
 ALONE = [(change, "cogiro") for change in CHANGES] + [
     (bumped_tracker, "parallel"),
-    (wavy_target, "parallel"),
+    pytest.param(wavy_target, "parallel", marks=pytest.mark.sweep),
     pytest.param(lens, "parallel", marks=pytest.mark.sweep),
     pytest.param(rubbing, "parallel", marks=pytest.mark.sweep),
     pytest.param(swaying_floor, "parallel", marks=pytest.mark.sweep),
 ]
 BESIDE = [
     swaying_floor,
-    bumped_tracker,
-    *(pytest.param(change, marks=pytest.mark.sweep) for change in (lens, rubbing, wavy_target)),
+    *(
+        pytest.param(change, marks=pytest.mark.sweep)
+        for change in (bumped_tracker, lens, rubbing, wavy_target)
+    ),
 ]
 
 

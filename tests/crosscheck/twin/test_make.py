@@ -235,9 +235,16 @@ def test_null_twins_leave_white_noise(robot, seed):
     assert np.all(np.abs(left.mean(axis=0)) * np.sqrt(len(left)) < 4.5)
 
 
+# Each effect on one of the two robots; on both in a sweep.
+EXPLAINED = [
+    pytest.param(robot, name, marks=() if (k + turn) % 2 else pytest.mark.sweep)
+    for k, name in enumerate(FAST)
+    for turn, robot in enumerate(("demobot_cogiro", "demobot_parallel"))
+]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("robot", ["demobot_cogiro", "demobot_parallel"])
-@pytest.mark.parametrize("name", FAST)
+@pytest.mark.parametrize(("robot", "name"), EXPLAINED)
 def test_what_is_hidden_explains_the_readings(robot, name):
     twin = make_twin(model_path(robot), 21, effects=(name,), points=POINTS, tensions=True)
     assert is_noise(residuals(twin))
