@@ -16,8 +16,10 @@ from seecr.recording.stream import Recording
 
 ROOT = "bars"
 # The drawing is 100 wide; y points down, one row per model.
-_LEFT, _RIGHT, _ROW, _HEAD = 27.0, 80.0, 4.2, 5.0
+_LEFT, _RIGHT, _ROW, _HEAD = 31.0, 82.0, 4.4, 5.6
 _DIM, _LABEL = 0.45, 2.2
+# Points of the screen for one part of the drawing, of the title, of a column; most of a column.
+_POINTS, _TITLE, _COLUMN, _MOST = 5.2, 32.0, 1010.0, 0.6
 
 
 def write_bars(
@@ -32,13 +34,26 @@ def write_bars(
 def view(found: Diagnosis, stages: list[Stage]) -> rrb.Spatial2DView:
     """The bars' view."""
     assert found.search is not None
-    height = len(kinds_read(found.search.problem)) * _block_height(len(stages))
+    height = _height(found, stages)
     return rrb.Spatial2DView(
         name="rms error on runs left out, logarithmic; the line is the noise",
         origin=ROOT,
         background=rrb.Background(color=layout.GROUND),
         visual_bounds=rrb.VisualBounds2D(x_range=(0.0, 100.0), y_range=(-1.0, height)),
     )
+
+
+def share(found: Diagnosis, stages: list[Stage]) -> float:
+    """Height over that of a column in a window of 1080 points, so that labels have room.
+
+    The viewer's letters keep their size whatever the drawing's is.
+    """
+    return min((_POINTS * _height(found, stages) + _TITLE) / _COLUMN, _MOST)
+
+
+def _height(found: Diagnosis, stages: list[Stage]) -> float:
+    assert found.search is not None
+    return len(kinds_read(found.search.problem)) * _block_height(len(stages))
 
 
 def _block_height(rows: int) -> float:

@@ -16,7 +16,7 @@ from seecr.recording.colours import COMMAND, MUJOCO, SEECR
 from seecr.recording.scene import LEGEND, Scene, write_legend
 from seecr.recording.stream import (
     Recording,
-    pose_index,
+    opening,
     recording_file,
     settling_index,
 )
@@ -40,9 +40,9 @@ def write_case_recording(result: CaseResult, path: str | Path) -> None:
         _draw_scene(recording, material)
         write_legend(recording, material.top)
         series = Series(recording, material)
-        series.over_poses(pose_index(material.count))
+        series.over_poses(material.index)
         panels = Panels(recording, material)
-        panels.over_poses(pose_index(material.count))
+        panels.over_poses(material.index)
         if material.motion is not None:
             over_time = settling_index(material.motion.t_s)
             series.over_settling(over_time)
@@ -70,13 +70,14 @@ def blueprint(material: Material) -> rrb.Blueprint:
             column_shares=[5, 4, 2.6],
         ),
         playback_speed=material.playback_speed,
+        timeline=opening(material.index),
     )
 
 
 def _draw_scene(recording: Recording, material: Material) -> None:
     scene = Scene(recording, material.robot, material.seen, material.top)
-    scene.surroundings(material.labels)
-    index = pose_index(material.count)
+    scene.surroundings()
+    index = material.index
     scene.platform("command", index, material.command, COMMAND)
     scene.platform("seecr", index, material.seecr.pose, SEECR, solid=True)
     scene.platform("mujoco", index, material.mujoco.pose, MUJOCO)

@@ -17,7 +17,7 @@ from crosscheck.recording.misfit import MEASURED, Misfit
 from crosscheck.units import in_unit, short
 from seecr.recording import colours, layout, plots, shapes
 from seecr.recording.scene import Scene
-from seecr.recording.stream import Recording, pose_index, recording_file
+from seecr.recording.stream import Index, Recording, pose_index, recording_file
 
 if TYPE_CHECKING:
     from crosscheck.comparison.result import Comparison
@@ -48,7 +48,7 @@ def write_comparison_recording(found: Comparison, path: str | Path) -> None:
     with recording_file(path, name, _blueprint(found, shown, name, seen)) as recording:
         top = colours.round_up(float(np.nanmax(found.state.prediction.tensions, initial=0.0)))
         scene = Scene(recording, problem.robot, seen, top)
-        scene.surroundings(plots.short_names(problem.robot.cable_names))
+        scene.surroundings()
         _over_poses(recording, scene, found, shown)
         _verdict(recording, found, shown)
 
@@ -94,7 +94,7 @@ def _over_poses(recording: Recording, scene: Scene, found: Comparison, shown: Mi
     recording.rows("text/now", index, rr.TextDocument.columns(text=texts, media_type=kinds))
 
 
-def _plots(recording: Recording, index: rr.TimeColumn, found: Comparison, kind: Kind) -> None:
+def _plots(recording: Recording, index: Index, found: Comparison, kind: Kind) -> None:
     """The errors of one kind, reading by reading, over the poses."""
     names, _units = channels(found.problem)
     counted = found.problem.counted[:, kind.columns]
@@ -104,9 +104,9 @@ def _plots(recording: Recording, index: rr.TimeColumn, found: Comparison, kind: 
         if not counted[:, k].any():
             continue
         entity = f"plot/{kind.name}/reading_{k + 1}"
-        recording.scalars(entity, index, raw[:, k])
         colour = (int(shade[0]), int(shade[1]), int(shade[2]), 255)
-        plots.as_line(recording, entity, name, colour, 1.5)
+        starts = found.problem.experiment.commands.starts
+        plots.line_by_runs(recording, entity, index, raw[:, k], starts, name, colour, 1.5)
 
 
 def _verdict(recording: Recording, found: Comparison, shown: Misfit | None) -> None:

@@ -47,7 +47,7 @@ def write_diagnosis_recording(found: Diagnosis, path: str | Path) -> None:
     shown = Misfit(found.search.problem, stages[0].state)
     with recording_file(path, _name(found), _blueprint(found, stages, shown)) as recording:
         scene = Scene(recording, shown.problem.robot, _seen(shown), _top_tension(stages))
-        scene.surroundings(plots.short_names(shown.problem.robot.cable_names))
+        scene.surroundings()
         _over_steps(recording, scene, found, stages, shown)
         _over_poses(recording, scene, stages, shown)
         document = rr.TextDocument(verdict_words(found, shown), media_type=_MARKDOWN)
@@ -79,6 +79,7 @@ def _top_tension(stages: list[Stage]) -> float:
 def _blueprint(found: Diagnosis, stages: list[Stage], shown: Misfit) -> rrb.Blueprint:
     low, high = shapes.extent(shown.problem.robot, _seen(shown))
     robot = shown.problem.robot
+    low_part = bars.share(found, stages)
     middle = [*misfit.map_views(shown), bars.view(found, stages)]
     plotted = [
         layout.plot(f"{kind.name.capitalize()} error [{kind.unit}]", [f"plot/{kind.name}/**"])
@@ -90,7 +91,10 @@ def _blueprint(found: Diagnosis, stages: list[Stage], shown: Misfit) -> rrb.Blue
             rrb.Tabs(*plotted),
             row_shares=[3.0, 1.3],
         ),
-        rrb.Vertical(*middle, row_shares=[*[2.0] * len(shown.kinds), 1.7]),
+        rrb.Vertical(
+            *middle,
+            row_shares=[*[(1.0 - low_part) / len(shown.kinds)] * len(shown.kinds), low_part],
+        ),
         rrb.Vertical(
             layout.text("Verdict", "text/verdict"),
             layout.text("Now", "text/now"),
@@ -146,10 +150,10 @@ def _plots(
     for k, stage in enumerate(stages):
         entity = f"plot/{kind.name}/model_{k}"
         sizes = kind.sizes(shown.problem, stage.state.raw) * kind.factor
-        recording.scalars(entity, index, sizes)
         shade = colours.VERMILION if k == 0 else _BETWEEN[(k - 1) % len(_BETWEEN)]
         shade = colours.SKY if 0 < k == len(stages) - 1 else shade
-        plots.as_line(recording, entity, stage.label, shade, 1.5)
+        starts = shown.problem.experiment.commands.starts
+        plots.line_by_runs(recording, entity, index, sizes, starts, stage.label, shade, 1.5)
     entity = f"plot/{kind.name}/left_out"
     steps = rr.TimeColumn(MODEL_STEP, sequence=range(len(stages)))
     rms = [kind.factor * (stage.step.held_out.rms[kind.key] or 0.0) for stage in stages]

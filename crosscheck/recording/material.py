@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+import rerun as rr
 from numpy.typing import NDArray
 
 from crosscheck.settle.physics import Physics
@@ -14,8 +15,9 @@ from crosscheck.settle.settler import Settler, Settling
 from crosscheck.suite.agreement import Differences
 from crosscheck.suite.verdicts import Verdict
 from seecr.pose import Array, pose_difference
-from seecr.recording import colours, plots
+from seecr.recording import colours
 from seecr.recording.shapes import States
+from seecr.recording.stream import sweep_index
 from seecr.robot import Robot
 from seecr.solution import Status
 
@@ -81,15 +83,15 @@ class Material:
         """Number of poses n."""
         return len(self.command)
 
+    @cached_property
+    def index(self) -> list[rr.TimeColumn]:
+        """The timelines over the poses."""
+        return sweep_index(self.command)
+
     @property
     def is_sweep(self) -> bool:
         """Whether the poses follow each other along a line."""
         return self.result.case.kind == "sweep"
-
-    @cached_property
-    def labels(self) -> list[str]:
-        """Names of the cables without what all have in common in front."""
-        return plots.short_names(self.robot.cable_names)
 
     @cached_property
     def seecr(self) -> States:

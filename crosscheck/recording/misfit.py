@@ -12,17 +12,17 @@ from numpy.typing import NDArray
 from crosscheck.diagnosis.steps import drawn, magnification, views_of
 from crosscheck.fit.problem import POSITION, Kind, Problem, kinds_read
 from crosscheck.fit.state import State
+from crosscheck.recording.axes import bounds, draw_axes
 from seecr.pose import Array, quat_from_rxyz, rxyz_from_quat
 from seecr.recording import colours, layout
 from seecr.recording.shapes import States
-from seecr.recording.stream import Recording
+from seecr.recording.stream import Index, Recording
 
 MEASURED: colours.Rgba = colours.MUJOCO
 # Top of a colour scale: this percentile of the errors.
 _LARGEST = 95.0
 # Radii of arrows over the robot's size, of dots in points of the screen.
 _ARROW, _DOT, _RING, _THIN = 0.0021, 5.0, 9.0, 0.8
-_MARGIN = 0.14
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +115,7 @@ def worst_row(misfit: Misfit) -> int:
 
 
 def arrows(
-    recording: Recording, index: rr.TimeColumn, misfit: Misfit, states: list[State], size: float
+    recording: Recording, index: Index, misfit: Misfit, states: list[State], size: float
 ) -> None:
     """At each time the errors of one model: arrows of position, or dots where none was read."""
     rows, place = misfit.rows, misfit.place
@@ -141,9 +141,12 @@ def _vectors(misfit: Misfit, state: State) -> Array:
     return misfit.magnify * np.where(counted, state.raw[:, POSITION], 0.0)
 
 
-def maps(recording: Recording, index: rr.TimeColumn, misfit: Misfit, states: list[State]) -> None:
+def maps(recording: Recording, index: Index, misfit: Misfit, states: list[State]) -> None:
     """A map a kind of reading, its dots coloured by the error."""
     rows = misfit.rows
+    for kind in misfit.kinds:
+        words = f"{misfit.top(kind):g} {kind.unit}"
+        draw_axes(recording, f"map/{kind.name}", _flat(misfit, misfit.place)[rows], words)
     points = np.tile(_flat(misfit, misfit.place)[rows], (len(states), 1))
     count = [len(rows)] * len(states)
     for kind in misfit.kinds:
@@ -161,7 +164,7 @@ def maps(recording: Recording, index: rr.TimeColumn, misfit: Misfit, states: lis
             recording.always(f"map/{kind.name}/arrows", style)
 
 
-def cursor(recording: Recording, index: rr.TimeColumn, misfit: Misfit) -> None:
+def cursor(recording: Recording, index: Index, misfit: Misfit) -> None:
     """A ring around the dot of the row under the cursor, on every map."""
     points = _flat(misfit, misfit.place)
     radius = _on_screen(_RING)
@@ -186,22 +189,22 @@ def _flat(misfit: Misfit, vectors: Array) -> Array:
 def map_views(misfit: Misfit) -> list[rrb.Spatial2DView]:
     """The maps' views."""
     points = _flat(misfit, misfit.place)[misfit.rows]
-    low, high = points.min(axis=0), points.max(axis=0)
-    margin = _MARGIN * float(np.max(high - low))
-    plane = "".join("xyz"[k] for k in views_of(misfit.place[misfit.rows])[0])
+    across, down = bounds(points)
+    plane = ", ".join("xyz"[k] for k in views_of(misfit.place[misfit.rows])[0])
     return [
         rrb.Spatial2DView(
-            name=f"{kind.name.capitalize()} error over {plane}: yellow is {misfit.top(kind):g} "
-            f"{kind.unit} or more",
+            name=f"{kind.name.capitalize()} error [{kind.unit}] over {plane} [m]"
+            f"{_arrow_words(misfit, kind)}",
             origin=f"map/{kind.name}",
             background=rrb.Background(color=layout.GROUND),
-            visual_bounds=rrb.VisualBounds2D(
-                x_range=(low[0] - margin, high[0] + margin),
-                y_range=(low[1] - margin, high[1] + margin),
-            ),
+            visual_bounds=rrb.VisualBounds2D(x_range=across, y_range=down),
         )
         for kind in misfit.kinds
     ]
+
+
+def _arrow_words(misfit: Misfit, kind: Kind) -> str:
+    return f", arrows {drawn(misfit.magnify)}" if kind.name == "position" and misfit.magnify else ""
 
 
 def words_of(misfit: Misfit) -> str:

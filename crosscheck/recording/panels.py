@@ -10,7 +10,7 @@ from crosscheck.recording import words
 from crosscheck.recording.material import Material
 from crosscheck.suite.verdicts import Verdict
 from seecr.pose import pose_difference
-from seecr.recording.stream import Recording
+from seecr.recording.stream import Index, Recording, opening
 
 READ_ME, NOW = "text/read_me", "text/now"
 _LISTED = 12
@@ -31,13 +31,13 @@ class Panels:
     def __init__(self, recording: Recording, material: Material) -> None:
         self.recording, self.material = recording, material
 
-    def over_poses(self, index: rr.TimeColumn) -> None:
+    def over_poses(self, index: Index) -> None:
         """The guide, and the numbers of each pose."""
         document = rr.TextDocument(self._guide(), media_type=_MARKDOWN)
         self.recording.always(READ_ME, document)
         self._texts(index, [self._pose(i) for i in range(self.material.count)])
 
-    def over_settling(self, index: rr.TimeColumn) -> None:
+    def over_settling(self, index: Index) -> None:
         """The numbers of each instant of the settling."""
         material, motion = self.material, self.material.motion
         assert motion is not None
@@ -50,7 +50,7 @@ class Panels:
         ]
         self._texts(index, texts)
 
-    def _texts(self, index: rr.TimeColumn, texts: list[str]) -> None:
+    def _texts(self, index: Index, texts: list[str]) -> None:
         kinds = [str(_MARKDOWN)] * len(texts)
         columns = rr.TextDocument.columns(text=texts, media_type=kinds)
         self.recording.rows(NOW, index, columns)
@@ -71,6 +71,7 @@ class Panels:
             self._worst(),
             self._findings(),
             lines=material.is_sweep,
+            along=opening(material.index),
         )
 
     def _findings(self) -> list[str]:
@@ -115,5 +116,5 @@ class Panels:
         return head + words.table(rows)
 
     def _loose(self, which: NDArray[np.bool_]) -> str:
-        names = self.material.labels
+        names = self.material.robot.cable_names
         return ", ".join(n for n, yes in zip(names, which, strict=True) if yes) or "none"

@@ -12,7 +12,7 @@ from crosscheck.suite.verdicts import UNSOLVED, Verdict
 from seecr.pose import Array, pose_difference
 from seecr.recording import colours, layout, plots
 from seecr.recording.colours import Rgba
-from seecr.recording.stream import Recording
+from seecr.recording.stream import Index, Recording
 
 DEVIATION, TILT, TENSION = "plot/deviation", "plot/tilt", "plot/tension"
 DIFFERENCE, SETTLED, LIMIT = "plot/difference", "plot/plain_settling", "plot/limit"
@@ -63,7 +63,7 @@ class Series:
             ),
         ]
 
-    def over_poses(self, index: rr.TimeColumn) -> None:
+    def over_poses(self, index: Index) -> None:
         """Both physics at every pose, their difference and its limits."""
         material = self.material
         for who, states in (("seecr", material.seecr), ("mujoco", material.mujoco)):
@@ -77,7 +77,7 @@ class Series:
         _verdict_style(self.recording)
         self._style()
 
-    def over_settling(self, index: rr.TimeColumn) -> None:
+    def over_settling(self, index: Index) -> None:
         """MuJoCo on its way, and how far it still is from SEECR's answer."""
         material, i = self.material, self.material.watched
         assert material.motion is not None
@@ -95,16 +95,16 @@ class Series:
         self._log(DIFFERENCE, "tension", index, worst)
         self._lanes(index, plots.lane_states(moving.slack, moving.slack & False, moving.known))
 
-    def _deviation(self, who: str, index: rr.TimeColumn, poses: Array, command: Array) -> None:
+    def _deviation(self, who: str, index: Index, poses: Array, command: Array) -> None:
         for name, values in plots.deviation(poses, command).items():
             root = DEVIATION if name in plots.TRANSLATIONS else TILT
             self.recording.scalars(f"{root}/{who}/{_entity(name)}", index, values)
 
-    def _tension(self, who: str, index: rr.TimeColumn, tensions: Array) -> None:
-        for name, values in zip(self.material.labels, tensions.T, strict=True):
+    def _tension(self, who: str, index: Index, tensions: Array) -> None:
+        for name, values in zip(self.material.robot.cable_names, tensions.T, strict=True):
             self.recording.scalars(f"{TENSION}/{who}/{_entity(name)}", index, values)
 
-    def _differences(self, index: rr.TimeColumn) -> None:
+    def _differences(self, index: Index) -> None:
         gap, limit = self.material.gap, self.material.result.allowance
         pairs = {
             "position": (gap.position_m, limit.position_m),
@@ -118,11 +118,11 @@ class Series:
         self._log(SETTLED, "position", index, gap.settled_position_m)
         self._log(SETTLED, "orientation", index, gap.settled_orientation_rad)
 
-    def _lanes(self, index: rr.TimeColumn, states: NDArray[np.object_]) -> None:
-        for name, column in zip(self.material.labels, states.T, strict=True):
-            plots.lanes(self.recording, f"{LANES}/{_cable(name)}", index, list(column))
+    def _lanes(self, index: Index, states: NDArray[np.object_]) -> None:
+        for name, column in zip(self.material.robot.cable_names, states.T, strict=True):
+            plots.lanes(self.recording, f"{LANES}/{_entity(name)}", index, list(column))
 
-    def _log(self, root: str, quantity: str, index: rr.TimeColumn, values: Array) -> None:
+    def _log(self, root: str, quantity: str, index: Index, values: Array) -> None:
         self.recording.scalars(f"{root}/{quantity}", index, plots.log10(values))
 
     def _style(self) -> None:
@@ -131,10 +131,10 @@ class Series:
             root = DEVIATION if name in plots.TRANSLATIONS else TILT
             self._pair(root, _entity(name), name, colour)
         shades = colours.cable_colours(self.material.robot.n_cables)
-        for name, shade in zip(self.material.labels, shades, strict=True):
+        for name, shade in zip(self.material.robot.cable_names, shades, strict=True):
             colour = (int(shade[0]), int(shade[1]), int(shade[2]), 255)
             self._pair(TENSION, _entity(name), name, colour)
-            plots.lane_style(self.recording, f"{LANES}/{_cable(name)}", colour)
+            plots.lane_style(self.recording, f"{LANES}/{_entity(name)}", colour)
         for quantity, (name, colour) in _QUANTITIES.items():
             plots.as_dots(self.recording, f"{DIFFERENCE}/{quantity}", name, colour, 2.5)
             plots.as_crosses(self.recording, f"{SETTLED}/{quantity}", name, colour, 3.5)
@@ -181,11 +181,6 @@ def _still(largest: float) -> tuple[float, float] | None:
 
 def _both(root: str, names: list[str]) -> list[str]:
     return [f"{root}/{who}/{_entity(name)}" for who in ("seecr", "mujoco") for name in names]
-
-
-def _cable(label: str) -> str:
-    """Entity of a cable's lane; its last part is what the viewer shows."""
-    return rr.escape_entity_path_part(f"cable{label}")
 
 
 def _entity(name: str) -> str:

@@ -20,7 +20,7 @@ dashed one hangs slack.
 **Plots.** {marks} The lowest plot is their difference as a decimal logarithm: −9 is a billionth \
 of a metre.
 
-**Play.** The timeline `pose` goes through the {n} commands.{settling}
+**Play.** The timeline `{along}` goes through the {n} commands.{settling}
 {findings}
 ## Largest differences
 {table}
@@ -50,6 +50,7 @@ def read_me(
     findings: Sequence[str],
     *,
     lines: bool = True,
+    along: str = "pose",
 ) -> str:
     """What to look at in a case, and its worst numbers.
 
@@ -67,6 +68,7 @@ def read_me(
         name=name,
         sentence=sentence,
         n=count,
+        along=along,
         marks=_LINES if lines else _CROSSES,
         settling="" if watched is None else _SETTLING.format(watched=watched),
         table=table(rows, ("quantity", "largest", "pose", "allowed")) if rows else _NOTHING,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from seecr.pose import Array, pose_difference
 from seecr.recording.colours import Rgba
-from seecr.recording.stream import Recording
+from seecr.recording.stream import Index, Recording
 
 MM, DEG = 1e3, 180.0 / np.pi
 TRANSLATIONS, TURNS = ("dx", "dy", "dz"), ("about x", "about y", "about z")
@@ -29,6 +29,26 @@ _RED: Rgba = (215, 45, 45, 255)
 def as_line(recording: Recording, entity: str, name: str, colour: Rgba, width: float) -> None:
     """Draw a series as a line."""
     style = rr.SeriesLines(names=name, colors=[colour], widths=[width])
+    recording.always(entity, style)
+
+
+def line_by_runs(
+    recording: Recording, entity: str, index: Index, values: Array, starts: NDArray[np.bool_],
+    name: str, colour: Rgba, width: float,
+) -> None:  # fmt: skip
+    """Draw numbers (n,) as a line that does not join a run to the next.
+
+    Every other run is on a second line of the same name: the viewer breaks lines where nothing is,
+    and its legend names both once.
+
+    Args:
+        recording: where. entity: what. index: the timelines. values: (n,).
+        starts: (n,) bool, first rows of runs. name, colour, width: of the line.
+    """
+    second = np.cumsum(starts) % 2 == 0
+    both = np.stack([np.where(second, np.nan, values), np.where(second, values, np.nan)], axis=1)
+    recording.scalars(entity, index, both)
+    style = rr.SeriesLines(names=[name] * 2, colors=[colour] * 2, widths=[width] * 2)
     recording.always(entity, style)
 
 
@@ -82,7 +102,7 @@ def lane_states(
     return words
 
 
-def lanes(recording: Recording, entity: str, index: rr.TimeColumn, words: Sequence[str]) -> None:
+def lanes(recording: Recording, entity: str, index: Index, words: Sequence[str]) -> None:
     """One lane over a timeline, (k,) words."""
     recording.rows(entity, index, rr.StateChange.columns(state=list(words)))
 
@@ -104,12 +124,3 @@ def state_colours(recording: Recording, entity: str, shades: dict[str, Rgba]) ->
 def _dim(colour: Rgba) -> Rgba:
     red, green, blue = (int(_DIM * c) for c in colour[:3])
     return red, green, blue, 255
-
-
-def short_names(names: Sequence[str]) -> list[str]:
-    """Names without what all have in common in front."""
-    common = 0
-    while len({name[: common + 1] for name in names}) == 1 and common < min(map(len, names)):
-        common += 1
-    short = [name[common:] for name in names]
-    return short if all(short) else list(names)

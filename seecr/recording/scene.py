@@ -14,7 +14,7 @@ from seecr.pose import Array, transform_points
 from seecr.recording import colours, shapes
 from seecr.recording.colours import Rgba
 from seecr.recording.shapes import States
-from seecr.recording.stream import Recording
+from seecr.recording.stream import Index, Recording
 from seecr.robot import Robot
 
 ROOT, LEGEND = "scene", "legend"
@@ -43,8 +43,8 @@ class Scene:
         self.size = float(np.linalg.norm(self.high - self.low))
         self.box = shapes.platform_box(robot, self.size)
 
-    def surroundings(self, labels: list[str]) -> None:
-        """What does not move: the axes' convention, the frame, the exit points with labels."""
+    def surroundings(self) -> None:
+        """What does not move: the axes' convention, the frame, the exit points by cables' names."""
         robot, record = self.robot, self.recording
         record.always(ROOT, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
         record.always(
@@ -61,10 +61,23 @@ class Scene:
                 robot.exit_points,
                 radii=1.5 * _FRAME * self.size,
                 colors=colours.SILVER,
-                labels=labels,
+                labels=list(robot.cable_names),
                 show_labels=True,
             ),
         )
+
+    def axes(self) -> None:
+        """Numbers in metres where the edges of the frame end that leave its lowest corner."""
+        ends = np.where(np.eye(3, dtype=bool), self.high, self.low)
+        words = [
+            f"{axis} {end[k]:.3g} m" for k, (axis, end) in enumerate(zip("xyz", ends, strict=True))
+        ]
+        corner = ", ".join(f"{value:.3g}" for value in self.low)
+        numbers = rr.Points3D(
+            [self.low, *ends], radii=0.0, colors=colours.COMMAND, labels=[f"{corner} m", *words],
+            show_labels=True,
+        )  # fmt: skip
+        self.recording.always(f"{ROOT}/axes", numbers)
 
     def path(self, name: str, poses: Array, colour: Rgba) -> None:
         """The line along which the platform's origin goes."""
@@ -73,7 +86,7 @@ class Scene:
         self.recording.always(f"{ROOT}/{name}/path", line)
 
     def platform(
-        self, name: str, index: rr.TimeColumn, poses: Array, colour: Rgba, *, solid: bool = False
+        self, name: str, index: Index, poses: Array, colour: Rgba, *, solid: bool = False
     ) -> None:
         """The platform as a box: solid, or only its edges so that others show through."""
         seen = np.isfinite(poses).all(axis=1)
@@ -89,7 +102,7 @@ class Scene:
         style = rr.Boxes3D.from_fields(colors=[colour], radii=[_EDGE * self.size], fill_mode=fill)
         self.recording.always(entity, style)
 
-    def anchors(self, name: str, index: rr.TimeColumn, poses: Array, colour: Rgba) -> None:
+    def anchors(self, name: str, index: Index, poses: Array, colour: Rgba) -> None:
         """Anchor points as dots, which also shows a platform that is a bar or a point."""
         seen = np.isfinite(poses).all(axis=1)
         points = transform_points(poses[seen], self.robot.anchor_points).reshape(-1, 3)
@@ -99,7 +112,7 @@ class Scene:
         style = rr.Points3D.from_fields(radii=[1.6 * _TAUT * self.size], colors=[colour])
         self.recording.always(entity, style)
 
-    def cables(self, name: str, index: rr.TimeColumn, states: States) -> None:
+    def cables(self, name: str, index: Index, states: States) -> None:
         """Taut cables as thick lines coloured by tension, slack ones dashed, grey, sagging."""
         known = states.known
         poses = np.where(known[:, None], states.pose, self.robot.reference_pose)
@@ -113,7 +126,7 @@ class Scene:
         style = rr.LineStrips3D.from_fields(radii=[_LOOSE * self.size], colors=[colours.SLACK])
         self.recording.always(entity, style)
 
-    def _taut(self, entity: str, index: rr.TimeColumn, states: States, poses: Array) -> None:
+    def _taut(self, entity: str, index: Index, states: States, poses: Array) -> None:
         pulls = ~states.slack & states.known[:, None]
         columns = rr.LineStrips3D.columns(
             strips=shapes.taut_strips(self.robot, poses, ~pulls),
@@ -125,6 +138,20 @@ class Scene:
 
 def write_legend(recording: Recording, top: float, who: Mapping[str, Rgba] = PHYSICS) -> None:
     """The tension scale from 0 to ``top`` [N], and whose colour is whose, slack cables first."""
+    write_scale(recording, top)
+    places = [(px, _BAR[2]) for px in _PLACES[: 1 + len(who)]]
+    names, shades_of = ["slack", *who], [colours.SLACK, *who.values()]
+    for (x, y), name, colour in zip(places, names, shades_of, strict=True):
+        strips = [np.array([[x - 2.5 + d, y], [x - 1.5 + d, y]]) for d in (0, 2, 4)]
+        dashed = strips if name == "slack" else [np.array([strips[0][0], strips[-1][1]])]
+        radius = 0.25 if name == "slack" else 0.7
+        line = rr.LineStrips2D(dashed, radii=radius, colors=colour)
+        recording.always(f"{LEGEND}/{name}", line)
+    _words(recording, "names", [(px, y + 2.6) for px, y in places], names, shades_of)
+
+
+def write_scale(recording: Recording, top: float, words: str = "") -> None:
+    """The scale of colours from 0 to ``top`` [N], and words on what it is of."""
     left, right, y = _BAR
     x = np.linspace(left, right, _SLICES + 1)
     pieces = [np.array([[x[i], y], [x[i + 1], y]]) for i in range(_SLICES)]
@@ -138,15 +165,8 @@ def write_legend(recording: Recording, top: float, who: Mapping[str, Rgba] = PHY
         [f"{part * top:g} N" for part in ticks],
         [colours.COMMAND] * 3,
     )
-    places = [(px, y) for px in _PLACES[: 1 + len(who)]]
-    names, shades_of = ["slack", *who], [colours.SLACK, *who.values()]
-    for place, name, colour in zip(places, names, shades_of, strict=True):
-        strips = [np.array([[place[0] - 2.5 + d, y], [place[0] - 1.5 + d, y]]) for d in (0, 2, 4)]
-        dashed = strips if name == "slack" else [np.array([strips[0][0], strips[-1][1]])]
-        radius = 0.25 if name == "slack" else 0.7
-        line = rr.LineStrips2D(dashed, radii=radius, colors=colour)
-        recording.always(f"{LEGEND}/{name}", line)
-    _words(recording, "names", [(px, y + 2.6) for px, _ in places], names, shades_of)
+    if words:
+        _words(recording, "of", [(_PLACES[1], y - 2.2)], [words], [colours.COMMAND])
 
 
 def _words(

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import rerun as rr
@@ -17,6 +17,9 @@ from seecr.files import written
 from seecr.pose import Array
 
 POSE, SETTLING, MODEL_STEP = "pose", "settling_time", "model_step"
+Index: TypeAlias = rr.TimeColumn | Sequence[rr.TimeColumn]
+# Places on a timeline are off by less than this part of a step.
+_ROUNDED = 0.03
 
 
 class Recording:
@@ -33,18 +36,49 @@ class Recording:
         """Something that holds at every time."""
         self.stream.log(entity, *archetypes, static=True, strict=True)
 
-    def rows(self, entity: str, index: rr.TimeColumn, columns: Iterable[Any]) -> None:
-        """Rows over a timeline, sent as columns: faster and smaller than row by row."""
-        self.stream.send_columns(entity, [index], columns, strict=True)
+    def rows(self, entity: str, index: Index, columns: Iterable[Any]) -> None:
+        """Rows over timelines, sent as columns: faster and smaller than row by row."""
+        timelines = [index] if isinstance(index, rr.TimeColumn) else index
+        self.stream.send_columns(entity, timelines, columns, strict=True)
 
-    def scalars(self, entity: str, index: rr.TimeColumn, values: ArrayLike) -> None:
-        """Numbers (n,) over a timeline, in double precision."""
-        self.rows(entity, index, rr.Scalars.columns(scalars=np.asarray(values, dtype=float)))
+    def scalars(self, entity: str, index: Index, values: ArrayLike) -> None:
+        """Numbers (n,), or (n, k) of k lines, over timelines, in double precision."""
+        numbers = np.asarray(values, dtype=float)
+        columns = rr.Scalars.columns(scalars=numbers.ravel())
+        several = numbers.ndim > 1
+        lengths = [numbers.shape[1]] * len(numbers) if several else None
+        self.rows(entity, index, columns.partition(lengths) if lengths else columns)
 
 
 def pose_index(count: int) -> rr.TimeColumn:
     """The timeline over poses, counted from 1 as in the text and the tables."""
     return rr.TimeColumn(POSE, sequence=range(1, count + 1))
+
+
+def sweep_index(poses: Array) -> list[rr.TimeColumn]:
+    """Timelines over commanded poses (n, 7): their number; of a line along an axis the place too.
+
+    Rerun's plots are over whole numbers: the place is in millimetres, or in micrometres where
+    these would tell too little. The timeline to open is the last one.
+    """
+    index = [pose_index(len(poses))]
+    moves = np.ptp(poses[:, :3], axis=0) if len(poses) > 1 else np.zeros(3)
+    axis = int(np.argmax(moves))
+    steps = np.diff(poses[:, axis])
+    along = moves[axis] > 0.0 and np.all(np.delete(moves, axis) < 1e-6 * moves[axis])
+    if not along or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
+        return index
+    for unit, factor in (("mm", 1e3), ("um", 1e6)):
+        places = factor * poses[:, axis]
+        if np.abs(places - places.round()).max() < _ROUNDED * np.abs(factor * steps).min():
+            name = f"{'xyz'[axis]}_{unit}"
+            return [*index, rr.TimeColumn(name, sequence=places.round().astype(int))]
+    return index
+
+
+def opening(index: Sequence[rr.TimeColumn]) -> str:
+    """The timeline that a recording opens with."""
+    return str(index[-1].timeline_name())
 
 
 def settling_index(t_s: Array) -> rr.TimeColumn:

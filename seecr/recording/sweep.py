@@ -13,7 +13,14 @@ from seecr.recording import colours, layout, plots, shapes
 from seecr.recording.colours import COMMAND, SEECR
 from seecr.recording.scene import LEGEND, Scene, write_legend
 from seecr.recording.shapes import States
-from seecr.recording.stream import Recording, pose_index, recording_file
+from seecr.recording.stream import (
+    Index,
+    Recording,
+    opening,
+    pose_index,
+    recording_file,
+    sweep_index,
+)
 from seecr.solution import Solution
 
 __all__ = ["write_sweep_recording"]
@@ -35,10 +42,11 @@ def write_sweep_recording(solution: Solution, path: str | Path, commanded: bool 
     robot, name = solution.robot, f"{solution.robot.name} sweep"
     seen = np.concatenate([solution.command, solution.pose])
     top = colours.round_up(float(np.nanmax(solution.tensions, initial=0.0)))
-    with recording_file(path, name, _blueprint(solution, seen, name, commanded)) as recording:
-        index = pose_index(len(solution))
+    index = sweep_index(solution.command) if commanded else [pose_index(len(solution))]
+    layouts = _blueprint(solution, seen, name, commanded, opening(index))
+    with recording_file(path, name, layouts) as recording:
         scene = Scene(recording, robot, seen, top)
-        scene.surroundings(plots.short_names(robot.cable_names))
+        scene.surroundings()
         scene.platform("seecr", index, solution.pose, SEECR, solid=True)
         states = States(solution.pose, solution.tensions, solution.rest_lengths, solution.slack)
         scene.cables("seecr", index, states)
@@ -50,7 +58,9 @@ def write_sweep_recording(solution: Solution, path: str | Path, commanded: bool 
         _plots(recording, index, solution, commanded)
 
 
-def _blueprint(solution: Solution, seen: Array, name: str, commanded: bool) -> rrb.Blueprint:
+def _blueprint(
+    solution: Solution, seen: Array, name: str, commanded: bool, timeline: str
+) -> rrb.Blueprint:
     robot = solution.robot
     share = layout.lanes_share(robot.n_cables)
     low, high = shapes.extent(robot, seen)
@@ -64,10 +74,11 @@ def _blueprint(solution: Solution, seen: Array, name: str, commanded: bool) -> r
             *drawn,
         ]
     left = rrb.Vertical(scene, layout.legend(LEGEND), lanes, row_shares=[0.9 - share, 0.1, share])
-    return layout.blueprint(rrb.Horizontal(left, rrb.Vertical(*drawn), column_shares=[6, 5]))
+    root = rrb.Horizontal(left, rrb.Vertical(*drawn), column_shares=[6, 5])
+    return layout.blueprint(root, timeline=timeline)
 
 
-def _plots(recording: Recording, index: rr.TimeColumn, solution: Solution, commanded: bool) -> None:
+def _plots(recording: Recording, index: Index, solution: Solution, commanded: bool) -> None:
     if commanded:
         parts = plots.deviation(solution.pose, solution.command)
         for (name, values), colour in zip(parts.items(), colours.SERIES, strict=False):
@@ -77,13 +88,13 @@ def _plots(recording: Recording, index: rr.TimeColumn, solution: Solution, comma
     known = np.asarray(np.isfinite(solution.pose).all(axis=1))
     nowhere = np.zeros(solution.slack.shape, dtype=bool)
     states = plots.lane_states(solution.slack, nowhere, known)
-    names = plots.short_names(solution.robot.cable_names)
+    names = solution.robot.cable_names
     for k, shade in enumerate(colours.cable_colours(solution.robot.n_cables)):
         colour = (int(shade[0]), int(shade[1]), int(shade[2]), 255)
         entity = f"{_PULL}/{_entity(names[k])}"
         recording.scalars(entity, index, solution.tensions[:, k])
         plots.as_line(recording, entity, names[k], colour, 1.5)
-        lane = f"{_LANES}/{rr.escape_entity_path_part('cable' + names[k])}"
+        lane = f"{_LANES}/{_entity(names[k])}"
         plots.lanes(recording, lane, index, list(states[:, k]))
         plots.lane_style(recording, lane, colour)
 

@@ -9,8 +9,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from seecr.maps import Workspace
-from seecr.recording import colours, layout, plots, shapes
-from seecr.recording.scene import ROOT, Scene
+from seecr.recording import colours, layout, shapes
+from seecr.recording.scene import LEGEND, ROOT, Scene, write_scale
 from seecr.recording.stream import recording_file
 
 __all__ = ["write_map_recording"]
@@ -39,10 +39,13 @@ def write_map_recording(found: Workspace, path: str | Path) -> None:
     corners = np.tile(robot.reference_pose, (2, 1))
     corners[:, :3] = [[axis[end] for axis in found.axes] for end in (0, -1)]
     low, high = shapes.extent(robot, corners)
-    view = layout.scene_view(robot, low, high, name, 1.7)
-    with recording_file(path, name, layout.blueprint(rrb.Horizontal(view))) as recording:
+    view = layout.scene_view(robot, low, high, name, 1.9)
+    root = rrb.Vertical(view, layout.legend(LEGEND), row_shares=[0.9, 0.1])
+    with recording_file(path, name, layout.blueprint(root)) as recording:
         scene = Scene(recording, robot, corners, top)
-        scene.surroundings(plots.short_names(robot.cable_names))
+        scene.surroundings()
+        scene.axes()
+        write_scale(recording, top, "tensions can stay so far inside their limits")
         points = rr.Points3D(
             places,
             radii=0.004 * scene.size,

@@ -33,16 +33,18 @@ class Readback:
         return {entity for entity, names, _ in self.chunks if timeline in names}
 
     def column(self, entity: str, component: str, timeline: str | None = "pose") -> list[Any]:
-        wanted = (timeline,) if timeline else ()
         rows: list[Any] = []
         for path, names, batch in self.chunks:
-            if path == entity and names == wanted and component in batch.schema.names:
+            wanted = timeline in names if timeline else not names
+            if path == entity and wanted and component in batch.schema.names:
                 rows += batch.column(batch.schema.names.index(component)).to_pylist()
         assert rows, f"{entity} has no {component} over {timeline}"
         return rows
 
     def scalars(self, entity: str, timeline: str = "pose") -> np.ndarray:
-        return np.array(self.column(entity, "Scalars:scalars", timeline), dtype=float)[:, 0]
+        """Numbers (n,) of a line, be it cut into two by runs."""
+        lines = np.array(self.column(entity, "Scalars:scalars", timeline), dtype=float)
+        return np.where(np.isnan(lines[:, 0]), lines[:, -1], lines[:, 0])
 
     def seconds(self, entity: str) -> np.ndarray:
         """Times of an entity's rows on the timeline of the settling [s]."""

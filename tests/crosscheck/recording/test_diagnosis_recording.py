@@ -17,13 +17,13 @@ from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import Stage, stages_of
 from crosscheck.fit.problem import KINDS, POSITION
 from crosscheck.fit.reasons import DiagnosisVerdict
+from crosscheck.recording import bars
 from crosscheck.recording.comparison import write_comparison_recording
 from crosscheck.recording.diagnosis import write_diagnosis_recording
 from crosscheck.recording.diagnosis_words import plain
 from crosscheck.recording.misfit import Misfit, read_poses, states_of, worst_row
 from crosscheck.units import short
 from seecr.errors import InputFileError
-from seecr.recording.plots import short_names
 
 STEP = "model_step"
 
@@ -254,10 +254,37 @@ def test_written_whole_or_not_at_all(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_names_lose_what_they_share() -> None:
-    assert short_names(["cable1", "cable2"]) == ["1", "2"]
-    assert short_names(["a", "ab"]) == ["a", "ab"]
-    assert short_names(["left", "right"]) == ["left", "right"]
+def test_cables_go_by_their_names(back: Readback, shown: Misfit) -> None:
+    labels = back.static("/scene/exit_points", "Points3D:labels")
+    assert labels == list(shown.problem.robot.cable_names)
+
+
+def test_lines_do_not_join_runs(compared: Path, comparison: Comparison) -> None:
+    lines = np.array(Readback(compared).column("/plot/position/reading_1", "Scalars:scalars"))
+    runs = comparison.problem.data.run
+    assert lines.shape == (len(runs), 2) and np.all(np.isnan(lines).sum(axis=1) == 1)
+    joined = ~np.isnan(lines[1:, 0]) == ~np.isnan(lines[:-1, 0])
+    np.testing.assert_array_equal(joined, runs[1:] == runs[:-1])
+
+
+def test_maps_have_axes_and_the_scale_of_their_colours(back: Readback, shown: Misfit) -> None:
+    for kind in shown.kinds:
+        labels = back.static(f"/map/{kind.name}/numbers", "Points2D:labels")
+        places = np.array(back.static(f"/map/{kind.name}/numbers", "Points2D:positions"))
+        assert labels[-2:] == [f"{shown.top(kind):g} {kind.unit}", "0"]
+        dots = np.array(back.column(f"/map/{kind.name}/errors", "Points2D:positions", STEP)[0])
+        level = np.isclose(places[:-2, 1], places[0, 1])  # numbers under the first axis
+        across = [float(word) for word, low in zip(labels, level, strict=False) if low]
+        assert len(across) >= 2 and across == pytest.approx(places[:-2][level, 0])
+        assert dots[:, 0].min() - 0.1 < across[0] and across[-1] < dots[:, 0].max() + 0.1
+        bar = np.array(back.static(f"/map/{kind.name}/scale", "LineStrips2D:strips"))
+        assert bar[..., 0].min() > dots[:, 0].max(), "beside the dots"
+
+
+def test_bars_have_room_for_their_words(found: Diagnosis, stages: list[Stage]) -> None:
+    few, many = (bars.share(found, stages * k) for k in (1, 20))
+    rows = 3 * (len(stages) + 1)  # of three kinds, each with its title
+    assert few * 1010.0 > 20.0 * rows and many < 0.7
 
 
 @pytest.fixture(scope="module")

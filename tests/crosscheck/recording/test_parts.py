@@ -13,10 +13,11 @@ from recordings import Readback
 from crosscheck.errors import CrosscheckError
 from crosscheck.recording import bars
 from seecr.errors import InputFileError
+from seecr.maps import workspace_map
 from seecr.recording import layout, plots
 from seecr.recording.scene import Scene, write_legend
 from seecr.recording.shapes import States
-from seecr.recording.stream import pose_index, recording_file, settling_index
+from seecr.recording.stream import opening, pose_index, recording_file, settling_index, sweep_index
 
 
 def blueprint() -> rrb.Blueprint:
@@ -96,3 +97,59 @@ def test_bars_end_by_the_logarithm_of_the_error() -> None:
     assert np.all(np.diff(ends) > 0) and np.ptp(np.diff(ends)) == pytest.approx(0.0, abs=1e-9)
     linear = bars._places(values, values, 0.0)
     assert linear[2] - linear[0] == pytest.approx(11.0 * (linear[1] - linear[0]))
+
+
+def line(start: list[float], end: list[float], count: int) -> np.ndarray:
+    places = np.linspace(start, end, count)
+    return np.column_stack([places, np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))])
+
+
+@pytest.mark.parametrize(
+    ("poses", "timeline", "places"),
+    [
+        (line([0.17, 0.25, 0.1], [0.63, 0.25, 0.1], 24), "x_mm", [170, 190]),
+        (line([0.0, 0.0, 0.003], [0.0, 0.0, 0.001], 5), "z_um", [3000, 2500]),
+        (line([0.0, 0.1, 0.0], [0.0, 0.2, 0.0], 8), "y_mm", [100, 114]),
+        (line([0.0, 0.0, 0.0], [0.1, 0.1, 0.0], 5), "pose", [1, 2]),
+        (line([0.1, 0.0, 0.0], [0.1, 0.0, 0.0], 3), "pose", [1, 2]),
+        (line([0.1, 0.0, 0.0], [0.1, 0.0, 0.0], 1), "pose", [1]),
+        (line([0.0, 0.0, 0.0], [0.1, 0.0, 0.0], 5)[[0, 1, 0, 2]], "pose", [1, 2]),
+    ],
+)
+def test_a_line_along_an_axis_is_drawn_over_the_place(
+    poses: np.ndarray, timeline: str, places: list[int]
+) -> None:
+    index = sweep_index(poses)
+    assert opening(index) == timeline
+    assert index[0].timeline_name() == "pose"
+    assert index[-1].as_arrow_array().to_pylist()[: len(places)] == places
+
+
+def test_several_timelines_and_lines_cut_by_runs(tmp_path: Path) -> None:
+    path, starts = tmp_path / "a.rrd", np.array([True, False, True, True])
+    index = sweep_index(line([0.0, 0.0, 0.0], [0.3, 0.0, 0.0], 4))
+    values = np.array([1.0, 2.0, 3.0, 4.0])
+    with recording_file(path, "a", blueprint()) as recording:
+        plots.line_by_runs(recording, "plot/a", index, values, starts, "a", (1, 2, 3, 255), 1.0)
+    back = Readback(path)
+    assert back.timelines == {"pose", "x_mm"}
+    assert back.column("/plot/a", "x_mm", "x_mm") == [0, 100, 200, 300]
+    lines = np.array(back.column("/plot/a", "Scalars:scalars"))
+    np.testing.assert_array_equal(lines, [[1, np.nan], [2, np.nan], [np.nan, 3], [4, np.nan]])
+    assert back.scalars("/plot/a").tolist() == values.tolist()
+
+
+def test_a_workspace_has_numbers_at_its_edges_and_the_scale_of_its_margins(tmp_path: Path) -> None:
+    robot = soft_cogiro()
+    found = workspace_map(robot, [0.3, 0.4], [0.2, 0.3], [0.1], elastic=False)
+    write_map_recording(found, tmp_path / "map.rrd")
+    back = Readback(tmp_path / "map.rrd")
+    corner, *ends = back.static("/scene/axes", "Points3D:labels")
+    assert corner.endswith(" m") and [word[0] for word in ends] == ["x", "y", "z"]
+    places = np.array(back.static("/scene/axes", "Points3D:positions"))
+    for k, word in enumerate(ends):
+        assert float(word.split()[1]) == pytest.approx(places[k + 1, k], abs=1e-3)
+    margins = found.margin[found.feasible]
+    top = float(back.static("/legend/ticks", "Points2D:labels")[-1].removesuffix(" N"))
+    assert np.quantile(margins, 0.95) <= top <= 2.0 * np.quantile(margins, 0.95)
+    assert "inside their limits" in back.static("/legend/of", "Points2D:labels")[0]

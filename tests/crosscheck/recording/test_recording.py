@@ -64,7 +64,7 @@ def reported(result: CaseResult) -> dict[str, Any]:
 
 
 def test_both_timelines_and_no_other(back: Readback) -> None:
-    assert back.timelines == {"pose", "settling_time"}
+    assert back.timelines == {"pose", "x_mm", "settling_time"}
 
 
 def test_poses_are_counted_from_one(back: Readback) -> None:
@@ -101,7 +101,7 @@ def test_deviation_tilt_and_tension_of_both(back: Readback, result: CaseResult, 
     tilt = 2.0 * np.degrees(np.arccos(np.clip(np.abs(turn[:, 0]), 0.0, 1.0)))
     np.testing.assert_allclose(back.scalars(f"/plot/tilt/{who}/tilt"), tilt, atol=2e-6)
     for k in range(8):
-        drawn = back.scalars(f"/plot/tension/{who}/{k + 1}")
+        drawn = back.scalars(f"/plot/tension/{who}/cable{k + 1}")
         np.testing.assert_array_equal(drawn, answer.tensions[:, k])
 
 
@@ -169,7 +169,7 @@ def test_the_text_has_the_guide_and_the_numbers(back: Readback, result: CaseResu
     now = [row[0] for row in back.column(f"/{NOW}", "TextDocument:text")]
     assert len(now) == POSES
     assert "Pose 1 of 6" in now[0] and "x 170.00, y 250.00, z 100.00 mm" in now[0]
-    assert "26.5" in now[0] and "| slack | 2, 4, 5, 7 |" in now[0]
+    assert "26.5" in now[0] and "| slack | cable2, cable4, cable5, cable7 |" in now[0]
     assert "Settling, " in back.column(f"/{NOW}", "TextDocument:text", "settling_time")[0][0]
 
 
@@ -281,7 +281,7 @@ def test_no_settling_to_watch(failed: CaseResult, tmp_path: Path) -> None:
     nothing = dataclasses.replace(failed, settling=SettlingBatch(rows))
     write_case_recording(nothing, tmp_path / "nothing.rrd")
     back = Readback(tmp_path / "nothing.rrd")
-    assert back.timelines == {"pose"}
+    assert back.timelines == {"pose", "x_mm"}
     assert "settling_time" not in back.static(f"/{READ_ME}", "TextDocument:text")[0]
 
 
@@ -323,7 +323,7 @@ def test_any_robot(size: float, tmp_path: Path) -> None:
     back = Readback(tmp_path / "odd.rrd")
     radius = back.static("/scene/mujoco/cables/taut", "LineStrips3D:radii")[0]
     assert 1e-3 < radius / size < 6e-3
-    lanes = sorted(e for e in back.entities("pose") if e.startswith("/lanes/cable"))
+    lanes = sorted(e for e in back.entities("pose") if e.startswith("/lanes/haul"))
     assert len(lanes) == 4
     half = back.column("/scene/seecr/platform", "Boxes3D:half_sizes")[0][0]
     assert min(half) > 1e-3 * size, "a platform that is a point is seen all the same"
