@@ -18,6 +18,7 @@ from seecr.recording import layout, plots
 from seecr.recording.scene import Scene, write_legend
 from seecr.recording.shapes import States
 from seecr.recording.stream import opening, pose_index, recording_file, settling_index, sweep_index
+from seecr.recording.workspace import write_map_recording
 
 
 def blueprint() -> rrb.Blueprint:
