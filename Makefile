@@ -30,6 +30,7 @@ docs: ## write the pages and pictures made from the sources, and build the site:
 	$(BIN)/python scripts/draw_effects.py
 	$(BIN)/python scripts/make_effects.py
 	$(BIN)/python scripts/make_api.py
+	$(BIN)/python scripts/make_commands.py
 	$(BIN)/python scripts/draw_floors.py
 	$(BIN)/python scripts/make_paper.py
 	$(BIN)/python -m sphinx -q -W --keep-going -c docs -d build/read . build/site

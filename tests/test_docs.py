@@ -9,6 +9,7 @@ from pathlib import Path
 import draw_effects
 import draw_floors
 import make_api
+import make_commands
 import make_effects
 import pytest
 
@@ -62,6 +63,13 @@ def test_the_pictures_of_effects_are_current() -> None:
 
 def test_the_page_of_public_names_is_current() -> None:
     assert make_api.page() == make_api.PAGE.read_text(encoding="utf-8"), AGAIN
+
+
+def test_the_page_of_commands_is_current() -> None:
+    page = make_commands.PAGE.read_text(encoding="utf-8")
+    assert make_commands.page() == page, AGAIN
+    assert "\n### crosscheck diagnose\n" in page and "\n### seecr correct\n" in page
+    assert "| `--max-position 0.5mm` | Limit on the rms position error. |" in page
 
 
 def test_the_page_of_public_names_has_them_all() -> None:
