@@ -4,33 +4,41 @@
 
 The viewer needs a graphics driver; without a graphics card Debian's ``mesa-vulkan-drivers`` will
 do. The page of the diagnosis needs Chromium, and is left out where there is none. The pictures
-are written to ``docs/pictures``, or to the folder given.
+are written to ``docs/pictures``, or to the folder given. Each keeps the numbers that it shows
+(``numbers`` in the PNG), by which tests tell when it is due again.
 """
 
 from __future__ import annotations
 
 import io
-import shutil
+import json
 import socket
-import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import browser
+import numpy as np
 from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 from rerun.experimental import ViewerClient
 
+from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.verdict import diagnose
-from crosscheck.recording import write_diagnosis_recording
+from crosscheck.recording import write_case_recording, write_diagnosis_recording
 from crosscheck.report import write_page
-from crosscheck.suite.cases import select, shipped_cases
+from crosscheck.suite.cases import Case, select, shipped_cases
 from crosscheck.suite.run import run_case
 from crosscheck.suite.thresholds import load_thresholds
 from crosscheck.twin.make import make_twin
+from seecr.equilibrium import solve
+from seecr.maps import Workspace, workspace_map
+from seecr.mjcf import load_robot
+from seecr.report.figures import map_figure
 from seecr.shipped import model_path
 
 FOLDER = Path(__file__).resolve().parents[1] / "docs" / "pictures"
@@ -40,6 +48,9 @@ _TOP_BAR = 36
 _MESSAGES_FADE, _DRAWN = 8.0, 1.5
 
 
+Numbers = dict[str, float]
+
+
 @dataclass(frozen=True)
 class Picture:
     """One picture: a recording, and where its cursor stands.
@@ -47,87 +58,127 @@ class Picture:
     Attributes:
         name: of the file.
         case: of the suite.
-        pose: cursor on the timeline over poses; None for another timeline.
+        x_mm: cursor on the timeline over places [mm]; None for another timeline.
         settling_s: cursor on the timeline of the settling [s].
         step: cursor on the timeline over the models of a diagnosis.
     """
 
     name: str
     case: str
-    pose: int | None = None
+    x_mm: int | None = None
     settling_s: float | None = None
     step: int | None = None
 
 
 PICTURES = (
-    Picture("sweep", "parallel-fishing-z0.10", pose=2),
+    Picture("sweep", "parallel-fishing-z0.10", x_mm=190),
     Picture("settling", "parallel-fishing-z0.10", settling_s=0.1),
-    Picture("cogiro", "cogiro-fishing-z0.20", pose=5),
+    Picture("cogiro", "cogiro-fishing-z0.20", x_mm=250),
 )
 # The README's case: crosscheck twin demobot_parallel.xml --hide 13.
 _SEED = 13
 DIAGNOSIS = Picture("diagnosis-recording", f"twin {_SEED}", step=0)
+REPORT, MAP = "diagnosis-report", "map"
 # The page: as wide as this, and of its height what a README has room for [pixels].
 _PAGE, _SCALE = (1130, 1262), 1.5
+# seecr map demobot_cogiro --grid 0.04:0.76:73 0.04:0.46:43 0.05:0.40:6
+_GRID = ((0.04, 0.76, 73), (0.04, 0.46, 43), (0.05, 0.40, 6))
+_COLOURS = 128
 
 
 def main(folder: Path = FOLDER) -> None:
     """Run the cases, record them, and draw each picture."""
     folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory() as scratch, viewer() as client:
-        recorded = {p.case: record(p.case, Path(scratch)) for p in PICTURES}
+    with tempfile.TemporaryDirectory() as name, viewer() as client:
+        scratch = Path(name)
         for picture in PICTURES:
-            client.open(str(recorded[picture.case]))
-            complaints = draw(client, picture, folder / f"{picture.name}.png")
-            print(f"{picture.name}.png: {picture.case}", *complaints, sep="\n  ")
-        page = diagnosed(Path(scratch))
-        client.open(str(page.with_suffix(".rrd")))
-        complaints = draw(client, DIAGNOSIS, folder / f"{DIAGNOSIS.name}.png")
-        print(f"{DIAGNOSIS.name}.png: {DIAGNOSIS.case}", *complaints, sep="\n  ")
-        print(photograph(page, folder / "diagnosis-report.png"))
+            (case,) = select(shipped_cases(), [picture.case])
+            write_case_recording(run_case(case, load_thresholds()), scratch / "case.rrd")
+            draw(client, scratch / "case.rrd", picture, folder, numbers_of_case(case))
+        twin = make_twin(model_path("demobot_parallel"), _SEED)
+        found = diagnose(twin.robot, twin.measured)
+        write_diagnosis_recording(found, scratch / "diagnosis.rrd")
+        draw(client, scratch / "diagnosis.rrd", DIAGNOSIS, folder, numbers_of_diagnosis(found))
+        photograph(found, scratch, folder)
+        whole = workspace(elastic=True)
+        map_figure(scratch / "map.png", whole)
+        keep(scratch / "map.png", folder / f"{MAP}.png", numbers_of_map(whole), few=True)
 
 
-def diagnosed(folder: Path) -> Path:
-    """Hide effects, diagnose them, and write page and recording; the page's path."""
-    twin = make_twin(model_path("demobot_parallel"), _SEED)
-    found = diagnose(twin.robot, twin.measured)
-    write_diagnosis_recording(found, folder / "diagnosis.rrd")
-    write_page(found, folder / "diagnosis.html")
-    return folder / "diagnosis.html"
+def numbers_of_case(case: Case) -> Numbers:
+    """What a recording of the suite shows: SEECR's answers, the largest of each kind."""
+    robot = load_robot(case.model)
+    if case.ea is not None:
+        robot = replace(robot, ea=np.full(robot.n_cables, case.ea))
+    found = solve(robot, case.poses)
+    away = found.deviation
+    return {
+        "deviation_mm": 1e3 * float(np.linalg.norm(away[:, :3], axis=1).max()),
+        "rotation_deg": float(np.degrees(np.linalg.norm(away[:, 3:], axis=1).max())),
+        "tension_N": float(found.tensions.max()),
+    }
 
 
-def photograph(page: Path, path: Path) -> str:
-    """Let Chromium draw the top of the page; says what it drew."""
-    browser = shutil.which("chromium") or shutil.which("google-chrome")
-    if browser is None:
-        return f"{path.name}: left out, as there is no Chromium here"
+def numbers_of_diagnosis(found: Diagnosis) -> Numbers:
+    """What its page and recording show: errors step by step, and the values found."""
+    out = {"before_mm": 1e3 * (found.before["position_rms_m"] or 0.0)}
+    for one in found.missing:
+        out[f"{one.effect} left_mm"] = 1e3 * (one.held_out_rms["position_rms_m"] or 0.0)
+        values = zip(one.layout.names, one.values.tolist(), strict=True)
+        out |= {f"{one.effect} {name}": value for name, value in values}
+    return out
+
+
+def workspace(*, elastic: bool) -> Workspace:
+    """DemoBot's, in the Cogiro configuration."""
+    axes = [np.linspace(*axis) for axis in _GRID]
+    return workspace_map(load_robot(model_path("demobot_cogiro")), *axes, elastic=elastic)
+
+
+def numbers_of_map(found: Workspace) -> Numbers:
+    """What the map of a workspace shows of what can be held."""
+    margins = found.margin[found.feasible]
+    return {"held": float(found.feasible.sum()), "largest_margin_N": float(margins.max())}
+
+
+def numbers_in(path: Path) -> Numbers:
+    """The numbers that a picture was made with."""
+    with Image.open(path) as picture:
+        numbers: Numbers = json.loads(picture.info["numbers"])
+    return numbers
+
+
+def keep(made: Path | Image.Image, path: Path, numbers: Numbers, *, few: bool = False) -> None:
+    """Write a picture with its numbers; one of few colours takes a third of the room."""
+    image = made if isinstance(made, Image.Image) else Image.open(made)
+    image = image.convert("RGB")
+    if few:
+        image = image.quantize(_COLOURS, dither=Image.Dither.NONE)
+    info = PngInfo()
+    info.add_text("numbers", json.dumps({name: float(f"{v:.6g}") for name, v in numbers.items()}))
+    image.save(path, optimize=True, pnginfo=info)
+    print(f"{path.name}: {path.stat().st_size // 1000} kB")
+
+
+def photograph(found: Diagnosis, scratch: Path, folder: Path) -> None:
+    """Let a browser draw the top of the page, if there is one."""
+    page, taken = scratch / "diagnosis.html", scratch / "diagnosis.png"
+    write_page(found, page)
+    if browser.browser() is None:
+        print(f"{REPORT}.png: left out, as there is no Chromium or Chrome on the path")
+        return
     width, height = _PAGE
-    with tempfile.TemporaryDirectory() as profile:
-        subprocess.run(
-            [
-                browser, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars",
-                "--disable-background-networking", f"--user-data-dir={profile}",
-                f"--force-device-scale-factor={_SCALE}", f"--window-size={width},{height}",
-                f"--screenshot={path}", page.as_uri(),
-            ],
-            check=True, capture_output=True,
-        )  # fmt: skip
-    image = Image.open(path).convert("RGB")
-    image.quantize(128, dither=Image.Dither.NONE).save(path, optimize=True)
-    return f"{path.name}: {DIAGNOSIS.case}"
+    browser.shoot(page, taken, width, height=height, scale=_SCALE)
+    keep(taken, folder / f"{REPORT}.png", numbers_of_diagnosis(found))
 
 
-def record(case: str, folder: Path) -> Path:
-    """Run one case of the suite and write its recording."""
-    (chosen,) = select(shipped_cases(), [case])
-    result = run_case(chosen, load_thresholds(), folder)
-    return folder / str(result.recording)
-
-
-def draw(client: ViewerClient, picture: Picture, path: Path) -> list[str]:
+def draw(
+    client: ViewerClient, recorded: Path, picture: Picture, folder: Path, numbers: Numbers
+) -> None:
     """Set the cursor, take the picture, and tell what the viewer could not show."""
-    if picture.pose is not None:
-        client.set_time("pose", sequence=picture.pose, play_state="paused")
+    client.open(str(recorded))
+    if picture.x_mm is not None:
+        client.set_time("x_mm", sequence=picture.x_mm, play_state="paused")
     elif picture.step is not None:
         client.set_time("model_step", sequence=picture.step, play_state="paused")
     else:
@@ -135,9 +186,9 @@ def draw(client: ViewerClient, picture: Picture, path: Path) -> list[str]:
     time.sleep(_DRAWN)
     image = Image.open(io.BytesIO(client.take_screenshot())).convert("RGB")
     image = image.crop((0, _TOP_BAR, image.width, image.height))
-    image.save(path, optimize=True)
+    keep(image, folder / f"{picture.name}.png", numbers)
     views = client.get_state().views
-    return [f"{view.name}: {report.summary}" for view in views for report in view.reports]
+    print(*(f"  {view.name}: {report.summary}" for view in views for report in view.reports))
 
 
 @contextmanager

@@ -6,32 +6,38 @@ import contextlib
 import io
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
+import render_pictures
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
-def printed_by(number: int) -> tuple[str, str]:
-    """What an example of README prints, and what README says that it prints."""
+def printed_by(number: int) -> tuple[str, str, dict[str, Any]]:
+    """What an example of README prints, what README says that it prints, and its names."""
     examples = re.findall(r"```python\n(.*?)```\n\n```text\n(.*?)```", README, re.DOTALL)
     code, said = examples[number]
-    printed = io.StringIO()
+    printed, names = io.StringIO(), dict[str, Any]()
     with contextlib.redirect_stdout(printed):
-        exec(compile(code, "README.md", "exec"), {})
-    return printed.getvalue(), said
+        exec(compile(code, "README.md", "exec"), names)
+    return printed.getvalue(), said, names
 
 
 def test_the_example_of_seecr_prints_what_it_says() -> None:
-    printed, said = printed_by(0)
+    printed, said, _ = printed_by(0)
     assert printed == said and said.startswith("x 0.17 m")
 
 
 @pytest.mark.slow
 def test_the_diagnosis_from_python_prints_what_it_says() -> None:
-    printed, said = printed_by(1)
+    printed, said, names = printed_by(1)
     assert printed == said and said.startswith("effects_found")
+    for name in (render_pictures.REPORT, render_pictures.DIAGNOSIS.name):
+        shown = render_pictures.numbers_in(render_pictures.FOLDER / f"{name}.png")
+        today = render_pictures.numbers_of_diagnosis(names["found"])
+        assert shown == pytest.approx(today, rel=1e-3), "run: scripts/render_pictures.py"
 
 
 def test_ci_runs_the_test_command_of_the_readme() -> None:

@@ -102,7 +102,7 @@ def _blueprint(found: Diagnosis, stages: list[Stage], shown: Misfit) -> rrb.Blue
         ),
         column_shares=[5.0, 3.6, 2.8],
     )
-    return layout.blueprint(root, timeline=MODEL_STEP, frames_per_second=_STEPS_A_SECOND)
+    return layout.blueprint(root, timeline=(MODEL_STEP, 1.0), poses_a_second=_STEPS_A_SECOND)
 
 
 def _over_steps(

@@ -71,7 +71,7 @@ class Panels:
             self._worst(),
             self._findings(),
             lines=material.is_sweep,
-            along=opening(material.index),
+            along=opening(material.index)[0],
         )
 
     def _findings(self) -> list[str]:

@@ -77,7 +77,8 @@ def _panel(axes: Axes, found: Diagnosis, stages: list[Stage], kind: Kind) -> Non
     for row, (stage, value, runs) in enumerate(zip(stages, values, blocks, strict=True)):
         in_sample = _in_sample(found, stage, kind)
         (_point if logarithmic else _bar)(axes, row, stage, value)
-        _runs(axes, row, runs)
+        # beside a dot, which would hide it, and on a bar
+        _runs(axes, row + 0.3 * logarithmic, runs)
         if stage.added and in_sample is not None:
             axes.plot(
                 [in_sample] * 2, [row - 0.3, row + 0.3], color="#b9c0c7", linewidth=1.4, zorder=4
@@ -129,7 +130,7 @@ def _bar(axes: Axes, row: int, stage: Stage, value: float) -> None:
     )  # fmt: skip
 
 
-def _runs(axes: Axes, row: int, runs: np.ndarray) -> None:
+def _runs(axes: Axes, row: float, runs: np.ndarray) -> None:
     """The range over the runs left out, and one tick per run."""
     runs = runs[np.isfinite(runs)]
     if len(runs) < 2:

@@ -145,16 +145,16 @@ def blueprint(
     root: rrb.Container,
     *,
     playback_speed: float = 1.0,
-    timeline: str = POSE,
-    frames_per_second: float = _FPS,
+    timeline: tuple[str, float] = (POSE, 1.0),
+    poses_a_second: float = _FPS,
 ) -> rrb.Blueprint:
     """Views, with the timeline over poses first and nothing else in the way.
 
     Args:
         root: the views.
         playback_speed: of timelines in seconds, over real time.
-        timeline: that it opens with.
-        frames_per_second: when playing a timeline that counts.
+        timeline: that it opens with, and how much of it lies between two poses.
+        poses_a_second: when playing a timeline that counts.
     """
     return rrb.Blueprint(
         root,
@@ -162,8 +162,8 @@ def blueprint(
         rrb.SelectionPanel(state="hidden"),
         rrb.TimePanel(
             state="collapsed",
-            timeline=timeline,
-            fps=frames_per_second / playback_speed,
+            timeline=timeline[0],
+            fps=poses_a_second * timeline[1] / playback_speed,
             playback_speed=playback_speed,
             play_state="paused",
             loop_mode="all",

@@ -76,9 +76,10 @@ def sweep_index(poses: Array) -> list[rr.TimeColumn]:
     return index
 
 
-def opening(index: Sequence[rr.TimeColumn]) -> str:
-    """The timeline that a recording opens with."""
-    return str(index[-1].timeline_name())
+def opening(index: Sequence[rr.TimeColumn]) -> tuple[str, float]:
+    """The timeline that a recording opens with, and how much of it lies between two poses."""
+    steps = np.abs(np.diff(index[-1].as_arrow_array().to_numpy(zero_copy_only=False)))
+    return str(index[-1].timeline_name()), float(np.median(steps)) if len(steps) else 1.0
 
 
 def settling_index(t_s: Array) -> rr.TimeColumn:

@@ -59,7 +59,7 @@ def write_sweep_recording(solution: Solution, path: str | Path, commanded: bool 
 
 
 def _blueprint(
-    solution: Solution, seen: Array, name: str, commanded: bool, timeline: str
+    solution: Solution, seen: Array, name: str, commanded: bool, timeline: tuple[str, float]
 ) -> rrb.Blueprint:
     robot = solution.robot
     share = layout.lanes_share(robot.n_cables)

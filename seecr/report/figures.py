@@ -207,7 +207,7 @@ def _slack_panel(found: Workspace, row: Any, x: Array, y: Array, slices: Slices)
 
     count = np.where(found.rests, found.slack, np.nan).ravel()
     m = found.robot.n_cables
-    steps = matplotlib.colormaps["viridis_r"].resampled(m + 1)
+    steps = matplotlib.colormaps["viridis"].resampled(m + 1)
     return _colours(row, x, y, [count[k] for k in slices], -0.5, m + 0.5, steps, found, slices)
 
 

@@ -121,7 +121,8 @@ def test_a_line_along_an_axis_is_drawn_over_the_place(
     poses: np.ndarray, timeline: str, places: list[int]
 ) -> None:
     index = sweep_index(poses)
-    assert opening(index) == timeline
+    name, step = opening(index)
+    assert name == timeline and step == abs(places[-1] - places[0] or 1)
     assert index[0].timeline_name() == "pose"
     assert index[-1].as_arrow_array().to_pylist()[: len(places)] == places
 
