@@ -33,6 +33,7 @@ docs: ## write the pages and pictures made from the sources, and build the site:
 	$(BIN)/python scripts/make_commands.py
 	$(BIN)/python scripts/draw_floors.py
 	$(BIN)/python scripts/make_paper.py
+	$(BIN)/python scripts/draw_fall.py
 	$(BIN)/python -m sphinx -q -W --keep-going -c docs -d build/read . build/site
 
 suite: ## SEECR against MuJoCo, every case; results in crosscheck-results/

@@ -25,4 +25,5 @@ nb_merge_streams = True
 
 html_theme = "furo"
 html_title = f"seecr {version}"
+html_static_path, html_css_files = ["static"], ["wide.css"]
 html_extra_path = ["front"]  # index.html, which leads to docs/index.html

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import io
+import json
 import re
 from pathlib import Path
 from typing import Any
 
+import draw_fall
 import pytest
 import render_pictures
+from shown import Page
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -32,12 +35,31 @@ def test_the_example_of_seecr_prints_what_it_says() -> None:
 
 @pytest.mark.slow
 def test_the_diagnosis_from_python_prints_what_it_says() -> None:
+    """And the first picture has that diagnosis' numbers, which README gives in words too."""
     printed, said, names = printed_by(1)
     assert printed == said and said.startswith("effects_found")
     for name in (render_pictures.REPORT, render_pictures.DIAGNOSIS.name):
         shown = render_pictures.numbers_in(render_pictures.FOLDER / f"{name}.png")
         today = render_pictures.numbers_of_diagnosis(names["found"])
         assert shown == pytest.approx(today, rel=1e-3), "run: scripts/render_pictures.py"
+    fall = draw_fall.steps(names["robot"], names["twin"].measured, names["found"])
+    drawn = json.loads(draw_fall.NUMBERS.read_text(encoding="utf-8"))
+    now = draw_fall.numbers(fall)
+    assert list(now) == list(drawn), "run: make docs"
+    for model, errors in now.items():
+        assert errors == pytest.approx(drawn[model], rel=2e-3), "run: make docs"
+    told = [f"{errors['position_mm']:.2g} mm" for errors in drawn.values()][:-1]
+    assert all(value in README.split("docs/pictures/fall.png")[0] for value in told)
+
+
+@pytest.mark.sweep
+def test_the_commands_of_one_robot_do_what_they_say(tmp_path: Path) -> None:
+    """The tutorial's are the same commands; these take half a minute."""
+    (tmp_path / "models").symlink_to(ROOT / "models")
+    block = next(b for b in re.findall(r"```sh\n.*?```", README, re.DOTALL) if "--hide 13" in b)
+    page = Page(tmp_path)
+    page.run(f"\n\n{block}\n")
+    assert len(page.commands) == 7
 
 
 def test_ci_runs_the_test_command_of_the_readme() -> None:
