@@ -9,6 +9,7 @@ import rerun.blueprint as rrb
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import Stage, floor_of
 from crosscheck.fit.problem import Kind, kinds_read
+from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.units import short
 from seecr.recording import colours, layout
 from seecr.recording.colours import Rgba
@@ -72,7 +73,7 @@ def _block(
     floor = kind.factor * floor_of(found, kind)
     ends = _places(values, values, floor)
     rows = top + _HEAD + _ROW * (np.arange(len(stages)) + 0.5)
-    lit = np.array([_lit(stage) for stage in stages], dtype=np.uint8)
+    lit = np.array([_lit(stage, found) for stage in stages], dtype=np.uint8)
     root = f"{ROOT}/{kind.name}"
     strips = [np.array([[_LEFT, y], [x, y]]) for x, y in zip(ends, rows, strict=True)]
     thick = 0.3 * _ROW
@@ -110,9 +111,10 @@ def _places(values: np.ndarray, every: np.ndarray, floor: float) -> np.ndarray:
     return np.asarray(_LEFT + (_RIGHT - _LEFT) * np.clip(part, 0.01, 1.0))
 
 
-def _lit(stage: Stage) -> Rgba:
+def _lit(stage: Stage, found: Diagnosis) -> Rgba:
     if not stage.added:
-        return colours.VERMILION
+        calm = found.verdict is DiagnosisVerdict.NO_EFFECT_MISSING
+        return colours.SILVER if calm else colours.VERMILION
     return colours.SKY if stage.listed else colours.SILVER
 
 

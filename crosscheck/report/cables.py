@@ -133,8 +133,12 @@ def paid_out(problem: Problem, prediction: Prediction) -> Array:
     return np.asarray(np.where(first[:, None], np.nan, lengths - before))
 
 
-def draw_wall(wall: Wall) -> str:
-    """One row of panels per cable (or reading), one column per abscissa."""
+def draw_wall(wall: Wall, alone: str = BEFORE) -> str:
+    """One row of panels per cable (or reading), one column per abscissa.
+
+    Args:
+        wall: residuals. alone: their colour where no effect accounts for a part of them.
+    """
     rows = _worth_showing(wall)
     with styled():
         height = _ROW_HEIGHT * len(rows) + 0.75
@@ -148,7 +152,7 @@ def draw_wall(wall: Wall) -> str:
         )  # fmt: skip
         for place, k in enumerate(rows):
             for axes, (_name, values) in zip(panels[place], wall.abscissae, strict=True):
-                _panel(axes, values if values.ndim == 1 else values[:, k], wall, k)
+                _panel(axes, values if values.ndim == 1 else values[:, k], wall, k, alone)
             name = wall.names[k].replace(" about ", "\nabout ")  # else it leaves the page
             panels[place, 0].set_ylabel(name, rotation=0, ha="right", va="center", labelpad=6)
         for axes, (name, _values) in zip(panels[-1], wall.abscissae, strict=True):
@@ -166,13 +170,13 @@ def _worth_showing(wall: Wall) -> list[int]:
     return sorted(int(k) for k in worst) if count > _MOST_ROWS else list(range(count))
 
 
-def _panel(axes: Axes, x: Array, wall: Wall, k: int) -> None:
+def _panel(axes: Axes, x: Array, wall: Wall, k: int, alone: str) -> None:
     y, model = wall.measured[:, k], wall.predicted[:, k]
     level = float(wall.noise[k])
     axes.axhspan(-2 * level, 2 * level, color=NOISE, linewidth=0, zorder=0)
     many = bool(np.isfinite(y).sum() > MANY)
     overlaid = bool(np.any(wall.predicted[np.isfinite(wall.predicted)] != 0.0))
-    dots(axes, x, y, 2.4 if many else 4.4, TINT if overlaid else BEFORE, 0.6)
+    dots(axes, x, y, 2.4 if many else 4.4, TINT if overlaid else alone, 0.6)
     if overlaid:
         dots(axes, x, model, 1.0 if many else 2.0, AFTER, 0.7)
     axes.axhline(0.0, color=INK, linewidth=0.5, zorder=1)

@@ -11,6 +11,7 @@ from crosscheck.comparison.result import Comparison, Group
 from crosscheck.diagnosis.steps import Standing
 from crosscheck.fit.problem import KINDS, Rms
 from crosscheck.report.cables import draw_wall, walls_of
+from crosscheck.report.drawing import BEFORE, CALM
 from crosscheck.report.page import facts, title_of
 from crosscheck.report.tables import association_block
 from crosscheck.report.where import caption, failure_map
@@ -49,7 +50,10 @@ def comparison_context(found: Comparison) -> dict[str, Any]:
     if found.coordinates:
         stage = Standing(" + ".join(names) or "plain SEECR", found.state)
         context["map"] = Markup(failure_map(problem, stage, stage))  # ours, escaped there
-        context["walls"] = [Markup(draw_wall(wall)) for wall in walls_of(problem, stage, stage)]
+        context["walls"] = [
+            Markup(draw_wall(wall, CALM if found.is_noise else BEFORE))
+            for wall in walls_of(problem, stage, stage)
+        ]
         context["caption"] = caption(problem, stage)
     return context
 

@@ -8,10 +8,11 @@ from markupsafe import Markup
 
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import shown_stages, stages_of
+from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.fit.words import rms_words
 from crosscheck.report.cables import draw_wall, walls_of
 from crosscheck.report.confusion import confusion_of, draw_confusion
-from crosscheck.report.drawing import AFTER, BEFORE, TINT
+from crosscheck.report.drawing import AFTER, BEFORE, CALM, TINT
 from crosscheck.report.findings import finding_card
 from crosscheck.report.page import facts, title_of
 from crosscheck.report.tables import association_block, candidate_rows, checks, untried
@@ -64,7 +65,9 @@ def _of_search(found: Diagnosis) -> dict[str, Any]:
         "map": failure_map(problem, before, after),
         "confusion": draw_confusion(confusion) if confusion is not None else "",
     }
-    walls = [draw_wall(wall) for wall in walls_of(problem, before, last)]
+    calm = found.verdict is DiagnosisVerdict.NO_EFFECT_MISSING
+    alone = CALM if calm else BEFORE
+    walls = [draw_wall(wall, alone) for wall in walls_of(problem, before, last)]
     added = [n for n in last.state.terms.names if n not in found.search.base]
     return {
         "facts": [*facts(problem), *_unknown_facts(found)],
@@ -75,7 +78,7 @@ def _of_search(found: Diagnosis) -> dict[str, Any]:
         "together": bool(problem.sigma.length_m),
         "unsure": not all(stage.listed for stage in stages_of(found)),
         "added": added,
-        "tint": TINT if added else BEFORE,
+        "tint": TINT if added else alone,
     }
 
 

@@ -26,6 +26,9 @@ from seecr.pose import Array
 
 # Okabe and Ito (2008): pairs that stay apart for every common kind of colour blindness.
 BEFORE, TINT, AFTER, UNSURE = "#D55E00", "#EFA06B", "#0072B2", "#8a94a0"
+CALM = "#6f7f8f"
+"""Of the model as it stands where nothing is missing: no colour of alarm."""
+
 INK, GREY, FAINT, NOISE = "#1d2329", "#6b747d", "#e7eaed", "#d9dee3"
 WIDTH = 10.4
 """Width of a figure [in]; the page scales it to its own."""

@@ -8,9 +8,11 @@ from matplotlib.axes import Axes
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import Stage, by_block, floor_of, stages_of
 from crosscheck.fit.problem import Kind, kinds_read, rms_by_kind
+from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.report.drawing import (
     AFTER,
     BEFORE,
+    CALM,
     GREY,
     INK,
     NOISE,
@@ -76,7 +78,7 @@ def _panel(axes: Axes, found: Diagnosis, stages: list[Stage], kind: Kind) -> Non
     )  # fmt: skip
     for row, (stage, value, runs) in enumerate(zip(stages, values, blocks, strict=True)):
         in_sample = _in_sample(found, stage, kind)
-        (_point if logarithmic else _bar)(axes, row, stage, value)
+        (_point if logarithmic else _bar)(axes, row, stage, value, _colour(stage, found))
         # beside a dot, which would hide it, and on a bar
         _runs(axes, row + 0.3 * logarithmic, runs)
         if stage.added and in_sample is not None:
@@ -86,7 +88,7 @@ def _panel(axes: Axes, found: Diagnosis, stages: list[Stage], kind: Kind) -> Non
         reach = max(value, float(np.nanmax(runs, initial=0.0)))
         words = f"{short(value)} {kind.unit}"
         if row == len(stages) - 1 and value > _ABOVE * floor > 0 and not _is_noise(found):
-            words += ", not explained"
+            words += "\nnot explained"
         axes.annotate(
             words, (reach, row), xytext=(5, 0), textcoords="offset points", va="center",
             fontsize=8.5, color=INK,
@@ -108,21 +110,21 @@ def _in_sample(found: Diagnosis, stage: Stage, kind: Kind) -> float | None:
     return None if value is None else value * kind.factor
 
 
-def _colour(stage: Stage) -> str:
-    return BEFORE if not stage.added else AFTER if stage.listed else UNSURE
+def _colour(stage: Stage, found: Diagnosis) -> str:
+    if not stage.added:
+        return CALM if found.verdict is DiagnosisVerdict.NO_EFFECT_MISSING else BEFORE
+    return AFTER if stage.listed else UNSURE
 
 
-def _point(axes: Axes, row: int, stage: Stage, value: float) -> None:
+def _point(axes: Axes, row: int, stage: Stage, value: float, colour: str) -> None:
     """Where the axis has no zero to begin a bar at."""
-    colour = _colour(stage)
     axes.plot(
         value, row, marker="o", markersize=11, markeredgewidth=1.6, zorder=2,
         markeredgecolor=colour, markerfacecolor=colour if stage.listed else "white",
     )  # fmt: skip
 
 
-def _bar(axes: Axes, row: int, stage: Stage, value: float) -> None:
-    colour = _colour(stage)
+def _bar(axes: Axes, row: int, stage: Stage, value: float, colour: str) -> None:
     axes.barh(
         row, value, height=0.52, zorder=2,
         color=colour if stage.listed else "white", edgecolor=colour,

@@ -30,6 +30,7 @@ from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 from crosscheck.report import write_page
 from crosscheck.report.cables import Wall, draw_wall, paid_out, walls_of
 from crosscheck.report.confusion import confusion_of
+from crosscheck.report.drawing import AFTER, BEFORE, CALM
 from crosscheck.report.findings import finding_card
 from crosscheck.report.tables import candidate_rows, checks, untried
 from crosscheck.report.waterfall import waterfall
@@ -373,3 +374,20 @@ def test_written_whole_or_not_at_all(tmp_path: Path) -> None:
 
 def test_pages_are_small() -> None:
     assert all(len(page(name).encode()) < 2_000_000 for name in ALL)
+
+
+def test_nothing_missing_is_not_drawn_in_the_colour_of_alarm() -> None:
+    *calm, _confusion = figures_of(page("nothing"))  # which frames what imitates what
+    assert len(calm) > 2 and not any(BEFORE.lower() in figure.lower() for figure in calm)
+    alarming = figures_of(page("unknown"))[0].lower()
+    assert BEFORE.lower() in alarming and CALM.lower() not in alarming
+
+
+@pytest.mark.parametrize(("name", "models"), [("pulleys", 2), ("nothing", 1)])
+def test_where_an_axis_has_no_zero_there_are_dots_and_no_bars(name: str, models: int) -> None:
+    (figure,) = figures_of(waterfall(diagnosis(name)))
+    logarithmic = text_of(figure).count("logarithmic")
+    fills = rf'<path d="M [^"]*z\s*"[^>]*style="fill: (?:{BEFORE}|{CALM}|{AFTER})'
+    bars = len(re.findall(fills, figure, re.IGNORECASE))
+    assert bars == models * (3 - logarithmic)
+    assert (logarithmic > 0) == (name == "pulleys")
