@@ -15,6 +15,7 @@ include_patterns = ["*.md", "docs/*.md", "models/README.md", "examples/*"]
 exclude_patterns = [".venv*", "build", "dist"]
 extensions = ["myst_nb"]
 
+smartquotes = False  # two hyphens begin an option
 myst_heading_anchors = 4  # by the names that code hosts give them
 nitpicky = True
 # notebooks are kept without outputs and run here; one that fails stops the build

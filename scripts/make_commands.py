@@ -7,6 +7,7 @@ A test runs :func:`page` and goes red where the page is out of date.
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterator
 from inspect import cleandoc
@@ -54,7 +55,7 @@ def _command(context: click.Context) -> Iterator[str]:
     options = [one for one in command.params if isinstance(one, click.Option)]
     rows = [record for one in options if (record := one.get_help_record(context))]
     yield "| option | what it does |\n|---|---|"
-    yield "\n".join(f"| `{_cell(name)}` | {_cell(words)} |" for name, words in rows) + "\n"
+    yield "\n".join(f"| `{_cell(name)}` | {_marked(_cell(words))} |" for name, words in rows) + "\n"
     yield from _paragraphs(command.epilog or "")
 
 
@@ -62,15 +63,20 @@ def _paragraphs(text: str) -> Iterator[str]:
     """A help text as Markdown; what a terminal must not wrap stays as it is."""
     for paragraph in cleandoc(text).split("\n\n"):
         if not paragraph.startswith("\b"):
-            yield f"{paragraph}\n"
+            yield f"{_marked(paragraph)}\n"
             continue
         head, *lines = paragraph.removeprefix("\b\n").split("\n")
         kind = "sh" if head.startswith("Example") else "text"
         body = "\n".join(line.removeprefix("  ") for line in lines)
         if head.endswith(":"):
-            yield f"{head}\n\n```{kind}\n{body}\n```\n"
+            yield f"{_marked(head)}\n\n```{kind}\n{body}\n```\n"
         else:
-            yield "  \n".join([head, *lines]) + "\n"
+            yield _marked("  \n".join([head, *lines])) + "\n"
+
+
+def _marked(text: str) -> str:
+    """A text with its options in the letters of code."""
+    return re.sub(r"(?<![\w`-])(--[a-z][a-z-]*)", r"`\1`", text)
 
 
 def _cell(text: str) -> str:
