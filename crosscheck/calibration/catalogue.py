@@ -11,7 +11,7 @@ from crosscheck.calibration.colour import whitened
 from crosscheck.calibration.gram import ColumnGroup, Gram, gram_of
 from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.later import added_columns, amplitudes, amplitudes_at_null
-from crosscheck.calibration.worth import WIDTHS
+from crosscheck.fit.evidence import WIDTHS
 from crosscheck.fit.known import known_readings
 from crosscheck.fit.registration import NAME as TRACKER
 from crosscheck.fit.state import derivatives
@@ -20,7 +20,7 @@ from seecr.effects.base import Layout
 from seecr.pose import Array
 
 # Where the tracker stands has no plausible size.
-TRACKER_WIDTHS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
+TRACKER_WIDTHS = (*WIDTHS, 30.0, 100.0, 300.0)
 # Effects that move no reading by this part of its noise, for plausible sizes, are not seen.
 _UNSEEN = 0.02
 

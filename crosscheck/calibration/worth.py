@@ -6,7 +6,7 @@ of a group's own normal matrix C and gradient b says what its evidence gains ove
     ln gain = 1/2 sum lambda^2 b_i^2/(1 + lambda^2 e_i) - 1/2 sum ln(1 + lambda^2 e_i)
 
 in the axes of C = U diag(e) U^T. One width for the group is averaged over, so that a plausible
-size that is off by ten does not decide. A single parameter that cannot be negative has half a
+size that is off by far does not decide. A single parameter that cannot be negative has half a
 Gaussian as its prior.
 """
 
@@ -18,9 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import special, stats
 
+from crosscheck.fit.evidence import WIDTHS
 from seecr.pose import Array
-
-WIDTHS = (0.1, 0.3, 1.0, 3.0, 10.0)
 
 
 def log_gains(normal: Array, gradient: Array, widths: ArrayLike, one_sided: bool = False) -> Array:

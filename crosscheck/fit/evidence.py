@@ -7,7 +7,7 @@ derivatives X by plausible sizes z ~ N(0, lambda^2),
     ln Z(lambda) = -1/2 [|y|^2 - sum c_i^2 g_i] - 1/2 sum ln(1 + lambda^2 s_i^2),
     g_i = lambda^2 s_i^2/(1 + lambda^2 s_i^2),  X = U diag(s) V^T,  c = U^T y,  y = r + X z
 
-averaged over lambda, so that a plausible size that is off by ten does not decide. A parameter
+averaged over lambda, so that a plausible size that is off by far does not decide. A parameter
 the data do not see (s_i = 0) costs nothing and gains nothing.
 """
 
@@ -24,7 +24,12 @@ from crosscheck.fit.known import known_readings
 # Family-wise chance of a false alarm, over all candidates of a step.
 FALSE_ALARM = 0.01
 
-_LAMBDAS = (0.1, 0.3, 1.0, 3.0, 10.0)
+WIDTHS = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
+"""Standard deviations that sizes may have, in plausible ones.
+
+What a good tracker sees of some effects is a hundredth of what they may well be: a robot built that
+well is charged for the range of its like, not for that of any robot.
+"""
 
 
 @dataclass(frozen=True)
@@ -60,12 +65,12 @@ def evidence(fit: Fit, noise_scale: float = 1.0) -> Evidence:
     c2 = (v.T @ (x.T @ y)) ** 2 / np.maximum(power, 1e-300)
     total = float(y @ y)
     logs = []
-    for lam in _LAMBDAS:
+    for lam in WIDTHS:
         gain = (lam * s) ** 2 / (1.0 + (lam * s) ** 2)
         logs.append(
             -0.5 * (total - float(c2 @ gain)) - 0.5 * float(np.sum(np.log1p((lam * s) ** 2)))
         )
-    log = float(special.logsumexp(logs) - np.log(len(_LAMBDAS))) - 0.5 * fit.state.log_det
+    log = float(special.logsumexp(logs) - np.log(len(WIDTHS))) - 0.5 * fit.state.log_det
     return Evidence(log, fit.chi2, int(np.sum(s > 1e-2)))
 
 

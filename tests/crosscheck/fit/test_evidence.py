@@ -13,7 +13,7 @@ from crosscheck.fit.evidence import evidence, p_value
 from crosscheck.fit.gauss_newton import Fit
 
 # Standard deviations of the prior, in plausible sizes, that the evidence is averaged over.
-LAMBDAS = (0.1, 0.3, 1.0, 3.0, 10.0)
+LAMBDAS = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
 
 
 def small(name: str, z: float, scale: float = 0.1) -> tuple[LinearToy, Fit]:
