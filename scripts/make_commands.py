@@ -62,6 +62,9 @@ def _command(context: click.Context) -> Iterator[str]:
 def _paragraphs(text: str) -> Iterator[str]:
     """A help text as Markdown; what a terminal must not wrap stays as it is."""
     for paragraph in cleandoc(text).split("\n\n"):
+        if paragraph.startswith("Example: "):
+            yield f"Example:\n\n```sh\n{paragraph.removeprefix('Example: ')}\n```\n"
+            continue
         if not paragraph.startswith("\b"):
             yield f"{_marked(paragraph)}\n"
             continue
