@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from seecr.cli.following import following
-from seecr.cli.options import FILE, json_option, out_option
+from seecr.cli.options import FILE, json_option, made_by, out_option
 
 
 @click.command(
@@ -113,9 +113,10 @@ def command(
     machine = load_robot(robot)
     choices = Choices.said(machine, **options)
     found = import_case(form, files, machine, logs, choices)
-    write_case(found, robot, out)
+    made = made_by(robot, *files, *logs)
+    write_case(found, robot, out, made)
     if as_json:
-        click.echo(json_text({**found.as_json(), "folder": str(out)}))
+        click.echo(json_text({"made": made, **found.as_json(), "folder": str(out)}))
         return 0
     for line in found.lines():
         click.echo(line)

@@ -29,6 +29,7 @@ from crosscheck.measurements.read import load_commands
 from crosscheck.measurements.together import together
 from crosscheck.measurements.write import write_measurements
 from seecr.experiment import Experiment
+from seecr.made import Made
 from seecr.pose import Array
 from seecr.result import Record, Result
 from seecr.robot import Robot
@@ -139,15 +140,16 @@ def import_case(
     return Imported(robot, measured, frames, tuple(takes), (*said, frames.how, _noise(sigma)))
 
 
-def write_case(found: Imported, robot_path: Path, out: Path) -> None:
-    """Write the case folder, whole or not at all."""
+def write_case(found: Imported, robot_path: Path, out: Path, made: Made | None = None) -> None:
+    """Write the case folder, whole or not at all; ``made`` says how it came about."""
+    said = {} if made is None else {"made": made}
     with staged(out) as folder:
         write_measurements(folder / "measured.csv", found.measured)
         copy_robot(robot_path, folder / "robot.xml")
         rows = found.records()
         lines = [",".join(rows[0])] + [",".join(_cell(v) for v in row.values()) for row in rows]
         write_text(folder / "dwells.csv", "\n".join(lines) + "\n")
-        write_text(folder / "import.json", json_text(found.as_json()) + "\n")
+        write_text(folder / "import.json", json_text({**said, **found.as_json()}) + "\n")
 
 
 def _cell(value: object) -> str:

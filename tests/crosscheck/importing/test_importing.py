@@ -238,5 +238,7 @@ def test_the_command_writes_a_case_and_names_the_next_one(made, commands, tmp_pa
     assert set(data.free) == {"tracker_frame", "tracker_target"}
     assert data.sigma.position_m is not None
     assert len((out / "dwells.csv").read_text().splitlines()) == 25
-    assert json.loads((out / "import.json").read_text())["dwells"] == 24
+    said = json.loads((out / "import.json").read_text())
+    assert said["dwells"] == 24
+    assert set(said["made"]["sha256"]) == {"robot.xml", "take.csv", commands.name}
     assert crosscheck.compare(out / "robot.xml", out / "measured.csv", TRUE).is_noise

@@ -13,7 +13,10 @@ from made_data import case
 import crosscheck
 from crosscheck.report.write import render
 
-pytestmark = pytest.mark.skipif(browser.browser() is None, reason="no Chromium or Chrome here")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(browser.browser() is None, reason="no Chromium or Chrome here"),
+]
 PHONE = 390
 
 
