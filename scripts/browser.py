@@ -63,7 +63,7 @@ def measure(page: Path, width: int) -> Size:
 
 def title(page: Path) -> str:
     """The title of a page once its scripts have run."""
-    dump = _run(page, "--dump-dom", "--window-size=1400,900")
+    dump = _run(page, "--dump-dom", "--window-size=1400,900", "--virtual-time-budget=3000")
     found = re.search(r"<title>(.*?)</title>", dump, re.DOTALL)
     assert found is not None, dump[:300]
     return html.unescape(found[1])

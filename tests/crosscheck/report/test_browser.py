@@ -61,6 +61,18 @@ def test_a_picture_is_dark_where_the_reader_is(pages: Path, tmp_path: Path) -> N
     assert corners[0] == (255, 255, 255) and max(corners[1]) < 64
 
 
+CLICKED = """<script>document.querySelector("a[href^='#glossary-']").click(); setTimeout(() => {
+  document.title = [document.querySelector("#glossary").open, scrollY > 500];
+}, 100);</script></body>"""
+
+
+def test_a_word_that_is_clicked_is_explained(pages: Path) -> None:
+    text = (pages / "diagnosis.html").read_text(encoding="utf-8")
+    clicked = pages / "explained.html"
+    clicked.write_text(text.replace("</body>", CLICKED), encoding="utf-8")
+    assert browser.title(clicked) == "true,true"
+
+
 SORTED = """
 const table = document.querySelector("table.sorts");
 const read = () => [...table.tBodies[0].rows].map((row) => row.cells[CELL].innerText);
