@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+import seecr
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -29,6 +32,8 @@ def test_the_site_builds_without_warnings(tmp_path: Path) -> None:
     run = subprocess.run(
         [*build, "-d", str(tmp_path / "read"), ".", str(tmp_path / "site")],
         cwd=ROOT,
+        # the notebook's kernel starts elsewhere and takes the package that is tested here
+        env={**os.environ, "PYTHONPATH": str(Path(seecr.__file__).resolve().parents[1])},
         capture_output=True,
         text=True,
     )
