@@ -20,8 +20,9 @@ from seecr.result import COORDINATES, Record, Result, named
 from seecr.robot import Robot
 from seecr.solution import Solution
 from seecr.starts import commanded_poses
-from seecr.tables import Tables, assemble
+from seecr.tables import Tables, assemble, take
 from seecr.told import told_lengths
+from seecr.unheld import why_not_held
 
 PREFERENCES = ("pose", "position")
 """What may give way at a pose that cannot be held: both, or the orientation alone."""
@@ -30,6 +31,8 @@ PREFERENCES = ("pose", "position")
 _ROUNDS, _MISSED = 40, 1e-10
 # A pose that is missed by less than this [m, and rad over the length] has been reached.
 _REACHED = 1e-6
+# Poses whose reason is told.
+_NAMED = 5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -42,6 +45,7 @@ class Correction(Result):
         lengths: (n, m) [m] to tell the winches, counted as the plain robot counts.
         held: (n,) bool, the wanted pose can be held by tensions within the limits.
         found: (n,) bool, there is an answer: lengths for the wanted pose or the nearest.
+        why_not: (n,) sentences, why a wanted pose cannot be held; "" where it can.
         solution: where the platform rests with these lengths, certified.
         commands: the lengths as commands that every function takes, with the runs, times,
             temperatures and loads they are for.
@@ -55,6 +59,7 @@ class Correction(Result):
     found: NDArray[np.bool_]
     solution: Solution
     commands: Commands
+    why_not: tuple[str, ...]
 
     @property
     def left(self) -> Array:
@@ -85,6 +90,7 @@ class Correction(Result):
             out.append(
                 f"{int(lost.sum())} cannot be held: no tensions within the limits balance the load"
             )
+            out += self._reasons()
         if np.any(near):
             out.append(
                 f"the nearest poses that can be held are up to "
@@ -93,13 +99,20 @@ class Correction(Result):
             )
         stays = self.solution.converged
         for rows, text in (
-            (lost & ~self.found, "of them have no pose near that can be held either"),
+            (lost & ~self.found, "of them: no pose near was found that can be held"),
             (self.found & ~stays, "are balanced, but the platform would not stay there"),
             (self.held & stays & ~at, "are missed"),
         ):
             if np.any(rows):
                 out.append(f"{int(rows.sum())} {text}")
         return out
+
+    def _reasons(self) -> list[str]:
+        """The first poses that cannot be held, each with the reason."""
+        rows = np.flatnonzero(~self.held)
+        named_rows = [f"  pose {i}: {self.why_not[i]}" for i in rows[:_NAMED]]
+        more = len(rows) - _NAMED
+        return [*named_rows, f"  and {more} more, see why_not"] if more > 0 else named_rows
 
     def records(self) -> list[Record]:
         """One row per pose: wanted, lengths, what is left, tensions."""
@@ -111,6 +124,7 @@ class Correction(Result):
                 **named("length_{}_m", [str(k + 1) for k in range(len(cables))], self.lengths[i]),
                 "held": bool(self.held[i]),
                 "reached": bool(self.reached[i]),
+                "why_not": self.why_not[i],
                 **named("left_{}", moved, left[i]),
                 **named("tension_{}_N", cables, self.solution.tensions[i]),
             }
@@ -191,7 +205,17 @@ class _Search:
         return Correction(
             self.robot, self.given.pose, aimed, lengths, held.fine, found,
             _without(solution, ~found), replace(commands, lengths=lengths, told=True),
+            self._why_not(lost, tables),
         )  # fmt: skip
+
+    def _why_not(self, lost: NDArray[np.intp], tables: Tables) -> tuple[str, ...]:
+        """(n,) sentences; "" of rows that can be held."""
+        out, limits = [""] * len(self.given), self.limits
+        if len(lost) == 0:
+            return tuple(out)
+        for i, matrix, load in zip(lost, *balance_of(take(tables, lost), limits.low), strict=True):
+            out[i] = why_not_held(matrix, load, limits.low, limits.high, self.robot.cable_names)
+        return tuple(out)
 
     def _tables(self, commands: Commands) -> Tables:
         """Tables at the poses of commands; what is paid out does not matter."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from seecr.distribution import balanced, distribute
 from seecr.joints import pose_of_values, values_of_pose
-from seecr.pose import Array, pose_add
+from seecr.pose import Array, pose_add, pose_difference
 from seecr.robot import Robot
 
 Balance = Callable[[Array, NDArray[np.intp]], tuple[Array, Array]]
@@ -62,7 +62,14 @@ def nearest(
     free = np.full(robot.n_dof, np.inf)
     if fix_position:
         free[~robot.hinges] = 0.0
-    return _Way(robot, wanted, values, balance, least, most, scale, free).run()
+    way = _Way(robot, wanted, values, balance, least, most, scale, free)
+    away, found = np.zeros((len(wanted), robot.n_dof)), np.zeros(len(wanted), dtype=bool)
+    way.run(away, found)
+    if not fix_position and not found.all():
+        # from afar the linearised balance leads nowhere: go from where the robot is at home
+        away[~found] = way.to(robot.reference_pose)[~found]
+        way.run(away, found)
+    return way.placed(away, np.arange(len(wanted))), found
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,37 +85,56 @@ class _Way:
     scale: Array
     free: Array
 
-    def run(self) -> tuple[Array, NDArray[np.bool_]]:
+    def run(self, away: Array, found: NDArray[np.bool_]) -> None:
+        """Go on from ``away`` (n, d) in the rows that are not found, both changed in place."""
         n, length = len(self.wanted), self.robot.length
-        rows, away = np.arange(n), np.zeros((n, self.robot.n_dof))
-        before, share = np.full(n, np.inf), np.ones(n)
-        found = np.zeros(n, dtype=bool)
-        each = zip(*self.balance(self.wanted, rows), self.least, self.most, strict=True)
-        tensions = np.stack([balanced(*one)[0] for one in each])
+        rows = np.flatnonzero(~found)
+        expected, share = np.full(n, np.inf), np.ones(n)
+        tensions = np.zeros(self.least.shape)
+        each = self.balance(self.placed(away[rows], rows), rows)
+        for i, matrix, load in zip(rows, *each, strict=True):
+            tensions[i] = balanced(matrix, load, self.least[i], self.most[i])[0]
+        good, pulled = away.copy(), tensions.copy()
         for _ in range(_ROUNDS):
             step, change, left, possible = self._step(away[rows], tensions[rows], rows)
             size = np.linalg.norm(step, axis=1)
             done = possible & (left <= _TIGHT * self.scale[rows]) & (size <= _ENOUGH * length)
+            found[rows[done]] = True
             # curvature that the linearised balance does not see can make whole steps go to and fro
             slower = np.maximum(0.5 * share[rows], _SLOWEST)
-            share[rows] = np.where(size > _FALLS * before[rows], slower, share[rows])
-            before[rows] = size
+            slow = (size > expected[rows]) | ~possible
+            share[rows] = np.where(slow, slower, share[rows])
+            on, back = rows[possible & ~done], rows[~possible]
+            good[on], pulled[on] = away[on], tensions[on]
             part = np.minimum(share[rows], _LARGEST * length / np.maximum(size, 1e-300))
-            part = np.where(possible, part, 0.0)[:, None]
-            away[rows] += part * step
-            tensions[rows] += part * change
-            found[rows[done]] = True
-            rows = rows[possible & ~done]
+            # what is left where all goes as the linearised balance says, and somewhat more
+            expected[rows] = (1.0 - (1.0 - _FALLS) * part) * size
+            part = part[possible & ~done][:, None]
+            away[on] += part * step[possible & ~done]
+            tensions[on] += part * change[possible & ~done]
+            # too far: half the way back to where there was a step, until that is no way any more
+            near = np.linalg.norm(away[back] - good[back], axis=1) <= _ENOUGH * length
+            back = back[~near]
+            away[back] = 0.5 * (away[back] + good[back])
+            tensions[back] = 0.5 * (tensions[back] + pulled[back])
+            rows = np.sort(np.concatenate([on, back]))
             if len(rows) == 0:
                 break
-        return self._placed(away, np.arange(n)), found
+
+    def to(self, pose: Array) -> Array:
+        """(n, d) how far a pose is from each wanted one."""
+        if self.values is None:
+            change = pose_difference(pose, self.wanted)
+        else:
+            change = values_of_pose(self.robot, pose[None])[0] - self.values
+        return change * np.where(self.robot.hinges, self.robot.length, 1.0)
 
     def _step(
         self, away: Array, tensions: Array, rows: NDArray[np.intp]
     ) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
         """Steps of way and tensions, what is out of balance [N], whether there is a step."""
         k, m = tensions.shape
-        matrix, load = self.balance(self._placed(away, rows), rows)
+        matrix, load = self.balance(self.placed(away, rows), rows)
         rates = self._rates(away, tensions, rows)
         left = np.einsum("ndm,nm->nd", matrix, tensions) - load
         # unknowns: tensions, scaled to next to nothing, and the whole way from the wanted pose
@@ -120,9 +146,13 @@ class _Way:
         )
         aim = load + np.einsum("ndk,nk->nd", rates, away)
         answer, possible = distribute(whole, aim, np.zeros(low.shape[1]), low, high)
+        for i in np.flatnonzero(~possible):
+            step = _by_parts(whole[i], aim[i], low[i], high[i], m)
+            if step is not None:
+                answer[i], possible[i] = step, True
         return answer[:, m:] - away, answer[:, :m] / unit - tensions, np.abs(left).max(1), possible
 
-    def _placed(self, away: Array, rows: NDArray[np.intp]) -> Array:
+    def placed(self, away: Array, rows: NDArray[np.intp]) -> Array:
         """Poses (k, 7) so far from the wanted ones of rows."""
         change = away * np.where(self.robot.hinges, 1.0 / self.robot.length, 1.0)
         if self.values is None:
@@ -137,7 +167,34 @@ class _Way:
             sides = []
             for sign in (1.0, -1.0):
                 moved = away + sign * step * np.eye(d)[k]
-                matrix, load = self.balance(self._placed(moved, rows), rows)
+                matrix, load = self.balance(self.placed(moved, rows), rows)
                 sides.append(np.einsum("ndm,nm->nd", matrix, tensions) - load)
             out[..., k] = (sides[0] - sides[1]) / (2.0 * step)
         return out
+
+
+def _by_parts(matrix: Array, aim: Array, low: Array, high: Array, m: int) -> Array | None:
+    """Balance with the least sum of parts of the way, where least squares lose it to rounding.
+
+    The first m unknowns are tensions, which cost nothing. A linear program (HiGHS, by SciPy).
+    """
+    from scipy.optimize import linprog
+
+    d = matrix.shape[1] - m
+    unit = np.abs(matrix).max(axis=0)
+    unit = np.where(unit > 0.0, unit, 1.0)
+    scaled = matrix / unit
+    found = linprog(
+        np.concatenate([np.zeros(m), np.tile(1.0 / unit[m:], 2)]),
+        A_eq=np.concatenate([scaled, -scaled[:, m:]], axis=1),
+        b_eq=aim,
+        bounds=[
+            *zip(low[:m] * unit[:m], high[:m] * unit[:m], strict=True),
+            *zip(np.zeros(2 * d), np.tile(high[m:] * unit[m:], 2), strict=True),
+        ],
+        method="highs",
+    )
+    if found.status != 0:
+        return None
+    way = found.x[m : m + d] - found.x[m + d :]
+    return np.asarray(np.concatenate([found.x[:m], way]) / unit)

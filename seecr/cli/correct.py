@@ -56,8 +56,9 @@ def command(
 
     ROBOT is an MJCF file or the name of a shipped robot, POSES.csv a list of commands: the poses
     wanted. Elasticity and all effects of the model are taken into account; tensions stay within
-    the limits. A pose that cannot be held is replaced by the nearest one that can. Where the model
-    keeps a covariance, correction.json says of each row how likely its tensions stay within them.
+    the limits. A pose that cannot be held is replaced by the nearest one that can, and it is told
+    which cables would have to push, or pull more than they may. Where the model keeps a covariance,
+    correction.json says of each row how likely its tensions stay within the limits.
 
     Writes corrected.csv and corrected.toml, which every command reads as commands, and
     correction.json. Poses without any answer are left out of corrected.csv.

@@ -96,6 +96,7 @@ def document_of(found: Correction, kept: Array | None = None) -> dict[str, Any]:
                 "aimed": found.aimed[i] if found.found[i] else None,
                 "lengths_m": found.lengths[i],
                 "held": bool(found.held[i]),
+                "why_not": found.why_not[i] or None,
                 "reached": bool(found.reached[i]),
                 "left_m": left[i, :3],
                 "left_rad": left[i, 3:],

@@ -140,7 +140,7 @@ def test_correct_writes_commands_that_every_command_reads(tmp_path: Path) -> Non
     for row, wanted in zip(rows, ([0.4, 0.25, 0.1], [0.45, 0.2, 0.15]), strict=True):
         assert row["pose"][:3] == pytest.approx(wanted, abs=1e-12)
         assert min(row["tensions_N"]) > 0.2 - 1e-9
-    lost = run(*args, "--lowest", "50", "--highest", "51", "--out", tmp_path / "lost")
+    lost = run(*args, "--lowest", "0", "--highest", "0.4", "--out", tmp_path / "lost")
     assert lost.exit_code == 3
     assert "2 cannot be held: no tensions within the limits" in lost.stdout
 

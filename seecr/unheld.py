@@ -1,0 +1,72 @@
+"""Why a pose cannot be held: which cables would have to pull less, or more, than they may.
+
+Balance A tau = load with the limits of tensions let go where that takes least, in newtons
+altogether: a linear program, whose solution lets go of few cables (HiGHS, by SciPy).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from seecr.pose import Array
+
+# What is let go by less than this part of the load is rounding.
+_ROUNDING = 1e-7
+# Cables named in a sentence.
+_MOST = 3
+
+
+def why_not_held(matrix: Array, load: Array, low: Array, high: Array, names: Sequence[str]) -> str:
+    """A sentence on one pose.
+
+    Args:
+        matrix: (d, m) balance, load: (d,) [N], torques over a length.
+        low, high: (m,) limits of the tensions [N].
+        names: of the m cables.
+    """
+    beyond = _least_beyond(matrix, load, low, high)
+    if beyond is None:
+        return "no pulls of the cables, however large, balance the load there"
+    rounding = _ROUNDING * max(float(np.abs(load).max()), 1e-300)
+    order = [k for k in np.argsort(-np.abs(beyond)) if abs(beyond[k]) > rounding]
+    if not order:
+        return "held only just: the tensions are at their limits"
+    said = [_of_cable(names[k], beyond[k], low[k], high[k]) for k in order[:_MOST]]
+    more = f" and {len(order) - _MOST} more cables are beyond their limits" * (len(order) > _MOST)
+    return "; ".join(said) + more
+
+
+def _of_cable(name: str, beyond: float, low: float, high: float) -> str:
+    who = name if "cable" in name.lower() else f"cable {name}"
+    if beyond > 0.0:
+        return f"{who} would have to pull {high + beyond:.3g} N, more than {high:.3g} N"
+    pull = low + beyond
+    if pull >= 0.0:
+        return f"{who} would have to pull {pull:.3g} N, less than {low:.3g} N"
+    return f"{who} would have to push with {-pull:.3g} N"
+
+
+def _least_beyond(matrix: Array, load: Array, low: Array, high: Array) -> Array | None:
+    """(m,) [N] by how much tensions are above the limits, or below; None where that is no help."""
+    from scipy.optimize import linprog
+
+    m, scale = matrix.shape[1], max(float(np.abs(load).max()), 1e-300)
+    eye, zero = np.eye(m), np.zeros((m, m))
+    bounded = np.isfinite(high)
+    # unknowns: tensions, what they are below and above the limits
+    above = np.concatenate([eye, zero, -eye], axis=1)[bounded]
+    below = np.concatenate([-eye, -eye, zero], axis=1)
+    found = linprog(
+        np.concatenate([np.zeros(m), np.ones(2 * m)]),
+        A_ub=np.concatenate([below, above]),
+        b_ub=np.concatenate([-low, high[bounded]]) / scale,
+        A_eq=np.concatenate([matrix, np.zeros((len(matrix), 2 * m))], axis=1),
+        b_eq=load / scale,
+        bounds=[*[(None, None)] * m, *[(0.0, None)] * (2 * m)],
+        method="highs",
+    )
+    if found.status != 0:
+        return None
+    return np.asarray(scale * (found.x[2 * m :] - found.x[m : 2 * m]))
