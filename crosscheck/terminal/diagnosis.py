@@ -10,7 +10,7 @@ from rich.table import Table
 
 from crosscheck.diagnosis.result import MissingEffect
 from crosscheck.diagnosis.words import probability_words
-from crosscheck.fit.reasons import DiagnosisVerdict
+from crosscheck.fit.reasons import DiagnosisVerdict, Why
 from crosscheck.terminal.lines import console_for, print_parameters, rms_table, say
 
 if TYPE_CHECKING:
@@ -70,5 +70,7 @@ def _print_finding(console: Console, finding: MissingEffect) -> None:
 
 
 def _print_candidates(console: Console, found: Diagnosis) -> None:
-    for row in found.candidates[:_MOST_CANDIDATES]:
+    # what the user left out need not be said
+    rows = [row for row in found.candidates if row.why_not.why is not Why.EXCLUDED]
+    for row in rows[:_MOST_CANDIDATES]:
         say(console, f"not {row.effect}: {row.why_not}", "dim")

@@ -31,6 +31,8 @@ __all__ = [
 _PART = 0.1
 # Part of the weight that shows how soft a pose is.
 _NUDGE = 0.01
+# Decimals of millimetres and degrees beyond which a deviation is rounding.
+_DECIMALS = 9
 
 
 def pose_lines(
@@ -61,8 +63,8 @@ def pose_lines(
     if commanded:
         yield (
             f"off its command by {_three(1e3 * away[:3], '+.4f')} mm "
-            f"({1e3 * np.linalg.norm(away[:3]):.4g} mm), turned by "
-            f"{np.degrees(np.linalg.norm(away[3:])):.4g} deg"
+            f"({np.round(1e3 * np.linalg.norm(away[:3]), _DECIMALS):.4g} mm), turned by "
+            f"{np.round(np.degrees(np.linalg.norm(away[3:])), _DECIMALS):.4g} deg"
             f" ({_three(np.degrees(away[3:]), '+.4f')} deg about x y z)"
         )
     yield from stiffness_lines(solution, i)

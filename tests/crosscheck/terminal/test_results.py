@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from crosscheck.add import add_effect
 from crosscheck.comparison.limits import Limits, check
 from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.result import Comparison
+from crosscheck.fit.reasons import Reason, Why
 from crosscheck.fit.words import shown
 from crosscheck.terminal.addition import print_addition, why_not
 from crosscheck.terminal.comparison import print_comparison
@@ -75,6 +77,20 @@ def test_a_diagnosis_begins_with_what_shows_and_then_its_verdict() -> None:
     assert lines[0] == f"effects_found: {found.sentence}"
     assert any(line.startswith("pulley_radius: ") for line in lines)
     assert any(line.startswith("not ") for line in lines) and lines[-1].startswith("Results in")
+
+
+def test_what_was_left_out_as_asked_is_not_told_again() -> None:
+    screen, out = console()
+    whole = made.pulleys()
+    asked = [
+        replace(row, why_not=Reason(Why.EXCLUDED)) if row.effect == "creep" else row
+        for row in whole.candidates
+    ]
+    for rows in (asked[:3], [row for row in asked if row.effect == "creep"]):
+        print_diagnosis(replace(whole, candidates=rows), Path("here"), screen)
+    lines = [line for line in out.getvalue().splitlines() if line.startswith("not ")]
+    told = {line.split()[1].rstrip(":") for line in lines}
+    assert told == {row.effect for row in asked[:3]} - {"creep"}
 
 
 def test_numbers_are_shown_with_the_unit_that_people_read() -> None:
