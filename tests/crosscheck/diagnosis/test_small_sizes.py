@@ -6,6 +6,8 @@ import pytest
 from made_data import COGIRO, measured, term
 
 from crosscheck.diagnosis.verdict import diagnose
+from crosscheck.planning.design import make_plan
+from crosscheck.planning.visibility import NAMED
 from seecr.mjcf import load_robot
 
 pytestmark = pytest.mark.slow
@@ -43,4 +45,19 @@ def test_many_small_numbers_are_not_taken_for_few_of_another_effect(name, values
     found = diagnose(robot, data)
     assert found.verdict == "effects_found"
     (one,) = found.missing
+    assert name in {one.effect, *(rival.name for rival in one.rivals)}
+
+
+@pytest.mark.parametrize(
+    ("name", "parameter"), [("pulley_radius", "radius_m"), ("length_scale", "factor")]
+)
+def test_what_a_plan_says_is_named_is_named(name, parameter):
+    """Nine in ten of the curve in docs/diagnosis.md; two of which a test can see."""
+    robot = load_robot(COGIRO)
+    planned = make_plan(robot, measured(robot, points=12))
+    seen = next(found for found in planned.effects if found.name == name)
+    size = seen.as_json()["nine_in_ten_named"][parameter]
+    assert size == pytest.approx(NAMED * seen.factor * seen.signal.layout.scale[0])
+    data = measured(robot, [term(robot, name, **{parameter: size})], points=12, seed=5)
+    (one,) = diagnose(robot, data).missing
     assert name in {one.effect, *(rival.name for rival in one.rivals)}
