@@ -154,7 +154,7 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
         axes.plot(multiple, 100 * np.mean(hits), "o", color="#0072B2")
     axes.axhline(90.0, color="0.5", linestyle=":", linewidth=1.0)
     axes.set(
-        xscale="log", ylim=(0, 103), xlabel="size over the smallest that plan calls identifiable"
+        xscale="log", ylim=(0, 103), xlabel="size, in units of the smallest that plan says shows"
     )
     axes.set_xticks(TIMES, [f"{m:g}" for m in TIMES])
     axes.minorticks_off()

@@ -56,6 +56,14 @@ def test_sure_effects_are_a_diagnosis_though_many_others_stay_open() -> None:
     assert (said.verdict, said.sure) == (DiagnosisVerdict.EFFECTS_FOUND, ("a", "b"))
 
 
+def test_many_open_effects_beside_one_that_is_not_sure_are_no_diagnosis() -> None:
+    some = [*"cdefg", *map("".join, combinations("cdefg", 2))]
+    hints = {"ab" + x: -0.1 for x in some}
+    said = judged({"": -900.0, "a": -0.01, "b": -500.0, "ab": 0.0, **hints})
+    assert 1.0 < said.undecided < 2.0 and said.sure == ("a",)
+    assert said.verdict is DiagnosisVerdict.MANY_EFFECTS
+
+
 def test_equals_share_their_certainty() -> None:
     said = judged({"": -900.0, "a": 0.0, "b": -1.0})
     assert (said.verdict, said.sure) == (DiagnosisVerdict.EFFECTS_FOUND, ("a",))

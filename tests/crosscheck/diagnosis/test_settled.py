@@ -1,0 +1,46 @@
+"""What the end of a search is worth: its last effects are hints until they are sure."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from crosscheck.diagnosis.chances import Chances
+from crosscheck.diagnosis.search import Search
+from crosscheck.diagnosis.settled import _sure_part
+
+NOTHING: Any = None
+
+
+def way(*added: str, noise_from: int) -> Search:
+    """Steps that end with noise from this one on."""
+    steps: Any = [
+        SimpleNamespace(added=name, whiteness=SimpleNamespace(is_noise=k >= noise_from))
+        for k, name in enumerate(("", *added))
+    ]
+    return Search(NOTHING, tuple(steps), {})
+
+
+def chances(**each: float) -> Chances:
+    classes = tuple(((name,), p) for name, p in each.items())
+    return Chances(each, classes, None, None)
+
+
+def test_a_last_effect_that_is_not_sure_is_no_finding() -> None:
+    found = way("mass", "tilt", noise_from=1)
+    assert _sure_part(found, chances(mass=0.999, tilt=0.94)).found == ("mass",)
+    assert _sure_part(found, chances(mass=0.999, tilt=0.96)).found == ("mass", "tilt")
+
+
+def test_all_that_are_not_sure_go_until_one_is() -> None:
+    found = way("mass", "tilt", "creep", noise_from=0)
+    assert _sure_part(found, chances(mass=0.6, tilt=0.7, creep=0.8)).found == ()
+    assert _sure_part(found, chances(mass=0.6, tilt=0.99, creep=0.8)).found == ("mass", "tilt")
+
+
+def test_an_effect_without_which_no_noise_is_left_stays() -> None:
+    found = way("mass", "tilt", noise_from=2)
+    assert _sure_part(found, chances(mass=0.999, tilt=0.5)).found == ("mass", "tilt")
+    assert np.isclose(chances(mass=0.5).of("mass"), 0.5) and chances().of("mass") == 0.0
