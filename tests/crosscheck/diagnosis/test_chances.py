@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import made_diagnoses
 import pytest
 
 from crosscheck.diagnosis.chances import Chances, Together
+from crosscheck.diagnosis.nearby import _refitted
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.words import probability_words
 from crosscheck.fit.problem import Rms
@@ -59,3 +63,30 @@ def test_a_class_has_the_probability_of_all_its_members() -> None:
 @pytest.mark.parametrize(("p", "words"), [(0.999, "> 99 %"), (0.001, "< 1 %"), (0.5, "50 %")])
 def test_probabilities_in_words(p: float, words: str) -> None:
     assert probability_words(p) == words
+
+
+def test_sets_that_were_fitted_count_with_their_own_evidence() -> None:
+    """The last model is a and b; c was tried in b's place, by two ways, and d in vain."""
+    last = frozenset("ab")
+    scores: Any = SimpleNamespace(
+        score=lambda names: 40.0 if names == last else -1e9,
+        log_prior=lambda names: -3.0 * len(names),
+    )
+    fits = {"c": 7.0, "better c": 8.0, "d": 99.0, "again": 50.0}
+    known = {
+        (frozenset("a"), "c"): fit_of(fits["c"]),
+        (frozenset("c"), "a"): fit_of(fits["better c"]),
+        (frozenset("a"), "d"): fit_of(fits["d"], valid=False),
+        (frozenset("a"), "b"): fit_of(fits["again"]),
+    }
+    found: Any = SimpleNamespace(
+        last=SimpleNamespace(evidence=SimpleNamespace(log=10.0)),
+        known=known,
+        trials=SimpleNamespace(evidence=lambda fit: SimpleNamespace(log=fit.log)),
+    )
+    # the last model's 40 is of evidence 10 and of two effects: two less evidence is two less
+    assert _refitted(found, scores, last) == {frozenset("ac"): pytest.approx(38.0)}
+
+
+def fit_of(log: float, valid: bool = True) -> Any:
+    return 0.0, SimpleNamespace(log=log, valid=valid)
