@@ -44,7 +44,7 @@ def commands_of(robot: Robot) -> Measurements:
     return replace(sweeps(robot, 18, 0.5, 1), sigma=sigma_of(robot))
 
 
-def drawn(found: Visible, size: float, seed: int) -> Term:
+def drawn(robot: Robot, found: Visible, size: float, seed: int) -> Term:
     """The effect with each parameter drawn about so many plausible sizes.
 
     One parameter has just that size; several are normal ones, scaled to the signal that the plan
@@ -61,6 +61,8 @@ def drawn(found: Visible, size: float, seed: int) -> Term:
     mirrored = np.where(layout.shape, start, layout.null - size * z * layout.scale)
     outside = (vector < layout.lower) | (vector > layout.upper)
     vector = np.where(outside, mirrored, vector)
+    if not Term(layout, vector).is_possible(robot):  # such as cables that pull less when stretched
+        vector = mirrored
     return Term(layout, np.clip(vector, layout.lower, layout.upper))
 
 
@@ -195,9 +197,9 @@ def todo(chosen: argparse.Namespace) -> list[tuple[Robot, Term, float, int]]:
     seeds = range(chosen.first, chosen.first + chosen.seeds)
     if chosen.plausible:
         twins = range(chosen.first, chosen.first + chosen.plausible)
-        return [(robot, drawn(seen[s % len(seen)], 1.0, s), 0.0, s) for s in twins]
+        return [(robot, drawn(robot, seen[s % len(seen)], 1.0, s), 0.0, s) for s in twins]
     return [
-        (robot, drawn(v, m * v.factor, 100 * s + k), m, 100 * s + k)
+        (robot, drawn(robot, v, m * v.factor, 100 * s + k), m, 100 * s + k)
         for s in seeds
         for k, v in enumerate(seen)
         for m in TIMES

@@ -22,6 +22,7 @@ from crosscheck.calibration.unseen import shown_from
 from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.search import Search
 from crosscheck.fit.problem import Rms
+from crosscheck.fit.reasons import Why
 from crosscheck.fit.registration import NAME as TRACKER
 from crosscheck.fit.state import evaluate
 from seecr.effects import Term, Terms
@@ -52,8 +53,21 @@ def chances_near(found: Search, alike: Mapping[str, Sequence[str]]) -> Chances:
     explore(scores, [always, names])
     every = scores.near | {n: s for n, (s, _w) in scores.solved.items()}
     every |= _refitted(found, scores, names)
+    none = _impossible(found)
+    every = {some: score for some, score in every.items() if not some & none}
     shown = shown_from(setting, joint, *_all_of(columns))
     return _with_equals(every, effects, alike, shown)
+
+
+def _impossible(found: Search) -> Names:
+    """Effects that would need what no robot can have wherever they were fitted."""
+    tried: dict[str, list[bool]] = {}
+    for one in (c for step in found.steps for c in step.candidates):
+        no = one.why_not is not None and one.why_not.why is Why.IMPOSSIBLE
+        tried.setdefault(one.layout.name, []).append(no)
+    return frozenset(name for name, no in tried.items() if all(no)) - set(
+        found.last.fit.terms.names
+    )
 
 
 def _refitted(found: Search, scores: Scores, last: Names) -> dict[Names, float]:

@@ -9,10 +9,11 @@ import made_diagnoses
 import pytest
 
 from crosscheck.diagnosis.chances import Chances, Together
-from crosscheck.diagnosis.nearby import _refitted
+from crosscheck.diagnosis.nearby import _impossible, _refitted
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.words import probability_words
 from crosscheck.fit.problem import Rms
+from crosscheck.fit.reasons import Reason, Why
 
 RMS: Rms = {"position_rms_m": 1e-3, "orientation_rms_rad": None, "tension_rms_N": None}
 
@@ -90,3 +91,22 @@ def test_sets_that_were_fitted_count_with_their_own_evidence() -> None:
 
 def fit_of(log: float, valid: bool = True) -> Any:
     return 0.0, SimpleNamespace(log=log, valid=valid)
+
+
+def test_what_no_robot_can_have_wherever_it_was_fitted_is_out_of_the_question() -> None:
+    def tried(**why: Why | None) -> SimpleNamespace:
+        rows = [
+            SimpleNamespace(
+                layout=SimpleNamespace(name=name), why_not=None if no is None else Reason(no)
+            )
+            for name, no in why.items()
+        ]
+        return SimpleNamespace(
+            candidates=rows, fit=SimpleNamespace(terms=SimpleNamespace(names=("mass",)))
+        )
+
+    no = Why.IMPOSSIBLE
+    steps = [tried(law=no, tilt=no, creep=Why.UNSEEN, mass=no), tried(law=no, tilt=None)]
+    found: Any = SimpleNamespace(steps=steps, last=steps[-1])
+    # a tilt is possible beside the mass, and the mass is in the model
+    assert _impossible(found) == {"law"}
