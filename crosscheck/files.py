@@ -2,6 +2,7 @@
 
 from seecr.files import (
     Toml,
+    check_writable,
     json_text,
     plain,
     read_text,
@@ -14,6 +15,7 @@ from seecr.files import (
 
 __all__ = [
     "Toml",
+    "check_writable",
     "json_text",
     "plain",
     "read_text",

@@ -15,6 +15,8 @@ from seecr.units import UNITS, short, with_error
 
 __all__ = [
     "EXAMPLE",
+    "LEAST",
+    "MOST",
     "SI",
     "chance",
     "in_unit",
@@ -30,6 +32,9 @@ SI = {"position": "m", "orientation": "rad", "tension": "N", "length": "m"}
 
 EXAMPLE = {"position": "0.5mm", "orientation": "0.2deg", "tension": "1N", "length": "0.2mm"}
 """What a person may type for each of them."""
+
+# In SI; beyond them squares, which fits and noise are made of, are lost in rounding.
+LEAST, MOST = 1e-15, 1e15
 
 _SHOWN = {unit.si: unit for unit in UNITS if unit.shown}
 _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
@@ -80,6 +85,8 @@ def parse_kind(label: str, kinds: Sequence[str], text: str) -> tuple[str, float]
     if not (value > 0 and math.isfinite(value)):
         raise CrosscheckError(f"{label}: expected more than zero, got {text!r}")
     kind, unit = units[name]
+    if not LEAST < unit.to_si(value) < MOST:
+        raise CrosscheckError(f"{label}: expected a size that can be measured, got {text!r}")
     return kind, unit.to_si(value)
 
 

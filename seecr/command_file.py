@@ -17,6 +17,7 @@ from seecr.columns.beside import choice
 from seecr.columns.known import know_columns
 from seecr.columns.loads import known_loads
 from seecr.columns.poses import command_lengths, command_poses, poses_of
+from seecr.columns.reach import check_reach
 from seecr.columns.table import read_table
 from seecr.columns.times import runs, temperatures, times
 from seecr.commands import Commands
@@ -65,6 +66,7 @@ def read_commands(path: str | Path, robot: Robot) -> CommandFile:
         poses = command_poses(columns, robot)
     else:
         poses = np.tile(robot.reference_pose, (len(run), 1)) if wanted is None else wanted
+    check_reach(columns, robot, poses, lengths)
     told, stands = _beside(path.with_suffix(".toml"))
     commands = Commands(
         pose=poses,

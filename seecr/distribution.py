@@ -32,7 +32,11 @@ def tension_limits(robot: Robot, lowest: ArrayLike, highest: ArrayLike) -> tuple
         bounds.append(np.array(np.broadcast_to(array, (m,))))
     low, high = bounds
     if not (np.all(np.isfinite(low)) and np.all(low >= 0.0) and np.all(high >= low)):
-        raise InputError("tension bounds must be 0 <= lowest <= highest [N]")
+        got = [f"{bound.min():g}" for bound in bounds]
+        raise InputError(
+            "tension bounds must be 0 <= lowest <= highest [N], got "
+            f"lowest {got[0]} and highest {got[1]}"
+        )
     return low, high
 
 

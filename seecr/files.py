@@ -28,7 +28,9 @@ from seecr.errors import InputError, InputFileError
 
 __all__ = [
     "Toml",
+    "check_writable",
     "json_text",
+    "no_text",
     "plain",
     "read_bytes",
     "read_text",
@@ -38,6 +40,26 @@ __all__ = [
     "write_texts",
     "written",
 ]
+
+_BEGINNINGS = (
+    (b"\x89PNG", "a PNG picture"),
+    (b"\xff\xd8\xff", "a JPEG picture"),
+    (b"PK\x03\x04", "a zip archive or an Excel workbook"),
+    (b"\xd0\xcf\x11\xe0", "an Excel workbook"),
+    (b"%PDF", "a PDF"),
+    (b"\x1f\x8b", "a gzip archive"),
+    (b"\x89HDF", "an HDF5 file"),
+    (b"RRF", "a Rerun recording"),
+    (b"MATLAB", "a MATLAB file"),
+    (b"\xff\xfe", "UTF-16 text"),
+    (b"\xfe\xff", "UTF-16 text"),
+)
+
+
+def no_text(data: bytes) -> str:
+    """What bytes are instead of UTF-8 text, such as ``"a PNG picture"``; empty if perhaps text."""
+    known = next((kind for beginning, kind in _BEGINNINGS if data.startswith(beginning)), "")
+    return known or ("a binary file" if b"\0" in data else "")
 
 
 def read_bytes(path: Path, expected: str) -> bytes:
@@ -154,14 +176,27 @@ def write_text(path: Path, text: str, failure: str = "cannot be written") -> Non
     write_texts({path: text}, failure)
 
 
+def check_writable(path: Path) -> None:
+    """That a file can be written there, before the work that it is for.
+
+    Raises:
+        InputFileError: it is a folder, or lies below what is none or may not be written to.
+    """
+    above = next(folder for folder in path.absolute().parents if folder.exists())
+    if path.is_dir() or not above.is_dir() or not os.access(above, os.W_OK):
+        what = "is a folder" if path.is_dir() else f"{above} is no folder to write to"
+        raise InputFileError.at(path, f"cannot be written: {what}; expected the name of a file")
+
+
 @contextmanager
-def staged(out: str | Path) -> Iterator[Path]:
+def staged(out: str | Path, option: str = "--out") -> Iterator[Path]:
     """A temporary folder whose files move into ``out`` when the block ends well.
 
     It lies inside ``out``, so that moving is renaming; if the block fails, ``out`` is as it was.
 
     Args:
         out: the folder of results, made if need be.
+        option: of the command line that named it, for the error.
 
     Raises:
         InputError: it cannot be made or written to; said before any work is done.
@@ -174,8 +209,8 @@ def staged(out: str | Path) -> Iterator[Path]:
     except OSError as error:
         _remove_empty(made)
         raise InputError(
-            f"--out {out}: cannot write there: {reason_of(error)}; expected a folder that can be "
-            "made or written to"
+            f"{option} {out}: cannot write there: {reason_of(error)}; expected a folder that can "
+            "be made or written to"
         ) from None
     done = False
     try:

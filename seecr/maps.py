@@ -111,9 +111,10 @@ class Workspace(Result):
         rests = self.rests
         if np.any(rests):
             counts = self.slack[rests]
-            parts = [f"{int(np.sum(counts == k))} with {k}" for k in np.unique(counts)]
+            parts = [f"{k} at {int(np.sum(counts == k))}" for k in np.unique(counts)]
             out.append(
-                f"elastic: at rest at {int(rests.sum())} commands; slack: {', '.join(parts)}"
+                f"elastic: at rest at {int(rests.sum())} of {n} commands; "
+                f"slack cables: {', '.join(parts)}"
             )
             where = rests & self.feasible
             if np.any(where):

@@ -8,11 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from seecr.errors import RobotError
+from seecr.files import no_text, read_bytes
 from seecr.pose import Array, quat_rotate, quat_to_matrix
 from seecr.robot import Joint, Robot
 
 if TYPE_CHECKING:
     import mujoco
+
+_EXPECTED = "expected the robot as MJCF, XML that begins with <mujoco"
 
 
 def load_robot(path: str | Path) -> Robot:
@@ -67,6 +70,9 @@ def _compile(path: Path) -> mujoco.MjModel:
         raise RobotError(f"{path}: no such file; expected an MJCF model of the robot")
     if path.is_dir():
         raise RobotError(f"{path}: is a folder; expected an MJCF file")
+    other = not_mjcf(path)
+    if other:
+        raise RobotError(f"{path}: {other}")
     import mujoco
 
     try:
@@ -76,6 +82,21 @@ def _compile(path: Path) -> mujoco.MjModel:
         raise RobotError(f"{path}: MuJoCo cannot read this as MJCF: {reason}") from None
     _check_names(model, path)
     return model
+
+
+def not_mjcf(path: Path) -> str:
+    """What a file is instead of XML, which MuJoCo would say in a parser's words; else nothing."""
+    data = read_bytes(path, _EXPECTED)
+    begins = data.removeprefix(b"\xef\xbb\xbf").lstrip()
+    kind = no_text(data)
+    if kind and not kind.startswith("UTF-16"):
+        return f"is {kind}; {_EXPECTED}"
+    if not begins:
+        return f"is empty; {_EXPECTED}"
+    if kind or begins.startswith(b"<"):
+        return ""
+    line = begins.splitlines()[0][:40].decode("utf-8", "replace")
+    return f"begins with {line!r}, which is no XML; {_EXPECTED}; the robot's file goes first"
 
 
 def _check_names(model: mujoco.MjModel, path: Path) -> None:

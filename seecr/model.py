@@ -49,6 +49,7 @@ if TYPE_CHECKING:
 FORMAT = 1
 """Of the file; raised when a key changes its meaning or goes."""
 
+_EXPECTED = "expected a model as crosscheck add writes it"
 _TABLES = ("format", "robot", "effect", "calibration")
 _OF_EFFECT = (
     "name", "fixed", "parameters", "provenance", "refitted", "before", "after", "held_out",
@@ -146,7 +147,7 @@ def load_model(path: str | Path, robot: Robot) -> Model:
             that is unknown, missing, given twice, no number or out of bounds.
     """
     path = Path(path)
-    text = read_text(path, "expected a model as crosscheck add writes it")
+    text = read_text(path, _EXPECTED)
     document = _parse(path, text)
     where = Where(path, text)
     _check_tables(where, document)
@@ -168,7 +169,8 @@ def _parse(path: Path, text: str) -> TOMLDocument:
         return tomlkit.parse(text)
     except TOMLKitError as error:
         line = getattr(error, "line", None)
-        raise InputFileError.at(path, f"is not TOML: {error}", line=line) from None
+        text = f"is not TOML: {error}; {_EXPECTED}"
+        raise InputFileError.at(path, text, line=line) from None
 
 
 def _check_tables(where: Where, document: Mapping[str, Any]) -> None:
@@ -177,6 +179,9 @@ def _check_tables(where: Where, document: Mapping[str, Any]) -> None:
         near = difflib.get_close_matches(name.lower(), _TABLES, cutoff=0.7)
         if name not in _TABLES and near:
             raise where.error(f"unknown {name}; expected {near[0]}", key=name)
+    if document and not any(name in document for name in _TABLES):
+        has = ", ".join(document)
+        raise where.error(f"is no model, it has {has}; {_EXPECTED}, with tables [[effect]]")
     version = document.get("format", FORMAT)
     if version != FORMAT:
         raise where.error(

@@ -164,6 +164,12 @@ class Robot:
         return max(reach, floor) or 0.01 * longest
 
     @cached_property
+    def reach(self) -> float:
+        """Largest distance [m] of two exit points, or of one and the reference position."""
+        points = np.concatenate([self.exit_points, self.reference_pose[None, :3]])
+        return float(np.max(np.linalg.norm(points[:, None] - points[None], axis=-1)))
+
+    @cached_property
     def reference_lengths(self) -> Array:
         """Straight lengths |A_i - (t + R B_i)| at the reference pose, (m,) [m]."""
         return np.asarray(self.nominal_lengths(self.reference_pose[None])[0])

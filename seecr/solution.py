@@ -142,7 +142,8 @@ class Solution(Result):
         """
         frequencies = np.full(self.stiffness.shape[:2], np.nan)
         shapes = np.full(self.stiffness.shape, np.nan)
-        rows = np.flatnonzero(np.isfinite(self.stiffness).all(axis=(1, 2)))
+        known = np.isfinite(self.stiffness).all(axis=(1, 2)) & np.isfinite(self.pose).all(axis=1)
+        rows = np.flatnonzero(known)
         if len(rows) == 0:
             return frequencies, shapes
         mass = mass_matrices(self.robot, take(self.tables, rows), self.pose[rows])

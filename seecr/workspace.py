@@ -19,6 +19,7 @@ from seecr.joints import motion_columns, values_of_pose
 from seecr.pose import Array, quat_rotate, transform_points
 from seecr.robot import Robot
 from seecr.solution import Solution
+from seecr.starts import finite
 from seecr.threads import in_parts
 
 # Part of the load that may stay unbalanced: rounding of the tensions found.
@@ -177,9 +178,9 @@ def _wrench(value: ArrayLike, n: int) -> Array:
 
 def _wrenches(values: ArrayLike) -> Array:
     some = np.atleast_2d(np.asarray(values, float))
-    if some.ndim != 2 or some.shape[1] != 6 or not np.all(np.isfinite(some)):
-        raise InputError(f"wrenches must be (k, 6) finite numbers [N, N m], got {np.shape(values)}")
-    return some
+    if some.ndim != 2 or some.shape[1] != 6:
+        raise InputError(f"wrenches must be (k, 6) [N, N m], got {np.shape(values)}")
+    return finite(some, "wrenches [N, N m]")
 
 
 def _rows(wrench: ArrayLike | None, rows: NDArray[np.intp]) -> ArrayLike | None:

@@ -67,6 +67,7 @@ def command(
     equilibrium or a fit that does not come to an end.
     """
     from crosscheck import add_effect, add_effects, load_measurements
+    from crosscheck.files import staged
     from crosscheck.measurements.stated import with_stated
     from crosscheck.model import load_diagnosed
     from seecr import load_model, load_robot, new_model
@@ -90,6 +91,9 @@ def command(
     written = found.pays or force
     made = made_by(robot, *data, all_from, model)  # of the model as it was read
     if written:
+        if out is not None:
+            with staged(out):  # what cannot be told leaves the model as it was
+                pass
         _write(found, old, machine, measured.path, model)
     _tell(found, old, model, written, made, out, as_json)
     if not as_json:

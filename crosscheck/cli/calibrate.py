@@ -58,6 +58,7 @@ def command(
     input, 3 rows without an equilibrium, or a fit that did not settle.
     """
     from crosscheck import calibrate, load_measurements
+    from crosscheck.files import staged
     from crosscheck.given import considered
     from crosscheck.measurements.stated import with_stated
     from seecr import load_model, load_robot, new_model
@@ -73,6 +74,9 @@ def command(
     written = found.pays or (force and found.settled)
     made = made_by(robot, *data, model)  # of the model as it was read
     if written:
+        if out is not None:
+            with staged(out):  # what cannot be told leaves the model as it was
+                pass
         _write(found, old, machine, measured.path, model)
     _tell(found, model, written, made, out, as_json)
     if not as_json:

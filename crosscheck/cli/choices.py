@@ -59,7 +59,7 @@ def figures_in(folder: Path | None) -> Iterator[None]:
     if folder is None:
         yield
         return
-    with staged(folder) as unfinished, keeping(unfinished):
+    with staged(folder, "--figures") as unfinished, keeping(unfinished):
         yield
 
 

@@ -72,7 +72,7 @@ def command(
     3 rows without an equilibrium.
     """
     from crosscheck import DiagnosisVerdict, Tolerance, diagnose, load_measurements
-    from crosscheck.files import json_text, staged, write_text
+    from crosscheck.files import check_writable, json_text, staged, write_text
     from crosscheck.given import considered
     from crosscheck.measurements.stated import with_stated
     from crosscheck.report import write_page
@@ -84,6 +84,8 @@ def command(
     machine = load_robot(robot)
     measured = with_stated(load_measurements(data, machine), sigmas)
     own = load_model(model, machine) if model is not None else new_model(machine)
+    if model_out is not None:
+        check_writable(model_out)
     with staged(out) as folder:
         with progress_share("diagnosing") as progress:
             found = diagnose(
@@ -99,7 +101,7 @@ def command(
             from crosscheck.recording import write_diagnosis_recording
 
             write_diagnosis_recording(found, folder / "diagnosis.rrd")
-    note = _keep(found, own, machine, measured.path, model_out) if model_out is not None else ""
+        note = "" if model_out is None else _keep(found, own, machine, measured.path, model_out)
     if as_json:
         click.echo(text)
     else:

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from seecr.cli.following import following
-from seecr.cli.options import FILE, json_option, made_by, out_option
+from seecr.cli.options import FILE, finite, json_option, made_by, out_option
 
 
 @click.command(
@@ -65,7 +65,8 @@ Examples:
 )
 @click.option(
     "--rest-for",
-    type=float,
+    type=click.FloatRange(min=0, min_open=True),
+    callback=finite,
     metavar="S",
     default=0.5,
     show_default=True,
@@ -75,6 +76,7 @@ Examples:
 @click.option(
     "--clock",
     type=float,
+    callback=finite,
     metavar="S",
     default=0.0,
     help="What the tracker's clock shows more than that of the commands.",

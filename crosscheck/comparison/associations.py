@@ -187,7 +187,8 @@ def _row(
 def _p(between: Array, won: Array, within: Array, lost: Array) -> Array:
     good = (won > 0) & (lost > 0)
     safe = np.where(good, lost, 1.0)
-    f = (between / np.maximum(won, 1)) / np.maximum(within / safe, 1e-300)
+    with np.errstate(over="ignore"):  # of rows that are alike to the last digit
+        f = (between / np.maximum(won, 1)) / np.maximum(within / safe, 1e-300)
     return np.where(good, stats.f.sf(f, np.maximum(won, 1), safe), 1.0)
 
 

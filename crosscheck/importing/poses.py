@@ -102,7 +102,9 @@ def _turns(table: Table, found: dict[str, tuple[int, str]]) -> Array | None:
             raise table.error(text)
     if "qw" in found:
         values = np.stack([table.numbers(found[n][0], blank_is_nan=True) for n in quat], axis=1)
-        return np.asarray(values / np.linalg.norm(values, axis=1, keepdims=True))
+        size = np.linalg.norm(values, axis=1, keepdims=True)
+        size[size == 0.0] = np.nan  # how some trackers write that a body was not seen
+        return np.asarray(values / size)
     if "rx" not in found:
         return None
     units = of_columns("rad")

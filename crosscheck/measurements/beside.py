@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import difflib
-import math
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.files import Toml, read_toml
 from crosscheck.measurements.data import Sigma
-from crosscheck.units import EXAMPLE, parse_quantity
+from crosscheck.units import EXAMPLE, LEAST, MOST, parse_quantity
 from seecr.columns.beside import CHOICES, choice
 from seecr.effects import catalogue
 
@@ -87,7 +86,7 @@ def _sigma(toml: Toml, key: str, value: object) -> float:
         except CrosscheckError as error:
             raise toml.error(str(error), key) from None
     number = float(value) if isinstance(value, int | float) and value is not True else 0.0
-    if not (math.isfinite(number) and number > 0):
+    if not LEAST < number < MOST:
         text = f'{key} must be a positive number [{unit}] or a text such as "{EXAMPLE[kind]}"'
         raise toml.error(f"{text}, got {value!r}; leave it out if it is not known", key)
     return number

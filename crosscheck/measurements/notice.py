@@ -8,13 +8,14 @@ import numpy as np
 
 from crosscheck.measurements.data import Measurements
 from seecr.columns.known import POSITION, Columns
+from seecr.columns.reach import away_from, check_reach
 from seecr.pose import Array, quat_conjugate, quat_multiply, rotvec_from_quat
 
 if TYPE_CHECKING:
     from seecr.robot import Robot
 
-# Commands beyond this many times the frame's reach are in another unit; beyond the lesser, odd.
-_ABSURD, _FAR = 10.0, 2.5
+# Commands beyond this many times the frame's reach are odd.
+_FAR = 2.5
 # Readings that spread by this much more, or less, than what was commanded are in another unit.
 _OTHER_UNIT, _LEAST_ROWS = 100.0, 4
 # Quaternions this far [rad] from where they should be, and near it in another order.
@@ -28,54 +29,14 @@ def notice(columns: Columns, robot: Robot, data: Measurements) -> list[str]:
     Raises:
         InputFileError: commands or readings that must be in another unit or order.
     """
-    _check_reach(columns, robot, data)
+    check_reach(columns, robot, data.command_pose, data.command_lengths)
     _check_spread(columns, data)
     return [*_far(robot, data), *_other_order(columns, robot, data), *twice(data)]
 
 
-def _reach(robot: Robot) -> float:
-    """Distance [m] of the farthest exit point from the reference position, or of two of them."""
-    points = np.concatenate([robot.exit_points, robot.reference_pose[None, :3]])
-    return float(np.max(np.linalg.norm(points[:, None] - points[None], axis=-1)))
-
-
-def _away(robot: Robot, data: Measurements) -> Array:
-    """How far (n, k) [m] commands are from the reference position; lengths as they are."""
-    if data.command_lengths is not None:
-        return data.command_lengths
-    assert data.command_pose is not None
-    return np.abs(data.command_pose[:, :3] - robot.reference_pose[:3])
-
-
-def _commanded(data: Measurements) -> list[str]:
-    """The quantities whose columns :func:`_away` looks at."""
-    if data.command_lengths is not None:
-        return [f"length_{i + 1}" for i in range(data.n_cables)]
-    return [f"cmd_{axis}" for axis in POSITION]
-
-
-def _check_reach(columns: Columns, robot: Robot, data: Measurements) -> None:
-    reach = _reach(robot)
-    for quantity, away in zip(_commanded(data), _away(robot, data).T, strict=True):
-        if quantity in columns.known:
-            _refuse_far(columns, quantity, away, reach)
-
-
-def _refuse_far(columns: Columns, quantity: str, away: Array, reach: float) -> None:
-    unit, given = columns.known[quantity].unit.suffix, columns.numbers(quantity)
-    columns.refuse(
-        away > _ABSURD * reach,
-        quantity,
-        lambda row: (
-            f"far outside the robot: expected numbers of the size of its frame, {reach:.3g} m "
-            f"across, got {given[row]:.4g} m; are these really {unit}? Name the column by its "
-            f"unit, such as {quantity}_mm"
-        ),
-    )
-
-
 def _far(robot: Robot, data: Measurements) -> list[str]:
-    reach, away = _reach(robot), np.max(_away(robot, data), axis=1)
+    reach = robot.reach
+    away = np.max(away_from(robot, data.command_pose, data.command_lengths), axis=1)
     row = int(np.argmax(away))
     if away[row] <= _FAR * reach:
         return []

@@ -50,6 +50,8 @@ def failure_map(problem: Problem, before: Drawn, after: Drawn) -> str:
 def _height(place: Array, view: tuple[int, int], columns: int) -> float:
     """Of a panel [in] whose two axes have the same scale."""
     span = np.ptp(place, axis=0)
+    if not span.any():  # one pose, or all alike
+        span = np.ones(3)
     wide, high = (max(float(span[k]), 0.15 * float(span.max())) for k in view)
     return float(np.clip(8.6 / columns * (high + 0.3 * wide) / (1.3 * wide), 1.1, _MOST_HEIGHT))
 
@@ -145,7 +147,7 @@ def thinned(problem: Problem) -> int:
 def _frame(axes: Axes, place: Array, view: tuple[int, int]) -> None:
     names = "xyz"
     span = float(np.max(np.ptp(place, axis=0)))
-    margin = 0.15 * span
+    margin = 0.15 * span or 0.05  # [m] about one pose
     low, high = place.min(axis=0) - margin, place.max(axis=0) + margin
     axes.set_xlim(float(low[view[0]]), float(high[view[0]]))
     axes.set_ylim(float(low[view[1]]), float(high[view[1]]))

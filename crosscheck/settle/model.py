@@ -17,6 +17,7 @@ import mujoco
 import numpy as np
 
 from seecr.errors import InputFileError
+from seecr.mjcf import not_mjcf
 
 _DISABLE = (
     mujoco.mjtDisableBit.mjDSBL_AUTORESET,  # else a diverging run restarts as if nothing happened
@@ -58,6 +59,9 @@ def compile_model(source: str | Path | mujoco.MjModel) -> mujoco.MjModel:
     path = Path(source)
     if not path.is_file():
         raise InputFileError(f"{path}: no such file; expected an MJCF model of the robot")
+    other = not_mjcf(path)
+    if other:
+        raise InputFileError(f"{path}: {other}")
     try:
         return mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:

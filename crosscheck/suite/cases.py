@@ -150,10 +150,10 @@ def select(cases: Sequence[N], patterns: Sequence[str]) -> list[N]:
     names = [case.name for case in cases]
     for pattern in patterns:
         if not fnmatch.filter(names, pattern):
-            near = difflib.get_close_matches(pattern, names, n=3, cutoff=0.4) or names
+            near = difflib.get_close_matches(pattern, names, n=3, cutoff=0.0)
             raise CrosscheckError(
                 f"--case {pattern}: no such case; the nearest are {', '.join(near)} "
-                "(patterns such as 'cogiro-*' work)"
+                "(--list has all, patterns such as 'cogiro-*' work)"
             )
     return [c for c in cases if any(fnmatch.fnmatchcase(c.name, p) for p in patterns)]
 

@@ -15,13 +15,17 @@ from seecr.cli.options import FILE
 
 if TYPE_CHECKING:
     import numpy as np
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from seecr import Model, Robot
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 _NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+
+
+_LEAST_EA, _MOST_EA = 1e-3, 1e12  # [N]: a steel rope as thick as an arm has 1e9
+_MOST_POSES = 10_000_000  # of a grid; more would take days, and all memory
 
 
 class NumbersCommand(click.Command):
@@ -112,9 +116,10 @@ def robot_at(given: Path, cable: str | None = None) -> Robot:
         ea = CABLES[cable] if cable in CABLES else float(cable)
     except ValueError:
         ea = -1.0
-    if not 0.0 < ea < float("inf"):
+    if not _LEAST_EA < ea < _MOST_EA:
         raise InputError(
-            f"--cable: expected {', '.join(CABLES)} or k_c above zero [N], got {cable!r}"
+            f"--cable: expected {', '.join(CABLES)} or k_c from {_LEAST_EA:g} to {_MOST_EA:g} N, "
+            f"got {cable!r}"
         )
     return replace(robot, ea=np.full(robot.n_cables, ea))
 
@@ -130,16 +135,58 @@ def pose_of(coordinates: Sequence[float], robot: Robot) -> list[float]:
     """A pose (7,) from X Y Z or X Y Z QW QX QY QZ; turned as the reference pose without the last.
 
     Raises:
-        InputError: another number of numbers.
+        InputError: another number of numbers, or a position far outside the robot.
     """
     from seecr import InputError
 
     if len(coordinates) not in (3, 7):
         raise InputError(f"expected X Y Z or X Y Z QW QX QY QZ, got {len(coordinates)} numbers")
+    check_places(coordinates[:3], robot)
     return [*coordinates[:3], *(coordinates[3:] or robot.reference_pose[3:].tolist())]
 
 
-def axis_of(text: str) -> NDArray[np.float64]:
+def check_places(places: ArrayLike, robot: Robot) -> None:
+    """That positions (..., 3) [m] are numbers, and of the robot's size.
+
+    Raises:
+        InputError: they are in another unit, which a solve would answer after minutes, if at all.
+    """
+    import numpy as np
+
+    from seecr import InputError
+    from seecr.columns.reach import ABSURD
+
+    array = np.asarray(places, float).reshape(-1, 3)
+    far = ~(np.abs(array - robot.reference_pose[:3]) <= ABSURD * robot.reach)
+    if np.any(far):
+        row, axis = np.argwhere(far)[0]
+        raise InputError(
+            f"{'XYZ'[axis]}: expected metres, of the size of {robot.name}'s frame, "
+            f"{robot.reach:.3g} m across, got {array[row, axis]:g}"
+        )
+
+
+def axes_of(texts: Sequence[str], robot: Robot) -> list[NDArray[np.float64]]:
+    """The axes of a grid.
+
+    Raises:
+        InputError: one that is none, or far outside the robot; more poses than can be solved.
+    """
+    import math
+
+    import numpy as np
+
+    from seecr import InputError
+
+    axes = [_axis_of(text) for text in texts]
+    total = math.prod(len(axis) for axis in axes)
+    if total > _MOST_POSES:
+        raise InputError(f"--grid: expected at most {_MOST_POSES:.0e} poses, got {total:.1e}")
+    check_places(np.array([[axis[k] for axis in axes] for k in (0, -1)]), robot)
+    return axes
+
+
+def _axis_of(text: str) -> NDArray[np.float64]:
     """One axis of a grid: FIRST:LAST:COUNT or one number.
 
     Raises:
@@ -154,11 +201,11 @@ def axis_of(text: str) -> NDArray[np.float64]:
         if len(parts) == 1:
             return np.array([float(text)])
         first, last, count = float(parts[0]), float(parts[1]), int(parts[2])
-        if len(parts) != 3 or count < 1:
+        if len(parts) != 3 or count < 1 or not np.isfinite(last - first):
             raise ValueError
     except (ValueError, IndexError):
         raise InputError(
             f"--grid: expected FIRST:LAST:COUNT with a count above zero, or one number [m], "
             f"got {text!r}"
         ) from None
-    return np.linspace(first, last, count)
+    return np.linspace(first, last, min(count, _MOST_POSES + 1))

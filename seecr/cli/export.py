@@ -48,10 +48,14 @@ def command(
     \b
     Exit status: 0 all well, 2 bad input, or a pose without rest.
     """
-    from seecr import export
+    from seecr import InputError, export
     from seecr.files import json_text, write_texts
 
     machine = robot_at(robot, cable)
+    if out.suffix.lower() not in (".xml", ".mjcf"):
+        raise InputError(f"{out}: expected the name of an MJCF file to write, such as out.xml")
+    if out.exists() and machine.source is not None and out.samefile(machine.source):
+        raise InputError(f"{out}: is the robot itself; expected another file to write")
     own = model_at(model, machine)
     found = export(machine, own or (), pose_of(coordinates, machine) if coordinates else None)
     beside = out.with_name(f"{out.stem}-mujoco{out.suffix}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 import sys
 from collections.abc import Callable, Iterator
@@ -21,6 +22,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 SECONDS_BETWEEN_LINES = 15.0
 """How often work that takes long tells where it is, without a terminal."""
+
 
 FILE = click.Path(path_type=Path)
 """A file that the command itself opens, so that the error is its own."""
@@ -141,3 +143,10 @@ def progress_share(text: str) -> Iterator[Callable[[str, float], None]]:
             done = percent
 
         yield tell
+
+
+def finite(ctx: click.Context, param: click.Parameter, value: float) -> float:
+    """A number as it is, as an option's callback; a usage error where it is none, or has no end."""
+    if not math.isfinite(value):
+        raise click.BadParameter(f"{value} is no finite number.", ctx, param)
+    return value

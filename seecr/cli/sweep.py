@@ -9,7 +9,8 @@ import click
 
 from seecr.cli.arguments import (
     NumbersCommand,
-    axis_of,
+    axes_of,
+    check_places,
     model_at,
     picture_options,
     robot_at,
@@ -139,6 +140,8 @@ def _commands(
     if len(ways) + (poses is not None) != 1:
         got = " and ".join([*(["POSES.csv"] if poses else []), *(f"--{w}" for w in ways)])
         raise InputError(f"expected one of POSES.csv, --line, --grid; got {got or 'none'}")
+    if poses is not None and given["turned"]:
+        raise InputError(f"--turned is of --line and --grid; {poses} has its own orientations")
     if poses is None:
         return Commands(_along(robot, given)), {}, ()
     read = read_commands(poses, robot)
@@ -159,9 +162,10 @@ def _along(robot: Robot, given: dict[str, Any]) -> NDArray[np.float64]:
     from seecr.starts import commanded_poses
 
     if given["line"]:
+        check_places(given["line"], robot)
         places = np.linspace(given["line"][:3], given["line"][3:], given["count"])
     else:
-        axes = [axis_of(text) for text in given["grid"]]
+        axes = axes_of(given["grid"], robot)
         places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     turned = given["turned"] or robot.reference_pose[3:]
     return commanded_poses(np.column_stack([places, np.tile(turned, (len(places), 1))]))

@@ -8,7 +8,7 @@ import click
 
 from seecr.cli.arguments import (
     NumbersCommand,
-    axis_of,
+    axes_of,
     limit_options,
     model_at,
     picture_options,
@@ -98,7 +98,7 @@ def command(
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
-    axes = [axis_of(text) for text in grid] if grid else list(default_axes(machine))
+    axes = axes_of(grid, machine) if grid else list(default_axes(machine))
     total = int(np.prod([len(axis) for axis in axes]))
     with staged(out) as folder:
         with progress_bar("mapping", total) as tell:

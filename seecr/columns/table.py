@@ -18,26 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.errors import InputFileError, MissingPackageError
-from seecr.files import read_bytes
+from seecr.files import no_text, read_bytes
 from seecr.pose import Array
 
 EXPECTED_FILE = "expected a CSV file in UTF-8 with a header row and one row per resting pose"
 
 _PARQUET_MAGIC = b"PAR1"
-_BEGINNINGS = (
-    (b"\x89PNG", "a PNG picture"),
-    (b"\xff\xd8\xff", "a JPEG picture"),
-    (b"PK\x03\x04", "a zip archive or an Excel workbook"),
-    (b"\xd0\xcf\x11\xe0", "an Excel workbook"),
-    (b"%PDF", "a PDF"),
-    (b"\x1f\x8b", "a gzip archive"),
-    (b"\x89HDF", "an HDF5 file"),
-    (b"RRF", "a Rerun recording"),
-    (b"MATLAB", "a MATLAB file"),
-    (b"\xff\xfe", "UTF-16 text"),
-    (b"\xfe\xff", "UTF-16 text"),
-)
 _TEXT_BEGINNINGS = {"{": "JSON", "[": "JSON or TOML", "<": "XML, such as a robot's MJCF"}
+# Squares of larger numbers are lost, and nothing is read that is so large.
+_MOST = 1e30
 _SEPARATORS = (",", ";", "\t")
 # What stands for a reading that was not made, besides an empty cell.
 _NOT_READ = ("nan", "NaN")
@@ -83,7 +72,7 @@ class Table:
         except ValueError:
             raise self._first_fault(index, cells, blank_is_nan) from None
         blank = np.array([not cell for cell in cells])
-        odd = np.any(np.isfinite(values) == blank) or "_" in "".join(cells)
+        odd = np.any((np.abs(values) < _MOST) == blank) or "_" in "".join(cells)
         if odd or (np.any(blank) and not blank_is_nan):
             raise self._first_fault(index, cells, blank_is_nan)
         return values
@@ -121,11 +110,9 @@ def _read_bytes(path: Path) -> bytes:
 
 
 def _decode(path: Path, data: bytes) -> str:
-    for beginning, kind in _BEGINNINGS:
-        if data.startswith(beginning):
-            raise InputFileError.at(path, f"is {kind}; {EXPECTED_FILE}, or Parquet")
-    if b"\0" in data:
-        raise InputFileError.at(path, f"is a binary file; {EXPECTED_FILE}, or Parquet")
+    kind = no_text(data)
+    if kind:
+        raise InputFileError.at(path, f"is {kind}; {EXPECTED_FILE}, or Parquet")
     try:
         return data.decode("utf-8").removeprefix("\ufeff")
     except UnicodeDecodeError as error:
@@ -270,7 +257,7 @@ def _cell_fault(cell: str, blank_is_nan: bool) -> str | None:
     if re.fullmatch(r"[+-]?[\d.]+(e[+-]?\d+)?\s*[^\W\d_]+", cell, re.IGNORECASE):
         return f"{expected}, got {show(cell)}; a unit belongs in the column's name, not in a cell"
     try:
-        finite = "_" not in cell and math.isfinite(float(cell))
+        finite = "_" not in cell and abs(float(cell)) < _MOST
     except ValueError:
         finite = False
     return None if finite else f"{expected}, got {show(cell)}"

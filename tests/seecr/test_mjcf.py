@@ -177,9 +177,14 @@ def test_missing_folder_and_broken_files(tmp_path: Path, monkeypatch: pytest.Mon
     assert refusal(tmp_path / "none.xml") == "no such file; expected an MJCF model of the robot"
     assert refusal(tmp_path) == "is a folder; expected an MJCF file"
     broken = tmp_path / "broken.xml"
-    for text in ("<mujoco><worldbody>", "", "\x00\x01", "run,t_s\n1,2\n", "<urdf/>"):
+    for text in ("<mujoco><worldbody>", "<urdf/>"):
         broken.write_text(text)
         assert refusal(broken).startswith("MuJoCo cannot read this as MJCF: ")
+    other = {"": "is empty; ", "\x00\x01": "is a binary file; ",
+             "run,t_s\n1,2\n": "begins with 'run,t_s', which is no XML; "}  # fmt: skip
+    for text, words in other.items():
+        broken.write_text(text)
+        assert refusal(broken).startswith(f"{words}expected the robot as MJCF, XML that begins")
     broken.write_text('<mujoco><worldbody><body mas="1"/></worldbody></mujoco>')
     assert "mas" in refusal(broken)  # MuJoCo's own words about the place come along
     assert sorted(p.name for p in tmp_path.iterdir()) == ["broken.xml"]  # and no log file

@@ -1,0 +1,100 @@
+"""What a user may get wrong at the crosscheck command: one sentence, status 2, nothing written."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from pathlib import Path
+
+import pytest
+from made_data import case, refused, run
+
+
+@pytest.fixture(scope="module")
+def stiff(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    return case(tmp_path_factory.mktemp("stiff"), {"stiffness": {"factor": 1.4}})
+
+
+def test_sizes_that_nothing_measures(stiff: tuple[Path, Path], tmp_path: Path) -> None:
+    """Their squares are nought or without end, and no noise can be made of them."""
+    for size in ("1e-300mm", "1e300mm"):
+        said = refused("compare", *stiff, "--sigma", f"position={size}", "--out", tmp_path / "o")
+        assert f"--sigma position: expected a size that can be measured, got '{size}'" in said
+    robot, data = stiff
+    other = tmp_path / "other.csv"
+    other.write_bytes(data.read_bytes())
+    other.with_suffix(".toml").write_text("[sigma]\nposition_m = 1e-300\n")
+    assert "position_m must be a positive number [m]" in refused("compare", robot, other)
+    header, first, *rows = data.read_text().splitlines()
+    place = header.split(",").index("meas_x_m")
+    cells = first.split(",")
+    cells[place] = "1e300"
+    other.write_text("\n".join([header, ",".join(cells), *rows]))
+    assert "column meas_x_m: expected a number, or an empty cell" in refused(
+        "compare", robot, other
+    )
+
+
+def test_where_nothing_can_be_written(stiff: tuple[Path, Path], tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.write_text("mine")
+    model = tmp_path / "model.toml"
+    out = tmp_path / "out"
+    quiet = ("--no-recording", "--out", out)
+    assert f"--figures {file}: cannot write there" in refused(
+        "compare", *stiff, "--figures", file, *quiet
+    )
+    assert f"--out {file}: cannot write there" in refused(
+        "calibrate", *stiff, "--model", model, "--only", "stiffness", "--out", file
+    )
+    assert f"--out {file}: cannot write there" in refused(
+        "add", "stiffness", *stiff, "--model", model, "--out", file
+    )
+    only = ("--only", "stiffness", *quiet)
+    assert "is a folder; expected the name of a file" in refused(
+        "diagnose", *stiff, "--model-out", tmp_path, *only
+    )
+    assert f"{file} is no folder to write to" in refused(
+        "diagnose", *stiff, "--model-out", file / "model.toml", *only
+    )
+    assert [path.name for path in tmp_path.iterdir()] == ["file"] and file.read_text() == "mine"
+
+
+def test_a_toml_of_another_kind_is_no_model(stiff: tuple[Path, Path]) -> None:
+    noise = stiff[1].with_suffix(".toml")
+    assert "is no model, it has sigma; expected a model as" in refused(
+        "compare", *stiff, "--model", noise
+    )
+
+
+def test_one_row_or_rows_all_alike_are_compared(stiff: tuple[Path, Path], tmp_path: Path) -> None:
+    robot, data = stiff
+    header, first, *_ = data.read_text().splitlines()
+    for times in (1, 6):
+        alike = tmp_path / f"alike{times}.csv"
+        alike.write_text("\n".join([header, *times * [first]]))
+        out = tmp_path / str(times)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            result = run("compare", robot, alike, "--no-recording", "--out", out)
+        assert result.exit_code == 0 and result.stderr == "", result.output
+        assert json.loads((out / "comparison.json").read_text())["rows"]["compared"] == times
+        assert "Where the model fails" in (out / "comparison.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "said"),
+    [
+        ("--clock", "nan", "nan is no finite number"),
+        ("--rest-for", "inf", "inf is no finite number"),
+        ("--rest-for", "-1", "-1.0 is not in the range x>0"),
+    ],
+)
+def test_times_of_an_import_are_numbers(option: str, value: str, said: str) -> None:
+    words = ("import", "poses", "log.csv", "--robot", "r.xml", "--commands", "c.csv")
+    assert said in refused(*words, option, value)
+
+
+def test_of_many_cases_the_nearest_three_are_named() -> None:
+    said = refused("run", "--case", "nosuch")
+    assert said.count(",") == 3 and "--list has all" in said

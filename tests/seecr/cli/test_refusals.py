@@ -1,0 +1,82 @@
+"""What a user may get wrong at the seecr command: one sentence, status 2, nothing written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from seecr.cli import main
+from seecr.shipped import model_path
+
+CSV = "run,cmd_x_m,cmd_y_m,cmd_z_m\na,0.4,0.25,0.1\n"
+ROBOT = "planar_vertical"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("pose demobot_parallel 400 250 100",
+         "X: expected metres, of the size of demobot_parallel's frame, 0.834 m across, got 400"),
+        ("pose demobot_parallel 0.4 0.25 nan", "Z: expected metres, of the size of"),
+        ("pose demobot_parallel 1e300 0 1", "got 1e+300"),
+        ("pose demobot_parallel 0.4 0.25 0.1 --cable 1e300",
+         "--cable: expected vectran, fishing or k_c from 0.001 to 1e+12 N, got '1e300'"),
+        ("pose here.csv 0 0 0", "here.csv: begins with 'run,cmd_x_m,cmd_y_m,cmd_z_m', which is no "
+         "XML; expected the robot as MJCF, XML that begins with <mujoco; the robot's file goes "
+         "first"),
+        ("pose picture.xml 0 0 0", "picture.xml: is a PNG picture; expected the robot as MJCF"),
+        ("pose empty.xml 0 0 0", "empty.xml: is empty; expected the robot as MJCF"),
+        ("pose demobot_parallel 0.4 0.25 0.1 --model noise.toml",
+         "noise.toml: is no model, it has sigma; expected a model as crosscheck add writes it"),
+        ("pose demobot_parallel 0.4 0.25 0.1 --model here.csv",
+         "; expected a model as crosscheck add writes it"),
+        ("sweep demobot_parallel far.csv --out o",
+         "far.csv: line 2, column cmd_x_m: far outside the robot: expected numbers of the size of "
+         "its frame, 0.834 m across, got 400 m; are these really m?"),
+        ("sweep demobot_parallel huge.csv --out o",
+         "huge.csv: line 2, column cmd_x_m: expected a number in every row, got '1e300'"),
+        ("sweep demobot_parallel --line 0.4 0.25 0.1 0.4 250 0.1 --out o", "Y: expected metres"),
+        ("sweep demobot_parallel --grid 0:inf:3 0.25 0.1 --out o", "got '0:inf:3'"),
+        ("sweep demobot_parallel --grid 0:1:100000 0:1:100000 0.1 --out o",
+         "--grid: expected at most 1e+07 poses, got 1.0e+10"),
+        ("sweep demobot_parallel --grid 0:1:99999999999999 0 0.1 --out o", "at most 1e+07 poses"),
+        ("sweep demobot_parallel here.csv --turned 1 0 0 0 --out o",
+         "--turned is of --line and --grid; here.csv has its own orientations"),
+        ("map demobot_parallel --grid 200:300:3 0.25 0.1 --out o", "X: expected metres"),
+        ("map demobot_parallel --lowest 50 --highest 1 --out o",
+         "tension bounds must be 0 <= lowest <= highest [N], got lowest 50 and highest 1"),
+        ("map demobot_parallel --wrench nan 0 0 0 0 0 --out o",
+         "wrenches [N, N m] holds numbers that are not finite"),
+        ("export demobot_parallel out.csv",
+         "out.csv: expected the name of an MJCF file to write, such as out.xml"),
+        ("export own.xml own.xml", "own.xml: is the robot itself; expected another file to write"),
+        ("export own.xml out.xml nan 0 1", "X: expected metres"),
+    ],
+)  # fmt: skip
+def test_a_mistake_is_one_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: str, said: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "here.csv").write_text(CSV)
+    (tmp_path / "far.csv").write_text(CSV.replace("0.4", "400"))
+    (tmp_path / "huge.csv").write_text(CSV.replace("0.4", "1e300"))
+    (tmp_path / "picture.xml").write_bytes(b"\x89PNG\r\n\x1a\n\0")
+    (tmp_path / "empty.xml").write_text(" \n")
+    (tmp_path / "noise.toml").write_text('[sigma]\nposition_m = "0.1mm"\n')
+    (tmp_path / "own.xml").write_text(model_path("demobot_parallel").read_text())
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    result = CliRunner().invoke(main, words.split())
+    assert result.exit_code == 2 and result.stdout == ""
+    assert said in result.stderr and result.stderr.count("\n") == 1
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_a_platform_that_falls_is_told_without_vibrations() -> None:
+    """Its pose is unknown, and so are mass matrix and frequencies there."""
+    result = CliRunner().invoke(
+        main, ["pose", ROBOT, "0.4", "0", "0.3", "--cable", "0.01", "--alone"]
+    )
+    assert result.exit_code == 3
+    assert "no equilibrium found" in result.stdout and "vibrates" not in result.stdout
