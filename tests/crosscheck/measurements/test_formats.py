@@ -302,7 +302,7 @@ def block(language: str) -> str:
 
 
 def test_the_reference_s_examples_are_read(write: Write, robot: Robot):
-    data = load_measurements(write(block("csv"), toml=block("toml")), robot)
+    data = load_measurements(write(block("text"), toml=block("toml")), robot)
     assert data.read.tolist() == [True, False, True] and data.stands.all()
     assert data.sigma.position_m == pytest.approx(3e-5) and data.sigma.length_m == 1e-4
     assert data.loads is not None and data.loads.mass.tolist() == [0.0, 0.0, 0.2]
