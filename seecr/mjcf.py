@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +16,10 @@ from seecr.robot import Joint, Robot
 if TYPE_CHECKING:
     import mujoco
 
+# A value of numbers one of which is none: MuJoCo warns of it, and writes a log, before it refuses.
+_NO_NUMBER = re.compile(
+    rb"""\b(?!name\b)\w+\s*=\s*["'](?:[-+.\deE\s]*\s)?[-+]?nan\b[-+.\deE\sna]*["']""", re.IGNORECASE
+)
 _EXPECTED = "expected the robot as MJCF, XML that begins with <mujoco"
 
 
@@ -93,6 +98,10 @@ def not_mjcf(path: Path) -> str:
         return f"is {kind}; {_EXPECTED}"
     if not begins:
         return f"is empty; {_EXPECTED}"
+    holds = _NO_NUMBER.search(data)
+    if holds:
+        number = data.count(b"\n", 0, holds.start()) + 1
+        return f"line {number}: holds {holds[0].decode()}; expected numbers"
     if kind or begins.startswith(b"<"):
         return ""
     line = begins.splitlines()[0][:40].decode("utf-8", "replace")

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from crosscheck.importing.logged import Logged
 from seecr.columns.table import Table, read_table
+from seecr.errors import InputError
 from seecr.pose import Array
 from seecr.units import UNITS, Unit, of_columns
 
@@ -31,6 +32,9 @@ def read_poses(path: Path, unit: str | None = None) -> Logged:
     Raises:
         InputFileError: no table, no times, no positions, an unknown unit, or times that jump back.
     """
+    lengths = of_columns("m")
+    if unit is not None and unit not in lengths:
+        raise InputError(f"--unit: expected one of {', '.join(lengths)}, got {unit!r}")
     table = read_table(path)
     found = _columns(table)
     t_s = _times(table)

@@ -62,10 +62,9 @@ def averaged_dwells(data: Measurements) -> Measurements:
         else np.array([mean_rotation(data.quat_wxyz[some]) for some in rows]),
     )
     ratio, said = _sureness(data, mean, rows, size)
-    note = (
-        f"{data.n_rows} rows are {len(start)} dwells, each averaged: {size.min()} to {size.max()} "
-        f"rows in one{said}"
-    )
+    least, most = int(size.min()), int(size.max())
+    in_one = f"{most}" if least == most else f"{least} to {most}"
+    note = f"{data.n_rows} rows are {len(start)} dwells, each averaged: {in_one} rows in one{said}"
     return replace(mean, sigma_ratio=mean.sigma_ratio * ratio).with_notes([note])
 
 
@@ -157,7 +156,7 @@ def _sureness(
         error = kept + scatter.single**2 * np.minimum(scatter.alike / size, 1.0)
         ratio[:, k] = np.sqrt(error) / sigma
         said.append(f"{kind.name.split('_')[0]}s {np.median(ratio[:, k]):.2g}")
-    words = f"; of the noise stated for one reading the means have: {', '.join(said)}"
+    words = f"; the noise of a mean, over that stated for one reading: {', '.join(said)}"
     return ratio, words if said else ""
 
 

@@ -180,6 +180,10 @@ def test_missing_folder_and_broken_files(tmp_path: Path, monkeypatch: pytest.Mon
     for text in ("<mujoco><worldbody>", "<urdf/>"):
         broken.write_text(text)
         assert refusal(broken).startswith("MuJoCo cannot read this as MJCF: ")
+    broken.write_text('<mujoco>\n<option gravity="0 0 nan"/>\n</mujoco>')
+    assert refusal(broken) == 'line 2: holds gravity="0 0 nan"; expected numbers'
+    broken.write_text('<mujoco model="nano"><site name="nan"/></mujoco>')
+    assert "expected numbers" not in refusal(broken)
     other = {"": "is empty; ", "\x00\x01": "is a binary file; ",
              "run,t_s\n1,2\n": "begins with 'run,t_s', which is no XML; "}  # fmt: skip
     for text, words in other.items():

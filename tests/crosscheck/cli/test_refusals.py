@@ -95,6 +95,27 @@ def test_times_of_an_import_are_numbers(option: str, value: str, said: str) -> N
     assert said in refused(*words, option, value)
 
 
+def test_a_unit_that_is_none_is_told_where_names_have_theirs_too(
+    stiff: tuple[Path, Path], tmp_path: Path
+) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("t_s,x_mm,y_mm,z_mm\n0,1,2,3\n")
+    words = ("import", "poses", log, "--robot", stiff[0], "--commands", stiff[1])
+    assert "--unit: expected one of m, cm, mm, um, got 'parsec'" in refused(
+        *words, "--unit", "parsec"
+    )
+
+
+def test_quaternions_of_noughts_are_a_body_not_seen(
+    stiff: tuple[Path, Path], tmp_path: Path
+) -> None:
+    log = tmp_path / "log.csv"
+    rows = "".join(f"{k},1,2,3,0,0,0,0\n" for k in range(9))
+    log.write_text(f"t_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n{rows}")
+    words = ("import", "poses", log, "--robot", stiff[0], "--commands", stiff[1])
+    assert "the body is seen in 0 rows; expected at least 5" in refused(*words)
+
+
 def test_of_many_cases_the_nearest_three_are_named() -> None:
     said = refused("run", "--case", "nosuch")
     assert said.count(",") == 3 and "--list has all" in said

@@ -55,8 +55,8 @@ def test_white_noise_averages_out(white):
     assert np.std(off) == pytest.approx(1.0, rel=0.15)
     turned = 2 * data.quat_wxyz[:, 1:] / (NOISE_RAD * data.sigma_ratio[:, 1:2])
     assert np.std(turned) == pytest.approx(1.0, rel=0.15)
-    assert "2400 rows are 60 dwells, each averaged: 40 to 40 rows in one" in data.notes[-1]
-    assert "of the noise stated for one reading the means have" in data.notes[-1]
+    assert "2400 rows are 60 dwells, each averaged: 40 rows in one" in data.notes[-1]
+    assert "the noise of a mean, over that stated for one reading: positions 0." in data.notes[-1]
 
 
 def test_readings_that_go_together_count_for_fewer(white):
