@@ -130,6 +130,12 @@ class Plan(Result):
     @property
     def sentence(self) -> str:
         """The plan in a sentence."""
+        if not self.effects and not self.planned.unsolved.all():
+            rows = self.planned.problem.data.n_rows
+            return (
+                f"Nothing can be planned with so few rows ({rows}): an effect takes more rows than "
+                "it has parameters; add poses, or have them chosen with --rows 40."
+            )
         if not self.effects:
             return "Nothing can be planned: the model has no equilibrium at any of the rows."
         seen = [v for v in self.effects if v.visible]
