@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from crosscheck.calibration.judgement import SURE
 from crosscheck.diagnosis.chances import Chances
+from crosscheck.diagnosis.exchange import exchanged
 from crosscheck.diagnosis.listed import diagnosis_of, missing_of, not_listed
 from crosscheck.diagnosis.nearby import chances_near
 from crosscheck.diagnosis.result import Diagnosis, NotListed
@@ -21,7 +22,11 @@ from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 def settled(found: Search, notes: Sequence[str]) -> Diagnosis:
     """The diagnosis of a search whose last model leaves noise."""
     rivals = _all_rivals(found)
-    chances = chances_near(found, {n: [r.name for r in some] for n, some in rivals.items()})
+    chances = _chances(found, rivals)
+    other = exchanged(found, chances)
+    if other is not found:
+        found, rivals = other, _all_rivals(other)
+        chances = _chances(found, rivals)
     way = _sure_part(found, chances)
     if way is not found:
         rivals = _all_rivals(way)
@@ -42,6 +47,10 @@ def settled(found: Search, notes: Sequence[str]) -> Diagnosis:
         notes=notes,
         chances=chances,
     )
+
+
+def _chances(found: Search, rivals: Mapping[str, Sequence[Rival]]) -> Chances:
+    return chances_near(found, {n: [r.name for r in some] for n, some in rivals.items()})
 
 
 def _all_rivals(found: Search) -> dict[str, list[Rival]]:

@@ -1,0 +1,55 @@
+"""Effects that a search ended with, in exchange for others that the probabilities prefer.
+
+Steps go one effect at a time: what imitates two together is taken first, and the second then has
+nothing left to add. Sets are compared all at once, and their best is fitted here in earnest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from crosscheck.calibration.judgement import SURE
+from crosscheck.diagnosis.chances import Chances
+from crosscheck.diagnosis.node import Node, node_of
+from crosscheck.diagnosis.order import fitted_to_the_end, in_order
+from crosscheck.diagnosis.search import Search
+from crosscheck.fit.candidates import try_candidate
+
+# An effect that was found and is less probable than this may be in another's place.
+_DOUBTED = 0.5
+
+
+def exchanged(found: Search, chances: Chances) -> Search:
+    """The search, or one that ends with other effects where their fit is the better one.
+
+    Args:
+        found: a search that ended with noise.
+        chances: about its last model.
+    """
+    gone = [name for name in found.found if chances.of(name) < _DOUBTED]
+    inside = set(found.last.fit.terms.names)
+    come = [m[0] for m, p in chances.classes if p > SURE and not inside & set(m)]
+    if not gone or not come:
+        return found
+    node = _fitted(found, gone, come)
+    if node is None or not node.whiteness.is_noise:
+        return found
+    if node.evidence.log <= found.last.evidence.log:
+        return found
+    return replace(found, steps=in_order(found.trials, found.steps[0].node, node, {}))
+
+
+def _fitted(found: Search, gone: list[str], come: list[str]) -> Node | None:
+    """The last model with some effects for others; None where that cannot be fitted."""
+    trials, terms = found.trials, found.last.fit.terms
+    layouts = {c.name: c.layout for c in trials.candidates(trials.problem) if c.why_not is None}
+    kept = terms.only([name for name in terms.names if name not in gone])
+    fit = trials.refit(kept, found.last.fit.state)
+    for name in come:
+        if name not in layouts or not fit.valid:
+            return None
+        tried = try_candidate(trials, fit, layouts[name])
+        if tried.fit is None:
+            return None
+        fit = tried.fit
+    return fitted_to_the_end(trials, node_of(trials, fit))
