@@ -4,22 +4,25 @@ A group of 24 parameters always fits better than one of 1. The evidence charges 
 for how much of its plausible range the data rule out: at a model's own optimum, with whitened
 derivatives X by plausible sizes z ~ N(0, lambda^2),
 
-    ln Z(lambda) = -1/2 [|y|^2 - sum c_i^2 g_i] - 1/2 sum ln(1 + lambda^2 s_i^2),
-    g_i = lambda^2 s_i^2/(1 + lambda^2 s_i^2),  X = U diag(s) V^T,  c = U^T y,  y = r + X z
+    ln Z(lambda) = -1/2 |y|^2 + 1/2 b^T A^-1 b - 1/2 ln det A,  y = r + X z,
+    A = 1 + L X^T X L,  b = L X^T y,  L = diag(lambda)
 
-averaged over lambda, so that a plausible size that is off by far does not decide. A parameter
-the data do not see (s_i = 0) costs nothing and gains nothing.
+averaged over lambda, which each effect has for itself, so that a plausible size that is off by far
+does not decide. A parameter the data do not see costs nothing and gains nothing.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import special, stats
 
 from crosscheck.fit.gauss_newton import Fit
 from crosscheck.fit.known import known_readings
+from seecr.pose import Array
 
 # Family-wise chance of a false alarm, over all candidates of a step.
 FALSE_ALARM = 0.01
@@ -30,6 +33,8 @@ WIDTHS = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
 What a good tracker sees of some effects is a hundredth of what they may well be: a robot built that
 well is charged for the range of its like, not for that of any robot.
 """
+# Rounds of finding the width of each effect beside those of the others.
+_ROUNDS = 2
 
 
 @dataclass(frozen=True)
@@ -60,18 +65,45 @@ def evidence(fit: Fit, noise_scale: float = 1.0) -> Evidence:
     left = np.concatenate([white, readings - columns @ fit.terms.sizes])
     x = x[:, free]
     y = left + x @ fit.terms.sizes[free]
-    power, v = np.linalg.eigh(x.T @ x)
-    s = np.sqrt(np.maximum(power, 0.0))
-    c2 = (v.T @ (x.T @ y)) ** 2 / np.maximum(power, 1e-300)
-    total = float(y @ y)
-    logs = []
-    for lam in WIDTHS:
-        gain = (lam * s) ** 2 / (1.0 + (lam * s) ** 2)
-        logs.append(
-            -0.5 * (total - float(c2 @ gain)) - 0.5 * float(np.sum(np.log1p((lam * s) ** 2)))
-        )
-    log = float(special.logsumexp(logs) - np.log(len(WIDTHS))) - 0.5 * fit.state.log_det
-    return Evidence(log, fit.chi2, int(np.sum(s > 1e-2)))
+    normal, gradient = x.T @ x, x.T @ y
+    power = np.linalg.eigvalsh(normal)
+    groups = [one for one in (fit.terms.own(n)[free] for n in fit.terms.names) if one.any()]
+    gain = _averaged(normal, gradient, groups)
+    log = gain - 0.5 * (float(y @ y) + fit.state.log_det)
+    return Evidence(log, fit.chi2, int(np.sum(power > 1e-4)))
+
+
+def _averaged(normal: Array, gradient: Array, groups: Sequence[NDArray[np.bool_]]) -> float:
+    """ln evidence over that of no effects, each effect's own width averaged over.
+
+    Several effects: the others keep the widths that serve best, found one effect at a time from
+    the best width that all share.
+    """
+    shared = np.tile(np.array(WIDTHS)[:, None], (1, len(gradient)))
+    logs = _gains(normal, gradient, shared)
+    if len(groups) == 1:
+        return float(special.logsumexp(logs) - np.log(len(WIDTHS)))
+    best = shared[int(np.argmax(logs))]
+    for _ in range(_ROUNDS):
+        for own in groups:
+            best = np.where(own, WIDTHS[int(np.argmax(_with(normal, gradient, best, own)))], best)
+    top = float(_gains(normal, gradient, best[None])[0])
+    means = [special.logsumexp(_with(normal, gradient, best, own)) for own in groups]
+    return top + float(np.sum(np.array(means) - np.log(len(WIDTHS)) - top))
+
+
+def _with(normal: Array, gradient: Array, widths: Array, own: NDArray[np.bool_]) -> Array:
+    """Gains (k,) with one effect at each of its widths."""
+    return _gains(normal, gradient, np.where(own, np.array(WIDTHS)[:, None], widths))
+
+
+def _gains(normal: Array, gradient: Array, widths: Array) -> Array:
+    """(k,) ln evidence over that of no effects, for prior standard deviations (k, p)."""
+    inside = np.eye(len(gradient)) + widths[:, :, None] * normal * widths[:, None, :]
+    root = np.linalg.cholesky(inside)
+    half = np.linalg.solve(root, (widths * gradient)[..., None])[..., 0]
+    diagonal = np.diagonal(root, axis1=1, axis2=2)
+    return np.asarray(0.5 * np.sum(half**2, axis=1) - np.sum(np.log(diagonal), axis=1))
 
 
 def p_value(drop: float, parameters: int, one_sided: bool) -> float:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from linear_toy import LinearToy, toy
-from scipy import integrate, stats
+from scipy import integrate, special, stats
 
 from crosscheck.fit.evidence import evidence, p_value
 from crosscheck.fit.gauss_newton import Fit
@@ -64,6 +64,30 @@ def test_of_two_parameters_that_go_together() -> None:
     found = made.fit(made.problem, made.terms("gravity_tilt"))
     assert found.jacobian.shape[1] == 2
     assert evidence(found).log == pytest.approx(log_integral(found), abs=1e-4)
+
+
+@pytest.mark.parametrize("sizes", [(9.0, 0.2), (0.2, 0.2), (9.0, 9.0)])
+def test_effects_have_each_their_own_width(sizes: tuple[float, float]) -> None:
+    """Beside a large effect a small one is not charged for the range of the large one.
+
+    Against the mean over all pairs of widths, by determinants of the readings' covariance.
+    """
+    names = ("tracker_scale", "gravity_tilt")
+    made = toy(dict(zip(names, sizes, strict=True)), names, seed=3)
+    found = made.fit(made.problem, made.terms(*names))
+    x = found.jacobian
+    y = found.state.white + x @ found.terms.sizes
+    own = [found.terms.own(name) for name in names]
+    logs = []
+    for a in LAMBDAS:
+        for b in LAMBDAS:
+            width = np.where(own[0], a, b)
+            covariance = np.eye(len(y)) + (x * width**2) @ x.T
+            sign, log_det = np.linalg.slogdet(covariance)
+            assert sign > 0
+            logs.append(-0.5 * float(y @ np.linalg.solve(covariance, y)) - 0.5 * log_det)
+    exact = float(special.logsumexp(logs) - np.log(len(logs)))
+    assert evidence(found).log == pytest.approx(exact, abs=0.1)
 
 
 def test_it_does_not_depend_on_where_the_fit_stopped() -> None:
