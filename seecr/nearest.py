@@ -22,6 +22,8 @@ Balance = Callable[[Array, NDArray[np.intp]], tuple[Array, Array]]
 """Balance at poses (k, 7) of some rows: matrices (k, d, m) and loads (k, d), A tau = load."""
 
 _ROUNDS = 200
+# Steps of a pose that a linear program may help with: each takes milliseconds.
+_HELPS = 30
 # A pose this near to the limit is held with something to spare: tensions, relative to the load.
 _INSIDE = 1e-6
 # Weight of a tension of one load, as a displacement over the robot's length: next to none.
@@ -64,11 +66,15 @@ def nearest(
         free[~robot.hinges] = 0.0
     way = _Way(robot, wanted, values, balance, least, most, scale, free)
     away, found = np.zeros((len(wanted), robot.n_dof)), np.zeros(len(wanted), dtype=bool)
-    way.run(away, found)
-    if not fix_position and not found.all():
-        # from afar the linearised balance leads nowhere: go from where the robot is at home
-        away[~found] = way.to(robot.reference_pose)[~found]
-        way.run(away, found)
+    way.run(away, found, np.arange(len(wanted)))
+    lost = np.flatnonzero(~found)
+    if not fix_position and len(lost):
+        # from afar the linearised balance leads nowhere: go from where the robot is at home, if
+        # it can be held there
+        home = way.to(robot.reference_pose)
+        lost = lost[way.held(home[lost], lost)]
+        away[lost] = home[lost]
+        way.run(away, found, lost)
     return way.placed(away, np.arange(len(wanted))), found
 
 
@@ -85,18 +91,18 @@ class _Way:
     scale: Array
     free: Array
 
-    def run(self, away: Array, found: NDArray[np.bool_]) -> None:
-        """Go on from ``away`` (n, d) in the rows that are not found, both changed in place."""
+    def run(self, away: Array, found: NDArray[np.bool_], rows: NDArray[np.intp]) -> None:
+        """Go on from ``away`` (n, d) in some rows; that and ``found`` are changed in place."""
+        if len(rows) == 0:
+            return
         n, length = len(self.wanted), self.robot.length
-        rows = np.flatnonzero(~found)
         expected, share = np.full(n, np.inf), np.ones(n)
         tensions = np.zeros(self.least.shape)
-        each = self.balance(self.placed(away[rows], rows), rows)
-        for i, matrix, load in zip(rows, *each, strict=True):
-            tensions[i] = balanced(matrix, load, self.least[i], self.most[i])[0]
+        tensions[rows] = self._balanced(away[rows], rows)[0]
         good, pulled = away.copy(), tensions.copy()
+        helps = np.zeros(n, dtype=np.intp)
         for _ in range(_ROUNDS):
-            step, change, left, possible = self._step(away[rows], tensions[rows], rows)
+            step, change, left, possible = self._step(away[rows], tensions[rows], rows, helps)
             size = np.linalg.norm(step, axis=1)
             done = possible & (left <= _TIGHT * self.scale[rows]) & (size <= _ENOUGH * length)
             found[rows[done]] = True
@@ -121,6 +127,17 @@ class _Way:
             if len(rows) == 0:
                 break
 
+    def held(self, away: Array, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
+        """Whether the poses so far from those of rows can be held."""
+        return np.asarray(self._balanced(away, rows)[1] < _TIGHT)
+
+    def _balanced(self, away: Array, rows: NDArray[np.intp]) -> tuple[Array, Array]:
+        """Tensions (k, m) that come nearest to balance, and what is left of the load (k,)."""
+        each = zip(rows, *self.balance(self.placed(away, rows), rows), strict=True)
+        found = [balanced(a, load, self.least[i], self.most[i]) for i, a, load in each]
+        tensions = np.array([one for one, _left in found]).reshape(len(rows), -1)
+        return tensions, np.array([left for _one, left in found])
+
     def to(self, pose: Array) -> Array:
         """(n, d) how far a pose is from each wanted one."""
         if self.values is None:
@@ -130,9 +147,12 @@ class _Way:
         return change * np.where(self.robot.hinges, self.robot.length, 1.0)
 
     def _step(
-        self, away: Array, tensions: Array, rows: NDArray[np.intp]
+        self, away: Array, tensions: Array, rows: NDArray[np.intp], helps: NDArray[np.intp]
     ) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
-        """Steps of way and tensions, what is out of balance [N], whether there is a step."""
+        """Steps of way and tensions, what is out of balance [N], whether there is a step.
+
+        ``helps`` (n,) counts where least squares lost it to rounding, changed in place.
+        """
         k, m = tensions.shape
         matrix, load = self.balance(self.placed(away, rows), rows)
         rates = self._rates(away, tensions, rows)
@@ -146,7 +166,8 @@ class _Way:
         )
         aim = load + np.einsum("ndk,nk->nd", rates, away)
         answer, possible = distribute(whole, aim, np.zeros(low.shape[1]), low, high)
-        for i in np.flatnonzero(~possible):
+        helps[rows[~possible]] += 1
+        for i in np.flatnonzero(~possible & (helps[rows] <= _HELPS)):
             step = _by_parts(whole[i], aim[i], low[i], high[i], m)
             if step is not None:
                 answer[i], possible[i] = step, True
