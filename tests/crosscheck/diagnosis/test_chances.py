@@ -7,13 +7,20 @@ from typing import Any
 
 import made_diagnoses
 import pytest
+from made_data import COGIRO, measured, term
 
+from crosscheck.diagnosis import nearby
 from crosscheck.diagnosis.chances import Chances, Together
-from crosscheck.diagnosis.nearby import _impossible, _refitted
+from crosscheck.diagnosis.nearby import _impossible, _refitted, chances_near
 from crosscheck.diagnosis.result import Diagnosis
+from crosscheck.diagnosis.stepwise import by_steps
 from crosscheck.diagnosis.words import probability_words
+from crosscheck.fit.candidates import null_fit
+from crosscheck.fit.prepare import prepare
 from crosscheck.fit.problem import Rms
 from crosscheck.fit.reasons import Reason, Why
+from seecr.effects import Terms
+from seecr.mjcf import load_robot
 
 RMS: Rms = {"position_rms_m": 1e-3, "orientation_rms_rad": None, "tension_rms_N": None}
 
@@ -73,10 +80,10 @@ def test_sets_that_were_fitted_count_with_their_own_evidence() -> None:
         score=lambda names: 40.0 if names == last else -1e9,
         log_prior=lambda names: -3.0 * len(names),
     )
-    fits = {"c": 7.0, "better c": 8.0, "d": 99.0, "again": 50.0}
+    fits = {"c": 8.0, "worse c": 7.0, "d": 99.0, "again": 50.0}
     known = {
         (frozenset("a"), "c"): fit_of(fits["c"]),
-        (frozenset("c"), "a"): fit_of(fits["better c"]),
+        (frozenset("c"), "a"): fit_of(fits["worse c"]),
         (frozenset("a"), "d"): fit_of(fits["d"], valid=False),
         (frozenset("a"), "b"): fit_of(fits["again"]),
     }
@@ -110,3 +117,17 @@ def test_what_no_robot_can_have_wherever_it_was_fitted_is_out_of_the_question() 
     found: Any = SimpleNamespace(steps=steps, last=steps[-1])
     # a tilt is possible beside the mass, and the mass is in the model
     assert _impossible(found) == {"law"}
+
+
+def test_effects_out_of_the_question_have_no_part_in_the_probabilities(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    robot = load_robot(COGIRO)
+    data = measured(robot, [term(robot, "stiffness", factor=1.4)], points=6)
+    problem = prepare(robot, data, Terms()).problem
+    factor = problem.noise(problem.experiment.predict(()))
+    base = null_fit(problem, Terms(), factor, refit=False)
+    found, _notes = by_steps(problem, base, factor, lambda _text, _part: None)
+    assert chances_near(found, {}).of("platform_mass") > 0.01
+    monkeypatch.setattr(nearby, "_impossible", lambda _found: frozenset({"platform_mass"}))
+    assert chances_near(found, {}).of("platform_mass") == 0.0

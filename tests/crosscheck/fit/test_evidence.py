@@ -9,7 +9,7 @@ import pytest
 from linear_toy import LinearToy, toy
 from scipy import integrate, special, stats
 
-from crosscheck.fit.evidence import evidence, p_value
+from crosscheck.fit.evidence import _averaged, evidence, p_value
 from crosscheck.fit.gauss_newton import Fit
 
 # Standard deviations of the prior, in plausible sizes, that the evidence is averaged over.
@@ -88,6 +88,27 @@ def test_effects_have_each_their_own_width(sizes: tuple[float, float]) -> None:
             logs.append(-0.5 * float(y @ np.linalg.solve(covariance, y)) - 0.5 * log_det)
     exact = float(special.logsumexp(logs) - np.log(len(logs)))
     assert evidence(found).log == pytest.approx(exact, abs=0.1)
+
+
+def test_widths_of_effects_that_go_together_are_found_beside_each_other() -> None:
+    """Against the mean over all pairs of widths; without looking again it is off by more than 1."""
+    rng, off = np.random.default_rng(0), []
+    own = np.array([True, True, True, False, False])
+    for _ in range(100):
+        x, share = rng.standard_normal((60, 5)), rng.uniform(0.0, 0.99)
+        x[:, 3:] = share * x[:, :2] + np.sqrt(1.0 - share**2) * x[:, 3:]
+        sizes = rng.choice([0.0, 0.01, 0.1, 1.0, 5.0], 2)
+        x *= rng.choice([1.0, 10.0, 100.0])
+        y = x @ (rng.standard_normal(5) * np.where(own, *sizes)) + rng.standard_normal(60)
+        normal, gradient = x.T @ x, x.T @ y
+        pairs = np.array([np.where(own, a, b) for a in LAMBDAS for b in LAMBDAS])
+        inside = np.eye(5) + pairs[:, :, None] * normal * pairs[:, None, :]
+        b = pairs * gradient
+        logs = 0.5 * np.einsum("ki,ki->k", b, np.linalg.solve(inside, b[..., None])[..., 0])
+        logs -= 0.5 * np.linalg.slogdet(inside)[1]
+        exact = float(special.logsumexp(logs) - np.log(len(pairs)))
+        off.append(abs(_averaged(normal, gradient, [own, ~own]) - exact))
+    assert max(off) < 0.6
 
 
 def test_it_does_not_depend_on_where_the_fit_stopped() -> None:
