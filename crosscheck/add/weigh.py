@@ -71,7 +71,7 @@ def weigh(
         from_nothing=distance,
         is_nothing=is_nothing(distance, count),
         whiteness=white,
-        warnings=tuple(_warnings(problem.robot, best, fitted, own)),
+        warnings=(*_warnings(problem.robot, best, fitted, own), *_widened(best, moved, own)),
         notes=tuple(dict.fromkeys(notes)),
     )
 
@@ -181,6 +181,16 @@ def _warnings(
                 "plausible size: check it on the robot"
             )
     return out + _together(best, own)
+
+
+def _widened(best: Fit, moved: Array, own: NDArray[np.bool_]) -> list[str]:
+    """That errors hold more than noise, where what is still missing makes most of them."""
+    if not np.any(own & (moved > best.stderr)):
+        return []
+    return [
+        "what is left is no noise: the standard errors hold by how much another missing effect "
+        "may move these values; crosscheck diagnose looks for it"
+    ]
 
 
 def _together(best: Fit, own: NDArray[np.bool_]) -> list[str]:

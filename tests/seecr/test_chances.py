@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from calibrated import POSES, ROBOT, model_of
 
 from seecr.chances import held_chance, kept_chance, margins_with
 from seecr.effects import Terms
@@ -14,7 +15,7 @@ from seecr.errors import InputError
 from seecr.inverse import correct
 from seecr.maps import workspace_map
 from seecr.mjcf import load_robot
-from seecr.model import Model, load_model
+from seecr.model import Model
 from seecr.report.corrections import chance_lines, document_of
 from seecr.report.maps import document_of as map_document
 from seecr.report.maps import likely_lines, write_arrays
@@ -22,8 +23,6 @@ from seecr.shipped import model_path
 from seecr.solution import Solution
 from seecr.workspace import tension_margin
 
-ROBOT = load_robot(model_path("demobot_cogiro"))
-POSES = np.array([[0.3, 0.2, 0.1, 1, 0, 0, 0], [0.5, 0.3, 0.2, 1, 0, 0, 0]])
 MODEL = """format = 1
 [[effect]]
 name = "platform_mass"
@@ -46,12 +45,6 @@ correlation = [[1.0], [0.5, 1.0]]
 """
 
 
-def model_of(folder: Path, text: str = MODEL + KEPT) -> Model:
-    path = folder / "model.toml"
-    path.write_text(text)
-    return load_model(path, ROBOT)
-
-
 def drawn(model: Model, n: int) -> list[Terms]:
     sizes = np.array([np.concatenate([model.stderr[name] for name in model.terms.names])])
     labels = [effect for effect, _key in model.terms.labels]
@@ -64,7 +57,7 @@ def drawn(model: Model, n: int) -> list[Terms]:
 
 
 def test_tensions_keep_their_limits_as_often_as_drawn_models_say(tmp_path: Path) -> None:
-    model = model_of(tmp_path)
+    model = model_of(tmp_path, MODEL + KEPT)
     found = correct(ROBOT, POSES, effects=model, lowest=0.2)
     # as narrow as half of the models allow
     highest = 1.01 * found.solution.tensions.max()
@@ -84,7 +77,7 @@ def test_tensions_keep_their_limits_as_often_as_drawn_models_say(tmp_path: Path)
 
 
 def test_poses_are_held_as_often_as_drawn_models_say(tmp_path: Path) -> None:
-    model = model_of(tmp_path)
+    model = model_of(tmp_path, MODEL + KEPT)
     # towards the edge of what can be held
     poses = np.tile(POSES[0], (9, 1))
     poses[:, 0] = np.linspace(0.02, 0.12, 9)
@@ -111,7 +104,7 @@ def test_a_model_without_covariance_says_nothing(tmp_path: Path) -> None:
 
 
 def test_a_map_has_the_probabilities_of_its_poses(tmp_path: Path) -> None:
-    model, x = model_of(tmp_path), np.linspace(0.02, 0.12, 6)
+    model, x = model_of(tmp_path, MODEL + KEPT), np.linspace(0.02, 0.12, 6)
     found = workspace_map(
         ROBOT, x, 0.2, 0.1, effects=model, lowest=0.02, elastic=False, chance=True
     )
@@ -143,4 +136,4 @@ def test_maps_that_can_have_no_probabilities_are_refused(tmp_path: Path) -> None
         plain.likely(1.5)
     two = load_robot(model_path("planar_two_cable"))
     with pytest.raises(InputError, match="fewer cables than freedoms: it holds no poses"):
-        held_chance(two, two.reference_pose, model_of(tmp_path))
+        held_chance(two, two.reference_pose, model_of(tmp_path, MODEL + KEPT))

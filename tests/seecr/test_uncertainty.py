@@ -6,22 +6,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from calibrated import POSES, ROBOT, model_of
 
 from seecr.effects import Terms
 from seecr.equilibrium import solve
 from seecr.errors import InputFileError
 from seecr.files import json_text
-from seecr.mjcf import load_robot
-from seecr.model import Model, load_model
 from seecr.pose import pose_difference
 from seecr.report.rows import csv_text, rows_of
 from seecr.report.words import cable_lines, pose_lines, sweep_lines
-from seecr.shipped import model_path
 from seecr.uncertainty import covariance_of, spread_of
 from seecr.units import with_error
 
-ROBOT = load_robot(model_path("demobot_cogiro"))
-POSES = np.array([[0.3, 0.2, 0.1, 1, 0, 0, 0], [0.5, 0.3, 0.2, 1, 0, 0, 0]])
 MODEL = """format = 1
 [[effect]]
 name = "stiffness"
@@ -46,14 +42,8 @@ correlation = [
 """
 
 
-def model_of(folder: Path, text: str = MODEL) -> Model:
-    path = folder / "model.toml"
-    path.write_text(text)
-    return load_model(path, ROBOT)
-
-
 def test_the_covariance_is_put_together_by_name(tmp_path: Path) -> None:
-    covariance = covariance_of(model_of(tmp_path))
+    covariance = covariance_of(model_of(tmp_path, MODEL))
     assert covariance is not None and covariance.shape == (8, 8)
     # terms stand in the order in which they act, not as in the file
     expected = np.diag([0.05, 0.02, 0.01, 0.01, 0.01, 0.0, 0.0, 0.0]) ** 2
@@ -62,7 +52,7 @@ def test_the_covariance_is_put_together_by_name(tmp_path: Path) -> None:
 
 
 def test_many_models_drawn_from_it_spread_as_said(tmp_path: Path) -> None:
-    model = model_of(tmp_path)
+    model = model_of(tmp_path, MODEL)
     spread = spread_of(ROBOT, POSES, model)
     covariance = covariance_of(model)
     assert spread is not None and covariance is not None
@@ -120,7 +110,7 @@ def test_correlations_that_are_none_are_one_sentence(tmp_path: Path, old: str, n
 
 
 def test_it_is_printed_and_written(tmp_path: Path) -> None:
-    model = model_of(tmp_path)
+    model = model_of(tmp_path, MODEL)
     found, spread = solve(ROBOT, POSES, effects=model), spread_of(ROBOT, POSES, model)
     assert spread is not None
     lines = list(pose_lines(found, spread=spread))

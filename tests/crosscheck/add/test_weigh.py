@@ -78,9 +78,12 @@ def test_errors_cover_what_another_missing_effect_does_to_a_value(
     alone = add_effect(parallel, data, "centre_of_mass")
     off = np.abs(alone.own.term.vector - centre.vector) / alone.own.stderr
     assert alone.pays and not alone.whiteness.is_noise and np.all(off < 2.0)
+    widened = "the standard errors hold by how much another missing effect may move these values"
+    assert any(widened in warning for warning in alone.warnings)
     monkeypatch.setattr(weigh, "moved_by_others", lambda _problem, best: np.zeros(len(best.terms)))
     blind = add_effect(parallel, data, "centre_of_mass")
     assert np.max(np.abs(blind.own.term.vector - centre.vector) / blind.own.stderr) > 5.0
+    assert not any(widened in warning for warning in blind.warnings)
 
 
 def test_a_fit_knows_whether_it_came_to_an_end() -> None:
