@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 
 from seecr.errors import InputError
-from seecr.pose import Array
+from seecr.pose import LARGEST, Array, all_finite
 from seecr.robot import Robot
 from seecr.threads import in_parts
 
@@ -31,10 +31,12 @@ def tension_limits(robot: Robot, lowest: ArrayLike, highest: ArrayLike) -> tuple
             raise InputError(f"{name} must be one number or ({m},) [N], got {array.shape}")
         bounds.append(np.array(np.broadcast_to(array, (m,))))
     low, high = bounds
-    if not (np.all(np.isfinite(low)) and np.all(low >= 0.0) and np.all(high >= low)):
+    high[high > LARGEST] = np.inf
+    if not (all_finite(low) and np.all(low >= 0.0) and np.all(high >= low)):
         got = [f"{bound.min():g}" for bound in bounds]
         raise InputError(
-            "tension bounds must be 0 <= lowest <= highest [N], got "
+            "tension bounds must be 0 <= lowest <= highest [N], lowest "
+            f"at most {LARGEST:g}, got "
             f"lowest {got[0]} and highest {got[1]}"
         )
     return low, high
@@ -57,7 +59,7 @@ def wanted_tensions(aim: str | ArrayLike, low: Array, high: Array) -> Array:
     wanted = np.asarray(aim, float)
     if wanted.ndim not in (0, 1, 2) or wanted.shape[-1:] not in ((), low.shape):
         raise InputError(f"aim must be (m,) or (n, m) with m = {len(low)}, got {wanted.shape}")
-    if not np.all(np.isfinite(wanted)):
+    if not all_finite(wanted):
         raise InputError("aim holds tensions that are not finite; expected finite ones [N]")
     return np.array(np.broadcast_to(wanted, np.broadcast_shapes(wanted.shape, low.shape)))
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.errors import InputError
-from seecr.pose import Array
+from seecr.pose import LARGEST, Array, all_finite
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +85,6 @@ def _filled(name: str, value: Array | None, otherwise: float, shape: tuple[int, 
         out = np.array(np.broadcast_to(given, shape))
     except ValueError:
         raise InputError(f"{name} must be {shape}, got {given.shape}") from None
-    if np.isinf(out).any() or (otherwise == 0.0 and np.isnan(out).any()):
-        raise InputError(f"{name} must be finite numbers, got {given}")
+    if not all_finite(out[~np.isnan(out)]) or (otherwise == 0.0 and np.isnan(out).any()):
+        raise InputError(f"{name} must be finite numbers, none beyond {LARGEST:g}, got {given}")
     return out

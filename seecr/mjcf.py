@@ -11,7 +11,7 @@ import numpy as np
 from seecr.errors import RobotError
 from seecr.files import no_text, read_bytes
 from seecr.pose import Array, quat_rotate, quat_to_matrix
-from seecr.robot import Joint, Robot
+from seecr.robot import ABSURD, Joint, Robot
 
 if TYPE_CHECKING:
     import mujoco
@@ -53,7 +53,7 @@ def load_robot(path: str | Path) -> Robot:
     if not joints:
         first = model.jnt_qposadr[model.body_jntadr[body]]
         reference_pose = model.qpos0[first : first + 7].copy()
-    return Robot(
+    robot = Robot(
         name=_model_name(model, path),
         exit_points=np.array(exit_points),
         anchor_points=np.array(anchor_points),
@@ -68,6 +68,18 @@ def load_robot(path: str | Path) -> Robot:
         cable_names=tuple(names),
         source=path,
     )
+    _check_lengths(robot, path)
+    return robot
+
+
+def _check_lengths(robot: Robot, path: Path) -> None:
+    """That rest lengths are of the frame's size."""
+    for name, length in zip(robot.cable_names, robot.rest_lengths, strict=True):
+        if length > ABSURD * robot.reach:
+            raise RobotError(
+                f"{path}: tendon {name} has rest length {length:g} m; expected metres, of the size "
+                f"of the frame, {robot.reach:.3g} m across"
+            )
 
 
 def _compile(path: Path) -> mujoco.MjModel:

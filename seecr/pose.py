@@ -10,12 +10,20 @@ vector [rad], both in the base frame, rotations multiplied from the left:
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
+LARGEST = 1e30
+"""Squares of larger numbers get lost, and nothing that is measured is so large."""
+
 # Below this angle the series of sin(x)/x are exact to double precision.
 _SMALL_ANGLE = 1e-4
+
+
+def all_finite(values: ArrayLike) -> bool:
+    """Whether all are numbers that can be reckoned with: finite, none beyond :data:`LARGEST`."""
+    return bool(np.all(np.abs(np.asarray(values, float)) <= LARGEST))
 
 
 def quat_multiply(a: Array, b: Array) -> Array:

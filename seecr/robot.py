@@ -10,7 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.errors import InputError, RobotError
-from seecr.pose import Array, transform_points
+from seecr.pose import LARGEST, Array, all_finite, transform_points
+
+ABSURD = 10.0
+"""Commands and rest lengths beyond this many times the frame's reach are in another unit."""
 
 IDENTITY_POSE = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 
@@ -83,8 +86,12 @@ class Robot:
             value = np.array(getattr(self, name), dtype=float)
             if value.shape != shape:
                 raise InputError(f"robot {self.name}: {name} must be {shape}, got {value.shape}")
-            if not np.all(np.isfinite(value)):
-                raise InputError(f"robot {self.name}: {name} holds a number that is not finite")
+            if not all_finite(value):
+                what = "stiffness x rest length" if name == "ea" else name
+                raise InputError(
+                    f"robot {self.name}: {what} holds a number that is not finite, or beyond "
+                    f"{LARGEST:g}"
+                )
             value.flags.writeable = False
             object.__setattr__(self, name, value)
         if not self.cable_names:
@@ -105,8 +112,10 @@ class Robot:
                     f"robot {self.name}: {name} has rest length {self.rest_lengths[i]:g} m; "
                     "expected a positive length"
                 )
-        if not self.mass >= 0:
-            raise RobotError(f"robot {self.name}: mass must not be negative, got {self.mass:g} kg")
+        if not 0 <= self.mass <= LARGEST:
+            raise RobotError(
+                f"robot {self.name}: expected a mass from 0 to {LARGEST:g} kg, got {self.mass:g} kg"
+            )
         short = self.nominal_lengths(self.reference_pose[None])[0] <= 1e-9 * self.length
         if np.any(short):
             name = self.cable_names[int(np.argmax(short))]

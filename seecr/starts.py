@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from seecr import statics
 from seecr.errors import InputError
 from seecr.joints import values_of_pose
-from seecr.pose import Array
+from seecr.pose import LARGEST, Array, all_finite
 from seecr.robot import Robot
 from seecr.tables import Tables
 
@@ -34,8 +34,10 @@ def finite(values: ArrayLike, name: str) -> Array:
         InputError: one of them is not.
     """
     array = np.asarray(values, dtype=float)
-    if not np.all(np.isfinite(array)):
-        raise InputError(f"{name} holds numbers that are not finite; expected finite ones")
+    if not all_finite(array):
+        raise InputError(
+            f"{name} holds numbers that are not finite, or beyond {LARGEST:g}; expected finite ones"
+        )
     return array
 
 

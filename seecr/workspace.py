@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from seecr.distribution import balanced, tension_limits
 from seecr.errors import InputError
 from seecr.joints import motion_columns, values_of_pose
-from seecr.pose import Array, quat_rotate, transform_points
+from seecr.pose import Array, all_finite, quat_rotate, transform_points
 from seecr.robot import Robot
 from seecr.solution import Solution
 from seecr.starts import finite
@@ -171,7 +171,7 @@ def _by_search(matrices: Array, loads: Array, low: Array, high: Array) -> Array:
 
 def _wrench(value: ArrayLike, n: int) -> Array:
     wrench = np.asarray(value, float)
-    if wrench.shape not in ((6,), (n, 6)) or not np.all(np.isfinite(wrench)):
+    if wrench.shape not in ((6,), (n, 6)) or not all_finite(wrench):
         raise InputError(f"wrench must be (6,) or ({n}, 6) finite numbers, got {wrench.shape}")
     return wrench
 
@@ -251,6 +251,6 @@ def balance_equations(
 
 def _poses(values: ArrayLike) -> Array:
     poses = np.atleast_2d(np.asarray(values, float))
-    if poses.ndim != 2 or poses.shape[1] != 7 or not np.all(np.isfinite(poses)):
+    if poses.ndim != 2 or poses.shape[1] != 7 or not all_finite(poses):
         raise InputError(f"poses must be (n, 7) finite numbers, got {np.shape(values)}")
     return poses

@@ -9,6 +9,7 @@ import click
 
 from crosscheck.cli.choices import figures_in, figures_option, listed, sigma_option
 from crosscheck.cli.following import after_plan
+from seecr.cli.arguments import check_places
 from seecr.cli.options import FILE, json_option, made_by, out_option, progress_share
 
 
@@ -87,6 +88,9 @@ def command(
     from seecr import load_robot
 
     machine = load_robot(robot)
+    room = box_of(box) if box else None
+    if room is not None:
+        check_places(room, machine)
     kinds, limits = tuple(listed(reads)), (lowest, highest)
     given = None if poses is None else load_commands(poses, machine)
     sigma = stated(Sigma() if given is None else given.sigma, sigmas)
@@ -94,7 +98,7 @@ def command(
         with progress_share("planning") as progress:
             commands = given or compose(
                 machine, rows or 0, sigma=sigma, reads=kinds, limits=limits, progress=progress,
-                box=box_of(box) if box else None,
+                box=room,
             )  # fmt: skip
             plan = make_plan(machine, commands, sigma, progress, reads=kinds, limits=limits)
         made = made_by(robot, poses)

@@ -6,12 +6,9 @@ import numpy as np
 
 from seecr.columns.known import POSITION, Columns
 from seecr.pose import Array
-from seecr.robot import Robot
+from seecr.robot import ABSURD, Robot
 
 __all__ = ["ABSURD", "away_from", "check_reach"]
-
-ABSURD = 10.0
-"""Commands beyond this many times the frame's reach are in another unit."""
 
 
 def away_from(robot: Robot, poses: Array | None, lengths: Array | None) -> Array:

@@ -19,14 +19,12 @@ from numpy.typing import NDArray
 
 from seecr.errors import InputFileError, MissingPackageError
 from seecr.files import no_text, read_bytes
-from seecr.pose import Array
+from seecr.pose import LARGEST, Array
 
 EXPECTED_FILE = "expected a CSV file in UTF-8 with a header row and one row per resting pose"
 
 _PARQUET_MAGIC = b"PAR1"
 _TEXT_BEGINNINGS = {"{": "JSON", "[": "JSON or TOML", "<": "XML, such as a robot's MJCF"}
-# Squares of larger numbers are lost, and nothing is read that is so large.
-_MOST = 1e30
 _SEPARATORS = (",", ";", "\t")
 # What stands for a reading that was not made, besides an empty cell.
 _NOT_READ = ("nan", "NaN")
@@ -72,7 +70,7 @@ class Table:
         except ValueError:
             raise self._first_fault(index, cells, blank_is_nan) from None
         blank = np.array([not cell for cell in cells])
-        odd = np.any((np.abs(values) < _MOST) == blank) or "_" in "".join(cells)
+        odd = np.any((np.abs(values) <= LARGEST) == blank) or "_" in "".join(cells)
         if odd or (np.any(blank) and not blank_is_nan):
             raise self._first_fault(index, cells, blank_is_nan)
         return values
@@ -257,7 +255,7 @@ def _cell_fault(cell: str, blank_is_nan: bool) -> str | None:
     if re.fullmatch(r"[+-]?[\d.]+(e[+-]?\d+)?\s*[^\W\d_]+", cell, re.IGNORECASE):
         return f"{expected}, got {show(cell)}; a unit belongs in the column's name, not in a cell"
     try:
-        finite = "_" not in cell and abs(float(cell)) < _MOST
+        finite = "_" not in cell and abs(float(cell)) <= LARGEST
     except ValueError:
         finite = False
     return None if finite else f"{expected}, got {show(cell)}"

@@ -127,9 +127,10 @@ def stiffness_lines(solution: Solution, i: int = 0) -> Iterator[str]:
 def _nudged(solution: Solution, i: int) -> str:
     """What a hundredth of the weight does where pose i is softest."""
     robot = solution.robot
-    step = _NUDGE * robot.weight / solution.smallest_eigenvalue[i] * solution.softest_direction[i]
-    if robot.weight == 0.0 or not np.isfinite(step).all():
+    soft = solution.smallest_eigenvalue[i]
+    if robot.weight == 0.0 or not soft > 0.0:
         return ""
+    step = _NUDGE * robot.weight / soft * solution.softest_direction[i]
     whole = np.linalg.norm(step * _metre(robot))
     moved = float(np.linalg.norm(step[~robot.hinges]))
     turned = float(np.linalg.norm(step[robot.hinges]))

@@ -90,5 +90,7 @@ def test_what_is_asked_of_a_plan_wrongly_is_said(poses, tmp_path):
     assert "--reads: expected some of position, orientation, tension, got 'colour'" in text
     for box in ("1,2", "0,0,0,1,1,inf"):
         assert "--box: expected X0,Y0" in refused("plan", poses[0], "--rows", 9, "--box", box, *out)
+    far = refused("plan", poses[0], "--rows", 9, "--box", "0,0,0,1e300,1,1", *out)
+    assert "X: expected metres, of the size of" in far
     text = refused("plan", poses[0], "--rows", 9, "--highest", "0.1", *out)
     assert "holds still at 0 of" in text and "ask for fewer --rows, wider tensions" in text

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -46,9 +47,18 @@ ROBOT = "planar_vertical"
          "--turned is of --line and --grid; here.csv has its own orientations"),
         ("map demobot_parallel --grid 200:300:3 0.25 0.1 --out o", "X: expected metres"),
         ("map demobot_parallel --lowest 50 --highest 1 --out o",
-         "tension bounds must be 0 <= lowest <= highest [N], got lowest 50 and highest 1"),
+         "lowest at most 1e+30, got lowest 50 and highest 1"),
         ("map demobot_parallel --wrench nan 0 0 0 0 0 --out o",
          "wrenches [N, N m] holds numbers that are not finite"),
+        ("map demobot_parallel --wrench 1e300 0 0 0 0 0 --out o",
+         "wrenches [N, N m] holds numbers that are not finite, or beyond 1e+30"),
+        ("map demobot_parallel --lowest 1e300 --out o",
+         "0 <= lowest <= highest [N], lowest at most 1e+30, got lowest 1e+300 and highest inf"),
+        ("correct demobot_parallel here.csv --lowest 1e300 --out o", "lowest at most 1e+30"),
+        ("pose long.xml 0.4 0.25 0.1", "long.xml: tendon cable1 has rest length 1e+06 m; expected "
+         "metres, of the size of the frame, 0.834 m across"),
+        ("pose stiff.xml 0.4 0.25 0.1",
+         "stiffness x rest length holds a number that is not finite, or beyond 1e+30"),
         ("export demobot_parallel out.csv",
          "out.csv: expected the name of an MJCF file to write, such as out.xml"),
         ("export own.xml own.xml", "own.xml: is the robot itself; expected another file to write"),
@@ -65,7 +75,10 @@ def test_a_mistake_is_one_sentence(
     (tmp_path / "picture.xml").write_bytes(b"\x89PNG\r\n\x1a\n\0")
     (tmp_path / "empty.xml").write_text(" \n")
     (tmp_path / "noise.toml").write_text('[sigma]\nposition_m = "0.1mm"\n')
-    (tmp_path / "own.xml").write_text(model_path("demobot_parallel").read_text())
+    own = model_path("demobot_parallel").read_text()
+    (tmp_path / "own.xml").write_text(own)
+    (tmp_path / "long.xml").write_text(re.sub('springlength="[^"]*"', 'springlength="0 1e6"', own))
+    (tmp_path / "stiff.xml").write_text(re.sub('stiffness="[^"]*"', 'stiffness="1e300"', own))
     before = {path: path.read_bytes() for path in tmp_path.iterdir()}
     result = CliRunner().invoke(main, words.split())
     assert result.exit_code == 2 and result.stdout == ""
