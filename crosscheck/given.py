@@ -15,11 +15,12 @@ from seecr.mjcf import load_robot
 from seecr.model import Model, load_model
 from seecr.pose import Array
 from seecr.robot import Robot
+from seecr.shipped import robot_file
 
 __all__ = ["GivenModel", "GivenRobot", "considered", "copy_robot", "model_of", "robot_of"]
 
 GivenRobot: TypeAlias = Robot | str | Path
-"""A robot, or the path of its MJCF."""
+"""A robot, the path of its MJCF, or the name of a shipped one."""
 
 GivenModel: TypeAlias = Model | Iterable[Term] | str | Path
 """A model, its effects alone, or the path of its TOML; ``()`` is the plain model."""
@@ -54,7 +55,7 @@ def copy_robot(source: Path, copy: Path) -> None:
     Raises:
         CrosscheckError: it needs other files, so that the copy is no robot.
     """
-    shutil.copyfile(source, copy)
+    shutil.copyfile(robot_file(source), copy)
     try:
         load_robot(copy)
     except Exception:

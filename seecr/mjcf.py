@@ -12,6 +12,7 @@ from seecr.errors import RobotError
 from seecr.files import no_text, read_bytes
 from seecr.pose import Array, quat_rotate, quat_to_matrix
 from seecr.robot import ABSURD, Joint, Robot
+from seecr.shipped import robot_file
 
 if TYPE_CHECKING:
     import mujoco
@@ -32,13 +33,14 @@ def load_robot(path: str | Path) -> Robot:
     gravity are those of the compiled model.
 
     Args:
-        path: the MJCF file.
+        path: the MJCF file, or the name of a shipped robot.
 
     Raises:
+        InputError: neither a file nor a shipped robot.
         RobotError: the file is missing, MuJoCo cannot compile it, or it is not such a robot;
             the message names the file and the element.
     """
-    path = Path(path)
+    path = robot_file(path)
     model = _compile(path)
     body = _moving_body(model, path)
     _refuse_other_forces(model, body, path)

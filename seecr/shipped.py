@@ -7,7 +7,7 @@ from pathlib import Path
 
 from seecr.errors import InputError
 
-__all__ = ["CABLES", "model_names", "model_path"]
+__all__ = ["CABLES", "model_names", "model_path", "robot_file"]
 
 CABLES: dict[str, float] = {"vectran": 3000.0, "fishing": 300.0}
 """k_c = E S [N] of the paper's two cables (eq 10), by name.
@@ -37,12 +37,34 @@ def model_path(name: str) -> Path:
     Raises:
         InputError: no robot of that name; the message lists those there are, nearest first.
     """
-    known = model_names()
-    if name in known:
+    if name in model_names():
         files = (place / name / f"{name}.xml" for place in _PLACES)
         return next(file for file in files if file.is_file())
+    raise InputError(f"shipped robot {name!r}: expected one of {_names_near(name)}")
+
+
+def robot_file(given: str | Path) -> Path:
+    """The MJCF file that is meant: a path, or the name of a shipped robot where no such file is.
+
+    Raises:
+        InputError: neither, and without a file's ending; the message lists the names, nearest
+            first.
+    """
+    path = Path(given)
+    if path.is_file() or path.suffix:
+        return path
+    if str(given) in model_names():
+        return model_path(str(given))
+    if path.exists() or path.name != str(given):
+        return path
+    raise InputError(
+        f"{given}: no such file and no shipped robot; expected an MJCF file or one of "
+        f"{_names_near(str(given))}"
+    )
+
+
+def _names_near(name: str) -> str:
+    known = model_names()
     nearest = difflib.get_close_matches(name, known, n=max(1, len(known)))
     names = ", ".join([*nearest, *(k for k in known if k not in nearest)])
-    raise InputError(
-        f"shipped robot {name!r}: expected one of {names or 'none: the models folder is missing'}"
-    )
+    return names or "none: the models folder is missing"

@@ -55,7 +55,6 @@ def test_the_diagnosis_from_python_prints_what_it_says() -> None:
 @pytest.mark.sweep
 def test_the_commands_of_one_robot_do_what_they_say(tmp_path: Path) -> None:
     """The tutorial's are the same commands; these take half a minute."""
-    (tmp_path / "models").symlink_to(ROOT / "models")
     block = next(b for b in re.findall(r"```sh\n.*?```", README, re.DOTALL) if "--hide 13" in b)
     page = Page(tmp_path)
     page.run(f"\n\n{block}\n")

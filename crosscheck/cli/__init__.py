@@ -23,6 +23,7 @@ def main() -> None:
     """Hold the statics of a cable-driven parallel robot against MuJoCo and against measurements.
 
     \b
+    ROBOT.xml is an MJCF file, or the name of a shipped robot (demobot_cogiro, planar_vertical ...).
     Exit status: 0 all well, 1 a threshold exceeded, 2 bad input or usage,
     3 a solve did not converge.
     """

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from crosscheck.cli.choices import sigma_option
-from crosscheck.cli.following import after_fit
+from crosscheck.cli.following import Given, after_fit
 from seecr.cli.options import FILE, json_option, made_by, progress_share
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def command(
         else:
             found = add_effects(machine, measured, listed, old.terms, progress)
     written = found.pays or force
-    made = made_by(robot, *data, all_from, model)  # of the model as it was read
+    made = made_by(machine.source, *data, all_from, model)  # of the model as it was read
     if written:
         if out is not None:
             with staged(out):  # what cannot be told leaves the model as it was
@@ -97,7 +97,8 @@ def command(
         _write(found, old, machine, measured.path, model)
     _tell(found, old, model, written, made, out, as_json)
     if not as_json:
-        click.echo(after_fit(found.whiteness.is_noise, written, robot, data, model))
+        given = Given.with_data(measured, robot, data, model, sigmas)
+        click.echo(after_fit(found.whiteness.is_noise, written, given))
     return 0 if written else 1
 
 

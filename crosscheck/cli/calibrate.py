@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from crosscheck.cli.choices import exclude_option, listed, only_option, sigma_option
-from crosscheck.cli.following import after_fit
+from crosscheck.cli.choices import exclude_option, only_option, sigma_option
+from crosscheck.cli.following import Given, after_fit
 from seecr.cli.options import FILE, json_option, made_by, progress_share
 
 if TYPE_CHECKING:
@@ -63,16 +63,14 @@ def command(
     from crosscheck.measurements.stated import with_stated
     from seecr import load_model, load_robot, new_model
 
-    considered(listed(only), listed(exclude))  # a wrong name is told before any file is read
+    considered(only, exclude)  # a wrong name is told before any file is read
     machine = load_robot(robot)
     old = load_model(model, machine) if model.exists() else new_model(machine)
     measured = with_stated(load_measurements(data, machine), sigmas)
     with progress_share("calibrating") as progress:
-        found = calibrate(
-            machine, measured, old, progress, only=listed(only), exclude=listed(exclude)
-        )
+        found = calibrate(machine, measured, old, progress, only=only, exclude=exclude)
     written = found.pays or (force and found.settled)
-    made = made_by(robot, *data, model)  # of the model as it was read
+    made = made_by(machine.source, *data, model)  # of the model as it was read
     if written:
         if out is not None:
             with staged(out):  # what cannot be told leaves the model as it was
@@ -80,7 +78,8 @@ def command(
         _write(found, old, machine, measured.path, model)
     _tell(found, model, written, made, out, as_json)
     if not as_json:
-        click.echo(after_fit(written, written, robot, data, model))
+        given = Given.with_data(measured, robot, data, model, sigmas)
+        click.echo(after_fit(written, written, given))
     if not found.settled:
         return 3
     return 0 if written else 1

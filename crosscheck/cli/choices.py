@@ -10,6 +10,16 @@ import click
 
 from seecr.cli.options import FILE
 
+
+def listed(ctx: click.Context, param: click.Parameter, texts: Sequence[str]) -> tuple[str, ...]:
+    """Words of an option that may be repeated and holds several between commas; its callback."""
+    words = [[word.strip() for word in text.split(",") if word.strip()] for text in texts]
+    for text, found in zip(texts, words, strict=True):
+        if not found:
+            raise click.BadParameter(f"expected {param.metavar}, got {text!r}.", ctx, param)
+    return tuple(word for found in words for word in found)
+
+
 sigma_option = click.option(
     "--sigma",
     "sigmas",
@@ -23,15 +33,20 @@ sigma_option = click.option(
 only_option = click.option(
     "--only",
     multiple=True,
+    callback=listed,
     metavar="EFFECT,...",
     help="Consider these effects alone, beside those of the model; may be repeated.",
 )
-"""``--only EFFECT,...``, given to the command as ``only``; see :func:`listed`."""
+"""``--only EFFECT,...``, given to the command as ``only``, a tuple of names."""
 
 exclude_option = click.option(
-    "--exclude", multiple=True, metavar="EFFECT,...", help="Do not consider these effects."
+    "--exclude",
+    multiple=True,
+    callback=listed,
+    metavar="EFFECT,...",
+    help="Do not consider these effects.",
 )
-"""``--exclude EFFECT,...``, given to the command as ``exclude``; see :func:`listed`."""
+"""``--exclude EFFECT,...``, given to the command as ``exclude``, a tuple of names."""
 
 tolerance_option = click.option(
     "--tolerance",
@@ -61,8 +76,3 @@ def figures_in(folder: Path | None) -> Iterator[None]:
         return
     with staged(folder, "--figures") as unfinished, keeping(unfinished):
         yield
-
-
-def listed(texts: Sequence[str]) -> list[str]:
-    """Words of an option that may be repeated and holds several, separated by commas."""
-    return [word.strip() for text in texts for word in text.split(",") if word.strip()]

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from crosscheck.cli.choices import figures_in, figures_option, sigma_option
-from crosscheck.cli.following import after_comparison
+from crosscheck.cli.following import Given, after_comparison
 from seecr.cli.options import FILE, json_option, made_by, out_option
 
 
@@ -79,7 +79,7 @@ def command(
         found = compare(machine, measured, own.terms if own else ())
         exceeded = check(limits, found)
         status = 1 if exceeded else (0 if found.converged else 3)
-        made = made_by(robot, *data, model)
+        made = made_by(machine.source, *data, model)
         document = {
             "made": made,
             "exit_status": status,
@@ -105,5 +105,5 @@ def command(
     for note in own.notes if own else ():
         click.echo(f"note: {note}")
     print_comparison(found, exceeded, limits != Limits(), out)
-    click.echo(after_comparison(found, robot, data, model))
+    click.echo(after_comparison(found, Given.with_data(measured, robot, data, model, sigmas)))
     return status

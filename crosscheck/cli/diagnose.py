@@ -16,7 +16,7 @@ from crosscheck.cli.choices import (
     sigma_option,
     tolerance_option,
 )
-from crosscheck.cli.following import after_diagnosis
+from crosscheck.cli.following import Given, after_diagnosis
 from seecr.cli.options import FILE, json_option, made_by, out_option, progress_share
 
 if TYPE_CHECKING:
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 @click.option(
     "--fail-on",
     multiple=True,
+    callback=listed,
     metavar="VERDICT,...",
     help="End 1 where the verdict is one of these, such as unknown_effect,no_verdict.",
 )
@@ -78,9 +79,9 @@ def command(
     from crosscheck.report import write_page
     from seecr import load_model, load_robot, new_model
 
-    gates = [DiagnosisVerdict.named(word) for word in listed(fail_on)]
+    gates = [DiagnosisVerdict.named(word) for word in fail_on]
     tolerance = Tolerance.parsed(tolerances)
-    considered(listed(only), listed(exclude))  # a wrong name is told before any file is read
+    considered(only, exclude)  # a wrong name is told before any file is read
     machine = load_robot(robot)
     measured = with_stated(load_measurements(data, machine), sigmas)
     own = load_model(model, machine) if model is not None else new_model(machine)
@@ -89,10 +90,10 @@ def command(
     with staged(out) as folder:
         with progress_share("diagnosing") as progress:
             found = diagnose(
-                machine, measured, own, progress, only=listed(only), exclude=listed(exclude),
+                machine, measured, own, progress, only=only, exclude=exclude,
                 tolerance=tolerance,
             )  # fmt: skip
-        made = made_by(robot, *data, model)
+        made = made_by(machine.source, *data, model)
         text = json_text({"made": made, **found.as_json()})
         write_text(folder / "diagnosis.json", text + "\n")
         with figures_in(figures):
@@ -111,7 +112,8 @@ def command(
     if note:
         click.echo(note, err=as_json)
     if not as_json:
-        click.echo(after_diagnosis(found, robot, data, model, model_out, out))
+        given = Given.with_data(measured, robot, data, model, sigmas)
+        click.echo(after_diagnosis(found, given, model_out, out))
     if found.verdict in gates:
         return 1
     return 0 if found.converged else 3

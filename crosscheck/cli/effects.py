@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from seecr.cli.following import following
-from seecr.cli.options import FILE, json_option
+from seecr.cli.options import FILE, json_option, made_by
 
 
 @click.command(
@@ -36,7 +36,9 @@ def command(name: str | None, robot: Path | None, as_json: bool) -> int:
     chosen = [effect_named(name)] if name is not None else list(catalogue().values())
     if as_json:
         rows = [effect_record(effect, machine) for effect in chosen]
-        click.echo(json_text(rows[0] if name is not None else {"effects": rows}))
+        told = rows[0] if name is not None else {"effects": rows}
+        made = made_by(None if machine is None else machine.source)
+        click.echo(json_text({"made": made, **told}))
     elif name is not None:
         print_effect(chosen[0], machine)
         given = (robot or "ROBOT.xml", "DATA.csv", "--model", "model.toml")

@@ -3,60 +3,102 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from seecr.cli.following import following, given_with
+from seecr.cli.following import Words, following, given_with
 
 if TYPE_CHECKING:
-    from crosscheck import Comparison, Diagnosis
+    from crosscheck import Comparison, Diagnosis, Measurements
 
 _MODEL = "model.toml"
 # Rows that a plan chooses where nobody said how many.
 _ROWS = 40
 
 
-def after_comparison(
-    found: Comparison, robot: Path, data: Sequence[Path], model: Path | None
-) -> str:
+@dataclass(frozen=True)
+class Given:
+    """What a command was given that the next one needs too.
+
+    Attributes:
+        robot, data, model: the files. sigmas: of ``--sigma``.
+        lengths: whether the data are commanded in lengths, which no pose is known of.
+    """
+
+    robot: Path
+    data: Sequence[Path]
+    model: Path | None = None
+    sigmas: Sequence[str] = ()
+    lengths: bool = False
+
+    @classmethod
+    def with_data(
+        cls, measured: Measurements, robot: Path, data: Sequence[Path], model: Path | None,
+        sigmas: Sequence[str],
+    ) -> Given:  # fmt: skip
+        """The same of files that were read."""
+        return cls(robot, data, model, sigmas, measured.command_lengths is not None)
+
+    @property
+    def options(self) -> Words:
+        """``--sigma`` again."""
+        return noise(self.sigmas)
+
+
+def noise(sigmas: Sequence[str]) -> Words:
+    """``--sigma`` as it was given."""
+    return tuple(word for text in sigmas for word in ("--sigma", text))
+
+
+def after_comparison(found: Comparison, given: Given) -> str:
     """What is missing; where nothing is, what these data could not have shown, or using it."""
+    files = (given.robot, *given.data)
     if not found.is_noise:
-        return following("crosscheck", "diagnose", robot, *data, *given_with(None, model))
-    if model is None:
-        return following("crosscheck", "plan", robot, data[0])
-    return following("seecr", "correct", robot, data[0], "--model", model)
+        model = given_with(None, given.model)
+        return following("crosscheck", "diagnose", *files, *model, *given.options)
+    if given.model is None:
+        return following("crosscheck", "plan", *files[:2], *given.options)
+    return _using(given, given.model)
 
 
-def after_diagnosis(
-    found: Diagnosis, robot: Path, data: Sequence[Path], model: Path | None, kept: Path | None,
-    out: Path,
-) -> str:  # fmt: skip
+def after_diagnosis(found: Diagnosis, given: Given, kept: Path | None, out: Path) -> str:
     """Adding what was found, calibrating all, or measuring more."""
     from crosscheck import DiagnosisVerdict
 
-    files, to = (robot, *data), ("--model", model or _MODEL)
+    files, to = (given.robot, *given.data), ("--model", given.model or _MODEL)
     match found.verdict:
         case DiagnosisVerdict.MANY_EFFECTS:
-            return following("crosscheck", "calibrate", *files, *to)
-        case DiagnosisVerdict.NO_EFFECT_MISSING if model is not None:
-            return following("seecr", "correct", robot, data[0], "--model", model)
+            return following("crosscheck", "calibrate", *files, *to, *given.options)
+        case DiagnosisVerdict.NO_EFFECT_MISSING if given.model is not None:
+            return _using(given, given.model)
         case DiagnosisVerdict.NO_VERDICT:
-            return following("crosscheck", "plan", robot, "--rows", _ROWS)
+            return following("crosscheck", "plan", given.robot, "--rows", _ROWS, *given.options)
     if not found.missing:
-        return following("crosscheck", "plan", robot, data[0])
+        return following("crosscheck", "plan", *files[:2], *given.options)
     if kept is not None:
-        return following("crosscheck", "compare", *files, "--model", kept)
+        return following("crosscheck", "compare", *files, "--model", kept, *given.options)
     listed = ("--all-from", out / "diagnosis.json")
-    return following("crosscheck", "add", *listed, *files, *to)
+    return following("crosscheck", "add", *listed, *files, *to, *given.options)
 
 
-def after_fit(is_noise: bool, written: bool, robot: Path, data: Sequence[Path], model: Path) -> str:
+def _using(given: Given, model: Path) -> str:
+    """Telling the winches what brings the platform to poses; a map, where none are known."""
+    if given.lengths:
+        return following("seecr", "map", given.robot, "--model", model)
+    line = following("seecr", "correct", given.robot, given.data[0], "--model", model)
+    return f"{line}  # the poses commanded there; or any CSV of poses that you want"
+
+
+def after_fit(is_noise: bool, written: bool, given: Given) -> str:
     """Holding the new model against the data, or looking for what else is missing."""
-    there = given_with(None, model) if written or model.exists() else ()
+    there = written or (given.model is not None and given.model.exists())
+    model = given_with(None, given.model) if there else ()
     verb = "compare" if is_noise and written else "diagnose"
-    return following("crosscheck", verb, robot, *data, *there)
+    return following("crosscheck", verb, given.robot, *given.data, *model, *given.options)
 
 
-def after_plan(robot: Path, poses: Path) -> str:
+def after_plan(robot: Path, poses: Path, sigmas: Sequence[str] = ()) -> str:
     """Once the poses have been measured."""
-    return following("crosscheck", "diagnose", robot, poses) + "  # once its poses are measured"
+    line = following("crosscheck", "diagnose", robot, poses, *noise(sigmas))
+    return f"{line}  # once its poses are measured"

@@ -115,7 +115,7 @@ def command(
     machine = load_robot(robot)
     choices = Choices.said(machine, **options)
     found = import_case(form, files, machine, logs, choices)
-    made = made_by(robot, *files, *logs)
+    made = made_by(machine.source, *files, *logs)
     write_case(found, robot, out, made)
     if as_json:
         click.echo(json_text({"made": made, **found.as_json(), "folder": str(out)}))

@@ -29,6 +29,7 @@ Examples:
 @click.option(
     "--reads",
     multiple=True,
+    callback=listed,
     metavar="KIND,...",
     help="What will be read, of position, orientation and tension.  [default: position,"
     "orientation, and tension where its noise is stated]",
@@ -91,17 +92,17 @@ def command(
     room = box_of(box) if box else None
     if room is not None:
         check_places(room, machine)
-    kinds, limits = tuple(listed(reads)), (lowest, highest)
+    limits = (lowest, highest)
     given = None if poses is None else load_commands(poses, machine)
     sigma = stated(Sigma() if given is None else given.sigma, sigmas)
     with staged(out) as folder:
         with progress_share("planning") as progress:
             commands = given or compose(
-                machine, rows or 0, sigma=sigma, reads=kinds, limits=limits, progress=progress,
+                machine, rows or 0, sigma=sigma, reads=reads, limits=limits, progress=progress,
                 box=room,
             )  # fmt: skip
-            plan = make_plan(machine, commands, sigma, progress, reads=kinds, limits=limits)
-        made = made_by(robot, poses)
+            plan = make_plan(machine, commands, sigma, progress, reads=reads, limits=limits)
+        made = made_by(machine.source, poses)
         status = 0 if plan.converged else 3
         text = json_text({"made": made, "exit_status": status, **plan.as_json()})
         write_text(folder / "plan.json", text + "\n")
@@ -112,5 +113,5 @@ def command(
         click.echo(text)
     else:
         print_plan(plan, out, files)
-        click.echo(after_plan(robot, poses or out / "poses.csv"))
+        click.echo(after_plan(robot, poses or out / "poses.csv", sigmas))
     return status

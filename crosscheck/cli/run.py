@@ -114,8 +114,9 @@ def command(
         chosen = _shipped(seed, patterns)
     else:
         from seecr import load_robot
+        from seecr.shipped import robot_file
 
-        robots = load_robot(robot), robot, mujoco_robot
+        robots = load_robot(robot), robot_file(robot), mujoco_robot
         chosen = list(select(user_cases(*robots, seed), patterns))
     if list_only:
         _list(chosen)

@@ -9,10 +9,11 @@ import click
 
 from crosscheck.cli.choices import sigma_option
 from seecr.cli.following import following
-from seecr.cli.options import FILE, json_option, out_option, progress_bar
+from seecr.cli.options import FILE, json_option, made_by, out_option, progress_bar
 
 if TYPE_CHECKING:
     from crosscheck import Twin
+    from seecr.made import Made
 
 
 @click.command(
@@ -114,19 +115,21 @@ def command(
             progress=lambda rows, now: advance(0, "measuring"),
         )
         advance(1, "measured")
-    _tell(twin, out, as_json)
+    _tell(twin, out, made_by(twin.robot.source, poses) if as_json else None)
     return 0
 
 
-def _tell(twin: Twin, out: Path, as_json: bool) -> None:
+def _tell(twin: Twin, out: Path, made: Made | None) -> None:
+    """What was made, as JSON where it is told how it was made."""
     from crosscheck.files import json_text
     from crosscheck.twin import FILES
 
     files = list(FILES)
     for note in twin.notes:
         click.echo(f"note: {note}", err=True)
-    if as_json:
-        click.echo(json_text({**twin.as_json(), "folder": str(out), "files": files}, indent=2))
+    if made is not None:
+        document = {"made": made, **twin.as_json(), "folder": str(out), "files": files}
+        click.echo(json_text(document, indent=2))
         return
     sigma = twin.answer.sigma
     click.echo(
@@ -142,11 +145,12 @@ def _tell(twin: Twin, out: Path, as_json: bool) -> None:
 def _open(path: Path, as_json: bool) -> int:
     from crosscheck.files import json_text
     from crosscheck.terminal import parameter_lines
-    from crosscheck.twin import unseal
+    from crosscheck.twin import FILES, unseal
 
     answer = unseal(path)
     if as_json:
-        click.echo(json_text(answer.as_json(), indent=2))
+        files = [path / name for name in FILES] if path.is_dir() else [path]
+        click.echo(json_text({"made": made_by(*files), **answer.as_json()}, indent=2))
         return 0
     if not answer.hidden:
         click.echo("nothing was hidden")

@@ -102,7 +102,7 @@ def make_twin(
     """Measure a robot that has effects nobody is told of.
 
     Args:
-        robot_path: its MJCF, without them.
+        robot_path: its MJCF, without them, or the name of a shipped robot.
         seed: draws effects, their sizes and the noise.
         effects: names of the effects; None lets the seed choose, ``()`` hides none.
         n_effects: how many the seed chooses; None lets it choose that too.
@@ -118,8 +118,8 @@ def make_twin(
         CrosscheckError: an effect that no twin can hide, or a robot that MuJoCo cannot rest.
         InputFileError: poses that cannot be read.
     """
-    robot_path = Path(robot_path)
     robot = load_robot(robot_path)
+    robot_path = robot.source or Path(robot_path)
     given = None if poses is None else commands_of(poses, robot)
     stated = sigma or (Sigma() if given is None else given.sigma)
     tensions = tensions or stated.tension_N is not None

@@ -103,13 +103,10 @@ def robot_at(given: Path, cable: str | None = None) -> Robot:
     """
     import numpy as np
 
-    from seecr import InputError, load_robot, model_names, model_path
+    from seecr import InputError, load_robot
     from seecr.shipped import CABLES
 
-    shipped = str(given) in model_names() and not given.exists()
-    if not given.exists() and not given.suffix:
-        model_path(str(given))  # tells the names there are
-    robot = load_robot(model_path(str(given)) if shipped else given)
+    robot = load_robot(given)
     if cable is None:
         return robot
     try:

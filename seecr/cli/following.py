@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from seecr import Commands, Robot, Solution
+    from seecr import Commands, Solution
 
 Words = tuple[object, ...]
 
@@ -34,15 +34,13 @@ def after_pose(solution: Solution, robot: Path, turned: Sequence[float], options
     return following("seecr", "sweep", robot, "--line", *start, *end, *way, *options)
 
 
-def after_sweep(
-    machine: Robot, commands: Commands, robot: Path, poses: Path | None, options: Words
-) -> str:
+def after_sweep(commands: Commands, robot: Path, poses: Path | None, options: Words) -> str:
     """Correcting the poses of a file; what measuring told lengths would show; the workspace."""
     if poses is None:
         return following("seecr", "map", robot, *options)
     if commands.lengths is None:
         return following("seecr", "correct", robot, poses, *options)
-    return following("crosscheck", "plan", machine.source, poses)
+    return following("crosscheck", "plan", robot, poses)
 
 
 def _numbers(values: Iterable[float]) -> list[str]:

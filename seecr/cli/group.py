@@ -6,6 +6,7 @@ import inspect
 import sys
 from collections.abc import Callable, Mapping
 from importlib import import_module
+from itertools import pairwise
 from typing import Any, TypeAlias
 
 import click
@@ -42,6 +43,14 @@ class LazyGroup(click.Group):
         ctx = super().make_context(info_name, args, parent, **extra)
         ctx.meta[ARGUMENTS] = given
         return ctx
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """The command and its words, none of which is empty."""
+        name, command, words = super().resolve_command(ctx, args)
+        _refuse_empty(words, ctx)
+        return name, command, words
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names in the order of the table."""
@@ -115,6 +124,17 @@ def group_of(package: str, table: CommandTable) -> Callable[[Callable[..., Any]]
         return click.version_option(__version__, prog_name=name)(group)
 
     return decorate
+
+
+def _refuse_empty(words: list[str], ctx: click.Context) -> None:
+    """Refuse words without a letter, as an unset variable of a shell leaves them."""
+    for before, word in pairwise(["", *words]):
+        name, equals, value = word.partition("=")
+        if equals and name.startswith("--") and not value.strip():
+            raise click.UsageError(f"{name}: expected a value, got none; leave it out", ctx)
+        if not word.strip():
+            where = f"{before}: " if before.startswith("-") else ""
+            raise click.UsageError(f"{where}expected a value, got an empty one; leave it out", ctx)
 
 
 def _usage_text(error: click.ClickException) -> str:

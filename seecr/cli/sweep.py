@@ -123,7 +123,7 @@ def command(
         click.echo(text)
         return status
     lines = [*sweep_lines(solution, commanded, spread), *jump_lines(solution)]
-    then = after_sweep(machine, commands, robot, poses, given_with(cable, model))
+    then = after_sweep(commands, robot, poses, given_with(cable, model))
     for line in [*notes, *lines, f"Results in {out}/", then]:
         click.echo(line)
     return status

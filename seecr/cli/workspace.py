@@ -133,7 +133,7 @@ def command(
     lines = [*found.lines(), *likely_lines(found, at_least)]
     tensions = ("--lowest", lowest) if lowest else ()
     most = () if highest is None else ("--highest", highest)
-    then = following("crosscheck", "plan", machine.source, "--rows", 40, *tensions, *most)
+    then = following("crosscheck", "plan", robot, "--rows", 40, *tensions, *most)
     for line in [*(own.notes if own else ()), *lines, f"Results in {out}/", then]:
         click.echo(line)
     return 0

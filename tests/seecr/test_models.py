@@ -20,7 +20,7 @@ from seecr.equilibrium import solve
 from seecr.errors import InputError
 from seecr.mjcf import load_robot
 from seecr.model import load_model
-from seecr.shipped import CABLES, model_names, model_path
+from seecr.shipped import CABLES, model_names, model_path, robot_file
 
 ROOT = Path(__file__).resolve().parents[2]
 DEMOBOTS = ("demobot_cogiro", "demobot_parallel")
@@ -397,6 +397,24 @@ def test_unknown_model_lists_the_known_nearest_first() -> None:
         "shipped robot 'demobot_paralel': expected one of demobot_parallel, demobot_uneven, "
     )
     assert all(name in text for name in ROBOTS) and "\n" not in text
+
+
+def test_a_robot_is_a_file_or_a_shipped_name(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert robot_file("planar_vertical") == model_path("planar_vertical")
+    (tmp_path / "planar_vertical").mkdir()  # results of it, perhaps
+    assert robot_file("planar_vertical") == model_path("planar_vertical")
+    (tmp_path / "cogiro_large").write_text("mine")
+    assert robot_file("cogiro_large") == Path("cogiro_large")
+    for path in ("gone.xml", "folder/gone"):
+        assert robot_file(path) == Path(path)  # whoever reads it says what is wrong
+    with pytest.raises(InputError) as caught:
+        robot_file("demobot_4")
+    assert str(caught.value).startswith(
+        "demobot_4: no such file and no shipped robot; expected an MJCF file or one of demobot_"
+    )
 
 
 def test_missing_models_folder_is_said(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

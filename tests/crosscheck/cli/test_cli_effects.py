@@ -39,6 +39,8 @@ def test_every_effect_can_be_described(name: str) -> None:
 def test_for_programs() -> None:
     every = json.loads(run("effects", "--json").stdout)["effects"]
     assert [row["effect"] for row in every] == list(catalogue())
+    named = json.loads(run("effects", "drum_gain", "--robot", "demobot_cogiro", "--json").stdout)
+    assert list(named["made"]["sha256"]) == [COGIRO.name]
     one = json.loads(run("effects", "drum_gain", "--robot", COGIRO, "--json").stdout)
     assert len(one["parameters"]) == load_robot(COGIRO).n_cables
     assert not one["own"]

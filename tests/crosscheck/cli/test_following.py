@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 from made_data import case, run
 
-from crosscheck.cli.following import after_comparison, after_diagnosis, after_fit, following
+from crosscheck.cli.following import Given, after_comparison, after_diagnosis, after_fit
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.fit.words import measured
 from crosscheck.terminal import parameter_lines
@@ -64,19 +64,40 @@ def test_the_catalogue_and_an_opened_twin_name_a_next_command():
 def test_after_each_verdict(verdict, missing, model, kept, expected):
     found = SimpleNamespace(verdict=DiagnosisVerdict(verdict), missing=("one",) * missing)
     paths = [None if name is None else Path(name) for name in (model, kept)]
-    line = after_diagnosis(found, Path("R"), [Path("D")], *paths, Path("out"))
+    line = after_diagnosis(found, Given(Path("R"), [Path("D")], paths[0]), paths[1], Path("out"))
     assert expected in line
 
 
 def test_names_with_blanks_are_quoted_and_all_files_named():
     found = SimpleNamespace(is_noise=False)
-    line = after_comparison(found, Path("my robot.xml"), [Path("a.csv"), Path("b.csv")], None)
+    given = Given(Path("my robot.xml"), [Path("a.csv"), Path("b.csv")])
+    line = after_comparison(found, given)
     assert line == "next: crosscheck diagnose 'my robot.xml' a.csv b.csv"
     noise = SimpleNamespace(is_noise=True)
-    assert "plan" in after_comparison(noise, Path("r.xml"), [Path("a.csv")], None)
-    line = after_fit(False, False, Path("r.xml"), [Path("a.csv")], Path("none.toml"))
-    assert line == "next: crosscheck diagnose r.xml a.csv"
-    assert following("a", 40) == "next: a 40"
+    assert after_comparison(noise, given) == "next: crosscheck plan 'my robot.xml' a.csv"
+    given = Given(Path("r.xml"), [Path("a.csv")], Path("none.toml"))
+    assert after_fit(False, False, given) == "next: crosscheck diagnose r.xml a.csv"
+
+
+def test_noise_that_was_stated_is_stated_again():
+    """Without it the next command would estimate it, and judge the same data otherwise."""
+    given = Given(Path("r.xml"), [Path("a.csv")], Path("m.toml"), ["position=0.1mm"])
+    end = " --model m.toml --sigma position=0.1mm"
+    off = SimpleNamespace(is_noise=False)
+    assert after_comparison(off, given) == f"next: crosscheck diagnose r.xml a.csv{end}"
+    assert after_fit(True, True, given) == f"next: crosscheck compare r.xml a.csv{end}"
+    found = SimpleNamespace(verdict=DiagnosisVerdict.EFFECTS_FOUND, missing=("one",))
+    assert after_diagnosis(found, given, None, Path("out")).endswith(f"r.xml a.csv{end}")
+
+
+def test_a_model_that_agrees_is_used_on_poses_or_mapped_where_none_are_known():
+    noise = SimpleNamespace(is_noise=True)
+    files = Path("r.xml"), [Path("a.csv"), Path("b.csv")], Path("m.toml")
+    line = after_comparison(noise, Given(*files))
+    assert line.startswith("next: seecr correct r.xml a.csv --model m.toml  # the poses commanded")
+    assert "any CSV of poses that you want" in line
+    line = after_comparison(noise, Given(*files, lengths=True))
+    assert line == "next: seecr map r.xml --model m.toml"
 
 
 @pytest.mark.parametrize(

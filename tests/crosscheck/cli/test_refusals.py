@@ -119,3 +119,28 @@ def test_quaternions_of_noughts_are_a_body_not_seen(
 def test_of_many_cases_the_nearest_three_are_named() -> None:
     said = refused("run", "--case", "nosuch")
     assert said.count(",") == 3 and "--list has all" in said
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("plan", "R", "D", "--reads", ""), "--reads: expected a value, got an empty one"),
+        (("plan", "R", "D", "--reads", " , "), "'--reads': expected KIND,..., got ' , '."),
+        (("diagnose", "R", "D", "--only", ""), "--only: expected a value, got an empty one"),
+        (("diagnose", "R", "D", "--only="), "--only: expected a value, got none; leave it out"),
+        (("diagnose", "R", "D", "--only", ","), "'--only': expected EFFECT,..., got ','."),
+        (("calibrate", "R", "D", "--exclude", ","), "'--exclude': expected EFFECT,..., got ','."),
+        (("compare", "R", ""), "expected a value, got an empty one; leave it out"),
+    ],
+)
+def test_nothing_given_is_not_the_same_as_not_given(words: tuple[str, ...], said: str) -> None:
+    """An unset variable of a shell would let all effects in, or read what the user left out."""
+    assert said in refused(*words)
+
+
+@pytest.mark.parametrize("verb", [("compare",), ("diagnose",), ("plan",), ("add", "stiffness")])
+def test_an_unknown_robot_lists_the_shipped_ones_nearest_first(verb: tuple[str, ...]) -> None:
+    said = refused(*verb, "demobot_4", "d.csv", *(("--model", "m.toml") if "add" in verb else ()))
+    assert (
+        "demobot_4: no such file and no shipped robot; expected an MJCF file or one of de" in said
+    )

@@ -306,15 +306,19 @@ def test_the_command_writes_a_case_and_does_not_tell(tmp_path):
     opened = CliRunner().invoke(main, ["twin", "--open", str(out)])
     assert opened.exit_code == 0 and "tracker_scale" in opened.output
     as_json = CliRunner().invoke(main, ["twin", "--open", str(out / NAME), "--json"])
-    assert json.loads(as_json.output)["hidden"] == ["tracker_scale"]
+    told = json.loads(as_json.output)
+    assert told["hidden"] == ["tracker_scale"] and list(told["made"]["sha256"]) == [NAME]
 
 
 def test_the_command_s_json_is_all_it_prints(tmp_path):
-    args = ["twin", str(COGIRO), "--hide", "1", "--effects", "0", "--out", str(tmp_path), "--json"]
-    run = CliRunner().invoke(main, args)
+    args = ["twin", "demobot_cogiro", "--hide", "1", "--effects", "0", "--out", str(tmp_path)]
+    run = CliRunner().invoke(main, [*args, "--json"])
     assert run.exit_code == 0
+    assert (tmp_path / "robot.xml").read_text() == COGIRO.read_text()
     result = json.loads(run.output)
     assert result["rows"] == 144 and "hidden" not in result and "values" not in result
+    assert "twin demobot_cogiro --hide 1" in result["made"]["command"]
+    assert list(result["made"]["sha256"]) == [COGIRO.name]
     assert unseal(tmp_path).hidden == []
 
 

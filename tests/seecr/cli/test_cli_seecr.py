@@ -75,7 +75,10 @@ def test_negative_numbers_are_coordinates() -> None:
 @pytest.mark.parametrize(
     ("args", "words"),
     [
-        (["pose", "nobot", *PLACE], "shipped robot 'nobot': expected one of"),
+        (
+            ["pose", "nobot", *PLACE],
+            "nobot: no such file and no shipped robot; expected an MJCF file or one of",
+        ),
         (["pose", "no.xml", *PLACE], "no.xml: no such file; expected an MJCF model"),
         (["pose", "demobot_cogiro", "1", "2"], "expected X Y Z or X Y Z QW QX QY QZ, got 2"),
         (
