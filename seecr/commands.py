@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -32,6 +33,8 @@ class Commands:
         stands: (n,) bool, rows whose run starts at its first row, at rest; the others' runs start
             at the reference pose. None: all of them.
         clock: (n,) int, number of the clock that ``time`` is read from; None for one alone.
+        parts: names (n,) of the "file" and the "run" that each row is of, for effects that have
+            values of their own for each.
     """
 
     pose: Array
@@ -44,6 +47,7 @@ class Commands:
     loads: Loads | None = None
     stands: NDArray[np.bool_] | None = None
     clock: NDArray[np.int64] | None = None
+    parts: Mapping[str, NDArray[np.str_]] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.pose)
@@ -58,6 +62,7 @@ class Commands:
             pose=self.pose[index], lengths=of(self.lengths), run=of(self.run), time=of(self.time),
             temperature=of(self.temperature), told=self.told, stands=of(self.stands),
             clock=of(self.clock), loads=None if self.loads is None else self.loads.rows(index),
+            parts={kind: names[index] for kind, names in self.parts.items()},
         )  # fmt: skip
 
     @property

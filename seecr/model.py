@@ -12,6 +12,11 @@
     [effect.after]
     [effect.held_out]
 
+An effect that is another for each file or run, such as a tracker that is set up anew, says
+``per_file = true`` or ``per_run = true``. Its own values stand in tables named after those,
+``[effect.of."monday/measured.csv"]``; those under ``parameters`` are what a further file or run is
+expected to have, as far as these differ, and may be left out.
+
 ``stderr = "unseen"`` stands for a parameter that the data do not see. A person may write a model
 by hand: name, parameters and values are all that is needed. What a person knows beside the data
 stands with the parameter (:mod:`seecr.cells`): ``fixed = true`` holds its value in every fit,
@@ -29,15 +34,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import tomlkit
 from tomlkit import TOMLDocument
 from tomlkit.exceptions import TOMLKitError
 
-from seecr.cells import Where, cell_of
-from seecr.effects import Knowledge, Term, Terms, catalogue, effect_named, layout_of
-from seecr.effects.base import Layout
-from seecr.errors import InputError, InputFileError
+from seecr.cells import Where, term_of
+from seecr.effects import Term, Terms, catalogue
+from seecr.errors import InputFileError
 from seecr.files import read_text
 from seecr.fingerprint import check_robot, fingerprint
 from seecr.pose import Array
@@ -51,9 +54,6 @@ FORMAT = 1
 
 _EXPECTED = "expected a model as crosscheck add writes it"
 _TABLES = ("format", "robot", "effect", "calibration")
-_OF_EFFECT = (
-    "name", "fixed", "parameters", "provenance", "refitted", "before", "after", "held_out",
-)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -90,29 +90,38 @@ class Model(Result):
         return [
             f"model of {robot}: plain SEECR and {count}" if self.names else
             f"model of {robot}: plain SEECR, no effects",
-            *(f"{name}: {_values(self.terms[name], self.stderr[name])}" for name in self.names),
+            *(f"{name}: {_shown(self.terms[name], self.stderr[name])}" for name in self.names),
             *self.notes,
         ]  # fmt: skip
 
     def records(self) -> list[Record]:
-        """One row per parameter: its value and standard error, None where there is none."""
+        """One row per parameter: its value and standard error, None where there is none.
+
+        ``of`` names the file or run where it has values of its own for each.
+        """
         return [
             {
                 "effect": name,
+                "of": of,
                 "parameter": key,
-                "value": float(term.vector[i]),
-                "stderr": float(error) if math.isfinite(error) else None,
-                "unit": term.layout.units[i],
+                "value": float(vector[i]),
+                "stderr": float(stderr[i]) if math.isfinite(stderr[i]) else None,
+                "unit": self.terms[name].layout.units[i],
             }
             for name in self.names
-            for term in [self.terms[name]]
-            for i, (key, error) in enumerate(
-                zip(term.layout.names, self.stderr[name], strict=True)
-            )
-        ]  # fmt: skip
+            for of, vector, stderr in self._tables(name)
+            for i, key in enumerate(self.terms[name].layout.names)
+        ]
+
+    def _tables(self, name: str) -> list[tuple[str, Array, Array]]:
+        """Values and errors of an effect, and those for files or runs by their names."""
+        term = self.terms[name]
+        own = {} if term.own is None else term.own.values
+        tables = [(of, one.vector, one.stderr) for of, one in own.items()]
+        return [("", term.vector, self.stderr[name]), *tables]
 
 
-def _values(term: Term, stderr: Array, most: int = 3) -> str:
+def _shown(term: Term, stderr: Array, most: int = 3) -> str:
     """Values of an effect for people, the first few."""
     parts = [
         f"{key} = {value:.6g}"
@@ -122,7 +131,10 @@ def _values(term: Term, stderr: Array, most: int = 3) -> str:
         )
     ]
     more = [f"{len(parts) - most} more"] if len(parts) > most else []
-    return ", ".join([*parts[:most], *more])
+    words = ", ".join([*parts[:most], *more])
+    if term.own is None:
+        return words
+    return f"of its own for each {term.own.kind}, {len(term.own.values)} known; elsewhere {words}"
 
 
 def new_model(robot: Robot) -> Model:
@@ -156,7 +168,7 @@ def load_model(path: str | Path, robot: Robot) -> Model:
     errors: dict[str, Array] = {}
     notes = (*notes, *_migrate(where, document))
     for k, table in enumerate(_effect_tables(where, document)):
-        term, stderr = _term(where, k, table, robot)
+        term, stderr = term_of(where, k, table, robot)
         if term.name in errors:
             raise where.error(f"effect {term.name} is listed twice; expected it once", k, "name")
         terms.append(term)
@@ -211,87 +223,3 @@ def _migrate(where: Where, document: Mapping[str, Any]) -> list[str]:
                     given.setdefault(key, copy.deepcopy(cell))
                 notes.append(f"effect {name}: {old} is read as {' and '.join(now)}, as it is now")
     return notes
-
-
-def _term(where: Where, k: int, table: Mapping[str, Any], robot: Robot) -> tuple[Term, Array]:
-    layout = _layout(where, k, table, robot)
-    given = table.get("parameters")
-    if not isinstance(given, Mapping):
-        raise where.error(
-            f"effect {layout.name}: expected a table [effect.parameters] with "
-            f"{_some(layout.names)}", k,
-        )  # fmt: skip
-    fixed = table.get("fixed", False)
-    if not isinstance(fixed, bool):
-        text = f"effect {layout.name}: fixed must be true or false, got {fixed!r}"
-        raise where.error(text, k, "fixed")
-    given = _spread(layout, given)
-    _check_names(where, k, layout, given)
-    names = enumerate(layout.names)
-    cells = [cell_of(where, k, layout, i, given[key], fixed) for i, key in names]
-    knowledge = Knowledge(
-        np.array([cell.fixed for cell in cells]),
-        np.array([cell.known for cell in cells]),
-        np.array([cell.known_stderr for cell in cells]),
-    )
-    term = Term(layout, np.array([cell.value for cell in cells]), knowledge)
-    return term, np.array([cell.stderr for cell in cells])
-
-
-def _layout(where: Where, k: int, table: Mapping[str, Any], robot: Robot) -> Layout:
-    """The effect that a table is of; other keys are the user's own, if they are not misspelt."""
-    name = table.get("name")
-    if not isinstance(name, str):
-        raise where.error(f'expected name = "..." of an effect, got {name!r}', k, "name")
-    for key in table:
-        near = difflib.get_close_matches(key.lower(), _OF_EFFECT, cutoff=0.7)
-        if key not in _OF_EFFECT and near:
-            raise where.error(f"effect {name}: unknown {key}; expected {near[0]}", k, key)
-    try:
-        return layout_of(effect_named(str(name)), robot)
-    except InputError as error:
-        raise where.error(str(error), k, "name") from None
-
-
-def _spread(layout: Layout, given: Mapping[str, Any]) -> Mapping[str, Any]:
-    """What is said of a parameter as a whole, said of each of its components.
-
-    In the file's tree itself where it is one, so that what is written has a place for each.
-    """
-    for whole, parts in layout.groups.items():
-        if whole in given and isinstance(given, MutableMapping):
-            said = given.pop(whole)
-            for key in parts:
-                given[key] = _both(given.get(key), said)
-    return given
-
-
-def _both(own: Any, said: Any) -> Any:
-    """What a component says and what is said of all of its kind; its own word counts."""
-    if own is None:
-        return copy.deepcopy(said)
-    cells = [cell if isinstance(cell, Mapping) else {"value": cell} for cell in (said, own)]
-    whole = tomlkit.inline_table()
-    whole.update({**cells[0], **cells[1]})
-    return whole
-
-
-def _check_names(where: Where, k: int, layout: Layout, given: Mapping[str, Any]) -> None:
-    for key in given:
-        if key not in layout.names:
-            near = difflib.get_close_matches(key, layout.names, n=len(layout), cutoff=0.0)
-            raise where.error(
-                f"effect {layout.name}: unknown parameter {key}; known, nearest first: "
-                f"{_some(near)}", k, key,
-            )  # fmt: skip
-    missing = [key for key in layout.names if key not in given]
-    if missing:
-        raise where.error(
-            f"effect {layout.name}: parameter {_some(missing)} is missing; expected a line such "
-            f"as {missing[0]} = {{ value = {layout.null[0]:g} }}", k, "parameters",
-        )  # fmt: skip
-
-
-def _some(names: Sequence[str], most: int = 8) -> str:
-    rest = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + rest

@@ -61,7 +61,7 @@ def covariance_of(model: Model) -> Array | None:
     stderr = np.concatenate([model.stderr[name] for name in model.terms.names])
     out = np.eye(len(labels))
     both = [(labels.index(name), k) for k, name in enumerate(names) if name in labels]
-    here, there = (np.array(part, dtype=int) for part in zip(*both, strict=True))
+    here, there = np.array(both, dtype=int).reshape(-1, 2).T
     out[np.ix_(here, here)] = kept[np.ix_(there, there)]
     known = np.where(np.isfinite(stderr), stderr, 0.0)
     return np.asarray(out * np.outer(known, known))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from typing import TypeAlias
 
 from crosscheck.add.result import Addition
@@ -16,7 +17,7 @@ from crosscheck.fit.reasons import Why
 from crosscheck.fit.state import State
 from crosscheck.given import GivenModel, GivenRobot, model_of, robot_of
 from crosscheck.measurements.read import GivenData, measurements_of
-from seecr.effects import Term, Terms, effect_named, layout_of
+from seecr.effects import ApartLayout, Own, Term, Terms, effect_named, layout_of
 from seecr.effects.base import Layout
 from seecr.pose import Array
 
@@ -33,6 +34,8 @@ def add_effect(
     name: str,
     model: GivenModel = (),
     progress: Progress = lambda _text, _part: None,
+    *,
+    per: str | None = None,
 ) -> Addition:
     """Fit an effect to data, jointly with those the model has.
 
@@ -43,6 +46,8 @@ def add_effect(
         model: effects of the model, or their file; where the named one is among them it is
             fitted again. The plain model without.
         progress: called with what is being done and the part of it that is done.
+        per: "file" or "run" gives the effect values of its own for each; so it has where the model
+            says so of it.
 
     Raises:
         InputError: no effect of that name.
@@ -55,7 +60,7 @@ def add_effect(
     def fitter(problem: Problem, terms: Terms, factor: Array) -> Fit:
         return _fitted(problem, terms, layout, factor)
 
-    return _added(robot, data, [layout], model, progress, fitter)
+    return _added(robot, data, [layout], model, progress, fitter, per)
 
 
 def add_effects(
@@ -92,12 +97,15 @@ def add_effects(
 
 def _added(
     robot: GivenRobot, data: GivenData, layouts: Sequence[Layout],
-    model: GivenModel, progress: Progress, fitter: Fitter,
+    model: GivenModel, progress: Progress, fitter: Fitter, per: str | None = None,
 ) -> Addition:  # fmt: skip
     robot = robot_of(robot)
     data = measurements_of(data, robot)
     terms, said = model_of(model, robot)
     names = [layout.name for layout in layouts]
+    had = terms.names
+    if per is not None:
+        terms = Terms([*terms.without(names[0]), _apart(terms, layouts[0], per)])
     ready = prepare(robot, data, terms)
     problem, notes = ready.problem, [*said, *ready.all_notes]
     if ready.refusal is not None:
@@ -120,7 +128,16 @@ def _added(
         problem = problem.without(outliers, words)
         best = fitter(problem, terms, factor)
     progress("predicting runs left out", 0.6)
-    return weigh(problem, terms, names, factor, best, notes)
+    # what belongs to files or runs was fitted to them already: before that it was not there
+    before = terms.only(name for name in terms.names if name in had or name not in names)
+    return weigh(problem, before, names, factor, best, notes)
+
+
+def _apart(terms: Terms, layout: Layout, kind: str) -> Term:
+    """An effect that is to have values of its own for each file or run."""
+    term = terms[layout.name] if layout.name in terms else Term(layout, layout.null)
+    known = term.own is not None and term.own.kind == kind
+    return term if known else replace(term, own=Own(kind, {}))
 
 
 def _refuse(problem: Problem, layout: Layout) -> None:
@@ -132,8 +149,8 @@ def _refuse(problem: Problem, layout: Layout) -> None:
 def _fitted(problem: Problem, terms: Terms, layout: Layout, factor: Array) -> Fit:
     """The best joint fit, from where the effect stands and from its most promising starts."""
     fits = [_to_the_end(problem, terms, factor)] if layout.name in terms else []
-    if fits and fits[0].valid and terms[layout.name].knowledge.any:
-        return fits[0]  # what is known of it says where it is
+    if fits and fits[0].valid and _is_placed(terms[layout.name]):
+        return fits[0]
     base = base_of(problem, terms, [layout.name], factor)
     tried = try_candidate(Trials(problem, factor), base, layout)
     if tried.fit is not None:
@@ -146,6 +163,11 @@ def _fitted(problem: Problem, terms: Terms, layout: Layout, factor: Array) -> Fi
         why = reason or fits[0].status.value
         raise kind(f"{problem.data.path} cannot carry {layout.name}: {why}")
     return min(good, key=lambda found: found.chi2)
+
+
+def _is_placed(term: Term) -> bool:
+    """Whether what is known of an effect, or of its files or runs, says where to look for it."""
+    return term.knowledge.any or isinstance(term.layout, ApartLayout)
 
 
 def _to_the_end(problem: Problem, terms: Terms, factor: Array, near: State | None = None) -> Fit:

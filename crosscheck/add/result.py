@@ -8,7 +8,7 @@ from typing import Any
 from crosscheck.fit.noise import Whiteness
 from crosscheck.fit.problem import Rms
 from crosscheck.fit.words import fitted_lines, fitted_records, rms_words
-from crosscheck.model.write import Fitted
+from crosscheck.model.fitted import Fitted
 from seecr.effects import Terms
 from seecr.result import Record, Result
 

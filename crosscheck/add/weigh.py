@@ -19,7 +19,7 @@ from crosscheck.fit.noise import whiteness
 from crosscheck.fit.problem import Problem, rms_by_kind
 from crosscheck.fit.state import evaluate
 from crosscheck.fit.systematic import moved_by_others
-from crosscheck.model.write import Fitted
+from crosscheck.model.fitted import Fitted
 from seecr.effects import Terms
 from seecr.pose import Array
 from seecr.robot import Robot

@@ -17,7 +17,7 @@ from crosscheck.fit.problem import Rms
 from crosscheck.fit.words import fitted_lines, fitted_records, rms_words
 from crosscheck.given import GivenModel, GivenRobot, considered, model_of, robot_of
 from crosscheck.measurements.read import GivenData, measurements_of
-from crosscheck.model.write import Fitted
+from crosscheck.model.fitted import Fitted
 from seecr.effects import Terms
 from seecr.pose import Array
 from seecr.result import Record, Result

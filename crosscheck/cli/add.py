@@ -25,6 +25,7 @@ Examples:
   crosscheck add pulley_radius robot.xml measured.csv --model model.toml
   crosscheck compare robot.xml measured.csv --model model.toml
   crosscheck add pulley_radius robot.xml second_day.csv --model model.toml --refit
+  crosscheck add tracker_frame robot.xml monday.csv tuesday.csv --model model.toml --per file
   crosscheck add --all-from diagnosis.json robot.xml measured.csv --model model.toml
 """,
 )
@@ -39,6 +40,11 @@ Examples:
     "--model", type=FILE, required=True, metavar="M.toml", help="The model; made if need be."
 )
 @click.option("--refit", is_flag=True, help="Fit again an effect that the model has.")
+@click.option(
+    "--per",
+    type=click.Choice(["file", "run"]),
+    help="Give EFFECT values of its own for each file or run.",
+)
 @click.option("--force", is_flag=True, help="Add it even if it does not predict any better.")
 @sigma_option
 @click.option("--out", type=FILE, metavar="DIR", help="Folder for add.json.  [default: none]")
@@ -48,6 +54,7 @@ def command(
     all_from: Path | None,
     model: Path,
     refit: bool,
+    per: str | None,
     force: bool,
     sigmas: tuple[str, ...],
     out: Path | None,
@@ -76,6 +83,8 @@ def command(
     effect, robot, data = _arguments(words, all_from)
     if effect is not None:
         effect_named(effect)
+    elif per is not None:
+        raise click.UsageError("--per is of one EFFECT; leave out --all-from")
     machine = load_robot(robot)
     listed = load_diagnosed(all_from, machine) if all_from is not None else ()
     names = [effect] if effect is not None else [term.name for term in listed]
@@ -85,7 +94,7 @@ def command(
     measured = with_stated(load_measurements(data, machine), sigmas)
     with progress_share(f"adding {' + '.join(names)}") as progress:
         if effect is not None:
-            found = add_effect(machine, measured, effect, old.terms, progress)
+            found = add_effect(machine, measured, effect, old.terms, progress, per=per)
         else:
             found = add_effects(machine, measured, listed, old.terms, progress)
     written = found.pays or force

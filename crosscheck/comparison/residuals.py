@@ -12,7 +12,7 @@ from crosscheck.comparison.quantities import channels
 from crosscheck.comparison.result import Comparison, Coordinate, Group, UnsolvedRow, WorstRow
 from crosscheck.comparison.travel import Travel, regions_of, travel
 from crosscheck.fit.noise import as_table, whiteness
-from crosscheck.fit.prepare import Prepared, noise_floor, outlying_rows, prepare
+from crosscheck.fit.prepare import noise_floor, outlying_rows, prepare
 from crosscheck.fit.problem import Problem, kinds_read, rms_by_kind
 from crosscheck.fit.state import State, evaluate
 from crosscheck.given import GivenModel, GivenRobot, model_of, robot_of
@@ -51,7 +51,7 @@ def compare(robot: GivenRobot, data: GivenData, model: GivenModel = ()) -> Compa
     some = problem.n_readings > 0
     if some:
         notes += _outliers(problem, state)
-    white = whiteness(problem, state.white, _fitted(ready)) if some else None
+    white = whiteness(problem, state.white, ready.fitted) if some else None
     return Comparison(
         problem=problem,
         state=state,
@@ -70,11 +70,6 @@ def compare(robot: GivenRobot, data: GivenData, model: GivenModel = ()) -> Compa
         notes=tuple(dict.fromkeys(notes)),
         refusal=ready.refusal,
     )
-
-
-def _fitted(ready: Prepared) -> int:
-    """How many values were fitted to the data after all."""
-    return sum(len(term.layout) for term in ready.terms if term.name in ready.problem.data.free)
 
 
 def _coloured(problem: Problem, state: State, factor: Array) -> Coloured | None:

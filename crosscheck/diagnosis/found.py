@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import shown_stages
-from crosscheck.model.write import Fitted
+from crosscheck.model.fitted import Fitted
 
 __all__ = ["found_effects"]
 

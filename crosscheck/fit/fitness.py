@@ -93,9 +93,13 @@ def _contradicting(
     neighbours = np.stack([used[:-1][at_rest], used[1:][at_rest]], axis=1)
     limit = np.inf if stated.position_m is None else _NOISE * np.sqrt(6.0) * stated.position_m
     spread = float(np.linalg.norm(np.std(predicted[used], axis=0)))
+    # files or runs that have values of their own may well differ
+    kinds = commands
+    if problem.groups is not None:
+        kinds = np.concatenate([commands, problem.groups[:, None]], axis=1)
     for pairs, most in (
         (neighbours, limit),
-        (_of_same_command(commands, used), _TRAVEL * spread),
+        (_of_same_command(kinds, used), _TRAVEL * spread),
     ):
         off = np.linalg.norm(place[pairs[:, 0]] - place[pairs[:, 1]], axis=1)
         wrong = off > most

@@ -1,73 +1,123 @@
-"""Effects that stay free in every fit of some data: how its tracker stands was found from it.
+"""Effects that are fitted before anything else: what the data alone can say of themselves.
 
 Frames that were aligned to the commands have taken in a part of every error. The values that say
 how they stand are therefore the data's own: fitted to them beside whatever else is, and of no use
-to other data.
+to other data. So are the values of a file or run that the model has not seen, of an effect that
+has its own for each.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
+from numpy.typing import NDArray
 
 from crosscheck.fit.gauss_newton import fit
+from crosscheck.fit.parts import LaidOut
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.registration import NAME as TRACKER
-from crosscheck.fit.registration import registered
+from crosscheck.fit.registration import registered_each
 from crosscheck.fit.state import State, evaluate
 from crosscheck.fit.words import shown
 from crosscheck.units import parameter_name
-from seecr.effects import Term, Terms, effect_named, layout_of
+from seecr.effects import ApartLayout, Term, Terms, apart, effect_named, layout_of
 from seecr.pose import Array
 
-__all__ = ["freed"]
+__all__ = ["Freed", "freed"]
 
 
-def freed(problem: Problem, terms: Terms) -> tuple[Terms, tuple[str, ...]]:
-    """The model with the effects that its data leave free, at their best values there.
+@dataclass(frozen=True, eq=False)
+class Freed:
+    """A model with what its data leave free.
 
-    All other effects keep theirs.
+    Attributes:
+        terms: with the values that are best there. free: (p,) which were fitted.
+        notes: a sentence about each effect.
+    """
+
+    terms: Terms
+    free: NDArray[np.bool_]
+    notes: tuple[str, ...] = ()
+
+
+def freed(problem: Problem, laid: LaidOut) -> Freed:
+    """The model with what its data leave free at the best values there.
+
+    All other values stay.
 
     Args:
         problem: the data; :attr:`Measurements.free` names the effects.
-        terms: effects of the model as it stands.
-
-    Returns:
-        the model, and a sentence about each of them.
+        laid: effects of the model as it stands, and of which files or runs it knows nothing.
     """
-    names = problem.data.free
-    if not names or not problem.n_readings:
-        return terms, ()
-    layouts = [layout_of(effect_named(name), problem.robot) for name in names]
-    own = [Term(layout, layout.null) for layout in layouts if layout.name not in terms]
+    names, terms = problem.data.free, laid.terms
+    if not (names or laid.fresh) or not problem.n_readings:
+        return Freed(terms, np.zeros(len(terms), dtype=bool))
+    own = [_new(problem, name) for name in names if name not in terms]
     every = Terms([*terms, *own])
+    free = _free(every, names, laid.fresh)
     factor = problem.noise(problem.experiment.predict(every.effects))
-    state = _registered(problem, every, factor)
-    free = np.array([effect in names for effect, _key in every.labels])
-    found = fit(problem, state.terms, factor, state, free=free)
-    return found.terms, tuple(_told(found.terms[name], problem) for name in names)
+    state = _registered(problem, every, factor, free)
+    found = fit(problem, state.terms, factor, state, free=free).terms
+    moved = free & ~found.knowledge.fixed
+    told = [_told(found, name, moved, problem, name in names) for name in found.names]
+    return Freed(found, moved, tuple(filter(None, told)))
 
 
-def _registered(problem: Problem, terms: Terms, factor: Array) -> State:
+def _new(problem: Problem, name: str) -> Term:
+    """An effect that the model has not; each of several files has its own."""
+    layout, data = layout_of(effect_named(name), problem.robot), problem.data
+    if data.files:
+        files = data.free_in.get(name, range(len(data.files)))
+        layout = apart(layout, "file", tuple(data.origins[k] for k in files), layout.null)
+    return Term(layout, layout.null)
+
+
+def _free(
+    terms: Terms, names: Sequence[str], fresh: Sequence[tuple[str, str]]
+) -> NDArray[np.bool_]:
+    """(p,) the parameters that are free: of some effects all, of others of some files or runs."""
+    free = np.array([effect in names for effect, _key in terms.labels], dtype=bool)
+    for effect, part in fresh:
+        layout = terms[effect].layout
+        assert isinstance(layout, ApartLayout)
+        own = np.arange(len(layout))[layout.part(part)]
+        free[terms.part(effect).start + own] = True
+    return free
+
+
+def _registered(problem: Problem, terms: Terms, factor: Array, free: NDArray[np.bool_]) -> State:
     """The model as it stands, or with the tracker's frame turned and shifted where that is nearer.
 
     Gauss-Newton would have a long way from another frame.
     """
     stood = evaluate(problem, terms, factor)
-    if TRACKER not in problem.data.free or terms[TRACKER].knowledge.any:
+    if TRACKER not in terms or not free[terms.part(TRACKER)].any():
         return stood
-    at_null = terms.with_term(Term(terms[TRACKER].layout, terms[TRACKER].layout.null))
-    plain = evaluate(problem, at_null, factor, stood)
-    frame = registered(problem, plain.prediction)
-    if frame is None:
+    term = terms[TRACKER]
+    if term.knowledge.any:
         return stood
-    turned = evaluate(problem, terms.with_term(frame), factor, plain)
+    mine = free[terms.part(TRACKER)]
+    at_null = np.where(mine, term.layout.null, term.vector)
+    plain = evaluate(problem, terms.with_term(term.with_vector(at_null)), factor, stood)
+    frames = registered_each(problem, plain.prediction, term.with_vector(at_null), mine)
+    turned = evaluate(problem, terms.with_term(frames), factor, plain)
     return min(stood, turned, key=lambda state: state.chi2)
 
 
-def _told(term: Term, problem: Problem) -> str:
-    values = zip(term.layout.names, term.layout.units, term.vector, strict=True)
-    words = ", ".join(f"{parameter_name(key, unit)} {shown(v, unit)}" for key, unit, v in values)
-    return (
-        f"{term.name} is free, as the TOML beside {problem.data.path.name} says, and was fitted to "
-        f"these data first: {words}"
-    )
+def _told(
+    terms: Terms, name: str, moved: NDArray[np.bool_], problem: Problem, by_toml: bool
+) -> str:
+    """What an effect was found to be; "" where it was not fitted."""
+    term, mine = terms[name], moved[terms.part(name)]
+    if not (mine.any() or by_toml):
+        return ""
+    layout = term.layout
+    values = zip(layout.names, layout.units, term.vector, mine, strict=True)
+    words = ", ".join(
+        f"{parameter_name(key, unit)} {shown(v, unit)}" for key, unit, v, own in values
+        if own or by_toml
+    )  # fmt: skip
+    why = f"is free, as the TOML beside {problem.data.path.name} says, and" if by_toml else ""
+    return f"{name} {why} was fitted to these data first: {words}".replace("  ", " ")

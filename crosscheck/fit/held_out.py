@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import zip_longest
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +45,16 @@ class HeldOut:
 
 
 def blocks_of(problem: Problem) -> list[NDArray[np.bool_]]:
-    """Rows (n,) of each block to leave out: runs, or blocks of time where runs are too few."""
+    """Rows (n,) of each block to leave out: runs, or blocks of time where runs are too few.
+
+    Where effects have values of their own for each file or run, a part of each is left out: what
+    those are in one of which nothing was seen, nothing says.
+    """
+    if problem.groups is not None:
+        groups = [problem.groups == k for k in np.unique(problem.groups[problem.use])]
+        every = [blocks_of(problem.with_groups(None).only(rows)) for rows in groups]
+        none = np.zeros_like(problem.use)
+        return [np.any(blocks, axis=0) for blocks in zip_longest(*every, fillvalue=none)]
     run = problem.data.run_index
     if _enough_runs(problem):
         return [(run == k) & problem.use for k in _runs(problem)]
@@ -55,6 +65,8 @@ def blocks_of(problem: Problem) -> list[NDArray[np.bool_]]:
 
 def blocks_note(problem: Problem) -> str:
     """That blocks of time are left out instead of runs, where it is so; "" elsewhere."""
+    if problem.groups is not None:
+        return "cross-validation leaves out a part of each file or run, as they have own values"
     if _enough_runs(problem):
         return ""
     runs = len(_runs(problem))

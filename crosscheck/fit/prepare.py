@@ -11,6 +11,7 @@ from crosscheck.fit.fitness import refusal_of
 from crosscheck.fit.freed import freed
 from crosscheck.fit.held_out import blocks_note
 from crosscheck.fit.noise import estimate_sigma
+from crosscheck.fit.parts import groups_of, laid_out
 from crosscheck.fit.problem import Problem, Rms, rms_by_kind
 from crosscheck.fit.reasons import Refusal, Unfit
 from crosscheck.fit.state import State
@@ -37,6 +38,7 @@ class Prepared:
         notes: what was assumed, estimated or left out.
         blocks_note: how cross-validation would cut the data, where that is to be said.
         refusal: why nothing can be said of these data; None where something can.
+        fitted: how many values were fitted to the data first, as these leave them free.
     """
 
     problem: Problem
@@ -44,6 +46,7 @@ class Prepared:
     notes: tuple[str, ...]
     blocks_note: str
     refusal: Refusal | None
+    fitted: int = 0
 
     @property
     def all_notes(self) -> tuple[str, ...]:
@@ -68,18 +71,21 @@ def prepare(
         return Prepared(
             problem, terms, tuple(data.notes), "", Refusal(Unfit.NO_READINGS, data.n_rows)
         )
-    plain = problem.experiment.predict(terms.effects)
+    laid = laid_out(data, terms)
+    plain = problem.experiment.predict(laid.terms.effects)
     problem = _solved_rows(problem, plain)
     problem, estimates = estimate_sigma(problem, problem.residuals(plain.readings))
-    terms, said = freed(problem, terms)
-    if said:
+    found = freed(problem, laid)
+    terms, said = found.terms, (*laid.notes, *found.notes)
+    if found.free.any():
         plain = problem.experiment.predict(terms.effects)
         if estimates:  # what was left then was the frame's
             known = replace(problem, sigma=data.sigma)
             problem, estimates = estimate_sigma(known, problem.residuals(plain.readings))
     notes = (*data.notes, *problem.left_out, *estimates, *said)
+    problem = problem.with_groups(groups_of(data, terms))
     refusal = refusal_of(problem, plain.pose[:, :3], data.sigma)
-    return Prepared(problem, terms, notes, blocks_note(problem), refusal)
+    return Prepared(problem, terms, notes, blocks_note(problem), refusal, int(found.free.sum()))
 
 
 def _solved_rows(problem: Problem, plain: Prediction) -> Problem:

@@ -23,6 +23,7 @@ from crosscheck.units import in_unit
 from seecr.effects import catalogue
 from seecr.effects.base import Readings
 from seecr.experiment import Experiment, Prediction
+from seecr.parted import Parted
 from seecr.pose import (
     Array,
     quat_conjugate,
@@ -47,6 +48,8 @@ class Problem:
         use: (n,) bool rows that count; others are way points or were left out, see ``left_out``.
         left_out: sentences that name the rows left out and why.
         considered: names of the effects that may explain them.
+        groups: (n,) number of the file or run of each row, where effects have values of their own
+            for each.
     """
 
     robot: Robot
@@ -55,10 +58,11 @@ class Problem:
     use: NDArray[np.bool_]
     left_out: tuple[str, ...] = ()
     considered: frozenset[str] = field(default_factory=lambda: frozenset(catalogue()))
+    groups: NDArray[np.int64] | None = None
     experiment: Experiment = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        self.experiment = Experiment(self.robot, self.data.as_commands(self.robot))
+        self.experiment = Parted(self.robot, self.data.as_commands(self.robot))
         self.use = self.use & self.data.read
 
     def without(self, rows: NDArray[np.bool_], why: str) -> Problem:
@@ -72,6 +76,10 @@ class Problem:
     def with_sigma(self, sigma: Sigma) -> Problem:
         """The same problem with other noise."""
         return self._like(sigma=sigma)
+
+    def with_groups(self, groups: NDArray[np.int64] | None) -> Problem:
+        """The same problem, whose rows go together otherwise."""
+        return self._like(groups=groups)
 
     def _like(self, **changes: object) -> Problem:
         other = replace(self, **changes)  # type: ignore[arg-type]

@@ -117,7 +117,8 @@ _REMEDIES = {
     Unfit.CONSTANT_COMMANDS: _MORE_POSES,
     Unfit.FROZEN_READINGS: "check that the tracker followed the platform, and read the poses again",
     Unfit.CONTRADICTION: "read these poses again, leave out the wrong rows, or, where the tracker "
-    "or the winches were set up anew in between, give each set-up a file of its own",
+    "or the winches were set up anew in between, give each set-up a file of its own and "
+    "crosscheck add tracker_frame (or another effect) --per file",
     Unfit.UNSOLVED_MODEL: "check the model's values and the robot's file",
 }
 

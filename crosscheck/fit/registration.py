@@ -7,9 +7,10 @@ is then left does not depend on how the tracker was set up.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crosscheck.fit.problem import Problem
-from seecr.effects import Term, effect_named, layout_of
+from seecr.effects import ApartLayout, Layout, Term, effect_named, layout_of
 from seecr.experiment import Prediction
 from seecr.pose import Array, quat_conjugate, quat_multiply, quat_rotate, rotvec_from_quat
 
@@ -38,6 +39,34 @@ def registered(problem: Problem, at: Prediction) -> Term | None:
     if whole.any():
         shift = np.median(places[1] - quat_rotate(turn, places[0]), axis=0)
     return Term(layout, np.concatenate([shift, rotvec_from_quat(turn)]))
+
+
+def registered_each(
+    problem: Problem, at: Prediction, term: Term, mine: NDArray[np.bool_] | None = None
+) -> Term:
+    """The tracker's frame registered, that of each file or run where they have their own.
+
+    Args:
+        problem: the data.
+        at: the prediction with frames at null.
+        term: the effect as it stands.
+        mine: (p,) which of its parameters may move; all by default.
+    """
+    values = term.vector.copy()
+    for rows, where in _frames(problem, term.layout):
+        free = mine is None or bool(mine[where].any())
+        frame = registered(problem.only(rows), at) if free else None
+        if frame is not None:
+            values[where] = frame.vector
+    return term.with_vector(values)
+
+
+def _frames(problem: Problem, layout: Layout) -> list[tuple[NDArray[np.bool_], slice]]:
+    """The rows that see a frame, and where its parameters stand."""
+    if not isinstance(layout, ApartLayout):
+        return [(problem.use, slice(0, len(layout)))]
+    names = problem.data.parts[layout.kind]
+    return [(names == part, layout.part(part)) for part in layout.parts]
 
 
 def _turn(problem: Problem, at: Prediction) -> Array | None:

@@ -25,6 +25,7 @@ from seecr.compiled.outcomes import CONVERGED
 from seecr.effects import Term, Terms
 from seecr.effects.base import Effect, Layout
 from seecr.experiment import Prediction
+from seecr.parted import PartedPrediction
 from seecr.pose import Array, pose_add, pose_difference
 from seecr.sensitivity import motion_of, sensitivities, with_inverse
 from seecr.tables import assemble
@@ -194,6 +195,7 @@ def _balanced_rows(problem: Problem, base: State, layout: Layout) -> NDArray[np.
     senses = layout.effect.edit_readings is not Effect.edit_readings
     # platforms on joints: a measured pose is off what they can reach, by its noise
     silent = senses or at.has_history or bool(at.setup.laws) or bool(problem.robot.joints)
+    silent = silent or isinstance(at, PartedPrediction)
     if silent or data.quat_wxyz is None:
         return np.zeros(data.n_rows, dtype=bool)
     read = np.isfinite(data.position).all(axis=1) & np.isfinite(data.quat_wxyz).all(axis=1)

@@ -12,8 +12,8 @@ from crosscheck.fit.problem import Problem, in_units_of
 from seecr.effects import Terms
 from seecr.effects.base import Effect
 from seecr.experiment import Experiment, Prediction
+from seecr.parted import rates
 from seecr.pose import Array
-from seecr.sensitivity import sensitivities
 
 # A row is far off beyond this mean square of its whitened residuals; only where few rows are
 # (this part of all), it may be that they rest in another equilibrium.
@@ -143,8 +143,8 @@ def derivatives(
     frozen: bool = False,
 ) -> Array:
     """Whitened derivative of the prediction by the terms' parameters, (N, p)."""
-    rates = sensitivities(state.experiment, state.terms, state.prediction, columns, frozen)
-    return problem.whiten(state.factor, problem.as_read(rates, state.prediction.readings))
+    change = rates(state.experiment, state.terms, state.prediction, columns, frozen)
+    return problem.whiten(state.factor, problem.as_read(change, state.prediction.readings))
 
 
 # Rounds of finding the likeliest errors: afresh, and from a state nearby.

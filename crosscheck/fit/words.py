@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.fit.problem import KINDS, Rms
-from crosscheck.model.write import Fitted
+from crosscheck.model.fitted import Fitted
 from crosscheck.units import in_unit, parameter_name, short, with_error
 from seecr.effects.base import Layout
 from seecr.pose import Array

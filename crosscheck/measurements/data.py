@@ -7,7 +7,7 @@ was not read is NaN. :mod:`crosscheck.measurements.read` reads them from files.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -61,6 +61,11 @@ class Sigma:
     length_m: float | None = None
 
 
+def origin_of(path: Path, depth: int = 2) -> str:
+    """The name by which models know a file: its own and that of its folder."""
+    return "/".join(path.resolve().parts[-depth:])
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Measurements(Result):
     """Commands and readings of n resting poses of a robot with m cables.
@@ -87,11 +92,13 @@ class Measurements(Result):
         temperature_C: (n,) [deg C] or None.
         loads: what the platform carried, or None.
         stands: (n,) bool, rows whose run starts at its first row instead of the reference pose.
-        free: names of effects that every fit of these data fits too: how the tracker stands, where
-            that was found from the data.
         sigma: stated noise.
         sigma_ratio: (n, 4) noise of each row over that, by kind: each file has its own.
+        free: names of effects that every fit of these data fits too: how the tracker stands, where
+            that was found from the data. free_in: numbers of the files that say so, by the effects'
+            names, where not all do.
         files: their names, where they are several; file: (n,) number of each row's file.
+        origins: names by which models know the files, where they are several.
         line: (n,) line of the file (row, for Parquet) each row came from.
         unused_columns: names of columns that mean nothing here.
         notes: sentences for the reader: what was assumed, filled in or left out.
@@ -115,10 +122,12 @@ class Measurements(Result):
     loads: Loads | None = None
     stands: Mask = _FILLED_IN
     free: tuple[str, ...] = ()
+    free_in: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     sigma: Sigma = field(default_factory=Sigma)
     sigma_ratio: Array = _FILLED_IN
     files: tuple[str, ...] = ()
     file: NDArray[np.int64] = _FILLED_IN
+    origins: tuple[str, ...] = ()
     line: NDArray[np.int64] = _FILLED_IN
     unused_columns: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
@@ -168,6 +177,16 @@ class Measurements(Result):
     def n_rows(self) -> int:
         """Number of rows n."""
         return len(self.run)
+
+    @property
+    def parts(self) -> dict[str, Names]:
+        """Names (n,) of the "file" and the "run" that each row is of, as models know them."""
+        origin = np.array(self.origins or (origin_of(self.path),), dtype=np.str_)[self.file]
+        run = self.run
+        if self.files:  # runs of several files are named after these
+            own = [len(self.files[k]) + 2 for k in self.file]
+            run = np.array([name[cut:] for name, cut in zip(run, own, strict=True)], dtype=np.str_)
+        return {"file": origin, "run": np.char.add(np.char.add(origin, ": "), run)}
 
     @property
     def runs(self) -> tuple[str, ...]:
@@ -227,6 +246,7 @@ class Measurements(Result):
             loads=self.loads,
             stands=self.stands,
             clock=self.file if self.files else None,
+            parts=self.parts,
         )
 
     @property

@@ -37,7 +37,7 @@ def together(parts: Sequence[Measurements]) -> Measurements:
     pairs = zip(parts, names, strict=True)
     notes = [f"{name}: {note}" for part, name in pairs for note in part.notes]
     t_s, lost_times = _of_all("t_s", [part.t_s for part in parts], names)
-    free, one_for_all = _free(parts)
+    free = _free(parts)
     warmth, lost_warmth = _of_all("temperature_C", [part.temperature_C for part in parts], names)
     quat, angles = _orientations(parts)
     whole = Measurements(
@@ -55,28 +55,26 @@ def together(parts: Sequence[Measurements]) -> Measurements:
         temperature_C=warmth,
         loads=_loads(parts),
         stands=np.concatenate([part.stands for part in parts]),
-        free=free,
+        free=tuple(free),
+        free_in=free,
         sigma=sigma,
         sigma_ratio=ratio,
         files=tuple(names),
+        origins=tuple(_short_names([part.path.resolve() for part in parts], 2)),
         file=np.repeat(np.arange(len(parts)), [part.n_rows for part in parts]),
         line=np.concatenate([part.line for part in parts]),
         unused_columns=tuple(dict.fromkeys(name for part in parts for name in part.unused_columns)),
-        notes=(*notes, *said, *lost_times, *lost_warmth, *one_for_all),
+        notes=(*notes, *said, *lost_times, *lost_warmth),
     )
     # what a file repeats of itself is in its own notes already
     own = any(twice(part) for part in parts)
     return whole if own else whole.with_notes(twice(whole))
 
 
-def _free(parts: Sequence[Measurements]) -> tuple[tuple[str, ...], list[str]]:
-    """What any of the files leaves free, and what that takes for granted."""
-    free = tuple(dict.fromkeys(name for part in parts for name in part.free))
-    words = (
-        f"{' and '.join(free)} is free, but one for all files: right where the tracker stood still "
-        "between them; give files of other days one by one."
-    )
-    return free, [words] if free else []
+def _free(parts: Sequence[Measurements]) -> dict[str, tuple[int, ...]]:
+    """Which files leave which effects free: each has values of its own."""
+    names = dict.fromkeys(name for part in parts for name in part.free)
+    return {name: tuple(k for k, part in enumerate(parts) if name in part.free) for name in names}
 
 
 def _check_alike(parts: Sequence[Measurements]) -> None:
@@ -100,9 +98,9 @@ def _commanded_in(data: Measurements) -> str:
     return "lengths as told" if data.told else "absolute lengths"
 
 
-def _short_names(paths: Sequence[Path]) -> list[str]:
+def _short_names(paths: Sequence[Path], least: int = 1) -> list[str]:
     """Names that tell files apart, with as many folders as that takes."""
-    for depth in range(1, max(len(path.parts) for path in paths) + 1):
+    for depth in range(least, max(len(path.parts) for path in paths) + 1):
         names = ["/".join(path.parts[-depth:]) for path in paths]
         if len(set(names)) == len(names):
             return names

@@ -14,9 +14,11 @@ import numpy as np
 import tomlkit
 
 from crosscheck.files import written
+from crosscheck.model.fitted import Fitted
+from crosscheck.model.own import Kept, kept, without_parts
 from seecr import __version__
 from seecr.cells import UNSEEN
-from seecr.effects import Knowledge, Term, Terms
+from seecr.effects import Knowledge, Terms
 from seecr.effects.base import Layout
 from seecr.fingerprint import fingerprint
 from seecr.model import Model
@@ -42,32 +44,6 @@ class Provenance:
     date: str
     version: str
     by: str
-
-
-@dataclass(frozen=True, eq=False)
-class Fitted:
-    """An effect as fitted.
-
-    Attributes:
-        term: with its values. stderr: (p,), inf where unseen. at_bound: (p,) bool.
-    """
-
-    term: Term
-    stderr: Array
-    at_bound: Any
-
-    def as_json(self) -> dict[str, Any]:
-        """Its parameters by name, in SI."""
-        layout = self.term.layout
-        return {
-            key: {
-                "value": float(self.term.vector[i]),
-                "stderr": float(self.stderr[i]),
-                "unit": layout.units[i],
-                "at_bound": bool(self.at_bound[i]),
-            }
-            for i, key in enumerate(layout.names)
-        }
 
 
 def provenance_of(data: Path, by: str) -> Provenance:
@@ -97,7 +73,7 @@ def with_fit(
         document.append("effect", tomlkit.aot())
     tables = {str(table["name"]): table for table in document["effect"]}
     order = [*model.names, *(name for name in added if name not in model.names)]
-    by_name = {f.term.name: f for f in fitted}
+    by_name = {one.usual.term.name: one for one in _kept(model, fitted)}
     for name in order:
         table = tables.get(name)
         if table is None:
@@ -106,11 +82,17 @@ def with_fit(
         _fill(table, by_name[name])
         if name in added:
             _describe(table, provenance, errors)
-        elif not by_name[name].term.knowledge.fixed.all():
+        elif not by_name[name].usual.term.knowledge.fixed.all():
             table["refitted"] = _plain(vars(provenance))
-    terms = Terms(by_name[name].term for name in order)
-    stderr = {name: np.asarray(by_name[name].stderr, float) for name in order}
-    return replace(model, terms=terms, stderr=stderr, document=document)
+    return _with_values(replace(model, document=document), [by_name[name].usual for name in order])
+
+
+def _with_values(model: Model, fitted: Sequence[Fitted]) -> Model:
+    return replace(
+        model,
+        terms=Terms(one.term for one in fitted),
+        stderr={one.term.name: np.asarray(one.stderr, float) for one in fitted},
+    )
 
 
 def calibrated(
@@ -133,27 +115,30 @@ def calibrated(
     if "effect" not in document:
         document.append("effect", tomlkit.aot())
     tables = {str(table["name"]): table for table in document["effect"]}
-    for one in fitted:
-        if one.term.name in tables:
-            _fill(tables[one.term.name], one)
+    every = _kept(model, fitted)
+    for one in every:
+        if one.usual.term.name in tables:
+            _fill(tables[one.usual.term.name], one)
         else:
             _appended(document, one)
     document.pop("calibration", None)
-    document["calibration"] = _together(fitted, covariance, provenance, errors)
-    return replace(
-        model,
-        terms=Terms(one.term for one in fitted),
-        stderr={one.term.name: np.asarray(one.stderr, float) for one in fitted},
-        document=document,
-    )
+    same = without_parts(fitted, covariance)
+    document["calibration"] = _together(*same, provenance, errors)
+    return _with_values(replace(model, document=document), [one.usual for one in every])
 
 
-def _appended(document: Any, fitted: Fitted) -> Any:
+def _kept(model: Model, fitted: Sequence[Fitted]) -> list[Kept]:
+    """What the model keeps of a fit."""
+    names = model.terms.names
+    return [kept(f, model.terms[f.term.name] if f.term.name in names else None) for f in fitted]
+
+
+def _appended(document: Any, one: Kept) -> Any:
     """A table for an effect that the document has not, at its end."""
-    table = tomlkit.table()
-    table["name"] = fitted.term.name
-    table["name"].comment(fitted.term.layout.effect.title)
-    _fill(table, fitted)
+    table, term = tomlkit.table(), one.usual.term
+    table["name"] = term.name
+    table["name"].comment(term.layout.effect.title)
+    _fill(table, one)
     document["effect"].append(table)
     table.trivia.indent = "\n"
     return table
@@ -165,10 +150,13 @@ def _together(
     """Where the values come from, what they are worth, and the correlations of their errors.
 
     The covariance is the correlation times the standard errors; a row ends at its diagonal.
+    Values of single files or runs go with nothing else elsewhere, and are not among them.
     """
     table = tomlkit.table()
     table.trivia.indent = "\n"
     _describe(table, provenance, errors)
+    if not fitted:
+        return table
     stderr = np.sqrt(np.diag(covariance))
     known = np.where(stderr > 0.0, stderr, np.inf)
     correlation = covariance / np.outer(known, known) + np.diag((stderr == 0.0).astype(float))
@@ -190,11 +178,24 @@ def _lines(items: Sequence[str]) -> Any:
     return tomlkit.parse(f"x = [\n{inside}]")["x"]
 
 
-def _fill(table: Any, fitted: Fitted) -> None:
+def _fill(table: Any, one: Kept) -> None:
+    """Values into an effect's table, and those of files or runs into theirs."""
+    own = one.usual.term.own
+    if own is not None:
+        table[f"per_{own.kind}"] = True
+    _fill_cells(_table_in(table, "parameters"), one.usual)
+    for name, part in one.parts.items():
+        _fill_cells(_table_in(_table_in(table, "of", is_super_table=True), name), part)
+
+
+def _table_in(table: Any, key: str, **how: bool) -> Any:
+    if not isinstance(table.get(key), Mapping):
+        table[key] = tomlkit.table(**how)
+    return table[key]
+
+
+def _fill_cells(parameters: Any, fitted: Fitted) -> None:
     layout = fitted.term.layout
-    if not isinstance(table.get("parameters"), Mapping):
-        table["parameters"] = tomlkit.table()
-    parameters = table["parameters"]
     for i, key in enumerate(layout.names):
         if key in parameters and fitted.term.knowledge.fixed[i]:
             continue  # stands as somebody wrote it

@@ -13,6 +13,7 @@ from crosscheck.diagnosis.steps import drawn, magnification, views_of
 from crosscheck.fit.problem import POSITION, Kind, Problem, kinds_read
 from crosscheck.fit.state import State
 from crosscheck.recording.axes import bounds, draw_axes
+from seecr.compiled.columns import REST
 from seecr.pose import Array, quat_from_rxyz, rxyz_from_quat
 from seecr.recording import colours, layout
 from seecr.recording.shapes import States
@@ -92,7 +93,7 @@ def states_of(state: State) -> States:
     """The model's platform and cables at every row; NaN where it has no equilibrium."""
     prediction = state.prediction
     pose = np.where(prediction.solved[:, None], prediction.pose, np.nan)
-    lengths = prediction.setup.rest_lengths()
+    lengths = prediction.tables.cables[..., REST]
     return States(pose, prediction.tensions, lengths, prediction.slack)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from rich.console import Console
 
 from crosscheck.calibration.result import Calibrated
-from crosscheck.model.write import Fitted
+from crosscheck.model.fitted import Fitted
 from crosscheck.terminal.lines import console_for, rms_table, say, table_of
 
 # A value this many standard errors from null is shown as sure.

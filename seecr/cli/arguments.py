@@ -125,7 +125,19 @@ def model_at(given: Path | None, robot: Robot) -> Model | None:
     """The model of a file, or none."""
     from seecr import load_model
 
-    return None if given is None else load_model(given, robot)
+    if given is None:
+        return None
+    model = load_model(given, robot)
+    return replace(model, notes=(*model.notes, *_usual(model)))
+
+
+def _usual(model: Model) -> list[str]:
+    """That values of no file or run in particular are used, where there are others."""
+    own = [(term.name, term.own.kind) for term in model.terms if term.own is not None]
+    return [
+        f"{name} has values of its own for each {kind}: those of no {kind} in particular are used"
+        for name, kind in own
+    ]
 
 
 def pose_of(coordinates: Sequence[float], robot: Robot) -> list[float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from seecr.effects.apart import Apart, ApartLayout, Own, Values, apart
 from seecr.effects.base import PLACES, Effect, Layout, Readings, layout_of, parameter
 from seecr.effects.knowledge import Knowledge
 from seecr.effects.registry import BUILT_IN, catalogue, effect_named
@@ -10,12 +11,17 @@ from seecr.effects.terms import Term, Terms
 __all__ = [
     "BUILT_IN",
     "PLACES",
+    "Apart",
+    "ApartLayout",
     "Effect",
     "Knowledge",
     "Layout",
+    "Own",
     "Readings",
     "Term",
     "Terms",
+    "Values",
+    "apart",
     "catalogue",
     "effect_named",
     "layout_of",

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seecr.effects.apart import Own
 from seecr.effects.base import Effect, Layout, layout_of
 from seecr.effects.knowledge import Knowledge
 from seecr.effects.registry import catalogue, effect_named
@@ -26,12 +27,14 @@ _FILLED_IN: Any = None
 class Term:
     """An effect with values: ``layout`` says which, ``vector`` (p,) how much.
 
-    ``knowledge`` says which values no fit may move and which were measured independently.
+    ``knowledge`` says which values no fit may move and which were measured independently; ``own``
+    has the values for files or runs that have their own, None where all have the same.
     """
 
     layout: Layout
     vector: Array
     knowledge: Knowledge = _FILLED_IN
+    own: Own | None = None
 
     def __post_init__(self) -> None:
         given: Any = self.knowledge

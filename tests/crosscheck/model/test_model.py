@@ -10,7 +10,8 @@ import pytest
 import tomlkit
 from made_data import COGIRO, term
 
-from crosscheck.model.write import Fitted, Provenance, renewed, save_model, with_fit
+from crosscheck.model.fitted import Fitted
+from crosscheck.model.write import Provenance, renewed, save_model, with_fit
 from seecr.errors import InputFileError
 from seecr.mjcf import load_robot
 from seecr.model import load_model, new_model

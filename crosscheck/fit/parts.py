@@ -1,0 +1,96 @@
+"""Effects with values of their own for each file or run, laid out for some data.
+
+A model keeps the values of the files or runs that it has seen. In a fit every file or run of the
+data has its own; those that the model has not seen begin where one of no file in particular is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.measurements.data import Measurements
+from seecr.effects import ApartLayout, Knowledge, Own, Term, Terms, Values, apart
+
+
+@dataclass(frozen=True, eq=False)
+class LaidOut:
+    """A model for some data.
+
+    Attributes:
+        terms: effects, those with values of their own laid out for the files or runs of the data.
+        fresh: effects, and files or runs that the model has no values for.
+        notes: what was taken from where.
+    """
+
+    terms: Terms
+    fresh: tuple[tuple[str, str], ...]
+    notes: tuple[str, ...]
+
+
+def laid_out(data: Measurements, terms: Terms) -> LaidOut:
+    """The model with its effects that have values of their own laid out for the data."""
+    out, fresh, notes = [], [], []
+    for term in terms:
+        if term.own is None or isinstance(term.layout, ApartLayout):
+            out.append(term)
+            continue
+        names = names_in(data, term.own.kind)
+        known = {name: _known(term.own, name) for name in names}
+        new = [name for name in names if known[name] is None]
+        out.append(_term(term, {name: known[name] or _unknown(term) for name in names}))
+        fresh += [(term.name, name) for name in new]
+        notes.append(_said(term.name, term.own.kind, [n for n in names if n not in new], new))
+    return LaidOut(Terms(out), tuple(fresh), tuple(notes))
+
+
+def names_in(data: Measurements, kind: str) -> tuple[str, ...]:
+    """Names of the files or runs, in the order of the data."""
+    return tuple(dict.fromkeys(data.parts[kind].tolist()))
+
+
+def groups_of(data: Measurements, terms: Terms) -> NDArray[np.int64] | None:
+    """(n,) number of the part each row is of, where effects have values of their own for parts."""
+    kinds = [term.layout.kind for term in terms if isinstance(term.layout, ApartLayout)]
+    if not kinds:
+        return None
+    _names, number = np.unique(data.parts["run" if "run" in kinds else "file"], return_inverse=True)
+    return np.asarray(number, np.int64)
+
+
+def _term(term: Term, values: dict[str, Values]) -> Term:
+    assert term.own is not None
+    layout = apart(term.layout, term.own.kind, tuple(values), term.vector)
+    vector = np.concatenate([one.vector for one in values.values()])
+    return Term(layout, vector, Knowledge.joined([v.knowledge for v in values.values()]), term.own)
+
+
+def _known(own: Own, name: str) -> Values | None:
+    """What the model has of a file or run; people may write its name without the folder."""
+    for written, values in own.values.items():
+        if name == written or name.endswith(f"/{written}"):
+            return values
+    return None
+
+
+def _unknown(term: Term) -> Values:
+    """One that the model has not seen: what it is measured to be elsewhere says nothing of it."""
+    count = len(term.layout)
+    knowledge = Knowledge.nothing(count)
+    fixed = Knowledge(term.knowledge.fixed, knowledge.value, knowledge.stderr)
+    return Values(term.vector, np.full(count, np.inf), fixed)
+
+
+def _said(effect: str, kind: str, known: Sequence[str], new: Sequence[str]) -> str:
+    words = [f"{_some(known)} as the model has them"] if known else []
+    if new:
+        words.append(f"{_some(new)} not known to the model, fitted to these data first")
+    return f"{effect} has values of its own for each {kind}: {'; '.join(words)}"
+
+
+def _some(names: Sequence[str], most: int = 4) -> str:
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more

@@ -1,0 +1,35 @@
+"""An effect as a fit left it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from seecr.effects import Term
+from seecr.pose import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """An effect as fitted.
+
+    Attributes:
+        term: with its values. stderr: (p,), inf where unseen. at_bound: (p,) bool.
+    """
+
+    term: Term
+    stderr: Array
+    at_bound: Any
+
+    def as_json(self) -> dict[str, Any]:
+        """Its parameters by name, in SI."""
+        layout = self.term.layout
+        return {
+            key: {
+                "value": float(self.term.vector[i]),
+                "stderr": float(self.stderr[i]),
+                "unit": layout.units[i],
+                "at_bound": bool(self.at_bound[i]),
+            }
+            for i, key in enumerate(layout.names)
+        }

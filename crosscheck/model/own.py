@@ -1,0 +1,78 @@
+"""Fitted values of each file or run, as a model keeps them: by their names, and what is usual."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from crosscheck.model.fitted import Fitted
+from seecr.effects import ApartLayout, Knowledge, Own, Term, Values
+from seecr.pose import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """An effect as a model keeps it.
+
+    Attributes:
+        usual: its values wherever it has none of its own, with these beside them.
+        parts: newly fitted values by the names that the model has for files or runs.
+    """
+
+    usual: Fitted
+    parts: Mapping[str, Fitted]
+
+
+def kept(one: Fitted, before: Term | None) -> Kept:
+    """What a model keeps of a fit.
+
+    A file or run of which nothing is known is expected to have the mean of the others, by as much
+    as these differ and are uncertain; by a plausible size where there is one alone.
+
+    Args:
+        one: the effect as fitted.
+        before: the same in the model as it was, if there.
+    """
+    term, layout = one.term, one.term.layout
+    if not isinstance(layout, ApartLayout):
+        return Kept(one, {})
+    values = dict(term.own.values) if term.own is not None else {}
+    parts = {}
+    for name in layout.parts:
+        written = next((w for w in values if name == w or name.endswith(f"/{w}")), name)
+        parts[written] = _part(one, layout, name)
+        fitted = parts[written]
+        values[written] = Values(fitted.term.vector, fitted.stderr, fitted.term.knowledge)
+    vector, stderr = _usual(layout, values)
+    knowledge = Knowledge.nothing(len(layout.base)) if before is None else before.knowledge
+    vector = np.where(knowledge.fixed | knowledge.measured, layout.rest, vector)
+    usual = Term(layout.base, vector, knowledge, Own(layout.kind, values))
+    return Kept(Fitted(usual, stderr, np.zeros(len(vector), dtype=bool)), parts)
+
+
+def _part(one: Fitted, layout: ApartLayout, name: str) -> Fitted:
+    where, known = layout.part(name), one.term.knowledge
+    knowledge = Knowledge(known.fixed[where], known.value[where], known.stderr[where])
+    term = Term(layout.base, one.term.vector[where], knowledge)
+    return Fitted(term, one.stderr[where], one.at_bound[where])
+
+
+def _usual(layout: ApartLayout, values: Mapping[str, Values]) -> tuple[Array, Array]:
+    """Mean of the values and by how much they differ, (p,) each."""
+    every = np.array([one.vector for one in values.values()])
+    if len(every) < 2:
+        return every[0], layout.base.scale.copy()
+    own = np.array([np.where(np.isfinite(one.stderr), one.stderr, 0.0) for one in values.values()])
+    return every.mean(axis=0), np.hypot(every.std(axis=0, ddof=1), np.sqrt((own**2).mean(axis=0)))
+
+
+def without_parts(fitted: Sequence[Fitted], covariance: Array) -> tuple[list[Fitted], Array]:
+    """The effects that are the same everywhere, and the covariance of theirs."""
+    same = [not isinstance(one.term.layout, ApartLayout) for one in fitted]
+    own = np.repeat(same, [len(one.term.layout) for one in fitted])
+    return (
+        [one for one, yes in zip(fitted, same, strict=True) if yes],
+        covariance[np.ix_(own, own)],
+    )
