@@ -47,6 +47,7 @@ class Prediction(Result):
         tables, found: of the rows asked for.
         readings: what would be read.
         has_history: whether rows depend on the rows before.
+        sensors: effects that edit the readings.
         solved: (n,) bool, a stable equilibrium was found.
     """
 
@@ -55,6 +56,7 @@ class Prediction(Result):
     found: statics.Evaluation
     readings: Readings
     has_history: bool
+    sensors: tuple[Effect, ...] = ()
     kept: dict[str, Array] = field(default_factory=dict, repr=False)
 
     @property
@@ -168,7 +170,8 @@ class Experiment:
             return self._predict_path(effects)
         start = None if near is None or near.has_history else near.found
         tables, found = self._solve(setup, start)
-        return Prediction(setup, tables, found, self._read(effects, setup, tables, found), False)
+        readings = self._read(effects, setup, tables, found)
+        return Prediction(setup, tables, found, readings, False, sensors_among(effects))
 
     def from_other_starts(
         self, effects: Sequence[Effect], at: Prediction, rows: NDArray[np.intp], poses: Array
@@ -183,7 +186,7 @@ class Experiment:
         found = statics.take_evaluation(at.found, np.arange(len(at.found.outcome)))
         statics.put_evaluation(found, rows, again)
         readings = self._read(effects, at.setup, at.tables, found)
-        return Prediction(at.setup, at.tables, found, readings, at.has_history)
+        return Prediction(at.setup, at.tables, found, readings, at.has_history, at.sensors)
 
     def _solve(
         self, setup: Setup, start: statics.Evaluation | None
@@ -215,7 +218,8 @@ class Experiment:
             later = (np.arange(len(found.outcome)) >= k) & (run[path.rows] == run[path.rows[k]])
             found.outcome[later & (found.outcome == CONVERGED)] = STALLED
         own = self.setup(effects)
-        return Prediction(own, rows, found, self._read(effects, own, rows, found), True)
+        readings = self._read(effects, own, rows, found)
+        return Prediction(own, rows, found, readings, True, sensors_among(effects))
 
     @staticmethod
     def _read(
@@ -262,10 +266,14 @@ def effects_of(model: GivenEffects) -> list[Effect]:
 def read(effects: Sequence[Effect], setup: Setup, poses: Array, tensions: Array) -> Readings:
     """What the sensors report of poses (n, 7) and tensions (n, m)."""
     readings = Readings(poses[:, :3].copy(), poses[:, 3:].copy(), tensions.copy())
-    for effect in effects:
-        if senses(type(effect)):
-            edit_readings(effect, readings, setup)
+    for effect in sensors_among(effects):
+        edit_readings(effect, readings, setup)
     return readings
+
+
+def sensors_among(effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    """The effects that edit readings."""
+    return tuple(effect for effect in effects if senses(type(effect)))
 
 
 def senses(effect: type[Effect]) -> bool:

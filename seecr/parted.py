@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from seecr import statics
 from seecr.effects import Apart, ApartLayout, Term, Terms
 from seecr.effects.base import Effect, Readings
-from seecr.experiment import Experiment, Prediction
+from seecr.experiment import Experiment, Prediction, sensors_among
 from seecr.pose import Array
-from seecr.sensitivity import sensitivities
+from seecr.sensitivity import read_by_length, sensitivities
 from seecr.tables import Tables
 
 
@@ -57,9 +57,10 @@ class Part:
 
 @dataclass(eq=False, repr=False)
 class PartedPrediction(Prediction):
-    """A prediction whose ``parts`` were solved each for itself."""
+    """A prediction whose ``parts`` were solved each for itself; ``rows`` has those of each."""
 
     parts: tuple[Prediction, ...] = ()
+    rows: tuple[NDArray[np.intp], ...] = ()
 
 
 @dataclass(eq=False)
@@ -144,8 +145,9 @@ class Parted(Experiment):
         )
         history = any(one.has_history for one in found)
         return PartedPrediction(
-            self.setup(effects), tables, whole, readings, history, parts=tuple(found)
-        )
+            self.setup(effects), tables, whole, readings, history, sensors_among(effects),
+            parts=tuple(found), rows=tuple(part.rows for part in parts),
+        )  # fmt: skip
 
 
 def _tables(parts: Sequence[Tables], order: NDArray[np.intp]) -> Tables:
@@ -159,6 +161,17 @@ def _tables(parts: Sequence[Tables], order: NDArray[np.intp]) -> Tables:
         rows("cables"), rows("load"), rows("poses"), rows("screws"),
         first.length, rows("scale"), rows("reach"), first.n_dof,
     )  # fmt: skip
+
+
+def rates_by_length(at: Prediction) -> Array:
+    """As :func:`seecr.sensitivity.read_by_length`, part by part where effects are taken apart."""
+    if not isinstance(at, PartedPrediction):
+        return read_by_length(at)
+    n, m = at.tensions.shape
+    out = np.empty((n, 6 + m, m))
+    for rows, part in zip(at.rows, at.parts, strict=True):
+        out[rows] = read_by_length(part)
+    return out
 
 
 def rates(

@@ -75,6 +75,46 @@ def length_sensitivities(at: Prediction) -> Array:
     )
 
 
+def read_by_length(at: Prediction) -> Array:
+    """Derivative of what the sensors read by each cable's rest length, (n, 6 + m, m)."""
+    change = length_sensitivities(at)
+    return rates_of_reading(at, at.sensors) @ change if _alters(at) else change
+
+
+def _alters(at: Prediction) -> bool:
+    """Whether the sensors report anything else than what is there."""
+    read, pose = at.readings, at.pose
+    there = (pose[:, :3], pose[:, 3:], at.tensions)
+    seen = (read.position, read.quat_wxyz, read.tensions)
+    return bool(at.sensors) and not all(map(np.array_equal, seen, there))
+
+
+def rates_of_reading(at: Prediction, sensors: Sequence[Effect]) -> Array:
+    """Derivative of the readings by pose and tensions, (n, 6 + m, 6 + m)."""
+    step = np.full(_shape(at)[1], _READ)
+    step[:3] *= at.tables.length
+    step[6:] *= max(1.0, float(np.max(np.abs(at.tensions))))
+    each = np.diag(step)
+    # our own sensors look at a row's readings alone: all steps are rows of one batch
+    together = all(is_built_in(type(effect)) for effect in sensors)
+    parts = [each] if together else [one[None] for one in each]
+    rates = np.concatenate([_read_apart(at, sensors, part) for part in parts], axis=2)
+    return np.asarray(rates / step)
+
+
+def _read_apart(at: Prediction, sensors: Sequence[Effect], steps: Array) -> Array:
+    """Half of what steps (k, 6 + m) ahead and back change of the readings, (n, 6 + m, k)."""
+    n, width = _shape(at)
+    k = len(steps)
+    change = np.repeat(steps, n, axis=0)
+    pose, tensions = np.tile(at.pose, (k, 1)), np.tile(at.tensions, (k, 1))
+    ahead, behind = (
+        read(sensors, at.setup, pose_add(pose, s * change[:, :6]), tensions + s * change[:, 6:])
+        for s in (1.0, -1.0)
+    )
+    return np.moveaxis(0.5 * readings_difference(ahead, behind).reshape(k, n, width), 0, 2)
+
+
 def _shape(at: Prediction) -> tuple[int, int]:
     n, m = at.tables.cables.shape[:2]
     return n, 6 + m
@@ -97,31 +137,7 @@ class _ByWrench:
     def read_rates(self) -> Array:
         """Derivative of the readings by pose and tensions, (n, 6 + m, 6 + m)."""
         own = [(t.name, *t.vector.tolist()) for t in self.terms if senses(t.layout.effect)]
-        return _kept(self.at, f"read_rates {own}", self._read_rates)
-
-    def _read_rates(self, at: Prediction) -> Array:
-        step = np.full(_shape(at)[1], _READ)
-        step[:3] *= at.tables.length
-        step[6:] *= max(1.0, float(np.max(np.abs(at.tensions))))
-        each = np.diag(step)
-        # our own sensors look at a row's readings alone: all steps are rows of one batch
-        together = all(is_built_in(type(effect)) for effect in self.sensing)
-        parts = [each] if together else [one[None] for one in each]
-        rates = np.concatenate([self._differences(at, part) for part in parts], axis=2)
-        return np.asarray(rates / step)
-
-    def _differences(self, at: Prediction, steps: Array) -> Array:
-        """Half of what steps (k, 6 + m) ahead and back change of the readings, (n, 6 + m, k)."""
-        n, width = _shape(at)
-        k = len(steps)
-        change = np.repeat(steps, n, axis=0)
-        pose, tensions = np.tile(at.pose, (k, 1)), np.tile(at.tensions, (k, 1))
-        ahead, behind = (
-            read(self.sensing, at.setup, pose_add(pose, s * change[:, :6]),
-                 tensions + s * change[:, 6:])
-            for s in (1.0, -1.0)
-        )  # fmt: skip
-        return np.moveaxis(0.5 * readings_difference(ahead, behind).reshape(k, n, width), 0, 2)
+        return _kept(self.at, f"read_rates {own}", lambda at: rates_of_reading(at, self.sensing))
 
     @property
     def inverse(self) -> Array:

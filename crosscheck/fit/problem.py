@@ -23,7 +23,7 @@ from crosscheck.units import in_unit
 from seecr.effects import catalogue
 from seecr.effects.base import Readings
 from seecr.experiment import Experiment, Prediction
-from seecr.parted import Parted
+from seecr.parted import Parted, rates_by_length
 from seecr.pose import (
     Array,
     quat_conjugate,
@@ -32,7 +32,6 @@ from seecr.pose import (
     rxyz_from_quat,
 )
 from seecr.robot import Robot
-from seecr.sensitivity import length_sensitivities
 
 # Columns of a residual row: position, orientation, then tensions.
 POSITION, ORIENTATION, TENSION = slice(0, 3), slice(3, 6), slice(6, None)
@@ -166,7 +165,7 @@ class Problem:
 
     def by_length(self, at: Prediction) -> Array:
         """Derivative of what was read by the rest lengths, (n, 6 + m, m)."""
-        return self.as_read(length_sensitivities(at), at.readings)
+        return self.as_read(rates_by_length(at), at.readings)
 
     def noise(self, at: Prediction) -> Array:
         """Cholesky factors of each row's noise, (n, 6 + m, 6 + m); 1 where nothing was read."""

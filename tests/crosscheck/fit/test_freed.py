@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from made_data import measured, soft_cogiro, term
 
 import crosscheck
+from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.together import together
 from crosscheck.measurements.write import write_measurements
 from seecr.effects import Terms
 from seecr.errors import InputFileError
+from seecr.experiment import Experiment
 
 ROBOT = soft_cogiro()
 FAR = {"shift_x_m": 0.4, "shift_z_m": -0.2, "rotation_z_rad": 0.7, "rotation_x_rad": 0.1}
@@ -71,3 +74,21 @@ def test_only_sensors_can_be_free(tmp_path, said):
     expected = "a.toml: line 1: free must be a list of some of tracker_frame"
     with pytest.raises(InputFileError, match=expected):
         crosscheck.load_measurements(tmp_path / "a.csv", ROBOT)
+
+
+def test_noise_of_lengths_is_read_through_the_tracker():
+    """Where the tracker stands turned, so does what noisy lengths do to the pose."""
+    sigma = Sigma(position_m=2e-5, orientation_rad=3e-4, length_m=2e-4)
+    frame = term(ROBOT, "tracker_frame", rotation_z_rad=1.6)
+    plain = measured(ROBOT, [frame], points=6, sigma=sigma)
+    random = np.random.default_rng(3)
+    errors = sigma.length_m * random.standard_normal((plain.n_rows, 8))
+    experiment = Experiment(ROBOT, plain.as_commands(ROBOT), errors)
+    read = experiment.predict([frame.effect()]).readings
+    data = replace(
+        plain,
+        position=read.position + sigma.position_m * random.standard_normal((plain.n_rows, 3)),
+        quat_wxyz=read.quat_wxyz,
+    )
+    state = crosscheck.compare(ROBOT, data, [frame]).state
+    assert state.chi2 / len(state.white) == pytest.approx(0.9, abs=0.25)  # 2.2 unturned
