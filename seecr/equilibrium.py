@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seecr.commands import Commands
+from seecr.counted import counted
 from seecr.effects.checked import edit_setup
 from seecr.errors import InputError
 from seecr.experiment import Experiment, GivenEffects, effects_of
@@ -97,7 +98,7 @@ def solve(
     if start is not None:
         starts = commanded_poses(start, "start")
         if len(starts) != len(commands):
-            raise InputError(f"start must have {len(commands)} poses, got {len(starts)}")
+            raise InputError(f"start must have {counted(len(commands), 'pose')}, got {len(starts)}")
     pushes = np.broadcast_to(np.zeros(6) if pushed is None else pushed, (len(commands), 6))
     if follow:
         if method != "newton" or start is not None:
@@ -138,7 +139,7 @@ def _commands(
     start = robot.reference_pose[None] if poses is None else commanded_poses(poses)
     if len(start) not in (1, len(table)):
         raise InputError(
-            f"poses must be one or as many as the {len(table)} rows of rest_lengths, "
+            f"poses must be one or as many as the {counted(len(table), 'row')} of rest_lengths, "
             f"got {len(start)}"
         )
     rows = np.broadcast_to(start, (len(table), 7)).copy()

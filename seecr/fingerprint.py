@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import tomlkit
 
+from seecr.counted import counted
 from seecr.errors import InputFileError
 
 if TYPE_CHECKING:
@@ -95,7 +96,8 @@ def _check_cables(path: Path, table: Mapping[str, Any], robot: Robot) -> None:
     if len(cables) != robot.n_cables:
         raise InputFileError.at(
             path,
-            f"made for another robot: {table.get('name', 'one')} with {len(cables)} cables; "
+            f"made for another robot: {table.get('name', 'one')} with "
+            f"{counted(len(cables), 'cable')}; "
             f"{robot.name} has {robot.n_cables}",
         )
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seecr.commands import Commands
+from seecr.counted import between, counted
 from seecr.distribution import tension_limits, wanted_tensions
 from seecr.effects.base import Effect
 from seecr.errors import InputError
@@ -77,14 +78,14 @@ class Correction(Result):
         """How many poses are reached, what is left, and what cannot be held."""
         n, left = len(self.wanted), self.left
         at, lost = self.reached, ~self.held
-        out = [f"{self.robot.name}: {int(at.sum())} of {n} poses reached"]
+        out = [f"{self.robot.name}: {int(at.sum())} of {counted(n, 'pose')} reached"]
         if np.any(at):
             out.append(
                 f"left there: {1e3 * np.linalg.norm(left[at, :3], axis=1).max():.2g} mm and "
                 f"{np.degrees(np.linalg.norm(left[at, 3:], axis=1).max()):.2g} deg at most"
             )
             pulls = self.solution.tensions[at]
-            out.append(f"tensions there from {pulls.min():.4g} to {pulls.max():.4g} N")
+            out.append(f"tensions there {between(pulls.min(), pulls.max())} N")
         near = lost & self.found
         if np.any(lost):
             out.append(
@@ -170,7 +171,7 @@ def correct(
     low, high = tension_limits(robot, lowest, highest)
     target = wanted_tensions(aim, low, high)
     if target.ndim == 2 and len(target) != len(given):
-        raise InputError(f"aim must have {len(given)} rows, got {len(target)}")
+        raise InputError(f"aim must have {counted(len(given), 'row')}, got {len(target)}")
     limits = _Limits(np.broadcast_to(target, (len(given), robot.n_cables)), low, high)
     return _Search(robot, given, effects_of(effects), limits).run(prefer == "position")
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seecr.chances import asked_chance, margins_with
+from seecr.counted import counted
 from seecr.equilibrium import solve
 from seecr.errors import InputError
 from seecr.experiment import GivenEffects, effects_of
@@ -101,7 +102,9 @@ class Workspace(Result):
     def lines(self) -> list[str]:
         """How much of the grid can be held, and how far off the elastic robot is there."""
         n, held = self.margin.size, int(self.feasible.sum())
-        out = [f"{self.robot.name}: {held} of {n} poses can be held{self.size_words(held)}"]
+        out = [
+            f"{self.robot.name}: {held} of {counted(n, 'pose')} can be held{self.size_words(held)}"
+        ]
         tightest = self.margin[self.feasible & np.isfinite(self.margin)]
         if len(tightest) and tightest.max() > 0:
             half = np.median(tightest)
@@ -113,7 +116,7 @@ class Workspace(Result):
             counts = self.slack[rests]
             parts = [f"{k} at {int(np.sum(counts == k))}" for k in np.unique(counts)]
             out.append(
-                f"elastic: at rest at {int(rests.sum())} of {n} commands; "
+                f"elastic: at rest at {int(rests.sum())} of {counted(n, 'command')}; "
                 f"slack cables: {', '.join(parts)}"
             )
             where = rests & self.feasible

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from seecr.counted import counted
 from seecr.errors import RobotError
 from seecr.files import no_text, read_bytes
 from seecr.pose import Array, quat_rotate, quat_to_matrix
@@ -261,8 +262,8 @@ def _cable_sites(
     wraps = slice(first, first + count)
     if count != 2 or np.any(model.wrap_type[wraps] != int(mujoco.mjtWrap.mjWRAP_SITE)):
         raise RobotError(
-            f"{path}: tendon {name} has {count} path elements or something that is no site; "
-            "expected exactly two sites, exit point and anchor point"
+            f"{path}: tendon {name} has {counted(count, 'path element')} or something that is no "
+            "site; expected exactly two sites, exit point and anchor point"
         )
     sites = [int(s) for s in model.wrap_objid[wraps]]
     on_body = [int(model.site_bodyid[s]) == body for s in sites]

@@ -39,6 +39,7 @@ from tomlkit import TOMLDocument
 from tomlkit.exceptions import TOMLKitError
 
 from seecr.cells import Where, term_of
+from seecr.counted import counted
 from seecr.effects import Term, Terms, catalogue
 from seecr.errors import InputFileError
 from seecr.files import read_text
@@ -86,7 +87,7 @@ class Model(Result):
         """Whose model it is, and the effects with their first few values."""
         table = self.document.get("robot")
         robot = table.get("name", "a robot") if isinstance(table, Mapping) else "a robot"
-        count = f"{len(self.names)} effect{'' if len(self.names) == 1 else 's'}"
+        count = counted(len(self.names), "effect")
         return [
             f"model of {robot}: plain SEECR and {count}" if self.names else
             f"model of {robot}: plain SEECR, no effects",

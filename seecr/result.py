@@ -10,6 +10,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from seecr.counted import counted
 from seecr.errors import MissingPackageError
 
 # Rows of the table in a notebook; all of them are in the data frame.
@@ -80,7 +81,9 @@ def _table(records: Sequence[Record]) -> str:
     heads = "".join(f"<th>{escape(name)}</th>" for name in records[0])
     rows = "".join(f"<tr>{_cells(record)}</tr>" for record in islice(records, _MOST_ROWS))
     more = len(records) - _MOST_ROWS
-    rest = f"<div>and {more} more rows: to_frame() has them all</div>" if more > 0 else ""
+    rest = (
+        f"<div>and {counted(more, 'more row')}: to_frame() has them all</div>" if more > 0 else ""
+    )
     return f"<table><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table>{rest}"
 
 

@@ -23,6 +23,7 @@ from seecr.compiled.outcomes import (
     TOLERANCE,
     UNSTABLE,
 )
+from seecr.counted import between, counted
 from seecr.inertia import mass_matrices
 from seecr.pose import Array, rotvec_from_quat
 from seecr.result import COORDINATES, Record, Result, named
@@ -204,7 +205,8 @@ class Solution(Result):
 
     def lines(self) -> list[str]:
         """How many poses came to rest, how far from their commands, and the cables' tensions."""
-        out = [f"{self.robot.name}: {int(self.converged.sum())} of {len(self)} poses at rest"]
+        there = f"{int(self.converged.sum())} of {counted(len(self), 'pose')}"
+        out = [f"{self.robot.name}: {there} at rest"]
         for status in dict.fromkeys(self.status):
             if status is not Status.CONVERGED:
                 rows = np.flatnonzero(self.status == status)
@@ -221,8 +223,8 @@ class Solution(Result):
         )
         pulls, slack = self.tensions[known], self.slack[known].sum(axis=1)
         out.append(
-            f"tensions from {pulls.min():.4g} to {pulls.max():.4g} N; slack cables: "
-            f"{slack.min()} to {slack.max()} of {self.robot.n_cables}"
+            f"tensions {between(pulls.min(), pulls.max())} N; slack cables: "
+            f"{between(slack.min(), slack.max(), 'd')} of {self.robot.n_cables}"
         )
         worst = float(np.max(self.residual[known]))
         return [*out, f"forces balance to {worst:.1g} of the load or better"]

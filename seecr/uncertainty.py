@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from seecr.cells import Where
 from seecr.commands import Commands
+from seecr.counted import counted
 from seecr.effects import Terms
 from seecr.experiment import Experiment, senses
 from seecr.files import read_text
@@ -96,8 +97,8 @@ def _correlations(model: Model, names: list[str], rows: object) -> Array:
         fine = False
     if not fine:
         raise _file_of(model).error(
-            f"correlation: expected {len(names)} rows of numbers, one for each of parameters, each "
-            "up to its diagonal, which is 1; calibrate the model again",
+            f"correlation: expected {counted(len(names), 'row')} of numbers, one for each of "
+            "parameters, each up to its diagonal, which is 1; calibrate the model again",
             key="correlation",
         )
     return out

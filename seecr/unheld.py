@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from seecr.counted import counted
 from seecr.pose import Array
 
 # What is let go by less than this part of the load is rounding.
@@ -34,8 +35,12 @@ def why_not_held(matrix: Array, load: Array, low: Array, high: Array, names: Seq
     if not order:
         return "held only just: the tensions are at their limits"
     said = [_of_cable(names[k], beyond[k], low[k], high[k]) for k in order[:_MOST]]
-    more = f" and {len(order) - _MOST} more cables are beyond their limits" * (len(order) > _MOST)
-    return "; ".join(said) + more
+    more = len(order) - _MOST
+    if more > 0:
+        said[-1] += (
+            f" and {counted(more, 'more cable')} {'is' if more == 1 else 'are'} beyond limits"
+        )
+    return "; ".join(said)
 
 
 def _of_cable(name: str, beyond: float, low: float, high: float) -> str:

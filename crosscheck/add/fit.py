@@ -121,9 +121,7 @@ def _added(
     progress("looking for outliers", 0.4)
     outliers = outlying_rows(problem, best.state)
     if outliers.any():
-        lines = data.places(outliers)
-        word = "line" if outliers.sum() == 1 else "lines"
-        words = f"{word} {lines} left out: outliers, far off the others"
+        words = f"{data.lines_of(outliers)} left out: outliers, far off the others"
         notes.append(words)
         problem = problem.without(outliers, words)
         best = fitter(problem, terms, factor)

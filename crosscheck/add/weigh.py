@@ -20,6 +20,7 @@ from crosscheck.fit.problem import Problem, rms_by_kind
 from crosscheck.fit.state import evaluate
 from crosscheck.fit.systematic import moved_by_others
 from crosscheck.model.fitted import Fitted
+from seecr.counted import counted
 from seecr.effects import Terms
 from seecr.pose import Array
 from seecr.robot import Robot
@@ -107,7 +108,7 @@ def _refuse_unsettled(problem: Problem, names: Sequence[str], best: Fit, held: H
         return
     why = "ended in a hollow: runs left out are predicted better than it fits them"
     if not best.settled:
-        why = f"did not come to an end in {best.iterations} steps"
+        why = f"did not come to an end in {counted(best.iterations, 'step')}"
     raise UnsolvedError(
         f"{problem.data.path}: the fit of {' + '.join(names)} {why}; nothing was added: look for "
         "what else is missing with crosscheck diagnose, or fix values that are known in the model"

@@ -18,6 +18,7 @@ from crosscheck.fit.words import fitted_lines, fitted_records, rms_words
 from crosscheck.given import GivenModel, GivenRobot, considered, model_of, robot_of
 from crosscheck.measurements.read import GivenData, measurements_of
 from crosscheck.model.fitted import Fitted
+from seecr.counted import counted, plural
 from seecr.effects import Terms
 from seecr.pose import Array
 from seecr.result import Record, Result
@@ -78,13 +79,14 @@ class Calibrated(Result):
             for name in self.scale
         ]
         if self.outliers:
-            out.append(f"hardly counted, far off: lines {', '.join(map(str, self.outliers))}")
+            lines = ", ".join(map(str, self.outliers))
+            out.append(f"hardly counted, far off: {plural(len(self.outliers), 'line')} {lines}")
         return out
 
     def lines(self) -> list[str]:
         """Errors before and after, the noise, and how many values there are."""
         out = [
-            f"{len(self.labels)} parameters of {len(self.fitted)} effects: "
+            f"{counted(len(self.labels), 'parameter')} of {counted(len(self.fitted), 'effect')}: "
             f"{rms_words(self.before)} before, {rms_words(self.after)} after, "
             f"{rms_words(self.held_out)} on runs left out (refitted linearly)",
             *self.noise_lines(),

@@ -134,10 +134,11 @@ def _shipped(seed: int, patterns: Sequence[str]) -> list[Case | EffectCase]:
 
 def _list(chosen: list[Case | EffectCase]) -> None:
     from crosscheck.suite import Case
+    from seecr.counted import counted
 
     width = max(len(case.name) for case in chosen)
     for case in chosen:
-        what = f"{len(case.poses):4d} poses" if isinstance(case, Case) else "    effect"
+        what = counted(len(case.poses), "pose", "4d") if isinstance(case, Case) else "    effect"
         click.echo(f"{case.name:{width}s} {what}  {case.model}")
 
 

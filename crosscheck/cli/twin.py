@@ -123,6 +123,7 @@ def _tell(twin: Twin, out: Path, made: Made | None) -> None:
     """What was made, as JSON where it is told how it was made."""
     from crosscheck.files import json_text
     from crosscheck.twin import FILES
+    from seecr.counted import counted
 
     files = list(FILES)
     for note in twin.notes:
@@ -133,7 +134,8 @@ def _tell(twin: Twin, out: Path, made: Made | None) -> None:
         return
     sigma = twin.answer.sigma
     click.echo(
-        f"{twin.measured.n_rows} rows of {twin.robot.name} in {len(twin.measured.runs)} runs; "
+        f"{counted(twin.measured.n_rows, 'row')} of {twin.robot.name} in "
+        f"{counted(len(twin.measured.runs), 'run')}; "
         f"noise {1e3 * sigma['position_m']:.3g} mm, "
         f"{57.29577951 * sigma['orientation_rad']:.2g} deg"
     )

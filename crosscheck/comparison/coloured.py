@@ -20,6 +20,7 @@ from crosscheck.calibration.robust import outliers, row_weights
 from crosscheck.calibration.strange import is_strange
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.state import State
+from seecr.counted import counted
 from seecr.effects import Terms
 from seecr.pose import Array
 
@@ -49,7 +50,7 @@ class Coloured:
             + (f" and correlated by {rho:.2f} from row to row" if rho > 0.05 else "")
             for name, rho in self.rho.items()
         )
-        return sizes + (f"; {self.outliers} rows far off" if self.outliers else "")
+        return sizes + (f"; {counted(self.outliers, 'row')} far off" if self.outliers else "")
 
 
 def coloured_noise(

@@ -84,9 +84,7 @@ def _outliers(problem: Problem, state: State) -> list[str]:
     rows = outlying_rows(problem, state)
     if not rows.any():
         return []
-    lines = problem.data.places(rows)
-    word = "line" if rows.sum() == 1 else "lines"
-    return [f"{word} {lines}: far off all the others, outliers? (counted)"]
+    return [f"{problem.data.lines_of(rows)}: far off all the others, outliers? (counted)"]
 
 
 def _coordinates(problem: Problem, state: State) -> Iterator[Coordinate]:

@@ -20,6 +20,7 @@ from crosscheck.fit.problem import BY_NAME, KINDS, Problem, Rms
 from crosscheck.fit.reasons import Refusal
 from crosscheck.fit.state import State
 from crosscheck.units import short
+from seecr.counted import counted
 from seecr.effects import Terms
 from seecr.pose import Array
 from seecr.result import Record, Result
@@ -220,7 +221,8 @@ class Comparison(Result):
             for kind in KINDS
             if (value := self.rms[kind.key]) is not None
         ]
-        head = f"{data.path.name}: {int(self.problem.use.sum())} of {data.n_rows} rows compared"
+        rows = f"{int(self.problem.use.sum())} of {counted(data.n_rows, 'row')}"
+        head = f"{data.path.name}: {rows} compared"
         return [head, *sizes, self.sentence]
 
     def records(self) -> list[Record]:

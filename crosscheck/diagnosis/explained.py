@@ -109,8 +109,8 @@ def _noise_notes(sought: Sought, chances: Chances) -> list[str]:
             out.append(f"noise of the {name}: {scale:.2f} times the assumed one{alike}")
     rows = sought.calibration.outliers
     if rows.any():
-        lines = sought.calibration.setting.problem.data.places(rows)
-        out.append(f"hardly counted, far from all the others: lines {lines}")
+        lines = sought.calibration.setting.problem.data.lines_of(rows)
+        out.append(f"hardly counted, far from all the others: {lines}")
     return out
 
 

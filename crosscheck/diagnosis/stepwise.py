@@ -52,9 +52,7 @@ def _without_outliers(found: Search, base: Fit, progress: Progress) -> tuple[Sea
     rows = outlying_rows(problem, state)
     if not rows.any():
         return found, ()
-    lines = problem.data.places(rows)
-    word = "line" if rows.sum() == 1 else "lines"
-    note = f"{word} {lines} left out: outliers, far from all the others"
+    note = f"{problem.data.lines_of(rows)} left out: outliers, far from all the others"
     cleaned = problem.without(rows, note)
     kept = ~rows[problem.row_of]
     if whiteness(cleaned, state.white[kept], found.last.evidence.parameters).structured:

@@ -19,7 +19,7 @@ from crosscheck.diagnosis.listed import diagnosis_of, missing_of, not_listed
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
 from crosscheck.diagnosis.search import Search
 from crosscheck.diagnosis.small import is_plausible, share_of, small_effects_alone
-from crosscheck.diagnosis.words import and_what_is_left, words_of
+from crosscheck.diagnosis.words import and_what_is_left, none_of, words_of
 from crosscheck.fit.prepare import noise_floor
 from crosscheck.fit.problem import rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict
@@ -78,10 +78,7 @@ def _is_warranted(found: Search, name: str) -> bool:
 
 def _sentence(missing: Sequence[MissingEffect], tried: int) -> str:
     if not missing:
-        return (
-            f"Structure remains that none of {tried} effects tried explains: an effect that is "
-            "not in the catalogue."
-        )
+        return f"Structure remains that {none_of(tried)}: an effect that is not in the catalogue."
     left = "structure remains that no known effect explains"
     return and_what_is_left(words_of(missing), left, tried)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from crosscheck.diagnosis.result import MissingEffect
+from seecr.counted import counted
 
 
 def words_of(missing: Sequence[MissingEffect]) -> str:
@@ -15,7 +16,11 @@ def words_of(missing: Sequence[MissingEffect]) -> str:
 def and_what_is_left(text: str, left: str, tried: int) -> str:
     """A sentence that says what was added, what is left then, and how many effects were tried."""
     text = f"{text}; {left}"
-    return text[0].upper() + text[1:] + f". {tried} effects were tried."
+    return (
+        text[0].upper()
+        + text[1:]
+        + f". {counted(tried, 'effect')} {'was' if tried == 1 else 'were'} tried."
+    )
 
 
 def agreement(tried: int, hints: Mapping[str, float] | None = None) -> str:
@@ -26,15 +31,19 @@ def agreement(tried: int, hints: Mapping[str, float] | None = None) -> str:
         hints: effects that explain a little, with their probabilities.
     """
     if not hints:
-        return (
-            f"Model and data agree: what is left is noise, and none of {tried} effects tried "
-            "explains any of it."
-        )
+        return f"Model and data agree: what is left is noise, and {none_of(tried)} any of it."
     some = ", ".join(f"{name} ({probability_words(p)})" for name, p in hints.items())
     return (
-        f"Model and data agree: what is left is noise; of {tried} effects tried there is a hint of "
-        f"{some}, too weak to be sure."
+        f"Model and data agree: what is left is noise; of {counted(tried, 'effect')} tried "
+        f"there is a hint of {some}, too weak to be sure."
     )
+
+
+def none_of(tried: int) -> str:
+    """That no effect that was tried explains something, whose name follows."""
+    if tried == 1:
+        return "the one effect tried does not explain"
+    return f"none of {tried} effects tried explains"
 
 
 def _words_of(effect: MissingEffect) -> str:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from crosscheck.fit.gauss_newton import Fit, fit
 from crosscheck.fit.problem import Problem, rms_by_kind
+from seecr.counted import counted
 from seecr.pose import Array
 
 # Fewer runs than this are cut into blocks of time.
@@ -70,9 +71,9 @@ def blocks_note(problem: Problem) -> str:
     if _enough_runs(problem):
         return ""
     runs = len(_runs(problem))
-    word = "a single run" if runs == 1 else f"only {runs} runs"
-    count = _count(problem)
-    return f"{word}: cross-validation leaves out {count} blocks of time instead of runs"
+    word = "a single run" if runs == 1 else f"only {counted(runs, 'run')}"
+    blocks = counted(_count(problem), "block")
+    return f"{word}: cross-validation leaves out {blocks} of time instead of runs"
 
 
 def _runs(problem: Problem) -> NDArray[np.int64]:

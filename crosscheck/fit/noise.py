@@ -17,6 +17,8 @@ STRUCTURED = 4.0
 POOR_FIT = 1e-3
 # Fewer pairs than this say nothing of how rows go together.
 _LEAST_PAIRS = 8
+# A third difference takes so many rows.
+_ROWS = 4
 # Robot's lengths by which commands under different loads are taken to be apart.
 _APART = 1e3
 # From so many standard errors on chances add up, and P is too close to one for doubles.
@@ -175,28 +177,43 @@ def estimate_sigma(problem: Problem, raw: Array) -> tuple[Problem, tuple[str, ..
     """Fill in noise that nobody stated, from how much neighbours along a run differ.
 
     Third differences of residuals along a run hold almost none of a smooth model error but
-    all of the noise (times sqrt(20)); the median keeps jumps out.
+    all of the noise (times sqrt(20)); the median keeps jumps out. Where no run has rows enough
+    for one, the residuals themselves are taken for noise.
     """
     sigma, notes = problem.sigma, []
     for kind in kinds_read(problem):
         if getattr(sigma, kind.sigma) is not None:
             continue
-        value = _by_differences(problem, raw[:, kind.columns])
-        sigma = replace(sigma, **{kind.sigma: value})
-        notes.append(
-            f"{kind.sigma} is not stated: estimated from differences between neighbouring rows as "
-            f"{value:.2g} {kind.si}"
-        )
+        differences = _differences(problem, raw[:, kind.columns])
+        rows = raw[problem.use][:, kind.columns] if differences is None else differences
+        sigma = replace(sigma, **{kind.sigma: _size(rows)})
+        size = f"{kind.factor * _size(rows):.2g} {kind.unit}"
+        how = f"estimated from differences between neighbouring rows as {size}"
+        if differences is None:
+            how = (
+                f"no run has the {_ROWS} rows that an estimate takes, so the errors themselves, "
+                f"{size}, count as noise; state it with --sigma {kind.sigma.rpartition('_')[0]}=..."
+            )
+        notes.append(f"{kind.sigma} is not stated: {how}")
     return problem.with_sigma(sigma), tuple(notes)
 
 
-def _by_differences(problem: Problem, raw: Array) -> float:
+def _differences(problem: Problem, raw: Array) -> Array | None:
+    """Third differences of residuals (n, k) along the runs, as noise; None where runs are short.
+
+    Of each channel between rows where it was read.
+    """
     index = problem.data.run_index
-    pieces = []
-    for name in np.unique(index):
-        part = raw[(index == name) & problem.use]
-        if len(part) >= 4:
-            pieces.append(np.abs(np.diff(part, n=3, axis=0)).ravel() / np.sqrt(20.0))
-    every = np.concatenate(pieces) if pieces else np.abs(raw[problem.use]).ravel()
-    every = every[np.isfinite(every)]
+    parts = [
+        channel[np.isfinite(channel)]
+        for name in np.unique(index)
+        for channel in raw[(index == name) & problem.use].T
+    ]
+    found = [np.diff(part, n=3) / np.sqrt(20.0) for part in parts if len(part) >= _ROWS]
+    return np.concatenate(found) if found else None
+
+
+def _size(values: Array) -> float:
+    """The standard deviation of normal noise of which these are some; outliers do not count."""
+    every = np.abs(values[np.isfinite(values)])
     return max(float(np.median(every)) / 0.6745, 1e-12) if len(every) else 1.0

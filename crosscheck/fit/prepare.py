@@ -95,8 +95,8 @@ def _solved_rows(problem: Problem, plain: Prediction) -> Problem:
         (~plain.solved & ~plain.singular, "no equilibrium was found there"),
     ):
         if np.any(rows & problem.use):
-            lines = problem.data.places(rows & problem.use)
-            problem = problem.without(rows, f"lines {lines} left out: {words}")
+            lines = problem.data.lines_of(rows & problem.use)
+            problem = problem.without(rows, f"{lines} left out: {words}")
     return problem
 
 

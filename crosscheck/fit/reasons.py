@@ -10,13 +10,14 @@ from dataclasses import dataclass
 from enum import Enum, StrEnum
 
 from crosscheck.errors import CrosscheckError
+from seecr.counted import counted
 
 
 class Why(Enum):
     """Why an effect is no candidate or was not chosen; the values are what people read."""
 
     EXCLUDED = "not considered, as was asked for"
-    TOO_MANY_PARAMETERS = "{parameters} parameters, but the data have {rows} rows"
+    TOO_MANY_PARAMETERS = "{parameters}, but the data have {rows}"
     NEEDS_POSES = "needs commanded poses, or lengths as told; these are absolute"
     NEEDS_TIME = "needs the time of each row (t_s)"
     NEEDS_TEMPERATURE = "needs temperature_C"
@@ -29,7 +30,7 @@ class Why(Enum):
     CHANCE = "chance explains it (p {p:.2g})"
     CHANCE_OVER_ALL = "chance explains it (p {p:.2g} over all tried)"
     PROMISES_LESS = "promises less than others beside it"
-    EXPLAINS_LITTLE = "explains too little for its {parameters} parameters"
+    EXPLAINS_LITTLE = "explains too little for its {parameters}"
     NOT_PREDICTIVE = "does not predict runs left out any better"
     EXPLAINED_BETTER = "explained better by {by}"
     NOT_NEEDED = "not needed"
@@ -38,7 +39,7 @@ class Why(Enum):
     CARRIES_LITTLE = "probable ({p:.2g}), but explains little beside {by}: not sure"
     NOT_SURE = "probable ({p:.2g}), but not sure"
     IMPROBABLE = "explains too little (probability {p:.2g})"
-    IMITATES = "not sure: {parameters} parameters imitate much of what no effect explains"
+    IMITATES = "not sure: its {parameters} can imitate much of what no effect explains"
     EXPLAINS_PART = "explains a part, but structure remains: not sure"
 
 
@@ -81,7 +82,10 @@ class Reason:
     def words(self) -> str:
         """The reason alone."""
         return self.why.value.format(
-            parameters=self.parameters, rows=self.rows, p=min(1.0, self.p), by=", ".join(self.by)
+            parameters=counted(self.parameters, "parameter"),
+            rows=counted(self.rows, "row"),
+            p=min(1.0, self.p),
+            by=", ".join(self.by),
         )
 
     def __str__(self) -> str:
@@ -93,9 +97,9 @@ class Unfit(Enum):
     """Why measurements are not fit for a verdict; the values are what people read."""
 
     NO_READINGS = "the data hold no readings"
-    NO_EQUILIBRIUM = "{lost} of {rows} rows have no equilibrium to compare with; see the notes"
-    FEW_READINGS = "only {readings} readings are left"
-    FEW_POSES = "only {rows} poses were measured, counting a pause once: too few to tell effects"
+    NO_EQUILIBRIUM = "at {lost} of {rows} there is no equilibrium to compare with; see the notes"
+    FEW_READINGS = "only {readings} left"
+    FEW_POSES = "only {poses} measured, counting a pause once: too few to tell effects"
     CONSTANT_COMMANDS = "all commands are the same: nothing tells effects apart"
     FROZEN_READINGS = "all readings are the same though the commands differ"
     CONTRADICTION = (
@@ -153,7 +157,11 @@ class Refusal:
 
     def __str__(self) -> str:
         return self.unfit.value.format(
-            rows=self.rows, lost=self.lost, readings=self.readings, lines=self.lines
+            rows=counted(self.rows, "row"),
+            poses=counted(self.rows, "pose"),
+            lost=self.lost,
+            readings=counted(self.readings, "reading"),
+            lines=self.lines,
         )
 
 

@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from crosscheck.errors import CrosscheckError
 from crosscheck.fit.registration import turn_of_points
 from crosscheck.measurements.dwells import mean_rotation
+from seecr.counted import counted
 from seecr.pose import Array, quat_conjugate, quat_multiply, quat_rotate
 
 # What is left may be this part of the spread of the points, and of named points.
@@ -67,8 +68,9 @@ def by_points(names: Sequence[str], there: Array, here: Array) -> Frames:
     turn = turn_of_points(there, here) if len(names) >= 3 else None
     if turn is None:
         raise CrosscheckError(
-            f"the frames cannot be aligned by {len(names)} points ({', '.join(names)}): expected "
-            "three or more that are not in one line; name more with --point"
+            f"the frames cannot be aligned by {counted(len(names), 'point')} "
+            f"({', '.join(names)}): expected three or more that are not in one line; "
+            "name more with --point"
         )
     shift = here.mean(axis=0) - quat_rotate(turn, there).mean(axis=0)
     left = np.linalg.norm(quat_rotate(turn, there) + shift - here, axis=1)
@@ -114,7 +116,7 @@ def to_commands(position: Array, quat: Array | None, told: Array, target: Array 
     left = np.linalg.norm(away - frames.shift, axis=1)
     _check(left, told)
     how = (
-        f"tracker's frame aligned to the commands of {len(told)} dwells: "
+        f"tracker's frame aligned to the commands of {counted(len(told), 'dwell')}: "
         f"{1e3 * float(np.sqrt(np.mean(left**2))):.3g} mm rms are left"
     )
     return with_target(replace(frames, how=how), quat, told, target)

@@ -28,6 +28,7 @@ from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import load_commands
 from crosscheck.measurements.together import together
 from crosscheck.measurements.write import write_measurements
+from seecr.counted import counted
 from seecr.experiment import Experiment
 from seecr.made import Made
 from seecr.pose import Array
@@ -58,7 +59,7 @@ class Imported(Result):
     def lines(self) -> list[str]:
         """How many dwells, and what was done."""
         n = int(self.measured.read.sum())
-        return [f"{n} dwells of {self.robot.name}", *self.notes]
+        return [f"{counted(n, 'dwell')} of {self.robot.name}", *self.notes]
 
     def records(self) -> list[Record]:
         """A record for each dwell: when, how many samples, their scatter and the mean's error."""

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from crosscheck.importing.logged import Stream
 from crosscheck.measurements.dwells import mean_error, mean_rotation
+from seecr.counted import counted
 from seecr.pose import Array
 
 REST_FOR = 0.5
@@ -78,7 +79,9 @@ def find_dwells(
     """
     seen = stream.seen
     if seen.sum() < LEAST:
-        raise stream.error(f"the body is seen in {seen.sum()} rows; expected at least {LEAST}")
+        raise stream.error(
+            f"the body is seen in {counted(int(seen.sum()), 'row')}; expected at least {LEAST}"
+        )
     step = float(np.median(np.diff(stream.t_s)))
     if LEAST * step > rest_for:
         raise stream.error(

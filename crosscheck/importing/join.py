@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from crosscheck.importing.dwells import Dwells
 from crosscheck.importing.logged import Stream
 from crosscheck.measurements.data import Measurements
+from seecr.counted import counted
 from seecr.errors import InputFileError
 from seecr.pose import Array
 
@@ -67,7 +68,8 @@ def matched(stream: Stream, held: HeldCommands, dwells: Dwells) -> NDArray[np.in
     if held.begin_s is None or held.end_s is None:
         if len(dwells) != len(held.row):
             raise stream.error(
-                f"rests {len(dwells)} times; expected the {len(held.row)} commands of "
+                f"rests {counted(len(dwells), 'time')}; expected the "
+                f"{counted(len(held.row), 'command')} of "
                 f"{held.log.path.name}, which has no times to tell them by; add a column t_s "
                 "there, or change --rest-for or --rest-speed"
             )

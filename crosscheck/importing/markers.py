@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from crosscheck.importing.logged import Logged, Stream
 from seecr.columns.table import read_table
+from seecr.counted import counted
 from seecr.errors import InputFileError
 from seecr.pose import Array
 from seecr.units import of_columns
@@ -41,7 +42,7 @@ def body_of_markers(
     seen = np.asarray(np.isfinite(points).all(axis=2))
     whole = np.flatnonzero(seen.all(axis=1))
     if len(names) < 3 or len(whole) == 0:
-        got = f"{len(names)} names" if len(names) < 3 else "no frame in which all are seen"
+        got = counted(len(names), "name") if len(names) < 3 else "no frame in which all are seen"
         text = f"expected three markers or more that are seen at once, got {got}; name others"
         raise InputFileError.at(export.path, text)
     if shape is None:
@@ -65,7 +66,7 @@ def body_of_markers(
     position[swapped], quat[swapped] = np.nan, np.nan
     lost = int(np.isnan(position[:, 0]).sum())
     said = f"rigid body of {', '.join(names)}, which fit to {1e3 * usual:.2g} mm"
-    said += f"; {lost} of {len(points)} frames lost" if lost else ""
+    said += f"; {lost} of {counted(len(points), 'frame')} lost" if lost else ""
     return Stream(export.path, export.t_s, export.line, position, quat), said
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from crosscheck.importing.logged import Logged
 from crosscheck.importing.rows import Block, FileRows, Row, check_body
+from seecr.counted import counted
 from seecr.pose import Array
 
 _EXPECTED = "expected a CSV export of Motive, which begins with Format Version"
@@ -107,8 +108,8 @@ def _check_count(rows: FileRows, settings: Mapping[str, str], block: Block) -> N
     said = settings.get("Total Exported Frames", "")
     if said.isdigit() and len(block.body) < int(said):
         text = (
-            f"expected {said} frames as the first line says, got {len(block.body)}; is the file "
-            "cut off? Export it again"
+            f"expected {counted(int(said), 'frame')} as the first line says, got "
+            f"{len(block.body)}; is the file cut off? Export it again"
         )
         raise rows.error(text, block.body[-1])
 

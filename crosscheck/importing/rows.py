@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from crosscheck.files import read_text
 from seecr.columns.table import show
+from seecr.counted import counted
 from seecr.errors import InputFileError
 from seecr.pose import Array
 
@@ -120,7 +121,7 @@ class Block:
         cells = self.rows.cells[row]
         if len(cells) <= max(columns):
             text = (
-                f"expected {len(self.labels)} cells as in the row of labels (line "
+                f"expected {counted(len(self.labels), 'cell')} as in the row of labels (line "
                 f"{self.label_row + 1}), got {len(cells)}"
             )
             if row == self.body[-1]:
@@ -139,7 +140,7 @@ class Block:
         sizes = {len(self.rows.cells[row]) for row in self.body[:-1]}
         last = len(self.rows.cells[self.body[-1]])
         if sizes and last < min(sizes):
-            text = f"expected {min(sizes)} cells as in the rows before, got {last}"
+            text = f"expected {counted(min(sizes), 'cell')} as in the rows before, got {last}"
             raise self.rows.error(
                 f"{text}; it is the last line: is the file cut off? Export it again", self.body[-1]
             )

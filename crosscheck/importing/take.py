@@ -19,6 +19,7 @@ from crosscheck.importing.motive import read_motive
 from crosscheck.importing.poses import read_poses
 from crosscheck.importing.vicon import read_vicon
 from crosscheck.measurements.data import Measurements
+from seecr.counted import between, counted
 from seecr.errors import InputError, InputFileError
 from seecr.joints import values_of_pose
 from seecr.robot import Robot
@@ -84,16 +85,20 @@ def _told(take: Take) -> list[str]:
     dwells, used = take.dwells, take.used
     n = dwells.samples[used]
     out = [
-        f"{len(used)} dwells of {n.min()} to {n.max()} samples (slower than "
+        f"{counted(len(used), 'dwell')} of {between(n.min(), n.max(), 'd')} samples (slower than "
         f"{1e3 * dwells.speed:.2g} mm/s), which scatter by "
         f"{1e3 * float(np.sqrt(np.mean(dwells.scatter_m[used] ** 2))):.2g} mm"
     ]
     none = int((take.number < 0).sum())
     rest = len(dwells) - len(used)
-    out += [f"{none} held commands without a dwell: gone through, not compared"] * (none > 0)
-    out += [f"{rest} shorter dwells of the same commands, or outside of all, left out"] * (rest > 0)
+    out += [f"{counted(none, 'held command')} without a dwell: gone through, not compared"] * (
+        none > 0
+    )
+    shorter = f"{counted(rest, 'shorter dwell')} of the same commands, or outside of all, left out"
+    out += [shorter] * (rest > 0)
     if take.held.passed:
-        out.append(f"{take.held.passed} set points on the way left out: the way counts as straight")
+        passed = counted(take.held.passed, "set point")
+        out.append(f"{passed} on the way left out: the way counts as straight")
     return out
 
 

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from crosscheck.measurements.named import named_columns
 from seecr.commands import Commands
+from seecr.counted import counted, plural
 from seecr.loads import Loads
 from seecr.pose import Array
 from seecr.result import Record, Result
@@ -225,6 +226,11 @@ class Measurements(Result):
         more = f" and {len(chosen) - most} more" if len(chosen) > most else ""
         return ", ".join(words) + more
 
+    def lines_of(self, rows: ArrayLike) -> str:
+        """The same after its noun: ``line 3``, ``lines 3, 5``."""
+        count = len(np.arange(self.n_rows)[np.asarray(rows)])
+        return f"{plural(count, 'line')} {self.places(rows)}"
+
     def place(self, row: int) -> str:
         """The line of one row, and its file where several are."""
         return (
@@ -276,8 +282,8 @@ class Measurements(Result):
             if there
         ]
         what = ", ".join(read) or "commands alone"
-        runs = "1 run" if len(self.runs) == 1 else f"{len(self.runs)} runs"
-        return [f"{self.path.name}: {self.n_rows} rows in {runs}, {what}", *self.notes]
+        rows, runs = counted(self.n_rows, "row"), counted(len(self.runs), "run")
+        return [f"{self.path.name}: {rows} in {runs}, {what}", *self.notes]
 
     def records(self) -> list[Record]:
         """Commands and readings row by row, named as in the file; None where not read."""

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.measurements.data import Measurements, Sigma
+from seecr.counted import between, counted, plural
 from seecr.pose import Array, quat_conjugate, quat_multiply
 
 # Shorter logs are taken row by row; longer ones where dwells have so many rows on average.
@@ -63,8 +64,9 @@ def averaged_dwells(data: Measurements) -> Measurements:
     )
     ratio, said = _sureness(data, mean, rows, size)
     least, most = int(size.min()), int(size.max())
-    in_one = f"{most}" if least == most else f"{least} to {most}"
-    note = f"{data.n_rows} rows are {len(start)} dwells, each averaged: {in_one} rows in one{said}"
+    in_one = f"{between(least, most, 'd')} {plural(most, 'row')} in one"
+    dwells = f"{counted(len(start), 'dwell')}, each averaged: {in_one}"
+    note = f"{counted(data.n_rows, 'row')} are {dwells}{said}"
     return replace(mean, sigma_ratio=mean.sigma_ratio * ratio).with_notes([note])
 
 

@@ -24,6 +24,7 @@ from seecr.columns.loads import known_loads
 from seecr.columns.poses import command_lengths, command_poses, measured_orientation
 from seecr.columns.table import read_table
 from seecr.columns.times import runs, temperatures, times
+from seecr.counted import counted
 
 if TYPE_CHECKING:
     from seecr.robot import Robot
@@ -144,5 +145,5 @@ def _way_points(data: Measurements) -> list[str]:
     silent = int(np.sum(~data.read))
     if not 0 < silent < data.n_rows:
         return []
-    rows = "1 row has" if silent == 1 else f"{silent} rows have"
+    rows = f"{counted(silent, 'row')} {'has' if silent == 1 else 'have'}"
     return [f"{rows} a command but no reading: a way point, gone through and not compared."]

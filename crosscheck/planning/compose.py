@@ -18,6 +18,7 @@ from crosscheck.planning.places import held_within, tilted_grid, trustworthy
 from crosscheck.planning.planned import Planned, Reads, expected_sigma, kinds_of, planned
 from crosscheck.planning.sight import all_visible
 from crosscheck.planning.visibility import EXACT, Signal, left_over, signals
+from seecr.counted import counted
 from seecr.joints import pose_of_values
 from seecr.pose import Array
 from seecr.robot import Robot
@@ -75,8 +76,9 @@ def compose(
     found = 0 if plan is None else plan.problem.data.n_rows
     if plan is None or found < rows:
         raise CrosscheckError(
-            f"robot {robot.name} holds still at {found} of {len(tried)} poses that were tried; "
-            f"expected {rows} or more; ask for fewer --rows, wider tensions, or another --box"
+            f"robot {robot.name} holds still at {found} of {counted(len(tried), 'pose')} "
+            f"that were tried; expected {rows} or more; ask for fewer --rows, wider "
+            "tensions, or another --box"
         )
     progress("sensitivities", 0.2)
     there = signals(plan)[0]

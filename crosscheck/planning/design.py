@@ -93,9 +93,9 @@ def _unsolved(plan: Planned) -> list[str]:
     rows = np.flatnonzero(plan.unsolved)
     if len(rows) == 0:
         return []
-    lines = plan.problem.data.places(rows)
+    lines = plan.problem.data.lines_of(rows)
     status = plan.base.state.prediction.solution().status[rows[0]].value
-    return [f"lines {lines} left out: {status}"]
+    return [f"{lines} left out: {status}"]
 
 
 def _confusion(own: Mapping[str, Signal]) -> tuple[tuple[str, ...], Array]:

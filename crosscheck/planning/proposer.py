@@ -19,6 +19,7 @@ from crosscheck.planning.adding import Adding, Extension
 from crosscheck.planning.greedy import Wanted, chosen_poses
 from crosscheck.planning.planned import Planned
 from crosscheck.planning.visibility import EXACT, Signal, joined, left_over
+from seecr.counted import counted
 from seecr.effects import Term
 from seecr.effects.base import Layout
 from seecr.pose import Array
@@ -148,8 +149,7 @@ def _few_poses(
         return Suggestion(Adding.POSES, "", ())
     some = np.isin(row_of, rows)
     few = {n: Signal(s.layout, s.shape, s.columns[some]) for n, s in there.items()}
-    count = f"{len(rows)} poses" if len(rows) > 1 else "one pose"
-    words = f"add the {count} listed below"
+    words = f"add the {counted(len(rows), 'pose')} listed below"
     gains, told = _gains(own, few, open_), grid.plan.problem.data.rows(rows)
     return Suggestion(Adding.POSES, words, gains, grid.poses[rows], told)
 

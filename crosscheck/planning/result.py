@@ -14,6 +14,7 @@ from crosscheck.planning.planned import Planned
 from crosscheck.planning.proposer import Suggestion
 from crosscheck.planning.visibility import LEVEL, NAMED, POWER, Signal
 from crosscheck.units import in_unit, short
+from seecr.counted import counted
 from seecr.pose import Array
 from seecr.result import Record, Result
 
@@ -141,10 +142,11 @@ class Plan(Result):
         seen = [v for v in self.effects if v.visible]
         named = [v for v in seen if v.named]
         return (
-            f"Of {len(self.effects)} effects, {len(seen)} would show at a plausible size and "
-            f"{len(named)} of these could be named; {100 * POWER:.0f} % of such are found, "
-            f"with {100 * LEVEL:.0f} % false alarms over all. From {NAMED:g} times the smallest "
-            "size that shows on, a diagnosis names nine in ten, or what is alike on these data."
+            f"Of {counted(len(self.effects), 'effect')}, {len(seen)} would show at a plausible "
+            f"size and {len(named)} of these could be named; {100 * POWER:.0f} % of such are "
+            f"found, with {100 * LEVEL:.0f} % false alarms over all. From {NAMED:g} times the "
+            "smallest size that shows on, a diagnosis names nine in ten, or what is alike on these "
+            "data."
         )
 
     def lines(self) -> list[str]:

@@ -14,6 +14,7 @@ from crosscheck.fit.reasons import Reason, Why
 from crosscheck.planning.planned import Planned, Reads
 from crosscheck.planning.result import Visible
 from crosscheck.planning.visibility import EXACT, Signal, left_over, needed, signals
+from seecr.counted import counted
 from seecr.pose import Array
 
 _MOST = 8
@@ -48,7 +49,8 @@ class Sight:
         """The same as sentences: what shows, what does not, what cannot be told apart."""
         total = len(self.effects) + len(self.missing)
         seen = len(self.effects) - len(self.hidden)
-        out = [f"These data would show {seen} of {total} effects if they had a plausible size."]
+        effects = f"{seen} of {counted(total, 'effect')}"
+        out = [f"These data would show {effects} if they had a plausible size."]
         lacking = _by_reason(self.missing)
         if lacking or self.hidden:
             small = [f"{', '.join(self.hidden)} (too small beside the noise)"] * bool(self.hidden)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from crosscheck.recording import words
 from crosscheck.recording.material import Material
 from crosscheck.suite.verdicts import Verdict
+from seecr.counted import counted
 from seecr.pose import pose_difference
 from seecr.recording.stream import Index, Recording, opening
 
@@ -59,7 +60,8 @@ class Panels:
         material = self.material
         case, robot = material.result.case, material.robot
         sentence = (
-            f"{robot.n_cables} cables, {robot.mass:g} kg, {robot.weight:.3g} N of weight; "
+            f"{counted(robot.n_cables, 'cable')}, {robot.mass:g} kg, "
+            f"{robot.weight:.3g} N of weight; "
             f"{material.count} {_KINDS.get(case.kind, 'poses')}."
         )
         watched = material.watched + 1 if material.motion is not None else None

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from crosscheck.measurements.data import Measurements
+from seecr.counted import counted
 from seecr.pose import Array, pose_difference, rxyz_from_quat
 from seecr.recording.plots import DEG, MM
 
@@ -20,7 +21,7 @@ dashed one hangs slack.
 **Plots.** {marks} The lowest plot is their difference as a decimal logarithm: −9 is a billionth \
 of a metre.
 
-**Play.** The timeline `{along}` goes through the {n} commands.{settling}
+**Play.** The timeline `{along}` goes through the {n}.{settling}
 {findings}
 ## Largest differences
 {table}
@@ -67,7 +68,7 @@ def read_me(
     return _READ_ME.format(
         name=name,
         sentence=sentence,
-        n=count,
+        n=counted(count, "command"),
         along=along,
         marks=_LINES if lines else _CROSSES,
         settling="" if watched is None else _SETTLING.format(watched=watched),

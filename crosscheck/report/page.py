@@ -10,6 +10,7 @@ from crosscheck.fit.problem import Problem, kinds_read
 from crosscheck.report.glossary import with_glossary
 from crosscheck.units import short
 from seecr import __version__
+from seecr.counted import counted
 from seecr.made import Made
 
 
@@ -55,7 +56,7 @@ def facts(problem: Problem) -> list[tuple[str, str]]:
     if ways:
         rows += f", {ways} way point" + "s" * (ways > 1)
     return [
-        ("robot", f"{problem.robot.name}, {problem.robot.n_cables} cables"),
+        ("robot", f"{problem.robot.name}, {counted(problem.robot.n_cables, 'cable')}"),
         ("data", data.path.name),
         ("rows", rows),
         ("runs", str(len(data.runs))),

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from crosscheck.diagnosis.steps import Drawn, drawn, magnification, views_of
 from crosscheck.fit.problem import POSITION, Kind, Problem, kinds_read
 from crosscheck.report.drawing import GREY, INK, MANY, blank, grid, image, styled
+from seecr.counted import counted
 from seecr.pose import Array
 
 # Colours end at this percentile of the errors.
@@ -87,7 +88,7 @@ def _title(stages: list[Drawn], column: int, magnify: float) -> str:
     when = "" if len(stages) == 1 else ("before: ", "after: ")[column]
     names = stage.label if column == 0 else " ".join(f"+ {n}" for n in stage.state.terms.names)
     if len(names) > _LONGEST:
-        names = f"with {len(stage.state.terms.names)} effects"
+        names = f"with {counted(len(stage.state.terms.names), 'effect')}"
     scale = f"   (arrows drawn {drawn(magnify)})" if magnify and column == 0 else ""
     return when + names + scale
 

@@ -24,6 +24,7 @@ from crosscheck.suite.pool import Pool
 from crosscheck.suite.results import CaseResult, Worst, counts, worst_of
 from crosscheck.suite.thresholds import Thresholds, load_thresholds
 from crosscheck.suite.verdicts import Answers, Verdict, held_to, judge
+from seecr.counted import counted
 from seecr.equilibrium import solve as seecr_solve
 from seecr.errors import InputFileError
 from seecr.mjcf import load_robot
@@ -240,5 +241,6 @@ def _check_same_cables(case: Case, robot: Robot, mujoco: MujocoRobot) -> None:
     m = mujoco.settler.physics.n_cables
     if m != robot.n_cables:
         raise InputFileError(
-            f"{case.mujoco_model}: {m} cables; expected {robot.n_cables} as in {case.model}"
+            f"{case.mujoco_model}: {counted(m, 'cable')}; expected {robot.n_cables} as in "
+            f"{case.model}"
         )

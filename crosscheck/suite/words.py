@@ -9,6 +9,7 @@ from crosscheck.suite.agreement import QUANTITIES
 from crosscheck.suite.effects import LOADS, ORIENTATION_RAD, POSITION_M, Counterpart
 from crosscheck.suite.outcome import Outcome
 from crosscheck.suite.verdicts import FINDINGS, PoseFinding, Verdict
+from seecr.counted import counted
 
 if TYPE_CHECKING:
     from crosscheck.suite.effects import EffectResult
@@ -100,9 +101,9 @@ def verdict_line(run: Run) -> str:
         return effects_line(run.effects)
     total = sum(len(result) for result in run.results)
     aside = sum(run.count(verdict) for verdict in FINDINGS)
-    poses = f"{count(total, 'pose')} of {count(len(run.results), 'case')}"
+    poses = f"{counted(total, 'pose')} of {counted(len(run.results), 'case')}"
     if aside:
-        poses = f"{total - aside} of {poses} ({count(aside, 'finding')})"
+        poses = f"{total - aside} of {poses} ({counted(aside, 'finding')})"
     bad = [r.case.name for r in run.every if r.outcome is not Outcome.AGREE]
     start = {
         Outcome.AGREE: f"SEECR and MuJoCo agree at {poses}",
@@ -142,7 +143,7 @@ def _line(result: CaseResult, finding: PoseFinding) -> str:
 def case_line(result: CaseResult) -> str:
     """A case in a line: name, poses, how it ended, the worst difference."""
     worst = max(result.worst.values(), key=lambda one: one.ratio, default=None)
-    poses, pair = count(len(result), "pose"), None if worst is None else (result, worst)
+    poses, pair = counted(len(result), "pose"), None if worst is None else (result, worst)
     notes = f" ({remarks(result)})" if remarks(result) else ""
     return f"{result.case.name}: {poses}, {result.outcome.value}{notes}; {worst_sentence(pair)}"
 
@@ -174,11 +175,6 @@ def _share(ratio: float) -> str:
     return f"{100 * ratio:.2g} % of" if ratio < 1.0 else f"{100 * ratio:.4g} % of"
 
 
-def count(number: int, noun: str) -> str:
-    """A number with its noun."""
-    return f"{number} {noun}{'' if number == 1 else 's'}"
-
-
 def name_list(names: Sequence[str], most: int = 4) -> str:
     """The first few names, and how many more."""
     rest = f" and {len(names) - most} more" if len(names) > most else ""
@@ -202,12 +198,12 @@ def effects_line(results: Sequence[EffectResult]) -> str:
     bad = [result.case.name for result in results if result.outcome is not Outcome.AGREE]
     verdict = "all agree"
     if bad:
-        verdict = f"{len(bad)} of {count(len(results), 'case')} do not agree: {name_list(bad)}"
+        verdict = f"{len(bad)} of {counted(len(results), 'case')} do not agree: {name_list(bad)}"
     worst = max(results, key=lambda result: result.worst[0])
     orientation = max(result.worst[1] for result in results)
     tension = max(result.worst[2] for result in results)
     return (
-        f"{count(len(effects), 'effect')}{loads} on {count(len(robots), 'robot')}"
+        f"{counted(len(effects), 'effect')}{loads} on {counted(len(robots), 'robot')}"
         f"{''.join(f', {name}' for name in alone)} against "
         f"{_counterparts(results)}: {verdict}; worst {worst.worst[0]:.1e} m "
         f"({worst.case.name}), {orientation:.1e} rad, {tension:.1e} N."
@@ -244,7 +240,7 @@ def effect_text(result: EffectResult) -> str:
         f"the effect moves a reading by {result.moved_m:.1e} m",
     ]
     if result.unsolved:
-        parts.append(f"no rest at {result.unsolved} of {count(len(result.compared), 'pose')}")
+        parts.append(f"no rest at {result.unsolved} of {counted(len(result.compared), 'pose')}")
     return "; ".join(parts)
 
 

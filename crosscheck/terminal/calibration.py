@@ -10,6 +10,7 @@ from rich.console import Console
 from crosscheck.calibration.result import Calibrated
 from crosscheck.model.fitted import Fitted
 from crosscheck.terminal.lines import console_for, rms_table, say, table_of
+from seecr.counted import counted
 
 # A value this many standard errors from null is shown as sure.
 _SURE = 3.0
@@ -40,7 +41,9 @@ def print_calibration(
         why = "Runs left out are not predicted any better: not written; --force writes it"
         say(console, why, "bold yellow")
     if written:
-        parts = f"{len(found.fitted)} effects, {len(found.covariance)} parameters"
+        parts = (
+            f"{counted(len(found.fitted), 'effect')}, {counted(len(found.covariance), 'parameter')}"
+        )
         say(console, f"Written to {model}: {parts}, with their covariance")
 
 

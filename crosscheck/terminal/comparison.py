@@ -16,6 +16,7 @@ from crosscheck.comparison.result import Comparison, Group
 from crosscheck.fit.problem import KINDS, Kind, Rms
 from crosscheck.terminal.lines import cell, console_for, heading, say, table_of
 from crosscheck.units import in_unit
+from seecr.counted import counted
 
 _MOST, _MOST_WORST, _MOST_UNSOLVED = 12, 5, 5
 
@@ -39,7 +40,10 @@ def print_comparison(
     for row in found.unsolved[:_MOST_UNSOLVED]:
         say(console, f"line {row.line}, run {row.run}: {row.why}", "bold yellow")
     if len(found.unsolved) > _MOST_UNSOLVED:
-        say(console, f"{len(found.unsolved) - _MOST_UNSOLVED} more rows without an equilibrium")
+        say(
+            console,
+            f"{counted(len(found.unsolved) - _MOST_UNSOLVED, 'more row')} without an equilibrium",
+        )
     say(console, found.sentence, "green" if found.is_noise else "bold yellow")
     for item in exceeded:
         say(console, item.words, "bold red")

@@ -12,6 +12,7 @@ from rich.text import Text
 from crosscheck.suite import words
 from crosscheck.suite.outcome import Outcome
 from crosscheck.suite.verdicts import FINDINGS, Verdict
+from seecr.counted import counted
 
 if TYPE_CHECKING:
     from crosscheck.suite.results import CaseResult
@@ -50,9 +51,8 @@ def print_run(run: Run, out: Path, console: Console | None = None) -> None:
         _print_notes(console, result)
     for verdict in FINDINGS:
         if run.count(verdict):
-            _print(
-                console, f"Finding at {words.count(run.count(verdict), 'pose')}: {verdict.value}."
-            )
+            poses = counted(run.count(verdict), "pose")
+            _print(console, f"Finding at {poses}: {verdict.value}.")
     _print_lines(console, words.effect_failures(run.effects), "effects")
     if run.effects and run.results:
         _print(console, words.effects_line(run.effects))

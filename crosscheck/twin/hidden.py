@@ -8,6 +8,7 @@ import numpy as np
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.twin.robot import TRUE_EFFECTS
+from seecr.counted import counted
 from seecr.effects import Layout, Term, effect_named, layout_of
 from seecr.pose import transform_points
 from seecr.robot import Robot
@@ -94,7 +95,7 @@ def _drawn(
     if count is None:
         count = int(random.choice(len(_SHARES), p=_SHARES))
     if count > len(known):
-        raise CrosscheckError(f"{count} effects: expected at most {len(known)}")
+        raise CrosscheckError(f"{counted(count, 'effect')}: expected at most {len(known)}")
     return [known[i] for i in random.choice(len(known), size=count, replace=False)]
 
 

@@ -147,9 +147,12 @@ def pose_of(coordinates: Sequence[float], robot: Robot) -> list[float]:
         InputError: another number of numbers, or a position far outside the robot.
     """
     from seecr import InputError
+    from seecr.counted import counted
 
     if len(coordinates) not in (3, 7):
-        raise InputError(f"expected X Y Z or X Y Z QW QX QY QZ, got {len(coordinates)} numbers")
+        raise InputError(
+            f"expected X Y Z or X Y Z QW QX QY QZ, got {counted(len(coordinates), 'number')}"
+        )
     check_places(coordinates[:3], robot)
     return [*coordinates[:3], *(coordinates[3:] or robot.reference_pose[3:].tolist())]
 

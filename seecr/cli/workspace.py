@@ -92,6 +92,7 @@ def command(
     import numpy as np
 
     from seecr import InputError, default_axes, workspace_map
+    from seecr.counted import counted
     from seecr.files import json_text, staged, write_text
     from seecr.report.figures import map_figure
     from seecr.report.maps import document_of, likely_lines, write_arrays
@@ -112,7 +113,7 @@ def command(
             raise InputError(
                 f"no pose of the grid can be held: no tensions from {lowest:g} to "
                 f"{np.inf if highest is None else highest:g} N balance the load at any of "
-                f"{total} poses; expected another grid, orientation or wider limits"
+                f"{counted(total, 'pose')}; expected another grid, orientation or wider limits"
             )
         text = json_text({
             "made": made_by(machine.source, model), "exit_status": 0,

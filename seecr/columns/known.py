@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from seecr.columns.names import meant_by, other_rotations, question, unused_note
 from seecr.columns.table import Table, show
+from seecr.counted import counted
 from seecr.errors import InputFileError
 from seecr.pose import Array
 from seecr.units import Unit, of_columns
@@ -202,7 +203,7 @@ def _check_cable(table: Table, quantity: str, name: str, n_cables: int) -> None:
         return
     if not 1 <= int(number) <= n_cables or number.startswith("0"):
         raise table.error(
-            f"there is no cable {number}; the robot has {n_cables} cables, expected "
+            f"there is no cable {number}; the robot has {counted(n_cables, 'cable')}, expected "
             f"{prefix}_1 to {prefix}_{n_cables}",
             column=name,
         )

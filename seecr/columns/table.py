@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from seecr.counted import counted
 from seecr.errors import InputFileError, MissingPackageError
 from seecr.files import no_text, read_bytes
 from seecr.pose import LARGEST, Array
@@ -202,8 +203,10 @@ def _check_cell_counts(
 ) -> None:
     for line, row in body:
         if len(row) != n_columns:
-            cells = "1 cell" if len(row) == 1 else f"{len(row)} cells"
-            text = f"expected {n_columns} cells as in the header (line {header_line}), got {cells}"
+            text = (
+                f"expected {counted(n_columns, 'cell')} as in the header (line {header_line}), "
+                f"got {counted(len(row), 'cell')}"
+            )
             if line == body[-1][0] and len(row) < n_columns:
                 text += "; it is the last line: is the file cut off?"
             if len(row) > n_columns:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from seecr.counted import counted
 from seecr.files import written
 from seecr.maps import Workspace
 
@@ -19,7 +20,7 @@ def likely_lines(found: Workspace, at_least: float | None) -> Iterator[str]:
     if at_least is not None:
         poses = int(found.likely(at_least).sum())
         yield (
-            f"with a probability of {at_least:g} or more {poses} poses can be held"
+            f"with a probability of {at_least:g} or more {counted(poses, 'pose')} can be held"
             f"{found.size_words(poses)}"
         )
 

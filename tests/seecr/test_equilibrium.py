@@ -590,7 +590,7 @@ def test_nothing_to_carry_and_nothing_pulls(cogiro: Robot) -> None:
         ({"poses": HERE, "wrench": [np.inf] * 6}, "wrench holds numbers that are not finite"),
         ({"poses": HERE, "gravity": [0.0, 1]}, r"gravity must be \(3,\), got \(2,\)"),
         ({"poses": HERE, "gravity": [0.0, 1, np.nan]}, "gravity holds numbers that are not"),
-        ({"poses": HERE, "start": [HERE, HERE]}, "start must have 1 poses, got 2"),
+        ({"poses": HERE, "start": [HERE, HERE]}, "start must have 1 pose, got 2"),
         ({"poses": HERE, "start": [[0.0, 1]]}, r"start must be \(n, 7\)"),
         ({"rest_lengths": [[1.0, 2.0]]}, r"rest_lengths must be \(n, 1\) for bob, got \(1, 2\)"),
         ({"rest_lengths": [[-1.0]]}, r"rest_lengths must be positive \[m\]"),

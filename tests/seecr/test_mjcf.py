@@ -274,7 +274,7 @@ CURVED = 'stiffness="200 30"'
         (changed('"A1"', '"B2"'), "tendon left has both sites on the platform; expected one on"),
         (
             {"joint": SLIDE, "tendons": GEAR},
-            "tendon gear has 1 path elements or something that is no site",
+            "tendon gear has 1 path element or something that is no site",
         ),
     ],
 )

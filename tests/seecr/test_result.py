@@ -97,7 +97,7 @@ def test_names_of_a_users_robot_are_escaped(solution: seecr.Solution) -> None:
 def test_a_prediction_shows_what_would_be_read() -> None:
     robot = seecr.load_robot(seecr.model_path("demobot_cogiro"))
     found = seecr.predict(robot, [HOME], [seecr.Term.of(robot, "tracker_scale", factor=2.0)])
-    assert str(found).startswith("demobot_cogiro: 1 of 1 poses at rest")
+    assert str(found).startswith("demobot_cogiro: 1 of 1 pose at rest")
     assert found.to_frame().to_pydict()["x_m"] == pytest.approx([2.0 * found.pose[0, 0]])
 
 

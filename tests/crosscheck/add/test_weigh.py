@@ -99,7 +99,7 @@ def test_a_fit_that_did_not_end_is_never_a_number(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(crosscheck.add.fit, "_TIMES", 0)
     monkeypatch.setattr(weigh, "_HOLLOW", 0.0)
     start = [Term.of(robot(), "pulley_radius", radius_m=0.05)]
-    with pytest.raises(UnsolvedError, match="did not come to an end in 1 steps; nothing was") as e:
+    with pytest.raises(UnsolvedError, match="did not come to an end in 1 step; nothing was") as e:
         add_effects(robot(), readings(radius_m=0.01), start)
     assert e.value.exit_status == 3
 

@@ -38,7 +38,7 @@ def test_two_to_five_rows_carry_no_verdict(data: Measurements, count: int) -> No
     few = data.rows(slice(0, count))
     found = diagnose(robot(), few)
     assert found.verdict is DiagnosisVerdict.NO_VERDICT and found.converged
-    assert f"only {count} poses were measured" in found.sentence
+    assert f"only {count} poses measured" in found.sentence
     assert "add poses spread over the workspace" in found.measure_next[0]
     with pytest.raises(CrosscheckError, match=f"only {count} poses .* add poses spread") as error:
         calibrate(robot(), few)
@@ -109,6 +109,6 @@ def test_from_the_command_line(tmp_path: Path) -> None:
     assert done.exit_code == 0 and "no_verdict: No verdict: only 4 poses" in done.stdout
     assert "next: add poses spread over the workspace" in done.stdout
     done = run("compare", xml, data, "--out", tmp_path / "out", "--no-recording")
-    assert "No verdict: only 4 poses were measured" in done.stdout and "agree" not in done.stdout
+    assert "No verdict: only 4 poses measured" in done.stdout and "agree" not in done.stdout
     words = refused("calibrate", xml, data, "--model", tmp_path / "m.toml")
-    assert "only 4 poses were measured" in words and not (tmp_path / "m.toml").exists()
+    assert "only 4 poses measured" in words and not (tmp_path / "m.toml").exists()

@@ -46,7 +46,7 @@ def test_what_is_not_fit_is_refused_with_the_reason(robot: Robot, data: Measurem
     assert nowhere.refusal is not None and nowhere.refusal.unfit is Unfit.NO_EQUILIBRIUM
     n = data.n_rows
     assert str(nowhere.refusal) == (
-        f"{n} of {n} rows have no equilibrium to compare with; see the notes"
+        f"at {n} of {n} rows there is no equilibrium to compare with; see the notes"
     )
     assert nowhere.notes[0].startswith("lines 2, 3, 4, 5, 6, 7, 8, 9 and ")
     assert nowhere.notes[0].endswith("more left out: the platform is free to move there")
@@ -57,7 +57,7 @@ def test_what_is_not_fit_is_refused_with_the_reason(robot: Robot, data: Measurem
     assert none.refusal is not None and none.refusal.unfit is Unfit.NO_READINGS
     few = prepare(robot, replace(data, quat_wxyz=None).rows(slice(0, 1)), Terms())
     assert few.refusal == Refusal(Unfit.FEW_READINGS, rows=1, lost=0, readings=3)
-    assert str(few.refusal) == "only 3 readings are left"
+    assert str(few.refusal) == "only 3 readings left"
 
 
 def test_the_exit_status_hangs_on_what_happened_and_on_no_word() -> None:
@@ -114,6 +114,22 @@ def test_noise_that_nobody_stated_is_estimated_and_said(robot: Robot) -> None:
     ready = prepare(robot, replace(data, sigma=Sigma(orientation_rad=3.5e-4)), Terms())
     assert ready.problem.sigma.position_m == pytest.approx(3e-5, rel=0.2)
     assert ready.notes[0].startswith("position_m is not stated: estimated from differences")
+    position = data.position.copy()
+    position[::2] = np.nan  # read in every second row alone
+    half = replace(data, position=position, sigma=Sigma(orientation_rad=3.5e-4))
+    found = prepare(robot, half, Terms()).problem.sigma.position_m
+    assert found == pytest.approx(3e-5, rel=0.35)
+
+
+@pytest.mark.parametrize("rows", [1, 3])
+def test_of_few_rows_no_noise_can_be_estimated_and_that_is_said(
+    robot: Robot, data: Measurements, rows: int
+) -> None:
+    """Once it was said to come from differences between neighbours, of which there were none."""
+    alone = replace(data.rows(np.arange(rows)), sigma=Sigma(orientation_rad=3.5e-4))
+    (note,) = [n for n in prepare(robot, alone, Terms()).notes if "is not stated" in n]
+    assert note.startswith("position_m is not stated: no run has the 4 rows that an estimate takes")
+    assert note.endswith("mm, count as noise; state it with --sigma position=...")
 
 
 def test_a_row_that_sticks_out_alone_is_an_outlier_and_two_together_are_not(

@@ -171,7 +171,7 @@ def test_a_command_without_a_dwell_is_a_way_point(made, commands, tmp_path):
     log.write_text("\n".join(kept) + "\n")
     found = import_case("poses", [log], ROBOT, [commands])
     assert np.flatnonzero(~found.measured.read).tolist() == [4]
-    assert any("1 held commands without a dwell" in note for note in found.notes)
+    assert any("1 held command without a dwell" in note for note in found.notes)
 
 
 def test_a_dense_log_of_commands_with_tensions(made, tmp_path):

@@ -94,7 +94,7 @@ def test_the_command_takes_poses_and_noise(tmp_path):
     args += ["--sigma", "position=2um", "--sigma", "tension=0.1N", "--out", str(tmp_path / "case")]
     result = CliRunner().invoke(main, args)
     assert result.exit_code == 0, result.output
-    assert "12 rows of demobot_cogiro in 1 runs; noise 0.002 mm" in result.output
+    assert "12 rows of demobot_cogiro in 1 run; noise 0.002 mm" in result.output
     toml = (tmp_path / "case" / "measured.toml").read_text()
     assert 'start = "first_row"' in toml and "tension_N = 0.1" in toml
     header = (tmp_path / "case" / "measured.csv").read_text().partition("\n")[0]
