@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, TypeAlias
+from dataclasses import dataclass, field, fields, replace
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -85,6 +85,28 @@ class Prediction(Result):
     def tensions(self) -> Array:
         """(n, m) [N]."""
         return self.found.states[..., TENSION]
+
+    def with_rows(self, other: Prediction, rows: NDArray[np.bool_]) -> Prediction:
+        """The same with some rows (n,) of another that differs in length errors alone.
+
+        Rows that depend on the rows before cannot be exchanged one by one: both have none.
+        """
+
+        def mixed(one: Array, two: Array) -> Array:
+            return np.where(rows.reshape(-1, *[1] * (one.ndim - 1)), two, one)
+
+        def put(one: Any, two: Any, *names: str) -> Any:
+            some = {name: mixed(getattr(one, name), getattr(two, name)) for name in names}
+            return replace(one, **some)
+
+        return replace(
+            self,
+            setup=put(self.setup, other.setup, "extra_length"),
+            tables=put(self.tables, other.tables, "cables", "load", "scale", "reach"),
+            found=put(self.found, other.found, *(f.name for f in fields(statics.Evaluation))),
+            readings=put(self.readings, other.readings, *(f.name for f in fields(Readings))),
+            kept={k: mixed(v, other.kept[k]) for k, v in self.kept.items() if k in other.kept},
+        )
 
     def lines(self) -> list[str]:
         """As a solution's: how many rows came to rest, and where."""

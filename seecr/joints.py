@@ -7,6 +7,7 @@ import numpy as np
 from seecr.errors import InputError
 from seecr.pose import (
     Array,
+    cross,
     pose_difference,
     quat_from_rotvec,
     quat_multiply,
@@ -79,5 +80,5 @@ def values_of_pose(robot: Robot, poses: Array) -> tuple[Array, Array]:
 def motion_columns(screws: Array, position: Array) -> Array:
     """Change of poses at positions (n, 3) by their joint values, (n, 6, d); screws (n, d, 7)."""
     axis, point, hinge = screws[..., 1:4], screws[..., 4:7], screws[..., :1]
-    linear = np.where(hinge == 1.0, np.cross(axis, position[:, None] - point), axis)
+    linear = np.where(hinge == 1.0, cross(axis, position[:, None] - point), axis)
     return np.swapaxes(np.concatenate([linear, axis * hinge], axis=-1), 1, 2)

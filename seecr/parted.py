@@ -62,6 +62,12 @@ class PartedPrediction(Prediction):
     parts: tuple[Prediction, ...] = ()
     rows: tuple[NDArray[np.intp], ...] = ()
 
+    def with_rows(self, other: Prediction, rows: NDArray[np.bool_]) -> Prediction:
+        whole = super().with_rows(other, rows)
+        assert isinstance(whole, PartedPrediction) and isinstance(other, PartedPrediction)
+        both = zip(self.parts, other.parts, self.rows, strict=True)
+        return replace(whole, parts=tuple(a.with_rows(b, rows[own]) for a, b, own in both))
+
 
 @dataclass(eq=False)
 class Parted(Experiment):

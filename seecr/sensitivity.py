@@ -69,6 +69,10 @@ def sensitivities(
 
 def length_sensitivities(at: Prediction) -> Array:
     """Derivative of pose and tensions by each cable's rest length, (n, 6 + m, m)."""
+    return _kept(at, "by_length", _by_length)
+
+
+def _by_length(at: Prediction) -> Array:
     step = 1e-6 * at.tables.length
     return _response_by_cable(
         at, at.tables.lengthened(step), at.tables.lengthened(-step), 2.0 * step
@@ -145,7 +149,7 @@ class _ByWrench:
 
     @property
     def by_length(self) -> Array:
-        return _kept(self.at, "by_length", length_sensitivities)
+        return length_sensitivities(self.at)
 
     def column(self, shift: Shift) -> Array:
         """Derivative of the readings (n, 6 + m) by the shifted parameter."""
@@ -250,10 +254,13 @@ def _inverse_stiffness(at: Prediction) -> Array:
     """Inverse of the stiffness of each row; of what is stiff, where a row is singular."""
     stiffness = statics.stiffness(at.tables, at.found)
     whole = np.where(np.isfinite(stiffness), stiffness, 0.0)
-    out = np.empty_like(whole)
+    solved = at.solved
     # a stable row's stiffness is far from singular, and inverting takes a fifth of the time
-    out[at.solved] = np.linalg.inv(whole[at.solved])
-    out[~at.solved] = np.linalg.pinv(whole[~at.solved], rcond=1e-12)
+    if solved.all():
+        return np.asarray(np.linalg.inv(whole))
+    out = np.empty_like(whole)
+    out[solved] = np.linalg.inv(whole[solved])
+    out[~solved] = np.linalg.pinv(whole[~solved], rcond=1e-12)
     return out
 
 

@@ -21,7 +21,7 @@ from seecr.compiled.columns import (
     TENSION,
 )
 from seecr.compiled.descent import STIFF, solve_batch
-from seecr.compiled.joints import place_joints
+from seecr.compiled.joints import place_batch
 from seecr.compiled.outcomes import CABLE_LAW, CONVERGED, IDLE, ITERATIONS, STALLED
 from seecr.compiled.platform import add_skew, evaluate_batch
 from seecr.compiled.walk import walk_in_order
@@ -232,11 +232,10 @@ def is_slack(tables: Tables, at: Evaluation) -> NDArray[np.bool_]:
 
 def joints_at_rest(tables: Tables, at: Evaluation) -> Array:
     """The joints (n, d, 7) as they stand at the joint values of ``at``."""
-    out, place = np.empty_like(tables.screws), np.empty(7)
-    if tables.screws.shape[1] == 0:
-        return out
-    for i in range(len(tables)):
-        place_joints(tables.screws[i], at.values[i], tables.length, tables.poses[i], place, out[i])
+    out = np.empty_like(tables.screws)
+    if tables.screws.shape[1]:
+        place = np.empty(7)
+        place_batch(tables.screws, at.values, tables.length, tables.poses, place, out)
     return out
 
 

@@ -180,7 +180,7 @@ def with_length_errors(
         share = np.where(better, np.minimum(2.0 * share, 1.0), np.where(moving, 0.3 * share, share))
         together = bool((better == moving).all())
         here = trial if together else here.with_rows(trial, better)
-    if not together:
+    if not together and here.prediction.has_history:
         here = Rows.predicted(problem, effects, here.length_errors, here.prediction)
     return here
 
@@ -206,14 +206,15 @@ class Rows:
         return cls(errors, at, at.solved, raw, rate, problem.noise_about(rate))
 
     def with_rows(self, other: Rows, rows: NDArray[np.bool_]) -> Rows:
-        """The same with some rows of another; the prediction is only near that."""
+        """The same with some rows of another; with history, the prediction is only near that."""
 
         def mixed(mine: Array, theirs: Array) -> Array:
             return np.where(rows.reshape(-1, *[1] * (mine.ndim - 1)), theirs, mine)
 
+        there = other.prediction
         return Rows(
             length_errors=mixed(self.length_errors, other.length_errors),
-            prediction=other.prediction,
+            prediction=there if there.has_history else self.prediction.with_rows(there, rows),
             solved=np.where(rows, other.solved, self.solved),
             raw=mixed(self.raw, other.raw),
             rate=mixed(self.rate, other.rate),
@@ -233,12 +234,7 @@ class Rows:
 
     def better_errors(self, problem: Problem, spread: Array) -> Array:
         """Errors of the lengths (n, m) that the readings make likeliest, to first order."""
-        weighed = _precision_times(problem, self.factor, self.linear_raw())
-        return spread**2 * (np.swapaxes(self.rate, 1, 2) @ weighed[..., None])[..., 0]
-
-
-def _precision_times(problem: Problem, factor: Array, raw: Array) -> Array:
-    """Sigma^-1 raw, (n, 6 + m), 0 where nothing was read."""
-    filled = np.where(problem.measured, raw, 0.0)[..., None]
-    half = np.linalg.solve(factor, filled)
-    return np.linalg.solve(np.swapaxes(factor, 1, 2), half)[..., 0]
+        read = np.where(problem.measured, self.linear_raw(), 0.0)[..., None]
+        white = np.linalg.solve(self.factor, np.concatenate([read, self.rate], axis=2))
+        along = np.swapaxes(white[..., 1:], 1, 2) @ white[..., :1]
+        return np.asarray(spread**2 * along[..., 0])

@@ -43,6 +43,13 @@ def place_joints(screws, values, length, origin, deviation, current):
     deviation[3], deviation[4], deviation[5], deviation[6] = w, x, y, z
 
 
+@jit
+def place_batch(screws, values, length, poses, deviation, current):
+    """The joints (n, d, 7) of n platforms as they stand; ``deviation`` (7,) is left of the last."""
+    for r in range(screws.shape[0]):
+        place_joints(screws[r], values[r], length, poses[r], deviation, current[r])
+
+
 @jit_inner
 def joint_columns(current, x, y, z, per, columns):
     """Motion (n, 6) of the platform origin, now at x, y, z, by the joints in scaled steps."""

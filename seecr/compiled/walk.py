@@ -29,6 +29,7 @@ from seecr.compiled.columns import (
 from seecr.compiled.descent import make_space, solve_in_stages
 from seecr.compiled.jit import jit_allocating, jit_inner
 from seecr.compiled.law import strain_of_tension
+from seecr.compiled.outcomes import CONVERGED, SINGULAR, STALLED
 
 
 @jit_inner
@@ -52,6 +53,9 @@ def walk_in_order(
 ):  # fmt: skip
     """Solve waypoints in order, each from the one before; all outputs are filled.
 
+    One that is not solved ends its run: where the way to a row is not known, nothing is. The
+    others of the run count as stalled; searching for each of them took up to ``limit`` steps.
+
     Args:
         cables: (N, m, N_COLUMNS); the columns OF_THE_PAST are filled.
         fresh: (N,) waypoints that start a run. elapsed: (N,) [s] since the one before.
@@ -63,7 +67,11 @@ def walk_in_order(
     crept, stretched = np.zeros(m), np.zeros(m)
     amplitude, friction = np.empty(m), np.empty(m)
     space = make_space(m, gradient.shape[1], screws.shape[1])
+    lost = False
     for k in range(n):
+        if lost and not fresh[k]:
+            outcome[k] = STALLED
+            continue
         if fresh[k]:
             start[:] = 0.0
             start[3] = 1.0
@@ -97,6 +105,7 @@ def walk_in_order(
             reach[k], limit, guess[k], gradient[k], hessian[k], states[k], slopes[k],
             deviation[k], values[k], softened, fresh[k], space,
         )  # fmt: skip
+        lost = outcome[k] != CONVERGED and outcome[k] != SINGULAR
         for i in range(m):
             row = cables[k, i]
             crept[i] = row[CREEP] + row[CREEP_RATE] * states[k, i, TENSION]

@@ -14,7 +14,7 @@ from seecr.equilibrium import solve
 from seecr.errors import InputError
 from seecr.experiment import Experiment
 from seecr.robot import Joint, Robot
-from seecr.sensitivity import readings_difference
+from seecr.sensitivity import length_sensitivities, readings_difference
 from seecr.setup import plain_setup
 from seecr.solution import Status
 
@@ -103,6 +103,29 @@ def test_a_lost_waypoint_spoils_the_rows_after_it_in_its_run_alone(
     monkeypatch.setattr(statics, "walk", lose_one)
     found = experiment.predict([effect_named("backlash")(gap=1e-3)])
     assert found.solved.tolist() == [True, False, False, True, True, True]
+
+
+def test_rows_of_a_prediction_are_exchanged_for_those_with_other_length_errors() -> None:
+    plain = experiment_of("demobot_cogiro")
+    random, rows = np.random.default_rng(0), np.arange(6) % 2 == 1
+    one, two = 1e-3 * random.standard_normal((2, 6, plain.robot.n_cables))
+    effects = [effect_named("pulley_radius")(radius=0.01)]
+    first, second, mixed = (
+        plain.with_length_errors(errors) for errors in (one, two, np.where(rows[:, None], two, one))
+    )
+    a, b, wanted = (e.predict(effects) for e in (first, second, mixed))
+    length_sensitivities(a), length_sensitivities(b)
+    got = a.with_rows(b, rows)
+    assert got.readings.position == pytest.approx(wanted.readings.position, abs=1e-10)
+    assert got.tensions == pytest.approx(wanted.tensions, abs=1e-5)
+    assert got.pose == pytest.approx(wanted.pose, abs=1e-10)
+    assert np.array_equal(got.tables.cables, wanted.tables.cables)
+    assert np.array_equal(got.setup.rest_lengths(), wanted.setup.rest_lengths())
+    # what was computed already goes with its row
+    rates = length_sensitivities(wanted)
+    assert length_sensitivities(got) == pytest.approx(
+        rates, rel=1e-6, abs=1e-6 * np.abs(rates).max()
+    )
 
 
 def test_readings_belong_to_the_prediction_alone() -> None:

@@ -103,6 +103,18 @@ def test_some_columns_and_length_errors_and_warm_starts_go_by_part():
     np.testing.assert_array_equal(rates(experiment, terms, cold, [7, 2]), every[..., [7, 2]])
 
 
+def test_rows_are_exchanged_in_each_part():
+    plain, effects = Parted(ROBOT, commands()), both().effects
+    errors, rows = 1e-4 * np.random.default_rng(1).standard_normal((2, 6, 8)), np.arange(6) > 2
+    one, two = (plain.with_length_errors(e).predict(effects) for e in errors)
+    mixed = plain.with_length_errors(np.where(rows[:, None], errors[1], errors[0]))
+    got, wanted = one.with_rows(two, rows), mixed.predict(effects)
+    np.testing.assert_allclose(got.readings.position, wanted.readings.position, atol=1e-10)
+    for mine, theirs in zip(got.parts, wanted.parts, strict=True):
+        np.testing.assert_allclose(mine.pose, theirs.pose, atol=1e-10)
+        assert np.array_equal(mine.tables.cables, theirs.tables.cables)
+
+
 def test_rows_that_nobody_takes_apart_have_what_is_usual():
     usual = term(ROBOT, "platform_mass", added_kg=0.1)
     layout = apart(usual.layout, "file", ("a",), usual.vector)

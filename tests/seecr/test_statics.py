@@ -78,6 +78,18 @@ def test_a_walk_of_cables_without_a_past_comes_to_rest_where_each_pose_does(kind
     assert np.all(tables.cables[path.fresh][..., list(OF_THE_PAST[:2])] == 0.0)
 
 
+def test_a_walk_does_not_search_beyond_a_waypoint_that_it_lost() -> None:
+    experiment = experiment_of("demobot_cogiro")
+    path = experiment.path
+    tables = assemble(experiment.setup([], path.commands))
+    lost = int(np.flatnonzero(path.fresh)[1]) - 3
+    tables.cables[lost, 3, REST] = np.nan
+    walked = statics.walk(tables, path, 400)
+    spoilt = np.isin(np.arange(len(tables)), range(lost, lost + 3))
+    assert np.array_equal(walked.outcome != CONVERGED, spoilt)
+    assert np.all(walked.count[~spoilt] > 0) and np.all(walked.count[lost + 1 : lost + 3] == 0)
+
+
 def test_a_past_is_taken_over_and_nothing_else_is() -> None:
     tables, _at = solved("demobot_cogiro")
     other = take(tables, np.arange(len(tables)))
