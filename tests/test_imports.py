@@ -196,7 +196,9 @@ def test_compiled_modules_import_numba_and_nobody_else_does() -> None:
 
 
 def test_what_is_compiled_takes_arrays_alone() -> None:
-    taken = {t for path in modules("seecr/compiled") for t in imports(path)}
+    # what tells a user that compiling takes long is beside what is compiled
+    files = [path for path in modules("seecr/compiled") if path.stem != "telling"]
+    taken = {t for path in files for t in imports(path)}
     assert {t.split(".")[0] for t in taken} == {"__future__", "math", "numba", "numpy", "seecr"}
     assert {place(t) for t in taken if t.startswith("seecr")} == {"seecr.compiled"}
 

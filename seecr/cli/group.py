@@ -12,6 +12,7 @@ from typing import Any, TypeAlias
 import click
 
 from seecr import SeecrError, __version__
+from seecr.compiled.telling import tell_compiling
 
 CommandTable: TypeAlias = Mapping[str, tuple[str, str]]
 
@@ -73,6 +74,8 @@ class LazyGroup(click.Group):
         """Run; bad input is one line on standard error and status 2, never a traceback."""
         if not extra.pop("standalone_mode", True):
             return self._run(*args, **extra)
+        if not args and extra.get("args") is None:  # as a program, not by Python
+            tell_compiling(self._tell_compiling)
         try:
             status = self._run(*args, **extra)
         except click.ClickException as error:
@@ -87,6 +90,10 @@ class LazyGroup(click.Group):
         except (click.Abort, KeyboardInterrupt):
             sys.exit(self._refuse("interrupted", _INTERRUPTED))
         sys.exit(status if isinstance(status, int) else 0)
+
+    def _tell_compiling(self) -> None:
+        name = self.package.partition(".")[0]
+        click.echo(f"{name}: compiling the solver: the first time alone, up to a minute", err=True)
 
     def _refuse(self, text: str, status: int = BAD_INPUT) -> int:
         click.echo(f"{self.package.partition('.')[0]}: {' '.join(text.split())}", err=True)

@@ -3,12 +3,28 @@
 from __future__ import annotations
 
 from numba import njit
+from numba.core import event
+
+from seecr.compiled import telling
 
 _COMMON = {"cache": True, "nogil": True, "error_model": "numpy"}
 # Numba counts who uses an array at every call and slice, atomically. A call here takes as long as
 # the physics in it, so that counting took three quarters of the time; what makes no array, and
 # gets its own from a caller that holds them, need not count.
 _UNCOUNTED = {**_COMMON, "_nrt": False}
+
+
+class _Listener(event.Listener):
+    """Hears of what Numba compiles; what its cache holds it does not compile."""
+
+    def on_start(self, _: event.Event) -> None:
+        telling.begins()
+
+    def on_end(self, _: event.Event) -> None:
+        telling.ends()
+
+
+event.register("numba:compile", _Listener())  # type: ignore[no-untyped-call]
 
 jit = njit(**_UNCOUNTED)  # type: ignore[call-overload]
 """Decorator of compiled functions. A division by zero gives inf or nan, as NumPy's does. They
