@@ -19,7 +19,7 @@ def plural(number: int, noun: str) -> str:
     return noun if number == 1 else f"{noun}s"
 
 
-def between(low: float, high: float, form: str = ".4g") -> str:
-    """From one number to another, "0 to 3"; one where both read alike."""
+def between(low: float, high: float, form: str = ".4g", lead: str = "") -> str:
+    """From one number to another, "0 to 3"; one, without what leads, where both read alike."""
     first, last = f"{low:{form}}", f"{high:{form}}"
-    return first if first == last else f"{first} to {last}"
+    return first if first == last else f"{lead}{first} to {last}"

@@ -85,7 +85,7 @@ class Correction(Result):
                 f"{np.degrees(np.linalg.norm(left[at, 3:], axis=1).max()):.2g} deg at most"
             )
             pulls = self.solution.tensions[at]
-            out.append(f"tensions there {between(pulls.min(), pulls.max())} N")
+            out.append(f"tensions there {between(pulls.min(), pulls.max(), lead='from ')} N")
         near = lost & self.found
         if np.any(lost):
             out.append(

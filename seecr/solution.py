@@ -223,7 +223,7 @@ class Solution(Result):
         )
         pulls, slack = self.tensions[known], self.slack[known].sum(axis=1)
         out.append(
-            f"tensions {between(pulls.min(), pulls.max())} N; slack cables: "
+            f"tensions {between(pulls.min(), pulls.max(), lead='from ')} N; slack cables: "
             f"{between(slack.min(), slack.max(), 'd')} of {self.robot.n_cables}"
         )
         worst = float(np.max(self.residual[known]))

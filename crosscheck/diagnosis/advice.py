@@ -21,15 +21,37 @@ from crosscheck.units import in_unit, parameter_name
 from seecr.effects import Term, catalogue
 from seecr.pose import Array, rotvec_from_quat
 from seecr.robot import Robot
+from seecr.units import with_error
 
 # Ways to tell two effects apart that are named.
 _MOST_WAYS = 2
 
 
-def check_of(term: Term, robot: Robot) -> str:
+class _Sure(float):
+    """A number that is written with the digits that its standard error leaves."""
+
+    error: float
+
+    def __new__(cls, value: float, error: float) -> _Sure:
+        number = super().__new__(cls, value)
+        number.error = error
+        return number
+
+    def __format__(self, form: str) -> str:
+        if not np.isfinite(self.error):
+            return format(float(self), form)
+        shown, _ = with_error(float(self), self.error)
+        return f"+{shown}" if form.startswith("+") and self >= 0.0 else shown
+
+
+def check_of(term: Term, robot: Robot, stderr: Array | None = None) -> str:
     """The effect's independent check, with what to expect: in mm, degrees and newtons.
 
     No number is given that no robot can have.
+
+    Args:
+        term: the effect with its values. robot: that has it.
+        stderr: of the values, (k,); numbers then have the digits that these leave.
     """
     layout = term.layout
     if not term.is_possible(robot):
@@ -38,21 +60,42 @@ def check_of(term: Term, robot: Robot) -> str:
             "something else acts like it"
         )
     values: dict[str, Any] = {}
+    errors = np.full(len(layout), np.inf) if stderr is None else stderr
+    doubts = _errors_of_totals(term, robot, errors)
+
+    def number(value: float, error: float, unit: str) -> _Sure:
+        factor = in_unit(unit)[0]
+        return _Sure(factor * float(value), factor * float(error))
+
     for name, unit, value in zip(layout.names, layout.units, term.vector, strict=True):
-        values[parameter_name(name, unit)] = in_unit(unit)[0] * float(value)
+        values[parameter_name(name, unit)] = number(value, errors[layout.names.index(name)], unit)
     # of several alike, the one that stands out most
     size = np.abs(term.vector - layout.null) / layout.scale * ~layout.shape
     k = int(np.argmax(size))
     values["which"] = parameter_name(layout.names[k], layout.units[k])
-    values["largest"] = in_unit(layout.units[k])[0] * float(term.vector[k])
+    values["largest"] = number(term.vector[k], errors[k], layout.units[k])
     for name, total in term.effect().totals(robot).items():
         key = "total" if name == layout.names[k] and len(layout) > 1 else name
-        values[key] = in_unit(total.unit)[0] * total.value
-        values[f"{key}_nominal"] = in_unit(total.unit)[0] * total.nominal
+        values[key] = number(total.value, doubts[name], total.unit)
+        values[f"{key}_nominal"] = number(total.nominal, doubts[name], total.unit)
     try:
         return layout.effect.advice.format(**values)
     except (KeyError, IndexError, ValueError):
         return layout.effect.advice
+
+
+def _errors_of_totals(term: Term, robot: Robot, errors: Array) -> dict[str, float]:
+    """Standard errors of what a person would measure, by how far one of each parameter moves it."""
+    whole = {name: total.value for name, total in term.effect().totals(robot).items()}
+    square = dict.fromkeys(whole, 0.0)
+    for k, error in enumerate(errors):
+        vector = term.vector.copy()
+        vector[k] += error if np.isfinite(error) else term.layout.scale[k]
+        for name, total in Term(term.layout, vector).effect().totals(robot).items():
+            moved = total.value - whole[name]
+            if moved != 0.0:
+                square[name] += moved**2 if np.isfinite(error) else np.inf
+    return {name: float(np.sqrt(value)) for name, value in square.items()}
 
 
 _CALIBRATE = (

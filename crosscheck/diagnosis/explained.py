@@ -59,7 +59,7 @@ def _missing(sought: Sought, way: Search, chances: Chances, name: str) -> Missin
         stderr=best.stderr[part],
         at_bound=best.at_bound[part],
         rivals=tuple(_rivals(sought, frozenset(way.last.fit.terms.names), name)),
-        check=check_of(term, way.problem.robot),
+        check=check_of(term, way.problem.robot, best.stderr[part]),
         rms=rms_by_kind(way.problem, step.fit.state.raw),
         held_out_rms=step.held_out.rms,
         share=share_of(before, step),

@@ -73,12 +73,13 @@ def missing_of(
     term, part = best.terms[name], best.terms.part(name)
     index = 1 + found.found.index(name)
     before, step = found.steps[index - 1], found.steps[index]
+    stderr = best.stderr[part] * found.last.whiteness.inflation
     return MissingEffect(
         term=term,
-        stderr=best.stderr[part] * found.last.whiteness.inflation,
+        stderr=stderr,
         at_bound=best.at_bound[part],
         rivals=tuple(rivals_of(found, name) if rivals is None else rivals),
-        check=check_of(term, found.problem.robot),
+        check=check_of(term, found.problem.robot, stderr),
         rms=rms_by_kind(found.problem, step.fit.state.raw),
         held_out_rms=step.held_out.rms,
         share=share_of(before, step),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from crosscheck.diagnosis.result import MissingEffect
+from crosscheck.fit.reasons import DiagnosisVerdict
 from seecr.counted import counted
 
 
@@ -60,6 +61,19 @@ def probability_words(probability: float) -> str:
     if probability > 0.99:
         return "> 99 %"
     return "< 1 %" if probability < 0.01 else f"{100.0 * probability:.0f} %"
+
+
+def probability_name(verdict: DiagnosisVerdict) -> str:
+    """What probabilities are: where something unknown acts, they are the catalogue's alone."""
+    unknown = verdict is DiagnosisVerdict.UNKNOWN_EFFECT
+    return "probability within the catalogue" if unknown else "probability"
+
+
+WITHIN = (
+    "Within the catalogue: how probable an effect is if what is missing is one of the catalogue's. "
+    "Here something remains that is none of them and may act like this one."
+)
+"""What is said of probabilities where structure remains."""
 
 
 def percent(share: float) -> str:

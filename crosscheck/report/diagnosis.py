@@ -8,6 +8,7 @@ from markupsafe import Markup
 
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import shown_stages, stages_of
+from crosscheck.diagnosis.words import WITHIN, probability_name
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.fit.words import rms_words
 from crosscheck.report.cables import draw_wall, walls_of
@@ -42,6 +43,8 @@ def diagnosis_context(found: Diagnosis) -> dict[str, Any]:
         "notes": list(found.notes),
         "measure_next": list(found.measure_next),
         "findings": [finding_card(found, finding) for finding in found.missing],
+        "probability": probability_name(found.verdict),
+        "within": WITHIN if found.verdict is DiagnosisVerdict.UNKNOWN_EFFECT else "",
         "candidates": candidate_rows(found),
         "untried": untried(found),
         "after": AFTER,

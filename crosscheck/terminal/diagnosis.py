@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from crosscheck.diagnosis.result import MissingEffect
-from crosscheck.diagnosis.words import probability_words
+from crosscheck.diagnosis.words import WITHIN, probability_name, probability_words
 from crosscheck.fit.reasons import DiagnosisVerdict, Why
 from crosscheck.terminal.lines import console_for, print_parameters, rms_table, say
 
@@ -41,7 +41,9 @@ def print_diagnosis(found: Diagnosis, out: Path, console: Console | None = None)
         if found.chances is not None:
             say(console, f"note: {found.chances.words}", "dim")
         for finding in found.missing:
-            _print_finding(console, finding)
+            _print_finding(console, finding, probability_name(found.verdict))
+        if found.missing and found.verdict is DiagnosisVerdict.UNKNOWN_EFFECT:
+            say(console, f"note: {WITHIN}", "dim")
         _print_candidates(console, found)
     for line in found.measure_next:
         say(console, f"measure next: {line}")
@@ -56,9 +58,9 @@ def _way(found: Diagnosis) -> Table:
     return rms_table("rms error", [*rows, ("noise alone", found.floor, "dim")])
 
 
-def _print_finding(console: Console, finding: MissingEffect) -> None:
+def _print_finding(console: Console, finding: MissingEffect, probability: str) -> None:
     likely = probability_words(finding.probability)
-    say(console, f"{finding.effect}: {finding.title} (probability {likely})", "bold")
+    say(console, f"{finding.effect}: {finding.title} ({probability} {likely})", "bold")
     print_parameters(
         console, finding.layout, finding.values, finding.stderr, finding.at_bound,
         _MOST_PARAMETERS, "diagnosis.json",

@@ -28,7 +28,8 @@ def test_one_is_no_plural() -> None:
 
 def test_one_number_is_no_range() -> None:
     assert between(0, 0, "d") == "0" and between(0, 3, "d") == "0 to 3"
-    assert between(1.00001, 1.00002) == "1"
+    assert between(1.00001, 1.00002, lead="from ") == "1"
+    assert between(1.0, 2.5, lead="from ") == "from 1 to 2.5"
 
 
 @pytest.mark.parametrize("package", ["seecr", "crosscheck"])

@@ -24,6 +24,7 @@ from crosscheck.diagnosis.steps import (
     stages_of,
     views_of,
 )
+from crosscheck.diagnosis.words import WITHIN
 from crosscheck.fit.imitation import imitated
 from crosscheck.fit.problem import KINDS
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
@@ -148,6 +149,14 @@ def test_what_was_found_but_is_not_sure_is_hatched() -> None:
     assert "(not sure)" not in text_of(page("pulleys"))
     assert shown_stages(unsure)[1].added == ""
     assert shown_stages(found)[1].added == "pulley_radius"
+
+
+def test_beside_something_unknown_probabilities_are_within_the_catalogue() -> None:
+    found = diagnosis("pulleys")
+    assert "within the catalogue" not in text_of(page("pulleys")).lower()
+    seen = text_of(render(replace(found, verdict=DiagnosisVerdict.UNKNOWN_EFFECT)))
+    assert "Probability within the catalogue that it is missing: > 99 %" in seen
+    assert WITHIN in seen and "probability within the catalogue" in seen
 
 
 def test_text_from_users_stays_text() -> None:

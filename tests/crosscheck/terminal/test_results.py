@@ -15,7 +15,7 @@ from crosscheck.add import add_effect
 from crosscheck.comparison.limits import Limits, check
 from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.result import Comparison
-from crosscheck.fit.reasons import Reason, Why
+from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 from crosscheck.fit.words import shown
 from crosscheck.terminal.addition import print_addition, why_not
 from crosscheck.terminal.comparison import print_comparison
@@ -77,6 +77,17 @@ def test_a_diagnosis_begins_with_what_shows_and_then_its_verdict() -> None:
     assert lines[0] == f"effects_found: {found.sentence}"
     assert any(line.startswith("pulley_radius: ") for line in lines)
     assert any(line.startswith("not ") for line in lines) and lines[-1].startswith("Results in")
+
+
+def test_beside_something_unknown_probabilities_are_within_the_catalogue() -> None:
+    texts = []
+    for verdict in (DiagnosisVerdict.EFFECTS_FOUND, DiagnosisVerdict.UNKNOWN_EFFECT):
+        screen, out = console()
+        print_diagnosis(replace(made.pulleys(), verdict=verdict), Path("here"), screen)
+        texts.append(out.getvalue())
+    assert "(probability > 99 %)" in texts[0] and "within" not in texts[0]
+    assert "(probability within the catalogue > 99 %)" in texts[1]
+    assert "note: Within the catalogue: how probable an effect is if what is missing" in texts[1]
 
 
 def test_what_was_left_out_as_asked_is_not_told_again() -> None:
