@@ -7,6 +7,7 @@ a drum a sine, creep a curve in time, friction and backlash a step with the dire
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -144,15 +145,16 @@ def draw_wall(wall: Wall, alone: str = BEFORE) -> str:
         height = _ROW_HEIGHT * len(rows) + 0.75
         figure = blank(height, constrained=False)
         panels = figure.subplots(
-            len(rows), len(wall.abscissae), sharex="col", sharey=bool(wall.unit), squeeze=False,
+            len(rows), len(wall.abscissae), squeeze=False,
             gridspec_kw={
                 "left": 0.105, "right": 0.995, "bottom": 0.5 / height, "top": 1.0 - 0.25 / height,
                 "wspace": 0.07 if wall.unit else 0.16, "hspace": 0.16,
             },
         )  # fmt: skip
+        _share(panels, wall, rows)
         for place, k in enumerate(rows):
             for axes, (_name, values) in zip(panels[place], wall.abscissae, strict=True):
-                _panel(axes, values if values.ndim == 1 else values[:, k], wall, k, alone)
+                _panel(axes, _of_row(values, k), wall, k, alone)
             name = wall.names[k].replace(" about ", "\nabout ")  # else it leaves the page
             panels[place, 0].set_ylabel(name, rotation=0, ha="right", va="center", labelpad=6)
         for axes, (name, _values) in zip(panels[-1], wall.abscissae, strict=True):
@@ -170,6 +172,40 @@ def _worth_showing(wall: Wall) -> list[int]:
     return sorted(int(k) for k in worst) if count > _MOST_ROWS else list(range(count))
 
 
+def _of_row(values: Array, k: int) -> Array:
+    return values if values.ndim == 1 else values[:, k]
+
+
+def _share(panels: Any, wall: Wall, rows: list[int]) -> None:
+    """Limits that panels have in common, and numbers on the outer ones alone.
+
+    Matplotlib's own way looks at every other panel for each thing that is drawn in one.
+    """
+    for column, (_name, values) in enumerate(wall.abscissae):
+        read = [_of_row(values, k)[np.isfinite(wall.measured[:, k])] for k in rows]
+        for axes in panels[:, column]:
+            axes.set_xlim(_limits(read, 0.04))
+    for place, k in enumerate(rows):
+        alike = rows if wall.unit else [k]
+        heights = [wall.measured[:, alike], wall.predicted[:, alike], 2.0 * wall.noise[alike]]
+        for axes in panels[place]:
+            axes.set_ylim(_limits([*heights, -2.0 * wall.noise[alike]], 0.05))
+            axes.tick_params(labelbottom=place == len(rows) - 1)
+    for axes in panels[:, 1:].flat:
+        axes.tick_params(labelleft=not wall.unit)
+
+
+def _limits(values: list[Array], margin: float) -> tuple[float, float]:
+    """From the least to the largest finite value and a part of that beyond."""
+    every = np.concatenate([np.ravel(v) for v in values])
+    every = every[np.isfinite(every)]
+    if len(every) == 0 or np.ptp(every) == 0.0:
+        middle = float(every[0]) if len(every) else 0.0
+        return middle - 0.5, middle + 0.5
+    room = margin * float(np.ptp(every))
+    return float(every.min()) - room, float(every.max()) + room
+
+
 def _panel(axes: Axes, x: Array, wall: Wall, k: int, alone: str) -> None:
     y, model = wall.measured[:, k], wall.predicted[:, k]
     level = float(wall.noise[k])
@@ -183,5 +219,4 @@ def _panel(axes: Axes, x: Array, wall: Wall, k: int, alone: str) -> None:
     if many:
         axes.set_rasterization_zorder(0.8)  # both kinds of dots as one image per panel
     grid(axes, "x")
-    axes.margins(x=0.04)
     axes.locator_params(axis="y", nbins=3)

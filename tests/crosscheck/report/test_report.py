@@ -357,6 +357,25 @@ def test_few_dots_are_drawn_as_what_they_are() -> None:
     assert "image/png" not in text
 
 
+@pytest.mark.parametrize(
+    ("unit", "beside"),
+    [
+        # one scale for all, beside the first column; else each panel has its own
+        ("mm", ["−5 0 5 a", "−5 0 5 b", ""]),
+        ("", ["−5 0 5 a two −5 0 5", "−0.1 0.0 0.1 b", "−0.1 0.0 0.1"]),
+    ],
+)
+def test_panels_of_a_wall_share_their_scales(unit: str, beside: list[str]) -> None:
+    values = np.outer(np.linspace(-1.0, 1.0, 7), [8.0, 0.1])
+    across = [("t", np.arange(7) * 1.0), ("l", np.outer(np.arange(7), [1.0, 10.0]))]
+    wall = Wall("two", ["a", "b"], values, 0.0 * values, np.full(2, 0.01), unit, across)
+    (text,) = figures_of(draw_wall(wall))
+    first, second, last = beside
+    # below the last row alone: the times, and the lengths of both rows
+    said = [first, "0 1 2 3 4 5 6 t", second, "0 10 20 30 40 50 60 l", last]
+    assert " ".join(re.findall(r">([^<\s]+)</text>", text)) == " ".join(said).strip()
+
+
 def test_a_wall_of_many_cables_shows_the_worst() -> None:
     n, m = 5, 30
     values = np.full((n, m), 0.1)
