@@ -10,6 +10,7 @@ from crosscheck.diagnosis.result import Diagnosis, MissingEffect
 from crosscheck.diagnosis.words import percent, probability_words
 from crosscheck.fit.words import rms_words
 from crosscheck.units import in_unit, parameter_name, short, with_error
+from seecr.counted import counted
 
 # Correlations above this are named; parameters beyond this many plausible sizes are doubtful.
 _CORRELATED, PLAUSIBLE = 0.9, 5.0
@@ -126,5 +127,5 @@ def _correlations(found: Diagnosis, finding: MissingEffect) -> list[str]:
         ]
         out.append(f"{names[0]} with {names[1]} ({short(value)})")
     if len(ranked) > _MOST_CORRELATIONS:
-        out.append(f"and {len(ranked) - _MOST_CORRELATIONS} more pairs")
+        out.append(f"and {counted(len(ranked) - _MOST_CORRELATIONS, 'more pair')}")
     return out

@@ -27,6 +27,7 @@ def page_of(template: str, made: Made | None, **context: Any) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.globals["counted"] = counted
     said = "" if made is None else made.words
     page = environment.get_template(template).render(version=__version__, made=said, **context)
     return with_glossary(page)

@@ -61,6 +61,25 @@ def test_a_picture_is_dark_where_the_reader_is(pages: Path, tmp_path: Path) -> N
     assert corners[0] == (255, 255, 255) and max(corners[1]) < 64
 
 
+@pytest.mark.parametrize("dark", [False, True])
+def test_what_goes_on_to_the_right_has_a_shadow_there(tmp_path: Path, dark: bool) -> None:
+    """A table that is all there has none."""
+    from PIL import Image
+
+    style = (Path(browser.__file__).parents[1] / "crosscheck/report/page.css").read_text()
+    tables = "".join(
+        '<div class="scrolls"><table style="margin: 0"><tr><td>cable1</td>'
+        f'<td><div style="width: {wide}px; height: 100px"></div></td></tr></table></div>'
+        for wide in (900, 100)
+    )
+    page, picture = tmp_path / "tables.html", tmp_path / "tables.png"
+    page.write_text(f"<!DOCTYPE html><style>{style}</style><main>{tables}</main>")
+    browser.shoot(page, picture, PHONE, dark=dark, height=300)
+    with Image.open(picture) as taken:
+        paper, goes_on, ends = (taken.getpixel((x, y)) for x, y in ((5, 5), (375, 60), (375, 180)))
+    assert ends == paper and abs(goes_on[0] - paper[0]) > 20
+
+
 CLICKED = """<script>document.querySelector("a[href^='#glossary-']").click(); setTimeout(() => {
   document.title = [document.querySelector("#glossary").open, scrollY > 500];
 }, 100);</script></body>"""
