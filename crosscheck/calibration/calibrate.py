@@ -7,7 +7,7 @@ asks for them. Size and correlation of the noise come from the fit's own margina
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,6 +77,9 @@ def calibrate(
     stood = evaluate(problem, terms, factor)
     fitted = fit_everything(setting, terms, progress)
     setting, joint = fitted.setting, fitted.joint
+    far_off = outliers(setting.chain, joint.weight, problem.data.n_rows)
+    problem = setting.problem.with_far_off(far_off)
+    setting = replace(setting, problem=problem)
     progress("predicting runs left out", 0.95)
     return Calibration(
         setting,
@@ -85,7 +88,7 @@ def calibrate(
         before=rms_by_kind(problem, stood.raw),
         after=rms_by_kind(problem, joint.state.raw),
         held_out=leave_out(setting, joint),
-        outliers=outliers(setting.chain, joint.weight, problem.data.n_rows),
+        outliers=far_off,
     )
 
 

@@ -80,7 +80,8 @@ class Calibrated(Result):
         ]
         if self.outliers:
             lines = ", ".join(map(str, self.outliers))
-            out.append(f"hardly counted, far off: {plural(len(self.outliers), 'line')} {lines}")
+            count = plural(len(self.outliers), "line")
+            out.append(f"hardly counted, and not in these errors, as far off: {count} {lines}")
         return out
 
     def lines(self) -> list[str]:

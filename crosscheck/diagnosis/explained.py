@@ -110,7 +110,7 @@ def _noise_notes(sought: Sought, chances: Chances) -> list[str]:
     rows = sought.calibration.outliers
     if rows.any():
         lines = sought.calibration.setting.problem.data.lines_of(rows)
-        out.append(f"hardly counted, far from all the others: {lines}")
+        out.append(f"hardly counted, and not in these errors, as far from all others: {lines}")
     return out
 
 

@@ -47,6 +47,7 @@ class Problem:
         use: (n,) bool rows that count; others are way points or were left out, see ``left_out``.
         left_out: sentences that name the rows left out and why.
         considered: names of the effects that may explain them.
+        far_off: (n,) bool rows that hardly count in fits and not at all in their errors, if any.
         groups: (n,) number of the file or run of each row, where effects have values of their own
             for each.
     """
@@ -58,6 +59,7 @@ class Problem:
     left_out: tuple[str, ...] = ()
     considered: frozenset[str] = field(default_factory=lambda: frozenset(catalogue()))
     groups: NDArray[np.int64] | None = None
+    far_off: NDArray[np.bool_] | None = None
     experiment: Experiment = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -75,6 +77,10 @@ class Problem:
     def with_sigma(self, sigma: Sigma) -> Problem:
         """The same problem with other noise."""
         return self._like(sigma=sigma)
+
+    def with_far_off(self, rows: NDArray[np.bool_]) -> Problem:
+        """The same problem, some of whose rows are known to be far off all others."""
+        return self._like(far_off=rows)
 
     def with_groups(self, groups: NDArray[np.int64] | None) -> Problem:
         """The same problem, whose rows go together otherwise."""
@@ -279,10 +285,14 @@ def kinds_read(problem: Problem) -> list[Kind]:
 def rms_by_kind(problem: Problem, raw: Array) -> Rms:
     """Root mean square of the counted residuals: position [m], orientation [rad], tension [N].
 
-    Of single components, so that noise alone gives its sigma; None where nothing was read.
+    Of single components, so that noise alone gives its sigma; None where nothing was read. Rows
+    far off all others are no part of it.
     """
     out: Rms = {}
+    counted = problem.counted
+    if problem.far_off is not None:
+        counted = counted & ~problem.far_off[:, None]
     for kind in KINDS:
-        values = raw[:, kind.columns][problem.counted[:, kind.columns]]
+        values = raw[:, kind.columns][counted[:, kind.columns]]
         out[kind.key] = float(np.sqrt((values**2).mean())) if len(values) else None
     return out

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from made_data import COGIRO, SIGMA, measured, term
 
 from crosscheck.fit.gauss_newton import fit
 from crosscheck.fit.noise import whiteness
-from crosscheck.fit.problem import Problem, angle_rates
+from crosscheck.fit.problem import Problem, angle_rates, rms_by_kind
 from crosscheck.fit.state import evaluate
 from crosscheck.measurements.data import Sigma
 from seecr.effects import Terms
@@ -88,3 +90,15 @@ def test_errors_of_values_grow_where_residuals_go_together() -> None:
     # in standard errors these should scatter by one
     assert np.sqrt(np.mean(np.square(plain))) > 2.0
     assert 0.5 < np.sqrt(np.mean(np.square(grown))) < 1.6
+
+
+def test_rows_that_are_far_off_are_no_part_of_the_errors():
+    data = measured(load_robot(COGIRO), points=4)
+    far = np.arange(data.n_rows) == 3
+    off = replace(data, position=data.position + far[:, None])
+    problem = Problem(load_robot(COGIRO), off, off.sigma, np.ones(data.n_rows, dtype=bool))
+    raw = problem.residuals(problem.experiment.predict(()).readings)
+    assert rms_by_kind(problem, raw)["position_rms_m"] > 0.1
+    without = rms_by_kind(problem.with_far_off(far), raw)
+    assert without == rms_by_kind(problem.only(~far), raw)
+    assert problem.with_far_off(far).n_readings == problem.n_readings
