@@ -1,8 +1,9 @@
-"""Late effects fitted by themselves, where everything else together leaves more than noise.
+"""Effects fitted by themselves, where everything together leaves more than noise.
 
-A joint fit without the effect that is really there can end in a hollow, where many others imitate
-it badly and what is left no longer looks like it. By itself, from the plain model, it may explain
-nearly all; from there the joint fit finds the rest.
+A joint fit can end in a hollow: without a late effect that is really there many others imitate it
+badly, and what is left no longer looks like it; or the platform rests otherwise at a few poses,
+which then hardly count. By itself, from the plain model, one effect may explain most; from there
+the joint fit finds the rest.
 """
 
 from __future__ import annotations
@@ -16,28 +17,39 @@ from crosscheck.fit.state import evaluate
 from seecr.effects import Term, Terms
 from seecr.effects.base import Layout
 
-# Steps of each fit, how many of them are taken up, and what part of chi2 they may leave at most.
-_STEPS, _TAKEN, _LEFT = 8, 2, 0.5
+# Steps of each fit, and what part of chi2 they may leave at most.
+_STEPS, _LEFT = 8, 0.5
+# Of late effects the best so many are taken up; of the others so many are tried, and taken up.
+_LATE, _TRIED, _TAKEN = 2, 3, 1
 
 
-def fitted_alone(setting: Setting, plain: JointFit, later: Sequence[Layout]) -> list[JointFit]:
-    """Fits of single late effects that explain much by themselves, the best first.
+def fitted_alone(
+    setting: Setting, plain: JointFit, later: Sequence[Layout], others: Sequence[Layout]
+) -> list[JointFit]:
+    """Fits of single effects that explain much by themselves, the best of each kind first.
 
     Args:
         setting: the data.
         plain: the model without them, with few effects or none (the tracker's frame).
-        later: effects that may be added.
+        later: effects with history or a shape that may be added.
+        others: all other effects that may be.
     """
-    found = []
-    for term, _gain in promising_beside(setting, plain, later):
-        fitted = _with(setting, plain, term)
-        if fitted is not None and fitted.state.chi2 < _LEFT * plain.state.chi2:
-            found.append(fitted)
-    return sorted(found, key=lambda j: j.state.chi2)[:_TAKEN]
+    late = [inside(term) for term, _gain in promising_beside(setting, plain, later)]
+    promising = sorted(promising_beside(setting, plain, others), key=lambda one: -one[1])
+    tried = [term for term, _gain in promising[:_TRIED]]
+    return [*_best(setting, plain, late)[:_LATE], *_best(setting, plain, tried)[:_TAKEN]]
+
+
+def _best(setting: Setting, plain: JointFit, terms: Sequence[Term]) -> list[JointFit]:
+    """Fits that explain much, the best first."""
+    fits = [_with(setting, plain, term) for term in terms]
+    most = _LEFT * plain.state.chi2
+    good = [found for found in fits if found is not None and found.state.chi2 < most]
+    return sorted(good, key=lambda j: j.state.chi2)
 
 
 def _with(setting: Setting, plain: JointFit, term: Term) -> JointFit | None:
-    terms = Terms([*plain.terms, inside(term)])
+    terms = Terms([*plain.terms, term])
     state = evaluate(setting.problem, terms, setting.factor, plain.state)
     if not state.valid:
         return None

@@ -1,4 +1,4 @@
-"""The stages of a joint fit: all at once, late effects alone where that was poor, then beside."""
+"""The stages of a joint fit: all at once, effects alone where that was poor, late ones beside."""
 
 from __future__ import annotations
 
@@ -54,8 +54,9 @@ def fit_everything(setting: Setting, terms: Terms, progress: Progress) -> Everyt
     wanted = [a for a in later if a.name not in terms]
     frozen = replace(setting, frozen=True)
     if poor(joint):
-        progress("trying effects with history alone", 0.4)
-        joint = _from_alone(frozen, joint, start, terms, wanted)
+        progress("trying effects alone", 0.4)
+        firm = [a for a in at_once if a.name not in terms and a.name != TRACKER]
+        joint = _from_alone(frozen, joint, start, terms, (wanted, firm))
     progress("looking at effects with history", 0.6)
     wanted = [a for a in wanted if a.name not in joint.terms]
     looked = promising_beside(frozen, joint, wanted)
@@ -122,15 +123,16 @@ def widened(setting: Setting, joint: JointFit) -> JointFit:
 
 
 def _from_alone(
-    setting: Setting, joint: JointFit, start: State, terms: Terms, later: Sequence[Layout]
-) -> JointFit:
-    """The joint fit, or a better one that begins with a late effect fitted by itself."""
+    setting: Setting, joint: JointFit, start: State, terms: Terms,
+    may_be: tuple[Sequence[Layout], Sequence[Layout]],
+) -> JointFit:  # fmt: skip
+    """The joint fit, or a better one that begins with an effect, late or not, by itself."""
     few = start.terms.only([*terms.names, TRACKER])
     plain = settle(
         setting, evaluate(setting.problem, few, setting.factor, start), widths_of(few), WHITE
     )  # fmt: skip
     found = [joint]
-    for alone in fitted_alone(setting, plain, later):
+    for alone in fitted_alone(setting, plain, *may_be):
         others = (t for t in start.terms if t.name not in alone.terms)
         state = evaluate(
             setting.problem, Terms([*alone.terms, *others]), setting.factor, alone.state
@@ -138,6 +140,8 @@ def _from_alone(
         if state.valid:
             fitted = tempered(setting, state, widths_of(state.terms), WHITE)
             found.append(with_noise(setting, fitted))
+            if not poor(found[-1]):
+                break
     return max(found, key=lambda j: worth(setting, j))
 
 

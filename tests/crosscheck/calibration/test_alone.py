@@ -1,4 +1,4 @@
-"""Effects that join late, fitted by themselves where everything else leaves more than noise."""
+"""Effects fitted by themselves, where everything together leaves more than noise."""
 
 from __future__ import annotations
 
@@ -24,7 +24,8 @@ def alone(hidden: Terms) -> tuple[JointFit, list[JointFit]]:
     factor = problem.noise(problem.experiment.predict(()))
     setting = Setting(problem, factor, chain_of(problem), frozen=True)
     plain = settle(setting, evaluate(problem, Terms(), factor), np.zeros(0), WHITE)
-    return plain, fitted_alone(setting, plain, layouts(problem)[1])
+    others, later = layouts(problem)
+    return plain, fitted_alone(setting, plain, later, others)
 
 
 def test_the_weight_of_cables_explains_nearly_all_by_itself() -> None:
@@ -36,6 +37,13 @@ def test_the_weight_of_cables_explains_nearly_all_by_itself() -> None:
     assert best.terms.vector[0] == pytest.approx(0.2, rel=0.02)
 
 
+def test_one_that_joins_at_once_may_begin_too_and_only_the_best_does() -> None:
+    hidden = Terms([term(ROBOT, "pulley_radius", radius_m=0.01)])
+    plain, found = alone(hidden)
+    assert [one.terms.names for one in found] == [("pulley_radius",)]
+    assert found[0].state.chi2 < 0.01 * plain.state.chi2
+
+
 def test_what_explains_less_than_half_is_not_taken_up() -> None:
-    _plain, found = alone(Terms([term(ROBOT, "gravity_tilt", tilt_x_rad=0.03)]))
+    _plain, found = alone(Terms())
     assert found == []
