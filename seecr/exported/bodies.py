@@ -28,6 +28,8 @@ SEGMENTS = 24
 
 # Mass of what carries exit points and winches over the platform's: gravcomp takes its weight away.
 _SMALL = 0.01
+# A cable whose way across is a smaller part of it goes straight up.
+_ABOVE = 1e-12
 # Turns a cylinder's axis, z, to y: across the sheave's plane.
 _ACROSS = "0.7071067811865476 -0.7071067811865476 0 0"
 
@@ -162,8 +164,7 @@ class _Cable:
 
     def _sheave(self, world: ET.Element) -> None:
         r, number = self.radius, self.i + 1
-        ahead = self.end - self.exit
-        ahead = ahead - (ahead @ self.up) * self.up
+        ahead = self._ahead()
         wheel = ET.SubElement(
             world, "body", name=f"sheave{number}", pos=numbers(self.exit),
             xyaxes=numbers(ahead, np.cross(self.up, ahead)),
@@ -176,6 +177,14 @@ class _Cable:
         lean = 0.9 * np.arctan2(r, self.tail)
         side = [r + 2.0 * r * np.sin(lean), 0.0, 2.0 * r * np.cos(lean)]
         ET.SubElement(wheel, "site", name=f"over{number}", pos=numbers(side))
+
+    def _ahead(self) -> Array:
+        """Where the sheave is turned to, (3,): to the anchor point; anywhere, if that is above."""
+        across = np.linalg.svd(self.up[None])[2][1]
+        way = self.end - self.exit
+        ahead = way - (way @ self.up) * self.up
+        size = np.linalg.norm(ahead)
+        return np.asarray(ahead / size if size > _ABOVE * np.linalg.norm(way) else across)
 
     def _behind(self) -> list[tuple[str, dict[str, str]]]:
         """What the cable goes through up to where it leaves."""
@@ -196,11 +205,10 @@ class _Cable:
         """Where it leaves its sheave (3,) [m], and its lengths [m] from there on and before."""
         way, r = self.end - self.exit, self.radius
         rise = float(way @ self.up)
-        ahead = way - rise * self.up
-        across = float(np.linalg.norm(ahead))
+        across = float(np.linalg.norm(way - rise * self.up))
         free = float(np.sqrt((across - r) ** 2 + rise**2 - r**2))
         psi = np.arctan2(rise, across - r) + np.arctan2(free, r)
-        out = r * (1.0 + np.cos(psi)) * ahead / across + r * np.sin(psi) * self.up
+        out = r * (1.0 + np.cos(psi)) * self._ahead() + r * np.sin(psi) * self.up
         return self.exit + out, free, float(r * (np.pi - psi))
 
     def _chain(self, world: ET.Element, body: ET.Element) -> list[str]:

@@ -7,6 +7,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from three_cables import THREE
 
 from crosscheck.settle.settler import Settler, settle_batch
 from seecr.effects import Term, Terms
@@ -135,6 +136,15 @@ def test_bodies_and_springs_rest_in_mujoco_where_seecr_says(given: dict[str, dic
     away = pose_difference(pose[None], exported.solution.pose)[0]
     assert np.abs(away[:3]).max() < NEAR * COGIRO.length and np.abs(away[3:]).max() < NEAR
     assert least > 0.0
+
+
+def test_a_cable_that_goes_straight_up_has_its_sheave_turned_anywhere() -> None:
+    """Its plane is undetermined; once the file had axes of noughts, which MuJoCo does not read."""
+    exported = export(THREE, [term(THREE, "pulley_radius", radius_m=0.02)])
+    assert exported.mujoco_text is not None and exported.solution is not None
+    pose = polished(exported.mujoco_text, 1e-5)[0]
+    away = pose_difference(pose[None], exported.solution.pose)[0]
+    assert np.abs(away).max() < NEAR * THREE.length
 
 
 def test_a_planar_robot_keeps_its_joints() -> None:
