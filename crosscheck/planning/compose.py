@@ -69,11 +69,14 @@ def compose(
     progress("looking for poses", 0.0)
     kinds = kinds_of(reads, sigma or Sigma())
     full, _assumed = expected_sigma(robot, sigma or Sigma(), kinds)
-    poses = tried = _candidates(robot, box)
-    if robot.n_cables >= (len(robot.joints) or 6):  # fewer cables hold no pose, but rest near it
-        poses = held_within(robot, poses, limits)
-    plan = _usable(robot, poses, full, Reads.of_kinds(robot.n_cables, kinds), limits)
-    found = 0 if plan is None else plan.problem.data.n_rows
+    tried, channels = _candidates(robot, box), Reads.of_kinds(robot.n_cables, kinds)
+    plan, found = None, 0
+    if robot.n_cables >= robot.n_dof:
+        plan = _usable(robot, held_within(robot, tried, limits), full, channels, limits)
+        found = 0 if plan is None else plan.problem.data.n_rows
+    if robot.n_cables <= robot.n_dof and found < rows:  # few cables hold little, but rest near it
+        plan = _usable(robot, tried, full, channels, limits)
+        found = 0 if plan is None else plan.problem.data.n_rows
     if plan is None or found < rows:
         raise CrosscheckError(
             f"robot {robot.name} holds still at {found} of {counted(len(tried), 'pose')} "

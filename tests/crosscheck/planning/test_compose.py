@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_data import SIGMA, measured, soft_cogiro, term
+from three_cables import THREE
 
 import crosscheck
 from crosscheck.fit.candidates import null_fit
@@ -145,3 +146,8 @@ def test_a_robot_that_holds_nowhere_is_told_and_a_box_keeps_poses_in(cogiro):
     box = np.array([[0.3, 0.0, 0.1], [0.5, 0.0, 0.2]])
     pose = compose(PLANAR, 6, box=box).command_pose
     assert np.all(pose[:, :3] >= box[0] - 1e-9) and np.all(pose[:, :3] <= box[1] + 1e-9)
+
+
+def test_a_robot_that_holds_few_poses_is_planned_where_it_rests():
+    """With no more cables than freedoms it comes near the others: they were refused once."""
+    assert feasible(THREE, compose(THREE, 18).command_pose).sum() < 18
