@@ -14,6 +14,7 @@ from crosscheck.diagnosis.rivals import Rival, rivals_of
 from crosscheck.diagnosis.search import Search
 from crosscheck.diagnosis.small import share_of
 from crosscheck.fit.candidates import Candidate
+from crosscheck.fit.noise import overestimated
 from crosscheck.fit.problem import Rms, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 
@@ -41,17 +42,18 @@ def diagnosis_of(
         shown: the way whose errors are shown, where the way itself leads to more than is listed.
     """
     last = (way if shown is None else shown).last
+    after = rms_by_kind(way.problem, last.fit.state.raw)
     return Diagnosis(
         verdict=verdict,
         sentence=sentence,
         missing=tuple(missing),
         before=before,
-        after=rms_by_kind(way.problem, last.fit.state.raw),
+        after=after,
         held_out=last.held_out.rms,
         floor=floor,
         candidates=tuple(candidates),
         measure_next=tuple(measure_next(way, missing, verdict, where)),
-        notes=tuple(dict.fromkeys(notes)),
+        notes=tuple(dict.fromkeys([*notes, *overestimated(way.problem, after)])),
         search=way,
         whiteness=way.last.whiteness,
         where=where,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import spatial, special, stats
 
-from crosscheck.fit.problem import Problem, kinds_read
+from crosscheck.fit.problem import Problem, Rms, kinds_read
 from seecr.pose import Array, rotvec_from_quat
 
 # Residuals are structured where neighbours agree by more than this many standard errors.
@@ -17,6 +17,8 @@ STRUCTURED = 4.0
 POOR_FIT = 1e-3
 # Fewer pairs than this say nothing of how rows go together.
 _LEAST_PAIRS = 8
+# What is left over the estimated noise, below which the estimate was wrong.
+_TOO_LARGE = 0.5
 # A third difference takes so many rows.
 _ROWS = 4
 # Robot's lengths by which commands under different loads are taken to be apart.
@@ -196,6 +198,26 @@ def estimate_sigma(problem: Problem, raw: Array) -> tuple[Problem, tuple[str, ..
             )
         notes.append(f"{kind.sigma} is not stated: {how}")
     return problem.with_sigma(sigma), tuple(notes)
+
+
+def overestimated(problem: Problem, left: Rms) -> list[str]:
+    """Noise that was estimated, and is larger than all that is left, a sentence each.
+
+    Between rows that are far apart a large model error differs as noise does.
+
+    Args:
+        problem: with its noise. left: rms of what is left, by kind.
+    """
+    out = []
+    for kind in kinds_read(problem):
+        size, noise = left[kind.key], getattr(problem.sigma, kind.sigma)
+        if getattr(problem.data.sigma, kind.sigma) is None and size and size < _TOO_LARGE * noise:
+            name, words = kind.sigma.rpartition("_")[0], f"{kind.factor * size:.2g} {kind.unit}"
+            out.append(
+                f"{kind.sigma} was estimated too large: no more than {words} rms are left; state "
+                f"the noise, as with --sigma {name}={words.replace(' ', '')}, and more will show"
+            )
+    return out
 
 
 def _differences(problem: Problem, raw: Array) -> Array | None:

@@ -11,6 +11,7 @@ from made_data import measured, soft_cogiro, term
 from crosscheck.fit.candidates import candidates_for, null_fit
 from crosscheck.fit.gauss_newton import FitStatus
 from crosscheck.fit.imitation import basis, beside, imitated, left_over
+from crosscheck.fit.noise import overestimated
 from crosscheck.fit.prepare import outlying_rows, prepare
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.reasons import Reason, Refusal, Unfit, Why
@@ -119,6 +120,20 @@ def test_noise_that_nobody_stated_is_estimated_and_said(robot: Robot) -> None:
     half = replace(data, position=position, sigma=Sigma(orientation_rad=3.5e-4))
     found = prepare(robot, half, Terms()).problem.sigma.position_m
     assert found == pytest.approx(3e-5, rel=0.35)
+
+
+def test_an_estimate_that_is_larger_than_all_that_is_left_is_told(robot: Robot) -> None:
+    """A large model error at poses in no order looks like noise, until an effect explains it."""
+    problem = prepare(robot, replace(measured(robot), sigma=Sigma()), Terms()).problem
+    noise = problem.sigma
+    assert noise.position_m is not None and noise.orientation_rad is not None
+    left = {"position_rms_m": 0.4 * noise.position_m, "tension_rms_N": None,
+            "orientation_rms_rad": 0.9 * noise.orientation_rad}  # fmt: skip
+    (said,) = overestimated(problem, left)
+    assert said.startswith("position_m was estimated too large: no more than ")
+    assert "--sigma position=" in said and "mm rms are left" in said
+    stated = replace(problem, data=replace(problem.data, sigma=noise))
+    assert overestimated(stated, left) == []
 
 
 @pytest.mark.parametrize("rows", [1, 3])
