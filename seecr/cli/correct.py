@@ -99,7 +99,9 @@ def command(
         click.echo(json_text(document))
         return status
     given = given_with(cable, model)
-    then = following("seecr", "sweep", robot, out / "corrected.csv", *given)
+    then = following("seecr", "map", robot, *given)  # where there is something to hold
+    if found.found.any():
+        then = following("seecr", "sweep", robot, out / "corrected.csv", *given)
     for line in [*notes, *found.lines(), *chance_lines(found, kept), f"Results in {out}/", then]:
         click.echo(line)
     return status

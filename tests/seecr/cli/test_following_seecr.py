@@ -85,3 +85,14 @@ def test_each_json_says_how_it_was_made(
     made = json.loads(run("seecr", *args, "--json").stdout)["made"]
     assert made["command"] == shlex.join(["seecr", *args, "--json"])
     assert list(made["sha256"]) == [COGIRO.name] and made["version"] and made["date"]
+
+
+def test_where_no_pose_can_be_corrected_the_workspace_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The file of what to tell the winches is empty then: nothing can be swept."""
+    monkeypatch.chdir(tmp_path)
+    Path("p.csv").write_text("cmd_x_m,cmd_y_m,cmd_z_m\n0.4,0.25,0.1\n")
+    lost = run("seecr", "correct", "demobot_cogiro", "p.csv", "--lowest", "1e9")
+    assert lost.exit_code == 3
+    assert lost.stdout.splitlines()[-1] == "next: seecr map demobot_cogiro"
