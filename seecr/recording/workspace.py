@@ -17,6 +17,8 @@ __all__ = ["write_map_recording"]
 
 # More points than these no viewer turns smoothly.
 _MOST = 200_000
+# A place is unsure where the probability that it can be held is between these.
+_SURELY_NOT, _SURELY = 0.05, 0.95
 
 
 def write_map_recording(found: Workspace, path: str | Path) -> None:
@@ -45,10 +47,23 @@ def write_map_recording(found: Workspace, path: str | Path) -> None:
         scene = Scene(recording, robot, corners, top)
         scene.surroundings()
         scene.axes()
-        write_scale(recording, top, "tensions can stay so far inside their limits")
+        words = "tensions can stay so far inside their limits"
+        more = "" if found.chance is None else "; red: the model does not know for sure"
+        write_scale(recording, top, words + more)
         points = rr.Points3D(
             places,
             radii=0.004 * scene.size,
             colors=colours.scale_colours(np.minimum(margins, top), top),
         )
         recording.always(f"{ROOT}/held", points)
+        if found.chance is not None:
+            recording.always(f"{ROOT}/unsure", _unsure(found, 0.004 * scene.size))
+
+
+def _unsure(found: Workspace, radius: float) -> rr.Points3D:
+    """Places of which the model does not know for sure whether they can be held."""
+    assert found.chance is not None
+    unsure = (found.chance > _SURELY_NOT) & (found.chance < _SURELY)
+    places = np.stack(np.meshgrid(*found.axes, indexing="ij"), axis=-1)[unsure]
+    every = 1 + len(places) // _MOST
+    return rr.Points3D(places[::every], radii=1.5 * radius, colors=colours.VERMILION)

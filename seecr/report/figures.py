@@ -149,6 +149,8 @@ def _slack(ax: Any, solution: Solution, at: Array, mark: dict[str, Any]) -> None
 def map_figure(path: Path, found: Workspace, most: int = 4) -> None:
     """Slices of a workspace: what can be held, slack cables, deviation and tilt at rest.
 
+    Where the map has probabilities, they come second.
+
     Args:
         path: the file.
         found: the workspace, with two or three axes of more than one value.
@@ -164,6 +166,8 @@ def map_figure(path: Path, found: Workspace, most: int = 4) -> None:
     wide, high = (k for k in range(3) if k != across)
     picked = np.unique(np.linspace(0, lengths[across] - 1, most + 2).round().astype(int)[1:-1])
     panels = [_held_panel]
+    if found.chance is not None:
+        panels.append(_chance_panel)
     if np.any(found.rests):
         panels += [_slack_panel, _away_panel, _turn_panel]
     size = (0.9 + 2.9 * len(picked), 0.5 + 2.3 * len(panels))
@@ -186,7 +190,8 @@ Slices = list[NDArray[np.intp]]
 
 def _bar_of(panel: Any, found: Workspace) -> dict[str, Any]:
     words = {
-        _held_panel: "tension margin [N]", _slack_panel: "slack cables",
+        _held_panel: "tension margin [N]", _chance_panel: "probability",
+        _slack_panel: "slack cables",
         _away_panel: "off its command [mm]", _turn_panel: "turned [°]",
     }  # fmt: skip
     more = {"ticks": np.arange(found.robot.n_cables + 1)} if panel is _slack_panel else {}
@@ -200,6 +205,13 @@ def _held_panel(found: Workspace, row: Any, x: Array, y: Array, slices: Slices) 
     # margins of poses far below the exit points grow without end and would hide the others
     top = float(np.quantile(finite, 0.95)) if len(finite) else 1.0
     return _colours(row, x, y, [flat[k] for k in slices], 0.0, top or 1.0)
+
+
+def _chance_panel(found: Workspace, row: Any, x: Array, y: Array, slices: Slices) -> Any:
+    """The probability that a pose can be held, with the boundary of the model's own values."""
+    assert found.chance is not None
+    chance = found.chance.ravel().astype(float)
+    return _colours(row, x, y, [chance[k] for k in slices], 0.0, 1.0, "cividis", found, slices)
 
 
 def _slack_panel(found: Workspace, row: Any, x: Array, y: Array, slices: Slices) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -126,6 +127,10 @@ def test_a_map_is_what_each_pose_says(tmp_path: Path) -> None:
     assert all(words in text for words in ("tension margin [N]", "slack cables", "x [mm]"))
     write_map_recording(found, tmp_path / "map.rrd")
     assert (tmp_path / "map.rrd").stat().st_size > 1000
+    assert "probability" not in text
+    unsure = replace(found, chance=np.where(found.feasible, 0.5, 0.0).astype(np.float32))
+    map_figure(tmp_path / "chance.svg", unsure)
+    assert "probability" in (tmp_path / "chance.svg").read_text()
     with pytest.raises(InputError, match="at least two axes"):
         map_figure(tmp_path / "no.png", workspace_map(robot, 0.4, 0.25, [0.1, 0.2], elastic=False))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -155,3 +156,8 @@ def test_a_workspace_has_numbers_at_its_edges_and_the_scale_of_its_margins(tmp_p
     top = float(back.static("/legend/ticks", "Points2D:labels")[-1].removesuffix(" N"))
     assert np.quantile(margins, 0.95) <= top <= 2.0 * np.quantile(margins, 0.95)
     assert "inside their limits" in back.static("/legend/of", "Points2D:labels")[0]
+    chance = np.array([0.5, 1.0, 0.0, 0.9], dtype=np.float32).reshape(2, 2, 1)
+    write_map_recording(replace(found, chance=chance), tmp_path / "chance.rrd")
+    back = Readback(tmp_path / "chance.rrd")
+    assert "does not know for sure" in back.static("/legend/of", "Points2D:labels")[0]
+    assert len(back.static("/scene/unsure", "Points3D:positions")) == 2
