@@ -28,6 +28,7 @@ from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import load_commands
 from crosscheck.measurements.together import together
 from crosscheck.measurements.write import write_measurements
+from crosscheck.units import LEAST
 from seecr.counted import counted
 from seecr.experiment import Experiment
 from seecr.made import Made
@@ -226,12 +227,12 @@ def _one(parts: Sequence[Measurements]) -> Measurements:
 
 
 def _sigma(takes: Sequence[Take], tensions: Sequence[Array]) -> Sigma:
-    """The noise of means, over all dwells; None where there is none at all."""
+    """The noise of means, over all dwells; None where there is none but rounding."""
 
     def pooled(parts: Sequence[Array]) -> float | None:
         every = np.concatenate(parts)
         rms = float(np.sqrt(np.mean(every**2))) if len(every) else 0.0
-        return float(f"{rms:.3g}") if rms > 0.0 else None
+        return float(f"{rms:.3g}") if rms > LEAST else None
 
     return Sigma(
         position_m=pooled([t.dwells.error_m[t.used] for t in takes]),

@@ -216,6 +216,25 @@ def test_noise_that_goes_together_counts_for_less():
     assert mean_error(alike) == pytest.approx(1 / np.sqrt(40), rel=0.5)
 
 
+def test_what_does_not_scatter_has_no_noise_but_rounding(tmp_path):
+    """An orientation that a log repeats; its 1e-32 rad was written, and refused when read."""
+    rng, rows, told = np.random.default_rng(0), [], []
+    for k, place in enumerate(np.array([[0.3, 0.2, 0.1], [0.5, 0.2, 0.1], [0.4, 0.3, 0.15]])):
+        quat = np.array([1.0, 0.013 * k, 0.007, 0.002])
+        told.append([3.0 * k, *place])
+        rows += [
+            [3.0 * k + 0.05 * j, *(1e3 * place + rng.normal(0.0, 0.05, 3)), *quat]
+            for j in range(40)
+        ]
+    log, commands = tmp_path / "log.csv", tmp_path / "commands.csv"
+    heads = ("t_s,x_mm,y_mm,z_mm,qw,qx,qy,qz", "t_s,cmd_x_m,cmd_y_m,cmd_z_m")
+    for path, head, table in zip((log, commands), heads, (rows, told), strict=True):
+        path.write_text("\n".join([head, *(",".join(map(str, row)) for row in table)]))
+    found = import_case("poses", [log], ROBOT, [commands], Choices(aligned=True))
+    assert found.measured.sigma.orientation_rad is None
+    assert 1e-6 < found.measured.sigma.position_m < 1e-4
+
+
 def test_a_swing_that_dies_out_is_no_rest():
     t = np.arange(0.0, 10.0, 0.01)
     swing = 0.05 * np.exp(-t / 0.8) * np.cos(8.0 * t)
