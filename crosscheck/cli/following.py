@@ -54,6 +54,8 @@ def noise(sigmas: Sequence[str]) -> Words:
 def after_comparison(found: Comparison, given: Given) -> str:
     """What is missing; where nothing is, what these data could not have shown, or using it."""
     files = (given.robot, *given.data)
+    if found.refusal is not None:
+        return following("crosscheck", "plan", given.robot, "--rows", _ROWS, *given.options)
     if not found.is_noise:
         model = given_with(None, given.model)
         return following("crosscheck", "diagnose", *files, *model, *given.options)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -82,7 +84,8 @@ def command(
     The platform is commanded along sweeps to and fro, at two heights and across, and around a
     tilted loop, 144 rows in all, scaled to the robot. MuJoCo brings it to rest at each; a tracker
     with noise reads its pose. With --poses it goes your own way: rows of POSES.csv that alone have
-    no reading are way points; noise is that of the TOML beside it, or of --sigma.
+    no reading are way points; noise is that of the TOML beside it, or of --sigma, and another at
+    other poses.
 
     \b
     Writes into --out:
@@ -136,12 +139,19 @@ def _tell(twin: Twin, out: Path, made: Made | None) -> None:
     click.echo(
         f"{counted(twin.measured.n_rows, 'row')} of {twin.robot.name} in "
         f"{counted(len(twin.measured.runs), 'run')}; "
-        f"noise {1e3 * sigma['position_m']:.3g} mm, "
-        f"{57.29577951 * sigma['orientation_rad']:.2g} deg"
+        f"noise {', '.join(_noises(sigma))}"
     )
     click.echo(f"written to {out}: {', '.join(files)}")
     click.echo(f"what was hidden: crosscheck twin --open {out}")
     click.echo(following("crosscheck", "diagnose", out / "robot.xml", out / "measured.csv"))
+
+
+def _noises(sigma: Mapping[str, float]) -> Iterator[str]:
+    """The noise of each kind of reading."""
+    yield f"{1e3 * sigma['position_m']:.3g} mm"
+    yield f"{math.degrees(sigma['orientation_rad']):.2g} deg"
+    if "tension_N" in sigma:
+        yield f"{sigma['tension_N']:.2g} N"
 
 
 def _open(path: Path, as_json: bool) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -28,6 +29,8 @@ _TENSION = 0.02
 _VISIBLE, _ENLARGED = 2.0, (1.0, 2.0, 3.0)
 # Extents of the sweeps, the smaller ones tried where MuJoCo finds no rest at some commands.
 EXTENTS = (1.0, 0.75, 0.5, 0.35)
+# Digits of commands that tell them apart: a nanometre.
+_TOLD = 9
 # Rows at which it has to rest; the others are left out.
 _AT_REST = 0.95
 
@@ -36,19 +39,27 @@ Progress = Callable[[int, str], None]
 
 @dataclass(frozen=True, eq=False)
 class Lab:
-    """Who measures: the robot, its seed, the noise that was stated, whether tensions are read."""
+    """Who measures.
+
+    Attributes:
+        robot, seed: whose twin. stated: noise. tensions: whether they are read.
+        tell: called with progress. commanded: what the noise differs by, besides its seed.
+    """
 
     robot: Robot
     seed: int
     stated: Sigma
     tensions: bool
     tell: Progress
+    commanded: tuple[int, ...] = ()
 
     def measure(self, case: Measurements, effects: Sequence[Effect], now: str) -> Truth:
         """The truth at commands, their lengths off by the noise of the winches."""
         errors = None
         if self.stated.length_m is not None:
-            noise = random_of(self.seed, 3).standard_normal((case.n_rows, case.n_cables))
+            noise = random_of(self.seed, 3, self.commanded).standard_normal(
+                (case.n_rows, case.n_cables)
+            )
             errors = self.stated.length_m * noise
         return measure(
             self.robot, case.as_commands(self.robot), effects, length_errors=errors,
@@ -68,9 +79,20 @@ class Measured:
     at_rest: NDArray[np.bool_]
 
 
-def random_of(seed: int, stream: int) -> np.random.Generator:
+def random_of(
+    seed: int, stream: int, commanded: tuple[int, ...] = ()
+) -> np.random.Generator:  # fmt: skip
     """Its own random numbers for each purpose: the noise does not depend on what is hidden."""
-    return np.random.default_rng([seed, stream])
+    return np.random.default_rng([seed, stream, *commanded])
+
+
+def key_of(case: Measurements) -> tuple[int, ...]:
+    """Numbers that commands of a user's own are known by: other poses are read with other noise."""
+    told = case.command_lengths if case.command_pose is None else case.command_pose
+    carried = None if case.loads is None else case.loads.mass
+    parts = [np.round(part, _TOLD) + 0.0 for part in (told, carried) if part is not None]
+    digest = hashlib.sha256(b"".join(part.tobytes() for part in parts)).digest()
+    return tuple(np.frombuffer(digest[:16], dtype=np.uint32).tolist())
 
 
 def lacking_in(case: Measurements) -> dict[str, str]:

@@ -27,6 +27,7 @@ from crosscheck.twin.lab import (
     Lab,
     Measured,
     Progress,
+    key_of,
     lacking_in,
     random_of,
     read_of,
@@ -127,9 +128,10 @@ def make_twin(
     hidden = choose(robot, random_of(seed, 0), effects, n_effects, tensions, lacking)
     cases = [given] if given is not None else [sweeps(robot, points, e, seed) for e in EXTENTS]
     tell = progress or (lambda rows, now: None)
-    lab = Lab(robot, seed, stated, tensions, tell)
+    commanded = () if given is None else key_of(given)
+    lab = Lab(robot, seed, stated, tensions, tell, commanded)
     made = rest_of(lab, cases, hidden)
-    measured = read_of(made, random_of(seed, 2))
+    measured = read_of(made, random_of(seed, 2, commanded))
     twin = Twin(
         robot=robot,
         # of a user's own commands all are kept: where nothing rested they were gone through

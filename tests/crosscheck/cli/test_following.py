@@ -69,11 +69,11 @@ def test_after_each_verdict(verdict, missing, model, kept, expected):
 
 
 def test_names_with_blanks_are_quoted_and_all_files_named():
-    found = SimpleNamespace(is_noise=False)
+    found = SimpleNamespace(is_noise=False, refusal=None)
     given = Given(Path("my robot.xml"), [Path("a.csv"), Path("b.csv")])
     line = after_comparison(found, given)
     assert line == "next: crosscheck diagnose 'my robot.xml' a.csv b.csv"
-    noise = SimpleNamespace(is_noise=True)
+    noise = SimpleNamespace(is_noise=True, refusal=None)
     assert after_comparison(noise, given) == "next: crosscheck plan 'my robot.xml' a.csv"
     given = Given(Path("r.xml"), [Path("a.csv")], Path("none.toml"))
     assert after_fit(False, False, given) == "next: crosscheck diagnose r.xml a.csv"
@@ -83,15 +83,22 @@ def test_noise_that_was_stated_is_stated_again():
     """Without it the next command would estimate it, and judge the same data otherwise."""
     given = Given(Path("r.xml"), [Path("a.csv")], Path("m.toml"), ["position=0.1mm"])
     end = " --model m.toml --sigma position=0.1mm"
-    off = SimpleNamespace(is_noise=False)
+    off = SimpleNamespace(is_noise=False, refusal=None)
     assert after_comparison(off, given) == f"next: crosscheck diagnose r.xml a.csv{end}"
     assert after_fit(True, True, given) == f"next: crosscheck compare r.xml a.csv{end}"
     found = SimpleNamespace(verdict=DiagnosisVerdict.EFFECTS_FOUND, missing=("one",))
     assert after_diagnosis(found, given, None, Path("out")).endswith(f"r.xml a.csv{end}")
 
 
+def test_data_that_are_fit_for_no_verdict_are_not_diagnosed_next():
+    """A diagnosis would refuse them, too."""
+    few = SimpleNamespace(is_noise=False, refusal="only 2 readings left")
+    line = after_comparison(few, Given(Path("r.xml"), [Path("a.csv")]))
+    assert line == "next: crosscheck plan r.xml --rows 40"
+
+
 def test_a_model_that_agrees_is_used_on_poses_or_mapped_where_none_are_known():
-    noise = SimpleNamespace(is_noise=True)
+    noise = SimpleNamespace(is_noise=True, refusal=None)
     files = Path("r.xml"), [Path("a.csv"), Path("b.csv")], Path("m.toml")
     line = after_comparison(noise, Given(*files))
     assert line.startswith("next: seecr correct r.xml a.csv --model m.toml  # the poses commanded")

@@ -384,6 +384,18 @@ def test_what_of_the_mjcf_plays_no_part_is_told_once(tmp_path):
     assert run.stderr == f"note: {note}\n"
 
 
+def test_other_poses_are_read_with_other_noise(tmp_path):
+    """Two days of one robot once shared their noise, and their mean was no better than one."""
+    noise = []
+    for name, x in (("a", 0.30), ("b", 0.31), ("a", 0.30)):
+        path = tmp_path / f"{name}.csv"
+        path.write_text(f"cmd_x_m,cmd_y_m,cmd_z_m\n{x},0.2,0.1\n0.4,0.2,0.1\n")
+        twin = make_twin(COGIRO, 2, effects=(), poses=path, sigma=Sigma(2e-5, 1e-4))
+        noise.append(twin.measured.position - twin.truth.position)
+    assert np.array_equal(noise[0], noise[2])
+    assert np.all(np.abs(noise[0] - noise[1]) > 1e-8)
+
+
 def test_effects_that_cannot_be_hidden_are_refused():
     with pytest.raises(InputError, match="no effect 'gravity'; known, nearest first: gravity_tilt"):
         make_twin(COGIRO, 1, effects=("gravity",))
