@@ -16,6 +16,12 @@ def stiff(tmp_path_factory):
     return case(tmp_path_factory.mktemp("stiff"), {"stiffness": {"factor": 1.4}})
 
 
+@pytest.fixture
+def unpaged(monkeypatch):
+    """No page is drawn, which takes most of the time, where nobody looks at it."""
+    monkeypatch.setattr("crosscheck.report.write_page", lambda _found, _path, _made: None)
+
+
 def compare(xml, data, *more):
     return run("compare", xml, data, *QUIET, *more)
 
@@ -36,7 +42,7 @@ def test_without_limits_it_reports_and_ends_0(stiff, tmp_path):
     assert document["poses"]["error"][0][6] is None  # no tensions were read
 
 
-def test_json_alone_on_standard_output(stiff, tmp_path):
+def test_json_alone_on_standard_output(stiff, tmp_path, unpaged):
     result = compare(*stiff, "--json", "--out", tmp_path)
     assert json.loads(result.stdout) == json.loads((tmp_path / "comparison.json").read_text())
 
@@ -56,7 +62,7 @@ def test_two_files_are_one_comparison_with_runs_that_keep_apart(stiff, tmp_path)
     assert "given twice; expected each file once" in refused("compare", xml, first, first)
 
 
-def test_a_limit_exceeded_ends_1_and_says_by_how_much_and_where(stiff, tmp_path):
+def test_a_limit_exceeded_ends_1_and_says_by_how_much_and_where(stiff, tmp_path, unpaged):
     result = compare(*stiff, "--max-position", "0.05mm", "--out", tmp_path)
     assert result.exit_code == 1
     assert "exceeds 0.05 mm by" in result.stdout and "worst at line" in result.stdout
@@ -67,7 +73,7 @@ def test_a_limit_exceeded_ends_1_and_says_by_how_much_and_where(stiff, tmp_path)
     assert worst.exit_code == 1 and "worst orientation error" in worst.stdout
 
 
-def test_limits_from_a_file(stiff, tmp_path):
+def test_limits_from_a_file(stiff, tmp_path, unpaged):
     limits = tmp_path / "limits.toml"
     limits.write_text('max_position = "5mm"\nmax_orientation = "0.001deg"\n')
     result = compare(*stiff, "--limits", limits, "--out", tmp_path)
@@ -76,7 +82,7 @@ def test_limits_from_a_file(stiff, tmp_path):
     assert result.exit_code == 0 and "All limits hold." in result.stdout
 
 
-def test_the_model_is_taken_up(stiff, tmp_path):
+def test_the_model_is_taken_up(stiff, tmp_path, unpaged):
     model = tmp_path / "m.toml"
     model.write_text('[[effect]]\nname = "stiffness"\nparameters.factor = 1.4\n')
     result = compare(*stiff, "--model", model, "--max-position", "0.05mm", "--out", tmp_path)

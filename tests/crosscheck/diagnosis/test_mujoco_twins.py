@@ -24,7 +24,8 @@ CASES = [
     ("demobot_cogiro", 2, ("pulley_radius",)),
     ("demobot_parallel", 3, ("backlash",)),
     ("demobot_cogiro", 4, ("exit_point_error",)),
-    ("demobot_parallel", 5, ("frame_compliance",)),
+    # of the shared laboratories one has a frame that yields, in every run
+    pytest.param("demobot_parallel", 5, ("frame_compliance",), marks=pytest.mark.sweep),
     ("demobot_cogiro", 7, ()),
     ("demobot_parallel", 8, ()),
 ]

@@ -22,6 +22,9 @@ from seecr.shipped import model_path
 pytestmark = pytest.mark.slow
 
 POSITION, ORIENTATION = 3e-5, 3.5e-4
+# How commands hand on to one another does not hang on how many effects are tried: the tutorial,
+# of the same commands, has them all.
+FEW = ("--only", "pulley_radius,stiffness,centre_of_mass,cable_weight,tracker_frame")
 
 
 def crosscheck(*words: str | Path) -> int:
@@ -74,7 +77,7 @@ def test_compare_diagnose_add_compare(case: tuple[Path, Path], tmp_path: Path) -
     model, limit = tmp_path / "model.toml", ("--max-position", "0.1mm")
     out = tmp_path / "out"
     assert crosscheck("compare", robot, data, "--out", out, *limit) == 1
-    assert crosscheck("diagnose", robot, data, "--out", out) == 0
+    assert crosscheck("diagnose", robot, data, *FEW, "--out", out) == 0
     found = json.loads((out / "diagnosis.json").read_text())
     assert [m["effect"] for m in found["missing"]] == ["pulley_radius"]
     page = (out / "diagnosis.html").read_text()
@@ -83,7 +86,7 @@ def test_compare_diagnose_add_compare(case: tuple[Path, Path], tmp_path: Path) -
     assert crosscheck("add", "pulley_radius", robot, data, "--model", model) == 0
     assert "pulley_radius" in model.read_text()
     assert crosscheck("compare", robot, data, "--model", model, "--out", out, *limit) == 0
-    assert crosscheck("diagnose", robot, data, "--model", model, "--out", out) == 0
+    assert crosscheck("diagnose", robot, data, *FEW, "--model", model, "--out", out) == 0
     again = json.loads((out / "diagnosis.json").read_text())
     assert again["verdict"] == "no_effect_missing"
     assert again["missing"] == []

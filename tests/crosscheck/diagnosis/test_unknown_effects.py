@@ -65,10 +65,15 @@ def wavy_target(data: Measurements) -> None:
     data.quat_wxyz[:] = quat_multiply(quat_from_rotvec(turn), data.quat_wxyz)
 
 
-CHANGES = (lens, swaying_floor, rubbing, bumped_tracker, wavy_target)
-# The search takes longest where it is led furthest astray: those run in a sweep.
-ALONE = [(change, "cogiro") for change in CHANGES] + [
+# The search takes longest where it is led furthest astray: those run in a sweep. Of the shared
+# twins one has a lens, in every run; the floor sways beside a known effect.
+ALONE = [
+    (bumped_tracker, "cogiro"),
+    (wavy_target, "cogiro"),
     (bumped_tracker, "parallel"),
+    pytest.param(lens, "cogiro", marks=pytest.mark.sweep),
+    pytest.param(swaying_floor, "cogiro", marks=pytest.mark.sweep),
+    pytest.param(rubbing, "cogiro", marks=pytest.mark.sweep),
     pytest.param(wavy_target, "parallel", marks=pytest.mark.sweep),
     pytest.param(lens, "parallel", marks=pytest.mark.sweep),
     pytest.param(rubbing, "parallel", marks=pytest.mark.sweep),
@@ -108,6 +113,7 @@ WHERE: dict[tuple[Change, str], Callable[[Diagnosis], None]] = {
     (bumped_tracker, "cogiro"): bumped_in_its_run,
     (swaying_floor, "cogiro"): swaying_at_its_period,
     (rubbing, "cogiro"): of_a_place_and_no_period,
+    (wavy_target, "cogiro"): of_a_place_and_no_period,
 }
 
 
@@ -135,3 +141,4 @@ def test_beside_a_known_effect_the_known_one_alone_is_named(change: Change) -> N
     assert [f.effect for f in found.missing] == ["pulley_radius"]
     # what is not modelled pulls at it, by more than noise would
     assert found.missing[0].values[0] == pytest.approx(0.01, rel=0.1)
+    WHERE.get((change, "cogiro"), lambda _found: None)(found)
