@@ -101,6 +101,7 @@ def _coordinates(problem: Problem, state: State) -> Iterator[Coordinate]:
             bias=float(values.mean()),
             rms=float(np.sqrt((values**2).mean())),
             max=float(values[top]),
+            row=int(rows[top]),
             line=int(problem.data.line[rows[top]]),
         )
 

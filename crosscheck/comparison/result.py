@@ -34,7 +34,7 @@ class Coordinate:
     Attributes:
         name: of the reading. unit: of its numbers. rows: how many were compared.
         bias, rms, max: mean, root mean square, and the error that is largest in size.
-        line: of the largest.
+        row, line: of the largest, from 0 and in its file.
     """
 
     name: str
@@ -43,6 +43,7 @@ class Coordinate:
     bias: float
     rms: float
     max: float
+    row: int
     line: int
 
     def as_json(self) -> dict[str, Any]:

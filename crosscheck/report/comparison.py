@@ -89,13 +89,13 @@ def _groups(found: Comparison) -> list[tuple[str, str, list[str]]]:
     return out
 
 
-def _coordinates(found: Comparison) -> list[tuple[str, list[str], str, int]]:
+def _coordinates(found: Comparison) -> list[tuple[str, list[str], str, str]]:
     """Name, bias, rms and largest error, unit, line of the largest."""
     out = []
     for row in found.coordinates:
         factor, unit = in_unit(row.unit)
         numbers = [short(factor * value) for value in (row.bias, row.rms, row.max)]
-        out.append((row.name, numbers, unit, row.line))
+        out.append((row.name, numbers, unit, found.problem.data.place(row.row)))
     return out
 
 

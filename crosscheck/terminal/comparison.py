@@ -57,7 +57,7 @@ def _coordinates(found: Comparison) -> Table:
     for row in found.coordinates:
         factor, unit = in_unit(row.unit)
         numbers = [f"{factor * value:.4g}" for value in (row.bias, row.rms, row.max)]
-        table.add_row(row.name, *numbers, unit, str(row.line), str(row.rows))
+        table.add_row(row.name, *numbers, unit, found.problem.data.place(row.row), str(row.rows))
     return table
 
 

@@ -17,6 +17,7 @@ from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.result import Comparison
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 from crosscheck.fit.words import shown
+from crosscheck.measurements.together import together
 from crosscheck.terminal.addition import print_addition, why_not
 from crosscheck.terminal.comparison import print_comparison
 from crosscheck.terminal.diagnosis import print_diagnosis
@@ -45,6 +46,17 @@ def test_a_comparison_ends_with_verdict_limits_and_files(found: Comparison) -> N
     row = next(line.split() for line in lines if line.startswith("z "))
     assert row == ["z", *(f"{1e3 * v:.4g}" for v in (z.bias, z.rms, z.max)), "mm",
                    str(z.line), str(z.rows)]  # fmt: skip
+
+
+def test_of_several_files_it_is_told_which_the_largest_errors_are_in() -> None:
+    robot = soft_cogiro()
+    days = [replace(measured(robot, seed=k), path=Path(f"{k}.csv")) for k in (1, 2)]
+    both = compare(robot, together(days))
+    screen, out = console()
+    print_comparison(both, [], False, Path("here"), screen)
+    row = next(line.split() for line in out.getvalue().splitlines() if line.startswith("z "))
+    z = next(c for c in both.coordinates if c.name == "z")
+    assert row[-3:-1] == both.problem.data.place(z.row).split() and row[-3] in ("1.csv", "2.csv")
 
 
 def test_a_limit_that_is_exceeded_is_said(found: Comparison) -> None:
