@@ -262,6 +262,8 @@ def boundary(
     lowest: ArrayLike = 0.0,
     highest: ArrayLike = np.inf,
     wrenches: ArrayLike | None = None,
+    effects: GivenEffects = (),
+    at_least: float | None = None,
 ) -> Array:
     """Where the ways from poses that can be held to poses that cannot leave the workspace.
 
@@ -272,18 +274,24 @@ def boundary(
         inside, outside: (n, 7) poses, of the same orientation in each row.
         tolerance: [m] within which the boundary is found.
         lowest, highest, wrenches: as in :func:`seecr.tension_margin`.
+        effects: of the robot, besides.
+        at_least: take for held what is held with this probability, by what a model that keeps its
+            covariance does not know; without it, what is held with the model's own values.
 
     Returns:
         (n, 7), the last poses found that can be held.
 
     Raises:
-        InputError: a pose that is not on the side it is said to be.
+        InputError: a pose that is not on the side it is said to be; a probability asked of
+            something without a covariance.
     """
     near, far = commanded_poses(inside, "inside"), commanded_poses(outside, "outside")
 
     def held(poses: Array) -> NDArray[np.bool_]:
-        margins = tension_margin(robot, poses, lowest=lowest, highest=highest, wrenches=wrenches)
-        return np.asarray(margins >= 0.0)
+        if at_least is not None:
+            chance = asked_chance(robot, poses, effects, lowest, highest, wrenches)
+            return np.asarray(chance >= at_least)
+        return _margins(robot, poses, lowest, highest, wrenches, effects) >= 0.0
 
     if not held(near).all() or held(far).any():
         raise InputError("boundary needs poses inside that can be held, and outside that cannot")

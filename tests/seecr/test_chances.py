@@ -13,7 +13,7 @@ from seecr.effects import Terms
 from seecr.equilibrium import solve
 from seecr.errors import InputError
 from seecr.inverse import correct
-from seecr.maps import workspace_map
+from seecr.maps import boundary, workspace_map
 from seecr.mjcf import load_robot
 from seecr.model import Model
 from seecr.report.corrections import chance_lines, document_of
@@ -124,6 +124,23 @@ def test_a_map_has_the_probabilities_of_its_poses(tmp_path: Path) -> None:
     write_arrays(tmp_path / "map.npz", found)
     with np.load(tmp_path / "map.npz") as kept:
         np.testing.assert_array_equal(kept["probability"], found.chance)
+
+
+def test_the_boundary_is_that_of_the_model_and_of_the_probability_asked_for(tmp_path: Path) -> None:
+    model = model_of(tmp_path, MODEL + KEPT)
+    inside, outside = POSES[:1].copy(), POSES[:1].copy()
+    inside[:, :3], outside[:, :3] = [0.3, 0.2, 0.1], [0.0, 0.2, 0.1]
+    ends = {"lowest": 0.02, "tolerance": 1e-5, "effects": model}
+    own = boundary(ROBOT, inside, outside, **ends)
+    np.testing.assert_allclose(margins_with(ROBOT, own, model, 0.02), 0.0, atol=1e-3)
+    plain = boundary(ROBOT, inside, outside, lowest=0.02, tolerance=1e-5)
+    assert abs(own - plain).max() > 5e-4
+    sure = boundary(ROBOT, inside, outside, at_least=0.95, **ends)
+    maybe = boundary(ROBOT, inside, outside, at_least=0.05, **ends)
+    assert sure[0, 0] > own[0, 0] > maybe[0, 0]
+    assert held_chance(ROBOT, sure, model, lowest=0.02)[0] == pytest.approx(0.95, abs=0.02)
+    with pytest.raises(InputError, match="by a model that keeps its covariance"):
+        boundary(ROBOT, inside, outside, at_least=0.95)
 
 
 def test_maps_that_can_have_no_probabilities_are_refused(tmp_path: Path) -> None:
