@@ -20,8 +20,9 @@ from crosscheck.calibration.robust import outliers
 from crosscheck.fit.noise import nearest_rows, next_rows, whiteness
 from crosscheck.fit.problem import KINDS
 
-# White noise may be so many times larger than stated; what goes together by more than this, less.
-_UNDERSTATED, _TOGETHER, _ALIKE = 3.0, 1.5, 0.3
+# White noise may be so many times larger than stated; what goes together by more than this, less:
+# people state half of what it is, and trackers are smooth in time, both at once.
+_UNDERSTATED, _TOGETHER, _ALIKE = 3.0, 2.3, 0.3
 # Where noise was estimated from differences of neighbours: what goes together is larger.
 _ESTIMATED, _DRIFT = 5.0, 0.9
 # More rows than this part never are outliers; chance that independent ones lie so side by side.

@@ -86,9 +86,10 @@ def _searched(
     """The verdict of data that are fit for one."""
     problem = ready.problem
     found, more = by_steps(problem, base, factor, _part(progress, 0.0, 0.5))
-    if found.last.whiteness.is_noise:
+    if found.last.whiteness.is_noise and found.noise_scale == 1.0:
         return settled(found, (*notes, *more))
-    # no few effects one after the other, or noise that goes together: all at once, in sets
+    # no few effects one after the other, noise that goes together, or noise that is larger than
+    # stated, which a few rows far off may have made of it: all at once, in sets
     sought = seek(problem, problem.data.sigma, ready.terms, _part(progress, 0.5, 1.0))
     if sought.judgement.verdict is not DiagnosisVerdict.UNKNOWN_EFFECT:
         return explained(sought, notes)

@@ -27,11 +27,12 @@ def noise(scale: float, rho: float) -> Colour:
         (1.0, 0.0, True),
         (1.0, 0.8, True),  # of the stated size: a tracker is smooth in time
         (2.0, 0.0, True),  # white, and stated too small
-        (2.0, 0.8, False),
+        (2.0, 0.8, True),  # coloured, and stated half as large as it is
+        (2.6, 0.8, False),
         (4.0, 0.0, False),
     ],
 )
-def test_stated_noise_may_be_coloured_or_larger_but_not_both(
+def test_stated_noise_may_be_coloured_and_wrong_by_two_but_no_more(
     scale: float, rho: float, is_noise: bool
 ) -> None:
     assert too_large(noise(scale, rho), POSITION, ["position"]) is not is_noise
