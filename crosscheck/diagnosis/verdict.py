@@ -63,6 +63,8 @@ def diagnose(
 
 
 Notes = tuple[str, ...]
+# What the steps end with is not listed where it is less likely than that.
+_DOUBTED = 0.5
 
 
 def _diagnosed(ready: Prepared, said: Notes, progress: Progress) -> Diagnosis:
@@ -87,9 +89,12 @@ def _searched(
     problem = ready.problem
     found, more = by_steps(problem, base, factor, _part(progress, 0.0, 0.5))
     if found.last.whiteness.is_noise and found.noise_scale == 1.0:
-        return settled(found, (*notes, *more))
-    # no few effects one after the other, noise that goes together, or noise that is larger than
-    # stated, which a few rows far off may have made of it: all at once, in sets
+        steps = settled(found, (*notes, *more))
+        if all(effect.probability > _DOUBTED for effect in steps.missing):
+            return steps
+    # no few effects one after the other, or one that is less likely than not; noise that goes
+    # together, or is larger than stated, which a few rows far off may have made of it: all at
+    # once, in sets
     sought = seek(problem, problem.data.sigma, ready.terms, _part(progress, 0.5, 1.0))
     if sought.judgement.verdict is not DiagnosisVerdict.UNKNOWN_EFFECT:
         return explained(sought, notes)
