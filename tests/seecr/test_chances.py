@@ -135,10 +135,13 @@ def test_the_boundary_is_that_of_the_model_and_of_the_probability_asked_for(tmp_
     np.testing.assert_allclose(margins_with(ROBOT, own, model, 0.02), 0.0, atol=1e-3)
     plain = boundary(ROBOT, inside, outside, lowest=0.02, tolerance=1e-5)
     assert abs(own - plain).max() > 5e-4
+    ends["tolerance"] = 2e-3
     sure = boundary(ROBOT, inside, outside, at_least=0.95, **ends)
     maybe = boundary(ROBOT, inside, outside, at_least=0.05, **ends)
     assert sure[0, 0] > own[0, 0] > maybe[0, 0]
-    assert held_chance(ROBOT, sure, model, lowest=0.02)[0] == pytest.approx(0.95, abs=0.02)
+    further = sure + np.array([-2e-3, 0, 0, 0, 0, 0, 0])
+    said = held_chance(ROBOT, np.concatenate([sure, further]), model, lowest=0.02)
+    assert said is not None and said[0] >= 0.95 > said[1]
     with pytest.raises(InputError, match="by a model that keeps its covariance"):
         boundary(ROBOT, inside, outside, at_least=0.95)
 
