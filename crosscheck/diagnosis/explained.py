@@ -49,8 +49,11 @@ def explained(sought: Sought, notes: Sequence[str]) -> Diagnosis:
 
 
 def _missing(sought: Sought, way: Search, chances: Chances, name: str) -> MissingEffect:
-    # where others are missing too that are not sure, values beside those are nearer to the truth
-    best = fit_of(sought.calibration.setting, sought.found.best.joint)
+    best = way.last.fit
+    if sought.judgement.verdict is DiagnosisVerdict.MANY_EFFECTS:
+        # others are missing too that are not sure: values beside those are nearer to the truth;
+        # elsewhere what is listed has to be a model by itself
+        best = fit_of(sought.calibration.setting, sought.found.best.joint)
     term, part = best.terms[name], best.terms.part(name)
     index = 1 + way.found.index(name)
     before, step = way.steps[index - 1], way.steps[index]

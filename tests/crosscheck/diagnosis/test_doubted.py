@@ -67,3 +67,8 @@ def test_an_effect_that_is_unlikely_is_not_listed_though_steps_end_with_noise(
     assert found.verdict is crosscheck.DiagnosisVerdict.EFFECTS_FOUND
     assert {one.effect for one in found.missing} == {"pulley_radius", "stiffness"}
     assert all(one.probability > 0.95 for one in found.missing)
+    # what is listed is a model by itself: the one whose errors are shown
+    assert found.search is not None
+    for one in found.missing:
+        shown = found.search.last.fit.terms[one.effect].vector
+        np.testing.assert_array_equal(one.term.vector, shown)
