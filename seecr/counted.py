@@ -1,8 +1,10 @@
-"""Numbers in sentences: with their nouns, and from one to another."""
+"""Numbers in sentences: with their nouns, from one to another, and of lists that are long."""
 
 from __future__ import annotations
 
-__all__ = ["between", "counted", "plural"]
+from collections.abc import Sequence
+
+__all__ = ["between", "counted", "plural", "some"]
 
 
 def counted(number: int, noun: str, form: str = "d") -> str:
@@ -23,3 +25,12 @@ def between(low: float, high: float, form: str = ".4g", lead: str = "") -> str:
     """From one number to another, "0 to 3"; one, without what leads, where both read alike."""
     first, last = f"{low:{form}}", f"{high:{form}}"
     return first if first == last else f"{lead}{first} to {last}"
+
+
+def some(words: Sequence[str], most: int = 4, mark: str = ", ") -> str:
+    """The first few, and how many more: a, b and 3 more; a; b; and 3 more."""
+    more = len(words) - most
+    if more <= 0:
+        return mark.join(words)
+    lead = " " if mark == ", " else mark
+    return f"{mark.join(words[:most])}{lead}and {more} more"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from typing import TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,9 +109,8 @@ class Parted(Experiment):
         parts = self.parts(effects)
         if not parts:
             return super().predict(effects, near)
-        # of other effects taken apart otherwise it is no help
-        known = near.parts if isinstance(near, PartedPrediction) else ()
-        nearby = known if len(known) == len(parts) else (None,) * len(parts)
+        # of rows that go together otherwise it is no help
+        nearby = near.parts if near is not None and _is_of(near, parts) else (None,) * len(parts)
         found = [
             part.experiment.predict(part.effects(effects), at)
             for part, at in zip(parts, nearby, strict=True)
@@ -156,6 +156,15 @@ class Parted(Experiment):
         )  # fmt: skip
 
 
+def _is_of(at: Prediction, parts: Sequence[Part]) -> TypeGuard[PartedPrediction]:
+    """Whether a prediction was solved part by part, of the same rows each."""
+    return (
+        isinstance(at, PartedPrediction)
+        and len(at.rows) == len(parts)
+        and all(np.array_equal(rows, part.rows) for rows, part in zip(at.rows, parts, strict=True))
+    )
+
+
 def _tables(parts: Sequence[Tables], order: NDArray[np.intp]) -> Tables:
     """Tables one below the other, in an order of their rows."""
     first = parts[0]
@@ -191,9 +200,9 @@ def rates(
     parts = experiment.parts(terms.effects) if isinstance(experiment, Parted) else []
     if not parts:
         return sensitivities(experiment, terms, at, columns, frozen)
-    if not isinstance(at, PartedPrediction) or len(at.parts) != len(parts):
+    if not _is_of(at, parts):
         at = experiment.predict(terms.effects)
-    assert isinstance(at, PartedPrediction)
+        assert _is_of(at, parts)
     wanted = np.array(list(columns) if len(columns) else range(len(terms)))
     n, m = at.tables.cables.shape[:2]
     out = np.zeros((n, 6 + m, len(wanted)))

@@ -23,7 +23,7 @@ from seecr.compiled.outcomes import (
     TOLERANCE,
     UNSTABLE,
 )
-from seecr.counted import between, counted
+from seecr.counted import between, counted, plural, some
 from seecr.inertia import mass_matrices
 from seecr.pose import Array, rotvec_from_quat
 from seecr.result import COORDINATES, Record, Result, named
@@ -263,9 +263,7 @@ class Solution(Result):
 
 def _some_rows(rows: NDArray[np.intp], most: int = 8) -> str:
     """Numbers of poses for people."""
-    named = ", ".join(str(k) for k in rows[:most])
-    more = f" and {len(rows) - most} more" if len(rows) > most else ""
-    return f"{'pose' if len(rows) == 1 else 'poses'} {named}{more}"
+    return f"{plural(len(rows), 'pose')} {some([str(k) for k in rows.tolist()], most)}"
 
 
 def certify(robot: Robot, tables: Tables, found: statics.Evaluation) -> Solution:

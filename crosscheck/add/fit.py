@@ -50,7 +50,7 @@ def add_effect(
             says so of it.
 
     Raises:
-        InputError: no effect of that name.
+        InputError: no effect of that name, or ``per`` is neither.
         CrosscheckError: the data cannot carry it.
         UnsolvedError: rows have no equilibrium, or the fit does not come to an end.
     """

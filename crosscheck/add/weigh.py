@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +19,7 @@ from crosscheck.fit.problem import Problem, rms_by_kind
 from crosscheck.fit.state import evaluate
 from crosscheck.fit.systematic import moved_by_others
 from crosscheck.model.fitted import Fitted
-from seecr.counted import counted
+from seecr.counted import counted, some
 from seecr.effects import Terms
 from seecr.pose import Array
 from seecr.robot import Robot
@@ -167,9 +166,9 @@ def _warnings(
         names = np.array(f.term.layout.names)
         unseen, stopped = ~np.isfinite(f.stderr), np.asarray(f.at_bound, bool)
         if stopped.any():
-            out.append(f"{f.term.name}: {_some(names[stopped])} ended on a bound")
+            out.append(f"{f.term.name}: {some(names[stopped])} ended on a bound")
         if (unseen & ~stopped).any():
-            out.append(f"{f.term.name}: {_some(names[unseen & ~stopped])} not seen by these data")
+            out.append(f"{f.term.name}: {some(names[unseen & ~stopped])} not seen by these data")
         if not f.term.is_possible(robot):
             out.append(
                 f"{f.term.name}: no robot can have these values, so something else acts like it"
@@ -178,7 +177,7 @@ def _warnings(
         large = (size > _IMPLAUSIBLE) & ~f.term.layout.shape
         if large.any():
             out.append(
-                f"{f.term.name}: {_some(names[large])} is up to {size[large].max():.3g} times a "
+                f"{f.term.name}: {some(names[large])} is up to {size[large].max():.3g} times a "
                 "plausible size: check it on the robot"
             )
     return out + _together(best, own)
@@ -208,8 +207,3 @@ def _together(best: Fit, own: NDArray[np.bool_]) -> list[str]:
         f"{labels[i]} and {labels[j]} are hardly determined apart (correlation {c:.3f})"
         for c, i, j in sorted(pairs, reverse=True)[:_MOST_NAMED]
     ]
-
-
-def _some(names: Any) -> str:
-    rest = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
-    return ", ".join(names[:_MOST_NAMED]) + rest

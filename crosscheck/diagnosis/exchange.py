@@ -15,8 +15,8 @@ from crosscheck.diagnosis.order import fitted_to_the_end, in_order
 from crosscheck.diagnosis.search import Search
 from crosscheck.fit.candidates import try_candidate
 
-# An effect that was found and is less probable than this may be in another's place.
-_DOUBTED = 0.5
+DOUBTED = 0.5
+"""An effect that steps found and that is less probable may stand in the place of others."""
 
 
 def exchanged(found: Search, chances: Chances) -> Search:
@@ -26,7 +26,7 @@ def exchanged(found: Search, chances: Chances) -> Search:
         found: a search that ended with noise.
         chances: about its last model.
     """
-    gone = [name for name in found.found if chances.of(name) < _DOUBTED]
+    gone = [name for name in found.found if chances.of(name) < DOUBTED]
     inside = set(found.last.fit.terms.names)
     come = [m[0] for m, p in chances.classes if p > SURE and not inside & set(m)]
     if not gone or not come:

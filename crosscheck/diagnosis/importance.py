@@ -54,4 +54,4 @@ def _left_and_noise(found: Diagnosis, search: Search, problem: Problem) -> tuple
     shape = problem.measured.shape
     sigma = np.broadcast_to(problem.reading_sigma, shape)
     left = np.nan_to_num(search.last.fit.state.table) * sigma
-    return rms_by_kind(problem, left), rms_by_kind(problem, search.noise_scale * sigma)
+    return rms_by_kind(problem, left), rms_by_kind(problem, sigma)

@@ -7,7 +7,6 @@ which effects are equals is known from refits (:mod:`crosscheck.diagnosis.rivals
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -40,10 +39,9 @@ def chances_near(found: Search, alike: Mapping[str, Sequence[str]]) -> Chances:
         alike: of each effect that was found, those that cannot be told from it.
     """
     problem, fit = found.problem, found.last.fit
-    colour = replace(WHITE, scale=WHITE.scale * found.noise_scale)
     setting = Setting(problem, found.factor, chain_of(problem), frozen=True)
     state = evaluate(problem, fit.terms, found.factor, fit.state)
-    joint = settle(setting, state, widths_of(fit.terms), colour, _STEPS)
+    joint = settle(setting, state, widths_of(fit.terms), WHITE, _STEPS)
     catalogue = _catalogue(setting, joint)
     always, names = frozenset(found.base), frozenset(fit.terms.names)
     effects = [n for n in catalogue.names if n not in always]
@@ -77,7 +75,7 @@ def _refitted(found: Search, scores: Scores, last: Names) -> dict[Names, float]:
     """
     base = scores.score(last) - found.last.evidence.log - scores.log_prior(last)
     out: dict[Names, float] = {}
-    for (names, name), (_chi2, fit) in found.known.items():
+    for (names, name), fit in found.fits.items():
         every = names | {name}
         if fit.valid and every != last:
             score = base + found.trials.evidence(fit).log + scores.log_prior(every)

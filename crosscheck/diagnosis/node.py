@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from crosscheck.calibration.probability import SMALL
-from crosscheck.fit.candidates import Candidate, Trials, fit_candidate, judged, screen
+from crosscheck.fit.candidates import Candidate, Trials, fit_candidate, screen
 from crosscheck.fit.evidence import FALSE_ALARM, Evidence
 from crosscheck.fit.gauss_newton import Fit
 from crosscheck.fit.noise import Whiteness
@@ -26,8 +26,8 @@ _FITTED, _FITTED_SMALL = 7, 2
 _PRUNE_NOISE, _PRUNE_OTHER = 0.02, 0.3
 
 Names = frozenset[str]
-# Fits of candidates by (effects beside it, its name), with the chi2 of those effects alone.
-Known = Mapping[tuple[Names, str], tuple[float, Fit]]
+# Fits of candidates by (effects beside it, its name).
+Fits = Mapping[tuple[Names, str], Fit]
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,13 +55,9 @@ class Node:
         return max(self.whiteness.chi2 - self.whiteness.dof, 1e-9)
 
     @property
-    def fits(self) -> Known:
-        """The fits of its candidates, for another search of the same data."""
-        return {
-            (self.names, c.name): (self.fit.chi2, c.fit)
-            for c in self.candidates
-            if c.fit is not None
-        }
+    def fits(self) -> Fits:
+        """The fits of its candidates."""
+        return {(self.names, c.name): c.fit for c in self.candidates if c.fit is not None}
 
 
 def node_of(trials: Trials, found: Fit) -> Node:
@@ -70,22 +66,20 @@ def node_of(trials: Trials, found: Fit) -> Node:
     return Node(found, evidence, trials.whiteness(found, evidence.parameters))
 
 
-def explored(trials: Trials, node: Node, all_: bool, known: Known, progress: Progress) -> Node:
+def explored(trials: Trials, node: Node, all_: bool, progress: Progress) -> Node:
     """The node with every effect tried that it does not have.
 
     Args:
         trials: how effects are tried.
         node: a model.
         all_: whether all that promise something are fitted, or only those that promise most.
-        known: fits of an earlier search of the same data.
         progress: called with what is being done and its share.
     """
     refused, promising = _screened(trials, node, lambda text, part: progress(text, 0.5 * part))
     chosen = promising if all_ else _most_promising(promising)
     tried = _fitted(
-        trials, node, promising, chosen, known,
-        lambda text, part: progress(text, 0.5 + 0.5 * part),
-    )  # fmt: skip
+        trials, node, promising, chosen, lambda text, part: progress(text, 0.5 + 0.5 * part)
+    )
     return replace(node, candidates=_judged(node, (*refused, *tried)))
 
 
@@ -129,7 +123,6 @@ def _fitted(
     node: Node,
     promising: Sequence[Candidate],
     chosen: Sequence[Candidate],
-    known: Known,
     progress: Progress,
 ) -> list[Candidate]:
     """The chosen candidates fitted, the others refused, in the same order."""
@@ -139,7 +132,7 @@ def _fitted(
             out.append(c.refused(Reason(Why.PROMISES_LESS)))
             continue
         progress(f"fitting {c.name}", k / len(promising))
-        tried = _tried(trials, node, c, _hopeless(node.fit.chi2, best), known)
+        tried = fit_candidate(trials, node.fit, c, _hopeless(node.fit.chi2, best))
         best = min(best, np.inf if tried.fit is None else tried.fit.chi2)
         out.append(tried)
     return out
@@ -152,14 +145,6 @@ def _hopeless(without: float, best: float) -> float:
         # nobody goes on from what explains little where another explains much
         limit = min(limit, (1.0 - LEAST_PART) * without)
     return limit
-
-
-def _tried(trials: Trials, node: Node, c: Candidate, hopeless: float, known: Known) -> Candidate:
-    """A candidate fitted; with what an earlier search found, where that fitted it."""
-    before = known.get((node.names, c.name))
-    if before is not None and before[0] == node.fit.chi2:
-        return judged(trials, before[1], node.fit, c)
-    return fit_candidate(trials, node.fit, c, hopeless)
 
 
 def _judged(node: Node, candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:

@@ -69,7 +69,7 @@ def _rival(found: Search, candidate: Candidate, without: Fit, own: int) -> Rival
     # residuals that go together count for fewer
     left = final.whiteness.inflation**2
     loss = (final.evidence.log - trials.evidence(best).log) / left
-    worse = (best.chi2 - final.fit.chi2) / trials.noise_scale**2 / left
+    worse = (best.chi2 - final.fit.chi2) / left
     alike = loss > -EQUAL and are_equals(loss, own, len(candidate.layout)) and worse < _TOLD_APART
     return Rival(candidate.name, best, loss) if alike else None
 
@@ -83,7 +83,7 @@ def _likely(found: Search, name: str, without: Fit) -> list[Candidate]:
     pool, best = _tried_beside(found, name)
     # structure that was left over then counts as noise
     left = max(best / max(final.whiteness.dof, 1), final.whiteness.inflation**2)
-    margin = 4.0 * _TOLD_APART * max(found.noise_scale**2, left)
+    margin = 4.0 * _TOLD_APART * max(1.0, left)
 
     def likely(fitted: Fit, other: str) -> bool:
         if fitted.chi2 < best + margin:

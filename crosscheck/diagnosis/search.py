@@ -21,7 +21,7 @@ from crosscheck.calibration.probability import SMALL
 from crosscheck.diagnosis.node import (
     LEAST_GAIN,
     LEAST_PART,
-    Known,
+    Fits,
     Names,
     Node,
     children_of,
@@ -55,12 +55,12 @@ class Search:
     Attributes:
         trials: the problem, its noise and how effects were tried, used throughout.
         steps: from the model as it stood to the last one.
-        known: fits of candidates, for a search of the same data again.
+        fits: of every candidate that was fitted.
     """
 
     trials: Trials
     steps: tuple[Step, ...]
-    known: Known
+    fits: Fits
 
     @property
     def problem(self) -> Problem:
@@ -71,11 +71,6 @@ class Search:
     def factor(self) -> Array:
         """Noise factors used throughout."""
         return self.trials.factor
-
-    @property
-    def noise_scale(self) -> float:
-        """Noise in units of the stated one, used by all tests."""
-        return self.trials.noise_scale
 
     @property
     def base(self) -> tuple[str, ...]:
@@ -98,37 +93,29 @@ class Search:
         return tuple(step.added for step in self.steps[1:])
 
 
-def search(
-    trials: Trials,
-    base: Fit,
-    progress: Progress = lambda _text, _part: None,
-    before: Search | None = None,
-) -> Search:
+def search(trials: Trials, base: Fit, progress: Progress = lambda _text, _part: None) -> Search:
     """Add effects to the base model until what is left is noise or nothing helps.
 
     Args:
         trials: the problem, its noise, and how effects are tried.
         base: the model as it stands.
         progress: called with what is being done and the part of it that is done.
-        before: a search of the same data with another noise scale: its fits still hold.
     """
-    known = {} if before is None else dict(before.known)
     root = node_of(trials, base)
-    best, seen = _climbed(trials, root, known, progress)
+    best, seen = _climbed(trials, root, progress)
     last = best if best is root else fitted_to_the_end(trials, best)
     last = without_needless(trials, last, base.terms.names)
     steps = in_order(trials, seen[root.names], last, seen)
-    for node in seen.values():
-        known.update(node.fits)
-    return Search(trials, steps, known)
+    fits = {key: fit for node in seen.values() for key, fit in node.fits.items()}
+    return Search(trials, steps, fits)
 
 
-def _climbed(trials: Trials, root: Node, known: Known, progress: Progress) -> tuple[Node, Seen]:
+def _climbed(trials: Trials, root: Node, progress: Progress) -> tuple[Node, Seen]:
     """The best model, and all that were met, by their effects."""
     best, abreast = root, [root]
     seen: Seen = {root.names: root}
     for depth in range(MOST_EFFECTS):
-        children, seen = _grown(trials, abreast, seen, depth, known, progress)
+        children, seen = _grown(trials, abreast, seen, depth, progress)
         better = [c for c in children if c.evidence.log > best.evidence.log + LEAST_GAIN]
         if depth == 0 and not any(c.whiteness.is_noise for c in better):
             better = _from_nearby(trials, better, progress)
@@ -152,9 +139,8 @@ def _next_best(better: Sequence[Node], best: Node) -> Node | None:
 
 
 def _grown(
-    trials: Trials, abreast: Sequence[Node], seen: Seen, depth: int, known: Known,
-    progress: Progress,
-) -> tuple[list[Node], Seen]:  # fmt: skip
+    trials: Trials, abreast: Sequence[Node], seen: Seen, depth: int, progress: Progress
+) -> tuple[list[Node], Seen]:
     """Models with one effect more that nobody has seen yet, and all seen with them."""
     children = []
     for k, node in enumerate(abreast):
@@ -164,7 +150,7 @@ def _grown(
             share = 1.0 - 0.5**depth * (1.0 - 0.5 * (before + part) / len(abreast))
             progress(f"round {depth + 1}: {text}", share)
 
-        node = explored(trials, node, depth == 0, known, tell)
+        node = explored(trials, node, depth == 0, tell)
         seen = {**seen, node.names: node}
         for child in children_of(trials, node):
             other = seen.get(child.names)

@@ -42,7 +42,7 @@ def settled(found: Search, notes: Sequence[str]) -> Diagnosis:
         missing,
         way,
         before=rms_by_kind(found.problem, found.steps[0].fit.state.raw),
-        floor=noise_floor(found.problem, found.last.fit.state, found.noise_scale),
+        floor=noise_floor(found.problem, found.last.fit.state),
         candidates=_with_hints(not_listed(way, way.found), hints),
         notes=notes,
         chances=chances,

@@ -1,4 +1,4 @@
-"""The search by steps over measurements as they are: stale values, outliers, noise understated."""
+"""The search by steps over measurements as they are: stale values, outliers."""
 
 from __future__ import annotations
 
@@ -15,8 +15,6 @@ from seecr.pose import Array
 
 # The model's values are refitted before the search where that takes away so much chi2.
 _STALE_VALUES = 30.0
-# Noise up to this many times the stated one is noise that was stated too small.
-_UNDERSTATED = 3.0
 
 Notes = tuple[str, ...]
 
@@ -28,8 +26,7 @@ def by_steps(
     base, refitted = _at_its_best(problem, base, factor)
     found = search(Trials(problem, factor), base, progress)
     found, outliers = _without_outliers(found, base, progress)
-    found, larger = _with_larger_noise(found, progress)
-    return found, (*refitted, *outliers, *larger)
+    return found, (*refitted, *outliers)
 
 
 def _at_its_best(problem: Problem, base: Fit, factor: Array) -> tuple[Fit, Notes]:
@@ -66,14 +63,3 @@ def _without_outliers(found: Search, base: Fit, progress: Progress) -> tuple[Sea
         with_all = ", ".join(found.found) or "nothing"
         note += f" (with them the search finds {with_all})"
     return better, (note,)
-
-
-def _with_larger_noise(found: Search, progress: Progress) -> tuple[Search, Notes]:
-    """Where what is left is white but too large, the noise was stated too small."""
-    last = found.last.whiteness
-    if last.is_noise or last.structured or last.scale > _UNDERSTATED or found.noise_scale != 1.0:
-        return found, ()
-    scale = last.scale
-    again = search(replace(found.trials, noise_scale=scale), found.steps[0].fit, progress, found)
-    note = f"what is left is white but {scale:.2f} times the stated noise: taken as the noise"
-    return again, (note,)

@@ -42,7 +42,7 @@ def unexplained(found: Search, chances: Chances, notes: Sequence[str]) -> Diagno
         missing,
         found,
         before=rms_by_kind(found.problem, found.steps[0].fit.state.raw),
-        floor=noise_floor(found.problem, found.last.fit.state, found.noise_scale),
+        floor=noise_floor(found.problem, found.last.fit.state),
         candidates=not_listed(found, [m.effect for m in missing]),
         notes=notes,
         chances=chances,

@@ -9,6 +9,7 @@ from threadpoolctl import threadpool_limits
 
 from crosscheck.calibration.search import seek
 from crosscheck.diagnosis.chances import chances_of
+from crosscheck.diagnosis.exchange import DOUBTED
 from crosscheck.diagnosis.explained import explained
 from crosscheck.diagnosis.importance import weighed
 from crosscheck.diagnosis.result import Diagnosis
@@ -63,8 +64,6 @@ def diagnose(
 
 
 Notes = tuple[str, ...]
-# What the steps end with is not listed where it is less likely than that.
-_DOUBTED = 0.5
 
 
 def _diagnosed(ready: Prepared, said: Notes, progress: Progress) -> Diagnosis:
@@ -88,13 +87,13 @@ def _searched(
     """The verdict of data that are fit for one."""
     problem = ready.problem
     found, more = by_steps(problem, base, factor, _part(progress, 0.0, 0.5))
-    if found.last.whiteness.is_noise and found.noise_scale == 1.0:
+    if found.last.whiteness.is_noise:
         steps = settled(found, (*notes, *more))
-        if all(effect.probability > _DOUBTED for effect in steps.missing):
+        if all(effect.probability > DOUBTED for effect in steps.missing):
             return steps
     # no few effects one after the other, or one that is less likely than not; noise that goes
-    # together, or is larger than stated, which a few rows far off may have made of it: all at
-    # once, in sets
+    # together, or is larger than stated: a few rows far off may have made it so. All at once,
+    # in sets
     sought = seek(problem, problem.data.sigma, ready.terms, _part(progress, 0.5, 1.0))
     if sought.judgement.verdict is not DiagnosisVerdict.UNKNOWN_EFFECT:
         return explained(sought, notes)

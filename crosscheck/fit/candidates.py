@@ -101,7 +101,6 @@ class Trials:
 
     Attributes:
         problem: the data. factor: noise factors, :meth:`Problem.noise`.
-        noise_scale: noise in units of the stated one.
         fit, starts, candidates: the functions :func:`crosscheck.fit.gauss_newton.fit`,
             :func:`crosscheck.fit.starts.starts_of` and :func:`candidates_for`, or others of
             their kind: the search takes no other way to the robot.
@@ -109,7 +108,6 @@ class Trials:
 
     problem: Problem
     factor: Array
-    noise_scale: float = 1.0
     fit: Callable[..., Fit] = fit
     starts: Callable[..., Starts] = starts_of
     candidates: Callable[[Problem], list[Candidate]] = candidates_for
@@ -119,12 +117,12 @@ class Trials:
         return self.fit(self.problem, terms, self.factor, near, **options)
 
     def evidence(self, found: Fit) -> Evidence:
-        """Of a fit, with the noise as it is taken to be."""
-        return evidence(found, self.noise_scale)
+        """Of a fit."""
+        return evidence(found)
 
     def whiteness(self, found: Fit, parameters: int) -> Whiteness:
         """Test of what a fit of so many directions leaves."""
-        return whiteness(self.problem, found.state.white / self.noise_scale, parameters)
+        return whiteness(self.problem, found.state.white, parameters)
 
 
 def try_candidate(trials: Trials, base: Fit, layout: Layout, hopeless: float = np.inf) -> Candidate:
@@ -139,7 +137,7 @@ def screen(trials: Trials, base: Fit, layout: Layout) -> Candidate:
     out = Candidate(layout, starts=starts)
     if not starts.seen:
         return out.refused(Reason(Why.UNSEEN))
-    drop = starts.gain / trials.noise_scale**2
+    drop = starts.gain
     return replace(out, drop=drop, p=p_value(drop, starts.directions, False) * starts.shapes)
 
 
@@ -170,7 +168,7 @@ def fit_candidate(
         elif found.valid and (best is None or found.chi2 < best.chi2):
             best = found
             hopeless = min(hopeless, 2.0 * best.chi2)
-            if best.chi2 < _WHITE * trials.noise_scale**2 * len(best.state.white):
+            if best.chi2 < _WHITE * len(best.state.white):
                 break  # it leaves noise: no other start does better
     if best is None:
         why = Why.IMPOSSIBLE if impossible else Why.UNSOLVED
@@ -189,7 +187,7 @@ def judged(trials: Trials, found: Fit, base: Fit, screened: Candidate) -> Candid
     layout, starts = screened.layout, screened.starts
     assert starts is not None
     one_sided = bool(np.isfinite(layout.lower[0])) and layout.lower[0] == layout.null[0]
-    drop = (base.chi2 - found.chi2) / trials.noise_scale**2
+    drop = base.chi2 - found.chi2
     own = found.terms.own(layout.name)
     p = p_value(drop, seen_directions(found, own), one_sided) * starts.shapes
     return Candidate(layout, found, trials.evidence(found), drop, p, starts=starts)

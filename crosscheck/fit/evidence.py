@@ -52,16 +52,16 @@ class Evidence:
     parameters: int
 
 
-def evidence(fit: Fit, noise_scale: float = 1.0) -> Evidence:
-    """Evidence of a fit; ``noise_scale`` is the factor of the stated noise."""
-    white = fit.state.white / noise_scale
+def evidence(fit: Fit) -> Evidence:
+    """Evidence of a fit."""
+    white = fit.state.white
     p = fit.jacobian.shape[1]
     if p == 0:
         return Evidence(-0.5 * (float(white @ white) + fit.state.log_det), fit.chi2, 0)
     # a parameter stopped by its bound is not at the optimum the formula is about
     free = ~fit.at_bound
     columns, readings = known_readings(fit.terms)
-    x = np.concatenate([fit.jacobian / noise_scale, columns])
+    x = np.concatenate([fit.jacobian, columns])
     left = np.concatenate([white, readings - columns @ fit.terms.sizes])
     x = x[:, free]
     y = left + x @ fit.terms.sizes[free]

@@ -119,5 +119,5 @@ def _told(
         f"{parameter_name(key, unit)} {shown(v, unit)}" for key, unit, v, own in values
         if own or by_toml
     )  # fmt: skip
-    why = f"is free, as the TOML beside {problem.data.path.name} says, and" if by_toml else ""
-    return f"{name} {why} was fitted to these data first: {words}".replace("  ", " ")
+    why = f" is free, as the TOML beside {problem.data.path.name} says, and" if by_toml else ""
+    return f"{name}{why} was fitted to these data first: {words}"

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.measurements.data import Measurements
+from seecr.counted import some
 from seecr.effects import ApartLayout, Knowledge, Own, Term, Terms, Values, apart
 
 
@@ -85,12 +86,7 @@ def _unknown(term: Term) -> Values:
 
 
 def _said(effect: str, kind: str, known: Sequence[str], new: Sequence[str]) -> str:
-    words = [f"{_some(known)} as the model has them"] if known else []
+    words = [f"{some(known)} as the model has them"] if known else []
     if new:
-        words.append(f"{_some(new)} not known to the model, fitted to these data first")
+        words.append(f"{some(new)} not known to the model, fitted to these data first")
     return f"{effect} has values of its own for each {kind}: {'; '.join(words)}"
-
-
-def _some(names: Sequence[str], most: int = 4) -> str:
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more

@@ -100,15 +100,12 @@ def _solved_rows(problem: Problem, plain: Prediction) -> Problem:
     return problem
 
 
-def noise_floor(problem: Problem, state: State | None = None, scale: float = 1.0) -> Rms:
-    """The rms errors that noise alone would give a perfect model, that of lengths included.
-
-    ``scale`` is the noise in units of the stated one.
-    """
+def noise_floor(problem: Problem, state: State | None = None) -> Rms:
+    """The rms errors that noise alone would give a perfect model, that of lengths included."""
     raw = np.broadcast_to(problem.reading_sigma, problem.measured.shape).copy()
     if state is not None:
         raw = np.sqrt(np.einsum("nij,nij->ni", state.factor, state.factor))
-    return rms_by_kind(problem, scale * raw)
+    return rms_by_kind(problem, raw)
 
 
 def outlying_rows(problem: Problem, state: State) -> np.ndarray:

@@ -41,21 +41,18 @@ def registered(problem: Problem, at: Prediction) -> Term | None:
     return Term(layout, np.concatenate([shift, rotvec_from_quat(turn)]))
 
 
-def registered_each(
-    problem: Problem, at: Prediction, term: Term, mine: NDArray[np.bool_] | None = None
-) -> Term:
+def registered_each(problem: Problem, at: Prediction, term: Term, mine: NDArray[np.bool_]) -> Term:
     """The tracker's frame registered, that of each file or run where they have their own.
 
     Args:
         problem: the data.
         at: the prediction with frames at null.
         term: the effect as it stands.
-        mine: (p,) which of its parameters may move; all by default.
+        mine: (p,) which of its parameters may move.
     """
     values = term.vector.copy()
     for rows, where in _frames(problem, term.layout):
-        free = mine is None or bool(mine[where].any())
-        frame = registered(problem.only(rows), at) if free else None
+        frame = registered(problem.only(rows), at) if mine[where].any() else None
         if frame is not None:
             values[where] = frame.vector
     return term.with_vector(values)

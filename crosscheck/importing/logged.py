@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from seecr.counted import some
 from seecr.errors import InputFileError
 from seecr.pose import Array, quat_conjugate, quat_multiply, quat_rotate
 
@@ -92,7 +93,11 @@ class Logged:
         if name is None and len(found) == 1:
             name = found[0]
         if name is None:
-            what = f"{len(found)} rigid bodies ({_some(found)})" if found else "no rigid body"
+            what = (
+                f"{len(found)} rigid bodies ({some(found, _MOST_NAMED)})"
+                if found
+                else "no rigid body"
+            )
             todo = "name one with --body" if found else "name its markers with --markers"
             raise InputFileError.at(self.path, f"expected one rigid body, got {what}; {todo}")
         if name not in self.bodies:
@@ -114,8 +119,3 @@ class Logged:
         there = ", ".join(near) or "none"
         text = f"has no {what} {name!r}; expected one of those it has, nearest first: {there}"
         return InputFileError.at(self.path, text)
-
-
-def _some(names: list[str]) -> str:
-    more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
-    return ", ".join(names[:_MOST_NAMED]) + more

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from crosscheck.measurements.named import named_columns
 from seecr.commands import Commands
-from seecr.counted import counted, plural
+from seecr.counted import counted, plural, some
 from seecr.loads import Loads
 from seecr.pose import Array
 from seecr.result import Record, Result
@@ -222,9 +222,7 @@ class Measurements(Result):
         Such as ``3, 5 and 2 more`` or ``monday.csv 3, tuesday.csv 5``.
         """
         chosen = np.arange(self.n_rows)[np.asarray(rows)]
-        words = [self.place(int(row)) for row in chosen[:most]]
-        more = f" and {len(chosen) - most} more" if len(chosen) > most else ""
-        return ", ".join(words) + more
+        return some([self.place(int(row)) for row in chosen], most)
 
     def lines_of(self, rows: ArrayLike) -> str:
         """The same after its noun: ``line 3``, ``lines 3, 5``."""

@@ -9,6 +9,7 @@ import numpy as np
 from crosscheck.measurements.data import Measurements
 from seecr.columns.known import POSITION, Columns
 from seecr.columns.reach import away_from, check_reach
+from seecr.counted import some
 from seecr.pose import Array, quat_conjugate, quat_multiply, rotvec_from_quat
 
 if TYPE_CHECKING:
@@ -120,8 +121,7 @@ def twice(data: Measurements) -> list[str]:
                 pairs.append(f"{data.place(row)} as {data.place(before)}")
     if not pairs:
         return []
-    more = f" and {len(pairs) - _MOST_LINES} more" if len(pairs) > _MOST_LINES else ""
     return [
-        f"Rows given twice, to the last digit: line {', '.join(pairs[:_MOST_LINES])}{more}; they "
+        f"Rows given twice, to the last digit: line {some(pairs, _MOST_LINES)}; they "
         "count twice: take one of each out if it was read once."
     ]

@@ -14,7 +14,7 @@ from crosscheck.fit.reasons import Reason, Why
 from crosscheck.planning.planned import Planned, Reads
 from crosscheck.planning.result import Visible
 from crosscheck.planning.visibility import EXACT, Signal, left_over, needed, signals
-from seecr.counted import counted
+from seecr.counted import counted, some
 from seecr.pose import Array
 
 _MOST = 8
@@ -57,8 +57,7 @@ class Sight:
             out.append(f"They cannot show {'; '.join([*lacking, *small])}.")
         pairs = [f"{name} from {' or '.join(others[:3])}" for name, others in self.alike.items()]
         if pairs:
-            more = f"; and {len(pairs) - _MOST} more" if len(pairs) > _MOST else ""
-            out.append(f"They could not tell {'; '.join(pairs[:_MOST])}{more}.")
+            out.append(f"They could not tell {some(pairs, _MOST, '; ')}.")
         return out
 
     def as_json(self) -> dict[str, Any]:

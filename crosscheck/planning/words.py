@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from crosscheck.planning.proposer import Gain
 from crosscheck.planning.result import Visible
-
-_MOST_NAMES = 4
+from seecr.counted import some
 
 
 def alike(found: Visible) -> str:
@@ -14,8 +13,7 @@ def alike(found: Visible) -> str:
     names += [name for name, _left in found.confused]
     if not found.visible and not found.twins:
         return "(a plausible size does not show)"
-    rest = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
-    return ", ".join(names[:_MOST_NAMES]) + rest
+    return some(names)
 
 
 def gain_words(gain: Gain) -> str:

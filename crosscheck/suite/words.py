@@ -9,7 +9,7 @@ from crosscheck.suite.agreement import QUANTITIES
 from crosscheck.suite.effects import LOADS, ORIENTATION_RAD, POSITION_M, Counterpart
 from crosscheck.suite.outcome import Outcome
 from crosscheck.suite.verdicts import FINDINGS, PoseFinding, Verdict
-from seecr.counted import counted
+from seecr.counted import counted, some
 
 if TYPE_CHECKING:
     from crosscheck.suite.effects import EffectResult
@@ -107,8 +107,8 @@ def verdict_line(run: Run) -> str:
     bad = [r.case.name for r in run.every if r.outcome is not Outcome.AGREE]
     start = {
         Outcome.AGREE: f"SEECR and MuJoCo agree at {poses}",
-        Outcome.DIFFER: f"SEECR and MuJoCo differ in {name_list(bad)}",
-        Outcome.NOT_CONVERGED: f"not every solve converged: see {name_list(bad)}",
+        Outcome.DIFFER: f"SEECR and MuJoCo differ in {some(bad)}",
+        Outcome.NOT_CONVERGED: f"not every solve converged: see {some(bad)}",
     }[run.outcome]
     return f"{start}; {worst_sentence(run.worst)}."
 
@@ -175,12 +175,6 @@ def _share(ratio: float) -> str:
     return f"{100 * ratio:.2g} % of" if ratio < 1.0 else f"{100 * ratio:.4g} % of"
 
 
-def name_list(names: Sequence[str], most: int = 4) -> str:
-    """The first few names, and how many more."""
-    rest = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + rest
-
-
 EFFECT_HEADS = [
     "effect", "robot", "moves [m]", "position [m]", "orientation [rad]", "tension [N]", "result",
     "against",
@@ -198,7 +192,7 @@ def effects_line(results: Sequence[EffectResult]) -> str:
     bad = [result.case.name for result in results if result.outcome is not Outcome.AGREE]
     verdict = "all agree"
     if bad:
-        verdict = f"{len(bad)} of {counted(len(results), 'case')} do not agree: {name_list(bad)}"
+        verdict = f"{len(bad)} of {counted(len(results), 'case')} do not agree: {some(bad)}"
     worst = max(results, key=lambda result: result.worst[0])
     orientation = max(result.worst[1] for result in results)
     tension = max(result.worst[2] for result in results)

@@ -13,6 +13,7 @@ from crosscheck.planning.proposer import Suggestion
 from crosscheck.planning.result import Plan
 from crosscheck.planning.words import alike, gain_words
 from crosscheck.terminal.lines import console_for, say
+from seecr.counted import some
 from seecr.pose import rotvec_from_quat
 
 _MOST_GAINS, _MOST_SLACK = 3, 5
@@ -51,13 +52,11 @@ def _table(plan: Plan) -> Table:
 def _print_slack(console: Console, plan: Plan) -> None:
     if not plan.slack:
         return
-    some = ", ".join(f"line {line} ({cable})" for line, cable in plan.slack[:_MOST_SLACK])
-    rest = len(plan.slack) - _MOST_SLACK
-    more = f" and {rest} more" if rest > 0 else ""
+    lines = [f"line {line} ({cable})" for line, cable in plan.slack]
     say(
         console,
-        f"About to go slack or taut: {some}{more}. Small errors change which cables pull there, "
-        "and what is said here of such poses is less sure.",
+        f"About to go slack or taut: {some(lines, _MOST_SLACK)}. Small errors change which cables "
+        "pull there, and what is said here of such poses is less sure.",
         "bold yellow",
     )
 
@@ -66,9 +65,8 @@ def _print_suggestion(console: Console, item: Suggestion) -> None:
     reached = item.reached
     if not reached:
         return
-    words = "; ".join(gain_words(g) for g in reached[:_MOST_GAINS])
-    more = f"; and {len(reached) - _MOST_GAINS} more" if len(reached) > _MOST_GAINS else ""
-    say(console, f"add: {item.words}: {words}{more}")
+    words = some([gain_words(g) for g in reached], _MOST_GAINS, "; ")
+    say(console, f"add: {item.words}: {words}")
     for pose in item.poses if item.poses is not None else ():
         turn = np.degrees(rotvec_from_quat(pose[3:]))
         x, y, z = pose[:3]

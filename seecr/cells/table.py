@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import copy
 import difflib
-from collections.abc import Mapping, MutableMapping, Sequence
+from collections.abc import Mapping, MutableMapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import tomlkit
 
 from seecr.cells.cell import Where, cell_of
+from seecr.counted import some
 from seecr.effects import Knowledge, Own, Term, Values, effect_named, layout_of
 from seecr.effects.apart import KINDS
 from seecr.effects.base import Layout
@@ -20,6 +21,7 @@ from seecr.pose import Array
 if TYPE_CHECKING:
     from seecr.robot import Robot
 
+_MOST_NAMED = 8
 _OF_EFFECT = (
     "name", "fixed", "per_file", "per_run", "parameters", "of", "provenance", "refitted", "before",
     "after", "held_out",
@@ -38,7 +40,7 @@ def term_of(where: Where, k: int, table: Mapping[str, Any], robot: Robot) -> tup
     if not isinstance(given, Mapping):
         raise where.error(
             f"effect {layout.name}: expected a table [effect.parameters] with "
-            f"{_some(layout.names)}", k,
+            f"{some(layout.names, _MOST_NAMED)}", k,
         )  # fmt: skip
     fixed = _flag(where, k, table, layout, "fixed")
     if kind and not given:
@@ -141,16 +143,11 @@ def _check_names(where: Where, k: int, layout: Layout, given: Mapping[str, Any])
             near = difflib.get_close_matches(key, layout.names, n=len(layout), cutoff=0.0)
             raise where.error(
                 f"effect {layout.name}: unknown parameter {key}; known, nearest first: "
-                f"{_some(near)}", k, key,
+                f"{some(near, _MOST_NAMED)}", k, key,
             )  # fmt: skip
     missing = [key for key in layout.names if key not in given]
     if missing:
         raise where.error(
-            f"effect {layout.name}: parameter {_some(missing)} is missing; expected a line such "
-            f"as {missing[0]} = {{ value = {layout.null[0]:g} }}", k, "parameters",
+            f"effect {layout.name}: parameter {some(missing, _MOST_NAMED)} is missing; expected a "
+            f"line such as {missing[0]} = {{ value = {layout.null[0]:g} }}", k, "parameters",
         )  # fmt: skip
-
-
-def _some(names: Sequence[str], most: int = 8) -> str:
-    rest = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + rest

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from seecr.effects.base import Effect, Layout, Readings
 from seecr.effects.knowledge import Knowledge
 from seecr.effects.totals import Total
+from seecr.errors import InputError
 from seecr.pose import Array
 from seecr.robot import Robot
 from seecr.setup import Setup
@@ -41,10 +42,18 @@ class Own:
 
     Attributes:
         kind: "file" or "run". values: by their names.
+
+    Raises:
+        InputError: another kind.
     """
 
     kind: str
     values: Mapping[str, Values]
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            words = " or ".join(map(repr, KINDS))
+            raise InputError(f"values of an effect's own are per {words}, got {self.kind!r}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from seecr.counted import between, counted, plural
+from seecr.counted import between, counted, plural, some
 
 ROOT = Path(__file__).resolve().parents[2]
 NOUNS = "row|pose|run|cable|line|effect|parameter|file|column|cell|command|case|step|reading"
@@ -30,6 +30,12 @@ def test_one_number_is_no_range() -> None:
     assert between(0, 0, "d") == "0" and between(0, 3, "d") == "0 to 3"
     assert between(1.00001, 1.00002, lead="from ") == "1"
     assert between(1.0, 2.5, lead="from ") == "from 1 to 2.5"
+
+
+def test_of_a_long_list_the_first_few_and_how_many_more() -> None:
+    assert some("abc", 3) == "a, b, c" and some([]) == ""
+    assert some("abcde", 3) == "a, b, c and 2 more"
+    assert some("abcde", 3, "; ") == "a; b; c; and 2 more"
 
 
 @pytest.mark.parametrize("package", ["seecr", "crosscheck"])

@@ -103,6 +103,27 @@ def test_some_columns_and_length_errors_and_warm_starts_go_by_part():
     np.testing.assert_array_equal(rates(experiment, terms, cold, [7, 2]), every[..., [7, 2]])
 
 
+def test_what_was_found_of_other_parts_is_no_help_though_there_are_as_many():
+    """Two files and two runs: the first row of a run is not that of the file."""
+    run = np.array([0, 0, 0, 1, 1, 1])
+    parts = {"file": np.where(run == 0, "a", "b"), "run": np.array(["1", "2", "1", "2", "1", "2"])}
+    experiment = Parted(ROBOT, Commands(POSES, run=run, parts=parts))
+    base = [term(ROBOT, "initial_pose_error", position_x_m=x) for x in (0.004, -0.003)]
+
+    def placed(kind, names):
+        layout = apart(base[0].layout, kind, names, base[0].layout.null)
+        return Terms([Term(layout, np.concatenate([one.vector for one in base]))])
+
+    by_file, by_run = placed("file", ("a", "b")), placed("run", ("1", "2"))
+    other = experiment.predict(by_run.effects)
+    wanted = experiment.predict(by_file.effects)
+    got = experiment.predict(by_file.effects, other)
+    np.testing.assert_allclose(got.pose, wanted.pose, atol=1e-12)
+    np.testing.assert_allclose(
+        rates(experiment, by_file, other), rates(experiment, by_file, wanted), atol=1e-9
+    )
+
+
 def test_rows_are_exchanged_in_each_part():
     plain, effects = Parted(ROBOT, commands()), both().effects
     errors, rows = 1e-4 * np.random.default_rng(1).standard_normal((2, 6, 8)), np.arange(6) > 2

@@ -136,7 +136,7 @@ def test_one_that_does_not_predict_runs_left_out_is_blamed() -> None:
     made = toy({}, NAMES)
     only = made.problem.data.run_index == 2
     made.table[only] += 2.0 * made.columns["gravity_tilt"][only].sum(axis=-1)
-    root = explored(made.trials, node_of(made.trials, made.base), True, {}, quiet)
+    root = explored(made.trials, node_of(made.trials, made.base), True, quiet)
     best = fitted_to_the_end(
         made.trials, node_of(made.trials, made.fit(made.problem, made.terms("gravity_tilt")))
     )
@@ -150,7 +150,7 @@ def test_one_that_does_not_predict_runs_left_out_is_blamed() -> None:
 def test_exploring_leaves_the_node_as_it_was_and_gives_every_effect_a_place() -> None:
     made = toy({"drum_gain": 0.4}, NAMES)
     node = node_of(made.trials, made.base)
-    after = explored(made.trials, node, True, {}, quiet)
+    after = explored(made.trials, node, True, quiet)
     assert node.candidates == ()
     assert {c.name for c in after.candidates} == set(NAMES)
     assert after.fit is node.fit
@@ -162,32 +162,12 @@ def test_beside_a_model_only_the_most_promising_are_fitted() -> None:
     names = (*NAMES, "platform_mass", "external_wrench", "exit_point_error", "anchor_point_error")
     made = toy({name: 0.3 for name in names}, names)
     node = node_of(made.trials, made.base)
-    after = explored(made.trials, node, False, {}, quiet)
+    after = explored(made.trials, node, False, quiet)
     assert sum(c.fit is not None for c in after.candidates) == 7
     refused = [c.why_not for c in after.candidates if c.fit is None]
     assert {reason.why for reason in refused if reason is not None} == {Why.PROMISES_LESS}
     small = [c for c in after.candidates if c.fit is not None and len(c.layout) <= 3]
     assert len(small) >= 2
-
-
-def test_a_search_of_the_same_data_again_fits_no_candidate_twice() -> None:
-    made = toy({"drum_gain": 0.4}, NAMES)
-    first = searched(made)
-    trials = replace(made.trials, noise_scale=1.001)
-    count = len(made.fits)
-    again = search(trials, first.steps[0].fit, quiet, first)
-    assert again.found == first.found
-    fresh = len(made.fits) - count
-    made.fits.clear()
-    search(trials, first.steps[0].fit)
-    assert fresh < len(made.fits)
-    assert set(again.known) >= set(first.known)
-
-
-def test_more_noise_than_stated_asks_for_more_evidence() -> None:
-    made = toy({"tracker_scale": 0.13}, NAMES)
-    assert searched(made).found == ("tracker_scale",)
-    assert search(replace(made.trials, noise_scale=3.0), made.base).found == ()
 
 
 def test_progress_goes_from_nothing_to_the_whole() -> None:
@@ -203,7 +183,7 @@ def test_what_chance_explains_over_all_that_were_tried_is_refused_whatever_its_e
     """An effect of many shapes has as many chances."""
     made = toy({"tracker_scale": 0.3}, NAMES)
     node = node_of(made.trials, made.base)
-    once = next(c for c in explored(made.trials, node, True, {}, quiet).candidates if c.fit)
+    once = next(c for c in explored(made.trials, node, True, quiet).candidates if c.fit)
     assert once.name == "tracker_scale" and once.why_not is None
 
     def of_many_shapes(problem: Problem, base: Fit, layout: Layout, factor: Array) -> Starts:
@@ -211,6 +191,6 @@ def test_what_chance_explains_over_all_that_were_tried_is_refused_whatever_its_e
         return replace(starts, shapes=0.01 / once.p) if layout.name == once.name else starts
 
     trials = replace(made.trials, starts=of_many_shapes)
-    again = next(c for c in explored(trials, node, True, {}, quiet).candidates if c.fit)
+    again = next(c for c in explored(trials, node, True, quiet).candidates if c.fit)
     assert again.evidence is not None and again.evidence.log - node.evidence.log > LEAST_GAIN
     assert again.why_not is not None and again.why_not.why is Why.CHANCE_OVER_ALL

@@ -150,6 +150,12 @@ def test_a_part_of_each_file_is_left_out(days):
         )
 
 
+def test_values_are_per_file_or_per_run_and_nothing_else(days):
+    with pytest.raises(seecr.InputError) as error:
+        crosscheck.add_effect(ROBOT, days / "monday.csv", "tracker_frame", per="day")
+    assert str(error.value) == "values of an effect's own are per 'file' or 'run', got 'day'"
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
