@@ -47,21 +47,40 @@ def test_two_effects_are_named_and_a_field_makes_the_verdict_unknown() -> None:
     values = found.found.best.joint.terms
     assert values["pulley_radius"].vector[0] == pytest.approx(0.006, rel=0.05)
     assert_shown_as_many(found)
+    assert_a_model_by_itself(found)
     unknown = judge(found.found, found.classes, 20.0, 1.0)
     assert unknown.verdict is DiagnosisVerdict.UNKNOWN_EFFECT
     assert judge(found.found, found.classes, -5.0, 9.0).verdict is DiagnosisVerdict.UNKNOWN_EFFECT
 
 
+def assert_a_model_by_itself(found: Sought) -> None:
+    """Of effects that are found alone the values are the best without those not listed."""
+    one = Judgement(DiagnosisVerdict.EFFECTS_FOUND, ("gravity_tilt",), 0.0)
+    (listed,) = explained(replace(found, judgement=one), []).missing
+    assert listed.values == pytest.approx(value_of(found, {"gravity_tilt"}), rel=1e-3)
+    # the pulleys, which are not listed, are taken in by the tilt
+    both = value_of(found, {"gravity_tilt", "pulley_radius"})
+    assert listed.values != pytest.approx(both, rel=0.2)
+
+
+def value_of(found: Sought, names: set[str]) -> list[float]:
+    """The tilt in a model of some effects."""
+    refit = found.found.refit(frozenset(names))
+    assert refit is not None
+    return list(refit.joint.terms["gravity_tilt"].vector)
+
+
 def assert_shown_as_many(found: Sought) -> None:
     """As it is told where only one of the two effects carries enough to be sure of."""
-    many = Judgement(DiagnosisVerdict.MANY_EFFECTS, ("pulley_radius",), 0.0)
+    many = Judgement(DiagnosisVerdict.MANY_EFFECTS, ("gravity_tilt",), 0.0)
     said = explained(replace(found, judgement=many), [])
     assert said.sentence.startswith("No few effects explain the error, but all ")
-    assert said.sentence.endswith("Sure among them: pulley_radius.")
+    assert said.sentence.endswith("Sure among them: gravity_tilt.")
     (listed,) = said.missing
-    # beside all that are probable: without the tilt it would be far off
-    assert listed.values[0] == pytest.approx(0.006, rel=0.05)
-    (tilt,) = (one for one in said.candidates if one.effect == "gravity_tilt")
-    assert tilt.why_not.why is Why.CARRIES_LITTLE and tilt.why_not.by == ("pulley_radius",)
-    assert tilt.why_not.p > 0.95
+    # beside all that are probable
+    both = value_of(found, {"gravity_tilt", "pulley_radius"})
+    assert listed.values == pytest.approx(both, rel=1e-3)
+    (pulley,) = (one for one in said.candidates if one.effect == "pulley_radius")
+    assert pulley.why_not.why is Why.CARRIES_LITTLE and pulley.why_not.by == ("gravity_tilt",)
+    assert pulley.why_not.p > 0.95
     assert any("crosscheck calibrate" in text for text in said.measure_next)
