@@ -78,8 +78,7 @@ Examples:
     type=float,
     callback=finite,
     metavar="S",
-    default=0.0,
-    help="What the tracker's clock shows more than that of the commands.",
+    help="What the tracker's clock shows more than that of the commands.  [default: found]",
 )
 @out_option("case")
 @json_option

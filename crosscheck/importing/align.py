@@ -21,9 +21,12 @@ from seecr.pose import Array, quat_conjugate, quat_multiply, quat_rotate
 
 # What is left may be this part of the spread of the points, and of named points.
 _LEFT, _LEFT_OF_POINTS = 0.2, 0.05
+# That much of the dwells is left by no more; others may be far off.
+_MOST = 0.8
 # Commands that are turned by less than this about their mean do not show where the target sits.
 _TURNED = np.radians(3.0)
 _ROUNDS = 10
+_LEAST = 3
 _NONE = np.array([1.0, 0.0, 0.0, 0.0])
 
 
@@ -95,8 +98,14 @@ def to_commands(position: Array, quat: Array | None, told: Array, target: Array 
             platform's; None to find both too.
 
     Raises:
-        CrosscheckError: commands in one line, or too much is left.
+        CrosscheckError: fewer than three, commands in one line, or too much is left.
     """
+    if len(told) < _LEAST:
+        raise CrosscheckError(
+            f"the frames cannot be aligned by {counted(len(told), 'dwell')}: expected {_LEAST} or "
+            "more that fall into a command; are both logs of one clock (--clock)? If so, name "
+            "three points with --point"
+        )
     home = told[:, 3:]
     shift = np.zeros(3) if target is None else target
     tilted = _varies(home) if target is None else False
@@ -162,10 +171,10 @@ def _spread(points: Array) -> float:
 
 
 def _check(left: Array, told: Array) -> None:
-    rms, spread = float(np.sqrt(np.median(left**2))), _spread(told[:, :3])
-    if rms > _LEFT * spread:
+    most, spread = float(np.quantile(left, _MOST)), _spread(told[:, :3])
+    if most > _LEFT * spread:
         raise CrosscheckError(
-            f"the frames cannot be aligned: {1e3 * rms:.3g} mm are left of commands that spread by "
-            f"{1e3 * spread:.3g} mm; expected the commands and the tracker's log of one recording; "
+            f"the frames cannot be aligned: {1e3 * most:.3g} mm are left of commands that spread "
+            f"by {1e3 * spread:.3g} mm; expected commands and a tracker's log of one recording; "
             "are these of the same robot, and of one clock (--clock)?"
         )

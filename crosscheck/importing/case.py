@@ -21,7 +21,7 @@ from crosscheck.importing.align import (
     with_target,
 )
 from crosscheck.importing.choices import Choices
-from crosscheck.importing.join import joined
+from crosscheck.importing.join import commanded, joined
 from crosscheck.importing.logged import Logged
 from crosscheck.importing.take import Take, take_of
 from crosscheck.measurements.data import Measurements, Sigma
@@ -30,7 +30,6 @@ from crosscheck.measurements.together import together
 from crosscheck.measurements.write import write_measurements
 from crosscheck.units import LEAST
 from seecr.counted import counted
-from seecr.experiment import Experiment
 from seecr.made import Made
 from seecr.pose import Array
 from seecr.result import Record, Result
@@ -133,7 +132,7 @@ def import_case(
         for file, log in zip(files, commands, strict=True)
     ]
     frames = _frames(robot, takes, choices)
-    parts = [_measured(take, frames, choices) for take in takes]
+    parts = [_measured(take, frames) for take in takes]
     measured = _one([part for part, _noise in parts])
     sigma = _sigma(takes, [noise for _part, noise in parts])
     measured = replace(
@@ -158,20 +157,13 @@ def _cell(value: object) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value).replace(",", " ")
 
 
-def _commanded(robot: Robot, log: Measurements) -> Array:
-    """Poses (n, 7) that were commanded, or that the plain model comes to where lengths were."""
-    if log.command_pose is not None:
-        return log.command_pose
-    return Experiment(robot, log.as_commands(robot)).predict(()).pose
-
-
 def _frames(robot: Robot, takes: Sequence[Take], choices: Choices) -> Frames:
     position = np.concatenate([take.dwells.position[take.used] for take in takes])
     quats = [take.dwells.quat_wxyz for take in takes]
     turned = [q[take.used] for q, take in zip(quats, takes, strict=True) if q is not None]
     quat = np.concatenate(turned) if len(turned) == len(takes) else None
     told = np.concatenate(
-        [_commanded(robot, t.held.log.rows(t.held.row[t.number >= 0])) for t in takes]
+        [commanded(robot, t.held.log.rows(t.held.row[t.number >= 0])) for t in takes]
     )
     # where markers sit on the platform was said
     target = np.zeros(3) if choices.shape and choices.target is None else choices.target
@@ -193,8 +185,8 @@ def _place(export: Logged, name: str) -> Array:
     return np.asarray(np.nanmean(export.marker(name), axis=0))
 
 
-def _measured(take: Take, frames: Frames, choices: Choices) -> tuple[Measurements, Array]:
-    rows, noise = joined(take.held, take.dwells, take.number, choices.clock)
+def _measured(take: Take, frames: Frames) -> tuple[Measurements, Array]:
+    rows, noise = joined(take.held, take.dwells, take.number)
     number = take.number[: rows.n_rows]
     there = number >= 0
     used, quat = number[there], take.dwells.quat_wxyz

@@ -30,7 +30,8 @@ class Choices:
         up: axis that points up in the file, "y" or "z"; the program's own by default.
         unit: of lengths, where a log's names have none.
         rotation: what three numbers mean, :data:`crosscheck.importing.vicon.ROTATIONS`.
-        rest_for: [s]. rest_speed: [m/s]. clock: [s], the tracker's less the commands'.
+        rest_for: [s]. rest_speed: [m/s]. clock: [s], the tracker's less the commands'; found
+            by default.
     """
 
     body: str | None = None
@@ -44,7 +45,7 @@ class Choices:
     rotation: str | None = None
     rest_for: float = REST_FOR
     rest_speed: float | None = None
-    clock: float = 0.0
+    clock: float | None = None
 
     @classmethod
     def said(

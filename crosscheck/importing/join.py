@@ -12,7 +12,9 @@ from crosscheck.importing.logged import Stream
 from crosscheck.measurements.data import Measurements
 from seecr.counted import counted
 from seecr.errors import InputFileError
+from seecr.experiment import Experiment
 from seecr.pose import Array
+from seecr.robot import Robot
 
 _MOST_LINES = 6
 
@@ -25,6 +27,7 @@ class HeldCommands:
         log: all rows. row: (k,) first row of each held command.
         begin_s, end_s: (k,) [s] by the tracker's clock; None without times.
         passed: rows of set points on the way between them.
+        clock: [s] what the tracker's clock shows more than that of the commands.
     """
 
     log: Measurements
@@ -32,6 +35,22 @@ class HeldCommands:
     begin_s: Array | None
     end_s: Array | None
     passed: int
+    clock: float = 0.0
+
+    def shifted(self, clock: float) -> HeldCommands:
+        """The same by a clock that shows so much [s] more."""
+        if self.begin_s is None or self.end_s is None:
+            return self
+        return replace(
+            self, begin_s=self.begin_s + clock, end_s=self.end_s + clock, clock=self.clock + clock
+        )
+
+
+def commanded(robot: Robot, log: Measurements) -> Array:
+    """Poses (n, 7) that were commanded, or that the plain model comes to where lengths were."""
+    if log.command_pose is not None:
+        return log.command_pose
+    return Experiment(robot, log.as_commands(robot)).predict(()).pose
 
 
 def held_commands(log: Measurements, rest_for: float, clock: float, end: float) -> HeldCommands:
@@ -55,7 +74,21 @@ def held_commands(log: Measurements, rest_for: float, clock: float, end: float) 
     begin = log.t_s[first] + clock
     stop = np.append(begin[1:], max(end, begin[-1]))
     held = stop - begin >= rest_for
-    return HeldCommands(log, first[held], begin[held], stop[held], int((~held).sum()))
+    passed = int((~held).sum())
+    return HeldCommands(log, first[held], begin[held], stop[held], passed, clock)
+
+
+def owners(held: HeldCommands, dwells: Dwells) -> NDArray[np.int64]:
+    """(k,) the dwell of each held command: the longest whose middle is in it; -1 for none."""
+    assert held.begin_s is not None and held.end_s is not None
+    middle = 0.5 * (dwells.begin_s + dwells.end_s)
+    number = np.searchsorted(held.begin_s, middle, side="right") - 1
+    inside = (number >= 0) & (middle <= held.end_s[np.maximum(number, 0)])
+    out = np.full(len(held.row), -1)
+    for k in np.argsort(dwells.end_s - dwells.begin_s, kind="stable"):  # the longest comes last
+        if inside[k]:
+            out[number[k]] = k
+    return out
 
 
 def matched(stream: Stream, held: HeldCommands, dwells: Dwells) -> NDArray[np.int64]:
@@ -74,13 +107,7 @@ def matched(stream: Stream, held: HeldCommands, dwells: Dwells) -> NDArray[np.in
                 "there, or change --rest-for or --rest-speed"
             )
         return np.arange(len(dwells))
-    middle = 0.5 * (dwells.begin_s + dwells.end_s)
-    number = np.searchsorted(held.begin_s, middle, side="right") - 1
-    inside = (number >= 0) & (middle <= held.end_s[np.maximum(number, 0)])
-    out = np.full(len(held.row), -1)
-    for k in np.argsort(dwells.end_s - dwells.begin_s, kind="stable"):  # the longest comes last
-        if inside[k]:
-            out[number[k]] = k
+    out = owners(held, dwells)
     if np.all(out < 0):
         raise InputFileError.at(
             held.log.path,
@@ -92,7 +119,7 @@ def matched(stream: Stream, held: HeldCommands, dwells: Dwells) -> NDArray[np.in
 
 
 def joined(
-    held: HeldCommands, dwells: Dwells, number: NDArray[np.int64], clock: float
+    held: HeldCommands, dwells: Dwells, number: NDArray[np.int64]
 ) -> tuple[Measurements, Array]:
     """The held commands as rows without poses yet, and the noise (k,) of averaged tensions.
 
@@ -105,10 +132,10 @@ def joined(
     if rows.t_s is None:
         t_s = middle[number]
     else:
-        t_s = np.where(number >= 0, middle[number], rows.t_s + clock)
+        t_s = np.where(number >= 0, middle[number], rows.t_s + held.clock)
     tensions, error = np.full_like(rows.tensions, np.nan), np.zeros(last)
     if held.log.t_s is not None:
-        clocked = held.log.t_s + clock
+        clocked = held.log.t_s + held.clock
         for row, k in enumerate(number):
             if k >= 0:
                 some = (clocked >= dwells.begin_s[k]) & (clocked <= dwells.end_s[k])

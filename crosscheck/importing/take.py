@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.importing.choices import Choices
+from crosscheck.importing.clock import Clock, find_clock
 from crosscheck.importing.dwells import Dwells, find_dwells
-from crosscheck.importing.join import HeldCommands, held_commands, matched
+from crosscheck.importing.join import HeldCommands, commanded, held_commands, matched
 from crosscheck.importing.logged import Logged, Stream
 from crosscheck.importing.markers import body_of_markers
 from crosscheck.importing.motive import read_motive
@@ -57,18 +58,29 @@ def take_of(
     export = READERS[form](path, choices)
     export = replace(export, up=choices.up or export.up).upright()
     stream, fit = _stream(export, choices)
-    held = held_commands(log, choices.rest_for, choices.clock, float(stream.t_s[-1]))
+    arm = float(np.sqrt(np.mean(np.sum(robot.anchor_points**2, axis=1))))
+    clock = _clock(stream, robot, log, choices, arm)
+    held = held_commands(log, choices.rest_for, clock.shift, float(stream.t_s[-1]))
     if len(held.row) == 0:
         raise CrosscheckError(
             f"{log.path}: no command is held for {choices.rest_for:g} s; expected poses that are "
             "held; give a shorter --rest-for"
         )
     breaks = np.zeros(0) if held.begin_s is None else held.begin_s
-    arm = float(np.sqrt(np.mean(np.sum(robot.anchor_points**2, axis=1))))
     dwells = find_dwells(stream, breaks, choices.rest_for, choices.rest_speed, arm)
     take = Take(stream, export, held, dwells, matched(stream, held, dwells))
-    said += [f"{path.name}: {note}" for note in (*export.notes, *fit, *_told(take))]
+    said += [f"{path.name}: {note}" for note in (*export.notes, *fit, *clock.said, *_told(take))]
     return take
+
+
+def _clock(stream: Stream, robot: Robot, log: Measurements, choices: Choices, arm: float) -> Clock:
+    """As the user says, or found."""
+    if choices.clock is not None or log.t_s is None:
+        return Clock(choices.clock or 0.0)
+    held = held_commands(log, choices.rest_for, 0.0, np.inf)
+    told = commanded(robot, log.rows(held.row))[:, :3]
+    rests = find_dwells(stream, np.zeros(0), choices.rest_for, choices.rest_speed, arm)
+    return find_clock(held, told, rests)
 
 
 def _check_reachable(robot: Robot, log: Measurements) -> None:

@@ -1,0 +1,98 @@
+"""Two clocks: the shift between them is found from where the platform rests, or left alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import made_recordings as made_of
+import numpy as np
+import pytest
+from made_data import run, soft_cogiro, soft_xml
+
+from crosscheck.importing import Choices, import_case
+from crosscheck.importing.clock import find_clock
+from crosscheck.importing.dwells import find_dwells
+from crosscheck.importing.join import HeldCommands
+from crosscheck.importing.logged import Stream
+from seecr.errors import SeecrError
+
+ROBOT = soft_cogiro()
+
+
+@pytest.fixture(scope="module")
+def made():
+    return made_of.recording(ROBOT)
+
+
+def taken(made, folder, clock, choices=None):
+    """The tracker's clock shows so much more than that of the commands."""
+    commands = made_of.commands_csv(folder / "c.csv", made, clock=clock)
+    return import_case(
+        "poses", [made_of.poses_csv(folder / "a.csv", made)], ROBOT, [commands], choices
+    )
+
+
+@pytest.mark.parametrize("clock", [37.3, -5.2, 2.0, -1000.0])
+def test_the_shift_is_found_and_said(made, tmp_path, clock):
+    found = taken(made, tmp_path, clock)
+    truth, measured = made.truth, found.measured
+    assert measured.command_pose == pytest.approx(truth.command_pose, abs=1e-8)
+    assert found.takes[0].held.clock == pytest.approx(clock, abs=0.3)  # as soon as it moves
+    alone = taken(made, tmp_path, clock, Choices(clock=clock))
+    assert measured.position == pytest.approx(alone.measured.position, abs=3e-5)
+    assert f"{abs(found.takes[0].held.clock):.3f} s {'more' if clock > 0 else 'less'}" in str(found)
+
+
+def test_one_clock_stays_one(made, tmp_path):
+    found = taken(made, tmp_path, 0.0)
+    assert found.takes[0].held.clock == 0.0 and "clock shows" not in str(found)
+
+
+def test_a_wrong_clock_that_is_given_is_refused(made, tmp_path):
+    for wrong in (2.0, -2.0):
+        with pytest.raises(SeecrError, match=r"cannot be aligned: .*\(--clock\)"):
+            taken(made, tmp_path, 0.0, Choices(clock=wrong))
+    with pytest.raises(SeecrError, match="cannot be aligned by 1 dwell: expected 3 or more"):
+        taken(made, tmp_path, 0.0, Choices(clock=made.t_s[-1] - 1.4))
+
+
+def going_round(told, clock):
+    """The rests of a platform that goes from place to place (k, 3), and the commands."""
+    sent = 2.0 * np.arange(len(told))
+    t = np.arange(0.0, sent[-1] + 2.0, 0.02)
+    number = np.searchsorted(sent, t, side="right") - 1
+    part = np.clip((t - sent[number]) / 0.5, 0.0, 1.0)[:, None]
+    before = told[np.maximum(number - 1, 0)]
+    noise = 1e-4 * np.random.default_rng(0).standard_normal((len(t), 3))
+    place = before + (told[number] - before) * part + noise
+    rests = find_dwells(Stream(Path("a.csv"), t, np.arange(len(t)), place), np.zeros(0))
+    begin = sent - clock
+    held = HeldCommands(None, np.arange(len(told)), begin, np.append(begin[1:], np.inf), 0)
+    return held, rests
+
+
+def test_what_cannot_be_told_is_left_alone():
+    """Round and round one square, with the first rounds not recorded: any round may be meant."""
+    square = np.tile([[0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1.0]], (10, 1))
+    held, rests = going_round(square, 0.0)
+    some = rests.begin_s > 20.0
+    few = replace(
+        rests, begin_s=rests.begin_s[some], end_s=rests.end_s[some], position=rests.position[some]
+    )
+    assert few.position.shape[0] < len(square) - 4
+    assert find_clock(held.shifted(7.0), square, few).shift == 0.0
+    uneven = np.random.default_rng(1).uniform(0.0, 1.0, (40, 3))
+    held, rests = going_round(uneven, 7.0)
+    assert find_clock(held, uneven, rests).shift == pytest.approx(7.0, abs=0.1)
+
+
+def test_from_the_command_line(made, tmp_path):
+    commands = made_of.commands_csv(tmp_path / "c.csv", made, clock=37.3)
+    log = made_of.poses_csv(tmp_path / "a.csv", made)
+    robot = tmp_path / "robot.xml"
+    robot.write_text(soft_xml())
+    done = run("import", "poses", log, "--robot", robot, "--commands", commands,
+               "--out", tmp_path / "case")  # fmt: skip
+    assert done.exit_code == 0, done.stderr
+    assert "a.csv: the tracker's clock shows 37." in done.stdout
