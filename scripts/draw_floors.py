@@ -14,6 +14,7 @@ import itertools
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from html import escape
 from pathlib import Path
 
@@ -93,6 +94,7 @@ def arrows() -> dict[str, frozenset[str]]:
 def without_detours(graph: Arrows) -> dict[str, frozenset[str]]:
     """The arrows that are not also a way through a third room."""
 
+    @cache
     def reached(start: str) -> set[str]:
         return set(graph[start]).union(*(reached(b) for b in graph[start]))
 

@@ -10,6 +10,8 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
+from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -59,30 +61,37 @@ def name_of(path: Path) -> str:
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-def imports_of(text: str, where: str = "") -> set[str]:
+@cache
+def tree_of(path: Path) -> ast.Module:
+    """A source, parsed once: many tests look at all of them."""
+    return ast.parse(path.read_text(encoding="utf-8"), str(path))
+
+
+def imports_of(tree: ast.Module) -> set[str]:
     """Every module that a source imports, also inside functions; not those for types alone."""
-    tree = ast.parse(text)
+    every = list(ast.walk(tree))
     typing_only = {
         id(inner)
-        for node in ast.walk(tree)
-        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
+        for node in every
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test)
         for inner in ast.walk(node)
     }
     found: set[str] = set()
-    for node in ast.walk(tree):
+    for node in every:
         if id(node) in typing_only:
             continue
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{where}: relative import"
+            assert node.level == 0, "relative import"
             assert node.module is not None
             found |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
     return found
 
 
-def imports(path: Path) -> set[str]:
-    return imports_of(path.read_text(encoding="utf-8"), str(path))
+@cache
+def imports(path: Path) -> frozenset[str]:
+    return frozenset(imports_of(tree_of(path)))
 
 
 def place(module: str) -> str:
@@ -91,7 +100,7 @@ def place(module: str) -> str:
     return ".".join(parts[:2]) if len(parts) > 1 else ""
 
 
-def upward(name: str, targets: set[str]) -> set[tuple[str, str]]:
+def upward(name: str, targets: Iterable[str]) -> set[tuple[str, str]]:
     """Imports of a module that do not point down."""
     own = place(name)
     out = set()
@@ -121,14 +130,14 @@ def test_no_import_points_upwards() -> None:
 
 def test_an_upward_import_is_seen_also_a_lazy_one() -> None:
     lazy = "def late():\n    from crosscheck.cli import main\n    return main\n"
-    assert upward("crosscheck.fit.problem", imports_of(lazy)) == {
+    assert upward("crosscheck.fit.problem", imports_of(ast.parse(lazy))) == {
         ("crosscheck.fit", "crosscheck.cli")
     }
-    assert upward("seecr.pose", imports_of("import crosscheck.fit.problem")) == {
+    assert upward("seecr.pose", imports_of(ast.parse("import crosscheck.fit.problem"))) == {
         ("seecr.pose", "crosscheck.fit")
     }
     only_types = f"if TYPE_CHECKING:\n{lazy.replace('def late():', '    pass').split('return')[0]}"
-    assert upward("crosscheck.fit.problem", imports_of(only_types)) == set()
+    assert upward("crosscheck.fit.problem", imports_of(ast.parse(only_types))) == set()
 
 
 def test_no_two_modules_import_each_other() -> None:
@@ -149,7 +158,7 @@ def test_no_two_classes_have_one_name() -> None:
         node.name
         for package in ("seecr", "crosscheck")
         for path in modules(package)
-        for node in ast.parse(path.read_text(encoding="utf-8")).body
+        for node in tree_of(path).body
         if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
     ]
     assert sorted({name for name in names if names.count(name) > 1}) == []

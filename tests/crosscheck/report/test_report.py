@@ -12,6 +12,7 @@ from pathlib import Path
 import made_diagnoses as made
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from PIL import Image
 from written_pages import figures_of, text_of
 
@@ -46,6 +47,12 @@ EVIL = '<script>alert("1")</script>&$x$'
 def diagnosis(name: str) -> Diagnosis:
     found: Diagnosis = getattr(made, name)()
     return found
+
+
+@pytest.fixture
+def words_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures of a page are not drawn, which takes most of the time."""
+    monkeypatch.setattr(Figure, "savefig", lambda *_args, **_named: None)
 
 
 _pages: dict[str, str] = {}
@@ -151,6 +158,7 @@ def test_what_was_found_but_is_not_sure_is_hatched() -> None:
     assert shown_stages(found)[1].added == "pulley_radius"
 
 
+@pytest.mark.usefixtures("words_alone")
 def test_beside_something_unknown_probabilities_are_within_the_catalogue() -> None:
     found = diagnosis("pulleys")
     assert "within the catalogue" not in text_of(page("pulleys")).lower()
@@ -387,10 +395,11 @@ def test_a_wall_of_many_cables_shows_the_worst() -> None:
     assert "rope17" in text
 
 
+@pytest.mark.usefixtures("words_alone")
 def test_written_whole_or_not_at_all(tmp_path: Path) -> None:
     path = tmp_path / "diagnosis.html"
     write_page(diagnosis("nothing"), path)
-    assert path.read_text(encoding="utf-8") == page("nothing")
+    assert path.read_text(encoding="utf-8") == render(diagnosis("nothing"))
     assert list(tmp_path.iterdir()) == [path]
     with pytest.raises(InputFileError, match=r"gone/d.html: cannot write the page: No such"):
         write_page(diagnosis("none"), tmp_path / "gone" / "d.html")
