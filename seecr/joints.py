@@ -53,6 +53,19 @@ def values_of_pose(robot: Robot, poses: Array) -> tuple[Array, Array]:
         InputError: a pose that the joints cannot reach.
     """
     poses = np.atleast_2d(np.asarray(poses, float))
+    values = _nearest(robot, poses)
+    reached, screws = pose_of_values(robot, values)
+    off = _off_joints(robot, poses, reached)
+    if off is not None:
+        raise InputError(
+            f"robot {robot.name}: commanded pose {off[0]} is off what its joints can reach, by "
+            f"{off[1]}; expected a pose on the joints"
+        )
+    return values, screws
+
+
+def _nearest(robot: Robot, poses: Array) -> Array:
+    """Joint values (n, d) that bring the platform nearest to poses (n, 7), by Newton steps."""
     values, before = np.zeros((len(poses), len(robot.joints))), np.inf
     for _ in range(50):
         reached, screws = pose_of_values(robot, values)
@@ -65,16 +78,27 @@ def values_of_pose(robot: Robot, poses: Array) -> tuple[Array, Array]:
         if size < 1e-14 or 0.5 * before <= size < 1e-12:
             break
         before = size
-    reached, screws = pose_of_values(robot, values)
+    return values
+
+
+def _off_joints(robot: Robot, poses: Array, reached: Array) -> tuple[int, str] | None:
+    """The row that is furthest off what the joints can reach, and by how much; None if none is."""
     miss = np.abs(pose_difference(poses, reached)) / np.repeat([robot.length, 1.0], 3)
-    if np.any(miss > _OFF_MANIFOLD):
-        row, part = np.unravel_index(np.argmax(miss), miss.shape)
-        raise InputError(
-            f"robot {robot.name}: commanded pose {row} is off what its joints can reach, by "
-            f"{miss[row, part] * (robot.length if part < 3 else 1.0):.3g} "
-            f"{'m' if part < 3 else 'rad'} in {'xyz'[part % 3]}; expected a pose on the joints"
-        )
-    return values, screws
+    if not np.any(miss > _OFF_MANIFOLD):
+        return None
+    row, part = np.unravel_index(np.argmax(miss), miss.shape)
+    size = miss[row, part] * (robot.length if part < 3 else 1.0)
+    return int(row), f"{size:.3g} {'m' if part < 3 else 'rad'} in {'xyz'[part % 3]}"
+
+
+def off_joints(robot: Robot, poses: Array) -> tuple[int, str] | None:
+    """The row of poses (n, 7) that is furthest off what the joints can reach, and by how much.
+
+    None where all can be reached; a platform with a free joint reaches all.
+    """
+    if not robot.joints:
+        return None
+    return _off_joints(robot, poses, pose_of_values(robot, _nearest(robot, poses))[0])
 
 
 def motion_columns(screws: Array, position: Array) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from crosscheck.comparison.limits import Exceeded, Limits, check, load_limits, with_options
 from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.result import Comparison
+from crosscheck.comparison.stranger import doubted
 
 __all__ = [
     "Comparison",
@@ -12,6 +13,7 @@ __all__ = [
     "Limits",
     "check",
     "compare",
+    "doubted",
     "load_limits",
     "with_options",
 ]

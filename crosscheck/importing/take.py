@@ -21,8 +21,6 @@ from crosscheck.importing.poses import read_poses
 from crosscheck.importing.vicon import read_vicon
 from crosscheck.measurements.data import Measurements
 from seecr.counted import between, counted
-from seecr.errors import InputError, InputFileError
-from seecr.joints import values_of_pose
 from seecr.robot import Robot
 
 READERS: Mapping[str, Callable[[Path, Choices], Logged]] = {
@@ -54,7 +52,6 @@ class Take:
 def take_of(
     form: str, path: Path, robot: Robot, log: Measurements, choices: Choices, said: list[str]
 ) -> Take:
-    _check_reachable(robot, log)
     export = READERS[form](path, choices)
     export = replace(export, up=choices.up or export.up).upright()
     stream, fit = _stream(export, choices)
@@ -81,16 +78,6 @@ def _clock(stream: Stream, robot: Robot, log: Measurements, choices: Choices, ar
     told = commanded(robot, log.rows(held.row))[:, :3]
     rests = find_dwells(stream, np.zeros(0), choices.rest_for, choices.rest_speed, arm)
     return find_clock(held, told, rests)
-
-
-def _check_reachable(robot: Robot, log: Measurements) -> None:
-    if log.command_pose is None or not robot.joints:
-        return
-    try:
-        values_of_pose(robot, log.command_pose)
-    except InputError as error:
-        text = f"{error}; are these the commands of another robot?"
-        raise InputFileError.at(log.path, text) from None
 
 
 def _told(take: Take) -> list[str]:

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from crosscheck.measurements.data import Measurements
-from seecr.columns.known import POSITION, Columns
+from seecr.columns.known import ANGLES, POSITION, Columns
 from seecr.columns.reach import away_from, check_reach
 from seecr.counted import some
-from seecr.pose import Array, quat_conjugate, quat_multiply, rotvec_from_quat
+from seecr.pose import Array, quat_conjugate, quat_multiply, rotvec_from_quat, rxyz_from_quat
 
 if TYPE_CHECKING:
     from seecr.robot import Robot
@@ -21,6 +21,9 @@ _FAR = 2.5
 _OTHER_UNIT, _LEAST_ROWS = 100.0, 4
 # Quaternions this far [rad] from where they should be, and near it in another order.
 _TURNED, _UNTURNED = np.radians(90.0), np.radians(45.0)
+# Positions that are usually further from the commands than this part of how these spread, and of
+# the frame, are of something else; angles in radians that are so far off are degrees.
+_ASTRAY, _OF_FRAME, _ODD_ANGLE = 0.5, 0.05, 0.5
 _MOST_LINES = 8
 
 
@@ -32,7 +35,13 @@ def notice(columns: Columns, robot: Robot, data: Measurements) -> list[str]:
     """
     check_reach(columns, robot, data.command_pose, data.command_lengths)
     _check_spread(columns, data)
-    return [*_far(robot, data), *_other_order(columns, robot, data), *twice(data)]
+    return [
+        *_far(robot, data),
+        *_elsewhere(robot, data),
+        *_degrees(columns, data),
+        *_other_order(columns, robot, data),
+        *twice(data),
+    ]
 
 
 def _far(robot: Robot, data: Measurements) -> list[str]:
@@ -70,6 +79,46 @@ def _check_spread(columns: Columns, data: Measurements) -> None:
         f"meas_{POSITION[which[0]]}_{'mm' if read > told else 'm'}",
         column=column.name,
     )
+
+
+def _elsewhere(robot: Robot, data: Measurements) -> list[str]:
+    """Positions that do not follow the commands."""
+    if data.command_pose is None or "tracker_frame" in data.free:
+        return []
+    which = [k for k in range(3) if data.position_mask[k]]
+    told, read = data.command_pose[:, which], data.position[:, which]
+    off = np.linalg.norm(read - told, axis=1)
+    off = off[np.isfinite(off)]
+    if not which or len(off) < _LEAST_ROWS:
+        return []
+    usual, spread = float(np.median(off)), _spread(told)
+    if usual <= max(_ASTRAY * spread, _OF_FRAME * robot.reach):
+        return []
+    return [
+        f"The measured positions do not follow the commands: they are {usual:.3g} m from them, "
+        f"which spread by {spread:.3g} m. Are axes exchanged, is this the file of another robot, "
+        "or is the tracker's frame not the robot's (crosscheck import aligns it)?"
+    ]
+
+
+def _degrees(columns: Columns, data: Measurements) -> list[str]:
+    """Angles in radians that are far from the commanded ones."""
+    if data.command_pose is None:
+        return []
+    told = rxyz_from_quat(data.command_pose[:, 3:])
+    for k, angle in enumerate(ANGLES):
+        column = columns.known.get(f"meas_{angle}")
+        if column is None or column.unit.suffix != "rad":
+            continue
+        off = columns.numbers(f"meas_{angle}", blank_is_nan=True) - told[:, k]
+        off = off[np.isfinite(off)]
+        if len(off) >= _LEAST_ROWS and np.sqrt(np.mean(off**2)) > _ODD_ANGLE:
+            return [
+                f"Column {column.name} is {np.sqrt(np.mean(off**2)):.3g} rad (rms) from the "
+                "commanded angles: are these degrees? Name the column by its unit, such as "
+                f"meas_{angle}_deg."
+            ]
+    return []
 
 
 def _turn(quat: Array, of: Array) -> Array:

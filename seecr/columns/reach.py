@@ -1,12 +1,16 @@
-"""Commands that are so far outside the robot that their unit must be another."""
+"""Commands that a robot cannot have been given: of another unit, or of another robot."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from seecr.columns.known import POSITION, Columns
+from seecr.joints import off_joints
 from seecr.pose import Array
 from seecr.robot import ABSURD, Robot
+
+# So many commands say where a robot goes.
+_SEVERAL = 4
 
 __all__ = ["ABSURD", "away_from", "check_reach"]
 
@@ -20,7 +24,7 @@ def away_from(robot: Robot, poses: Array | None, lengths: Array | None) -> Array
 
 
 def check_reach(columns: Columns, robot: Robot, poses: Array | None, lengths: Array | None) -> None:
-    """Refuse commands far outside the robot.
+    """Refuse commands far outside the robot, or off its joints.
 
     Raises:
         InputFileError: with line and column of the first.
@@ -32,6 +36,27 @@ def check_reach(columns: Columns, robot: Robot, poses: Array | None, lengths: Ar
     for quantity, away in zip(quantities, away_from(robot, poses, lengths).T, strict=True):
         if quantity in columns.known:
             _refuse_far(columns, quantity, away, robot.reach)
+    if lengths is None and poses is not None:
+        _refuse_another(columns, robot, poses)
+
+
+def _refuse_another(columns: Columns, robot: Robot, poses: Array) -> None:
+    """Commands (n, 7) that most likely are those of another robot."""
+    off = off_joints(robot, poses)
+    if off is not None:
+        raise columns.table.error(
+            f"the commanded pose is off what the joints of robot {robot.name} can reach, by "
+            f"{off[1]}; expected a pose on the joints; are these the commands of another robot?",
+            row=off[0],
+        )
+    away = np.linalg.norm(poses[:, :3] - robot.reference_pose[:3], axis=1)
+    if len(away) >= _SEVERAL and np.median(away) > robot.reach:
+        raise columns.table.error(
+            f"most commands are outside the frame of robot {robot.name}: half of them are "
+            f"{np.median(away):.3g} m or more from its reference position, and the frame is "
+            f"{robot.reach:.3g} m across; expected commands inside it; are these of another robot, "
+            "or in another unit?"
+        )
 
 
 def _refuse_far(columns: Columns, quantity: str, away: Array, reach: float) -> None:

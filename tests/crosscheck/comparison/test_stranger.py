@@ -1,0 +1,94 @@
+"""A file that belongs to another robot, or says another unit than it has, is noticed and said."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_data import measured, refused, run, soft_cogiro, soft_xml
+
+import crosscheck
+from crosscheck.measurements.data import Sigma
+from crosscheck.measurements.read import load_commands, load_measurements
+from crosscheck.measurements.write import write_measurements
+from seecr.errors import InputFileError
+from seecr.mjcf import load_robot
+from seecr.shipped import model_path
+
+COGIRO, PLANAR = soft_cogiro(), load_robot(model_path("planar_vertical"))
+
+
+@pytest.fixture(scope="module")
+def cogiro():
+    return measured(COGIRO, points=3, sigma=Sigma(3e-5, 3.5e-4, 0.05), tensions=True)
+
+
+def notes(robot, data):
+    return " ".join(crosscheck.compare(robot, data).notes)
+
+
+def test_commands_off_the_joints_of_a_planar_robot(tmp_path):
+    data = tmp_path / "measured.csv"
+    write_measurements(data, measured(COGIRO, points=3))
+    with pytest.raises(InputFileError, match=(
+        r"measured.csv: line \d+: the commanded pose is off what the joints of robot .* can reach, "
+        r"by .*; expected a pose on the joints; are these the commands of another robot\?"
+    )):  # fmt: skip
+        load_measurements(data, PLANAR)
+    said = refused("compare", model_path("planar_vertical"), data, "--out", tmp_path / "out")
+    assert "are these the commands of another robot?" in said and not (tmp_path / "out").exists()
+
+
+def test_most_commands_outside_the_frame(tmp_path):
+    file = tmp_path / "commands.csv"
+    far = COGIRO.reference_pose[:3] + COGIRO.reach * np.array([0.9, 0.9, 0.0])
+    lines = [",".join(f"{v:.4f}" for v in (*far[:2], far[2] + 0.01 * k)) for k in range(5)]
+    file.write_text("\n".join(["cmd_x_m,cmd_y_m,cmd_z_m", *lines]) + "\n")
+    with pytest.raises(InputFileError, match=r"most commands are outside the .*another robot"):
+        load_commands(file, COGIRO)
+    near = [",".join(f"{v:.4f}" for v in COGIRO.reference_pose[:3])] * 3
+    file.write_text("\n".join(["cmd_x_m,cmd_y_m,cmd_z_m", *near, *lines[:3]]) + "\n")
+    assert load_commands(file, COGIRO).n_rows == 6
+
+
+def test_positions_that_do_not_follow_the_commands(cogiro, tmp_path):
+    file = tmp_path / "measured.csv"
+    swapped = replace(cogiro, position=cogiro.position[:, [1, 0, 2]], tensions=None)
+    for data, odd in ((cogiro, False), (swapped, True)):
+        write_measurements(file, data)
+        said = " ".join(load_measurements(file, COGIRO).notes)
+        assert ("The measured positions do not follow the commands: they are" in said) is odd
+    write_measurements(file, replace(swapped, free=("tracker_frame",)))
+    assert "do not follow" not in " ".join(load_measurements(file, COGIRO).notes)
+
+
+def test_degrees_in_a_column_of_radians(tmp_path):
+    file = tmp_path / "measured.csv"
+    home = ",".join(f"{v:.4f}" for v in COGIRO.reference_pose[:3])
+    for unit, odd in (("rad", True), ("deg", False)):
+        rows = [f"{home},{angle}" for angle in (1.1, -0.9, 0.8, 1.3)]
+        file.write_text("\n".join([f"cmd_x_m,cmd_y_m,cmd_z_m,meas_ry_{unit}", *rows]) + "\n")
+        said = " ".join(load_measurements(file, COGIRO).notes)
+        assert (
+            "are these degrees? Name the column by its unit, such as meas_ry_deg" in said
+        ) is odd
+
+
+def test_a_model_worse_than_the_commands(cogiro):
+    assert "the commands themselves only" not in notes(COGIRO, cogiro)
+    obeyed = replace(cogiro, position=cogiro.command_pose[:, :3] + 1e-5, tensions=None)
+    assert "the commands themselves only 0.0100 mm (rms)" in notes(COGIRO, obeyed)
+
+
+def test_newtons_in_a_column_of_kilonewtons(cogiro, tmp_path):
+    assert "Tensions of" not in notes(COGIRO, cogiro)
+    assert "where the model expects" in notes(
+        COGIRO, replace(cogiro, tensions=1e3 * cogiro.tensions)
+    )
+    xml, file = tmp_path / "robot.xml", tmp_path / "measured.csv"
+    xml.write_text(soft_xml())
+    write_measurements(file, replace(cogiro, tensions=1e3 * cogiro.tensions))
+    done = run("diagnose", xml, file, "--only", "stiffness", "--no-recording",
+               "--out", tmp_path / "out")  # fmt: skip
+    assert "note: Tensions of" in done.stdout
