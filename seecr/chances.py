@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import norm, qmc
+from scipy.special import ndtri
 
 from seecr.commands import Commands
 from seecr.distribution import tension_limits
@@ -190,6 +190,8 @@ def _drawn(covariance: Array, count: int) -> Array:
     if len(covariance) == 0:
         return np.zeros((count, 0))
     values, vectors = np.linalg.eigh(covariance)
+    from scipy.stats import qmc  # takes a second to import
+
     unit = qmc.Sobol(len(covariance), seed=0).random(count)
-    drawn = norm.ppf(np.clip(unit, 1e-9, 1.0 - 1e-9))
+    drawn = ndtri(np.clip(unit, 1e-9, 1.0 - 1e-9))
     return np.asarray(drawn * np.sqrt(np.maximum(values, 0.0)) @ vectors.T)

@@ -7,7 +7,6 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import qmc
 
 from seecr.commands import Commands
 from seecr.effects.checked import edit_setup
@@ -95,6 +94,8 @@ def other_rests(
 def _all_rests(own: Solution, repeated: Callable[[int], Setup], most: int) -> Solution:
     """All stable equilibria of one command, from where its own search led."""
     robot, command = own.robot, own.command
+    from scipy.stats import qmc  # takes a second to import
+
     sampler = qmc.Sobol(robot.n_dof, seed=0)
     poses, starts = own.pose[own.converged], [own.pose[own.converged]]
     count, many = len(poses), repeated(_PART)

@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from seecr.compiled.algebra import eliminate
-from seecr.compiled.jit import jit, jit_allocating
+from seecr.compiled.jit import jit_allocating, jit_inner
 from seecr.compiled.rotation import rotated_less
 
 # A matrix is singular where a pivot of its factor falls below this part of the largest.
@@ -23,7 +23,7 @@ _TOP = 1e7
 _PIVOTS, _ROUNDING = 200, 1e-12
 
 
-@jit
+@jit_inner
 def null_space(matrix, load, work, particular, null):
     """Particular solution (m,) and null space (m, m - d) of matrix (d, m); False if singular."""
     d, m = matrix.shape
@@ -82,7 +82,7 @@ def null_space(matrix, load, work, particular, null):
     return True
 
 
-@jit
+@jit_inner
 def _rows(particular, null, low, high, top, a, b):
     """The functions a nu + b whose least is to be largest; how many. Artificial ones first."""
     m, r = null.shape
@@ -161,7 +161,7 @@ def _space(d, m):
     )  # fmt: skip
 
 
-@jit
+@jit_inner
 def _least_margin(matrix, loads, low, high, scale, space):
     """The least margin [N] over loads (k, d); nan where the matrix is singular."""
     work, particular, null, a, b = space

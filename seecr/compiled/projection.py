@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from seecr.compiled.algebra import cholesky, solve_factored
-from seecr.compiled.jit import jit, jit_allocating
+from seecr.compiled.jit import jit_allocating, jit_inner
 
 FOUND, NONE, UNDECIDED = 0, 1, 2
 # Most steps, most halvings of one, what of a balance may be left relative to its load, and how
@@ -18,7 +18,7 @@ _MOST_EVER = 1e6
 _PROVEN = 1e-10
 
 
-@jit
+@jit_inner
 def _clipped(matrix, aim, low, high, dual, tension):
     """tension = aim + A^T dual within limits; the part of the dual's value that hangs on it."""
     d, m = matrix.shape
@@ -33,7 +33,7 @@ def _clipped(matrix, aim, low, high, dual, tension):
     return value
 
 
-@jit
+@jit_inner
 def _unbalanced(matrix, load, tension, left):
     """left = A tension - load; the largest of it."""
     d, m = matrix.shape
@@ -72,7 +72,7 @@ def _newton_step(matrix, low, high, tension, left, damping, step):
         left[k] = -left[k]
 
 
-@jit
+@jit_inner
 def _take_up(matrix, low, high, step, tension):
     """A^T step to the tensions inside their limits, which they keep."""
     for i in range(matrix.shape[1]):
@@ -83,7 +83,7 @@ def _take_up(matrix, low, high, step, tension):
             tension[i] = min(max(tension[i] + change, low[i]), high[i])
 
 
-@jit
+@jit_inner
 def _none_balance(matrix, load, low, high, most_ever, dual):
     """Whether the dual proves that no tensions within limits balance (Farkas)."""
     d, m = matrix.shape

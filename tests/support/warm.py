@@ -6,8 +6,10 @@ import numpy as np
 
 import seecr
 from seecr.commands import Commands
+from seecr.distribution import distribute
 from seecr.experiment import Experiment
 from seecr.sensitivity import sensitivities
+from seecr.workspace import tension_margin
 
 # What a walk, a change of all and a change of each cable are needed for.
 EFFECTS = {
@@ -28,3 +30,8 @@ def compile_all() -> None:
     for name, values in EFFECTS.items():
         terms = seecr.Terms([seecr.Term.of(robot, name, **values)])
         sensitivities(experiment, terms, experiment.predict(terms.effects))
+    # jointed and free platforms have margins by functions of their own
+    for each in (robot, seecr.load_robot(seecr.model_path("demobot_parallel"))):
+        tension_margin(each, each.reference_pose)
+    one = np.ones((1, 1))
+    distribute(one[None], one, one, 0.0 * one, 2.0 * one)
