@@ -10,6 +10,7 @@ import paper_stiffness
 import pytest
 
 
+@pytest.mark.slow
 def test_the_numbers_of_the_page_are_current() -> None:
     page = make_paper.PAGE.read_text(encoding="utf-8")
     assert make_paper.with_table(page) == page, "run: python scripts/make_paper.py"
@@ -87,6 +88,7 @@ def test_a_size_that_is_no_use_stays_at_nothing() -> None:
     assert explain_figure_12.explain(("gravity_tilt",)).size == 0.0
 
 
+@pytest.mark.slow
 def test_the_chosen_stiffness_is_argued_with_what_it_gives() -> None:
     """The row of the choice is as computed now, and the worst search lies about the paper's 286."""
     page = make_paper.PAGE.read_text(encoding="utf-8")

@@ -29,6 +29,7 @@ def test_effects_are_considered_by_name() -> None:
         considered(["creep"], ["creep"])
 
 
+@pytest.mark.slow
 def test_a_diagnosis_considers_what_it_is_told_to() -> None:
     data = readings(radius_m=0.01)
     found = diagnose(robot(), data, only=["pulley_radius", "stiffness"])

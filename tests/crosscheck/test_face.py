@@ -16,6 +16,8 @@ import seecr
 from crosscheck.suite.cases import Case, select, shipped_cases
 from seecr.result import Result
 
+pytestmark = pytest.mark.slow
+
 ROBOT = seecr.model_path("planar_vertical")
 
 

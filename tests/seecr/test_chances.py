@@ -76,6 +76,7 @@ def test_tensions_keep_their_limits_as_often_as_drawn_models_say(tmp_path: Path)
     assert list(chance_lines(found, None)) == []
 
 
+@pytest.mark.slow
 def test_poses_are_held_as_often_as_drawn_models_say(tmp_path: Path) -> None:
     model = model_of(tmp_path, MODEL + KEPT)
     # towards the edge of what can be held
@@ -103,6 +104,7 @@ def test_a_model_without_covariance_says_nothing(tmp_path: Path) -> None:
     assert held_chance(ROBOT, POSES, model) is None
 
 
+@pytest.mark.slow
 def test_a_map_has_the_probabilities_of_its_poses(tmp_path: Path) -> None:
     model, x = model_of(tmp_path, MODEL + KEPT), np.linspace(0.02, 0.12, 6)
     found = workspace_map(
@@ -126,6 +128,7 @@ def test_a_map_has_the_probabilities_of_its_poses(tmp_path: Path) -> None:
         np.testing.assert_array_equal(kept["probability"], found.chance)
 
 
+@pytest.mark.slow
 def test_the_boundary_is_that_of_the_model_and_of_the_probability_asked_for(tmp_path: Path) -> None:
     model = model_of(tmp_path, MODEL + KEPT)
     inside, outside = POSES[:1].copy(), POSES[:1].copy()

@@ -38,6 +38,7 @@ def plain(robot: Robot, poses: np.ndarray) -> list[Plain]:
         return [plain_fsolve(robot, pose) for pose in poses]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("z", HEIGHTS)
 @pytest.mark.parametrize("cable", CABLES)
 @pytest.mark.parametrize("name", ["cogiro", "parallel"])
@@ -103,6 +104,7 @@ def test_parallel_mirrors_left_and_right(z: float) -> None:
 # --- the paper's own solver --------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("z", HEIGHTS)
 def test_residual_calls_of_the_papers_fsolve(z: float) -> None:
     """Section III-F: 14 iterations at best; several hundred at the ends of the parallel one."""

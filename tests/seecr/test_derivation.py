@@ -35,6 +35,7 @@ def three_forces_meet() -> sp.Expr:
     return sp.Matrix([*lines, [0, -1, 0]]).det()
 
 
+@pytest.mark.slow
 def test_the_bars_equation_and_its_limit() -> None:
     # docs/misprints.md: h times this vanishes
     bar = (
@@ -50,6 +51,7 @@ def test_the_bars_equation_and_its_limit() -> None:
     assert sp.expand(limit - (A * sp.cos(theta) - B * sp.sin(theta))) == 0
 
 
+@pytest.mark.slow
 def test_equation_5_is_the_half_angle_of_that_limit_and_is_0_over_0_at_the_level_pose() -> None:
     root = sp.sqrt(A**2 + B**2)
     t = (B + root) / -A  # tan(theta / 2)

@@ -198,6 +198,7 @@ COMBINATIONS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(len(COMBINATIONS)))
 def test_effects_together_are_solved_and_differentiated(seed: int) -> None:
     # nothing has a derivative where a cable is a micrometre from slack: other poses then

@@ -226,6 +226,7 @@ def hung(*effects: Effect, robot: Robot = HUNG, **more: object) -> Prediction:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["demobot_cogiro", "demobot_parallel", "planar_vertical"])
 def test_a_frame_yields_sideways_and_upwards_by_what_each_cable_pulls(kind: str) -> None:
     """Against exit points that are moved by C T u, over and over, on the plain robot."""

@@ -19,6 +19,8 @@ from seecr.report.words import jump_lines
 from seecr.robot import Robot
 from seecr.shipped import model_path
 
+pytestmark = pytest.mark.slow
+
 
 def parallel(softer: float = 1.0) -> Robot:
     robot = load_robot(model_path("demobot_parallel"))

@@ -305,6 +305,7 @@ def lift_by_small_steps(lengths: np.ndarray, amplitude: float, turning: float) -
     return heights
 
 
+@pytest.mark.slow
 def test_a_slack_cable_keeps_its_stretch_and_its_friction_and_pulls_again_from_there() -> None:
     robot = lift()
     lower = robot.rest_lengths[1] + np.array([0.0, 0.02, 0.08, 0.05, 0.09, 0.02, -0.01, 0.06, 0.0])

@@ -109,6 +109,7 @@ def test_the_parallel_robot_holds_what_its_workspace_says() -> None:
     assert f"{int((~found.held).sum())} cannot be held: no tensions within the limits" in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "x"), [("demobot_parallel", 0.2), ("demobot_parallel", 0.29), ("demobot_cogiro", 0.9)]
 )
@@ -143,6 +144,7 @@ def test_a_robot_with_too_few_cables_keeps_the_position() -> None:
     assert np.abs(found.left[0, :3]).max() < 1e-9 and np.abs(found.left[0, 4]) > 0.05
 
 
+@pytest.mark.slow
 def test_what_nothing_holds_has_no_numbers() -> None:
     robot = robot_named("demobot_cogiro")
     found = correct(robot, line(2), highest=0.4)  # eight of them are less than the weight
@@ -150,6 +152,7 @@ def test_what_nothing_holds_has_no_numbers() -> None:
     assert "2 of them: no pose near was found that can be held" in str(found)
 
 
+@pytest.mark.slow
 def test_a_pose_far_above_the_frame_comes_down_to_where_tensions_still_hold_it() -> None:
     """At the wanted pose every cable pulls the wrong way: the search goes on from home."""
     robot = robot_named("demobot_cogiro")
@@ -159,6 +162,7 @@ def test_a_pose_far_above_the_frame_comes_down_to_where_tensions_still_hold_it()
     assert robot.reference_pose[2] < found.aimed[0, 2] < 0.6
 
 
+@pytest.mark.slow
 def test_it_is_told_which_cable_cannot_do_what_it_would_have_to() -> None:
     robot = robot_named("demobot_cogiro")
     held, pulled = correct(robot, line(1, 0.4, 0.4, 0.1)), line(1, 0.4, 0.4, 0.1)

@@ -107,6 +107,7 @@ def test_the_boundary_is_where_the_margin_vanishes() -> None:
         boundary(robot, outside, inside)
 
 
+@pytest.mark.slow
 def test_a_map_is_what_each_pose_says(tmp_path: Path) -> None:
     robot = robot_named("demobot_parallel")
     axes = np.linspace(0.2, 0.6, 5), np.linspace(0.2, 0.3, 2), np.array([0.1, 0.2])

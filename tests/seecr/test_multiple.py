@@ -15,6 +15,7 @@ from seecr.report.words import other_lines, softest_words
 from seecr.shipped import model_path
 
 
+@pytest.mark.slow
 def test_what_thousands_of_starts_find_is_found() -> None:
     robot = load_robot(model_path("demobot_cogiro"))
     pose = np.array([0.4, 0.25, 0.15, 1, 0, 0, 0])

@@ -17,6 +17,7 @@ from seecr.shipped import model_path
 from seecr.tables import take
 
 
+@pytest.mark.slow
 def test_the_pass_between_the_two_rests_of_the_tilted_command() -> None:
     robot = load_robot(model_path("demobot_parallel"))
     pose = np.array([0.351, 0.216, 0.109, 0.943, 0.163, -0.288, -0.038])
@@ -54,6 +55,7 @@ def test_the_pass_between_the_two_rests_of_the_tilted_command() -> None:
     assert line.endswith("; reachable, 0.068 mJ to get there, 1.68 back")
 
 
+@pytest.mark.slow
 def test_mirrored_rests_are_twisted_and_as_far_up() -> None:
     robot = load_robot(model_path("demobot_cogiro"))
     pose = robot.reference_pose

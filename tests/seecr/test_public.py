@@ -46,6 +46,7 @@ def test_no_module_hides_a_public_name() -> None:
     assert not modules & set(seecr.__all__)
 
 
+@pytest.mark.slow
 def test_importing_all_of_it_by_name_loads_nothing_heavy() -> None:
     code = (
         "import sys, seecr; dir(seecr); seecr.Robot, seecr.Term, seecr.model_path, seecr.Status;"

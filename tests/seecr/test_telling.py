@@ -62,6 +62,7 @@ def test_numba_tells_of_what_it_compiles_and_not_of_what_it_has(
     assert twice(3.0) == 6.0 and seen == ["begins", "ends"]
 
 
+@pytest.mark.slow
 def test_a_program_tells_it_on_standard_error_and_python_is_left_in_peace() -> None:
     code = """
 import sys, time

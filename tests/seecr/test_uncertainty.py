@@ -51,6 +51,7 @@ def test_the_covariance_is_put_together_by_name(tmp_path: Path) -> None:
     np.testing.assert_allclose(covariance, expected, atol=1e-18)
 
 
+@pytest.mark.slow
 def test_many_models_drawn_from_it_spread_as_said(tmp_path: Path) -> None:
     model = model_of(tmp_path, MODEL)
     spread = spread_of(ROBOT, POSES, model)

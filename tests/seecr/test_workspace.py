@@ -17,6 +17,8 @@ from seecr.robot import Robot
 from seecr.shipped import model_path
 from seecr.workspace import Zone, feasible, slack_zones, unbalanced, wrench_matrix
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def cogiro() -> Robot:

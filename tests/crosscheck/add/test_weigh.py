@@ -66,6 +66,7 @@ def test_an_effect_that_is_nothing_is_not_worth_adding() -> None:
     assert not sure.is_nothing and sure.from_nothing > 50.0 and sure.pays
 
 
+@pytest.mark.slow
 def test_errors_cover_what_another_missing_effect_does_to_a_value(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

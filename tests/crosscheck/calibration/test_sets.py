@@ -36,6 +36,7 @@ def every_set(gram: Gram) -> list[Names]:
     return [frozenset(s) for k in range(9) for s in combinations(gram.names, k)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("alike", [False, True])
 @pytest.mark.parametrize("there", [(), (3,), (0, 5), (1, 2, 6), (0, 2, 3, 5, 7)])
 def test_the_search_ends_at_the_best_of_all_sets(there: tuple[int, ...], alike: bool) -> None:
@@ -57,6 +58,7 @@ def test_neighbours_of_a_set_are_scored_as_those_sets_are() -> None:
             assert score > scores.score(names) - 3.0
 
 
+@pytest.mark.slow
 def test_what_the_model_has_is_in_every_set_and_no_guess() -> None:
     gram, held = toy(0, (1, 2, 6)), frozenset({"e0"})
     scores = Scores(gram, 7, held)

@@ -17,6 +17,8 @@ from crosscheck.measurements.write import write_measurements
 from seecr.mjcf import load_robot
 from seecr.model import load_model
 
+pytestmark = pytest.mark.slow
+
 HIDDEN = {"pulley_radius": {"radius_m": 0.01}, "centre_of_mass": {"shift_x_m": 0.004}}
 
 

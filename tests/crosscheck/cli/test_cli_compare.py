@@ -7,6 +7,8 @@ import json
 import pytest
 from made_data import case, refused, run
 
+pytestmark = pytest.mark.slow
+
 QUIET = ("--no-recording",)
 
 

@@ -22,6 +22,8 @@ from seecr.mjcf import load_robot
 from seecr.model import load_model
 from seecr.shipped import model_path
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def planar(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:

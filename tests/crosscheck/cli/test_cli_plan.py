@@ -9,6 +9,8 @@ from made_data import case, refused, run
 
 from seecr.shipped import model_path
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def poses(tmp_path_factory):

@@ -49,6 +49,7 @@ def changed(path: Path, folder: Path, old: str, new: str) -> Path:
     return copy
 
 
+@pytest.mark.slow
 def test_agreement_ends_0_and_writes_what_it_promises(tmp_path):
     out = tmp_path / "out"
     result = run(*SMALL, "--out", out)
@@ -62,6 +63,7 @@ def test_agreement_ends_0_and_writes_what_it_promises(tmp_path):
     assert ET.parse(out / "junit.xml").getroot().find("testsuite").get("failures") == "0"
 
 
+@pytest.mark.slow
 def test_recordings_lie_beside_the_results(tmp_path):
     result = run("--case", "planar-two-cable", "--jobs", "1", "--out", tmp_path)
     assert result.exit_code == 0
@@ -70,6 +72,7 @@ def test_recordings_lie_beside_the_results(tmp_path):
     assert (tmp_path / "planar-two-cable.rrd").stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_json_goes_to_standard_output_and_nothing_else(tmp_path):
     result = run(*SMALL, "--json", "--out", tmp_path)
     assert result.exit_code == 0
@@ -77,6 +80,7 @@ def test_json_goes_to_standard_output_and_nothing_else(tmp_path):
     assert json.loads(result.stdout)["verdict"] == "agree"
 
 
+@pytest.mark.slow
 def test_one_stiffness_changed_by_a_thousandth_ends_1_and_names_the_case(tmp_path):
     stiffness = PLANAR.read_text().split('stiffness="')[1].split('"')[0]
     new = repr(float(stiffness) * 1.001)
@@ -94,6 +98,7 @@ def test_one_stiffness_changed_by_a_thousandth_ends_1_and_names_the_case(tmp_pat
     assert run("--robot", other, *arguments).exit_code == 0
 
 
+@pytest.mark.slow
 def test_what_of_the_users_mjcf_plays_no_part_is_told_once(tmp_path):
     rough = changed(PLANAR, tmp_path, '<joint name="x"', '<joint name="x" damping="2"')
     arguments = ("--no-recordings", "--jobs", "1", "--out", tmp_path / "out")
@@ -108,6 +113,7 @@ def test_what_of_the_users_mjcf_plays_no_part_is_told_once(tmp_path):
     assert plain.stderr == "" and json.loads(plain.stdout)["notes"] == []
 
 
+@pytest.mark.slow
 def test_thresholds_of_the_users_hold(tmp_path):
     strict = tmp_path / "strict.toml"
     strict.write_text("[polished]\ntension_N = 1e-18\n")
@@ -118,6 +124,7 @@ def test_thresholds_of_the_users_hold(tmp_path):
     assert "tension_N = 1e-18" in (out / "thresholds.toml").read_text()
 
 
+@pytest.mark.slow
 def test_a_solve_that_does_not_converge_ends_3(tmp_path, monkeypatch):
     import seecr
 
@@ -133,6 +140,7 @@ def test_a_solve_that_does_not_converge_ends_3(tmp_path, monkeypatch):
 EFFECT = "effect-demobot_parallel-platform_mass"
 
 
+@pytest.mark.slow
 def test_an_effect_is_a_case_like_any_other(tmp_path):
     result = run(*SMALL, "--case", EFFECT, "--out", tmp_path)
     assert result.exit_code == 0
@@ -168,6 +176,7 @@ def test_effects_alone_run_in_several_processes(tmp_path):
     assert not (tmp_path / "worst_pose.xml").exists()
 
 
+@pytest.mark.slow
 def test_an_effect_that_differs_ends_1_and_is_named(tmp_path, monkeypatch):
     honest = effect_suite.measure
 
@@ -187,6 +196,7 @@ def test_an_effect_that_differs_ends_1_and_is_named(tmp_path, monkeypatch):
     assert f"- {EFFECT}: position " in (tmp_path / "summary.md").read_text()
 
 
+@pytest.mark.slow
 def test_an_effect_without_rest_ends_3(tmp_path, monkeypatch):
     honest = effect_suite.measure
 
@@ -268,6 +278,7 @@ def test_an_output_folder_that_cannot_be_written(tmp_path):
     assert (tmp_path / "file").read_text() == "kept"
 
 
+@pytest.mark.slow
 def test_an_error_half_way_leaves_nothing(tmp_path, monkeypatch):
     from crosscheck import suite
 
@@ -322,6 +333,7 @@ def test_version_no_command_and_unknown_command():
     assert unknown.stderr.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_a_reader_who_leaves_is_no_error():
     code = "from crosscheck.cli import main; main(['run', '--list'])"
     process = subprocess.Popen(

@@ -24,6 +24,7 @@ def last(result):
     return shlex.split(line, comments=True)[1:]
 
 
+@pytest.mark.slow
 def test_from_a_plan_to_a_model_by_the_commands_that_each_names(tmp_path, monkeypatch):
     """What a command says next is run as it is said, until nothing is missing."""
     monkeypatch.chdir(tmp_path)

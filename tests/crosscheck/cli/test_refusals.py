@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from made_data import case, refused, run
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def stiff(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from made_data import COGIRO, SIGMA, measured
 
 from crosscheck.comparison.residuals import compare
@@ -53,6 +54,7 @@ def test_the_same_several_times_larger_than_stated_is_not() -> None:
     assert not found.is_noise and found.coloured is None
 
 
+@pytest.mark.slow
 def test_a_few_rows_far_off_are_noise_unless_they_lie_side_by_side() -> None:
     apart, together = np.zeros((rows(), 3)), np.zeros((rows(), 3))
     apart[5::23] += 40 * SIGMA.position_m

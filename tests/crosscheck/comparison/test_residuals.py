@@ -127,6 +127,7 @@ def test_errors_are_traced_to_what_they_follow(robot, against):
     assert sum(b.rows for b in first.bins) == plain.n_rows
 
 
+@pytest.mark.slow
 def test_noise_goes_with_nothing(robot):
     firsts = [compare(robot, measured(robot, seed=s)).associations[0].p for s in range(20)]
     assert np.sum(np.array(firsts) < 0.05) <= 3

@@ -52,6 +52,7 @@ def test_the_json_names_each_effect_once_with_its_class() -> None:
     assert "calibrated" not in document  # the steps ended with noise
 
 
+@pytest.mark.slow
 def test_where_something_is_unknown_the_joint_fit_is_told() -> None:
     document = made_diagnoses.unknown().as_json()
     assert document["calibrated"]["before"] == document["before"]
@@ -119,6 +120,7 @@ def test_what_no_robot_can_have_wherever_it_was_fitted_is_out_of_the_question() 
     assert _impossible(found) == {"law"}
 
 
+@pytest.mark.slow
 def test_effects_out_of_the_question_have_no_part_in_the_probabilities(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

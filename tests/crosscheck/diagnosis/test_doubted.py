@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 from made_data import term
 
 import crosscheck
@@ -45,6 +46,7 @@ MAY_BE = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_an_effect_that_is_unlikely_is_not_listed_though_steps_end_with_noise(
     tmp_path: Path,
 ) -> None:

@@ -71,6 +71,7 @@ def test_they_come_in_the_order_in_which_adding_them_pays() -> None:
     assert falls[0] > falls[1] > 0
 
 
+@pytest.mark.slow
 def test_of_noise_alone_nothing_is_found() -> None:
     alarms = [seed for seed in range(40) if searched(toy({}, NAMES, seed=seed)).found]
     assert len(alarms) <= 1, "more than one false alarm in a hundred searches"

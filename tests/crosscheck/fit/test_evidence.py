@@ -56,6 +56,7 @@ def test_of_one_parameter(size: float) -> None:
     assert evidence(found).log == pytest.approx(expected, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_of_two_parameters_that_go_together() -> None:
     made, _ = small("gravity_tilt", 0.8)
     columns = made.columns["gravity_tilt"]
@@ -65,6 +66,7 @@ def test_of_two_parameters_that_go_together() -> None:
     assert evidence(found).log == pytest.approx(log_integral(found), abs=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sizes", [(9.0, 0.2), (0.2, 0.2), (9.0, 9.0)])
 def test_effects_have_each_their_own_width(sizes: tuple[float, float]) -> None:
     """Beside a large effect a small one is not charged for the range of the large one.
@@ -89,6 +91,7 @@ def test_effects_have_each_their_own_width(sizes: tuple[float, float]) -> None:
     assert evidence(found).log == pytest.approx(exact, abs=0.1)
 
 
+@pytest.mark.slow
 def test_widths_of_effects_that_go_together_are_found_beside_each_other() -> None:
     """Against the mean over all pairs of widths; without looking again it is off by up to 2.3."""
     rng, off = np.random.default_rng(0), []
@@ -135,6 +138,7 @@ def test_a_parameter_on_its_bound_is_left_out_of_the_formula() -> None:
     assert evidence(stopped).log == pytest.approx(-0.5 * plain.chi2)
 
 
+@pytest.mark.slow
 def test_chances_of_a_fall_of_chi2_are_uniform_under_noise() -> None:
     """Linear fits of as many directions to noise alone."""
     rng = np.random.default_rng(1)

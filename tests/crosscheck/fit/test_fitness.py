@@ -101,6 +101,7 @@ def test_two_runs_that_do_not_agree_contradict_each_other(data: Measurements) ->
     assert unfit(with_position(both, both.position + 0.3 * shift)) is Unfit.CONTRADICTION
 
 
+@pytest.mark.slow
 def test_from_the_command_line(tmp_path: Path) -> None:
     xml, data = case(tmp_path, points=3)
     lines = data.read_text().splitlines()

@@ -26,6 +26,7 @@ def far_away(*effects, free=("tracker_frame",)):
     return replace(measured(ROBOT, [frame, *effects], points=6), free=free)
 
 
+@pytest.mark.slow
 def test_what_is_left_does_not_depend_on_where_the_tracker_stands():
     mass = term(ROBOT, "platform_mass", added_kg=0.6)
     here = replace(measured(ROBOT, [mass], points=6), free=("tracker_frame",))
@@ -36,6 +37,7 @@ def test_what_is_left_does_not_depend_on_where_the_tracker_stands():
     assert any("tracker_frame is free, as the TOML" in note for note in there.notes)
 
 
+@pytest.mark.slow
 def test_a_diagnosis_finds_what_is_missing_beside_the_frame_and_not_the_frame():
     gain = term(ROBOT, "pulley_radius", radius_m=0.01)
     target = term(ROBOT, "tracker_target", **TARGET)
@@ -46,6 +48,7 @@ def test_a_diagnosis_finds_what_is_missing_beside_the_frame_and_not_the_frame():
     assert found.verdict is crosscheck.DiagnosisVerdict.EFFECTS_FOUND
 
 
+@pytest.mark.slow
 def test_adding_fits_the_frame_too_and_a_fixed_one_stays():
     found = crosscheck.add_effect(
         ROBOT, far_away(term(ROBOT, "pulley_radius", radius_m=0.01)), "pulley_radius"

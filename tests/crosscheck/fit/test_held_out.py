@@ -37,6 +37,7 @@ def test_each_run_is_predicted_by_a_fit_to_the_others() -> None:
     assert held.valid
 
 
+@pytest.mark.slow
 def test_what_runs_left_out_leave_grows_with_the_rank() -> None:
     """Of N readings in k runs, rank p: chi2 about N + p k/(k - 1), where in sample it is N - p."""
     found = []

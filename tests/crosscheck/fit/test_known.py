@@ -17,6 +17,8 @@ from crosscheck.fit.prepare import prepare
 from crosscheck.measurements.data import Measurements
 from seecr.effects import Term, Terms
 
+pytestmark = pytest.mark.slow
+
 TRUE = 0.01
 
 

@@ -11,6 +11,8 @@ from crosscheck.fit.noise import STRUCTURED, agreement, best_of, whiteness
 from crosscheck.fit.problem import Problem
 from seecr.pose import Array
 
+pytestmark = pytest.mark.slow
+
 SEEDS = 600
 
 

@@ -21,6 +21,8 @@ from seecr.cli import main as seecr_main
 from seecr.effects import Own, Terms
 from seecr.mjcf import load_robot
 
+pytestmark = pytest.mark.slow
+
 ROBOT = load_robot(COGIRO)
 PULLEY = {"radius_m": 0.01}
 FRAMES = {

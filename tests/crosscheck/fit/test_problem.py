@@ -68,6 +68,7 @@ def test_exact_lengths_leave_the_noise_as_stated() -> None:
     assert state.log_det == 0.0
 
 
+@pytest.mark.slow
 def test_errors_of_values_grow_where_residuals_go_together() -> None:
     """A tracker whose noise wanders: what is fitted is less sure than its scatter says."""
     robot = load_robot(COGIRO)

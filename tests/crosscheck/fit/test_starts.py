@@ -65,6 +65,7 @@ def test_it_is_silent_on_sensors_and_on_rows_that_depend_on_rows_before(case) ->
     assert equation_start(problem, base.state, layout, shape, factor) is None
 
 
+@pytest.mark.slow
 def test_values_stay_within_their_bounds(case) -> None:
     problem, factor, base = case
     for name in ("cable_stiffness", "drum_gain", "anchor_point_error"):

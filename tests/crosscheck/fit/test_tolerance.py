@@ -80,6 +80,7 @@ def test_noise_that_nobody_stated_says_nothing_of_what_matters() -> None:
     assert "not stated, see --tolerance" in nothing.words
 
 
+@pytest.mark.slow
 def test_structure_is_a_verdict_only_where_it_matters() -> None:
     """Noise of the stated size that is smooth along the way, and a wave that is larger."""
     data = readings()

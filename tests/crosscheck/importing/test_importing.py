@@ -20,6 +20,8 @@ from crosscheck.importing.markers import aligning, body_of_markers
 from crosscheck.measurements.dwells import mean_error
 from seecr.pose import quat_rotate, rotvec_from_quat
 
+pytestmark = pytest.mark.slow
+
 ROBOT = soft_cogiro()
 TRUE = [term(ROBOT, "pulley_radius", radius_m=0.01)]
 POINTS = tuple(f"platform:points{i}" for i in (1, 2, 3, 4))

@@ -25,6 +25,8 @@ from seecr.mjcf import load_robot
 from seecr.shipped import model_path
 from seecr.workspace import feasible
 
+pytestmark = pytest.mark.slow
+
 PLANAR = load_robot(model_path("planar_vertical"))
 
 

@@ -29,6 +29,8 @@ from seecr.pose import rotvec_from_quat
 from seecr.shipped import model_path
 from seecr.workspace import feasible
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def robot():

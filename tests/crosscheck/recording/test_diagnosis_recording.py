@@ -25,6 +25,8 @@ from crosscheck.recording.misfit import Misfit, read_poses, states_of, worst_row
 from crosscheck.units import short
 from seecr.errors import InputFileError
 
+pytestmark = pytest.mark.slow
+
 STEP = "model_step"
 
 

@@ -31,6 +31,8 @@ from seecr.recording.colours import cable_colours, round_up, scale_colours
 from seecr.shipped import model_path
 from seecr.solution import Status
 
+pytestmark = pytest.mark.slow
+
 PARALLEL = model_path("demobot_parallel")
 POSES = 6
 

@@ -30,6 +30,7 @@ def drawn(points: int) -> str:
     return base64.b64decode(found[1]).decode()
 
 
+@pytest.mark.slow
 def test_a_figure_is_an_image_with_words_and_the_same_twice() -> None:
     text = drawn(5)
     assert ElementTree.fromstring(text).tag.endswith("svg")

@@ -14,6 +14,8 @@ import crosscheck
 from crosscheck.report.write import render
 from seecr.made import Made
 
+pytestmark = pytest.mark.slow
+
 ONLY = {"pulley_radius": {"radius_m": 0.01}}
 
 

@@ -40,6 +40,8 @@ from crosscheck.report.write import render
 from crosscheck.units import short, with_error
 from seecr.errors import InputFileError
 
+pytestmark = pytest.mark.slow
+
 ALL = ("pulleys", "nothing", "unknown", "none", "position_only", "tensions_only", "one_angle")
 EVIL = '<script>alert("1")</script>&$x$'
 

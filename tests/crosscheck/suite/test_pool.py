@@ -9,6 +9,8 @@ import pytest
 from crosscheck.errors import CrosscheckError
 from crosscheck.suite.pool import Pool
 
+pytestmark = pytest.mark.slow
+
 # Other processes import functions by name; those of a test's own module they would not find.
 DOUBLE = (2).__mul__
 

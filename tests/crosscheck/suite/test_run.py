@@ -127,6 +127,7 @@ def test_planar_robots_run_on_both_cables_at_more_heights(shipped):
             assert len(heights) == 5
 
 
+@pytest.mark.slow
 def test_the_seed_decides_the_random_poses():
     one, same, other = shipped_cases(3), shipped_cases(3), shipped_cases(4)
     for a, b, c in zip(one, same, other, strict=True):
@@ -519,6 +520,7 @@ def test_a_platform_may_be_free_to_move_where_that_is_named(wide):
     assert beyond(FindingLimits(free_elsewhere=1.0), wide, *free) == [3, 4]
 
 
+@pytest.mark.slow
 def test_elsewhere_a_share_may_be_free_to_move(wide):
     drawn = replace(wide, has_names=False)
     free = [finding(i, Verdict.NEUTRAL) for i in range(3)]

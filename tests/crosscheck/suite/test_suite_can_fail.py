@@ -32,6 +32,8 @@ from seecr.compiled import columns
 from seecr.pose import quat_conjugate, quat_from_rotvec, quat_multiply
 from seecr.shipped import model_path
 
+pytestmark = pytest.mark.slow
+
 CROSSED, TILTED, UNEVEN, OFF_CENTRE, PLANAR = (
     "cogiro-vectran-turned",
     "parallel-fishing-z0.10",

@@ -52,6 +52,7 @@ def test_told_lengths_lead_a_robot_with_effects_to_the_poses() -> None:
     assert np.abs(pose_difference(truth.pose, found.wanted)).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_with_a_memory_a_micrometre_is_left() -> None:
     robot = load_robot(model_path("demobot_cogiro"))
     effects = [

@@ -75,6 +75,7 @@ def test_lengths_as_told_go_through_winches_and_geometry() -> None:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stands", [False, True])
 def test_loads_and_starts_leave_the_same_history(stands: bool) -> None:
     experiment = experiment_of("demobot_cogiro", reach=0.5)

@@ -68,6 +68,7 @@ def users_poses(folder, way_points=True):
     return path
 
 
+@pytest.mark.slow
 def test_a_user_s_own_poses_are_measured_with_their_loads_and_way_points(tmp_path):
     path = users_poses(tmp_path)
     sigma = Sigma(position_m=1e-6, tension_N=0.05)
@@ -175,6 +176,7 @@ def test_the_answer_is_sealed_and_says_all(tmp_path):
     assert answer.moves_over_noise["centre_of_mass"].max > 2.0
 
 
+@pytest.mark.slow
 def test_a_seed_makes_the_same_twin_again():
     first, again = (make_twin(COGIRO, 11, points=POINTS) for _ in range(2))
     assert first.answer == again.answer
@@ -183,6 +185,7 @@ def test_a_seed_makes_the_same_twin_again():
     assert not np.array_equal(first.measured.position, other.measured.position)
 
 
+@pytest.mark.slow
 def test_the_noise_says_nothing_of_what_is_hidden():
     """The same seed gives the same noise, whatever is hidden."""
     none, some = (
@@ -265,6 +268,7 @@ def test_what_happens_on_the_way_explains_the_readings(robot, name):
     assert is_noise(residuals(twin))
 
 
+@pytest.mark.slow
 def test_two_hidden_effects_act_together():
     names = ("pulley_radius", "frame_compliance")
     twin = make_twin(COGIRO, 2, effects=names, points=POINTS)
@@ -296,6 +300,7 @@ def _scaled(text, factor):
     return ElementTree.tostring(root, encoding="unicode")
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_case_and_does_not_tell(tmp_path):
     out = tmp_path / "case"
     args = ["twin", str(COGIRO), "--hide", "3", "--effect", "tracker_scale", "--out", str(out)]
@@ -310,6 +315,7 @@ def test_the_command_writes_a_case_and_does_not_tell(tmp_path):
     assert told["hidden"] == ["tracker_scale"] and list(told["made"]["sha256"]) == [NAME]
 
 
+@pytest.mark.slow
 def test_the_command_s_json_is_all_it_prints(tmp_path):
     args = ["twin", "demobot_cogiro", "--hide", "1", "--effects", "0", "--out", str(tmp_path)]
     run = CliRunner().invoke(main, [*args, "--json"])
@@ -372,6 +378,7 @@ def test_an_answer_that_says_something_else_is_none(answer):
         Answer.of_json({**document, "all_move_over_noise": {"most": 1.0}})
 
 
+@pytest.mark.slow
 def test_what_of_the_mjcf_plays_no_part_is_told_once(tmp_path):
     rough = tmp_path / "rough.xml"
     text = model_path("planar_vertical").read_text(encoding="utf-8")

@@ -85,6 +85,7 @@ def test_an_effect_a_hundredth_off_does_not_agree():
     assert np.max(distance(truth.pose, ours.pose)) > 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("weight", [0.02, 0.2])
 def test_chains_come_to_the_catenary_with_the_square_of_the_segments(weight):
     robot = robot_named()
@@ -162,6 +163,7 @@ def test_a_platform_that_is_free_to_move_is_not_at_rest():
     assert taut == 2 and truth.free[0] and not truth.at_rest[0]
 
 
+@pytest.mark.slow
 def test_hysteresis_leaves_a_loop_and_forgets_it_between_runs():
     robot = dataclasses.replace(robot_named(), ea=np.full(8, 300.0))
     forth = np.linspace(-0.2, 0.2, 5)

@@ -105,6 +105,7 @@ def test_bad_input_is_one_line_and_nothing_is_written(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_sweep_writes_its_files(tmp_path: Path) -> None:
     out = tmp_path / "out"
     grid = ["--grid", "0.3:0.5:3", "0.25", "0.1:0.2:2", "--turned", "1", "0", "0", "0"]
@@ -124,6 +125,7 @@ def test_sweep_writes_its_files(tmp_path: Path) -> None:
     assert rows == document["rows"]
 
 
+@pytest.mark.slow
 def test_correct_writes_commands_that_every_command_reads(tmp_path: Path) -> None:
     poses, model = tmp_path / "poses.csv", tmp_path / "model.toml"
     poses.write_text("run,cmd_x_m,cmd_y_m,cmd_z_m\na,0.4,0.25,0.1\nb,0.45,0.2,0.15\n")
@@ -148,6 +150,7 @@ def test_correct_writes_commands_that_every_command_reads(tmp_path: Path) -> Non
     assert "2 cannot be held: no tensions within the limits" in lost.stdout
 
 
+@pytest.mark.slow
 def test_map_writes_its_files_or_says_why_not(tmp_path: Path) -> None:
     out = tmp_path / "out"
     grid = ["--grid", "0.3:0.5:3", "0.2:0.3:2", "0.1"]

@@ -87,6 +87,7 @@ def test_each_json_says_how_it_was_made(
     assert list(made["sha256"]) == [COGIRO.name] and made["version"] and made["date"]
 
 
+@pytest.mark.slow
 def test_where_no_pose_can_be_corrected_the_workspace_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -66,6 +66,7 @@ def test_a_pose_without_rest_has_no_numbers(sweep: Solution) -> None:
     assert ",,,,,,," in csv_text(rows_of(lost))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["png", "svg"])
 def test_the_figure_is_written(sweep: Solution, tmp_path: Path, kind: str) -> None:
     path = tmp_path / f"sweep.{kind}"
