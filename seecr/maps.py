@@ -105,9 +105,10 @@ class Workspace(Result):
         out = [
             f"{self.robot.name}: {held} of {counted(n, 'pose')} can be held{self.size_words(held)}"
         ]
-        tightest = self.margin[self.feasible & np.isfinite(self.margin)]
-        if len(tightest) and tightest.max() > 0:
-            half = np.median(tightest)
+        half = float(np.median(self.margin[self.feasible])) if held else 0.0
+        if half == np.inf:
+            out.append("at half of them or more all cables can be tightened without end")
+        elif half > 0.0:
             out.append(
                 f"at half of them tensions can stay {half:.3g} N or more inside their limits"
             )

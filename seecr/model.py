@@ -162,6 +162,8 @@ def load_model(path: str | Path, robot: Robot) -> Model:
     path = Path(path)
     text = read_text(path, _EXPECTED)
     document = _parse(path, text)
+    if not document:
+        raise InputFileError.at(path, f"is empty; {_EXPECTED}")
     where = Where(path, text)
     _check_tables(where, document)
     notes = check_robot(path, document.get("robot"), robot)

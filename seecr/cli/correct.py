@@ -67,7 +67,7 @@ def command(
     Exit status: 0 all poses reached or replaced by the nearest, 2 bad input,
     3 a pose without an answer.
     """  # fmt: skip
-    from seecr import correct, kept_chance
+    from seecr import InputFileError, correct, kept_chance
     from seecr.command_file import read_commands
     from seecr.files import json_text, staged, write_texts
     from seecr.report.corrections import chance_lines, corrected_csv, corrected_toml, document_of
@@ -75,6 +75,12 @@ def command(
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
     wanted = read_commands(poses, machine)
+    if wanted.commands.lengths is not None:
+        raise InputFileError.at(
+            poses,
+            "holds rest lengths; expected the poses that are wanted, such as cmd_x_m cmd_y_m "
+            "cmd_z_m: lengths are what correct finds",
+        )
     limits = float("inf") if highest is None else highest
     with staged(out) as folder:
         found = correct(

@@ -18,9 +18,11 @@ from seecr.compiled.rotation import rotated_less
 
 # A matrix is singular where a pivot of its factor falls below this part of the largest.
 _SINGULAR = 1e-11
-# The artificial functions start at this many loads: a margin near it has no bound.
+# The artificial functions start at this many loads: a margin that they hold has no bound.
 _TOP = 1e7
 _PIVOTS, _ROUNDING = 200, 1e-12
+# Rounding of numbers as large as the artificial functions; a weight beyond it holds.
+_OWN_ROUNDING, _HOLDS = 1e-14, 1e-9
 
 
 @jit_inner
@@ -106,7 +108,10 @@ def _rows(particular, null, low, high, top, a, b):
 
 @jit_allocating
 def _largest_least(a, b, count, r, scale):
-    """max over nu of min_i (a_i nu + b_i) by the dual simplex; nan where it does not end."""
+    """max over nu of min_i (a_i nu + b_i) by the dual simplex; nan where it does not end.
+
+    Infinite where artificial functions, the first r + 1, hold it: it would go on with them.
+    """
     k = r + 1
     basis = np.arange(k)
     system, right, answer = np.empty((k, k)), np.empty(k), np.empty(k)
@@ -119,7 +124,10 @@ def _largest_least(a, b, count, r, scale):
             system[row, r] = -1.0
             right[row] = -b[basis[row]]
         eliminate(system, right, answer)
-        least, enters = -_ROUNDING * scale, -1
+        size = scale * _ROUNDING
+        for c in range(k):
+            size = max(size, _OWN_ROUNDING * abs(answer[c]))
+        least, enters = -size, -1
         for i in range(count):
             value = b[i] - answer[r]
             for c in range(r):
@@ -127,7 +135,11 @@ def _largest_least(a, b, count, r, scale):
             if value < least:
                 least, enters = value, i
         if enters < 0:
-            return answer[r]
+            held = 0.0
+            for row in range(k):
+                if basis[row] < k:
+                    held += weights[row]
+            return np.inf if held > _HOLDS else answer[r]
         # the newcomer as a combination of the basis
         for row in range(k):
             for c in range(r):
@@ -174,7 +186,7 @@ def _least_margin(matrix, loads, low, high, scale, space):
         if np.isnan(found):
             return np.nan
         least = min(least, found)
-    return np.inf if least > 0.5 * _TOP * scale else least
+    return least
 
 
 @jit_allocating

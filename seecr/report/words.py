@@ -198,15 +198,24 @@ def other_lines(
         line = (
             f"could also rest {1e3 * np.linalg.norm(gap[:3]):.4g} mm and "
             f"{np.degrees(np.linalg.norm(gap[3:])):.4g} deg away, "
-            f"{1e3 * (others.energy[k] - solution.energy[i]):+.4g} mJ, "
+            f"{_more_energy(others.energy[k] - solution.energy[i])}"
             f"slack: {' '.join(slack) or 'none'}"
         )
         yield f"{line}; {_pass_words(passes[n])}" if passes else line
 
 
+def _more_energy(more: float) -> str:
+    """A moment from outside and a law in strain alone have no energy."""
+    return f"{1e3 * more:+.4g} mJ, " if np.isfinite(more) else ""
+
+
 def _pass_words(way: Barrier) -> str:
     least = "" if way.exact else "at most "
     twisted = "twisted" if way.twisted else "reachable"
+    if not np.isfinite(way.energy):
+        return (
+            f"{twisted}; what it takes to get there has no number: this load or law has no energy"
+        )
     return f"{twisted}, {least}{1e3 * way.energy:.3g} mJ to get there, {1e3 * way.back:.3g} back"
 
 
@@ -226,8 +235,12 @@ def jump_lines(solution: Solution) -> Iterator[str]:
             sure = "" if jump.certain else "; where it lands depends on damping"
             yield (
                 f"{at}: its rest ends and it jumps by {1e3 * moved:.4g} mm and "
-                f"{np.degrees(turned):.4g} deg, {1e3 * jump.energy:.3g} mJ set free{sure}"
+                f"{np.degrees(turned):.4g} deg{_set_free(jump.energy)}{sure}"
             )
+
+
+def _set_free(energy: float) -> str:
+    return f", {1e3 * energy:.3g} mJ set free" if np.isfinite(energy) else ""
 
 
 def sweep_lines(

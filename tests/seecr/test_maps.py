@@ -83,6 +83,38 @@ def test_robots_of_any_number_of_cables(seed: int) -> None:
         assert margin == pytest.approx(expected, rel=1e-6, abs=1e-8)
 
 
+def test_margins_without_a_bound_are_infinite(tmp_path: Path) -> None:
+    """Cables from the corners of a square pull against one another, wherever the platform is."""
+    sites = [(x, z) for x in (0, 1) for z in (0, 1)]
+    world = "".join(f'<site name="A{i}" pos="{x} 0 {z}"/>' for i, (x, z) in enumerate(sites))
+    body = "".join(
+        f'<site name="B{i}" pos="{0.1 * x - 0.05} 0 {0.03 - 0.06 * z}"/>'
+        for i, (x, z) in enumerate(sites)
+    )
+    cables = "".join(
+        f'<spatial springlength="0 0.69" stiffness="4000"><site site="A{i}"/><site site="B{i}"/>'
+        "</spatial>"
+        for i in range(4)
+    )
+    path = tmp_path / "square.xml"
+    path.write_text(
+        f'<mujoco model="square"><worldbody>{world}<body name="platform" pos="0.5 0 0.5">'
+        '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>'
+        '<joint type="hinge" axis="0 1 0"/><inertial pos="0 0 0" mass="0.5" '
+        f'diaginertia="1 1 1"/>{body}</body></worldbody><tendon>{cables}</tendon></mujoco>'
+    )
+    robot = load_robot(path)
+    axis = np.linspace(0.1, 0.9, 9)
+    poses = np.array([[x, 0, z, 1, 0, 0, 0] for x in axis for z in axis])
+    assert np.all(np.isposinf(tension_margin(robot, poses)))
+    bounded = tension_margin(robot, poses, highest=1e3)
+    expected = [margin_by_highs(*each, 0.0, 1e3)
+                for each in zip(*balance_equations(robot, poses), strict=True)]  # fmt: skip
+    np.testing.assert_allclose(bounded, expected, rtol=1e-7)
+    found = workspace_map(robot, axis, [0.0], axis, elastic=False)
+    assert "all cables can be tightened without end" in str(found)
+
+
 def test_a_set_of_wrenches_has_the_least_margin() -> None:
     robot = robot_named("demobot_cogiro")
     poses = some_poses(robot, 20)

@@ -55,6 +55,10 @@ ROBOT = "planar_vertical"
         ("map demobot_parallel --lowest 1e300 --out o",
          "0 <= lowest <= highest [N], lowest at most 1e+30, got lowest 1e+300 and highest inf"),
         ("correct demobot_parallel here.csv --lowest 1e300 --out o", "lowest at most 1e+30"),
+        ("correct demobot_parallel told.csv --out o",
+         "told.csv: holds rest lengths; expected the poses that are wanted, such as cmd_x_m"),
+        ("pose demobot_parallel 0.4 0.25 0.1 --model empty.xml",
+         "empty.xml: is empty; expected a model as crosscheck add writes it"),
         ("pose long.xml 0.4 0.25 0.1", "long.xml: tendon cable1 has rest length 1e+06 m; expected "
          "metres, of the size of the frame, 0.834 m across"),
         ("pose stiff.xml 0.4 0.25 0.1",
@@ -71,6 +75,8 @@ def test_a_mistake_is_one_sentence(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "here.csv").write_text(CSV)
     (tmp_path / "far.csv").write_text(CSV.replace("0.4", "400"))
+    names = ",".join(f"length_{i}_m" for i in range(1, 9))
+    (tmp_path / "told.csv").write_text(f"{names}\n{','.join(['0.5'] * 8)}\n")
     (tmp_path / "huge.csv").write_text(CSV.replace("0.4", "1e300"))
     (tmp_path / "picture.xml").write_bytes(b"\x89PNG\r\n\x1a\n\0")
     (tmp_path / "empty.xml").write_text(" \n")
