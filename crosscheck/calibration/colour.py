@@ -89,7 +89,8 @@ def _gaps(problem: Problem, row: NDArray[np.int64], before: NDArray[np.int64]) -
     clock = problem.data.t_s
     if clock is None:
         clock = np.arange(problem.data.n_rows, dtype=float)
-    since = np.where(before < 0, np.nan, clock[row] - clock[row[before]])
+    # rows that did not come from a file need not follow in time
+    since = np.where(before < 0, np.nan, np.abs(clock[row] - clock[row[before]]))
     usual = float(np.nanmedian(since)) if np.isfinite(since).any() else 1.0
     return np.nan_to_num(since / usual, nan=_LONG) if usual > 0 else np.ones(len(row))
 

@@ -1,14 +1,12 @@
 """An effect that no catalogue holds: a smooth field over the workspace, as a test.
 
-Each channel of readings gets a cubic of the commanded position of its own, one width for all
+Each channel of readings gets a cubic of the position of its own, one width for all
 coefficients. How much more evidence the data give with it, all effects integrated out and the
 noise at its best on both sides, says whether something smooth is left that none of them explains.
 It is never fitted: it would explain what effects explain.
 """
 
 from __future__ import annotations
-
-from itertools import combinations_with_replacement
 
 import numpy as np
 from scipy import special
@@ -18,9 +16,9 @@ from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.linearised import unwhitened
 from crosscheck.calibration.restricted import estimate, log_evidence
 from crosscheck.fit.problem import Problem
+from crosscheck.fit.smooth import field_columns
 from seecr.pose import Array
 
-_DEGREE = 3
 FIELD_WIDTHS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 # Spread of ln(true sigma/stated sigma) where it was stated.
 _STATED = 0.35
@@ -28,26 +26,9 @@ _STATED = 0.35
 UNKNOWN = 5.0
 
 
-def cubic(place: Array) -> Array:
-    """(n, 20) monomials to the third degree of places (n, 3), each axis scaled to [-1, 1]."""
-    middle = 0.5 * (place.max(axis=0) + place.min(axis=0))
-    half = 0.5 * np.ptp(place, axis=0)
-    unit = (place - middle) / np.where(half > 1e-3 * half.max(), half, np.inf)
-    columns = [np.ones(len(place))]
-    for degree in range(1, _DEGREE + 1):
-        for axes in combinations_with_replacement(range(3), degree):
-            columns.append(np.prod(unit[:, axes], axis=1))
-    whole = np.stack(columns, axis=1)
-    return np.asarray(whole[:, np.any(whole != 0.0, axis=0)])
-
-
-def field_columns(problem: Problem, place: Array) -> Array:
+def field_of(problem: Problem, place: Array) -> Array:
     """(N, k) columns of the field in units of the noise, a cubic for each channel."""
-    shapes = cubic(place)[problem.row_of]
-    channels = np.unique(problem.column_of)
-    return np.concatenate(
-        [shapes * (problem.column_of == c)[:, None] for c in channels], axis=1
-    )  # fmt: skip
+    return field_columns(problem, place, problem.measured.shape[1])
 
 
 def log_odds(setting: Setting, joint: JointFit, stated: bool = True) -> float:
@@ -58,7 +39,7 @@ def log_odds(setting: Setting, joint: JointFit, stated: bool = True) -> float:
         stated: whether the size of the noise was stated.
     """
     about, problem = unwhitened(joint), setting.problem
-    field = field_columns(problem, joint.state.prediction.pose[:, :3])
+    field = field_of(problem, joint.state.prediction.pose[:, :3])
     free = about.width > 0.0
     x = np.concatenate([about.x[:, free], field], axis=1)
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy import linalg, special
 
 from crosscheck.calibration.colour import whitened
-from crosscheck.calibration.field import FIELD_WIDTHS, UNKNOWN, field_columns
+from crosscheck.calibration.field import FIELD_WIDTHS, UNKNOWN, field_of
 from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.worth import gains_along
 from crosscheck.fit.noise import as_table
@@ -36,7 +36,7 @@ def shown_from(setting: Setting, joint: JointFit, columns: Array, width: Array) 
         rms errors that nine in ten such effects show from; None where they hide at any size.
     """
     problem = setting.problem
-    field = field_columns(problem, joint.state.prediction.pose[:, :3])
+    field = field_of(problem, joint.state.prediction.pose[:, :3])
     random = np.random.default_rng(0)
     drawn = random.standard_normal((field.shape[1], _DRAWN))
     drawn /= np.sqrt(np.mean((field @ drawn) ** 2, axis=0))

@@ -14,7 +14,7 @@ from crosscheck.comparison.stranger import doubts
 from crosscheck.comparison.travel import Travel, regions_of, travel
 from crosscheck.fit.noise import as_table, whiteness
 from crosscheck.fit.prepare import noise_floor, outlying_rows, prepare
-from crosscheck.fit.problem import Problem, kinds_read, rms_by_kind
+from crosscheck.fit.problem import Problem, kinds_stated, rms_by_kind
 from crosscheck.fit.state import State, evaluate
 from crosscheck.given import GivenModel, GivenRobot, model_of, robot_of
 from crosscheck.measurements.data import Names
@@ -76,8 +76,7 @@ def compare(robot: GivenRobot, data: GivenData, model: GivenModel = ()) -> Compa
 def _coloured(problem: Problem, state: State, factor: Array) -> Coloured | None:
     if not state.valid or problem.n_readings < _LEAST_READINGS:
         return None
-    given = problem.data.sigma
-    stated = [k.name for k in kinds_read(problem) if getattr(given, k.sigma) is not None]
+    stated = [kind.name for kind in kinds_stated(problem)]
     return coloured_noise(problem, state, factor, stated)
 
 

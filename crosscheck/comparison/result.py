@@ -16,7 +16,7 @@ from crosscheck.comparison.coloured import Coloured
 from crosscheck.comparison.quantities import QuantityKind, channels
 from crosscheck.comparison.travel import Travel
 from crosscheck.fit.noise import Whiteness
-from crosscheck.fit.problem import BY_NAME, KINDS, Problem, Rms
+from crosscheck.fit.problem import BY_NAME, KINDS, Problem, Rms, kinds_read, kinds_stated
 from crosscheck.fit.reasons import Refusal
 from crosscheck.fit.state import State
 from crosscheck.units import short
@@ -191,7 +191,8 @@ class Comparison(Result):
         if (w.is_noise or self.coloured is not None) and self.refusal is not None:
             return f"No verdict: {self.refusal}; {self.refusal.remedy}."
         if w.is_noise:
-            times = f"{w.scale:.2f} times the stated one"
+            stated = kinds_stated(self.problem) == kinds_read(self.problem)
+            times = f"{w.scale:.2f} times the {'stated' if stated else 'estimated'} one"
             return f"Model and data agree: what is left is noise ({times})."
         if self.coloured is not None:
             return f"Model and data agree: what is left is noise ({self.coloured.words})."

@@ -14,9 +14,9 @@ from crosscheck.diagnosis.rivals import Rival, rivals_of
 from crosscheck.diagnosis.search import Search
 from crosscheck.diagnosis.small import share_of
 from crosscheck.fit.candidates import Candidate
-from crosscheck.fit.noise import overestimated
 from crosscheck.fit.problem import Rms, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
+from crosscheck.fit.unstated import overestimated
 
 
 def diagnosis_of(

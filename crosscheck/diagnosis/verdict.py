@@ -19,7 +19,7 @@ from crosscheck.diagnosis.unexplained import unexplained
 from crosscheck.fit.candidates import null_fit
 from crosscheck.fit.gauss_newton import Fit
 from crosscheck.fit.prepare import Prepared, Progress, noise_floor, prepare
-from crosscheck.fit.problem import Problem, rms_by_kind
+from crosscheck.fit.problem import Problem, kinds_read, kinds_stated, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Refusal, Unfit
 from crosscheck.fit.tolerance import HALF_THE_NOISE, Tolerance
 from crosscheck.given import GivenModel, GivenRobot, considered, model_of, robot_of
@@ -87,13 +87,13 @@ def _searched(
     """The verdict of data that are fit for one."""
     problem = ready.problem
     found, more = by_steps(problem, base, factor, _part(progress, 0.0, 0.5))
-    if found.last.whiteness.is_noise:
+    if found.last.whiteness.is_noise and kinds_stated(problem) == kinds_read(problem):
         steps = settled(found, (*notes, *more))
         if all(effect.probability > DOUBTED for effect in steps.missing):
             return steps
     # no few effects one after the other, or one that is less likely than not; noise that goes
-    # together, or is larger than stated: a few rows far off may have made it so. All at once,
-    # in sets
+    # together, is larger than stated (a few rows far off may have made it so) or was estimated,
+    # from what may be an effect. All at once, in sets
     sought = seek(problem, problem.data.sigma, ready.terms, _part(progress, 0.5, 1.0))
     if sought.judgement.verdict is not DiagnosisVerdict.UNKNOWN_EFFECT:
         return explained(sought, notes)

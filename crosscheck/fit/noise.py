@@ -1,14 +1,14 @@
-"""Is what is left noise? Goodness of fit, structure along the way, and noise nobody stated."""
+"""Is what is left noise? Goodness of fit, and structure along the way."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import spatial, special, stats
 
-from crosscheck.fit.problem import Problem, Rms, kinds_read
+from crosscheck.fit.problem import Problem
 from seecr.pose import Array, rotvec_from_quat
 
 # Residuals are structured where neighbours agree by more than this many standard errors.
@@ -17,10 +17,6 @@ STRUCTURED = 4.0
 POOR_FIT = 1e-3
 # Fewer pairs than this say nothing of how rows go together.
 _LEAST_PAIRS = 8
-# What is left over the estimated noise, below which the estimate was wrong.
-_TOO_LARGE = 0.5
-# A third difference takes so many rows.
-_ROWS = 4
 # Robot's lengths by which commands under different loads are taken to be apart.
 _APART = 1e3
 # From so many standard errors on chances add up, and P is too close to one for doubles.
@@ -173,69 +169,3 @@ def nearest_rows(problem: Problem) -> NDArray[np.int64]:
                 break
     some = [(rows[a], rows[b]) for a, b in sorted(pairs)]
     return np.array(some, dtype=np.int64).reshape(-1, 2)
-
-
-def estimate_sigma(problem: Problem, raw: Array) -> tuple[Problem, tuple[str, ...]]:
-    """Fill in noise that nobody stated, from how much neighbours along a run differ.
-
-    Third differences of residuals along a run hold almost none of a smooth model error but
-    all of the noise (times sqrt(20)); the median keeps jumps out. Where no run has rows enough
-    for one, the residuals themselves are taken for noise.
-    """
-    sigma, notes = problem.sigma, []
-    for kind in kinds_read(problem):
-        if getattr(sigma, kind.sigma) is not None:
-            continue
-        differences = _differences(problem, raw[:, kind.columns])
-        rows = raw[problem.use][:, kind.columns] if differences is None else differences
-        sigma = replace(sigma, **{kind.sigma: _size(rows)})
-        size = f"{kind.factor * _size(rows):.2g} {kind.unit}"
-        how = f"estimated from differences between neighbouring rows as {size}"
-        if differences is None:
-            how = (
-                f"no run has the {_ROWS} rows that an estimate takes, so the errors themselves, "
-                f"{size}, count as noise; state it with --sigma {kind.sigma.rpartition('_')[0]}=..."
-            )
-        notes.append(f"{kind.sigma} is not stated: {how}")
-    return problem.with_sigma(sigma), tuple(notes)
-
-
-def overestimated(problem: Problem, left: Rms) -> list[str]:
-    """Noise that was estimated, and is larger than all that is left, a sentence each.
-
-    Between rows that are far apart a large model error differs as noise does.
-
-    Args:
-        problem: with its noise. left: rms of what is left, by kind.
-    """
-    out = []
-    for kind in kinds_read(problem):
-        size, noise = left[kind.key], getattr(problem.sigma, kind.sigma)
-        if getattr(problem.data.sigma, kind.sigma) is None and size and size < _TOO_LARGE * noise:
-            name, words = kind.sigma.rpartition("_")[0], f"{kind.factor * size:.2g} {kind.unit}"
-            out.append(
-                f"{kind.sigma} was estimated too large: no more than {words} rms are left; state "
-                f"the noise, as with --sigma {name}={words.replace(' ', '')}, and more will show"
-            )
-    return out
-
-
-def _differences(problem: Problem, raw: Array) -> Array | None:
-    """Third differences of residuals (n, k) along the runs, as noise; None where runs are short.
-
-    Of each channel between rows where it was read.
-    """
-    index = problem.data.run_index
-    parts = [
-        channel[np.isfinite(channel)]
-        for name in np.unique(index)
-        for channel in raw[(index == name) & problem.use].T
-    ]
-    found = [np.diff(part, n=3) / np.sqrt(20.0) for part in parts if len(part) >= _ROWS]
-    return np.concatenate(found) if found else None
-
-
-def _size(values: Array) -> float:
-    """The standard deviation of normal noise of which these are some; outliers do not count."""
-    every = np.abs(values[np.isfinite(values)])
-    return max(float(np.median(every)) / 0.6745, 1e-12) if len(every) else 1.0

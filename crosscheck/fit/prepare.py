@@ -10,11 +10,11 @@ import numpy as np
 from crosscheck.fit.fitness import refusal_of
 from crosscheck.fit.freed import freed
 from crosscheck.fit.held_out import blocks_note
-from crosscheck.fit.noise import estimate_sigma
 from crosscheck.fit.parts import groups_of, laid_out
 from crosscheck.fit.problem import Problem, Rms, rms_by_kind
 from crosscheck.fit.reasons import Refusal, Unfit
 from crosscheck.fit.state import State
+from crosscheck.fit.unstated import estimate_sigma
 from crosscheck.measurements.data import Measurements
 from seecr.effects import Terms, catalogue
 from seecr.experiment import Prediction
@@ -74,14 +74,14 @@ def prepare(
     laid = laid_out(data, terms)
     plain = problem.experiment.predict(laid.terms.effects)
     problem = _solved_rows(problem, plain)
-    problem, estimates = estimate_sigma(problem, problem.residuals(plain.readings))
+    problem, estimates = estimate_sigma(problem, plain)
     found = freed(problem, laid)
     terms, said = found.terms, (*laid.notes, *found.notes)
     if found.free.any():
         plain = problem.experiment.predict(terms.effects)
         if estimates:  # what was left then was the frame's
             known = replace(problem, sigma=data.sigma)
-            problem, estimates = estimate_sigma(known, problem.residuals(plain.readings))
+            problem, estimates = estimate_sigma(known, plain)
     notes = (*data.notes, *problem.left_out, *estimates, *said)
     problem = problem.with_groups(groups_of(data, terms))
     refusal = refusal_of(problem, plain.pose[:, :3], data.sigma)

@@ -282,6 +282,12 @@ def kinds_read(problem: Problem) -> list[Kind]:
     return [kind for kind in KINDS if problem.counted[:, kind.columns].any()]
 
 
+def kinds_stated(problem: Problem) -> list[Kind]:
+    """Those whose noise was stated, not estimated."""
+    given = problem.data.sigma
+    return [kind for kind in kinds_read(problem) if getattr(given, kind.sigma) is not None]
+
+
 def rms_by_kind(problem: Problem, raw: Array) -> Rms:
     """Root mean square of the counted residuals: position [m], orientation [rad], tension [N].
 

@@ -22,8 +22,8 @@ _DEGREE = 3
 _OWED = 100.0
 
 
-def cubic(place: Array) -> Array:
-    """(n, k) monomials to the third degree of places (n, 3), each axis scaled to [-1, 1].
+def monomials(place: Array, degree: int = _DEGREE) -> Array:
+    """(n, k) monomials to some degree of places (n, d), each axis scaled to [-1, 1].
 
     Axes along which nothing moves are left out.
     """
@@ -32,16 +32,16 @@ def cubic(place: Array) -> Array:
     moves = half > 1e-3 * max(float(half.max()), 1e-300)
     unit = ((place - middle) / np.where(moves, half, 1.0))[:, moves]
     columns = [np.ones(len(place))]
-    for degree in range(1, _DEGREE + 1):
-        for axes in combinations_with_replacement(range(unit.shape[1]), degree):
+    for power in range(1, degree + 1):
+        for axes in combinations_with_replacement(range(unit.shape[1]), power):
             columns.append(np.prod(unit[:, axes], axis=1))
     return np.stack(columns, axis=1)
 
 
-def field_columns(problem: Problem, place: Array) -> Array:
-    """(N, k) a cubic of places (n, 3) for each channel of the pose that was read."""
-    shapes = cubic(place)[problem.row_of]
-    channels = [c for c in np.unique(problem.column_of) if c < TENSION.start]
+def field_columns(problem: Problem, place: Array, last: int = TENSION.start) -> Array:
+    """(N, k) a cubic of places (n, 3) for each channel that was read before one; of the pose."""
+    shapes = monomials(place)[problem.row_of]
+    channels = [c for c in np.unique(problem.column_of) if c < last]
     parts = [shapes * (problem.column_of == c)[:, None] for c in channels]
     return np.concatenate(parts, axis=1) if parts else np.zeros((len(problem.row_of), 0))
 

@@ -7,7 +7,6 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from crosscheck.calibration.field import cubic
 from crosscheck.calibration.gram import ColumnGroup, Gram, gram_of
 from crosscheck.calibration.probability import probabilities
 from crosscheck.calibration.sets import Names, Scores, explore, log_prior, thinned
@@ -113,14 +112,3 @@ def test_equals_may_cost_what_their_parameters_do(
     scores = {NONE: -50.0, frozenset({"a"}): 0.0, frozenset({"b"}): -loss}
     found = probabilities(scores, frozenset({"a"}), "ab", {"a": own, "b": other})
     assert (found.members[0] == ("a", "b")) is equal
-
-
-def test_a_cubic_has_its_monomials_and_a_flat_axis_has_none() -> None:
-    rng = np.random.default_rng(2)
-    place = rng.uniform(size=(50, 3))
-    assert cubic(place).shape == (50, 20)
-    place[:, 2] = 0.3
-    assert cubic(place).shape == (50, 10)
-    target = place[:, 0] ** 3 - place[:, 0] * place[:, 1]
-    left = target - cubic(place) @ np.linalg.lstsq(cubic(place), target, rcond=None)[0]
-    assert np.abs(left).max() < 1e-12

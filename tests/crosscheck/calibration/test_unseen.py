@@ -9,7 +9,7 @@ import pytest
 from made_data import COGIRO, SIGMA, measured
 
 from crosscheck.calibration.colour import WHITE, chain_of
-from crosscheck.calibration.field import UNKNOWN, field_columns, log_odds
+from crosscheck.calibration.field import UNKNOWN, field_of, log_odds
 from crosscheck.calibration.joint import JointFit, Setting, settle
 from crosscheck.calibration.priors import widths_of
 from crosscheck.calibration.unseen import shown_from
@@ -43,7 +43,7 @@ def test_nine_in_ten_fields_of_that_size_are_seen_and_few_of_a_third() -> None:
     assert size["orientation_rms_rad"] == pytest.approx(
         shown * SIGMA.orientation_rad / SIGMA.position_m, rel=0.2
     )
-    field = field_columns(setting.problem, joint.state.prediction.pose[:, :3])
+    field = field_of(setting.problem, joint.state.prediction.pose[:, :3])
     random = np.random.default_rng(1)
 
     def seen(part: float) -> float:
@@ -62,5 +62,5 @@ def test_nine_in_ten_fields_of_that_size_are_seen_and_few_of_a_third() -> None:
 
 def test_what_the_catalogue_fits_whole_hides_at_any_size() -> None:
     setting, joint = joint_fit()
-    field = field_columns(setting.problem, joint.state.prediction.pose[:, :3])
+    field = field_of(setting.problem, joint.state.prediction.pose[:, :3])
     assert shown_from(setting, joint, field, np.full(field.shape[1], 1e4)) is None

@@ -11,12 +11,11 @@ from made_data import measured, soft_cogiro, term
 from crosscheck.fit.candidates import candidates_for, null_fit
 from crosscheck.fit.gauss_newton import FitStatus
 from crosscheck.fit.imitation import basis, beside, imitated, left_over
-from crosscheck.fit.noise import overestimated
 from crosscheck.fit.prepare import outlying_rows, prepare
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.reasons import Reason, Refusal, Unfit, Why
 from crosscheck.fit.state import evaluate
-from crosscheck.measurements.data import Measurements, Sigma
+from crosscheck.measurements.data import Measurements
 from seecr.effects import Terms
 from seecr.robot import Robot
 
@@ -108,43 +107,6 @@ def test_a_model_at_values_that_cannot_be_solved_says_so(robot: Robot, data: Mea
     assert found.status is FitStatus.UNSOLVED_AT_VALUES and found.status.value
     refitted = null_fit(problem, Terms([term(robot, "stiffness")]), factor, refit=True)
     assert refitted.status is FitStatus.UNSOLVED_AT_START
-
-
-def test_noise_that_nobody_stated_is_estimated_and_said(robot: Robot) -> None:
-    data = measured(robot, points=24)
-    ready = prepare(robot, replace(data, sigma=Sigma(orientation_rad=3.5e-4)), Terms())
-    assert ready.problem.sigma.position_m == pytest.approx(3e-5, rel=0.2)
-    assert ready.notes[0].startswith("position_m is not stated: estimated from differences")
-    position = data.position.copy()
-    position[::2] = np.nan  # read in every second row alone
-    half = replace(data, position=position, sigma=Sigma(orientation_rad=3.5e-4))
-    found = prepare(robot, half, Terms()).problem.sigma.position_m
-    assert found == pytest.approx(3e-5, rel=0.35)
-
-
-def test_an_estimate_that_is_larger_than_all_that_is_left_is_told(robot: Robot) -> None:
-    """A large model error at poses in no order looks like noise, until an effect explains it."""
-    problem = prepare(robot, replace(measured(robot), sigma=Sigma()), Terms()).problem
-    noise = problem.sigma
-    assert noise.position_m is not None and noise.orientation_rad is not None
-    left = {"position_rms_m": 0.4 * noise.position_m, "tension_rms_N": None,
-            "orientation_rms_rad": 0.9 * noise.orientation_rad}  # fmt: skip
-    (said,) = overestimated(problem, left)
-    assert said.startswith("position_m was estimated too large: no more than ")
-    assert "--sigma position=" in said and "mm rms are left" in said
-    stated = replace(problem, data=replace(problem.data, sigma=noise))
-    assert overestimated(stated, left) == []
-
-
-@pytest.mark.parametrize("rows", [1, 3])
-def test_of_few_rows_no_noise_can_be_estimated_and_that_is_said(
-    robot: Robot, data: Measurements, rows: int
-) -> None:
-    """Once it was said to come from differences between neighbours, of which there were none."""
-    alone = replace(data.rows(np.arange(rows)), sigma=Sigma(orientation_rad=3.5e-4))
-    (note,) = [n for n in prepare(robot, alone, Terms()).notes if "is not stated" in n]
-    assert note.startswith("position_m is not stated: no run has the 4 rows that an estimate takes")
-    assert note.endswith("mm, count as noise; state it with --sigma position=...")
 
 
 def test_a_row_that_sticks_out_alone_is_an_outlier_and_two_together_are_not(

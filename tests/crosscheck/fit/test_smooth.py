@@ -8,7 +8,7 @@ import numpy as np
 from made_data import COGIRO, SIGMA, measured, term
 
 from crosscheck.fit.problem import Problem
-from crosscheck.fit.smooth import beyond_smooth, cubic, field_columns
+from crosscheck.fit.smooth import beyond_smooth, field_columns, monomials
 from crosscheck.fit.state import State, evaluate
 from seecr.effects import Terms
 from seecr.mjcf import load_robot
@@ -25,9 +25,13 @@ def problem_and_state() -> tuple[Problem, State]:
 def test_cubics_leave_out_axes_along_which_nothing_moves() -> None:
     random = np.random.default_rng(0)
     place = random.uniform(-3.0, 5.0, (40, 3))
-    assert cubic(place).shape == (40, 20) and np.linalg.matrix_rank(cubic(place)) == 20
+    assert monomials(place).shape == (40, 20) and np.linalg.matrix_rank(monomials(place)) == 20
     place[:, 1] = 0.25
-    assert cubic(place).shape == (40, 10) and np.linalg.matrix_rank(cubic(place)) == 10
+    assert monomials(place).shape == (40, 10) and np.linalg.matrix_rank(monomials(place)) == 10
+    assert monomials(place, 1).shape == (40, 3)
+    target = place[:, 0] ** 3 - place[:, 0] * place[:, 2]
+    left = target - monomials(place) @ np.linalg.lstsq(monomials(place), target, rcond=None)[0]
+    assert np.abs(left).max() < 1e-10 * np.abs(target).max()
 
 
 def test_a_scale_explains_nothing_of_a_lens_that_a_field_does_not() -> None:
