@@ -82,12 +82,7 @@ def sure_effects(found: Found, classes: Classes, few: bool) -> tuple[str, ...]:
     """
     worth = worths(found)
     least = 0.0 if few else max(_WORTH, _PART * sum(worth.values()))
-    probability = {
-        e: p
-        for members, p in zip(classes.members, classes.probability, strict=True)
-        for e in members
-    }
-    some = [e for e in worth if probability[e] > SURE and worth[e] > least]
+    some = [e for e in worth if classes.of(e) > SURE and worth[e] > least]
     return tuple(sorted(some, key=lambda e: -worth[e]))
 
 

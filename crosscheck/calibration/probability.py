@@ -27,16 +27,24 @@ class Classes:
         effect: of each effect, that it is missing.
         members: classes of equals, the most probable first; every effect in one.
         probability: of each class, that some member is missing.
+        further: of members of the best set that share a class with one that is likelier, that as
+            many of the class are missing as it takes: with three equals, two may be.
     """
 
     effect: dict[str, float]
     members: list[tuple[str, ...]]
     probability: list[float]
+    further: dict[str, float]
 
     @property
     def undecided(self) -> float:
-        """Sum of min(P, 1 - P) over classes: how many of them are open."""
-        return float(sum(min(p, 1.0 - p) for p in self.probability))
+        """Sum of min(P, 1 - P) over classes, and further members: how many of them are open."""
+        return float(sum(min(p, 1.0 - p) for p in (*self.probability, *self.further.values())))
+
+    def of(self, name: str) -> float:
+        """Probability that an effect or one of its class is missing, beside likelier ones."""
+        pairs = zip(self.members, self.probability, strict=True)
+        return self.further.get(name, next(p for members, p in pairs if name in members))
 
 
 def all_scores(found: Found) -> dict[Names, float]:
@@ -76,23 +84,31 @@ def probabilities(
         sizes: how many parameters each has; one where not given.
     """
     effects = list(effects)
-    return of_classes(scores, effects, _classes(scores, best, effects, sizes or {}))
+    return of_classes(scores, best, effects, _classes(scores, best, effects, sizes or {}))
 
 
 def of_classes(
-    scores: Mapping[Names, float], effects: Iterable[str], members: Iterable[tuple[str, ...]]
+    scores: Mapping[Names, float],
+    best: Names,
+    effects: Iterable[str],
+    members: Iterable[tuple[str, ...]],
 ) -> Classes:
-    """Probabilities of effects and of given classes of them."""
+    """Probabilities of effects and of given classes of them; ``best`` is the best set."""
     names = list(scores)
     logs = np.array([scores[n] for n in names])
     share = np.exp(logs - special.logsumexp(logs))
 
-    def chance(some: Iterable[str]) -> float:
+    def chance(some: Iterable[str], least: int = 1) -> float:
         wanted = set(some)
-        return float(sum(p for n, p in zip(names, share, strict=True) if wanted & n))
+        return float(sum(p for n, p in zip(names, share, strict=True) if len(wanted & n) >= least))
 
     order = sorted(members, key=lambda c: -chance(c))
-    return Classes({e: chance([e]) for e in effects}, order, [chance(c) for c in order])
+    effect = {e: chance([e]) for e in effects}
+    further: dict[str, float] = {}
+    for members_of in order:
+        likeliest = sorted(best.intersection(members_of), key=lambda e: -effect[e])
+        further.update({e: chance(members_of, k) for k, e in enumerate(likeliest[1:], start=2)})
+    return Classes(effect, order, [chance(c) for c in order], further)
 
 
 def _classes(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -49,6 +51,7 @@ class Chances:
         field: ln odds that something smooth is left which no effect of the catalogue explains;
             None where no joint fit was made.
         together: the joint fit; None where none was made.
+        further: of effects that share a class with a likelier one, that both are missing.
         shown: rms size by kind of reading from which on a smooth effect that nobody knows would
             show beside the catalogue; None where it could hide at any size.
     """
@@ -58,6 +61,7 @@ class Chances:
     field: float | None
     together: Together | None
     shown: Rms | None = None
+    further: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
     @property
     def words(self) -> str:
@@ -70,8 +74,9 @@ class Chances:
         )
 
     def of(self, name: str) -> float:
-        """Probability that an effect or one of its class is missing."""
-        return next((p for members, p in self.classes if name in members), 0.0)
+        """Probability that an effect or one of its class is missing, beside likelier ones."""
+        every = next((p for members, p in self.classes if name in members), 0.0)
+        return self.further.get(name, every)
 
     def as_json(self) -> dict[str, Any]:
         """``catalogue``, ``classes``, ``calibrated`` and ``unknown`` of ``diagnosis.json``."""
@@ -92,7 +97,9 @@ def chances_of(sought: Sought) -> Chances:
     classes = sought.classes
     pairs = zip(classes.members, classes.probability, strict=True)
     together = together_of(sought.calibration)
-    return Chances(classes.effect, tuple(pairs), sought.field_odds, together, sought.shown)
+    return Chances(
+        classes.effect, tuple(pairs), sought.field_odds, together, sought.shown, classes.further
+    )
 
 
 def together_of(found: Calibration) -> Together:

@@ -115,7 +115,7 @@ def _with_equals(
     classes = [(name, *others) for name, others in alike.items()]
     known = {member for members in classes for member in members}
     alone = [(name,) for name in effects if name not in known]
-    found = of_classes(scores, effects, [*classes, *alone])
+    found = of_classes(scores, frozenset(alike), effects, [*classes, *alone])
     pairs = dict(zip(found.members, found.probability, strict=True))
     effect = dict(found.effect)
     for members in classes:

@@ -70,6 +70,16 @@ def test_equals_share_their_certainty() -> None:
     assert said.undecided < 0.5
 
 
+def test_of_two_equals_both_are_sure_only_where_both_are_missing() -> None:
+    """c could stand in for either, so that all three are of one class, which is sure."""
+    exchanged = {"": -900.0, "ac": -1.0, "bc": -1.2}
+    said = judged({**exchanged, "ab": 0.0, "a": -300.0, "b": -400.0, "c": -350.0})
+    assert (said.verdict, set(said.sure)) == (DiagnosisVerdict.EFFECTS_FOUND, {"a", "b"})
+    said = judged({**exchanged, "ab": 0.0, "a": -0.3, "b": -400.0, "c": -350.0})
+    assert (said.verdict, said.sure) == (DiagnosisVerdict.EFFECTS_FOUND, ("a",))
+    assert 0.2 < said.undecided < 0.8
+
+
 def test_a_field_or_runs_left_out_make_it_unknown() -> None:
     scores = {"": -900.0, "a": 0.0}
     assert judged(scores, odds=6.0).verdict is DiagnosisVerdict.UNKNOWN_EFFECT

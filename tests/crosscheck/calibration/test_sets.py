@@ -101,6 +101,20 @@ def test_probabilities_are_sums_over_sets_and_equals_are_one_class() -> None:
     assert found.undecided == pytest.approx(0.25 / total)
 
 
+def test_a_second_of_a_class_has_a_probability_of_its_own() -> None:
+    scores = {
+        NONE: -50.0, frozenset("ab"): 0.0, frozenset("a"): -1.0, frozenset("ac"): -1.0,
+        frozenset("bc"): -1.5,
+    }  # fmt: skip
+    found = probabilities(scores, frozenset("ab"), "abc")
+    assert found.members == [("a", "b", "c")] and found.probability == [pytest.approx(1.0)]
+    one = np.exp(-1.0) / (1.0 + 2.0 * np.exp(-1.0) + np.exp(-1.5))
+    assert found.further == {"b": pytest.approx(1.0 - one)}
+    assert found.of("a") == found.of("c") == found.probability[0]
+    assert found.of("b") == pytest.approx(1.0 - one)
+    assert found.undecided == pytest.approx(one)
+
+
 @pytest.mark.parametrize(("loss", "own", "other", "equal"), [
     (2.9, 1, 1, True), (3.1, 1, 1, False),
     (5.9, 2, 3, True),  # the third parameter costs that much by itself

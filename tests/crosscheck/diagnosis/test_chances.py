@@ -82,7 +82,7 @@ def test_sets_that_were_fitted_count_with_their_own_evidence() -> None:
         log_prior=lambda names: -3.0 * len(names),
     )
     fits = {"c": 8.0, "worse c": 7.0, "d": 99.0, "again": 50.0}
-    known = {
+    tried = {
         (frozenset("a"), "c"): fit_of(fits["c"]),
         (frozenset("c"), "a"): fit_of(fits["worse c"]),
         (frozenset("a"), "d"): fit_of(fits["d"], valid=False),
@@ -90,7 +90,7 @@ def test_sets_that_were_fitted_count_with_their_own_evidence() -> None:
     }
     found: Any = SimpleNamespace(
         last=SimpleNamespace(evidence=SimpleNamespace(log=10.0)),
-        known=known,
+        fits=tried,
         trials=SimpleNamespace(evidence=lambda fit: SimpleNamespace(log=fit.log)),
     )
     # the last model's 40 is of evidence 10 and of two effects: two less evidence is two less
@@ -98,7 +98,7 @@ def test_sets_that_were_fitted_count_with_their_own_evidence() -> None:
 
 
 def fit_of(log: float, valid: bool = True) -> Any:
-    return 0.0, SimpleNamespace(log=log, valid=valid)
+    return SimpleNamespace(log=log, valid=valid)
 
 
 def test_what_no_robot_can_have_wherever_it_was_fitted_is_out_of_the_question() -> None:
