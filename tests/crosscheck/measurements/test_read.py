@@ -73,8 +73,11 @@ def test_planar_robot_needs_only_what_it_can_move(csv_file, robots):
 
 
 def test_robot_on_an_arm_needs_the_coordinates_the_arm_sweeps(csv_file, robots):
-    path = csv_file("run,cmd_x_m,cmd_z_m,meas_x_m", "a,0.3,0.2,0.3")
+    x, _, z = robots["arm"].reference_pose[:3]
+    path = csv_file("run,cmd_x_m,cmd_z_m,meas_x_m", f"a,{x},{z},0.3")
     assert load_measurements(path, robots["arm"]).command_pose[0, 1] == 0.05
+    with pytest.raises(InputFileError, match="line 2: the commanded pose is off what the joints"):
+        load_measurements(csv_file("cmd_x_m,cmd_z_m,meas_x_m", f"{x},{z + 0.2},0"), robots["arm"])
     with pytest.raises(InputFileError, match="expected cmd_x_m cmd_z_m, cmd_z_m missing"):
         load_measurements(csv_file("cmd_x_m,meas_x_m", "0,0"), robots["arm"])
 
