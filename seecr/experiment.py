@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from seecr import statics
 from seecr.commands import Commands
 from seecr.compiled.columns import STRAIN, TENSION
-from seecr.compiled.outcomes import CONVERGED, SINGULAR, STALLED, TOLERANCE
+from seecr.compiled.outcomes import CONVERGED, ITERATIONS, SINGULAR, STALLED, TOLERANCE
 from seecr.effects.base import Effect, Readings
 from seecr.effects.checked import edit_readings, edit_setup
 from seecr.effects.terms import Term, Terms
@@ -34,6 +34,8 @@ GivenEffects: TypeAlias = "Model | Terms | Iterable[Term | Effect]"
 # Rounds of linearising users' laws about the strains found with them.
 _LAW_ROUNDS = 30
 _LIMIT = 400
+# Of more rows than this, and than a quarter of all, so many are tried first.
+_MANY, _SAMPLE = 16, 4
 
 
 @dataclass(eq=False, repr=False)
@@ -216,11 +218,19 @@ class Experiment:
         def run(tables: Tables, start: statics.Evaluation | None) -> statics.Evaluation:
             if start is None:
                 return statics.descend(tables, limit=_LIMIT)
-            found = statics.descend(
-                tables, start.deviation, _LIMIT, start_values=start.values, staged=False,
-                guess=start.guess,
-            )  # fmt: skip
-            return _mend(tables, found)
+
+            def warm(rows: NDArray[np.intp]) -> statics.Evaluation:
+                return statics.descend(
+                    take(tables, rows), start.deviation[rows], _LIMIT,
+                    start_values=start.values[rows], staged=False, guess=start.guess[rows],
+                )  # fmt: skip
+
+            def afresh(rows: NDArray[np.intp]) -> statics.Evaluation:
+                return statics.descend(take(tables, rows), limit=_LIMIT)
+
+            found = statics.take_evaluation(start, np.arange(len(start.outcome)))
+            found.outcome[:] = ITERATIONS
+            return _among(_among(found, warm), afresh)
 
         return _with_laws(setup, run, start)
 
@@ -303,12 +313,25 @@ def senses(effect: type[Effect]) -> bool:
     return effect.edit_readings is not Effect.edit_readings
 
 
-def _mend(tables: Tables, found: statics.Evaluation) -> statics.Evaluation:
-    """Solve afresh what a warm start did not lead to."""
-    lost = np.flatnonzero(found.outcome != CONVERGED)
-    if len(lost):
-        again = statics.descend(take(tables, lost), limit=_LIMIT)
-        statics.put_evaluation(found, lost, again)
+def _among(
+    found: statics.Evaluation, solve: Callable[[NDArray[np.intp]], statics.Evaluation]
+) -> statics.Evaluation:
+    """Solve what is not solved yet.
+
+    Where that is most rows, a few are tried first: with values under which no pose holds (a step
+    of a fit that went too far) the solver would try every row to its limit.
+    """
+    lost = found.outcome != CONVERGED
+    rows = np.flatnonzero(lost)
+    first, rest = rows, rows[:0]
+    if len(rows) > max(_MANY, len(lost) // 4):
+        some = np.zeros(len(rows), dtype=bool)
+        some[np.linspace(0, len(rows) - 1, _SAMPLE).astype(int)] = True
+        first, rest = rows[some], rows[~some]
+    if len(first):
+        statics.put_evaluation(found, first, solve(first))
+    if len(rest) and np.any(found.outcome[first] == CONVERGED):
+        statics.put_evaluation(found, rest, solve(rest))
     return found
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from effect_cases import KINDS, experiment_of, random_effect
@@ -13,10 +15,13 @@ from seecr.effects import effect_named
 from seecr.equilibrium import solve
 from seecr.errors import InputError
 from seecr.experiment import Experiment
+from seecr.mjcf import load_robot
 from seecr.robot import Joint, Robot
 from seecr.sensitivity import length_sensitivities, readings_difference
 from seecr.setup import plain_setup
+from seecr.shipped import model_path
 from seecr.solution import Status
+from seecr.tables import Tables
 
 FAMILIES = [
     ("stiffness", "pulley_radius"),
@@ -57,6 +62,25 @@ def test_a_warm_start_from_a_lost_row_starts_that_row_afresh() -> None:
     assert np.all(again.solved)
     cold = experiment.predict()
     assert np.abs(readings_difference(again.readings, cold.readings)).max() < 1e-9
+
+
+def test_where_nothing_holds_a_few_rows_are_tried_and_no_more(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Each would take the solver to its limit: a fit that went too far cost minutes."""
+    robot = load_robot(model_path("demobot_cogiro"))
+    experiment = Experiment(robot, Commands(np.tile(robot.reference_pose, (60, 1))))
+    near, solve, asked = experiment.predict(), statics.descend, []
+
+    def lost(tables: Tables, *args: Any, **options: Any) -> statics.Evaluation:
+        found = solve(tables, *args, **options)
+        asked.append(len(found.outcome))
+        found.outcome[:] = STALLED
+        return found
+
+    monkeypatch.setattr(statics, "descend", lost)
+    assert not experiment.predict([], near).solved.any()
+    assert set(asked) == {4}
 
 
 def test_a_prediction_with_history_is_no_start_for_one_without() -> None:
