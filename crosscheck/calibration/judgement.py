@@ -62,8 +62,7 @@ def judge(
     unknown = strange or field_odds > UNKNOWN or surprise > SURPRISE
     sure = sure_effects(found, classes, True)
     few = len(best) <= _FEW and undecided < (_OPEN_BESIDE if set(sure) == best else _OPEN)
-    if not few:
-        sure = sure_effects(found, classes, False)
+    sure = adequate(found, sure) if few and sure else sure_effects(found, classes, False)
     if unknown:  # known effects imitate it: none of them is sure
         return Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, (), undecided)
     if not sure and undecided < _OPEN and explained(found) < _OWED:
@@ -84,6 +83,20 @@ def sure_effects(found: Found, classes: Classes, few: bool) -> tuple[str, ...]:
     least = 0.0 if few else max(_WORTH, _PART * sum(worth.values()))
     some = [e for e in worth if classes.of(e) > SURE and worth[e] > least]
     return tuple(sorted(some, key=lambda e: -worth[e]))
+
+
+def adequate(found: Found, sure: tuple[str, ...]) -> tuple[str, ...]:
+    """These effects, and further ones of the best set while it explains much that they do not.
+
+    Which effect it is may be open where that something is missing is not.
+    """
+    worth, listed = worths(found), list(sure)
+    for name in sorted(set(worth) - set(sure), key=lambda e: -worth[e]):
+        alone = found.refit(found.always | set(listed))
+        if alone is not None and alone.score > found.best.score - _OWED:
+            break
+        listed.append(name)
+    return tuple(sorted(listed, key=lambda e: -worth[e]))
 
 
 def worths(found: Found) -> dict[str, float]:

@@ -27,8 +27,8 @@ class Classes:
         effect: of each effect, that it is missing.
         members: classes of equals, the most probable first; every effect in one.
         probability: of each class, that some member is missing.
-        further: of members of the best set that share a class with one that is likelier, that as
-            many of the class are missing as it takes: with three equals, two may be.
+        further: of members of the best set that share a class with one that is needed more, that
+            as many of the class are missing as it takes: of three equals, two may be.
     """
 
     effect: dict[str, float]
@@ -42,7 +42,7 @@ class Classes:
         return float(sum(min(p, 1.0 - p) for p in (*self.probability, *self.further.values())))
 
     def of(self, name: str) -> float:
-        """Probability that an effect or one of its class is missing, beside likelier ones."""
+        """Probability that an effect or one of its class is missing, beside those needed more."""
         pairs = zip(self.members, self.probability, strict=True)
         return self.further.get(name, next(p for members, p in pairs if name in members))
 
@@ -106,8 +106,11 @@ def of_classes(
     effect = {e: chance([e]) for e in effects}
     further: dict[str, float] = {}
     for members_of in order:
-        likeliest = sorted(best.intersection(members_of), key=lambda e: -effect[e])
-        further.update({e: chance(members_of, k) for k, e in enumerate(likeliest[1:], start=2)})
+        # the most needed first: without it the set explains least
+        needed = sorted(
+            best.intersection(members_of), key=lambda e: scores.get(best - {e}, -np.inf)
+        )
+        further.update({e: chance(members_of, k) for k, e in enumerate(needed[1:], start=2)})
     return Classes(effect, order, [chance(c) for c in order], further)
 
 

@@ -18,6 +18,7 @@ from crosscheck.calibration.stages import Progress
 from crosscheck.calibration.strange import is_strange
 from crosscheck.calibration.unseen import shown_from
 from crosscheck.fit.problem import Problem, Rms, kinds_read
+from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.fit.state import evaluate
 from crosscheck.measurements.data import Sigma
 from seecr.effects import Term, Terms
@@ -87,6 +88,12 @@ def seek(
     classes = probabilities(all_scores(found), found.best.names, effects, sizes)
     strange = strange or is_strange(setting, found.best.joint, known)
     said = judge(found, classes, odds, surprise, strange)
+    listed = found.always | set(said.sure)
+    alone = found.refit(listed) if said.verdict is DiagnosisVerdict.EFFECTS_FOUND else None
+    if alone is not None and listed != found.best.names:
+        # what could stand in the place of what is listed, not of a larger set
+        scores = {**all_scores(found), listed: alone.score}
+        classes = probabilities(scores, listed, effects, sizes)
     free = free_of(joint)
     shown = shown_from(setting, joint, joint.jacobian * free, joint.width * free)
     return Sought(whole, found, catalogue, classes, odds, shown, said)

@@ -51,7 +51,7 @@ class Chances:
         field: ln odds that something smooth is left which no effect of the catalogue explains;
             None where no joint fit was made.
         together: the joint fit; None where none was made.
-        further: of effects that share a class with a likelier one, that both are missing.
+        further: of effects that share a class with one needed more, that both are missing.
         shown: rms size by kind of reading from which on a smooth effect that nobody knows would
             show beside the catalogue; None where it could hide at any size.
     """
@@ -74,7 +74,7 @@ class Chances:
         )
 
     def of(self, name: str) -> float:
-        """Probability that an effect or one of its class is missing, beside likelier ones."""
+        """Probability that an effect or one of its class is missing, beside those needed more."""
         every = next((p for members, p in self.classes if name in members), 0.0)
         return self.further.get(name, every)
 

@@ -80,6 +80,21 @@ def test_of_two_equals_both_are_sure_only_where_both_are_missing() -> None:
     assert 0.2 < said.undecided < 0.8
 
 
+def test_the_one_that_is_needed_is_listed_and_not_the_likelier_by_itself() -> None:
+    """Of a's place b has a share; d beside it is worth nothing, but is in most sets."""
+    scores = {"": -900.0, "ad": 0.0, "a": -0.4, "bd": -0.1, "b": -0.5, "d": -300.0, "cd": -1.0}
+    said = judged({**scores, "ac": -1.1})
+    assert (said.verdict, said.sure) == (DiagnosisVerdict.EFFECTS_FOUND, ("a",))
+
+
+def test_what_is_listed_explains_about_as_much_as_the_best_set() -> None:
+    """Two others might do instead of b, so that b is not sure; without it nothing is explained."""
+    open_ = {"": -900.0, "ab": 0.0, "acd": -1.5, "b": -400.0}
+    assert judged({**open_, "a": -100.0}).sure == ("a", "b")
+    assert judged({**open_, "a": -3.0}).sure == ("a",)
+    assert judged({**open_, "a": -100.0}).verdict is DiagnosisVerdict.EFFECTS_FOUND
+
+
 def test_a_field_or_runs_left_out_make_it_unknown() -> None:
     scores = {"": -900.0, "a": 0.0}
     assert judged(scores, odds=6.0).verdict is DiagnosisVerdict.UNKNOWN_EFFECT
