@@ -73,7 +73,6 @@ def command(
     3 rows without an equilibrium.
     """
     from crosscheck import DiagnosisVerdict, Tolerance, diagnose, load_measurements
-    from crosscheck.comparison import doubted
     from crosscheck.files import check_writable, json_text, staged, write_text
     from crosscheck.given import considered
     from crosscheck.measurements.stated import with_stated
@@ -88,7 +87,6 @@ def command(
     own = load_model(model, machine) if model is not None else new_model(machine)
     if model_out is not None:
         check_writable(model_out)
-    measured = doubted(machine, measured, own.terms)
     with staged(out) as folder:
         with progress_share("diagnosing") as progress:
             found = diagnose(

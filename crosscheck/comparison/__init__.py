@@ -5,7 +5,6 @@ from __future__ import annotations
 from crosscheck.comparison.limits import Exceeded, Limits, check, load_limits, with_options
 from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.result import Comparison
-from crosscheck.comparison.stranger import doubted
 
 __all__ = [
     "Comparison",
@@ -13,7 +12,6 @@ __all__ = [
     "Limits",
     "check",
     "compare",
-    "doubted",
     "load_limits",
     "with_options",
 ]

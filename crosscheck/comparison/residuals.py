@@ -10,7 +10,6 @@ from crosscheck.comparison.associations import associations
 from crosscheck.comparison.coloured import Coloured, coloured_noise
 from crosscheck.comparison.quantities import channels
 from crosscheck.comparison.result import Comparison, Coordinate, Group, UnsolvedRow, WorstRow
-from crosscheck.comparison.stranger import doubts
 from crosscheck.comparison.travel import Travel, regions_of, travel
 from crosscheck.fit.noise import as_table, whiteness
 from crosscheck.fit.prepare import noise_floor, outlying_rows, prepare
@@ -51,7 +50,7 @@ def compare(robot: GivenRobot, data: GivenData, model: GivenModel = ()) -> Compa
     way = travel(problem, state.prediction)
     some = problem.n_readings > 0
     if some:
-        notes += [*doubts(problem, state), *_outliers(problem, state)]
+        notes += _outliers(problem, state)
     white = whiteness(problem, state.white, ready.fitted) if some else None
     return Comparison(
         problem=problem,

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from crosscheck.fit.doubts import doubts
 from crosscheck.fit.fitness import refusal_of
 from crosscheck.fit.freed import freed
 from crosscheck.fit.held_out import blocks_note
@@ -82,7 +83,8 @@ def prepare(
         if estimates:  # what was left then was the frame's
             known = replace(problem, sigma=data.sigma)
             problem, estimates = estimate_sigma(known, plain)
-    notes = (*data.notes, *problem.left_out, *estimates, *said)
+    odd = doubts(problem, plain.readings)
+    notes = (*data.notes, *odd, *problem.left_out, *estimates, *said)
     problem = problem.with_groups(groups_of(data, terms))
     refusal = refusal_of(problem, plain.pose[:, :3], data.sigma)
     return Prepared(problem, terms, notes, blocks_note(problem), refusal, int(found.free.sum()))

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_data import measured, soft_cogiro, term
+from made_data import term
 
 from crosscheck.fit.candidates import candidates_for, null_fit
 from crosscheck.fit.gauss_newton import FitStatus
@@ -18,16 +18,6 @@ from crosscheck.fit.state import evaluate
 from crosscheck.measurements.data import Measurements
 from seecr.effects import Terms
 from seecr.robot import Robot
-
-
-@pytest.fixture(scope="module")
-def robot() -> Robot:
-    return soft_cogiro()
-
-
-@pytest.fixture(scope="module")
-def data(robot: Robot) -> Measurements:
-    return measured(robot, points=4)
 
 
 def loose(robot: Robot) -> Robot:

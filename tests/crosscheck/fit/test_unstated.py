@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_data import COGIRO, SIGMA, measured, soft_cogiro, term
+from made_data import COGIRO, SIGMA, measured, term
 
 import crosscheck
 from crosscheck.calibration.colour import chain_of
@@ -21,16 +21,6 @@ from seecr.experiment import Experiment
 from seecr.mjcf import load_robot
 from seecr.pose import quat_from_rotvec, quat_multiply
 from seecr.robot import Robot
-
-
-@pytest.fixture(scope="module")
-def robot() -> Robot:
-    return soft_cogiro()
-
-
-@pytest.fixture(scope="module")
-def data(robot: Robot) -> Measurements:
-    return measured(robot, points=4)
 
 
 def test_noise_that_nobody_stated_is_estimated_and_said(robot: Robot) -> None:

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from crosscheck.fit.prepare import prepare
 from crosscheck.fit.problem import BY_NAME, Problem
-from crosscheck.fit.state import State, evaluate
-from crosscheck.measurements.data import Measurements
 from crosscheck.units import short
-from seecr.effects import Terms
-from seecr.robot import Robot
+from seecr.effects.base import Readings
+from seecr.pose import Array
 
 # A model so many times as far from the readings as the commands are, and as noise is, is worse than
 # none. Tensions that are off by such a factor are of something else.
@@ -20,33 +15,28 @@ _WORSE, _NOISE, _OTHER_TENSION = 3.0, 10.0, 20.0
 _LEAST_ROWS = 4
 
 
-def doubted(robot: Robot, data: Measurements, terms: Terms) -> Measurements:
-    """The same, with a note where this is hardly the robot that was measured."""
-    ready = prepare(robot, data, terms)
-    problem = ready.problem
-    if problem.n_readings == 0:
-        return data
-    factor = problem.noise(problem.experiment.predict(ready.terms.effects))
-    said = doubts(problem, evaluate(problem, ready.terms, factor))
-    return replace(data, notes=tuple(dict.fromkeys([*data.notes, *said])))
+def doubts(problem: Problem, readings: Readings) -> list[str]:
+    """Sentences where this is hardly the robot that was measured.
+
+    Args:
+        problem: the data with their noise. readings: what the model as it stands expects.
+    """
+    raw = problem.residuals(readings)
+    return [*_worse_than_commands(problem, raw), *_other_tensions(problem, raw)]
 
 
-def doubts(problem: Problem, state: State) -> list[str]:
-    """Sentences where this is hardly the robot that was measured."""
-    return [*_worse_than_commands(problem, state), *_other_tensions(problem, state)]
-
-
-def _worse_than_commands(problem: Problem, state: State) -> list[str]:
+def _worse_than_commands(problem: Problem, raw: Array) -> list[str]:
     told = problem.data.command_pose
     if told is None:
         return []
     columns = BY_NAME["position"].columns
-    counted = problem.counted[:, columns] & np.isfinite(state.raw[:, columns])
+    counted = problem.counted[:, columns] & np.isfinite(raw[:, columns])
     if counted.any(axis=1).sum() < _LEAST_ROWS:
         return []
-    off = float(np.sqrt(np.mean(state.raw[:, columns][counted] ** 2)))
+    off = float(np.sqrt(np.mean(raw[:, columns][counted] ** 2)))
     plain = float(np.sqrt(np.mean((problem.data.position - told[:, :3])[counted] ** 2)))
-    in_noise = float(np.sqrt(np.mean(state.table[:, columns][counted] ** 2)))
+    noise = np.broadcast_to(problem.reading_sigma, raw.shape)
+    in_noise = float(np.sqrt(np.mean((raw / noise)[:, columns][counted] ** 2)))
     if off <= _WORSE * plain or in_noise <= _NOISE:
         return []
     return [
@@ -56,14 +46,14 @@ def _worse_than_commands(problem: Problem, state: State) -> list[str]:
     ]
 
 
-def _other_tensions(problem: Problem, state: State) -> list[str]:
+def _other_tensions(problem: Problem, raw: Array) -> list[str]:
     columns = BY_NAME["tension"].columns
-    counted = problem.counted[:, columns] & np.isfinite(state.raw[:, columns])
+    counted = problem.counted[:, columns] & np.isfinite(raw[:, columns])
     if counted.any(axis=1).sum() < _LEAST_ROWS:
         return []
     read = problem.data.tensions[counted]
     usual = float(np.sqrt(np.mean(read**2)))
-    expected = float(np.sqrt(np.mean((read - state.raw[:, columns][counted]) ** 2)))
+    expected = float(np.sqrt(np.mean((read - raw[:, columns][counted]) ** 2)))
     if usual <= 0.0 or expected <= 0.0 or 1.0 / _OTHER_TENSION < usual / expected < _OTHER_TENSION:
         return []
     return [

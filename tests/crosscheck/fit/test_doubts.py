@@ -9,9 +9,11 @@ import pytest
 from made_data import measured, refused, run, soft_cogiro, soft_xml
 
 import crosscheck
+from crosscheck.fit.prepare import prepare
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import load_commands, load_measurements
 from crosscheck.measurements.write import write_measurements
+from seecr.effects import Terms
 from seecr.errors import InputFileError
 from seecr.mjcf import load_robot
 from seecr.shipped import model_path
@@ -91,4 +93,7 @@ def test_newtons_in_a_column_of_kilonewtons(cogiro, tmp_path):
     write_measurements(file, replace(cogiro, tensions=1e3 * cogiro.tensions))
     done = run("diagnose", xml, file, "--only", "stiffness", "--no-recording",
                "--out", tmp_path / "out")  # fmt: skip
-    assert "note: Tensions of" in done.stdout
+    assert done.stdout.count("note: Tensions of") == 1
+    # whatever is fitted to them says so, from Python as well
+    kilo = replace(cogiro, tensions=1e3 * cogiro.tensions)
+    assert any("Tensions of" in note for note in prepare(COGIRO, kilo, Terms()).all_notes)
