@@ -1,4 +1,4 @@
-"""Which robot a model was made for, written so that a person sees what differs."""
+"""Which robot a model or a diagnosis is of, written so that a person sees what differs."""
 
 from __future__ import annotations
 
@@ -15,16 +15,21 @@ from seecr.errors import InputFileError
 if TYPE_CHECKING:
     from seecr.robot import Robot
 
+__all__ = ["check_robot", "fingerprint"]
+
 # Points that moved by less than this part of the longest cable are where they were.
 _SAME = 1e-6
+# What a change of the other numbers means for a model.
+_TWICE = "its effects may count twice; fit them again (crosscheck add --refit)"
 _POINTS = ("exit_points_m", "anchor_points_m", "reference_pose")
+_ANEW = "give the robot it was made for, or make it anew for this one"
 _NOTED = ("mass_kg", "ea_N", "rest_lengths_m", "centre_of_mass_m")
 # Digits kept: more than anybody measures, few enough to read.
 _DIGITS = 9
 
 
 def fingerprint(robot: Robot) -> tomlkit.items.Table:
-    """The table ``[robot]`` of a model."""
+    """The table ``[robot]`` of a model, ``robot`` of a diagnosis."""
     table = tomlkit.table()
     table["name"] = robot.name
     table["cables"] = list(robot.cable_names)
@@ -51,13 +56,14 @@ def _toml(value: Any) -> Any:
     return rows.multiline(True)
 
 
-def check_robot(path: Path, table: Any, robot: Robot) -> tuple[str, ...]:
-    """Check that a model was made for this robot.
+def check_robot(path: Path, table: Any, robot: Robot, changed: str = _TWICE) -> tuple[str, ...]:
+    """Check that a model or a diagnosis was made for this robot.
 
     Args:
-        path: the model's file.
+        path: the file.
         table: its ``[robot]``; None where a person left it out, which is their business.
         robot: the one it is to be used for.
+        changed: what it means that mass, stiffness and the like have changed.
 
     Returns:
         notes about mass, stiffness and the like that have changed since.
@@ -83,8 +89,7 @@ def check_robot(path: Path, table: Any, robot: Robot) -> tuple[str, ...]:
         if np.any(apart > 1e-6 * size):
             notes.append(
                 f"{path} was made when {key} of robot {robot.name} was {_short(table[key])}; now "
-                f"it is {_short(own[key])}: its effects may count twice; fit them again "
-                "(crosscheck add --refit)"
+                f"it is {_short(own[key])}: {changed}"
             )
     return tuple(notes)
 
@@ -98,7 +103,7 @@ def _check_cables(path: Path, table: Mapping[str, Any], robot: Robot) -> None:
             path,
             f"made for another robot: {table.get('name', 'one')} with "
             f"{counted(len(cables), 'cable')}; "
-            f"{robot.name} has {robot.n_cables}",
+            f"{robot.name} has {robot.n_cables}; {_ANEW}",
         )
 
 
@@ -131,8 +136,7 @@ def _elsewhere(
         what = f"the {word} of {robot.cable_names[k]} is {1e3 * float(apart[k]):.3g} mm away"
     return InputFileError.at(
         path,
-        f"made for another robot: {name}, not {robot.name}: {what}; give the robot it was made "
-        "for, or make a new model",
+        f"made for another robot: {name}, not {robot.name}: {what}; {_ANEW}",
     )
 
 

@@ -11,10 +11,15 @@ from typing import Any
 
 from seecr import __version__
 
-__all__ = ["Made"]
+__all__ = ["Made", "digits_of"]
 
 # Of a SHA-256: more than files are ever mistaken by.
 _DIGITS = 16
+
+
+def digits_of(file: Path) -> str:
+    """The first digits of a file's SHA-256."""
+    return hashlib.sha256(file.read_bytes()).hexdigest()[:_DIGITS]
 
 
 @dataclass(frozen=True)
@@ -37,7 +42,7 @@ class Made:
         given = [file for file in files if file is not None]
         beside = [file.with_suffix(".toml") for file in given]
         hashes = {
-            file.name: hashlib.sha256(file.read_bytes()).hexdigest()[:_DIGITS]
+            file.name: digits_of(file)
             for file in dict.fromkeys([*given, *beside])
             if file.is_file()
         }

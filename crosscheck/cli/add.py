@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -86,7 +87,7 @@ def command(
     elif per is not None:
         raise click.UsageError("--per is of one EFFECT; leave out --all-from")
     machine = load_robot(robot)
-    listed = load_diagnosed(all_from, machine) if all_from is not None else ()
+    listed, said = load_diagnosed(all_from, machine) if all_from is not None else ((), ())
     names = [effect] if effect is not None else [term.name for term in listed]
     old = load_model(model, machine) if model.exists() else new_model(machine)
     for name in names:
@@ -97,6 +98,7 @@ def command(
             found = add_effect(machine, measured, effect, old.terms, progress, per=per)
         else:
             found = add_effects(machine, measured, listed, old.terms, progress)
+    found = replace(found, notes=(*said, *found.notes))
     written = found.pays or force
     made = made_by(machine.source, *data, all_from, model)  # of the model as it was read
     if written:

@@ -78,6 +78,7 @@ def command(
     from crosscheck.measurements.stated import with_stated
     from crosscheck.report import write_page
     from seecr import load_model, load_robot, new_model
+    from seecr.fingerprint import fingerprint
 
     gates = [DiagnosisVerdict.named(word) for word in fail_on]
     tolerance = Tolerance.parsed(tolerances)
@@ -94,7 +95,7 @@ def command(
                 tolerance=tolerance,
             )  # fmt: skip
         made = made_by(machine.source, *data, model)
-        text = json_text({"made": made, **found.as_json()})
+        text = json_text({"made": made, "robot": fingerprint(machine), **found.as_json()})
         write_text(folder / "diagnosis.json", text + "\n")
         with figures_in(figures):
             write_page(found, folder / "diagnosis.html", made)

@@ -11,6 +11,8 @@ from crosscheck.files import read_text
 from seecr.cells import number_of
 from seecr.effects import Term, Terms
 from seecr.errors import InputError, InputFileError
+from seecr.fingerprint import check_robot
+from seecr.made import digits_of
 from seecr.robot import Robot
 
 __all__ = ["load_diagnosed"]
@@ -18,12 +20,15 @@ __all__ = ["load_diagnosed"]
 _EXPECTED = "expected diagnosis.json as crosscheck diagnose writes it"
 
 
-def load_diagnosed(path: str | Path, robot: Robot) -> Terms:
+def load_diagnosed(path: str | Path, robot: Robot) -> tuple[Terms, tuple[str, ...]]:
     """The missing effects that a diagnosis lists, with the values that it found.
 
     Args:
         path: a ``diagnosis.json``.
         robot: that it is of.
+
+    Returns:
+        the effects, and notes about what of the robot has changed since.
 
     Raises:
         InputFileError: no such file, no diagnosis, one of another robot, or one that lists none.
@@ -33,15 +38,33 @@ def load_diagnosed(path: str | Path, robot: Robot) -> Terms:
     missing = document.get("missing")
     if not isinstance(missing, list) or "verdict" not in document:
         raise InputFileError.at(path, f"has no verdict and no list of missing effects; {_EXPECTED}")
+    notes = _check_robot(path, document, robot)
     terms = [_term(path, item, robot) for item in missing]
     if not terms:
         raise InputFileError.at(
             path, f"lists no missing effect ({document['verdict']}); there is nothing to add"
         )
     try:
-        return Terms(terms)
+        return Terms(terms), notes
     except InputError as error:
         raise InputFileError.at(path, str(error)) from None
+
+
+def _check_robot(path: Path, document: Mapping[str, Any], robot: Robot) -> tuple[str, ...]:
+    """Notes on what has changed of the robot; by its numbers, since files move and are edited."""
+    table, made = document.get("robot"), document.get("made")
+    hashes = made.get("sha256") if isinstance(made, Mapping) else None
+    now = None if robot.source is None else digits_of(robot.source)
+    read = list(hashes.values()) if isinstance(hashes, Mapping) else [now]
+    if table is None and now in read and hashes:
+        return ()
+    notes = check_robot(path, table, robot, "the fit begins at what was found then")
+    if notes or now is None or now in read:
+        return notes
+    return (
+        f"{path} was made from another text than {robot.source} has now; cables, points, mass and "
+        "stiffness are the same",
+    )
 
 
 def _document(path: Path) -> Mapping[str, Any]:

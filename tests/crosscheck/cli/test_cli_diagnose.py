@@ -132,6 +132,8 @@ def test_all_that_a_diagnosis_lists_is_added_at_once(
     assert done.exit_code == 0, done.output
     assert load_model(model, load_robot(planar[0])).names == ("pulley_radius",)
     other = model_path("demobot_cogiro")
+    said = refused("add", "--all-from", found, other, planar[1], "--model", tmp_path / "m.toml")
+    assert "made for another robot: planar_vertical with 4 cables; demobot_cogiro has 8" in said
     for text, words in (
         ("{", "line 1: is not JSON"),
         ("[]", "has no verdict and no list of missing effects"),

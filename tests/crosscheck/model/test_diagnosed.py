@@ -1,0 +1,77 @@
+"""Effects are taken from the diagnosis of this robot only; what of its file changed is said."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from made_data import COGIRO
+
+from crosscheck.files import json_text
+from crosscheck.model import load_diagnosed
+from seecr.errors import InputFileError
+from seecr.fingerprint import fingerprint
+from seecr.made import digits_of
+from seecr.mjcf import load_robot
+from seecr.robot import Robot
+from seecr.shipped import model_path
+
+ROBOT = load_robot(COGIRO)
+# It belongs to every robot: its name and parameters tell nothing.
+PULLEYS = {"effect": "pulley_radius", "parameters": {"radius_m": {"value": 0.01}}}
+
+
+def diagnosis(folder: Path, robot: Robot | None = ROBOT, source: Path | None = COGIRO) -> Path:
+    """One that lists pulleys, of a robot and a file if these are given."""
+    content: dict[str, Any] = {"verdict": "effects_found", "missing": [PULLEYS]}
+    if robot is not None:
+        content["robot"] = fingerprint(robot)
+    if source is not None:
+        content["made"] = {"sha256": {source.name: digits_of(source)}}
+    path = folder / "diagnosis.json"
+    path.write_text(json_text(content), encoding="utf-8")
+    return path
+
+
+def test_its_own_diagnosis_is_read_without_a_word(tmp_path: Path) -> None:
+    terms, notes = load_diagnosed(diagnosis(tmp_path), ROBOT)
+    assert terms["pulley_radius"].vector == pytest.approx([0.01]) and notes == ()
+    assert load_diagnosed(diagnosis(tmp_path, robot=None), ROBOT)[1] == ()
+
+
+@pytest.mark.parametrize(
+    "other, words",
+    [
+        ("planar_vertical", "planar_vertical with 4 cables; demobot_cogiro has 8; give the robot"),
+        ("demobot_parallel", "demobot_parallel, not demobot_cogiro: the exit point of cable"),
+    ],
+)
+def test_that_of_another_robot_is_refused(tmp_path: Path, other: str, words: str) -> None:
+    path = diagnosis(tmp_path, load_robot(other), model_path(other))
+    with pytest.raises(InputFileError, match=f"^{path}: made for another robot: {words}"):
+        load_diagnosed(path, ROBOT)
+
+
+def test_a_file_that_moved_and_was_edited_is_the_same_robot(tmp_path: Path) -> None:
+    moved = tmp_path / "mine.xml"
+    moved.write_bytes(COGIRO.read_bytes())
+    robot = load_robot(moved)
+    assert load_diagnosed(diagnosis(tmp_path), robot)[1] == ()
+    moved.write_text(f"{COGIRO.read_text()}<!-- checked -->\n", encoding="utf-8")
+    (note,) = load_diagnosed(diagnosis(tmp_path), robot)[1]
+    assert "was made from another text than" in note and "are the same" in note
+
+
+def test_other_numbers_and_a_diagnosis_that_says_nothing_are_noted(tmp_path: Path) -> None:
+    heavier = replace(ROBOT, mass=1.25 * ROBOT.mass, ea=np.array(ROBOT.ea))
+    (note,) = load_diagnosed(diagnosis(tmp_path, heavier), ROBOT)[1]
+    assert "mass_kg of robot demobot_cogiro was 0.5" in note
+    assert note.endswith("the fit begins at what was found then")
+    for path in (diagnosis(tmp_path, None, None), diagnosis(tmp_path, None, Path(__file__))):
+        (note,) = load_diagnosed(path, ROBOT)[1]
+        assert note == f"{path} does not say which robot it was made for"
+    assert "robot" not in json.loads(path.read_text())
