@@ -183,8 +183,13 @@ def check_writable(path: Path) -> None:
         InputFileError: it is a folder, or lies below what is none or may not be written to.
     """
     above = next(folder for folder in path.absolute().parents if folder.exists())
-    if path.is_dir() or not above.is_dir() or not os.access(above, os.W_OK):
-        what = "is a folder" if path.is_dir() else f"{above} is no folder to write to"
+    what = "is a folder" if path.is_dir() else ""
+    try:
+        with tempfile.TemporaryFile(dir=above):  # permissions do not tell all, nor to all
+            pass
+    except OSError as error:
+        what = f"{above} is no folder to write to: {reason_of(error)}"
+    if what:
         raise InputFileError.at(path, f"cannot be written: {what}; expected the name of a file")
 
 

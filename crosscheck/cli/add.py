@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from crosscheck.cli.choices import sigma_option
+from crosscheck.cli.choices import result_in, sigma_option
 from crosscheck.cli.following import Given, after_fit
 from seecr.cli.options import FILE, json_option, made_by, progress_share
 
@@ -75,7 +75,7 @@ def command(
     equilibrium or a fit that does not come to an end.
     """
     from crosscheck import add_effect, add_effects, load_measurements
-    from crosscheck.files import staged
+    from crosscheck.files import check_writable
     from crosscheck.measurements.stated import with_stated
     from crosscheck.model import load_diagnosed
     from seecr import load_model, load_robot, new_model
@@ -93,21 +93,24 @@ def command(
     for name in names:
         _check_names(old, name, refit, model)
     measured = with_stated(load_measurements(data, machine), sigmas)
-    with progress_share(f"adding {' + '.join(names)}") as progress:
-        if effect is not None:
-            found = add_effect(machine, measured, effect, old.terms, progress, per=per)
-        else:
-            found = add_effects(machine, measured, listed, old.terms, progress)
-    found = replace(found, notes=(*said, *found.notes))
-    written = found.pays or force
-    made = made_by(machine.source, *data, all_from, model)  # of the model as it was read
-    if written:
-        if out is not None:
-            with staged(out):  # what cannot be told leaves the model as it was
-                pass
-        _write(found, old, machine, measured.path, model)
-    _tell(found, old, model, written, made, out, as_json)
-    if not as_json:
+    check_writable(model)
+    with result_in(out, "add.json") as keep:
+        with progress_share(f"adding {' + '.join(names)}") as progress:
+            if effect is not None:
+                found = add_effect(machine, measured, effect, old.terms, progress, per=per)
+            else:
+                found = add_effects(machine, measured, listed, old.terms, progress)
+        found = replace(found, notes=(*said, *found.notes))
+        written = found.pays or force
+        made = made_by(machine.source, *data, all_from, model)  # of the model as it was read
+        text = _text(found, old, model, written, made)
+        keep(text)
+        if written:
+            _write(found, old, machine, measured.path, model)
+    if as_json:
+        click.echo(text)
+    else:
+        _tell(found, old, model, written)
         given = Given.with_data(measured, robot, data, model, sigmas)
         click.echo(after_fit(found.whiteness.is_noise, written, given))
     return 0 if written else 1
@@ -147,21 +150,16 @@ def _write(found: Addition, old: Model, robot: Robot, data: Path, path: Path) ->
     save_model(path, renewed(with_fit(old, found.fitted, found.names, source, errors), robot))
 
 
-def _tell(
-    found: Addition, old: Model, model: Path, written: bool, made: Made, out: Path | None,
-    as_json: bool,
-) -> None:  # fmt: skip
-    from crosscheck.files import json_text, staged, write_text
-    from crosscheck.terminal import print_addition
+def _text(found: Addition, old: Model, model: Path, written: bool, made: Made) -> str:
+    from crosscheck.files import json_text
 
     document = {"made": made, "written": written, "model": str(model), **found.as_json()}
-    text = json_text({**document, "model_notes": list(old.notes)})
-    if out is not None:
-        with staged(out) as folder:
-            write_text(folder / "add.json", text + "\n")
-    if as_json:
-        click.echo(text)
-        return
+    return json_text({**document, "model_notes": list(old.notes)})
+
+
+def _tell(found: Addition, old: Model, model: Path, written: bool) -> None:
+    from crosscheck.terminal import print_addition
+
     for note in old.notes:
         click.echo(f"note: {note}")
     print_addition(found, model, written)

@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from crosscheck.cli.choices import exclude_option, only_option, sigma_option
+from crosscheck.cli.choices import exclude_option, only_option, result_in, sigma_option
 from crosscheck.cli.following import Given, after_fit
 from seecr.cli.options import FILE, json_option, made_by, progress_share
 
 if TYPE_CHECKING:
     from crosscheck import Calibrated
     from seecr import Model, Robot
-    from seecr.made import Made
 
 
 @click.command(
@@ -58,26 +57,31 @@ def command(
     input, 3 rows without an equilibrium, or a fit that did not settle.
     """
     from crosscheck import calibrate, load_measurements
-    from crosscheck.files import staged
+    from crosscheck.files import check_writable, json_text
     from crosscheck.given import considered
     from crosscheck.measurements.stated import with_stated
+    from crosscheck.terminal import print_calibration
     from seecr import load_model, load_robot, new_model
 
     considered(only, exclude)  # a wrong name is told before any file is read
     machine = load_robot(robot)
     old = load_model(model, machine) if model.exists() else new_model(machine)
     measured = with_stated(load_measurements(data, machine), sigmas)
-    with progress_share("calibrating") as progress:
-        found = calibrate(machine, measured, old, progress, only=only, exclude=exclude)
-    written = found.pays or (force and found.settled)
-    made = made_by(machine.source, *data, model)  # of the model as it was read
-    if written:
-        if out is not None:
-            with staged(out):  # what cannot be told leaves the model as it was
-                pass
-        _write(found, old, machine, measured.path, model)
-    _tell(found, model, written, made, out, as_json)
-    if not as_json:
+    check_writable(model)
+    with result_in(out, "calibration.json") as keep:
+        with progress_share("calibrating") as progress:
+            found = calibrate(machine, measured, old, progress, only=only, exclude=exclude)
+        written = found.pays or (force and found.settled)
+        made = made_by(machine.source, *data, model)  # of the model as it was read
+        document = {"made": made, "written": written, "model": str(model), **found.as_json()}
+        text = json_text(document)
+        keep(text)
+        if written:
+            _write(found, old, machine, measured.path, model)
+    if as_json:
+        click.echo(text)
+    else:
+        print_calibration(found, model, written)
         given = Given.with_data(measured, robot, data, model, sigmas)
         click.echo(after_fit(written, written, given))
     if not found.settled:
@@ -92,19 +96,3 @@ def _write(found: Calibrated, old: Model, robot: Robot, data: Path, path: Path) 
     errors = {"before": found.before, "after": found.after, "held_out": found.held_out}
     new = calibrated(old, found.fitted, found.covariance, source, errors)
     save_model(path, renewed(new, robot))
-
-
-def _tell(
-    found: Calibrated, model: Path, written: bool, made: Made, out: Path | None, as_json: bool
-) -> None:
-    from crosscheck.files import json_text, staged, write_text
-    from crosscheck.terminal import print_calibration
-
-    text = json_text({"made": made, "written": written, "model": str(model), **found.as_json()})
-    if out is not None:
-        with staged(out) as folder:
-            write_text(folder / "calibration.json", text + "\n")
-    if as_json:
-        click.echo(text)
-        return
-    print_calibration(found, model, written)

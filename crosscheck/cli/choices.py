@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -76,3 +76,15 @@ def figures_in(folder: Path | None) -> Iterator[None]:
         return
     with staged(folder, "--figures") as unfinished, keeping(unfinished):
         yield
+
+
+@contextmanager
+def result_in(out: Path | None, name: str) -> Iterator[Callable[[str], None]]:
+    """A function that keeps a result's text in a folder, if any; it is tried before the work."""
+    from crosscheck.files import staged, write_text
+
+    if out is None:
+        yield lambda _text: None
+        return
+    with staged(out) as folder:
+        yield lambda text: write_text(folder / name, text + "\n")

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from crosscheck.files import (
+    check_writable,
     json_text,
     plain,
     read_text,
@@ -86,6 +87,12 @@ def test_files_written_together_are_all_old_or_all_new(tmp_path: Path) -> None:
 def test_a_folder_that_is_not_there_is_said(tmp_path: Path) -> None:
     with pytest.raises(InputFileError, match=r"gone/a: cannot be written: No such file"):
         write_text(tmp_path / "gone" / "a", "text")
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="Linux's own folder")
+def test_what_permissions_allow_may_still_not_be_written() -> None:
+    with pytest.raises(InputFileError, match=r"cannot be written: /proc is no folder to write to:"):
+        check_writable(Path("/proc/none/model.toml"))
 
 
 class Colour(Enum):

@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from made_data import case, refused, run
 
+import crosscheck
+
 pytestmark = pytest.mark.slow
 
 
@@ -40,17 +42,10 @@ def test_sizes_that_nothing_measures(stiff: tuple[Path, Path], tmp_path: Path) -
 def test_where_nothing_can_be_written(stiff: tuple[Path, Path], tmp_path: Path) -> None:
     file = tmp_path / "file"
     file.write_text("mine")
-    model = tmp_path / "model.toml"
     out = tmp_path / "out"
     quiet = ("--no-recording", "--out", out)
     assert f"--figures {file}: cannot write there" in refused(
         "compare", *stiff, "--figures", file, *quiet
-    )
-    assert f"--out {file}: cannot write there" in refused(
-        "calibrate", *stiff, "--model", model, "--only", "stiffness", "--out", file
-    )
-    assert f"--out {file}: cannot write there" in refused(
-        "add", "stiffness", *stiff, "--model", model, "--out", file
     )
     only = ("--only", "stiffness", *quiet)
     assert "is a folder; expected the name of a file" in refused(
@@ -60,6 +55,26 @@ def test_where_nothing_can_be_written(stiff: tuple[Path, Path], tmp_path: Path) 
         "diagnose", *stiff, "--model-out", file / "model.toml", *only
     )
     assert [path.name for path in tmp_path.iterdir()] == ["file"] and file.read_text() == "mine"
+
+
+@pytest.mark.parametrize("words", [("add", "stiffness"), ("calibrate",)])
+def test_what_cannot_be_written_is_told_before_the_fit(
+    stiff: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str]
+) -> None:
+    def fitted(*_given: object, **_options: object) -> None:
+        pytest.fail("it was fitted first")
+
+    for name in ("add_effect", "calibrate"):
+        monkeypatch.setattr(crosscheck, name, fitted)
+    file, model = tmp_path / "file", tmp_path / "model.toml"
+    file.write_text("mine")
+    assert f"model.toml: cannot be written: {file} is no folder to write to: Not a di" in refused(
+        *words, *stiff, "--model", file / "model.toml"
+    )
+    assert f"--out {file}: cannot write there" in refused(
+        *words, *stiff, "--model", model, "--out", file
+    )
+    assert list(tmp_path.iterdir()) == [file]
 
 
 def test_a_toml_of_another_kind_is_no_model(stiff: tuple[Path, Path]) -> None:
