@@ -93,13 +93,13 @@ def short(value: float | None, digits: int = 3) -> str:
     return f"{value:.{decimals}f}".replace("-", "−")
 
 
-def with_error(value: float, error: float) -> tuple[str, str]:
-    """A value and its standard error, to two digits of the error."""
+def with_error(value: float, error: float, digits: int = 2) -> tuple[str, str]:
+    """A value and its standard error, to so many digits of the error."""
     if not np.isfinite(error):
         return short(value), "not seen"
     if error <= 0.0:
         return short(value, 6), "0"
-    decimals = 1 - int(np.floor(np.log10(error)))
+    decimals = digits - 1 - int(np.floor(np.log10(error)))
     if decimals > 9 or abs(value) >= 10.0**_MOST_DIGITS:
         return short(value, 6), short(error, 2)
     decimals = max(decimals, 0)
