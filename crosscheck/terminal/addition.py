@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 
@@ -40,10 +41,7 @@ def why_not(found: Addition) -> str:
     """Why an effect is not worth adding."""
     mean, error = found.fall
     if found.is_nothing:
-        reason = (
-            f"{found.name} is no further from nothing than its standard errors "
-            f"({found.from_nothing:.2g} of them, all values together)"
-        )
+        reason = _nothing(found)
     elif found.p >= FALSE_ALARM:
         reason = f"chance explains what {found.name} explains (p {found.p:.2g})"
     else:
@@ -52,6 +50,21 @@ def why_not(found: Addition) -> str:
             f"{' ± '.join(with_error(mean, error))})"
         )
     return f"{reason}: it does not pay; --force adds it all the same"
+
+
+def _nothing(found: Addition) -> str:
+    """That the values are nothing: not seen, nothing itself, or within their errors of it."""
+    own = [one for one in found.fitted if one.term.name in found.names]
+    errors = np.concatenate([one.stderr[~one.term.layout.shape] for one in own])
+    if not (np.isfinite(errors) & (errors > 0.0)).any():
+        return f"{found.name} is not seen by these data: any value fits them as well"
+    if found.from_nothing == 0.0:
+        return f"{found.name} comes out as nothing"
+    together = ", all values together" if len(errors) > 1 else ""
+    return (
+        f"{found.name} is no further from nothing than its standard errors "
+        f"({found.from_nothing:.2g} of them{together})"
+    )
 
 
 def _left(found: Addition) -> str:

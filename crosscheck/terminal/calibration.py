@@ -12,14 +12,18 @@ from crosscheck.model.fitted import Fitted
 from crosscheck.terminal.lines import console_for, rms_table, say, table_of
 from seecr.counted import counted
 
-# A value this many standard errors from null is shown as sure.
+# A value this many standard errors from null is sure.
 _SURE = 3.0
+_UNSURE = (
+    f"No effect is {_SURE:g} standard errors from nothing by itself: each can be stood in for by "
+    "others, and only together they predict; crosscheck diagnose says which are missing"
+)
 
 
 def print_calibration(
     found: Calibrated, model: Path, written: bool, console: Console | None = None
 ) -> None:
-    """Print the errors, the effects whose values are sure, the noise, and what was written."""
+    """Print the errors, how far each effect is from nothing, the noise, and what was written."""
     console = console_for(console)
     for note in found.notes:
         say(console, f"note: {note}", "dim")
@@ -30,9 +34,13 @@ def print_calibration(
     )
     console.print(rms_table("rms error", rows))
     table = table_of(["effect", "parameters", "largest in its standard errors"])
-    for one in found.fitted:
-        table.add_row(one.term.name, str(len(one.term.layout)), _largest(one))
+    largest = [_largest(one) for one in found.fitted]
+    for one, size in zip(found.fitted, largest, strict=True):
+        cell = "-" if size is None else f"{size:.1f}"
+        table.add_row(one.term.name, str(len(one.term.layout)), cell)
     console.print(table)
+    if not any(size is not None and size > _SURE for size in largest):
+        say(console, _UNSURE)
     for line in found.noise_lines():
         say(console, line)
     if not found.settled:
@@ -47,9 +55,8 @@ def print_calibration(
         say(console, f"Written to {model}: {parts}, with their covariance")
 
 
-def _largest(one: Fitted) -> str:
-    """The value that stands out most from null, in standard errors; a dash where none does."""
+def _largest(one: Fitted) -> float | None:
+    """The value that stands out most from null, in standard errors; None where none is seen."""
     away = np.abs(one.term.vector - one.term.layout.null)
-    known = one.stderr > 0.0
-    ratio = np.divide(away, one.stderr, out=np.zeros_like(away), where=known)
-    return f"{ratio.max():.1f}" if ratio.max() > _SURE else "-"
+    seen = (one.stderr > 0.0) & np.isfinite(one.stderr)
+    return float(np.max(away[seen] / one.stderr[seen])) if seen.any() else None

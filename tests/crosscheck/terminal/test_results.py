@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
@@ -12,6 +13,7 @@ from made_data import measured, soft_cogiro, term
 from rich.console import Console
 
 from crosscheck.add import add_effect
+from crosscheck.calibration.result import calibrate
 from crosscheck.comparison.limits import Limits, check
 from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.result import Comparison
@@ -19,8 +21,10 @@ from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 from crosscheck.fit.words import shown
 from crosscheck.measurements.together import together
 from crosscheck.terminal.addition import print_addition, why_not
+from crosscheck.terminal.calibration import print_calibration
 from crosscheck.terminal.comparison import print_comparison
 from crosscheck.terminal.diagnosis import print_diagnosis
+from seecr.mjcf import load_robot
 
 
 def console() -> tuple[Console, StringIO]:
@@ -77,6 +81,37 @@ def test_an_addition_tells_values_errors_and_what_was_written() -> None:
     assert "With stiffness, what is left is noise." in text
     assert text.endswith("Written to m.toml: stiffness\n")
     assert why_not(added).endswith("it does not pay; --force adds it all the same")
+
+
+@pytest.mark.parametrize(
+    ("effect", "words"),
+    [
+        ("nonlinear_elasticity", "nonlinear_elasticity is not seen by these data: any value fits"),
+        ("winch_side_length", "winch_side_length comes out as nothing: it does not pay; --force"),
+        ("platform_mass", r"standard errors \(0\.0\d+ of them\): it does not pay"),
+        ("drum_gain", r"errors \(0\.0\d+ of them, all values together\): it does"),
+    ],
+)
+def test_what_is_nothing_says_in_which_way(effect: str, words: str) -> None:
+    robot = load_robot("planar_two_cable")
+    data = measured(robot, [term(robot, "pulley_radius", radius_m=0.01)], points=6)
+    assert re.search(words, why_not(add_effect(robot, data, effect)))
+
+
+@pytest.mark.parametrize("sure", [False, True])
+def test_a_calibration_tells_of_every_effect_how_sure_it_is(sure: bool) -> None:
+    """With two cables all of them can stand in for one another, and none looked like anything."""
+    robot = load_robot("planar_two_cable")
+    data = measured(robot, [term(robot, "stiffness", factor=1.3)], points=6)
+    names = ("stiffness", "platform_mass", "length_scale", "tracker_frame")
+    found = calibrate(robot, data, only=names[:1] if sure else names)
+    screen, out = console()
+    print_calibration(found, Path("m.toml"), True, screen)
+    rows = [line.split() for line in out.getvalue().splitlines()]
+    sizes = {row[0]: row[2] for row in rows if len(row) == 3 and row[0] in names}
+    assert len(sizes) == len(found.fitted) and "-" not in sizes.values()
+    assert any(float(size) > 3.0 for size in sizes.values()) == sure
+    assert ("No effect is 3 standard errors from nothing" in out.getvalue()) != sure
 
 
 def test_a_diagnosis_begins_with_what_shows_and_then_its_verdict() -> None:
