@@ -24,6 +24,8 @@ _WINDOW = 0.1
 _NOISE, _PART = 6.0, 0.01
 # Least samples of a dwell.
 LEAST = 5
+# Smaller changes [m, rad] are the rounding of our own arithmetic.
+_SAME = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +40,7 @@ class Dwells:
         scatter_m, scatter_rad: (k,) standard deviation of single samples, by coordinate.
         error_m, error_rad: (k,) standard error of the means: from means of parts, since
             neighbouring samples go together.
+        step_m, step_rad: (k,) least change from a sample to the next; inf where all are the same.
         speed: [m/s] slower than this was at rest.
     """
 
@@ -52,6 +55,8 @@ class Dwells:
     scatter_rad: Array
     error_m: Array
     error_rad: Array
+    step_m: Array
+    step_rad: Array
     speed: float
 
     def __len__(self) -> int:
@@ -190,6 +195,8 @@ def _averaged(stream: Stream, bounds: list[tuple[int, int]], limit: float) -> Dw
         scatter_rad=np.array([_rms(d) for d in turned]),
         error_m=np.array([mean_error(d) for d in away]),
         error_rad=np.array([mean_error(d) for d in turned]),
+        step_m=np.array([_step(d) for d in away]),
+        step_rad=np.array([_step(d) for d in turned]),
         speed=limit,
     )
 
@@ -202,3 +209,9 @@ def _about(quat: Array, mean: Array) -> Array:
 
 def _rms(values: Array) -> float:
     return float(np.sqrt(np.sum(values**2) / (max(len(values) - 1, 1) * values.shape[1])))
+
+
+def _step(values: Array) -> float:
+    """The least change from a row (n, 3) to the next; inf where there is none."""
+    size = np.linalg.norm(np.diff(values, axis=0), axis=1)
+    return float(np.min(size[size > _SAME], initial=np.inf))

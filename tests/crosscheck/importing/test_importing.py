@@ -218,14 +218,23 @@ def test_noise_that_goes_together_counts_for_less():
     assert mean_error(alike) == pytest.approx(1 / np.sqrt(40), rel=0.5)
 
 
-def test_what_does_not_scatter_has_no_noise_but_rounding(tmp_path):
-    """An orientation that a log repeats; its 1e-32 rad was written, and refused when read."""
+@pytest.mark.parametrize("flicker", [0.0, 1e-3], ids=["repeated", "last digit"])
+@pytest.mark.parametrize("digits", [0, 1, 9])
+def test_what_only_the_last_digit_shows_is_not_stated(tmp_path, flicker, digits):
+    """1e-32 rad of an orientation that is repeated was written, and 1e-7 of one in 0.001 deg.
+
+    Positions scatter by half their last digit where that is 0.1 mm; in whole mm they do not.
+    """
     rng, rows, told = np.random.default_rng(0), [], []
     for k, place in enumerate(np.array([[0.3, 0.2, 0.1], [0.5, 0.2, 0.1], [0.4, 0.3, 0.15]])):
         quat = np.array([1.0, 0.013 * k, 0.007, 0.002])
         told.append([3.0 * k, *place])
         rows += [
-            [3.0 * k + 0.05 * j, *(1e3 * place + rng.normal(0.0, 0.05, 3)), *quat]
+            [
+                3.0 * k + 0.05 * j,
+                *np.round(1e3 * place + rng.normal(0.0, 0.05, 3), digits),
+                *(quat + flicker * (j == 7) * np.eye(4)[1]),
+            ]
             for j in range(40)
         ]
     log, commands = tmp_path / "log.csv", tmp_path / "commands.csv"
@@ -233,8 +242,11 @@ def test_what_does_not_scatter_has_no_noise_but_rounding(tmp_path):
     for path, head, table in zip((log, commands), heads, (rows, told), strict=True):
         path.write_text("\n".join([head, *(",".join(map(str, row)) for row in table)]))
     found = import_case("poses", [log], ROBOT, [commands], Choices(aligned=True))
-    assert found.measured.sigma.orientation_rad is None
-    assert 1e-6 < found.measured.sigma.position_m < 1e-4
+    sigma = found.measured.sigma
+    assert sigma.orientation_rad is None
+    assert sigma.position_m is None if digits == 0 else 1e-6 < sigma.position_m < 1e-4
+    hidden = "position and orientation" if digits == 0 else "mm; orientation"
+    assert f"{hidden} not stated: within a dwell only the last digit changes" in found.notes[-1]
 
 
 def test_a_swing_that_dies_out_is_no_rest():
