@@ -77,6 +77,7 @@ def read_commands(path: str | Path, robot: Robot) -> CommandFile:
         told=told and lengths is not None,
         loads=known_loads(columns, robot),
         stands=np.ones(len(run), dtype=bool) if stands else None,
+        line=columns.table.line,
     )
     return CommandFile(path, commands, wanted, tuple(run.tolist()), tuple(columns.notes))
 

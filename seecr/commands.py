@@ -35,6 +35,7 @@ class Commands:
         clock: (n,) int, number of the clock that ``time`` is read from; None for one alone.
         parts: names (n,) of the "file" and the "run" that each row is of, for effects that have
             values of their own for each.
+        line: (n,) of the file that rows were read from; None where there is none.
     """
 
     pose: Array
@@ -48,6 +49,7 @@ class Commands:
     stands: NDArray[np.bool_] | None = None
     clock: NDArray[np.int64] | None = None
     parts: Mapping[str, NDArray[np.str_]] = field(default_factory=dict)
+    line: NDArray[np.int64] | None = None
 
     def __len__(self) -> int:
         return len(self.pose)
@@ -61,7 +63,8 @@ class Commands:
         return Commands(
             pose=self.pose[index], lengths=of(self.lengths), run=of(self.run), time=of(self.time),
             temperature=of(self.temperature), told=self.told, stands=of(self.stands),
-            clock=of(self.clock), loads=None if self.loads is None else self.loads.rows(index),
+            clock=of(self.clock), line=of(self.line),
+            loads=None if self.loads is None else self.loads.rows(index),
             parts={kind: names[index] for kind, names in self.parts.items()},
         )  # fmt: skip
 

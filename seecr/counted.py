@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
-__all__ = ["between", "counted", "plural", "some"]
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+__all__ = ["between", "counted", "plural", "rows_words", "some"]
 
 
 def counted(number: int, noun: str, form: str = "d") -> str:
@@ -34,3 +39,13 @@ def some(words: Sequence[str], most: int = 4, mark: str = ", ") -> str:
         return mark.join(words)
     lead = " " if mark == ", " else mark
     return f"{mark.join(words[:most])}{lead}and {more} more"
+
+
+def rows_words(rows: Iterable[int], line: NDArray[np.int64] | None, most: int = 8) -> str:
+    """Rows as people find them: line 24 of their file; without a file pose 3, counted from 0.
+
+    Args:
+        rows: counted from 0. line: (n,) of the file, that of each row. most: that are named.
+    """
+    numbers = [str(row if line is None else line[row]) for row in rows]
+    return f"{plural(len(numbers), 'pose' if line is None else 'line')} {some(numbers, most)}"

@@ -93,7 +93,8 @@ def solve(
                 "expected no other method, no start, no others, no follow, and external_wrench "
                 "among the effects instead of wrench"
             )
-        return Experiment(robot, commands).predict(acting).solution()
+        found = Experiment(robot, commands).predict(acting).solution()
+        return replace(found, line=commands.line)
     starts = None
     if start is not None:
         starts = commanded_poses(start, "start")
@@ -109,6 +110,7 @@ def solve(
         found = follow_commands(robot, commands, lambda way, row: setup_of(way, pushes[row]))
     else:
         found = solve_setup(setup, method, starts, max_iterations, threads)
+    found = replace(found, line=commands.line)
     if not others:
         return found
 

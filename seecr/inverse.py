@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seecr.commands import Commands
-from seecr.counted import between, counted
+from seecr.counted import between, counted, rows_words
 from seecr.distribution import tension_limits, wanted_tensions
 from seecr.effects.base import Effect
 from seecr.errors import InputError
@@ -108,10 +108,14 @@ class Correction(Result):
                 out.append(f"{int(rows.sum())} {text}")
         return out
 
+    def place(self, row: int) -> str:
+        """A row in words: "line 24" of its file, "pose 3", counted from 0, without one."""
+        return rows_words([row], self.commands.line)
+
     def _reasons(self) -> list[str]:
         """The first poses that cannot be held, each with the reason."""
         rows = np.flatnonzero(~self.held)
-        named_rows = [f"  pose {i}: {self.why_not[i]}" for i in rows[:_NAMED]]
+        named_rows = [f"  {self.place(i)}: {self.why_not[i]}" for i in rows[:_NAMED]]
         more = len(rows) - _NAMED
         return [*named_rows, f"  and {more} more, see why_not"] if more > 0 else named_rows
 

@@ -23,7 +23,7 @@ from seecr.compiled.outcomes import (
     TOLERANCE,
     UNSTABLE,
 )
-from seecr.counted import between, counted, plural, some
+from seecr.counted import between, counted, rows_words
 from seecr.inertia import mass_matrices
 from seecr.pose import Array, rotvec_from_quat
 from seecr.result import COORDINATES, Record, Result, named
@@ -92,6 +92,7 @@ class Solution(Result):
         status: (n,) of :class:`Status`.
         others: the other stable equilibria of each command, where they were asked for.
         jumps: on the way to each command, where it was followed.
+        line: (n,) of the file that commands were read from; None where there is none.
     """
 
     robot: Robot
@@ -109,6 +110,7 @@ class Solution(Result):
     status: NDArray[np.object_]
     others: tuple[Solution, ...] | None = None
     jumps: tuple[tuple[Jump, ...], ...] | None = None
+    line: NDArray[np.int64] | None = None
 
     def __len__(self) -> int:
         return len(self.pose)
@@ -174,6 +176,7 @@ class Solution(Result):
         for name in ("others", "jumps"):
             whole = getattr(self, name)
             values[name] = None if whole is None else tuple(whole[k] for k in at)
+        values["line"] = None if self.line is None else self.line[at]
         return replace(self, **values)
 
     @cached_property
@@ -210,7 +213,7 @@ class Solution(Result):
         for status in dict.fromkeys(self.status):
             if status is not Status.CONVERGED:
                 rows = np.flatnonzero(self.status == status)
-                out.append(f"{_some_rows(rows)}: {self.sentence(int(rows[0]))}")
+                out.append(f"{self.place(*rows)}: {self.sentence(int(rows[0]))}")
         known = np.flatnonzero(np.isfinite(self.pose).all(axis=1))
         if len(known) == 0:
             return out
@@ -218,7 +221,7 @@ class Solution(Result):
         turned = np.degrees(np.linalg.norm(self.deviation[:, 3:], axis=1))
         k = int(known[np.argmax(away[known])])
         out.append(
-            f"furthest from its command: pose {k}, by {1e3 * away[k]:.4g} mm "
+            f"furthest from its command: {self.place(k)}, by {1e3 * away[k]:.4g} mm "
             f"and {turned[k]:.4g} deg"
         )
         pulls, slack = self.tensions[known], self.slack[known].sum(axis=1)
@@ -246,6 +249,10 @@ class Solution(Result):
             for i in range(len(self))
         ]
 
+    def place(self, *rows: int) -> str:
+        """Rows in words: "line 24" of their file, "pose 3", counted from 0, without one."""
+        return rows_words(rows, self.line)
+
     def sentence(self, i: int) -> str:
         """What became of pose i, with the direction where it is singular or unstable."""
         status = self.status[i]
@@ -259,11 +266,6 @@ class Solution(Result):
             if abs(value) > 0.05
         ]
         return f"{status.value} (direction {' '.join(parts)})"
-
-
-def _some_rows(rows: NDArray[np.intp], most: int = 8) -> str:
-    """Numbers of poses for people."""
-    return f"{plural(len(rows), 'pose')} {some([str(k) for k in rows.tolist()], most)}"
 
 
 def certify(robot: Robot, tables: Tables, found: statics.Evaluation) -> Solution:

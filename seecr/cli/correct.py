@@ -61,7 +61,8 @@ def command(
     correction.json says of each row how likely its tensions stay within the limits.
 
     Writes corrected.csv and corrected.toml, which every command reads as commands, and
-    correction.json. Poses without any answer are left out of corrected.csv.
+    correction.json. Poses without any answer are left out of corrected.csv; poses are told by
+    their line in POSES.csv.
 
     \b
     Exit status: 0 all poses reached or replaced by the nearest, 2 bad input,

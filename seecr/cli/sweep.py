@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from seecr import Commands, Robot
 
 
+_COUNTED = "Poses are counted from 0, as the rows of sweep.json are."
+
+
 @click.command(
     cls=NumbersCommand,
     short_help="Where the platform rests at many commands.",
@@ -78,6 +81,8 @@ def command(
     measurements does: cmd_x_m ... or length_1_m ..., with run, t_s and temperature_C for effects
     that depend on them; or poses come from --line or --grid. Each command is solved for itself
     unless --follow or a model with a memory has them solved along the way.
+
+    Poses are told by their line in POSES.csv; those of --line and --grid count from 0.
 
     Writes sweep.json, sweep.csv, a figure and sweep.rrd.
 
@@ -143,7 +148,7 @@ def _commands(
     if poses is not None and given["turned"]:
         raise InputError(f"--turned is of --line and --grid; {poses} has its own orientations")
     if poses is None:
-        return Commands(_along(robot, given)), {}, ()
+        return Commands(_along(robot, given)), {}, (_COUNTED,)
     read = read_commands(poses, robot)
     more: dict[str, Any] = {}
     if len(set(read.run)) > 1:

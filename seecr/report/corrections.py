@@ -75,14 +75,14 @@ def chance_lines(found: Correction, kept: Array | None) -> Iterator[str]:
     worst = int(np.nanargmin(kept))
     many = int(np.sum(kept[np.isfinite(kept)] < _LIKELY))
     yield (
-        f"tensions stay within the limits with probability {np.nanmin(kept):.2f} at row {worst}, "
-        f"the least; below {_LIKELY:g} at {many} of {len(found.wanted)}"
+        f"tensions stay within the limits with probability {np.nanmin(kept):.2f} at "
+        f"{found.place(worst)}, the least; below {_LIKELY:g} at {many} of {len(found.wanted)}"
     )
 
 
 def document_of(found: Correction, kept: Array | None = None) -> dict[str, Any]:
     """``correction.json``; ``kept`` (n,) is how likely tensions stay within their limits."""
-    left = found.left
+    left, line = found.left, found.commands.line
     return {
         "robot": found.robot.name,
         "cables": found.robot.cable_names,
@@ -92,6 +92,7 @@ def document_of(found: Correction, kept: Array | None = None) -> dict[str, Any]:
         "without_answer": int((~(found.found & found.solution.converged)).sum()),
         "rows": [
             {
+                **({} if line is None else {"line": line[i]}),
                 "wanted": found.wanted[i],
                 "aimed": found.aimed[i] if found.found[i] else None,
                 "lengths_m": found.lengths[i],

@@ -22,6 +22,8 @@ COLOURS = (
     "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#000000", "#B8A800",
 )  # fmt: skip
 # More cables than colours are told apart by dashes.
+# What says which pose it is, where no coordinate does.
+_NUMBERS = ("line of the file", "pose, counted from 0")
 _DASHES = ("-", "--", ":", "-.")
 # Beyond so many cables a legend says nothing.
 _MOST_NAMED = 24
@@ -66,7 +68,7 @@ def sweep_figure(path: Path, solution: Solution, commanded: bool = True) -> None
     """
     at, label = _along(solution, commanded)
     mark: dict[str, Any] = {"marker": "o", "markersize": 2.5, "linewidth": 1.1}
-    if label == "pose number":
+    if label in _NUMBERS:
         mark["linewidth"] = 0.5
     panels = [_tensions, _slack]
     if commanded:
@@ -79,14 +81,16 @@ def sweep_figure(path: Path, solution: Solution, commanded: bool = True) -> None
 
 
 def _along(solution: Solution, commanded: bool) -> tuple[Array, str]:
-    """What to draw over: the coordinate that the sweep goes along, else the number of the pose."""
+    """What to draw over: the coordinate that the sweep goes along, else the file's line."""
     if commanded and len(solution) > 1:
         steps = np.diff(solution.command, axis=0)
         moves = [k for k in range(7) if np.any(np.abs(steps[:, k]) > 1e-12)]
         one_way = len(moves) == 1 and len({*np.sign(steps[:, moves[0]])}) == 1
         if one_way and moves[0] < 3:
             return 1e3 * solution.command[:, moves[0]], f"commanded {'xyz'[moves[0]]} [mm]"
-    return np.arange(1.0, len(solution) + 1.0), "pose number"
+    if solution.line is not None:
+        return solution.line.astype(float), _NUMBERS[0]
+    return np.arange(float(len(solution))), _NUMBERS[1]
 
 
 def _deviations(ax: Any, solution: Solution, at: Array, mark: dict[str, Any]) -> None:

@@ -35,6 +35,8 @@ def rows_of(
     """
     names = solution.robot.cable_names
     eigenvalues, extra = solution.smallest_eigenvalue, more or {}
+    if solution.line is not None:
+        extra = {"line": solution.line.tolist(), **extra}
     return [
         {
             **{name: values[i] for name, values in extra.items()},

@@ -227,7 +227,8 @@ def jump_lines(solution: Solution) -> Iterator[str]:
         yield "followed from the reference pose: the platform jumps nowhere on the way"
     for i, jumps in enumerate(solution.jumps):
         for jump in jumps:
-            at = f"on the way to pose {i}, at command {_three(1e3 * jump.command[:3], '.1f')} mm"
+            command = _three(1e3 * jump.command[:3], ".1f")
+            at = f"on the way to {solution.place(i)}, at command {command} mm"
             if not np.isfinite(jump.after).all():
                 yield f"{at}: its rest ends, and nothing holds it then"
                 continue

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -122,7 +123,9 @@ def test_sweep_writes_its_files(tmp_path: Path) -> None:
     assert "6 of 6 poses at rest" in said.stdout
     assert {file.name for file in (out / "again").iterdir()} == {"sweep.json", "sweep.csv"}
     rows = json.loads((out / "again" / "sweep.json").read_text())["rows"]
-    assert rows == document["rows"]
+    assert rows == [{"line": k, **row} for k, row in enumerate(document["rows"], start=2)]
+    assert "Poses are counted from 0" in document["notes"][0]
+    assert re.search("furthest from its command: line [2-7], by", said.stdout)
 
 
 @pytest.mark.slow

@@ -13,8 +13,10 @@ from recordings import Readback
 from seecr.command_file import read_commands
 from seecr.equilibrium import solve
 from seecr.files import json_text
+from seecr.inverse import correct
 from seecr.mjcf import load_robot
 from seecr.recording.sweep import write_sweep_recording
+from seecr.report.corrections import chance_lines, document_of
 from seecr.report.figures import sweep_figure
 from seecr.report.rows import csv_text, rows_of
 from seecr.report.words import at_rest, cable_lines, pose_lines, sweep_lines
@@ -47,6 +49,26 @@ def test_the_csv_is_read_again_as_commands(sweep: Solution, tmp_path: Path) -> N
     path.write_text(csv_text(rows_of(sweep, lengths)))
     again = read_commands(path, sweep.robot).commands.lengths
     np.testing.assert_array_equal(np.asarray(again), lengths)
+
+
+def test_rows_of_a_file_are_told_by_their_lines(tmp_path: Path) -> None:
+    robot = load_robot("planar_vertical")
+    path = tmp_path / "poses.csv"
+    path.write_text("# mine\ncmd_x_m,cmd_z_m\n0.4,0.15\n\n0.5,0.25\n0.9,0.25\n")
+    commands = read_commands(path, robot).commands
+    found, wanted = solve(robot, commands), correct(robot, commands)
+    assert found.lines()[1].startswith("furthest from its command: line 6, by ")
+    assert found.rows([2, 1]).lines()[1].startswith("furthest from its command: line 6, by ")
+    lost = replace(found, status=np.array([Status.FALLING] * 3, dtype=object))
+    assert lost.lines()[1].startswith("lines 3, 5, 6: no equilibrium found")
+    assert any(line.startswith("  line 6: cable1 would have to push") for line in wanted.lines())
+    (said,) = chance_lines(wanted, np.array([0.9, 0.2, 0.7]))
+    assert "with probability 0.20 at line 5, the least" in said
+    assert [row["line"] for row in document_of(wanted)["rows"]] == [3, 5, 6]
+    assert [row["line"] for row in rows_of(found)] == [3, 5, 6]
+    # without a file they count as they do in Python
+    assert "command: pose 2, by" in solve(robot, commands.pose).lines()[1]
+    assert "line" not in rows_of(solve(robot, commands.pose))[0]
 
 
 def test_words_of_a_pose(sweep: Solution) -> None:
