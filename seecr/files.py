@@ -15,7 +15,7 @@ import re
 import shutil
 import tempfile
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum
@@ -194,7 +194,7 @@ def check_writable(path: Path) -> None:
 
 
 @contextmanager
-def staged(out: str | Path, option: str = "--out") -> Iterator[Path]:
+def staged(out: str | Path, option: str = "--out", sometimes: Iterable[str] = ()) -> Iterator[Path]:
     """A temporary folder whose files move into ``out`` when the block ends well.
 
     It lies inside ``out``, so that moving is renaming; if the block fails, ``out`` is as it was.
@@ -202,6 +202,8 @@ def staged(out: str | Path, option: str = "--out") -> Iterator[Path]:
     Args:
         out: the folder of results, made if need be.
         option: of the command line that named it, for the error.
+        sometimes: names of files that belong to such a result, but not to each. Those that are not
+            written now are removed, since they are of an older one; nothing else is.
 
     Raises:
         InputError: it cannot be made or written to; said before any work is done.
@@ -220,8 +222,12 @@ def staged(out: str | Path, option: str = "--out") -> Iterator[Path]:
     done = False
     try:
         yield folder
-        for file in sorted(folder.iterdir()):
+        written_now = sorted(folder.iterdir())
+        for file in written_now:
             file.replace(out / file.name)
+        for name in {*sometimes} - {file.name for file in written_now}:
+            if (out / name).is_file():
+                (out / name).unlink()
         done = True
     finally:
         shutil.rmtree(folder, ignore_errors=True)

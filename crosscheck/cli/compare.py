@@ -75,7 +75,7 @@ def command(
     machine = load_robot(robot)
     measured = with_stated(load_measurements(data, machine), sigmas)
     own = load_model(model, machine) if model is not None else None
-    with staged(out) as folder:
+    with staged(out, sometimes=["comparison.rrd"]) as folder:
         found = compare(machine, measured, own.terms if own else ())
         exceeded = check(limits, found)
         status = 1 if exceeded else (0 if found.converged else 3)

@@ -88,7 +88,7 @@ def command(
     own = load_model(model, machine) if model is not None else new_model(machine)
     if model_out is not None:
         check_writable(model_out)
-    with staged(out) as folder:
+    with staged(out, sometimes=["diagnosis.rrd"]) as folder:
         with progress_share("diagnosing") as progress:
             found = diagnose(
                 machine, measured, own, progress, only=only, exclude=exclude,

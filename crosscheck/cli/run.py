@@ -153,7 +153,8 @@ def _run(
 ) -> int:
     from crosscheck.files import staged
 
-    with staged(out) as folder:
+    recordings_of = [f"{case.name}.rrd" for case in chosen]
+    with staged(out, sometimes=recordings_of) as folder:
         record = partial(_record, folder=folder) if recordings else None
         with progress_bar("compiling", sum(map(len, chosen))) as advance:
             from crosscheck.suite import run_suite

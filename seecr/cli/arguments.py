@@ -83,12 +83,20 @@ def turned_option(of: str) -> Callable[[F], F]:
     )
 
 
+_FIGURES = ("png", "svg")
+
+
+def files_of_pictures(name: str) -> list[str]:
+    """All files of that name that ``--figure`` and ``--no-recording`` write or leave out."""
+    return [f"{name}.{kind}" for kind in (*_FIGURES, "rrd")]
+
+
 def picture_options(function: F) -> F:
     """``--figure`` and ``--no-recording``, given as ``figure`` and ``no_recording``."""
     function = click.option("--no-recording", is_flag=True, help="Write no .rrd.")(function)
     return click.option(
         "--figure",
-        type=click.Choice(["png", "svg", "none"]),
+        type=click.Choice([*_FIGURES, "none"]),
         default="png",
         show_default=True,
         help="Kind of the figure.",

@@ -36,7 +36,7 @@ def out_option(default: str) -> Callable[[F], F]:
         default=default,
         show_default=True,
         metavar="DIR",
-        help="Folder for the results; made if it does not exist.",
+        help="Folder for the results; made if it does not exist. Older results there are replaced.",
     )
 
 

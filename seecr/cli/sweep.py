@@ -11,6 +11,7 @@ from seecr.cli.arguments import (
     NumbersCommand,
     axes_of,
     check_places,
+    files_of_pictures,
     model_at,
     picture_options,
     robot_at,
@@ -98,7 +99,7 @@ def command(
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
     commands, more, said = _commands(machine, poses, given)
-    with staged(out) as folder:
+    with staged(out, sometimes=files_of_pictures("sweep")) as folder:
         solution = solve(machine, commands, effects=own or (), follow=follow)
         spread = None if own is None else spread_of(machine, commands, own)
         commanded = commands.lengths is None

@@ -9,6 +9,7 @@ import click
 from seecr.cli.arguments import (
     NumbersCommand,
     axes_of,
+    files_of_pictures,
     limit_options,
     model_at,
     picture_options,
@@ -101,7 +102,7 @@ def command(
     own = model_at(model, machine)
     axes = axes_of(grid, machine) if grid else list(default_axes(machine))
     total = int(np.prod([len(axis) for axis in axes]))
-    with staged(out) as folder:
+    with staged(out, sometimes=files_of_pictures("map")) as folder:
         with progress_bar("mapping", total) as tell:
             found = workspace_map(
                 machine, *axes, orientation=turned or None, lowest=lowest,

@@ -128,6 +128,22 @@ def test_sweep_writes_its_files(tmp_path: Path) -> None:
     assert re.search("furthest from its command: line [2-7], by", said.stdout)
 
 
+def test_an_older_result_in_the_same_folder_goes_and_nothing_else(tmp_path: Path) -> None:
+    poses, out = tmp_path / "poses.csv", tmp_path / "out"
+    poses.write_text("cmd_x_m,cmd_z_m\n0.4,0.15\n")
+    (out / "sweep.png").mkdir(parents=True)
+    for name in ("sweep.svg", "sweep.rrd", "map.rrd", "mine.png", "sweep.txt"):
+        (out / name).write_text("old")
+    bare = ("--figure", "none", "--no-recording", "--out", out)
+    assert run("sweep", "planar_vertical", tmp_path / "none.csv", *bare).exit_code == 2
+    assert (out / "sweep.rrd").is_file()
+    assert run("sweep", "planar_vertical", poses, *bare).exit_code == 0
+    names = {file.name for file in out.iterdir()}
+    assert names == {
+        "sweep.json", "sweep.csv", "sweep.png", "map.rrd", "mine.png", "sweep.txt"
+    }  # fmt: skip
+
+
 @pytest.mark.slow
 def test_correct_writes_commands_that_every_command_reads(tmp_path: Path) -> None:
     poses, model = tmp_path / "poses.csv", tmp_path / "model.toml"
