@@ -258,7 +258,12 @@ def _cell_fault(cell: str, blank_is_nan: bool) -> str | None:
     if re.fullmatch(r"[+-]?[\d.]+(e[+-]?\d+)?\s*[^\W\d_]+", cell, re.IGNORECASE):
         return f"{expected}, got {show(cell)}; a unit belongs in the column's name, not in a cell"
     try:
-        finite = "_" not in cell and abs(float(cell)) <= LARGEST
+        number = float(cell.replace("_", "?"))
     except ValueError:
-        finite = False
-    return None if finite else f"{expected}, got {show(cell)}"
+        return f"{expected}, got {show(cell)}"
+    if abs(number) <= LARGEST:
+        return None
+    largest = f"{LARGEST:g}".replace("+", "")
+    return (
+        f"{expected}, got {show(cell)}, which is too large; numbers go from -{largest} to {largest}"
+    )

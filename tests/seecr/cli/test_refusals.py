@@ -37,7 +37,8 @@ ROBOT = "planar_vertical"
          "far.csv: line 2, column cmd_x_m: far outside the robot: expected numbers of the size of "
          "its frame, 0.834 m across, got 400 m; are these really m?"),
         ("sweep demobot_parallel huge.csv --out o",
-         "huge.csv: line 2, column cmd_x_m: expected a number in every row, got '1e300'"),
+         "huge.csv: line 2, column cmd_x_m: expected a number in every row, got '1e300', "
+         "which is too large; numbers go from -1e30 to 1e30"),
         ("sweep demobot_parallel --line 0.4 0.25 0.1 0.4 250 0.1 --out o", "Y: expected metres"),
         ("sweep demobot_parallel --grid 0:inf:3 0.25 0.1 --out o", "got '0:inf:3'"),
         ("sweep demobot_parallel --grid 0:1:100000 0:1:100000 0.1 --out o",
