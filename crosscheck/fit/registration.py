@@ -31,7 +31,7 @@ def registered(problem: Problem, at: Prediction) -> Term | None:
     whole = problem.use & np.isfinite(data.position).all(axis=1) & at.solved
     turn = _turn(problem, at)
     places = (at.readings.position[whole], data.position[whole])
-    if turn is None and whole.sum() >= 3:
+    if turn is None:
         turn = turn_of_points(*places)
     if turn is None:
         return None
@@ -85,10 +85,14 @@ def _turn(problem: Problem, at: Prediction) -> Array | None:
 
 
 def turn_of_points(here: Array, there: Array) -> Array | None:
-    """The turn (4,) that brings points (k, 3) nearest to others; None where they are in line.
+    """The turn (4,) that brings points (k, 3) nearest to others; None where they are in one line.
+
+    As fewer than three always are.
 
     By the eigenvector of Horn's matrix (Closed-form solution of absolute orientation, 1987).
     """
+    if len(here) < 3:
+        return None
     weight, turn = np.ones(len(here)), None
     for _ in range(_ROUNDS):
         mean = [np.average(points, axis=0, weights=weight) for points in (here, there)]

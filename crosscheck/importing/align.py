@@ -68,7 +68,7 @@ def by_points(names: Sequence[str], there: Array, here: Array) -> Frames:
     Raises:
         CrosscheckError: fewer than three, in one line, or with other distances between them.
     """
-    turn = turn_of_points(there, here) if len(names) >= 3 else None
+    turn = turn_of_points(there, here)
     if turn is None:
         raise CrosscheckError(
             f"the frames cannot be aligned by {counted(len(names), 'point')} "
