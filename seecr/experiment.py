@@ -13,8 +13,9 @@ from seecr import statics
 from seecr.commands import Commands
 from seecr.compiled.columns import STRAIN, TENSION
 from seecr.compiled.outcomes import CONVERGED, ITERATIONS, SINGULAR, STALLED, TOLERANCE
+from seecr.edits import Edits
 from seecr.effects.base import Effect, Readings
-from seecr.effects.checked import edit_readings, edit_setup
+from seecr.effects.checked import edit_readings
 from seecr.effects.terms import Term, Terms
 from seecr.path import Path, path_of
 from seecr.pose import Array
@@ -147,8 +148,9 @@ class Experiment:
     commands: Commands
     length_errors: Array | None = None
     _path: list[Path] = field(default_factory=list, repr=False)
-    # by identity of the commands: a plain setup holds them, so that no other takes their place
+    # by identity of the commands: a setup holds them, so that no other takes their place
     _plain: dict[int, Setup] = field(default_factory=dict, repr=False)
+    _edits: dict[int, Edits] = field(default_factory=dict, repr=False)
 
     @property
     def path(self) -> Path:
@@ -163,23 +165,24 @@ class Experiment:
 
     def setup(self, effects: Sequence[Effect], commands: Commands | None = None) -> Setup:
         """The setup as the effects leave it."""
-        setup = self._plain_of(self.commands if commands is None else commands).copy()
-        if self.length_errors is not None:
-            rows = slice(None) if commands is None else self.path.source
-            setup.extra_length += self.length_errors[rows]
-        for effect in effects:
-            edit_setup(effect, setup)
+        setup = self._edits_of(self.commands if commands is None else commands).by(effects)
         if np.any(setup.backlash):
             # what the winches did on the way to the rows counts too
             path = self.path
             setup.commands = path.given_turning if commands is None else path.turning
         return setup
 
-    def _plain_of(self, commands: Commands) -> Setup:
-        """The plain setup of commands, which fits ask for thousands of times."""
-        if id(commands) not in self._plain:
-            self._plain[id(commands)] = plain_setup(self.robot, commands)
-        return self._plain[id(commands)]
+    def _edits_of(self, commands: Commands) -> Edits:
+        """What effects make of the setup of commands: fits ask for that thousands of times."""
+        if id(commands) not in self._edits:
+            if id(commands) not in self._plain:
+                self._plain[id(commands)] = plain_setup(self.robot, commands)
+            setup = self._plain[id(commands)].shared()
+            if self.length_errors is not None:
+                rows = slice(None) if commands is self.commands else self.path.source
+                setup.extra_length = setup.extra_length + self.length_errors[rows]
+            self._edits[id(commands)] = Edits(setup)
+        return self._edits[id(commands)]
 
     def predict(self, effects: Sequence[Effect] = (), near: Prediction | None = None) -> Prediction:
         """Solve all rows and read the sensors.

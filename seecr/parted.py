@@ -77,7 +77,8 @@ class Parted(Experiment):
     _parts: dict[tuple[str, ...], list[Part]] = field(default_factory=dict, repr=False)
 
     def with_length_errors(self, errors: Array | None) -> Parted:
-        return Parted(self.robot, self.commands, errors, self._path, self._plain, self._parts)
+        same = (self.robot, self.commands, errors, self._path, self._plain)
+        return Parted(*same, _parts=self._parts)
 
     def parts(self, effects: Sequence[Effect]) -> list[Part]:
         """The rows that go together under some effects; none where all do."""

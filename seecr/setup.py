@@ -226,15 +226,21 @@ class Setup:
         )  # fmt: skip
         return out
 
-    def copy(self) -> Setup:
-        """One that can be edited for itself."""
-        own = {name: _copied(getattr(self, name)) for name in QUANTITIES}
-        return Setup(self.robot, self.commands, laws=list(self.laws), **own)
+    def shared(self) -> Setup:
+        """One whose quantities can be put anew; their arrays are those of this one."""
+        out = Setup.__new__(Setup)
+        vars(out).update(vars(self), laws=list(self.laws))
+        return out
+
+    def own(self) -> None:
+        """Make the arrays its own, so that they can be written in place."""
+        for name in QUANTITIES:
+            setattr(self, name, copy(getattr(self, name)))
 
     def differs(self, other: Setup) -> frozenset[str]:
         """Names of the quantities that are not the same to the last bit in another setup."""
         return frozenset(
-            name for name in QUANTITIES if _bits(getattr(self, name)) != _bits(getattr(other, name))
+            name for name in QUANTITIES if not _same(getattr(self, name), getattr(other, name))
         )
 
     @property
@@ -247,13 +253,13 @@ class Setup:
         )
 
 
-def _copied(value: Any) -> Any:
-    return value.copy() if isinstance(value, np.ndarray) else value
-
-
-def _bits(value: Any) -> Any:
-    # many times faster than comparing small arrays
-    return value.tobytes() if isinstance(value, np.ndarray) else value
+def _same(one: Any, other: Any) -> bool:
+    if one is other:
+        return True
+    if isinstance(one, np.ndarray):
+        # many times faster than comparing small arrays
+        return bool(one.tobytes() == other.tobytes())
+    return bool(one == other)
 
 
 QUANTITIES: Mapping[str, Quantity] = MappingProxyType(

@@ -132,13 +132,13 @@ def _fitted(
             out.append(c.refused(Reason(Why.PROMISES_LESS)))
             continue
         progress(f"fitting {c.name}", k / len(promising))
-        tried = fit_candidate(trials, node.fit, c, _hopeless(node.fit.chi2, best))
+        tried = fit_candidate(trials, node.fit, c, hopeless(node.fit.chi2, best))
         best = min(best, np.inf if tried.fit is None else tried.fit.chi2)
         out.append(tried)
     return out
 
 
-def _hopeless(without: float, best: float) -> float:
+def hopeless(without: float, best: float) -> float:
     """The chi2 above which a trial is given up: of the model without, of the best so far."""
     limit = 4.0 * best + 0.02 * without
     if best < (1.0 - LEAST_PART) * without:

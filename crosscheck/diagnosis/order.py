@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from crosscheck.diagnosis.node import LEAST_GAIN, Names, Node, node_of
+from crosscheck.diagnosis.node import LEAST_GAIN, Names, Node, hopeless, node_of
 from crosscheck.fit.candidates import Candidate, Trials
 from crosscheck.fit.evidence import Evidence
 from crosscheck.fit.gauss_newton import Fit
@@ -75,9 +75,11 @@ def without_needless(trials: Trials, node: Node, held: Collection[str]) -> Node:
     own = [name for name in node.fit.terms.names if name not in held]
     if len(own) < 2:
         return node
+    far = hopeless(node.fit.chi2, node.fit.chi2)
     for name in own:
-        shorter = trials.refit(node.fit.terms.without(name), node.fit.state)
-        if not shorter.valid:
+        rest = node.fit.terms.without(name)
+        shorter = trials.refit(rest, node.fit.state, hopeless=far)
+        if not shorter.valid or shorter.chi2 > far:
             continue
         other = node_of(trials, shorter)
         if other.evidence.log > node.evidence.log - LEAST_GAIN:

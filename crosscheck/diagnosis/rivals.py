@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from crosscheck.calibration.probability import EQUAL, are_equals
+from crosscheck.diagnosis.node import hopeless
 from crosscheck.diagnosis.search import Search
 from crosscheck.fit.candidates import Candidate, try_candidate
 from crosscheck.fit.gauss_newton import Fit
@@ -17,6 +18,8 @@ from seecr.effects.base import Layout
 _LIKELY = 0.9
 # A rival that leaves this much more chi2 has been told apart, whatever its evidence.
 _TOLD_APART = 9.0
+# A trial that came to its end this many times as far off is not fitted further.
+_MENDED = 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,17 +60,21 @@ def rivals_of(found: Search, name: str) -> list[Rival]:
 def _rival(found: Search, candidate: Candidate, without: Fit, own: int) -> Rival | None:
     """The candidate in place of the effect of ``own`` parameters, if it explains as well."""
     trials, final = found.trials, found.last
-    trial = candidate
+    # where structure is left over, differences count against that, not against the noise, and
+    # residuals that go together count for fewer
+    left = final.whiteness.inflation**2
+    trial, far = candidate, hopeless(without.chi2, final.fit.chi2)
     if trial.fit is None or len(found.found) > 1:
-        trial = try_candidate(trials, without, candidate.layout)
+        trial = try_candidate(trials, without, candidate.layout, far)
     if trial.fit is None or not trial.fit.valid:
+        return None
+    if trial.fit.settled and not trial.fit.state.prediction.has_history:
+        far = min(far, final.fit.chi2 + _MENDED * _TOLD_APART * left)
+    if trial.fit.chi2 > far:
         return None
     best = trials.refit(trial.fit.terms, trial.fit.state)
     if not best.valid:
         return None
-    # where structure is left over, differences count against that, not against the noise, and
-    # residuals that go together count for fewer
-    left = final.whiteness.inflation**2
     loss = (final.evidence.log - trials.evidence(best).log) / left
     worse = (best.chi2 - final.fit.chi2) / left
     alike = loss > -EQUAL and are_equals(loss, own, len(candidate.layout)) and worse < _TOLD_APART
@@ -83,7 +90,7 @@ def _likely(found: Search, name: str, without: Fit) -> list[Candidate]:
     pool, best = _tried_beside(found, name)
     # structure that was left over then counts as noise
     left = max(best / max(final.whiteness.dof, 1), final.whiteness.inflation**2)
-    margin = 4.0 * _TOLD_APART * max(1.0, left)
+    margin = _MENDED * _TOLD_APART * max(1.0, left)
 
     def likely(fitted: Fit, other: str) -> bool:
         if fitted.chi2 < best + margin:

@@ -32,7 +32,7 @@ class CableLengthOffset(Effect):
     offset: Array = parameter("m", of_length(2e-3), size="cable")
 
     def edit_setup(self, setup: Setup) -> None:
-        setup.extra_length += self.offset
+        setup.extra_length = setup.extra_length + self.offset
 
     def totals(self, robot: Robot) -> dict[str, Total]:
         return {
@@ -139,7 +139,8 @@ class DrumEccentricity(Effect):
             return
         angle = setup.commanded_change / self.drum_radius
         zero = 0.0 if setup.commands.absolute else 1.0
-        setup.extra_length += self.sine * np.sin(angle) + self.cosine * (np.cos(angle) - zero)
+        wave = self.sine * np.sin(angle) + self.cosine * (np.cos(angle) - zero)
+        setup.extra_length = setup.extra_length + wave
 
     @classmethod
     def shapes(cls, setup: Setup) -> list[dict[str, float]]:

@@ -51,6 +51,7 @@ def edit_setup(effect: Effect, setup: Setup) -> None:
     if is_built_in(type(effect)):
         effect.edit_setup(setup)
         return
+    setup.own()  # ours put arrays anew; nothing says that others do
     effect.edit_setup(setup)
     for name, item in QUANTITIES.items():
         value = _finite(getattr(setup, name), f"effect {effect.name} leaves setup.{name}")

@@ -246,8 +246,8 @@ class Terms:
         if term.name not in self:
             return Terms([*self._terms, term])
         # fits shift one parameter after the other: what is in order stays so
-        other = Terms.__new__(Terms)
-        other._terms = tuple(term if one.name == term.name else one for one in self._terms)
+        other, place = Terms.__new__(Terms), self._place(term.name)
+        other._terms = (*self._terms[:place], term, *self._terms[place + 1 :])
         return other
 
     def without(self, name: str) -> Terms:

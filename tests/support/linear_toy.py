@@ -125,7 +125,9 @@ class LinearToy:
         table = np.where(problem.measured, table, np.nan)
         white = table[problem.counted]
         told = problem.data.command_pose
-        solved: Any = SimpleNamespace(solved=np.ones(len(table), dtype=bool), pose=told)
+        solved: Any = SimpleNamespace(
+            solved=np.ones(len(table), dtype=bool), pose=told, has_history=False
+        )
         experiment: Any = None
         return State(
             terms, solved, table * problem.reading_sigma, table, white, np.zeros(0),

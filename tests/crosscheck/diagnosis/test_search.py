@@ -100,6 +100,15 @@ def test_exact_equals_are_named_beside_the_one_that_is_listed() -> None:
     assert rivals_of(searched(toy({hidden: 0.5}, NAMES)), hidden) == []
 
 
+def test_what_explains_far_less_is_not_fitted_to_the_end_to_see_that() -> None:
+    made = toy({"drum_gain": 0.4, "stiffness": 0.5}, NAMES)
+    found = searched(made)
+    assert set(found.found) == {"drum_gain", "stiffness"}
+    made.fits.clear()
+    assert rivals_of(found, "drum_gain") == []
+    assert made.fits and len(made.fits) == len(set(made.fits))
+
+
 def test_what_no_effect_explains_is_not_explained() -> None:
     """A wave through all readings: large groups take a part of it, and nobody is accused."""
     made = toy({}, NAMES)
