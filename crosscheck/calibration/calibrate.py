@@ -7,6 +7,7 @@ asks for them. Size and correlation of the noise come from the fit's own margina
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -63,7 +64,10 @@ class Calibration:
 
 
 def calibrate(
-    problem: Problem, terms: Terms = PLAIN, progress: Progress = lambda _text, _part: None
+    problem: Problem,
+    terms: Terms = PLAIN,
+    progress: Progress = lambda _text, _part: None,
+    given: Sequence[Terms] = (),
 ) -> Calibration:
     """Fit every effect that the data can see.
 
@@ -71,11 +75,12 @@ def calibrate(
         problem: readings, from :func:`crosscheck.fit.prepare.prepare`.
         terms: effects of the model as it stands; their values are the start.
         progress: called with what is being done and the part of it that is done.
+        given: sets of effects that were found elsewhere, with their values, the best last.
     """
     factor = problem.noise(problem.experiment.predict(terms.effects))
     setting = Setting(problem, factor, chain_of(problem))
     stood = evaluate(problem, terms, factor)
-    fitted = fit_everything(setting, terms, progress)
+    fitted = fit_everything(setting, terms, progress, given)
     setting, joint = fitted.setting, fitted.joint
     far_off = outliers(setting.chain, joint.weight, problem.data.n_rows)
     problem = setting.problem.with_far_off(far_off)

@@ -161,10 +161,7 @@ def _step(
     values, z = terms.vector, terms.sizes
 
     def objective(at: State) -> float:
-        white = whitened(setting.chain, colour, weight, at.white)
-        off = known_left(at.terms)
-        power = float(white @ white) + float(off @ off)
-        return power + at.log_det + penalty(at.terms.sizes, width)
+        return cost(setting, colour, weight, at, width)
 
     known = known_readings(terms)[0]
     x = np.concatenate([whitened(setting.chain, colour, weight, jacobian), known])
@@ -203,6 +200,14 @@ def _movable(
     slope = slope + z / np.where(width > 0.0, width, 1.0) ** 2
     held = (width == 0.0) | ((values <= lower) & (slope > 0)) | ((values >= upper) & (slope < 0))
     return np.flatnonzero(~held)
+
+
+def cost(setting: Setting, colour: Colour, weight: Array, at: State, width: Array) -> float:
+    """What a joint fit makes least: -2 ln of likelihood and prior, for this noise and weight."""
+    white = whitened(setting.chain, colour, weight, at.white)
+    off = known_left(at.terms)
+    power = float(white @ white) + float(off @ off)
+    return power + at.log_det + penalty(at.terms.sizes, width)
 
 
 def penalty(z: Array, width: Array) -> float:

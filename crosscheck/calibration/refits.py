@@ -7,7 +7,7 @@ catalogue is made linear about the best of them again, until that stays.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -82,6 +82,7 @@ def compare_sets(
     told: Callable[[str], None] = lambda _text: None,
     most: int = _REFITTED,
     rounds: int = ROUNDS,
+    given: Iterable[Terms] = (),
 ) -> Found:
     """Search the sets of effects, linear and exact in turn.
 
@@ -93,13 +94,15 @@ def compare_sets(
         told: called with what is going on.
         most: sets to refit about one linear model.
         rounds: of making the catalogue linear about the best set, at most.
+        given: sets that were found elsewhere, with the values that they have there.
     """
     always = frozenset(plain.terms.names)
     of = len(set(catalogue.names) - always)
     fixed = replace(setting, frozen=True, weight=joint.weight)
-    exact = _Exact(fixed, joint, catalogue, plain, told)
+    known = {frozenset(terms.names): terms for terms in given}
+    exact = _Exact(fixed, joint, catalogue, plain, told, known)
     scores = Scores(gram_about(fixed, joint, catalogue), of, always)
-    begin, best = frozenset(scores.gram.names) | always, exact.best_of(scores, [always])
+    begin, best = frozenset(scores.gram.names) | always, exact.best_of(scores, [always, *known])
     for k in range(rounds):
         explore(scores, [always, begin])
         before, best = best.names, exact.best_of(scores, [always, *scores.best(most, _WITHIN)])
@@ -118,6 +121,7 @@ class _Exact:
 
     Attributes:
         setting, joint, catalogue, plain, told: as for :func:`compare_sets`.
+        given: values that sets have elsewhere.
         fitted: by set; None where it could not be solved.
     """
 
@@ -126,6 +130,7 @@ class _Exact:
     catalogue: Catalogue
     plain: State
     told: Callable[[str], None]
+    given: Mapping[Names, Terms] = field(default_factory=dict)
     fitted: dict[Names, Refit | None] = field(default_factory=dict)
 
     @property
@@ -185,8 +190,10 @@ class _Exact:
         linear, widths = scores.score(names), scores.widths(names)
         best = self._from(scores, names, _linear_terms(self.catalogue, scores, names), widths)
         few = 0 < len(names - scores.always) <= _FEW
+        starts = [self.given[names]] if names in self.given else []
         if few and (best is None or best.score < linear - _HOLLOW):
-            start = Terms(_inside(self.catalogue.start(name)) for name in names)
+            starts.append(Terms(_inside(self.catalogue.start(name)) for name in names))
+        for start in starts:
             again = self._from(scores, names, start, widths)
             if again is not None and (best is None or again.score > best.score):
                 best = again

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,6 +54,7 @@ def seek(
     stated: Sigma,
     terms: Terms = PLAIN,
     progress: Progress = lambda _text, _part: None,
+    given: Sequence[Terms] = (),
 ) -> Sought:
     """Fit everything at once, then compare sets of effects.
 
@@ -61,8 +63,9 @@ def seek(
         stated: the noise that the user stated; what was estimated is missing in it.
         terms: effects of the model as it stands; they are in every set.
         progress: called with what is being done and the part of it that is done.
+        given: sets that were found elsewhere, with their values; they are compared too.
     """
-    whole = calibrate(problem, terms, lambda text, part: progress(text, 0.5 * part))
+    whole = calibrate(problem, terms, lambda text, part: progress(text, 0.5 * part), given)
     setting, joint = whole.setting, whole.joint
     known = [k.name for k in kinds_read(problem) if getattr(stated, k.sigma) is not None]
     odds = log_odds(setting, joint, len(known) == len(kinds_read(problem)))
@@ -82,7 +85,7 @@ def seek(
         tried += 1
         progress(f"trying {text}", 0.5 + 0.5 * tried / (tried + most))
 
-    found = compare_sets(setting, joint, catalogue, plain, told, most, rounds)
+    found = compare_sets(setting, joint, catalogue, plain, told, most, rounds, given)
     effects = [n for n in catalogue.names if n not in terms]
     sizes = {name: len(catalogue.start(name).layout) for name in effects}
     classes = probabilities(all_scores(found), found.best.names, effects, sizes)

@@ -10,7 +10,7 @@ import numpy as np
 from crosscheck.calibration.alone import fitted_alone
 from crosscheck.calibration.colour import WHITE, Colour
 from crosscheck.calibration.gram import best_widths, gram_of
-from crosscheck.calibration.joint import JointFit, Setting, settle, tempered
+from crosscheck.calibration.joint import JointFit, Setting, cost, settle, tempered
 from crosscheck.calibration.later import PAYS, at_null, inside, layouts, promising_beside
 from crosscheck.calibration.linearised import groups_of, linearised, unwhitened
 from crosscheck.calibration.priors import wider, widths_of
@@ -45,14 +45,24 @@ class Everything:
     later: Terms
 
 
-def fit_everything(setting: Setting, terms: Terms, progress: Progress) -> Everything:
-    """The joint fit, effects that join later among them."""
+def fit_everything(
+    setting: Setting, terms: Terms, progress: Progress, given: Sequence[Terms] = ()
+) -> Everything:
+    """The joint fit, effects that join later among them.
+
+    Args:
+        setting: the data. terms: effects of the model as it stands.
+        progress: called with what is being done and the part of it that is done.
+        given: sets of effects that were found elsewhere, with their values, the best last.
+    """
     at_once, later = layouts(setting.problem)
     progress("fitting all effects", 0.05)
     start = start_of(setting, terms, Terms(Term(a, a.null) for a in at_once))
     joint = with_noise(setting, tempered(setting, start, widths_of(start.terms), WHITE))
     wanted = [a for a in later if a.name not in terms]
     frozen = replace(setting, frozen=True)
+    for some in given[-1:]:
+        joint = from_given(frozen, joint, start, some)
     if poor(joint):
         progress("trying effects alone", 0.4)
         firm = [a for a in at_once if a.name not in terms and a.name != TRACKER]
@@ -143,6 +153,23 @@ def _from_alone(
             if not poor(found[-1]):
                 break
     return max(found, key=lambda j: worth(setting, j))
+
+
+def from_given(setting: Setting, joint: JointFit, start: State, given: Terms) -> JointFit:
+    """The joint fit, or one that begins with a few effects where these alone are the better fit.
+
+    A fit of everything is no worse than one of a part of it, but where it ended in a hollow.
+    """
+    every = Terms([*given, *(at_null(t) for t in start.terms if t.name not in given)])
+    state = evaluate(setting.problem, every, setting.factor, start)
+    if not state.valid:
+        return joint
+    width = widths_of(every)
+    here = cost(setting, joint.colour, joint.weight, joint.state, joint.width)
+    if cost(setting, joint.colour, joint.weight, state, width) >= here:
+        return joint
+    other = with_noise(setting, settle(setting, state, width, joint.colour))
+    return max(joint, other, key=lambda j: worth(setting, j))
 
 
 def _joined(setting: Setting, joint: JointFit, first: Terms, added: list[Term]) -> JointFit:

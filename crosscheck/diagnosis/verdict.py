@@ -94,7 +94,8 @@ def _searched(
     # no few effects one after the other, or one that is less likely than not; noise that goes
     # together, is larger than stated (a few rows far off may have made it so) or was estimated,
     # from what may be an effect. All at once, in sets
-    sought = seek(problem, problem.data.sigma, ready.terms, _part(progress, 0.5, 1.0))
+    way = [step.fit.terms for step in found.steps[1:]]
+    sought = seek(problem, problem.data.sigma, ready.terms, _part(progress, 0.5, 1.0), way)
     if sought.judgement.verdict is not DiagnosisVerdict.UNKNOWN_EFFECT:
         return explained(sought, notes)
     return unexplained(found, chances_of(sought), (*notes, *more))

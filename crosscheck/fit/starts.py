@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from scipy import optimize
 
 from crosscheck.fit.gauss_newton import PRIOR_SIZES, Fit
+from crosscheck.fit.imitation import beside
 from crosscheck.fit.problem import Problem
-from crosscheck.fit.state import State, derivatives
+from crosscheck.fit.state import State, derivatives, evaluate
 from seecr import statics
 from seecr.compiled.outcomes import CONVERGED
 from seecr.effects import Term, Terms
@@ -92,11 +93,13 @@ def starts_of(problem: Problem, base: Fit, layout: Layout, factor: Array) -> Sta
     if not scored:
         return Starts((), 0.0, 1, 1.0, False)
     scored.sort(key=lambda item: -item[0])
+    gain, directions = scored[0][:2]
     vectors = [vector for _g, _d, vector, _s in scored[:2]]
     if np.any((layout.lower == layout.null) & ~layout.shape):
         # the derivative at a bound can point the wrong way: start inside as well
-        inside = layout.start(scored[0][3])
-        vectors = [vectors[0], np.where(layout.shape, inside, inside + 0.5 * layout.scale)]
+        inside, across = _across(problem, base, Term(layout, layout.start(scored[0][3])), factor)
+        vectors = [vectors[0], inside] if across < gain else [inside, vectors[0]]
+        gain = max(gain, across)
     elif len(shapes) == 1:
         vectors = vectors[:1]
     balanced = None
@@ -104,8 +107,32 @@ def starts_of(problem: Problem, base: Fit, layout: Layout, factor: Array) -> Sta
         start = layout.start(scored[0][3])
         balanced = partial(equation_start, problem, base.state, layout, start, factor)
     # neighbouring shapes are alike: about every third is one more chance of its own
-    gain, directions = scored[0][:2]
     return Starts(tuple(vectors), gain, directions, max(1.0, len(shapes) / 3.0), seen, balanced)
+
+
+def _across(problem: Problem, base: Fit, null: Term, factor: Array) -> tuple[Array, float]:
+    """Values inside the bounds, and the fall of chi2 that what a plausible size does promises.
+
+    Sag goes with the square of a weight: what the derivative at null says of it may be the
+    contrary of what any weight does.
+    """
+    layout = null.layout
+    span = np.where(layout.shape, 0.0, layout.scale)
+
+    def moved(part: float) -> Array:
+        return np.clip(null.vector + part * span, layout.lower, layout.upper)
+
+    half = moved(0.5)
+    terms = base.terms.with_term(null.with_vector(moved(1.0)))
+    there = evaluate(problem, terms, factor, base.state)
+    if not there.valid:
+        return half, 0.0
+    white = base.state.white
+    change = beside(white - there.white, base.span)
+    power = float(change @ change)
+    part = float(np.clip(change @ white / max(power, 1e-300), 0.0, _START_SIZES))
+    promised = part * (2.0 * float(change @ white) - part * power)
+    return (moved(part) if part > 0.0 else half), promised
 
 
 def _some_slack(base: Fit) -> bool:

@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_data import SIGMA, measured, term
+from made_data import COGIRO, SIGMA, measured, term
 
 from crosscheck.fit.candidates import Trials, candidates_for, fit_candidate, null_fit, screen
+from crosscheck.fit.gauss_newton import fit
 from crosscheck.fit.problem import Problem
-from crosscheck.fit.starts import equation_start
+from crosscheck.fit.starts import equation_start, starts_of
 from seecr.effects import Terms
 from seecr.mjcf import load_robot
 from seecr.shipped import model_path
@@ -52,6 +53,24 @@ def test_it_leads_where_the_derivative_at_null_does_not(case) -> None:
     assert reached[0].chi2 > 10 * noise
     far = (reached[1].terms.vector - OFFSETS) / reached[1].stderr
     assert np.all(np.abs(far) < 4.5)
+
+
+def test_what_a_weight_does_is_seen_where_its_derivative_says_the_contrary() -> None:
+    """The sag of cables goes with the square of their weight, their load with the weight."""
+    robot = load_robot(COGIRO)
+    hidden = [
+        term(robot, "cable_weight", weight_N_per_m=0.2),
+        term(robot, "tracker_scale", factor=1.005),
+    ]
+    data = measured(robot, hidden, points=8, seed=1)
+    problem = Problem(robot, data, SIGMA, np.ones(data.n_rows, dtype=bool))
+    factor = problem.noise(problem.experiment.predict())
+    base = fit(problem, Terms(hidden[1:]), factor)
+    starts = starts_of(problem, base, layout_named(problem, "cable_weight"), factor)
+    first, by_derivative = (vector[0] for vector in starts)
+    assert by_derivative == 0.0
+    assert first == pytest.approx(0.2, rel=0.3)
+    assert starts.gain > 0.9 * base.chi2
 
 
 def test_it_is_silent_on_sensors_and_on_rows_that_depend_on_rows_before(case) -> None:

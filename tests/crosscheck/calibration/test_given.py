@@ -1,0 +1,91 @@
+"""Sets of effects that were found elsewhere: the joint fit and the sets begin there too."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from made_data import COGIRO, SIGMA, measured, term
+
+from crosscheck.calibration import refits, stages
+from crosscheck.calibration.catalogue import Catalogue
+from crosscheck.calibration.colour import WHITE, chain_of
+from crosscheck.calibration.joint import JointFit, Setting, settle
+from crosscheck.calibration.later import layouts
+from crosscheck.calibration.priors import widths_of
+from crosscheck.calibration.search import seek
+from crosscheck.calibration.sets import Names
+from crosscheck.calibration.stages import from_given
+from crosscheck.fit.prepare import prepare
+from crosscheck.fit.problem import Problem
+from crosscheck.fit.state import State, evaluate
+from crosscheck.given import considered
+from seecr.effects import Term, Terms
+from seecr.mjcf import load_robot
+
+ROBOT = load_robot(COGIRO)
+HIDDEN = Terms(
+    [
+        term(ROBOT, "cable_weight", weight_N_per_m=0.2),
+        term(ROBOT, "tracker_scale", factor=1.005),
+    ]
+)
+FEW = ("cable_weight", "tracker_scale", "tracker_frame", "nonlinear_elasticity")
+
+
+@pytest.fixture(scope="module")
+def problem() -> Problem:
+    data = measured(ROBOT, list(HIDDEN), points=8, seed=1)
+    return prepare(ROBOT, data, Terms(), considered(FEW)).problem
+
+
+def far_from(terms: Terms) -> Terms:
+    """Other values than these."""
+    return terms.with_vector(terms.vector + np.array([0.3, 0.02]))
+
+
+def test_a_joint_fit_begins_where_effects_alone_are_the_better_fit(problem: Problem) -> None:
+    factor = problem.noise(problem.experiment.predict(()))
+    setting = Setting(problem, factor, chain_of(problem), frozen=True)
+    at_once, _later = layouts(problem)
+    start = evaluate(problem, Terms(Term(a, a.null) for a in at_once), factor)
+    hollow = settle(setting, start, widths_of(start.terms), WHITE, 0)
+    better = from_given(setting, hollow, start, HIDDEN)
+    assert set(better.terms.names) == {*start.terms.names, *HIDDEN.names}
+    assert better.terms["cable_weight"].vector[0] == pytest.approx(0.2, rel=0.05)
+    assert np.max(better.colour.scale) < 1.1
+    # of other data they are no better than what there is
+    assert from_given(setting, better, start, far_from(HIDDEN)) is better
+
+
+def test_the_best_of_what_was_found_elsewhere_is_tried(
+    problem: Problem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tried: list[Terms] = []
+
+    def spied(_setting: Setting, joint: JointFit, _start: State, given: Terms) -> JointFit:
+        tried.append(given)
+        return joint
+
+    monkeypatch.setattr(stages, "from_given", spied)
+    seek(problem, SIGMA, given=[HIDDEN.without("cable_weight"), HIDDEN])
+    seek(problem, SIGMA)
+    assert tried == [HIDDEN]
+
+
+def test_sets_that_were_found_elsewhere_are_compared_from_their_values(
+    problem: Problem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They end where they begin here: a fit from nothing may end in a hollow."""
+    monkeypatch.setattr(refits, "_STEPS", 0)
+    monkeypatch.setattr(
+        refits, "_linear_terms", lambda catalogue, _scores, names: nulls(catalogue, names)
+    )
+    one = frozenset(HIDDEN.names)
+    without, with_ = (seek(problem, SIGMA, given=g).found.refit(one) for g in ([], [HIDDEN]))
+    assert without is not None and with_ is not None
+    assert with_.joint.terms["cable_weight"].vector[0] == pytest.approx(0.2, rel=0.05)
+    assert with_.score > without.score + 100.0
+
+
+def nulls(catalogue: Catalogue, names: Names) -> Terms:
+    return Terms(catalogue.start(name) for name in sorted(names))
