@@ -15,7 +15,7 @@ import numpy as np
 from crosscheck.calibration.catalogue import Catalogue, gram_about, widths_for
 from crosscheck.calibration.gram import Gram, averaged, best_widths, gram_of
 from crosscheck.calibration.joint import JointFit, Setting, settle
-from crosscheck.calibration.later import promising_beside
+from crosscheck.calibration.later import inside, promising_beside
 from crosscheck.calibration.linearised import groups_of, linearised
 from crosscheck.calibration.priors import SHAPES
 from crosscheck.calibration.sets import Names, Scores, explore
@@ -104,14 +104,15 @@ def compare_sets(
     scores = Scores(gram_about(fixed, joint, catalogue), of, always)
     begin, best = frozenset(scores.gram.names) | always, exact.best_of(scores, [always, *known])
     for k in range(rounds):
-        explore(scores, [always, begin])
-        before, best = best.names, exact.best_of(scores, [always, *scores.best(most, _WITHIN)])
-        best = exact.thinned(scores, best)
+        before, best = best.names, exact.searched(scores, begin, most)
         if k and before == best.names:
             break
         begin = best.names
         scores = Scores(gram_about(fixed, best.joint, catalogue), of, always)
-    best = exact.swapped(scores, best)
+    other = exact.swapped(scores, best)
+    if other.names != best.names:
+        scores = Scores(gram_about(fixed, other.joint, catalogue), of, always)
+        best = exact.searched(scores, other.names, most)
     return Found(exact.possible, best, scores, lambda names: exact.fit(scores, names), always)
 
 
@@ -144,6 +145,12 @@ class _Exact:
             and (names == always or all(t.is_possible(robot) for t in found.joint.terms))
         }
 
+    def searched(self, scores: Scores, begin: Names, most: int) -> Refit:
+        """The best that linear evidence leads to, from no effect and from these."""
+        explore(scores, [scores.always, begin])
+        best = self.best_of(scores, [scores.always, *scores.best(most, _WITHIN)])
+        return self.thinned(scores, best)
+
     def best_of(self, scores: Scores, some: Iterable[Names]) -> Refit:
         """The best of all that are fitted, these among them."""
         for names in some:
@@ -175,29 +182,36 @@ class _Exact:
             absent = [layout for layout in shaped if layout.name not in best.names]
             for term, gain in promising_beside(self.setting, rest.joint, absent):
                 if gain > max(least, 0.0):
-                    self.fit(scores, rest.names | {term.name})
+                    self.told(" + ".join(sorted(rest.names | {term.name})))
+                    self.take(scores, Terms([*rest.joint.terms, inside(term)]))
         return self.best_of(scores, [])
+
+    def take(self, scores: Scores, start: Terms) -> None:
+        """Fit a set from these values, and keep that if it is better than what there is."""
+        names = frozenset(start.names)
+        # the linear model may hold at nothing what means something from here on only
+        wide = {name: max(width, 1.0) for name, width in scores.widths(names).items()}
+        found, before = self._from(scores, names, start, wide), self.fitted.get(names)
+        if before is None or (found is not None and found.score > before.score):
+            self.fitted[names] = found
 
     def fit(self, scores: Scores, names: Names) -> Refit | None:
         """A set fitted exactly; None where that has no solution."""
         if names not in self.fitted:
             self.told(" + ".join(sorted(names)) or "none")
-            self.fitted[names] = self._fit(scores, names)
+            self._fit(scores, names)
         return self.fitted[names]
 
-    def _fit(self, scores: Scores, names: Names) -> Refit | None:
-        """From its linear values, and from null where that ends badly."""
+    def _fit(self, scores: Scores, names: Names) -> None:
+        """From its linear values, those given, and from null where that ends badly."""
         linear, widths = scores.score(names), scores.widths(names)
         best = self._from(scores, names, _linear_terms(self.catalogue, scores, names), widths)
+        self.fitted[names] = best
+        if names in self.given:
+            self.take(scores, self.given[names])
         few = 0 < len(names - scores.always) <= _FEW
-        starts = [self.given[names]] if names in self.given else []
         if few and (best is None or best.score < linear - _HOLLOW):
-            starts.append(Terms(_inside(self.catalogue.start(name)) for name in names))
-        for start in starts:
-            again = self._from(scores, names, start, widths)
-            if again is not None and (best is None or again.score > best.score):
-                best = again
-        return best
+            self.take(scores, Terms(_inside(self.catalogue.start(name)) for name in names))
 
     def _from(
         self, scores: Scores, names: Names, start: Terms, widths: dict[str, float]

@@ -1,0 +1,62 @@
+"""Effects with a shape that the linear model has at another: they are fitted from their own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_data import COGIRO, SIGMA, measured, term
+
+from crosscheck.calibration.catalogue import Catalogue, gram_about
+from crosscheck.calibration.colour import WHITE, chain_of
+from crosscheck.calibration.joint import Setting, settle
+from crosscheck.calibration.priors import widths_of
+from crosscheck.calibration.refits import _Exact
+from crosscheck.calibration.sets import Scores
+from crosscheck.fit.problem import Problem
+from crosscheck.fit.state import evaluate
+from seecr.commands import Commands
+from seecr.effects import Terms
+from seecr.experiment import Experiment
+from seecr.mjcf import load_robot
+
+ROBOT = load_robot(COGIRO)
+EXPANSION = 2e-4
+
+
+def warmed() -> Problem:
+    """A hall that warms up by ten degrees through the day."""
+    data = measured(ROBOT, points=6)
+    warmth = 20.0 + 10.0 * np.arange(data.n_rows) / data.n_rows
+    rows = Commands(data.command_pose, run=data.run_index, time=data.t_s, temperature=warmth)
+    hidden = term(ROBOT, "thermal_expansion", expansion_1_per_K=EXPANSION, zero_temperature_C=20.0)
+    experiment = Experiment(ROBOT, rows)
+    ahead, plain = experiment.predict([hidden.effect()]), experiment.predict()
+    data = replace(
+        data,
+        temperature_C=warmth,
+        position=data.position + ahead.readings.position - plain.readings.position,
+    )
+    return Problem(ROBOT, data, SIGMA, np.ones(data.n_rows, dtype=bool))
+
+
+def test_a_swapped_effect_begins_at_the_shape_that_promises_most() -> None:
+    problem = warmed()
+    factor = problem.noise(problem.experiment.predict(()))
+    setting = Setting(problem, factor, chain_of(problem), frozen=True)
+    creep = Terms([term(ROBOT, "creep", amount=0.05, time_s=1000.0)])
+    # so far from every temperature it does what an offset does, and the sets hold it at nothing
+    absurd = term(ROBOT, "thermal_expansion", zero_temperature_C=500.0)
+    plain = evaluate(problem, Terms(), factor)
+    joint = settle(setting, evaluate(problem, creep, factor), widths_of(creep), WHITE)
+    fixed = replace(setting, weight=joint.weight)
+    catalogue = Catalogue(Terms(), Terms([absurd, *creep]))
+    exact = _Exact(fixed, joint, catalogue, plain, lambda _text: None)
+    scores = Scores(gram_about(fixed, joint, catalogue), 2, frozenset())
+    start = exact.fit(scores, frozenset({"creep"}))
+    assert start is not None
+    best = exact.swapped(scores, start)
+    assert best.names == {"thermal_expansion"}
+    assert best.joint.terms["thermal_expansion"].vector == pytest.approx([EXPANSION, 20.0], rel=0.1)
+    assert best.score > start.score + 100.0
