@@ -28,6 +28,8 @@ of them the error of that order is taken away (Richardson)."""
 _AT_REST, _MAX_STEPS = 1e-6, 40_000
 # Tangents of a law with memory until it agrees with MuJoCo: relative to the load.
 _AGREED, _TANGENTS = 1e-9, 60
+# A single step for a tangent that leaves more than this part of what was out of balance crawls.
+_CRAWLS = 0.5
 # Steps downhill.
 _LIMIT = 300
 # Rounds until what lies on the sheaves and what hangs free agree, relative to a cable.
@@ -232,16 +234,19 @@ def _walk(world: World, way: Way, rest: Array, loads: Loads | None, tell: Progre
 def _agree(world: World, cables: list[Cable]) -> Descent:
     """Tangents of the cables' laws and MuJoCo's settling in turns until both hold."""
     world.update()
-    springs, before = None, None
+    springs, before, last, crawls = None, None, np.inf, False
     for turn in range(_TANGENTS):
         tangent = _tangents(world, cables)
         if springs is not None and turn > _TANGENTS // 3:
             # a kink at which tangents flip: meet halfway
             tangent = tangent.halfway(springs)
         springs = tangent
-        # one step for each tangent is Newton's method on both; all of them where that fails
-        quick = turn < _TANGENTS // 6
-        fine = _settle(world, springs, judge=False, limit=1 if quick else _LIMIT).balanced
+        # one step for each tangent is Newton's method on both; all of them where that gets
+        # nowhere, as with cables in pieces
+        quick = turn < _TANGENTS // 6 and not crawls
+        step = _settle(world, springs, judge=False, limit=1 if quick else _LIMIT)
+        fine, crawls = step.balanced, crawls or (turn > 1 and step.residual > _CRAWLS * last)
+        last = step.residual
         if not (fine or quick):
             return _NOWHERE
         tensions = world.cable_tensions()
