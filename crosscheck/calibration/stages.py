@@ -29,6 +29,9 @@ _SURE = 3.0
 # runs, is no place to start effects with history from alone.
 _POOR, _ALIKE = 1.5, 0.5
 
+# A few effects whose cost is so many times that of everything, or less, are begun with too.
+_COMPARABLE = 2.0
+
 
 @dataclass(frozen=True, eq=False)
 class Everything:
@@ -156,9 +159,10 @@ def _from_alone(
 
 
 def from_given(setting: Setting, joint: JointFit, start: State, given: Terms) -> JointFit:
-    """The joint fit, or one that begins with a few effects where these alone are the better fit.
+    """The joint fit, or one that begins with a few effects where these alone explain as much.
 
-    A fit of everything is no worse than one of a part of it, but where it ended in a hollow.
+    A fit of everything is no worse than one that begins at a part of it, but where it ended in a
+    hollow; and there the few may yet leave what further effects explain.
     """
     every = Terms([*given, *(at_null(t) for t in start.terms if t.name not in given)])
     state = evaluate(setting.problem, every, setting.factor, start)
@@ -166,7 +170,7 @@ def from_given(setting: Setting, joint: JointFit, start: State, given: Terms) ->
         return joint
     width = widths_of(every)
     here = cost(setting, joint.colour, joint.weight, joint.state, joint.width)
-    if cost(setting, joint.colour, joint.weight, state, width) >= here:
+    if cost(setting, joint.colour, joint.weight, state, width) > _COMPARABLE * here:
         return joint
     other = with_noise(setting, settle(setting, state, width, joint.colour))
     return max(joint, other, key=lambda j: worth(setting, j))
