@@ -7,7 +7,6 @@ asks for them. Size and correlation of the noise come from the fit's own margina
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -67,7 +66,7 @@ def calibrate(
     problem: Problem,
     terms: Terms = PLAIN,
     progress: Progress = lambda _text, _part: None,
-    given: Sequence[Terms] = (),
+    given: Terms | None = None,
 ) -> Calibration:
     """Fit every effect that the data can see.
 
@@ -75,7 +74,7 @@ def calibrate(
         problem: readings, from :func:`crosscheck.fit.prepare.prepare`.
         terms: effects of the model as it stands; their values are the start.
         progress: called with what is being done and the part of it that is done.
-        given: sets of effects that were found elsewhere, with their values, the best last.
+        given: a few effects that were found elsewhere, with the values that they have there.
     """
     factor = problem.noise(problem.experiment.predict(terms.effects))
     setting = Setting(problem, factor, chain_of(problem))

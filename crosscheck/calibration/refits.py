@@ -19,6 +19,7 @@ from crosscheck.calibration.later import inside, promising_beside
 from crosscheck.calibration.linearised import groups_of, linearised
 from crosscheck.calibration.priors import SHAPES
 from crosscheck.calibration.sets import Names, Scores, explore
+from crosscheck.fit.possible import can_be
 from crosscheck.fit.state import State, evaluate
 from seecr.effects import Term, Terms
 from seecr.pose import Array
@@ -137,13 +138,16 @@ class _Exact:
     @property
     def possible(self) -> dict[Names, Refit]:
         """Those with values that a robot can have (no negative mass); the model as it stands."""
-        robot, always = self.setting.problem.robot, frozenset(self.plain.terms.names)
+        always = frozenset(self.plain.terms.names)
         return {
             names: found
             for names, found in self.fitted.items()
-            if found is not None
-            and (names == always or all(t.is_possible(robot) for t in found.joint.terms))
+            if found is not None and (names == always or self.can_be(found))
         }
+
+    def can_be(self, found: Refit) -> bool:
+        """Whether a robot can have all these values."""
+        return can_be(self.setting.problem.robot, found.joint.terms, self.plain.terms)
 
     def searched(self, scores: Scores, begin: Names, most: int) -> Refit:
         """The best that linear evidence leads to, from no effect and from these."""
@@ -187,13 +191,18 @@ class _Exact:
         return self.best_of(scores, [])
 
     def take(self, scores: Scores, start: Terms) -> None:
-        """Fit a set from these values, and keep that if it is better than what there is."""
+        """Fit a set from these values, and keep that if it is better than what there is.
+
+        What no robot can have is not, whatever it explains: the set would not be compared.
+        """
         names = frozenset(start.names)
         # the linear model may hold at nothing what means something from here on only
         wide = {name: max(width, 1.0) for name, width in scores.widths(names).items()}
-        found, before = self._from(scores, names, start, wide), self.fitted.get(names)
-        if before is None or (found is not None and found.score > before.score):
-            self.fitted[names] = found
+        found = [self.fitted.get(names), self._from(scores, names, start, wide)]
+        fitted = [refit for refit in found if refit is not None]
+        self.fitted[names] = max(
+            fitted, key=lambda refit: (self.can_be(refit), refit.score), default=None
+        )
 
     def fit(self, scores: Scores, names: Names) -> Refit | None:
         """A set fitted exactly; None where that has no solution."""

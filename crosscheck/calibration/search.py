@@ -63,9 +63,11 @@ def seek(
         stated: the noise that the user stated; what was estimated is missing in it.
         terms: effects of the model as it stands; they are in every set.
         progress: called with what is being done and the part of it that is done.
-        given: sets that were found elsewhere, with their values; they are compared too.
+        given: sets that were found elsewhere, with their values, the best last; they are compared
+            too.
     """
-    whole = calibrate(problem, terms, lambda text, part: progress(text, 0.5 * part), given)
+    first = given[-1] if given else None
+    whole = calibrate(problem, terms, lambda text, part: progress(text, 0.5 * part), first)
     setting, joint = whole.setting, whole.joint
     known = [k.name for k in kinds_read(problem) if getattr(stated, k.sigma) is not None]
     odds = log_odds(setting, joint, len(known) == len(kinds_read(problem)))

@@ -49,14 +49,14 @@ class Everything:
 
 
 def fit_everything(
-    setting: Setting, terms: Terms, progress: Progress, given: Sequence[Terms] = ()
+    setting: Setting, terms: Terms, progress: Progress, given: Terms | None = None
 ) -> Everything:
     """The joint fit, effects that join later among them.
 
     Args:
         setting: the data. terms: effects of the model as it stands.
         progress: called with what is being done and the part of it that is done.
-        given: sets of effects that were found elsewhere, with their values, the best last.
+        given: a few effects that were found elsewhere, with the values that they have there.
     """
     at_once, later = layouts(setting.problem)
     progress("fitting all effects", 0.05)
@@ -64,8 +64,8 @@ def fit_everything(
     joint = with_noise(setting, tempered(setting, start, widths_of(start.terms), WHITE))
     wanted = [a for a in later if a.name not in terms]
     frozen = replace(setting, frozen=True)
-    for some in given[-1:]:
-        joint = from_given(frozen, joint, start, some)
+    if given is not None:
+        joint = from_given(frozen, joint, start, given)
     if poor(joint):
         progress("trying effects alone", 0.4)
         firm = [a for a in at_once if a.name not in terms and a.name != TRACKER]
@@ -159,10 +159,11 @@ def _from_alone(
 
 
 def from_given(setting: Setting, joint: JointFit, start: State, given: Terms) -> JointFit:
-    """The joint fit, or one that begins with a few effects where these alone explain as much.
+    """The joint fit, or a better one that begins with a few effects that were found elsewhere.
 
-    A fit of everything is no worse than one that begins at a part of it, but where it ended in a
-    hollow; and there the few may yet leave what further effects explain.
+    Everything together explains at least as much as a part of it, unless the fit ended in a hollow.
+    So where the few explain about as much by themselves, everything is fitted from their values
+    too.
     """
     every = Terms([*given, *(at_null(t) for t in start.terms if t.name not in given)])
     state = evaluate(setting.problem, every, setting.factor, start)

@@ -17,6 +17,7 @@ from crosscheck.fit.evidence import Evidence, evidence, p_value
 from crosscheck.fit.gauss_newton import Fit, FitStatus, fit
 from crosscheck.fit.imitation import beside
 from crosscheck.fit.noise import Whiteness, whiteness
+from crosscheck.fit.possible import can_be
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.reasons import Reason, Why
 from crosscheck.fit.starts import Starts, starts_of
@@ -25,7 +26,6 @@ from seecr.effects import Term, Terms, catalogue, layout_of
 from seecr.effects.base import Layout
 from seecr.errors import InputError
 from seecr.pose import Array
-from seecr.robot import Robot
 
 # Most Gauss-Newton steps of a trial; what is chosen is fitted to the end.
 _TRIAL_ITERATIONS = 12
@@ -163,7 +163,7 @@ def fit_candidate(
             )  # fmt: skip
         except (InputError, np.linalg.LinAlgError):
             continue
-        if found.valid and not _possible(trials.problem.robot, found, base):
+        if found.valid and not can_be(trials.problem.robot, found.terms, base.terms):
             impossible = True
         elif found.valid and (best is None or found.chi2 < best.chi2):
             best = found
@@ -174,12 +174,6 @@ def fit_candidate(
         why = Why.IMPOSSIBLE if impossible else Why.UNSOLVED
         return Candidate(layout, starts=starts, why_not=Reason(why))
     return judged(trials, best, base, screened)
-
-
-def _possible(robot: Robot, found: Fit, base: Fit) -> bool:
-    """Whether a robot can have the values (no negative mass); the model's own are its user's."""
-    own = {term.name for term in base.terms if not term.is_possible(robot)}
-    return all(term.name in own or term.is_possible(robot) for term in found.terms)
 
 
 def judged(trials: Trials, found: Fit, base: Fit, screened: Candidate) -> Candidate:

@@ -60,3 +60,31 @@ def test_a_swapped_effect_begins_at_the_shape_that_promises_most() -> None:
     assert best.names == {"thermal_expansion"}
     assert best.joint.terms["thermal_expansion"].vector == pytest.approx([EXPANSION, 20.0], rel=0.1)
     assert best.score > start.score + 100.0
+
+
+def test_what_no_robot_can_have_does_not_take_the_place_of_what_one_can(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """However well a platform of less than no mass explains the data."""
+    problem = warmed()
+    factor = problem.noise(problem.experiment.predict(()))
+    setting = Setting(problem, factor, chain_of(problem), frozen=True)
+    heavy = Terms([term(ROBOT, "platform_mass", added_kg=0.5)])
+    light = heavy.with_vector(np.array([-0.99 * ROBOT.mass]))
+    plain = evaluate(problem, Terms(), factor)
+    joint = settle(setting, evaluate(problem, heavy, factor), widths_of(heavy), WHITE)
+    exact = _Exact(setting, joint, Catalogue(Terms(), heavy), plain, lambda _text: None)
+    scores = Scores(gram_about(setting, joint, exact.catalogue), 1, frozenset())
+    names = frozenset(heavy.names)
+    kept = exact.fit(scores, names)
+    assert kept is not None
+    impossible = replace(kept.joint, state=replace(kept.joint.state, terms=light))
+    better = replace(kept, joint=impossible, score=kept.score + 10.0)
+    monkeypatch.setattr(exact, "_from", lambda *_given: better)
+    exact.take(scores, heavy)
+    assert exact.possible == {names: kept}
+    # and the other way about: what one can have takes the place, though it explains less
+    exact.fitted[names] = better
+    monkeypatch.setattr(exact, "_from", lambda *_given: kept)
+    exact.take(scores, heavy)
+    assert exact.possible == {names: kept}
