@@ -21,6 +21,7 @@ from seecr.pose import Array
 from seecr.result import Record, Result
 from seecr.robot import Robot
 from seecr.starts import commanded_poses, finite
+from seecr.threads import processors, run_parts
 from seecr.workspace import load_scale, tension_margin
 
 Progress = Callable[[int], None]
@@ -28,8 +29,8 @@ Progress = Callable[[int], None]
 
 __all__ = ["Workspace", "boundary", "default_axes", "workspace_map"]
 
-# Poses at a time.
-_PART = 20_000
+# Poses at a time, of each processor.
+_PART = 5_000
 # Default grid: values along an axis on which something can change.
 _VALUES, _FEW = 33, 13
 _NEVER = -1
@@ -202,8 +203,9 @@ def workspace_map(
     margin, slack = np.empty(n), np.full(n, _NEVER, dtype=np.int8)
     likely = np.empty(n, np.float32) if chance else None
     moved, stiffness = np.full((n, 6), np.nan, np.float32), np.full(n, np.nan, np.float32)
-    for first in range(0, n, _PART):
-        rows = np.arange(first, min(first + _PART, n))
+
+    def fill(part: slice) -> None:
+        rows = np.arange(part.start, part.stop)
         index = np.unravel_index(rows, shape)
         places = np.column_stack([axis[k] for axis, k in zip(axes, index, strict=True)])
         poses = commanded_poses(np.column_stack([places, np.tile(turned, (len(rows), 1))]))
@@ -216,8 +218,13 @@ def workspace_map(
             moved[rows[there]] = found.deviation[there]
             slack[rows[there]] = found.slack[there].sum(axis=1)
             stiffness[rows] = np.where(there, found.smallest_eigenvalue, np.nan)
+
+    at_once = _PART * processors()
+    for first in range(0, n, at_once):
+        last = min(first + at_once, n)
+        run_parts(fill, [slice(k, min(k + _PART, last)) for k in range(first, last, _PART)])
         if progress is not None:
-            progress(len(rows))
+            progress(last - first)
     return Workspace(
         robot, axes, np.asarray(turned), margin.reshape(shape),
         moved[:, :3].reshape(*shape, 3), moved[:, 3:].reshape(*shape, 3),

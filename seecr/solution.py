@@ -29,6 +29,7 @@ from seecr.pose import Array, rotvec_from_quat
 from seecr.result import COORDINATES, Record, Result, named
 from seecr.robot import Robot
 from seecr.tables import Tables, take
+from seecr.threads import in_parts
 
 if TYPE_CHECKING:
     from seecr.following import Jump
@@ -188,7 +189,13 @@ class Solution(Result):
             there = statics.take_evaluation(self.evaluation, rows)
             hessian[rows] = statics.without_idle(take(self.tables, rows), there).hessian
         finite = np.isfinite(hessian)
-        values, vectors = np.linalg.eigh(np.where(finite, hessian, 0.0))
+        values, vectors = np.empty(hessian.shape[:2]), np.empty_like(hessian)
+        clean = np.where(finite, hessian, 0.0)
+
+        def run(part: slice) -> None:
+            values[part], vectors[part] = np.linalg.eigh(clean[part])
+
+        in_parts(run, len(clean))
         values[~finite.all(axis=(1, 2))] = np.nan
         return values, vectors
 
@@ -272,7 +279,9 @@ def certify(robot: Robot, tables: Tables, found: statics.Evaluation) -> Solution
     """Recompute wrench, stiffness and energy at the answer, and say what it is worth."""
     check = statics.evaluate(tables, found, threads=None)
     check.count = found.count
-    status = np.array([_OF_OUTCOME.get(o, Status.GAVE_UP) for o in found.outcome], dtype=object)
+    status = np.full(len(found.outcome), Status.GAVE_UP, dtype=object)
+    for outcome, words in _OF_OUTCOME.items():
+        status[found.outcome == outcome] = words
     balanced = check.residual < TOLERANCE
     status[(status == Status.CONVERGED) & ~balanced] = Status.STALLED
     # not found's own: a search in joint values alone leaves its deviations unplaced

@@ -76,7 +76,7 @@ def assemble(setup: Setup, strains: Array | None = None) -> Tables:
     poses = np.array(setup.commands.pose, order="C")  # of our own: see seecr.compiled.jit
     n, m = len(poses), robot.n_cables
     cables, load = np.zeros((n, m, N_COLUMNS)), np.zeros((n, N_LOAD))
-    _write(setup, QUANTITIES, cables, load)
+    _write(setup, QUANTITIES, cables, load, blank=True)
     if setup.laws:
         _linearise(setup, np.zeros((n, m)) if strains is None else strains, cables)
     rest, gap = cables[..., REST], cables[..., GAP]
@@ -110,11 +110,18 @@ _OF_LENGTHS = {"exit_points", "anchor_points", "pulley_radius"} | {
 _OF_LOAD = {"mass", "centre_of_mass", "gravity", "pulley_radius", "lift"}
 
 
-def _write(setup: Setup, names: Collection[str], cables: Array, load: Array) -> None:
-    """Write some quantities, and what is made of them, where the compiled loop reads it."""
+def _write(
+    setup: Setup, names: Collection[str], cables: Array, load: Array, *, blank: bool = False
+) -> None:
+    """Write some quantities, and what is made of them, where the compiled loop reads it.
+
+    In tables that are ``blank`` the zeros are there already, most of them for nothing.
+    """
     for name in names:
         item = QUANTITIES[name]
         value = np.asarray(getattr(setup, name))
+        if blank and not value.any():
+            continue
         if item.column is not None:
             per_cable = value if item.shape[-1] == 3 else value[..., None]
             cables[..., item.column : item.column + per_cable.shape[-1]] = per_cable

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
@@ -16,6 +17,8 @@ __all__ = [
 
 # Fewer poses than this are not worth a second thread.
 _CHUNK = 128
+# Of each thread, whether it is at a part of a batch: that is not parted again.
+_at = threading.local()
 
 
 def processors() -> int:
@@ -26,18 +29,34 @@ def processors() -> int:
 
 
 def in_parts(run: Callable[[slice], None], n: int, threads: int | None = None) -> None:
-    """Run a job on n rows, in as many parts as there are threads and rows enough for them."""
+    """Run a job on n rows, in as many parts as there are threads and rows enough for them.
+
+    Within a part of another job there is one: the other threads have theirs.
+    """
     count = max(1, n // _CHUNK)
     if count > 1:  # asking the system takes longer than a few rows
-        count = min(count, processors() if threads is None else threads)
+        most = 1 if getattr(_at, "part", False) else threads
+        count = min(count, processors() if most is None else most)
     edges = [n * k // count for k in range(count + 1)]
     run_parts(run, [slice(a, b) for a, b in pairwise(edges)])
 
 
 def run_parts(run: Callable[[slice], None], parts: list[slice]) -> None:
     """Run a job on every part of a batch, the first in this thread."""
-    others = [_pool().submit(run, part) for part in parts[1:]]
-    run(parts[0])
+    if getattr(_at, "part", False) or len(parts) == 1:
+        for part in parts:
+            run(part)
+        return
+
+    def one(part: slice) -> None:
+        _at.part = True
+        try:
+            run(part)
+        finally:
+            _at.part = False
+
+    others = [_pool().submit(one, part) for part in parts[1:]]
+    one(parts[0])
     for other in others:
         other.result()
 

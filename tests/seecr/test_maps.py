@@ -10,6 +10,7 @@ import pytest
 from random_robots import random_poses, random_robot
 from scipy.optimize import linprog
 
+from seecr import maps
 from seecr.equilibrium import solve
 from seecr.errors import InputError
 from seecr.maps import boundary, default_axes, workspace_map
@@ -166,6 +167,18 @@ def test_a_map_is_what_each_pose_says(tmp_path: Path) -> None:
     assert "probability" in (tmp_path / "chance.svg").read_text()
     with pytest.raises(InputError, match="at least two axes"):
         map_figure(tmp_path / "no.png", workspace_map(robot, 0.4, 0.25, [0.1, 0.2], elastic=False))
+
+
+def test_a_map_is_the_same_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = robot_named("demobot_parallel")
+    axes = np.linspace(0.2, 0.6, 5), np.linspace(0.2, 0.3, 2), np.array([0.1, 0.2])
+    whole, done = workspace_map(robot, *axes), list[int]()
+    monkeypatch.setattr(maps, "_PART", 3)
+    monkeypatch.setattr(maps, "processors", lambda: 2)
+    parts = workspace_map(robot, *axes, progress=done.append)
+    assert done == [6, 6, 6, 2]
+    for name in ("margin", "deviation", "rotation", "slack", "stiffness"):
+        np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))
 
 
 def test_too_few_cables_are_mapped_by_position() -> None:

@@ -47,3 +47,40 @@ def test_an_error_in_another_thread_is_the_callers() -> None:
 
     with pytest.raises(ValueError, match="lost"):
         threads.run_parts(run, [slice(0, 1), slice(1, 2)])
+
+
+def test_within_a_part_there_is_one_part_in_the_same_thread(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Else parts that wait for parts of their own could take all threads there are."""
+    monkeypatch.setattr(threads, "processors", lambda: 4)
+    done = np.zeros((2, 1000), dtype=int)
+    seen: list[tuple[int, slice]] = []
+
+    def outer(part: slice) -> None:
+        def inner(own: slice) -> None:
+            done[part, own] += 1
+            seen.append((threading.get_ident(), own))
+
+        here = threading.get_ident()
+        threads.in_parts(inner, 1000)
+        assert all(own == slice(0, 1000) for _thread, own in seen)
+        assert here in {thread for thread, _own in seen}
+
+    threads.run_parts(outer, [slice(0, 1), slice(1, 2)])
+    assert np.all(done == 1) and len({thread for thread, _own in seen}) == 2
+    # and afterwards as before
+    parts: list[slice] = []
+    threads.in_parts(parts.append, 1000)
+    assert len(parts) == 4
+
+
+def test_a_part_that_fails_leaves_the_thread_as_it_was() -> None:
+    def fails(_part: slice) -> None:
+        raise ValueError("as it should")
+
+    with pytest.raises(ValueError, match="as it should"):
+        threads.run_parts(fails, [slice(0, 1), slice(1, 2)])
+    parts: list[slice] = []
+    threads.in_parts(parts.append, 1000, 2)
+    assert len(parts) == 2
