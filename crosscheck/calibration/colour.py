@@ -91,8 +91,9 @@ def _gaps(problem: Problem, row: NDArray[np.int64], before: NDArray[np.int64]) -
         clock = np.arange(problem.data.n_rows, dtype=float)
     # rows that did not come from a file need not follow in time
     since = np.where(before < 0, np.nan, np.abs(clock[row] - clock[row[before]]))
-    usual = float(np.nanmedian(since)) if np.isfinite(since).any() else 1.0
-    return np.nan_to_num(since / usual, nan=_LONG) if usual > 0 else np.ones(len(row))
+    # a clock that stood still tells nothing: rows of one moment follow as any others do
+    usual = float(np.median(since[since > 0.0])) if (since > 0.0).any() else 1.0
+    return np.nan_to_num(np.where(since == 0.0, usual, since) / usual, nan=_LONG)
 
 
 def foretold(chain: Chain, colour: Colour) -> Array:

@@ -114,3 +114,11 @@ def test_rows_that_do_not_follow_in_time_are_no_further_alike(robot: Robot) -> N
     clock = np.random.default_rng(1).permutation(12).astype(float)
     chain = chain_of(prepare(robot, replace(data, t_s=clock), Terms()).problem)
     assert np.all(chain.gap > 0.0)
+
+
+def test_rows_of_one_moment_follow_as_any_others_do(robot: Robot) -> None:
+    """Two rows at one time have noise of their own: it was taken for one reading, and no number."""
+    data = in_no_order(robot, [], 12)
+    for clock in (np.repeat(np.arange(6.0), 2), np.zeros(12)):
+        chain = chain_of(prepare(robot, replace(data, t_s=clock), Terms()).problem)
+        assert set(chain.gap[chain.before >= 0]) == {1.0}
