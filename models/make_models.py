@@ -62,18 +62,17 @@ PLANAR_HORIZONTAL: tuple[tuple[Vector, Vector], ...] = (
     ((0.657, 0.0, 0.486), (-0.0515, 0.0, 0.018)),
     ((0.76, 0.0, 0.486), (0.0515, 0.0, 0.018)),
 )
-# CoGiRo's kind, 15 x 11 x 6 m, in the middle of its floor; opposite cables by a half turn. How the
-# numbers are known: models/README.md.
-_LARGE_HALF: tuple[tuple[Vector, Vector], ...] = (
-    ((-7.2, -5.25, 5.5), (0.5, -0.5, -0.5)),
-    ((-7.3, -5.1, 5.5), (-0.5, 0.35, 0.5)),
-    ((-7.3, 5.25, 5.5), (-0.5, -0.3, -0.5)),
-    ((-7.2, 5.4, 5.5), (0.5, 0.35, 0.5)),
-)
-COGIRO_LARGE = tuple(
-    ((round(7.5 + s * a[0], 6), round(5.5 + s * a[1], 6), a[2]), (s * b[0], s * b[1], b[2]))
-    for s in (1, -1)
-    for a, b in _LARGE_HALF
+# CoGiRo of LIRMM and Tecnalia, measured with a laser tracker in November 2015. The base frame lies
+# in the middle of the floor, the platform's in the middle of the platform's lower face.
+COGIRO_LARGE: tuple[tuple[Vector, Vector], ...] = (
+    ((-7.1775, -5.4361, 5.3911), (0.5032, -0.4928, 0.0)),
+    ((-7.4594, -5.1504, 5.3999), (-0.5097, 0.3508, 0.9976)),
+    ((-7.3911, 5.1940, 5.3976), (-0.5032, -0.2700, 0.0)),
+    ((-7.1026, 5.4753, 5.4094), (0.4960, 0.3561, 0.9996)),
+    ((7.2398, 5.3759, 5.4093), (-0.5032, 0.4928, 0.0)),
+    ((7.5208, 5.0851, 5.4200), (0.4998, -0.3404, 0.9991)),
+    ((7.4461, -5.2539, 5.3874), (0.5021, 0.2750, -0.0007)),
+    ((7.1608, -5.5342, 5.3973), (-0.5045, -0.3463, 0.9976)),
 )
 # WireX, IPAnema3Design: frame 8 x 3.5 m, exit points at 3.25 and 0.25 m; the upper cables hold the
 # lower edge of a platform of 1.5 x 0.5 x 0.5 m, the lower cables its upper edge.
@@ -102,6 +101,9 @@ class Model:
         reference: position of the platform in the reference pose, unturned [m].
         box: edges of the platform [m].
         frame: edges of the frame [m]; planar robots have none in depth.
+        corner: lower left front corner of the frame in the base frame [m].
+        middle: of the platform's box in the platform frame [m].
+        inertia: xx, yy, zz, xy, xz, yz about its centre of mass [kg m^2]; None for a solid box.
         planar: moves in the x-z plane only.
         mass: of the platform [kg].
         bar: edge of the frame's square profile [m].
@@ -120,6 +122,9 @@ class Model:
     reference: Vector = (0.4, 0.25, 0.15)
     box: Vector = (0.102, 0.044, 0.036)
     frame: Vector = (0.80, 0.50, 0.50)
+    corner: Vector = (0.0, 0.0, 0.0)
+    middle: Vector = (0.0, 0.0, 0.0)
+    inertia: tuple[float, ...] | None = None
     planar: bool = False
     mass: float = 0.4
     bar: float = 0.02
@@ -153,6 +158,7 @@ MODELS = (
         reference=(0.5, 0.0, 0.5),
         box=(0.2, 0.02, 0.02),
         frame=(1.04, 0.0, 1.02),
+        corner=(-0.02, 0.0, 0.0),
         planar=True,
     ),
     Model(
@@ -173,14 +179,19 @@ MODELS = (
     ),
     Model(
         "cogiro_large",
-        "A suspended robot of CoGiRo's kind and size, eight crossed steel cables",
+        "CoGiRo, a suspended robot of 15 m, eight crossed steel cables",
         COGIRO_LARGE,
-        reference=(7.5, 5.5, 2.0),
+        reference=(0.0, 0.0, 1.5),
         box=(1.0, 1.0, 1.0),
-        frame=(15.0, 11.0, 6.0),
-        mass=100.0,
+        frame=(15.24, 11.24, 5.93),
+        corner=(-7.62, -5.62, 0.0),
+        middle=(0.0, 0.0, 0.5),
+        mass=91.058,
+        # its source prints products of inertia, +integral of x y dm: the matrix has minus them
+        inertia=(36.598, 35.982, 25.439, 0.453, -3.012, 1.539),
+        centre=(-0.034, -0.013, 0.264),
         bar=0.3,
-        ea=7.0e5,
+        ea=100e9 * 8.2051e-6,
         looks=12.0,
     ),
     Model(
@@ -329,13 +340,8 @@ _LOOKS = """\
 
 
 def _middle(model: Model) -> Vector:
-    (x, y, z), inset = model.frame, _inset(model)
-    return (0.5 * x - inset, 0.5 * y, 0.5 * z - 0.03)
-
-
-def _inset(model: Model) -> float:
-    """How far left of the base frame's origin the frame's outer edge stands [m]."""
-    return 0.02 if model.name == "planar_two_cable" else 0.0
+    (x, y, z), (left, front, floor) = model.frame, model.corner
+    return (left + 0.5 * x, front + 0.5 * y, floor + 0.5 * z - 0.03)
 
 
 def _surroundings(model: Model) -> Iterator[str]:
@@ -344,7 +350,7 @@ def _surroundings(model: Model) -> Iterator[str]:
     lamp = [round(v, 3) for v in (x - 0.3, y - 0.5, above + 0.8)]
     yield f'    <light name="lamp" pos="{numbers(*lamp)}" dir="0.3 0.5 -1.8" cutoff="60"'
     yield '     diffuse="0.60 0.60 0.60" specular="0.2 0.2 0.2"/>'
-    wide = "2 2" if model.looks == 1.0 else numbers(*(round(2.0 * max(x, y), 3),) * 2)
+    wide = "2 2" if model.looks == 1.0 else numbers(*(round(max(model.frame), 3),) * 2)
     yield f'    <geom name="floor" type="plane" pos="{numbers(x, y, 0.0)}" size="{wide} 0.1"'
     yield '     material="floor"/>'
     yield f'    <camera name="front" {_camera(model, azimuth=90.0, elevation=-8.0)}/>'
@@ -365,8 +371,9 @@ def _camera(model: Model, *, azimuth: float, elevation: float) -> str:
 def _frame(model: Model) -> Iterator[str]:
     """The frame's bars, inside its outer edges; a planar robot's is a portal behind the plane."""
     (x, y, z), half = model.frame, 0.5 * model.bar
-    left, right = half - _inset(model), x - half - _inset(model)
-    depths = (0.04,) if model.planar else (half, y - half)
+    left, right = model.corner[0] + half, model.corner[0] + x - half
+    near, far = model.corner[1] + half, model.corner[1] + y - half
+    depths = (0.04,) if model.planar else (near, far)
     for d in depths:
         for side in (left, right):
             yield _bar((side, d, 0.0), (side, d, z), half)
@@ -378,7 +385,7 @@ def _frame(model: Model) -> Iterator[str]:
         return
     for side in (left, right):
         for height in (half, z - half):
-            yield _bar((side, model.bar, height), (side, y - model.bar, height), half)
+            yield _bar((side, near + half, height), (side, far - half, height), half)
 
 
 def _bar(start: Vector, end: Vector, half: float) -> str:
@@ -426,11 +433,13 @@ def _platform(model: Model) -> Iterator[str]:
             yield f'      <joint name="{name}" type="slide" axis="{axis}"/>'
     else:
         yield "      <freejoint/>"
-    inertia = numbers(*box_inertia(model.mass, model.box))
+    kind = "diaginertia" if model.inertia is None else "fullinertia"
+    inertia = numbers(*(model.inertia or box_inertia(model.mass, model.box)))
     centre, mass = _bare(*model.centre), numbers(model.mass)
-    yield f'      <inertial pos="{centre}" mass="{mass}" diaginertia="{inertia}"/>'
+    yield f'      <inertial pos="{centre}" mass="{mass}" {kind}="{inertia}"/>'
     halves = numbers(*(0.5 * edge for edge in model.box))
-    yield f'      <geom name="platform" type="box" size="{halves}" material="platform"/>'
+    place = f'pos="{_bare(*model.middle)}" ' if any(model.middle) else ""
+    yield f'      <geom name="platform" type="box" {place}size="{halves}" material="platform"/>'
     yield from _anchor_pins(model)
     for i, (_, anchor) in enumerate(model.cables, start=1):
         yield f'      <site name="B{i}" class="anchor" pos="{numbers(*anchor)}"/>'
@@ -441,7 +450,8 @@ def _anchor_pins(model: Model) -> Iterator[str]:
     """A pin to each anchor point that stands well clear of the platform's box."""
     for _, anchor in model.cables:
         inside = [
-            max(-0.5 * edge, min(0.5 * edge, b)) for b, edge in zip(anchor, model.box, strict=True)
+            max(m - 0.5 * edge, min(m + 0.5 * edge, b))
+            for b, m, edge in zip(anchor, model.middle, model.box, strict=True)
         ]
         if math.dist(anchor, inside) > 0.002:
             yield (

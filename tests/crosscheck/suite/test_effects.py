@@ -46,7 +46,7 @@ def test_sag_is_run_where_it_is_large_and_tensions_go_with_the_weight(good):
     assert last.name == "effect-cogiro_large-cable_weight" and last.seed == 2
     assert good.tension_limit == pytest.approx(1e-6)
     heavy = replace(good, case=last)
-    assert heavy.tension_limit == pytest.approx(1e-6 * 100 / 0.4)
+    assert heavy.tension_limit == pytest.approx(1e-6 * 91.058 / 0.4)
     line = words.effects_line([good, good, heavy])
     assert "on 1 robot, cable_weight on cogiro_large against" in line
 
