@@ -47,7 +47,8 @@ class Sight:
 
     def lines(self) -> list[str]:
         """The same as sentences: what shows, what does not, what cannot be told apart."""
-        total = len(self.effects) + len(self.missing)
+        asked = [why for why in self.missing.values() if why.why is not Why.EXCLUDED]
+        total = len(self.effects) + len(asked)
         seen = len(self.effects) - len(self.hidden)
         effects = f"{seen} of {counted(total, 'effect')}"
         out = [f"These data would show {effects} if they had a plausible size."]

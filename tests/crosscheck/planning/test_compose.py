@@ -138,7 +138,7 @@ def test_a_diagnosis_begins_with_it(cogiro):
         cogiro, measured(cogiro, [term(cogiro, "pulley_radius", radius_m=0.01)], points=3),
         only=["pulley_radius", "stiffness", "platform_mass"],
     )  # fmt: skip
-    assert found.lines()[0].startswith("These data would show 3 of ")
+    assert found.lines()[0].startswith("These data would show 3 of 3 effects")
     assert "stiffness" in found.as_json()["can_show"]["cannot_be_told_from"]
 
 
