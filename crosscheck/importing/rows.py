@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.files import read_text
-from seecr.columns.table import show
+from seecr.columns.table import show, taken_for
 from seecr.counted import counted
 from seecr.errors import InputFileError
 from seecr.pose import Array
@@ -21,8 +21,6 @@ Row = list[str]
 
 _SEPARATORS = (",", ";", "\t")
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+(e[+-]?\d+)?", re.IGNORECASE)
-# First cells of the files of each program.
-VICON = ("segments", "trajectories", "devices", "joints", "model outputs")
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,14 +68,10 @@ class FileRows:
 
     def taken_for(self) -> str:
         """What kind of file this seems to be, and what to do with such; "" if it is not known."""
-        cell = self.cells[self.first][0].lower()
-        if cell == "format version":
-            return "; this is an export of Motive: crosscheck import motive"
-        if cell in VICON:
-            return "; this is an export of Vicon: crosscheck import vicon"
-        if any(name.startswith(("cmd_", "meas_")) for name in self.cells[self.first]):
+        names = self.cells[self.first]
+        if any(name.startswith(("cmd_", "meas_")) for name in names):
             return "; these are columns of a log: crosscheck import poses"
-        return ""
+        return taken_for(names)
 
 
 @dataclass(frozen=True, eq=False)

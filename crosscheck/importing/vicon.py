@@ -14,7 +14,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from crosscheck.importing.logged import Logged
-from crosscheck.importing.rows import VICON, Block, FileRows, check_body
+from crosscheck.importing.rows import Block, FileRows, check_body
+from seecr.columns.table import VICON
 from seecr.pose import Array
 from seecr.units import of_columns
 

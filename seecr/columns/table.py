@@ -26,6 +26,9 @@ EXPECTED_FILE = "expected a CSV file in UTF-8 with a header row and one row per 
 
 _PARQUET_MAGIC = b"PAR1"
 _TEXT_BEGINNINGS = {"{": "JSON", "[": "JSON or TOML", "<": "XML, such as a robot's MJCF"}
+# First cells of the files of each program.
+VICON = ("segments", "trajectories", "devices", "joints", "model outputs")
+_QUALISYS = "no_of_frames"
 _SEPARATORS = (",", ";", "\t")
 # What stands for a reading that was not made, besides an empty cell.
 _NOT_READ = ("nan", "NaN")
@@ -89,6 +92,18 @@ def show(text: str) -> str:
     return repr(text if len(text) <= 40 else text[:37] + "...")
 
 
+def taken_for(names: Sequence[str]) -> str:
+    """Of what program's file this seems the first row, and what to do; "" if it is not known."""
+    cell = names[0].lower()
+    if cell == "format version":
+        return "; this is an export of Motive: crosscheck import motive"
+    if cell in VICON:
+        return "; this is an export of Vicon: crosscheck import vicon"
+    if cell == _QUALISYS:
+        return "; this is an export of Qualisys: make a plain log of it, crosscheck import poses"
+    return ""
+
+
 def read_table(path: Path) -> Table:
     """Read a CSV or Parquet file (told apart by content, not by name).
 
@@ -138,7 +153,7 @@ def _read_csv(path: Path, data: bytes) -> Table:
         raise InputFileError.at(
             path, "has a header but no rows; expected one row per resting pose", line=header_line
         )
-    _check_cell_counts(path, header_line, len(header), body)
+    _check_cell_counts(path, header_line, header, body)
     columns = zip(*(row for _, row in body), strict=True)
     cells = [[cell.strip() for cell in column] for column in columns]
     return Table(
@@ -165,6 +180,9 @@ def _check_first_line(path: Path, number: int, line: str) -> None:
     kind = _TEXT_BEGINNINGS.get(line.lstrip()[0])
     if kind:
         raise InputFileError.at(path, f"looks like {kind}; {EXPECTED_FILE}", line=number)
+    program = taken_for([cell.strip(' "\r\n') for cell in re.split("[,;\t]", line)])
+    if program:
+        raise InputFileError.at(path, f"{EXPECTED_FILE}{program}", line=number)
     if line.count("|") > max(line.count(mark) for mark in _SEPARATORS):
         text = "expected commas, semicolons or tabs between cells, got bars; write 1.5,2.5"
         raise InputFileError.at(path, text, line=number)
@@ -199,9 +217,13 @@ def _csv_rows(
 
 
 def _check_cell_counts(
-    path: Path, header_line: int, n_columns: int, body: list[tuple[int, list[str]]]
+    path: Path, header_line: int, header: list[str], body: list[tuple[int, list[str]]]
 ) -> None:
+    n_columns = len(header)
     for line, row in body:
+        if row == header:
+            text = f"expected a row of cells, got the header (line {header_line}) again; are two "
+            raise InputFileError.at(path, f"{text}files in one? Give them one by one", line=line)
         if len(row) != n_columns:
             text = (
                 f"expected {counted(n_columns, 'cell')} as in the header (line {header_line}), "

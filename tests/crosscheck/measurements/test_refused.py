@@ -15,6 +15,22 @@ REFUSED = {
     "json": (['{"run": [1, 2]}'], "line 1: looks like JSON; expected a CSV"),
     "toml": (["# sigma", "[sigma]", "a = 1"], "line 2: looks like JSON or TOML; expected a CSV"),
     "xml": (["<mujoco>", "</mujoco>"], "line 1: looks like XML, such as a robot's MJCF; expected"),
+    "Motive": (
+        ["Format Version,1.23,Take Name,a take", "", ",Type,Rigid Body,Rigid Body"],
+        "line 1: expected a CSV .*; this is an export of Motive: crosscheck import motive$",
+    ),
+    "Vicon": (
+        ["", "Segments", "200", ",,a:platform", "Frame,Sub Frame,RX"],
+        "line 2: expected a CSV .*; this is an export of Vicon: crosscheck import vicon$",
+    ),
+    "Qualisys": (
+        ["NO_OF_FRAMES\t10", "BODY_NAMES\tplatform", "X\tY\tZ", "1\t2\t3"],
+        "line 1: .*; this is an export of Qualisys: make a plain log of it, crosscheck import",
+    ),
+    "two files in one": (
+        ["run," + POSE, "a,0,0,0,0", "a,0,0,0,0.1", "run," + POSE, "a,0,0,0,0"],
+        r"line 4: expected a row of cells, got the header \(line 1\) again; are two files in one\?",
+    ),
     "bars": (
         [POSE.replace(",", "|"), "0|0|0|0"],
         "line 1: expected commas, semicolons or tabs between cells, got bars",
