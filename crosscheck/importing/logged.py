@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -56,6 +57,7 @@ class Logged:
         markers: by name, positions (n, 3) [m].
         up: the axis that points up in it, "y" or "z".
         notes: what was done in reading it.
+        began: the time of day at which t_s is 0, where the file says so.
     """
 
     path: Path
@@ -65,6 +67,7 @@ class Logged:
     markers: Mapping[str, Array]
     up: str = "z"
     notes: tuple[str, ...] = ()
+    began: datetime | None = None
 
     def upright(self) -> Logged:
         """The same with Z up; a body that is not turned stays so."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from crosscheck.importing.logged import Logged
 from seecr.columns.table import Table, read_table
+from seecr.columns.times import began, times_of_day
 from seecr.errors import InputError
 from seecr.pose import Array
 from seecr.units import UNITS, Unit, of_columns
@@ -37,7 +39,7 @@ def read_poses(path: Path, unit: str | None = None) -> Logged:
         raise InputError(f"--unit: expected one of {', '.join(lengths)}, got {unit!r}")
     table = read_table(path)
     found = _columns(table)
-    t_s = _times(table)
+    t_s, first = _times(table)
     lacking = [axis for axis in "xyz" if axis not in found]
     if lacking:
         raise table.error(
@@ -45,7 +47,8 @@ def read_poses(path: Path, unit: str | None = None) -> Logged:
             "them so"
         )
     position = np.stack([_length(table, *found[axis], unit) for axis in "xyz"], axis=1)
-    return Logged(path, t_s, table.line, {path.stem: (position, _turns(table, found))}, {})
+    bodies = {path.stem: (position, _turns(table, found))}
+    return Logged(path, t_s, table.line, bodies, {}, began=first)
 
 
 def _columns(table: Table) -> dict[str, tuple[int, str]]:
@@ -63,14 +66,18 @@ def _columns(table: Table) -> dict[str, tuple[int, str]]:
     return out
 
 
-def _times(table: Table) -> Array:
+def _times(table: Table) -> tuple[Array, datetime | None]:
     found = [(c, m) for c, name in enumerate(table.names) if (m := _TIMES.fullmatch(name))]
     if len(found) != 1:
         got = ", ".join(table.names[c] for c, _m in found) or "none"
         raise table.error(f"expected one column of times such as t_s, got {got}; name it so")
     column, match = found[0]
-    unit = _unit(table, column, "s", match.group(2) or match.group(3) or "s")
-    t_s = unit.to_si(table.numbers(column, blank_is_nan=False))
+    first = began(table, column)
+    if first is None:
+        unit = _unit(table, column, "s", match.group(2) or match.group(3) or "s")
+        t_s = unit.to_si(table.numbers(column, blank_is_nan=False))
+    else:
+        t_s = times_of_day(table, column)
     falls = np.flatnonzero(np.diff(t_s) <= 0.0)
     if len(falls):
         k = int(falls[0]) + 1
@@ -79,7 +86,7 @@ def _times(table: Table) -> Array:
             "recordings in one file? Give them one by one"
         )
         raise table.error(text, row=k, column=table.names[column])
-    return t_s
+    return t_s, first
 
 
 def _unit(table: Table, column: int, si: str, suffix: str) -> Unit:

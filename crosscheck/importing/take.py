@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -56,7 +57,7 @@ def take_of(
     export = replace(export, up=choices.up or export.up).upright()
     stream, fit = _stream(export, choices)
     arm = float(np.sqrt(np.mean(np.sum(robot.anchor_points**2, axis=1))))
-    clock = _clock(stream, robot, log, choices, arm)
+    clock = _clock(stream, robot, log, choices, arm, _apart(export.began, log.began))
     held = held_commands(log, choices.rest_for, clock.shift, float(stream.t_s[-1]))
     if len(held.row) == 0:
         raise CrosscheckError(
@@ -70,14 +71,24 @@ def take_of(
     return take
 
 
-def _clock(stream: Stream, robot: Robot, log: Measurements, choices: Choices, arm: float) -> Clock:
-    """As the user says, or found."""
+def _apart(tracker: datetime | None, commands: datetime | None) -> float:
+    """What the first clock shows more [s] where both files say the time of day, and its zone."""
+    if tracker is None or commands is None or (tracker.tzinfo is None) != (commands.tzinfo is None):
+        return 0.0
+    return (commands - tracker).total_seconds()
+
+
+def _clock(
+    stream: Stream, robot: Robot, log: Measurements, choices: Choices, arm: float, apart: float
+) -> Clock:
+    """As the user says, or found; beyond what times of day (``apart`` [s]) say."""
     if choices.clock is not None or log.t_s is None:
-        return Clock(choices.clock or 0.0)
-    held = held_commands(log, choices.rest_for, 0.0, np.inf)
+        return Clock(apart + (choices.clock or 0.0))
+    held = held_commands(log, choices.rest_for, apart, np.inf)
     told = commanded(robot, log.rows(held.row))[:, :3]
     rests = find_dwells(stream, np.zeros(0), choices.rest_for, choices.rest_speed, arm)
-    return find_clock(held, told, rests)
+    found = find_clock(held, told, rests)
+    return Clock(apart + found.shift, found.said)
 
 
 def _told(take: Take) -> list[str]:

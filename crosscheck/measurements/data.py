@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -82,7 +83,7 @@ class Measurements(Result):
         command_pose: (n, 7) commanded platform pose, or None.
         command_lengths: (n, m) [m] rest lengths, or None. told: whether they are what the winches
             were told, counted as the plain model counts; else they are absolute.
-        t_s: (n,) [s] or None.
+        t_s: (n,) [s] or None. began: the time of day at which it is 0, where the file says so.
         position: (n, 3) [m] in the base frame, NaN where not read.
         quat_wxyz: (n, 4) unit quaternions, NaN rows where not read, or None.
         angles_rad: (n, 3) [rad] rx ry rz with R = Rx(rx) Ry(ry) Rz(rz), NaN where not read.
@@ -111,6 +112,7 @@ class Measurements(Result):
     command_pose: Array | None = None
     command_lengths: Array | None = None
     t_s: Array | None = None
+    began: datetime | None = None
     position: Array = _FILLED_IN
     quat_wxyz: Array | None = None
     angles_rad: Array = _FILLED_IN

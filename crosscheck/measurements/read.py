@@ -23,7 +23,7 @@ from seecr.columns.known import POSITION, Columns, know_columns
 from seecr.columns.loads import known_loads
 from seecr.columns.poses import command_lengths, command_poses, measured_orientation
 from seecr.columns.table import read_table
-from seecr.columns.times import runs, temperatures, times
+from seecr.columns.times import began, runs, temperatures, times
 from seecr.counted import counted
 
 if TYPE_CHECKING:
@@ -115,6 +115,7 @@ def _load(columns: Columns, robot: Robot, sigma_path: str | Path | None) -> Meas
         n_cables=robot.n_cables,
         run=run,
         t_s=t_s,
+        began=None if t_s is None else began(columns.table, columns.known["t"].index),
         command_pose=pose,
         command_lengths=lengths,
         told=beside.told and lengths is not None,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.columns.known import Columns
-from seecr.columns.table import show
+from seecr.columns.table import Table, show
 from seecr.errors import InputFileError
 from seecr.pose import Array
 
@@ -58,9 +58,12 @@ def times(columns: Columns, run: NDArray[np.str_]) -> Array | None:
     """
     if "t" not in columns.known:
         return None
-    cells = columns.table.cells[columns.known["t"].index]
-    of_day = _ISO.fullmatch(cells[0]) is not None and not cells[0].isdigit()
-    t_s = _seconds(columns) if of_day else columns.numbers("t")
+    index = columns.known["t"].index
+    cells = columns.table.cells[index]
+    of_day = began(columns.table, index) is not None
+    if of_day:
+        columns.notes.append(f"Column t_s holds times of day: counted from {show(cells[0])}.")
+    t_s = times_of_day(columns.table, index) if of_day else columns.numbers("t")
     falls = np.concatenate([[False], (np.diff(t_s) < 0) & (run[1:] == run[:-1])])
     columns.refuse(
         falls,
@@ -92,35 +95,44 @@ def temperatures(columns: Columns) -> Array | None:
     return celsius
 
 
-def _shown(cells: Sequence[str], t_s: Array, row: int, of_day: bool) -> str:
-    return cells[row] if of_day else f"{t_s[row]:.9g} s"
+def began(table: Table, index: int) -> datetime | None:
+    """The time of day in the first row of a column; None where it has numbers.
+
+    Raises:
+        InputFileError: it looks like a time of day and is none.
+    """
+    cell = table.cells[index][0]
+    of_day = _ISO.fullmatch(cell) is not None and not cell.isdigit()
+    return _moment(table, index, 0) if of_day else None
 
 
-def _seconds(columns: Columns) -> Array:
-    """Times of day (n,) [s] since the first row's."""
-    first = _moment(columns, 0)
-    out = np.empty(columns.n_rows)
-    for row in range(columns.n_rows):
-        now = _moment(columns, row)
+def times_of_day(table: Table, index: int) -> Array:
+    """Seconds (n,) since the first row of a column of times of day.
+
+    Raises:
+        InputFileError: a cell that is no time of day, or of another zone.
+    """
+    cells = table.cells[index]
+    first = _moment(table, index, 0)
+    out = np.empty(len(cells))
+    for row in range(len(cells)):
+        now = _moment(table, index, row)
         if (now.tzinfo is None) != (first.tzinfo is None):
-            text = f"expected a time zone in every row or in none, got {_cell(columns, row)} after "
-            raise _error(columns, row, text + _cell(columns, 0))
+            text = f"expected a time zone in every row or in none, got {show(cells[row])} after "
+            raise table.error(text + show(cells[0]), row=row, column=table.names[index])
         out[row] = (now - first).total_seconds()
-    columns.notes.append(f"Column t_s holds times of day: counted from {_cell(columns, 0)}.")
     return out
 
 
-def _moment(columns: Columns, row: int) -> datetime:
+def _moment(table: Table, index: int, row: int) -> datetime:
+    cells = table.cells[index]
     try:
-        return datetime.fromisoformat(columns.table.cells[columns.known["t"].index][row])
+        return datetime.fromisoformat(cells[row])
     except ValueError:
-        text = f"expected a time in ISO 8601, as {_cell(columns, 0)} in the first row"
-        raise _error(columns, row, f"{text}, got {_cell(columns, row)}") from None
+        text = f"expected a time in ISO 8601, as {show(cells[0])} in the first row"
+        text = f"{text}, got {show(cells[row])}"
+        raise table.error(text, row=row, column=table.names[index]) from None
 
 
-def _cell(columns: Columns, row: int) -> str:
-    return show(columns.table.cells[columns.known["t"].index][row])
-
-
-def _error(columns: Columns, row: int, text: str) -> InputFileError:
-    return columns.table.error(text, row=row, column=columns.known["t"].name)
+def _shown(cells: Sequence[str], t_s: Array, row: int, of_day: bool) -> str:
+    return cells[row] if of_day else f"{t_s[row]:.9g} s"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -98,9 +99,19 @@ def recording(
     return Recording(truth, t, position, quat, points_there, sent)
 
 
-def commands_csv(path: Path, made: Recording, *, times: bool = True, clock: float = 0.0) -> Path:
+def _clock_cells(t_s: Array, began: datetime | None) -> list[str]:
+    """Seconds, or the times of day where it began at one."""
+    if began is None:
+        return [f"{s:.6f}" for s in t_s]
+    return [(began + timedelta(seconds=float(s))).isoformat() for s in t_s]
+
+
+def commands_csv(
+    path: Path, made: Recording, *, times: bool = True, clock: float = 0.0,
+    began: datetime | None = None,
+) -> Path:  # fmt: skip
     """The log of commands, one row each."""
-    t = [f"{s - clock:.6f}" for s in made.sent_s]
+    t = _clock_cells(made.sent_s - clock, began)
     head = "run,t_s" if times else "run"
     rows = [f"{head},cmd_x_m,cmd_y_m,cmd_z_m,cmd_qw,cmd_qx,cmd_qy,cmd_qz"]
     for k, pose in enumerate(made.truth.command_pose):
@@ -200,9 +211,13 @@ def vicon_csv(path: Path, made: Recording, *, sep: str = ",", rotation: str = "v
     return path
 
 
-def poses_csv(path: Path, made: Recording, *, labels: str = "", turned: bool = True) -> Path:
+def poses_csv(
+    path: Path, made: Recording, *, labels: str = "", turned: bool = True,
+    began: datetime | None = None,
+) -> Path:  # fmt: skip
     """A plain log in metres with a scalar-first quaternion."""
     head = labels or "time_s,x_m,y_m,z_m" + (",qw,qx,qy,qz" if turned else "")
-    values = np.column_stack([made.t_s, made.position, *([made.quat] if turned else [])])
-    path.write_text("\n".join([head, *(",".join(_cells(row)) for row in values)]) + "\n")
+    values = np.column_stack([made.position, *([made.quat] if turned else [])])
+    rows = zip(_clock_cells(made.t_s, began), values, strict=True)
+    path.write_text("\n".join([head, *(",".join([t, *_cells(v)]) for t, v in rows)]) + "\n")
     return path

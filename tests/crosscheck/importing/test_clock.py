@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 
 import made_recordings as made_of
@@ -47,6 +48,18 @@ def test_the_shift_is_found_and_said(made, tmp_path, clock):
 def test_one_clock_stays_one(made, tmp_path):
     found = taken(made, tmp_path, 0.0)
     assert found.takes[0].held.clock == 0.0 and "clock shows" not in str(found)
+
+
+def test_times_of_day_are_one_clock(made, tmp_path):
+    """Times count from each file's first row, and the files begin 8 s apart; one is 7.5 s wrong."""
+    there = datetime(2025, 11, 3, 10)
+    tracked = made_of.poses_csv(tmp_path / "log.csv", made, began=there)
+    told = made_of.commands_csv(tmp_path / "told.csv", made, clock=-7.5, began=there)
+    given = import_case("poses", [tracked], ROBOT, [told], Choices(clock=-7.5))
+    assert given.takes[0].held.begin_s == pytest.approx(made.sent_s, abs=1e-6)
+    plain = taken(made, tmp_path, 0.0).measured
+    assert given.measured.position == pytest.approx(plain.position, abs=3e-5)
+    assert "clock shows 7.520 s less" in str(import_case("poses", [tracked], ROBOT, [told]))
 
 
 def test_a_wrong_clock_that_is_given_is_refused(made, tmp_path):
