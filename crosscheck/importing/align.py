@@ -17,7 +17,7 @@ from crosscheck.errors import CrosscheckError
 from crosscheck.fit.registration import turn_of_points
 from crosscheck.measurements.dwells import mean_rotation
 from seecr.counted import counted
-from seecr.pose import Array, quat_conjugate, quat_multiply, quat_rotate
+from seecr.pose import Array, quat_conjugate, quat_multiply, quat_rotate, rotvec_from_quat
 
 # What is left may be this part of the spread of the points, and of named points.
 _LEFT, _LEFT_OF_POINTS = 0.2, 0.05
@@ -53,6 +53,8 @@ class Frames:
         if quat is None:
             return place, None
         turned = quat_multiply(quat_multiply(self.turn, quat), quat_conjugate(self.target_turn))
+        # q and -q are one turn: people expect the one that is near 1 0 0 0
+        turned = np.where(turned[:, :1] < 0.0, -turned, turned)
         return place - quat_rotate(turned, self.target_shift), turned
 
 
@@ -139,9 +141,15 @@ def with_target(frames: Frames, quat: Array | None, told: Array, target: Array |
     if quat is None:
         return replace(frames, free=free)
     base = quat_multiply(frames.turn, quat)
-    turn = mean_rotation(quat_multiply(quat_conjugate(told[:, 3:]), base))
-    angle = np.degrees(Rotation.from_quat(turn, scalar_first=True).magnitude())
-    how = f"{frames.how}; the body's axes turned by {angle:.3g} deg into the platform's"
+    inside = quat_multiply(quat_conjugate(told[:, 3:]), base)
+    turn = mean_rotation(inside)
+    away = rotvec_from_quat(quat_multiply(inside, quat_conjugate(turn)))
+    left = np.degrees(np.sqrt(np.mean(np.sum(away**2, axis=1))))
+    angle = np.degrees(np.linalg.norm(rotvec_from_quat(turn)))
+    how = (
+        f"{frames.how}; the body's axes turned by {angle:.3g} deg into the platform's: {left:.2g} "
+        "deg rms are left"
+    )
     return replace(frames, target_turn=turn, how=how, free=free)
 
 

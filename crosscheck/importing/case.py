@@ -131,9 +131,12 @@ def import_case(
             "give --commands once for each file, in their order"
         )
     said: list[str] = []
+    logs = [load_commands(log, robot) for log in commands]
+    for log in logs:
+        said += [f"{log.path.name}: {note}" for note in log.notes]
     takes = [
-        take_of(form, Path(file), robot, load_commands(log, robot), choices, said)
-        for file, log in zip(files, commands, strict=True)
+        take_of(form, Path(file), robot, log, choices, said)
+        for file, log in zip(files, logs, strict=True)
     ]
     frames = _frames(robot, takes, choices)
     parts = [_measured(take, frames) for take in takes]

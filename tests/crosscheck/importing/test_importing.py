@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 
 import made_recordings as made_of
@@ -163,6 +164,23 @@ def test_positions_alone_and_level_commands(tmp_path):
     found = import_case("poses", [log], ROBOT, [commands])
     assert found.measured.quat_wxyz is None and found.measured.sigma.orientation_rad is None
     assert crosscheck.compare(ROBOT, found.measured, TRUE).is_noise
+
+
+def test_what_commands_leave_open_and_orientations_leave_is_said(made, tmp_path):
+    """A wrong order of Euler angles shows in what is left, commands that are not turned too."""
+    commands = made_of.commands_csv(tmp_path / "c.csv", made)
+    file = made_of.vicon_csv(tmp_path / "a.csv", made, rotation="XYZ")
+    left = []
+    for order in ("XYZ", "ZYX"):
+        found = import_case("vicon", [file], ROBOT, [commands], Choices(rotation=order))
+        left.append(float(re.search(r"platform's: (\S+) deg rms are left", str(found))[1]))
+        assert np.nanmin(found.measured.quat_wxyz[:, 0]) > 0.9
+    assert left[0] < 0.7 * left[1]
+    rows = [line.split(",")[:5] for line in commands.read_text().splitlines()]
+    commands.write_text("\n".join(",".join([*row, "1"]) for row in rows).replace("z_m,1", "z_m,a"))
+    notes = import_case("vicon", [file], ROBOT, [commands], Choices(rotation="XYZ")).notes
+    assert "c.csv: Not used: a." in notes
+    assert "c.csv: No commanded orientation: that of the reference pose is used." in notes
 
 
 def test_a_command_without_a_dwell_is_a_way_point(made, commands, tmp_path):
