@@ -9,11 +9,15 @@ from crosscheck.files import write_texts
 from crosscheck.measurements.data import Measurements
 
 
-def write_measurements(path: str | Path, data: Measurements) -> None:
+def write_measurements(path: str | Path, data: Measurements, remark: str = "") -> None:
     """Write the CSV and, beside it, the TOML with all that is no column; both whole or not at all.
 
     Numbers have 9 significant digits, readings that are missing are empty cells. Runs start all at
     the reference pose or all at their first rows: a TOML cannot say it run by run.
+
+    Args:
+        path: of the CSV. data: what is written.
+        remark: what a line before the header says.
 
     Raises:
         InputFileError: the folder cannot be written.
@@ -21,7 +25,8 @@ def write_measurements(path: str | Path, data: Measurements) -> None:
     path = Path(path)
     columns = dict(data.columns())
     rows = (",".join(map(_cell, row)) for row in zip(*columns.values(), strict=True))
-    text = "\n".join([",".join(columns), *rows]) + "\n"
+    said = [f"# {remark}"] if remark else []
+    text = "\n".join([*said, ",".join(columns), *rows]) + "\n"
     # The CSV last: a TOML without it is no measurement.
     write_texts({path.with_suffix(".toml"): _toml(data), path: text})
 

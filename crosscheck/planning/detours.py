@@ -55,6 +55,7 @@ def _way_points(plan: Planned, data: Measurements) -> Iterator[Extension]:
     gone_through = replace(
         both,
         run=named_again(both),
+        t_s=None if data.t_s is None else _halfway(data.t_s),
         command_pose=np.stack([beyond, data.command_pose], axis=1).reshape(2 * n, 7),
         # something is read at the stops and nothing between them; what, is the model's
         position=np.where(stops[:, None], np.zeros(3), np.nan),
@@ -64,6 +65,12 @@ def _way_points(plan: Planned, data: Measurements) -> Iterator[Extension]:
     )
     words = "reach each pose again over a way point beyond it, so that it is come to from there"
     yield Extension(Adding.WAY_POINTS, words, like(plan, gone_through))
+
+
+def _halfway(t_s: Array) -> Array:
+    """Times (2n,) [s] of a way point before each row, halfway from the row before it, and of it."""
+    before = np.concatenate([[t_s[0] - np.diff(t_s[:2], append=t_s[0])[0]], t_s[:-1]])
+    return np.stack([np.minimum(0.5 * (before + t_s), t_s), t_s], axis=1).ravel()
 
 
 def _beyond(plan: Planned, data: Measurements) -> Array | None:

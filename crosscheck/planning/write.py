@@ -28,8 +28,14 @@ def write_plan(plan: Plan, folder: Path, chosen: bool) -> tuple[str, ...]:
         if item.reached and item.commands is not None:
             files[f"add-{item.kind.value}.csv"] = item.commands
     for name, commands in files.items():
-        write_measurements(folder / name, _unread(commands))
+        write_measurements(folder / name, _unread(commands), remark_of(commands))
     return tuple(files)
+
+
+def remark_of(commands: Measurements) -> str:
+    """Which lines, below the remark and the header, are not to be read; "" where all are."""
+    lines = ", ".join(str(row + 3) for row in np.flatnonzero(~commands.read))
+    return lines and f"way points, gone through without a reading: lines {lines}"
 
 
 def _unread(data: Measurements) -> Measurements:

@@ -13,12 +13,15 @@ import crosscheck
 from crosscheck.fit.candidates import null_fit
 from crosscheck.fit.prepare import prepare
 from crosscheck.measurements.data import Sigma
+from crosscheck.measurements.read import load_commands
+from crosscheck.measurements.write import write_measurements
 from crosscheck.planning.adding import Adding
 from crosscheck.planning.compose import compose
 from crosscheck.planning.design import make_plan
 from crosscheck.planning.detours import detours
 from crosscheck.planning.planned import Reads, planned
 from crosscheck.planning.sight import sight_of
+from crosscheck.planning.write import remark_of
 from seecr.effects import Terms
 from seecr.equilibrium import solve
 from seecr.mjcf import load_robot
@@ -92,7 +95,7 @@ def test_a_set_up_sees_what_it_reads(cogiro):
     )
 
 
-def test_way_points_and_payloads_aside_are_proposed(cogiro):
+def test_way_points_and_payloads_aside_are_proposed(cogiro, tmp_path):
     data = measured(cogiro, points=3)
     plan = planned(cogiro, data, SIGMA, Reads.whole(cogiro.n_cables))
     found = {one.kind: one.plan.problem.data for one in detours(plan)}
@@ -100,6 +103,12 @@ def test_way_points_and_payloads_aside_are_proposed(cogiro):
     assert np.array_equal(over.read, np.tile([False, True], data.n_rows))
     assert np.array_equal(over.command_pose[1::2], data.command_pose)
     assert feasible(cogiro, over.command_pose[::2][:6]).all()
+    assert np.all(np.diff(over.t_s)[over.run[1:] == over.run[:-1]] > 0.0)
+    assert np.array_equal(over.t_s[1::2], data.t_s)
+    remark = remark_of(over)
+    write_measurements(tmp_path / "add.csv", over, remark)
+    line = load_commands(tmp_path / "add.csv", cogiro).line[~over.read]
+    assert remark.endswith(f"without a reading: lines {', '.join(map(str, line))}")
     moved = np.linalg.norm(over.command_pose[::2, :3] - data.command_pose[:, :3], axis=1)
     assert moved.max() > 0.05
     aside = found[Adding.PAYLOAD_ASIDE].loads
