@@ -224,7 +224,9 @@ def wrench_matrix(robot: Robot, poses: ArrayLike) -> Array:
     places = _poses(poses)
     anchors = transform_points(places, robot.anchor_points)
     cables = robot.exit_points - anchors
-    unit = cables / np.linalg.norm(cables, axis=-1, keepdims=True)
+    size = np.linalg.norm(cables, axis=-1, keepdims=True)
+    # a cable without a length has no direction to pull in
+    unit = cables / np.where(size > 0.0, size, np.inf)
     moment = np.cross(anchors - places[:, None, :3], unit)
     return np.swapaxes(np.concatenate([unit, moment], axis=-1), 1, 2)
 

@@ -15,7 +15,14 @@ from seecr.mjcf import load_robot
 from seecr.pose import quat_rotate
 from seecr.robot import Robot
 from seecr.shipped import model_path
-from seecr.workspace import Zone, feasible, slack_zones, unbalanced, wrench_matrix
+from seecr.workspace import (
+    Zone,
+    feasible,
+    slack_zones,
+    tension_margin,
+    unbalanced,
+    wrench_matrix,
+)
 
 pytestmark = pytest.mark.slow
 
@@ -158,3 +165,11 @@ def test_zones_count_only_where_there_is_an_answer(parallel: Robot) -> None:
 def test_bad_input(cogiro: Robot, arguments: dict, text: str) -> None:
     with pytest.raises(InputError, match=text):
         feasible(cogiro, **{"poses": [0.4, 0.25, 0.1, 1, 0, 0, 0], **arguments})
+
+
+def test_a_cable_without_a_length_holds_nothing() -> None:
+    robot = load_robot(model_path("camera"))
+    at = np.concatenate([robot.exit_points[0], [1.0, 0.0, 0.0, 0.0]])
+    # the three others pull sideways alone
+    assert tension_margin(robot, at)[0] == -np.inf
+    assert not feasible(robot, at)[0]
