@@ -21,9 +21,14 @@ __all__ = ["figure", "map_figure", "sweep_figure"]
 COLOURS = (
     "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#000000", "#B8A800",
 )  # fmt: skip
-# More cables than colours are told apart by dashes.
 # What says which pose it is, where no coordinate does.
 _NUMBERS = ("line of the file", "pose, counted from 0")
+# A grid of more than this [m] is told in metres.
+_LARGE = 5.0
+# Margins grow without end towards the height of the exit points: so many times what half of the
+# poses have is the end of their colours.
+_OUTSTANDING = 4.0
+# More cables than colours are told apart by dashes.
 _DASHES = ("-", "--", ":", "-.")
 # Beyond so many cables a legend says nothing.
 _MOST_NAMED = 24
@@ -175,18 +180,23 @@ def map_figure(path: Path, found: Workspace, most: int = 4) -> None:
     if np.any(found.rests):
         panels += [_slack_panel, _away_panel, _turn_panel]
     size = (0.9 + 2.9 * len(picked), 0.5 + 2.3 * len(panels))
-    extents = 1e3 * found.axes[wide], 1e3 * found.axes[high]
+    metres = max(float(np.ptp(axis)) for axis in found.axes) > _LARGE
+    unit, per_metre = ("m", 1.0) if metres else ("mm", 1e3)
+    extents = per_metre * found.axes[wide], per_metre * found.axes[high]
     with figure(path, len(panels), len(picked), sharex=True, sharey=True, figsize=size) as axes:
         for row, panel in zip(axes, panels, strict=True):
             number = np.arange(found.margin.size).reshape(lengths)
             slices = [np.take(number, k, across) for k in picked]
             shown = panel(found, row, *extents, slices)
             row[0].figure.colorbar(shown, ax=list(row), **_bar_of(panel, found))
-            row[0].set_ylabel(f"{'xyz'[high]} [mm]")
+            row[0].set_ylabel(f"{'xyz'[high]} [{unit}]")
         for k, ax in zip(picked, axes[0], strict=True):
-            ax.set_title(f"{'xyz'[across]} = {1e3 * found.axes[across][k]:.4g} mm")
+            ax.set_title(f"{'xyz'[across]} = {per_metre * found.axes[across][k]:.4g} {unit}")
         for ax in axes[-1]:
-            ax.set_xlabel(f"{'xyz'[wide]} [mm]")
+            ax.set_xlabel(f"{'xyz'[wide]} [{unit}]")
+        if len(panels) > 1:
+            words = "orange: the edge of what tensions within the limits can hold"
+            axes[0, 0].figure.suptitle(words, fontsize=9)
 
 
 Slices = list[NDArray[np.intp]]
@@ -198,7 +208,11 @@ def _bar_of(panel: Any, found: Workspace) -> dict[str, Any]:
         _slack_panel: "slack cables",
         _away_panel: "off its command [mm]", _turn_panel: "turned [°]",
     }  # fmt: skip
-    more = {"ticks": np.arange(found.robot.n_cables + 1)} if panel is _slack_panel else {}
+    more: dict[str, Any] = {"extend": "max"}
+    if panel is _chance_panel:
+        more = {}
+    elif panel is _slack_panel:
+        more = {"ticks": np.arange(found.robot.n_cables + 1)}
     return {"label": words[panel], "shrink": 0.9, **more}
 
 
@@ -206,9 +220,9 @@ def _held_panel(found: Workspace, row: Any, x: Array, y: Array, slices: Slices) 
     """The margin where poses can be held, with the workspace's boundary."""
     flat = np.where(found.feasible, found.margin, np.nan).ravel()
     finite = flat[np.isfinite(flat)]
-    # margins of poses far below the exit points grow without end and would hide the others
-    top = float(np.quantile(finite, 0.95)) if len(finite) else 1.0
-    return _colours(row, x, y, [flat[k] for k in slices], 0.0, top or 1.0)
+    half = float(np.median(finite)) if len(finite) else 0.0
+    top = min(_top(finite), _OUTSTANDING * half) or 1.0
+    return _colours(row, x, y, [flat[k] for k in slices], 0.0, top)
 
 
 def _chance_panel(found: Workspace, row: Any, x: Array, y: Array, slices: Slices) -> Any:
@@ -251,7 +265,8 @@ def _colours(
     for k, (ax, value) in enumerate(zip(row, values, strict=True)):
         shown = ax.pcolormesh(x, y, value.T, vmin=low, vmax=high, cmap=colours, shading="nearest")
         if found is not None and slices is not None:
-            inside = np.clip(found.margin.ravel()[slices[k]].T, -1e3, 1e3)
+            inside = np.where(found.feasible, np.maximum(found.margin, 0.0), found.margin)
+            inside = np.clip(inside.ravel()[slices[k]].T, -1e3, 1e3)
             if inside.min() < 0.0 < inside.max():
                 ax.contour(x, y, inside, levels=[0.0], colors="#D55E00", linewidths=1.2)
         ax.set_aspect("equal")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -179,6 +180,21 @@ def test_a_map_is_the_same_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     assert done == [6, 6, 6, 2]
     for name in ("margin", "deviation", "rotation", "slack", "stiffness"):
         np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))
+
+
+def test_a_large_robots_map_is_drawn_in_metres_and_its_colours_show_most_margins(
+    tmp_path: Path,
+) -> None:
+    robot = robot_named("camera")
+    found = workspace_map(
+        robot, [0, 30, 52.5, 75, 105], [0, 20, 34, 48, 68], [8, 24.99], elastic=False
+    )
+    map_figure(tmp_path / "map.svg", found, most=1)
+    text = (tmp_path / "map.svg").read_text()
+    assert "x [m]" in text and "y [m]" in text and "z = 8 m" in text
+    margins = found.margin[found.feasible]
+    ticks = [float(tick) for tick in re.findall(r">(\d+(?:\.\d+)?)</text>", text)]
+    assert margins.max() > 1e4 > 1e3 > max(ticks) > np.median(margins)
 
 
 def test_too_few_cables_are_mapped_by_position() -> None:
