@@ -237,12 +237,9 @@ class _Search:
         self, rows: NDArray[np.intp], scale: Array, fix_position: bool
     ) -> tuple[Array, NDArray[np.bool_]]:
         wanted, limits = self.given.pose[rows], self.limits
-        whole = self.given.pose.copy()
 
         def balance(poses: Array, some: NDArray[np.intp]) -> tuple[Array, Array]:
-            at = rows[some]
-            whole[at] = poses
-            part = replace(self.given, pose=whole).rows(at)
+            part = replace(self.given.rows(rows[some]), pose=poses)
             return balance_of(self._tables(part), limits.low)
 
         args = (self.robot, wanted, balance, limits.low, limits.high, scale[rows])

@@ -3,6 +3,12 @@
 Least position^2 + (length x rotation)^2 subject to balance, W(q) tau = -w(q), and limits: a
 sequence of projections on the linearised balance (Gauss-Newton), each the same small problem as
 a distribution of tensions, with the change of the pose among its unknowns.
+
+From the wanted pose that goes to what is near it, but only where the workspace curves less than
+the pose is far away. So a second search starts where the way from home leaves the workspace and
+stays in it: each step aims but a little nearer to the wanted pose, which has the same answers, goes
+back to balance, and counts where it came nearer (Levenberg's way with the length of steps). The
+nearer of both answers is taken; there may be nearer ones still, turned otherwise.
 """
 
 from __future__ import annotations
@@ -19,9 +25,13 @@ from seecr.pose import Array, pose_add, pose_difference
 from seecr.robot import Robot
 
 Balance = Callable[[Array, NDArray[np.intp]], tuple[Array, Array]]
-"""Balance at poses (k, 7) of some rows: matrices (k, d, m) and loads (k, d), A tau = load."""
+"""Balance at poses (k, 7) of some rows, which may come again: matrices (k, d, m), loads (k, d)."""
 
-_ROUNDS = 200
+# Rounds from the wanted pose, of which there are more where nothing follows; steps from home, and
+# how often each goes back to balance; halvings of the way from home.
+_ROUNDS, _ALONE, _INWARD, _RESTORED, _HALVINGS = 60, 200, 150, 2, 7
+# A step that comes nearer by less than this part of its length ends the search.
+_FLAT = 1e-7
 # Steps of a pose that a linear program may help with: each takes milliseconds.
 _HELPS = 30
 # A pose this near to the limit is held with something to spare: tensions, relative to the load.
@@ -66,15 +76,13 @@ def nearest(
         free[~robot.hinges] = 0.0
     way = _Way(robot, wanted, values, balance, least, most, scale, free)
     away, found = np.zeros((len(wanted), robot.n_dof)), np.zeros(len(wanted), dtype=bool)
-    way.run(away, found, np.arange(len(wanted)))
-    lost = np.flatnonzero(~found)
-    if not fix_position and len(lost):
-        # from afar the linearised balance leads nowhere: go from where the robot is at home, if
-        # it can be held there
-        home = way.to(robot.reference_pose)
-        lost = lost[way.held(home[lost], lost)]
-        away[lost] = home[lost]
-        way.run(away, found, lost)
+    rows = np.arange(len(wanted))
+    way.run(away, found, rows, _ALONE if fix_position else _ROUNDS)
+    if not fix_position:
+        inward, rows = way.from_home(rows)
+        nearer = np.linalg.norm(inward, axis=1) < np.linalg.norm(away[rows], axis=1)
+        nearer |= ~found[rows]
+        away[rows[nearer]], found[rows] = inward[nearer], True
     return way.placed(away, np.arange(len(wanted))), found
 
 
@@ -91,17 +99,17 @@ class _Way:
     scale: Array
     free: Array
 
-    def run(self, away: Array, found: NDArray[np.bool_], rows: NDArray[np.intp]) -> None:
+    def run(
+        self, away: Array, found: NDArray[np.bool_], rows: NDArray[np.intp], rounds: int
+    ) -> None:
         """Go on from ``away`` (n, d) in some rows; that and ``found`` are changed in place."""
-        if len(rows) == 0:
-            return
         n, length = len(self.wanted), self.robot.length
         expected, share = np.full(n, np.inf), np.ones(n)
         tensions = np.zeros(self.least.shape)
         tensions[rows] = self._balanced(away[rows], rows)[0]
         good, pulled = away.copy(), tensions.copy()
         helps = np.zeros(n, dtype=np.intp)
-        for _ in range(_ROUNDS):
+        for _ in range(rounds):
             step, change, left, possible = self._step(away[rows], tensions[rows], rows, helps)
             size = np.linalg.norm(step, axis=1)
             done = possible & (left <= _TIGHT * self.scale[rows]) & (size <= _ENOUGH * length)
@@ -127,6 +135,52 @@ class _Way:
             if len(rows) == 0:
                 break
 
+    def from_home(self, rows: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
+        """How far (k, d) what is held stays from those of rows, and these: home is held there."""
+        home = self.to(self.robot.reference_pose)
+        rows = rows[self.held(home[rows], rows)]
+        if len(rows) == 0:
+            return np.empty((0, home.shape[1])), rows
+        away = home[rows] * (1.0 - self._held_part(home[rows], rows)[:, None])
+        pulls, length = self._balanced(away, rows)[0], self.robot.length
+        reach, still = np.full(len(rows), length), np.arange(len(rows))
+        for _ in range(_INWARD):
+            if len(still) == 0:
+                break
+            at, far = rows[still], np.linalg.norm(away[still], axis=1)
+            part = reach[still] / np.maximum(far, 1e-300)
+            to, pull, left = self._nearer(away[still], pulls[still], at, np.minimum(part, 1.0))
+            gain = far - np.linalg.norm(to, axis=1)
+            better = (left <= _TIGHT * self.scale[at]) & (gain > 0.0)
+            away[still[better]], pulls[still[better]] = to[better], pull[better]
+            flat = better & (gain < _FLAT * reach[still])
+            reach[still] *= np.where(better, 2.0, 0.25)
+            still = still[~flat & (reach[still] > _ENOUGH * length) & (far > _ENOUGH * length)]
+        return away, rows
+
+    def _held_part(self, home: Array, rows: NDArray[np.intp]) -> Array:
+        """(k,) how much of the straight way from home to the wanted poses can be held."""
+        inner, outer = np.zeros(len(rows)), np.ones(len(rows))
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (inner + outer)
+            ok = self.held(home * (1.0 - middle[:, None]), rows)
+            inner, outer = np.where(ok, middle, inner), np.where(ok, outer, middle)
+        return inner
+
+    def _nearer(
+        self, away: Array, tensions: Array, rows: NDArray[np.intp], part: Array
+    ) -> tuple[Array, Array, Array]:
+        """A part of the way on and back to balance: where to, tensions, what is left [N]."""
+        to, pull = away, tensions
+        for k in range(_RESTORED + 1):
+            goal = to * (1.0 - part[:, None]) if k == 0 else to
+            step, change, _, possible = self._step(to, pull, rows, goal=goal)
+            to = np.where(possible[:, None], to + step, away)
+            pull = np.where(possible[:, None], pull + change, tensions)
+        matrix, load = self.balance(self.placed(to, rows), rows)
+        left = np.abs(np.einsum("ndm,nm->nd", matrix, pull) - load).max(axis=1)
+        return to, pull, left
+
     def held(self, away: Array, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
         """Whether the poses so far from those of rows can be held."""
         return np.asarray(self._balanced(away, rows)[1] < _TIGHT)
@@ -147,12 +201,18 @@ class _Way:
         return change * np.where(self.robot.hinges, self.robot.length, 1.0)
 
     def _step(
-        self, away: Array, tensions: Array, rows: NDArray[np.intp], helps: NDArray[np.intp]
+        self,
+        away: Array,
+        tensions: Array,
+        rows: NDArray[np.intp],
+        helps: NDArray[np.intp] | None = None,
+        goal: Array | None = None,
     ) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
         """Steps of way and tensions, what is out of balance [N], whether there is a step.
 
-        ``helps`` (n,) counts where least squares lost it to rounding, changed in place.
-        """
+        ``helps`` (n,) counts where least squares lost it to rounding, changed in place; without it
+        nothing helps. To ``goal`` (k, d), or the wanted poses with the least tensions.
+        """  # fmt: skip
         k, m = tensions.shape
         matrix, load = self.balance(self.placed(away, rows), rows)
         rates = self._rates(away, tensions, rows)
@@ -164,8 +224,18 @@ class _Way:
             np.concatenate([one[rows] * unit, np.tile(sign * self.free, (k, 1))], axis=1)
             for one, sign in ((self.least, -1.0), (self.most, 1.0))
         )
+        near = np.zeros(low.shape)
+        if goal is not None:
+            near = np.concatenate([tensions * unit, goal], axis=1)
         aim = load + np.einsum("ndk,nk->nd", rates, away)
-        answer, possible = distribute(whole, aim, np.zeros(low.shape[1]), low, high)
+        answer, possible = distribute(whole, aim, near, low, high)
+        if helps is None:
+            return (
+                answer[:, m:] - away,
+                answer[:, :m] / unit - tensions,
+                np.abs(left).max(1),
+                possible,
+            )
         helps[rows[~possible]] += 1
         for i in np.flatnonzero(~possible & (helps[rows] <= _HELPS)):
             step = _by_parts(whole[i], aim[i], low[i], high[i], m)
@@ -182,16 +252,13 @@ class _Way:
 
     def _rates(self, away: Array, tensions: Array, rows: NDArray[np.intp]) -> Array:
         """Derivatives (k, d, d) of what is out of balance by the way, the tensions kept."""
-        d, step = away.shape[1], _DIFFERENCE * self.robot.length
-        out = np.empty((len(away), d, d))
-        for k in range(d):
-            sides = []
-            for sign in (1.0, -1.0):
-                moved = away + sign * step * np.eye(d)[k]
-                matrix, load = self.balance(self.placed(moved, rows), rows)
-                sides.append(np.einsum("ndm,nm->nd", matrix, tensions) - load)
-            out[..., k] = (sides[0] - sides[1]) / (2.0 * step)
-        return out
+        (k, d), step = away.shape, _DIFFERENCE * self.robot.length
+        sides = step * np.concatenate([np.eye(d), -np.eye(d)])
+        moved = (away + sides[:, None]).reshape(-1, d)
+        matrix, load = self.balance(self.placed(moved, np.tile(rows, 2 * d)), np.tile(rows, 2 * d))
+        left = np.einsum("ndm,nm->nd", matrix, np.tile(tensions, (2 * d, 1))) - load
+        plus, minus = left.reshape(2, d, k, -1)
+        return np.asarray(np.moveaxis(plus - minus, 0, 2) / (2.0 * step))
 
 
 def _by_parts(matrix: Array, aim: Array, low: Array, high: Array, m: int) -> Array | None:

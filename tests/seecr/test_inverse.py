@@ -136,6 +136,33 @@ def test_the_nearest_pose_is_the_nearest(name: str, x: float) -> None:
     assert 0.99 * theirs < ours < 1.001 * theirs
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["demobot_parallel", "ipanema"])
+def test_poses_far_outside_have_a_nearest_one_too(name: str) -> None:
+    robot = robot_named(name)
+    limits = {"lowest": 50.0, "highest": 3000.0} if name == "ipanema" else {}
+    size = float(np.ptp(robot.exit_points, axis=0).max())
+    toward = np.random.default_rng(3).normal(size=(6, 3))
+    toward /= np.linalg.norm(toward, axis=1)[:, None]
+    want = np.tile(robot.reference_pose, (6, 1))
+    want[:, :3] += size * np.array([0.7, 1.0, 1.5, 2.5, 4.0, 5.5])[:, None] * toward
+    found = correct(robot, want, **limits)
+    assert found.found.all() and not found.held.any() and found.solution.converged.all()
+    assert np.abs(pose_difference(found.solution.pose, found.aimed)).max() < 1e-9
+    # none that can be held and is but a little nearer: 1 % of the robot towards the wanted pose,
+    # turned by up to 0.3 deg besides
+    unit = np.repeat([1.0, robot.length], 3)
+    rng = np.random.default_rng(4)
+    for aimed, wanted in zip(found.aimed, want, strict=True):
+        way = unit * pose_difference(wanted, aimed)
+        step = 0.01 * robot.length * way / np.linalg.norm(way)
+        tried = step + 0.5 * np.linalg.norm(step) * rng.normal(size=(200, 6))
+        poses = pose_add(np.tile(aimed, (200, 1)), tried / unit)
+        nearer = np.linalg.norm(unit * pose_difference(np.tile(wanted, (200, 1)), poses), axis=1)
+        poses = poses[nearer < np.linalg.norm(way) - 0.5 * np.linalg.norm(step)]
+        assert len(poses) > 50 and not feasible(robot, poses, **limits).any()
+
+
 def test_a_robot_with_too_few_cables_keeps_the_position() -> None:
     robot = robot_named("planar_two_cable")
     want = robot.reference_pose + np.array([0.1, 0, 0.05, 0, 0, 0, 0])
