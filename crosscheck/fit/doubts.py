@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crosscheck.fit.problem import BY_NAME, Problem
 from crosscheck.units import short
@@ -22,15 +23,21 @@ def doubts(problem: Problem, readings: Readings) -> list[str]:
         problem: the data with their noise. readings: what the model as it stands expects.
     """
     raw = problem.residuals(readings)
-    return [*_worse_than_commands(problem, raw), *_other_tensions(problem, raw)]
+    data = problem.data
+    said = [
+        f"{data.files[k]}: {note}" if data.files else note
+        for k in np.unique(data.file)
+        for note in _worse_than_commands(problem, raw, data.file == k)
+    ]
+    return [*said, *_other_tensions(problem, raw)]
 
 
-def _worse_than_commands(problem: Problem, raw: Array) -> list[str]:
+def _worse_than_commands(problem: Problem, raw: Array, rows: NDArray[np.bool_]) -> list[str]:
     told = problem.data.command_pose
     if told is None:
         return []
     columns = BY_NAME["position"].columns
-    counted = problem.counted[:, columns] & np.isfinite(raw[:, columns])
+    counted = problem.counted[:, columns] & np.isfinite(raw[:, columns]) & rows[:, None]
     if counted.any(axis=1).sum() < _LEAST_ROWS:
         return []
     off = float(np.sqrt(np.mean(raw[:, columns][counted] ** 2)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import crosscheck
 from crosscheck.fit.prepare import prepare
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import load_commands, load_measurements
+from crosscheck.measurements.together import together
 from crosscheck.measurements.write import write_measurements
 from seecr.effects import Terms
 from seecr.errors import InputFileError
@@ -81,6 +83,15 @@ def test_a_model_worse_than_the_commands(cogiro):
     assert "the commands themselves only" not in notes(COGIRO, cogiro)
     obeyed = replace(cogiro, position=cogiro.command_pose[:, :3] + 1e-5, tensions=None)
     assert "the commands themselves only 0.0100 mm (rms)" in notes(COGIRO, obeyed)
+
+
+def test_of_several_files_the_one_of_another_robot_is_named(cogiro):
+    odd = replace(cogiro, position=cogiro.command_pose[:, :3] + 1e-5, tensions=None)
+    both = together([replace(cogiro, path=Path("own.csv")), replace(odd, path=Path("odd.csv"))])
+    said = [
+        note for note in crosscheck.compare(COGIRO, both).notes if "commands themselves" in note
+    ]
+    assert len(said) == 1 and said[0].startswith("odd.csv: The model is ")
 
 
 def test_newtons_in_a_column_of_kilonewtons(cogiro, tmp_path):
