@@ -113,15 +113,15 @@ def figure_4(path: Path) -> None:
             found = solve(one, poses)
             colour = COLOURS[k]
             place.plot(x, np.full_like(x, z), "+", color=colour)
-            place.plot(found.pose[:, 0], found.pose[:, 2], "o-", color=colour, markersize=3,
-                       label=f"commanded y = {z:g} m")  # fmt: skip
+            place.plot(found.pose[:, 0], found.pose[:, 2], "o-", color=colour, markersize=3)
             at_command = np.degrees(bar_tilt(EXITS, np.column_stack([x, np.full_like(x, z)]), HALF))
             angle.plot(x, at_command, "--", color=colour)
-            angle.plot(found.pose[:, 0], -tilt(found), "o-", color=colour, markersize=3)
+            angle.plot(found.pose[:, 0], -tilt(found), "o-", color=colour, markersize=3,
+                       label=f"commanded y = {z:g} m")  # fmt: skip
         place.set(xlabel="x [m]", ylabel="y [m]", title="+ commanded, ● at rest (k_c = 100 N)")
         place.set_ylim(0.0, 0.8)
-        place.legend(fontsize=8, loc="lower center", ncols=1)
         angle.set(xlabel="x [m]", ylabel="tilt θ [°]", title="- - at the command, ● at rest")
+        angle.legend(fontsize=8)
 
 
 def _zones(ax: Any, x: Array, solution: Solution) -> None:
@@ -257,6 +257,13 @@ def _two_cables() -> Iterator[tuple[str, str, str, str]]:
     )
 
 
+def _midlines_off(found: Solution) -> Array:
+    """Sideways from the centre of mass to where the midlines meet, V or H (n,) [m]."""
+    ends = transform_points(found.pose, found.robot.anchor_points)
+    point = midline_point(found.robot.exit_points[:, [0, 2]], ends[..., [0, 2]])
+    return np.asarray(point[:, 0] - found.pose[:, 0])
+
+
 def _four_cables() -> Iterator[tuple[str, str, str, str]]:
     vertical, level = sweep("planar_vertical", 0.2), sweep("planar_horizontal", 0.2)
     x = vertical.command[:, 0]
@@ -267,17 +274,18 @@ def _four_cables() -> Iterator[tuple[str, str, str, str]]:
         "both occur",
         (f"{width(vertical, x, 2):.0f} mm, {width(vertical, x, 1):.0f} mm wide"),
     )
-    one = robot("planar_vertical")
-    ends = transform_points(vertical.pose[[0, len(x) // 2]], one.anchor_points)
-    points = midline_point(one.exit_points[:, [0, 2]], ends[..., [0, 2]])
+    off = [_midlines_off(found) for found in (vertical, level)]
     yield (
         "9",
         "point V at x = 0.17 m / in the middle, off the centre of mass",
         ("off, and on its line"),
-        " / ".join(
-            f"{1e3 * (p[0] - q[0]):+.1f} mm"
-            for p, q in zip(points, vertical.pose[[0, len(x) // 2]], strict=True)
-        ),
+        " / ".join(f"{1e3 * off[0][i]:+.1f} mm" for i in (0, len(x) // 2)),
+    )
+    yield (
+        "9",
+        "point H off the line of the centre of mass by at most",
+        "on it",
+        nothing(np.abs(off[1]).max(), " m"),
     )
     yield (
         "8",
