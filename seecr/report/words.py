@@ -206,7 +206,12 @@ def other_lines(
 
 def _more_energy(more: float) -> str:
     """A moment from outside and a law in strain alone have no energy."""
-    return f"{1e3 * more:+.4g} mJ, " if np.isfinite(more) else ""
+    return f"{_joules(more, '+.4g')}, " if np.isfinite(more) else ""
+
+
+def _joules(energy: float, form: str = ".3g") -> str:
+    """An energy in mJ, from 1 J on in J."""
+    return f"{energy:{form}} J" if abs(energy) >= 1.0 else f"{1e3 * energy:{form}} mJ"
 
 
 def _pass_words(way: Barrier) -> str:
@@ -216,7 +221,9 @@ def _pass_words(way: Barrier) -> str:
         return (
             f"{twisted}; what it takes to get there has no number: this load or law has no energy"
         )
-    return f"{twisted}, {least}{1e3 * way.energy:.3g} mJ to get there, {1e3 * way.back:.3g} back"
+    # the top of a way that was not made exact may be its end, but for rounding
+    back = _joules(way.back) if way.back > 1e-12 * way.energy else "next to nothing"
+    return f"{twisted}, {least}{_joules(way.energy)} to get there, {back} back"
 
 
 def jump_lines(solution: Solution) -> Iterator[str]:
@@ -241,7 +248,7 @@ def jump_lines(solution: Solution) -> Iterator[str]:
 
 
 def _set_free(energy: float) -> str:
-    return f", {1e3 * energy:.3g} mJ set free" if np.isfinite(energy) else ""
+    return f", {_joules(energy)} set free" if np.isfinite(energy) else ""
 
 
 def sweep_lines(

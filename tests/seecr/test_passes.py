@@ -52,7 +52,7 @@ def test_the_pass_between_the_two_rests_of_the_tilted_command() -> None:
             highest = max(highest, float(evaluated(robot, many, on).energy.max()))
         assert highest - own.energy[0] >= way.energy
     (line,) = other_lines(own, every, [way])
-    assert line.endswith("; reachable, 0.068 mJ to get there, 1.68 back")
+    assert line.endswith("; reachable, 0.068 mJ to get there, 1.68 mJ back")
 
 
 @pytest.mark.slow

@@ -35,3 +35,9 @@ def test_what_has_no_energy_gets_no_number() -> None:
     assert "what it takes to get there has no number" in line
     (line,) = other_lines(free, free.others[0])
     assert " mJ, slack:" in line
+    # a hall's energies are told in joules; a way that ends at its top takes nothing back
+    hall = replace(free.others[0], energy=free.energy + 428.0)
+    steep = Barrier(428.0, 1e-13, tilted, False, True)
+    (line,) = other_lines(free, hall, [steep])
+    assert ", +428 J, slack:" in line
+    assert line.endswith("; twisted, at most 428 J to get there, next to nothing back")
