@@ -1,7 +1,7 @@
 # The tasks of this repository; `make` lists them. They use .venv, which `make setup` makes.
 BIN := .venv/bin
 
-.PHONY: help setup quick test sweep bench docs pictures suite ci
+.PHONY: help setup quick test sweep bench docs paper pictures suite ci
 
 help: ## list the tasks
 	@sed -n 's/^\([a-z]*\): .*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 8
@@ -35,6 +35,10 @@ docs: ## write the pages and pictures made from the sources, and build the site:
 	$(BIN)/python scripts/make_paper.py
 	$(BIN)/python scripts/draw_fall.py
 	$(BIN)/python -m sphinx -q -W --keep-going -c docs -d build/read . build/site
+
+paper: ## every figure and number of docs/paper.md; three minutes
+	$(BIN)/python scripts/make_paper.py
+	$(BIN)/python scripts/explain_figure_12.py
 
 pictures: ## docs/pictures by the viewer and a browser; the pages, light and dark, wide and narrow, in pages/
 	$(BIN)/python scripts/render_pictures.py

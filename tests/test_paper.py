@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import explain_figure_12
 import make_paper
 import numpy as np
@@ -21,6 +23,13 @@ def test_every_figure_is_on_the_page() -> None:
     for name in make_paper.FIGURES:
         assert f"pictures/paper/{name}.png" in page
         assert (make_paper.PICTURES / f"{name}.png").exists()
+    # one command remakes them, with that of what would explain figure 12
+    shown = set(re.findall(r"pictures/paper/([\w-]+)\.png", page))
+    assert shown == {*make_paper.FIGURES, "figure-12-explained"} and "`make paper`" in page
+    recipe = (
+        (make_paper.ROOT / "Makefile").read_text().partition("\npaper:")[2].partition("\n\n")[0]
+    )
+    assert all(f"scripts/{one.__name__}.py" in recipe for one in (make_paper, explain_figure_12))
 
 
 @pytest.mark.slow
