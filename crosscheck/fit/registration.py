@@ -105,8 +105,9 @@ def turn_of_points(here: Array, there: Array) -> Array | None:
 
 
 def _turn_of_weighted(here: Array, there: Array, weight: Array) -> Array | None:
-    spread = np.linalg.svd(here, compute_uv=False)
-    if spread[1] <= _THIN * spread[0]:
+    # what bends in one of the frames alone is an error, and shows no turn
+    spreads = [np.linalg.svd(points, compute_uv=False) for points in (here, there)]
+    if any(spread[1] <= _THIN * spread[0] for spread in spreads):
         return None
     s = (here * weight[:, None]).T @ there
     cross = np.array([s[1, 2] - s[2, 1], s[2, 0] - s[0, 2], s[0, 1] - s[1, 0]])

@@ -27,6 +27,11 @@ _MOST = 0.8
 _TURNED = np.radians(3.0)
 _ROUNDS = 10
 _LEAST = 3
+_ONE_LINE = (
+    "the frames cannot be aligned: the commanded positions of the dwells lie in one line, or "
+    "nearer to one than to what was read, which shows no turn about it; name three points with "
+    "--point"
+)
 _NONE = np.array([1.0, 0.0, 0.0, 0.0])
 
 
@@ -114,18 +119,16 @@ def to_commands(position: Array, quat: Array | None, told: Array, target: Array 
     turn = None
     for _ in range(_ROUNDS if tilted else 1):
         turn = turn_of_points(position, told[:, :3] + quat_rotate(home, shift))
-        if turn is None:
-            raise CrosscheckError(
-                "the frames cannot be aligned: the commanded positions of the dwells lie in one "
-                "line, which shows no turn about it; name three points with --point"
-            )
-        if tilted:
+        if turn is not None and tilted:
             shift = _target(quat_rotate(turn, position), told)
-    assert turn is not None
+    if turn is None:
+        raise CrosscheckError(_ONE_LINE)
     away = told[:, :3] + quat_rotate(home, shift) - quat_rotate(turn, position)
     frames = Frames(turn, np.median(away, axis=0), _NONE, shift, "", ("tracker_frame",))
     left = np.linalg.norm(away - frames.shift, axis=1)
     _check(left, told)
+    if np.median(left) > _aside(told[:, :3]):
+        raise CrosscheckError(_ONE_LINE)
     how = (
         f"tracker's frame aligned to the commands of {counted(len(told), 'dwell')}: "
         f"{1e3 * float(np.sqrt(np.mean(left**2))):.3g} mm rms are left"
@@ -172,6 +175,12 @@ def _target(base: Array, told: Array) -> Array:
 def _varies(quat: Array) -> bool:
     turns = Rotation.from_quat(quat, scalar_first=True)
     return bool(np.sqrt(np.mean((turns * turns.mean().inv()).magnitude() ** 2)) > _TURNED)
+
+
+def _aside(points: Array) -> float:
+    """How far points (n, 3) usually lie from the line that is nearest to them."""
+    sizes = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return float(np.sqrt(np.sum(sizes[1:] ** 2) / len(points)))
 
 
 def _spread(points: Array) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import made_recordings as made_of
 import numpy as np
@@ -178,6 +179,13 @@ def test_frames_that_cannot_be_aligned(files, made, tmp_path):
     short.write_text("\n".join(lines_of(files["poses"])[:rows]) + "\n")
     message = wrong({"poses": short}, commands=line)
     assert "the commanded positions of the dwells lie in one line" in message
+    # a robot that sags bends them, which is its error and shows no turn about the line
+    bent = replace(made, position=made.position + 0.002 * np.sin(20.0 * made.position[:, :1]))
+    sagging = made_of.poses_csv(tmp_path / "bent.csv", bent)
+    assert "of the dwells lie in one line" in wrong({"poses": sagging}, commands=line)
+    about = cell(lines_of(line), 3, 4, str(made.truth.command_pose[1, 1] + 1e-3))
+    line.write_text("\n".join(about) + "\n")
+    assert "in one line, or nearer to one than" in wrong({"poses": sagging}, commands=line)
     # the commands of another recording: the same poses in another order
     other = tmp_path / "other.csv"
     head = [row.split(",")[:2] for row in lines[1:]]
