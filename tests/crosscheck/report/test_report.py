@@ -148,6 +148,9 @@ def test_unknown_shows_where_structure_is_left() -> None:
         assert str(row.against) in seen
         assert row.bins[0].label in seen or len(row.bins) == 1
     assert "not explained" in seen
+    # what was tried may be a part of the catalogue; inks are other ones on dark pages
+    assert found.sentence.endswith("tried explains: an effect that is not among them.")
+    assert "Black:" not in seen and "Bracket: the spread over these runs" in seen
     assert "not explained" not in text_of(page("pulleys"))
 
 
