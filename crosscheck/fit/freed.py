@@ -20,7 +20,7 @@ from crosscheck.fit.problem import Problem
 from crosscheck.fit.registration import NAME as TRACKER
 from crosscheck.fit.registration import registered_each
 from crosscheck.fit.state import State, evaluate
-from crosscheck.fit.words import shown
+from crosscheck.fit.words import measured
 from crosscheck.units import parameter_name
 from seecr.effects import ApartLayout, Term, Terms, apart, effect_named, layout_of
 from seecr.pose import Array
@@ -59,9 +59,12 @@ def freed(problem: Problem, laid: LaidOut) -> Freed:
     free = _free(every, names, laid.fresh)
     factor = problem.noise(problem.experiment.predict(every.effects))
     state = _registered(problem, every, factor, free)
-    found = fit(problem, state.terms, factor, state, free=free).terms
+    best = fit(problem, state.terms, factor, state, free=free)
+    found = best.terms
     moved = free & ~found.knowledge.fixed
-    told = [_told(found, name, moved, problem, name in names) for name in found.names]
+    # where the model misses something, values are no surer than it is right
+    error = best.stderr * max(1.0, np.sqrt(best.state.chi2 / problem.n_readings))
+    told = [_told(found, name, moved, error, problem, name in names) for name in found.names]
     return Freed(found, moved, tuple(filter(None, told)))
 
 
@@ -107,16 +110,17 @@ def _registered(problem: Problem, terms: Terms, factor: Array, free: NDArray[np.
 
 
 def _told(
-    terms: Terms, name: str, moved: NDArray[np.bool_], problem: Problem, by_toml: bool
+    terms: Terms, name: str, moved: NDArray[np.bool_], error: Array, problem: Problem, by_toml: bool
 ) -> str:
     """What an effect was found to be; "" where it was not fitted."""
     term, mine = terms[name], moved[terms.part(name)]
     if not (mine.any() or by_toml):
         return ""
     layout = term.layout
-    values = zip(layout.names, layout.units, term.vector, mine, strict=True)
+    errors = np.where(mine, error[terms.part(name)], 0.0)
+    values = zip(layout.names, layout.units, term.vector, errors, mine, strict=True)
     words = ", ".join(
-        f"{parameter_name(key, unit)} {shown(v, unit)}" for key, unit, v, own in values
+        f"{parameter_name(key, unit)} {measured(v, e, unit)}" for key, unit, v, e, own in values
         if own or by_toml
     )  # fmt: skip
     why = f" is free, as the TOML beside {problem.data.path.name} says, and" if by_toml else ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from made_data import measured, soft_cogiro, term
 
 import crosscheck
+from crosscheck.fit.prepare import prepare
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.together import together
 from crosscheck.measurements.write import write_measurements
@@ -35,6 +37,16 @@ def test_what_is_left_does_not_depend_on_where_the_tracker_stands():
     assert not there.is_noise
     assert crosscheck.compare(ROBOT, far_away(mass), [mass]).is_noise
     assert any("tracker_frame is free, as the TOML" in note for note in there.notes)
+
+
+def test_free_values_are_told_with_errors_that_what_is_missing_widens():
+    errors = []
+    for effects in ((), (term(ROBOT, "platform_mass", added_kg=0.6),)):
+        notes = " ".join(prepare(ROBOT, far_away(*effects), Terms()).all_notes)
+        value, error = re.search(r"shift_x (\S+) ± (\S+) mm", notes).groups()
+        assert float(value) == pytest.approx(400.0, abs=4.0 * float(error))
+        errors.append(float(error))
+    assert errors[0] < 0.03 < 5.0 * errors[0] < errors[1]
 
 
 @pytest.mark.slow
