@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from crosscheck.importing.logged import Logged
-from seecr.columns.table import Table, read_table
+from seecr.columns.table import Table, read_table, show
 from seecr.columns.times import began, times_of_day
 from seecr.errors import InputError
 from seecr.pose import Array
@@ -67,6 +67,9 @@ def _columns(table: Table) -> dict[str, tuple[int, str]]:
 
 
 def _times(table: Table) -> tuple[Array, datetime | None]:
+    if len(table.names) == 1:
+        text = "expected names, and cells between commas, semicolons or tabs under them"
+        raise table.error(f"{text}, got {show(table.names[0])}; export it so")
     found = [(c, m) for c, name in enumerate(table.names) if (m := _TIMES.fullmatch(name))]
     if len(found) != 1:
         got = ", ".join(table.names[c] for c, _m in found) or "none"
@@ -92,10 +95,10 @@ def _times(table: Table) -> tuple[Array, datetime | None]:
 def _unit(table: Table, column: int, si: str, suffix: str) -> Unit:
     known = {unit.suffix: unit for unit in UNITS if unit.si == si}
     if suffix not in known:
-        got = repr(suffix) if suffix else "none"
+        got, todo = (repr(suffix), "convert it") if suffix else ("none", "add it")
         text = f"expected a unit in the name of column {table.names[column]} ({', '.join(known)})"
         more = " or --unit" if si == "m" else ""
-        raise table.error(f"{text}, got {got}; add it{more}", column=table.names[column])
+        raise table.error(f"{text}, got {got}; {todo}{more}", column=table.names[column])
     return known[suffix]
 
 

@@ -121,6 +121,14 @@ DAMAGE = {
         "poses", lambda x: [x[0].replace("y_m", "y"), *x[1:]],
         r"line 1, column y: expected a unit in the name of column y \(m, cm, mm, um\), got none; "
     ),
+    "nanoseconds": (
+        "poses", lambda x: [x[0].replace("time_s", "time_ns"), *x[1:]],
+        r"line 1, column time_ns: expected a unit .* \(s, ms\), got 'ns'; convert it"
+    ),
+    "spaces between numbers without names": (
+        "poses", lambda x: ["# t x y z qw qx qy qz", *(y.replace(",", " ") for y in x[1:])],
+        r"line 2: expected names, and cells between commas, semicolons or tabs under them, got '0"
+    ),
     "no times": (
         "poses", lambda x: [x[0].replace("time_s", "when"), *x[1:]],
         r"line 1: expected one column of times such as t_s, got none; name it so"
