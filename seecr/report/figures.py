@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,6 +26,8 @@ COLOURS = (
 _NUMBERS = ("line of the file", "pose, counted from 0")
 # A grid of more than this [m] is told in metres.
 _LARGE = 5.0
+# Letters of a title that fit into an inch.
+_LETTERS = 13
 # Margins grow without end towards the height of the exit points: so many times what half of the
 # poses have is the end of their colours.
 _OUTSTANDING = 4.0
@@ -196,6 +199,7 @@ def map_figure(path: Path, found: Workspace, most: int = 4) -> None:
             ax.set_xlabel(f"{'xyz'[wide]} [{unit}]")
         if len(panels) > 1:
             words = "orange: the edge of what tensions within the limits can hold"
+            words = textwrap.fill(words, int(_LETTERS * size[0]))
             axes[0, 0].figure.suptitle(words, fontsize=9)
 
 

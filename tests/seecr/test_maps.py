@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 from random_robots import random_poses, random_robot
 from scipy.optimize import linprog
 
@@ -168,6 +169,13 @@ def test_a_map_is_what_each_pose_says(tmp_path: Path) -> None:
     assert "probability" in (tmp_path / "chance.svg").read_text()
     with pytest.raises(InputError, match="at least two axes"):
         map_figure(tmp_path / "no.png", workspace_map(robot, 0.4, 0.25, [0.1, 0.2], elastic=False))
+
+
+def test_the_title_of_a_narrow_figure_is_whole(tmp_path: Path) -> None:
+    found = workspace_map(robot_named("demobot_cogiro"), [0.3, 0.4], 0.25, [0.1, 0.2])
+    map_figure(tmp_path / "narrow.png", found)
+    picture = np.asarray(Image.open(tmp_path / "narrow.png").convert("L"))
+    assert picture[:, [0, -1]].min() == 255
 
 
 def test_a_map_is_the_same_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
