@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr.distribution import balanced, distribute
+from seecr.distribution import balanced, distribute, least_parts
 from seecr.joints import pose_of_values, values_of_pose
 from seecr.pose import Array, pose_add, pose_difference
 from seecr.robot import Robot
@@ -30,6 +30,8 @@ Balance = Callable[[Array, NDArray[np.intp]], tuple[Array, Array]]
 # Rounds from the wanted pose, of which there are more where nothing follows; steps from home, and
 # how often each goes back to balance; halvings of the way from home.
 _ROUNDS, _ALONE, _INWARD, _RESTORED, _HALVINGS = 60, 200, 150, 2, 7
+# How often rows go on from one another's answers, and by how much nearer these have to be.
+_SHARED, _NEARER = 2, 1e-3
 # A step that comes nearer by less than this part of its length ends the search.
 _FLAT = 1e-7
 # Steps of a pose that a linear program may help with: each takes milliseconds.
@@ -79,10 +81,9 @@ def nearest(
     rows = np.arange(len(wanted))
     way.run(away, found, rows, _ALONE if fix_position else _ROUNDS)
     if not fix_position:
-        inward, rows = way.from_home(rows)
-        nearer = np.linalg.norm(inward, axis=1) < np.linalg.norm(away[rows], axis=1)
-        nearer |= ~found[rows]
-        away[rows[nearer]], found[rows] = inward[nearer], True
+        way.keep_nearer(away, found, *way.from_home(rows))
+        for _ in range(_SHARED):
+            way.keep_nearer(away, found, *way.from_others(away, found))
     return way.placed(away, np.arange(len(wanted))), found
 
 
@@ -135,13 +136,35 @@ class _Way:
             if len(rows) == 0:
                 break
 
+    def keep_nearer(
+        self, away: Array, found: NDArray[np.bool_], other: Array, rows: NDArray[np.intp]
+    ) -> None:
+        """Take what was found for rows where it is nearer; the first two are changed in place."""
+        nearer = np.linalg.norm(other, axis=1) < np.linalg.norm(away[rows], axis=1)
+        nearer |= ~found[rows]
+        away[rows[nearer]], found[rows] = other[nearer], True
+
     def from_home(self, rows: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
-        """How far (k, d) what is held stays from those of rows, and these: home is held there."""
+        """Answers (k, d) and their rows, from where the straight ways from home end to be held."""
         home = self.to(self.robot.reference_pose)
         rows = rows[self.held(home[rows], rows)]
-        if len(rows) == 0:
-            return np.empty((0, home.shape[1])), rows
-        away = home[rows] * (1.0 - self._held_part(home[rows], rows)[:, None])
+        return self._inward(home[rows] * (1.0 - self._held_part(home[rows], rows)[:, None]), rows)
+
+    def from_others(self, away: Array, found: NDArray[np.bool_]) -> tuple[Array, NDArray[np.intp]]:
+        """Answers and their rows, from other rows' answers where these are nearer than the own."""
+        own = np.where(found, np.linalg.norm(away, axis=1), np.inf)
+        start, least = away.copy(), (1.0 - _NEARER) * own
+        for pose in self.placed(away[found], np.flatnonzero(found)):
+            there = self.to(pose)
+            size = np.linalg.norm(there, axis=1)
+            start = np.where((size < least)[:, None], there, start)
+            least = np.minimum(size, least)
+        rows = np.flatnonzero(least < (1.0 - _NEARER) * own)
+        rows = rows[self.held(start[rows], rows)]
+        return self._inward(start[rows], rows)
+
+    def _inward(self, away: Array, rows: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
+        """From poses (k, d) that are held to the nearest ones that are, and their rows."""
         pulls, length = self._balanced(away, rows)[0], self.robot.length
         reach, still = np.full(len(rows), length), np.arange(len(rows))
         for _ in range(_INWARD):
@@ -187,6 +210,8 @@ class _Way:
 
     def _balanced(self, away: Array, rows: NDArray[np.intp]) -> tuple[Array, Array]:
         """Tensions (k, m) that come nearest to balance, and what is left of the load (k,)."""
+        if len(rows) == 0:
+            return np.empty((0, self.least.shape[1])), np.empty(0)
         each = zip(rows, *self.balance(self.placed(away, rows), rows), strict=True)
         found = [balanced(a, load, self.least[i], self.most[i]) for i, a, load in each]
         tensions = np.array([one for one, _left in found]).reshape(len(rows), -1)
@@ -238,7 +263,7 @@ class _Way:
             )
         helps[rows[~possible]] += 1
         for i in np.flatnonzero(~possible & (helps[rows] <= _HELPS)):
-            step = _by_parts(whole[i], aim[i], low[i], high[i], m)
+            step = least_parts(whole[i], aim[i], low[i], high[i], m)
             if step is not None:
                 answer[i], possible[i] = step, True
         return answer[:, m:] - away, answer[:, :m] / unit - tensions, np.abs(left).max(1), possible
@@ -259,30 +284,3 @@ class _Way:
         left = np.einsum("ndm,nm->nd", matrix, np.tile(tensions, (2 * d, 1))) - load
         plus, minus = left.reshape(2, d, k, -1)
         return np.asarray(np.moveaxis(plus - minus, 0, 2) / (2.0 * step))
-
-
-def _by_parts(matrix: Array, aim: Array, low: Array, high: Array, m: int) -> Array | None:
-    """Balance with the least sum of parts of the way, where least squares lose it to rounding.
-
-    The first m unknowns are tensions, which cost nothing. A linear program (HiGHS, by SciPy).
-    """
-    from scipy.optimize import linprog
-
-    d = matrix.shape[1] - m
-    unit = np.abs(matrix).max(axis=0)
-    unit = np.where(unit > 0.0, unit, 1.0)
-    scaled = matrix / unit
-    found = linprog(
-        np.concatenate([np.zeros(m), np.tile(1.0 / unit[m:], 2)]),
-        A_eq=np.concatenate([scaled, -scaled[:, m:]], axis=1),
-        b_eq=aim,
-        bounds=[
-            *zip(low[:m] * unit[:m], high[:m] * unit[:m], strict=True),
-            *zip(np.zeros(2 * d), np.tile(high[m:] * unit[m:], 2), strict=True),
-        ],
-        method="highs",
-    )
-    if found.status != 0:
-        return None
-    way = found.x[m : m + d] - found.x[m + d :]
-    return np.asarray(np.concatenate([found.x[:m], way]) / unit)

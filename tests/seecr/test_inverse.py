@@ -163,6 +163,21 @@ def test_poses_far_outside_have_a_nearest_one_too(name: str) -> None:
         assert len(poses) > 50 and not feasible(robot, poses, **limits).any()
 
 
+@pytest.mark.slow
+def test_no_other_rows_answer_is_nearer_than_the_own() -> None:
+    robot = robot_named("ipanema")
+    want = np.tile(robot.reference_pose, (12, 1))
+    want[:, 0] += np.linspace(6.4, 20.0, 12)
+    found = correct(robot, want, lowest=50.0, highest=3000.0)
+    assert found.found.all() and not found.held.any()
+    unit = np.repeat([1.0, robot.length], 3)
+    away = np.array([
+        np.linalg.norm(unit * pose_difference(found.aimed, np.tile(one, (12, 1))), axis=1)
+        for one in want
+    ])  # fmt: skip
+    assert np.all(np.diag(away) <= 1.002 * away.min(axis=1))
+
+
 def test_a_robot_with_too_few_cables_keeps_the_position() -> None:
     robot = robot_named("planar_two_cable")
     want = robot.reference_pose + np.array([0.1, 0, 0.05, 0, 0, 0, 0])
