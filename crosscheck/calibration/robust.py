@@ -16,7 +16,9 @@ from crosscheck.calibration.colour import Chain, Colour
 from crosscheck.fit.problem import KINDS
 from seecr.pose import Array
 
-_CHANCE, _LARGER = 0.05, 10.0
+_CHANCE = 0.05
+LARGER = 10.0
+"""How many times as large as the noise outliers are."""
 # A row of which less than this counts is called an outlier.
 OUTLIER = 0.05
 
@@ -43,10 +45,10 @@ def _weights(row: NDArray[np.int64], residual: Array, scale: float) -> Array:
     # a fit may not be done yet: the size of the bulk, where that is larger than the noise
     bulk = np.sqrt(np.median(power / stats.chi2.median(count)))
     power = power / max(scale, float(bulk)) ** 2
-    odds = np.log(_CHANCE / (1.0 - _CHANCE)) - count * np.log(_LARGER)
-    odds = odds + 0.5 * power * (1.0 - _LARGER**-2)
+    odds = np.log(_CHANCE / (1.0 - _CHANCE)) - count * np.log(LARGER)
+    odds = odds + 0.5 * power * (1.0 - LARGER**-2)
     off = 1.0 / (1.0 + np.exp(-np.clip(odds, -500.0, 500.0)))
-    least = np.minimum(_LARGER**-2, count / np.maximum(power, 1e-300))
+    least = np.minimum(LARGER**-2, count / np.maximum(power, 1e-300))
     return np.asarray((1.0 - off + off * least)[group])
 
 

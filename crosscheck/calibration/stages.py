@@ -15,6 +15,7 @@ from crosscheck.calibration.later import PAYS, at_null, inside, layouts, promisi
 from crosscheck.calibration.linearised import groups_of, linearised, unwhitened
 from crosscheck.calibration.priors import wider, widths_of
 from crosscheck.calibration.restricted import estimate, log_evidence
+from crosscheck.calibration.robust import LARGER, outliers
 from crosscheck.fit.registration import NAME as TRACKER
 from crosscheck.fit.registration import registered
 from crosscheck.fit.state import State, evaluate
@@ -29,6 +30,8 @@ _SURE = 3.0
 # runs, is no place to start effects with history from alone.
 _POOR, _ALIKE = 1.5, 0.5
 
+# All rows count alike as noise of so many times the size that outliers have, one after the other.
+_HEATS = (0.3, 1.0, 3.0, 10.0)
 # A few effects whose cost is so many times that of everything, or less, are begun with too.
 _COMPARABLE = 2.0
 
@@ -66,6 +69,7 @@ def fit_everything(
     frozen = replace(setting, frozen=True)
     if given is not None:
         joint = from_given(frozen, joint, start, given)
+    joint = with_rows_back(setting, joint)
     if poor(joint):
         progress("trying effects alone", 0.4)
         firm = [a for a in at_once if a.name not in terms and a.name != TRACKER]
@@ -111,6 +115,24 @@ def with_noise(setting: Setting, joint: JointFit) -> JointFit:
         joint = settle(setting, joint.state, joint.width, colour, _STEPS, joint.jacobian)
         if float(np.max(change)) < _SETTLED:
             break
+    return joint
+
+
+def with_rows_back(setting: Setting, joint: JointFit) -> JointFit:
+    """The fit, or a better one that did not write off rows it can explain.
+
+    A fit that has cables slack where they are taut is far off in a few rows, and once these hardly
+    count nothing pulls it back. So all rows count alike for a while, as noise of about the size
+    that outliers have; true outliers are no better explained after it.
+    """
+    alike = replace(setting, weight=np.ones(len(joint.state.white)))
+    for heat in _HEATS:
+        if not np.any(outliers(setting.chain, joint.weight, setting.problem.data.n_rows)):
+            break
+        wide = settle(alike, joint.state, joint.width, WHITE.hotter(heat * LARGER), _STEPS)
+        other = with_noise(setting, settle(setting, wide.state, joint.width, joint.colour))
+        if worth(setting, other) > worth(setting, joint) + _SURE:
+            joint = other
     return joint
 
 

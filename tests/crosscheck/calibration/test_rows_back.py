@@ -1,0 +1,73 @@
+"""Joint fits that wrote off rows which they can explain."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_data import COGIRO, measured
+
+from crosscheck.calibration.colour import WHITE, chain_of
+from crosscheck.calibration.joint import JointFit, Setting, tempered
+from crosscheck.calibration.priors import widths_of
+from crosscheck.calibration.robust import outliers
+from crosscheck.calibration.stages import with_noise, with_rows_back, worth
+from crosscheck.fit.prepare import prepare
+from crosscheck.fit.state import evaluate
+from crosscheck.given import considered
+from crosscheck.measurements.data import Measurements
+from seecr.effects import Term, Terms, effect_named, layout_of
+from seecr.mjcf import load_robot
+
+ROBOT = load_robot(COGIRO)
+# Every tolerance a little off: which cables are slack where is another matter with each of them.
+SOME = (
+    "cable_length_offset", "anchor_point_error", "exit_point_error", "centre_of_mass",
+    "cable_stiffness", "drum_gain", "platform_mass", "gravity_tilt", "tracker_target",
+    "tracker_frame",
+)  # fmt: skip
+LAYOUTS = [layout_of(effect_named(name), ROBOT) for name in SOME]
+SEED = 12
+
+
+def fitted(data: Measurements) -> tuple[Setting, JointFit]:
+    problem = prepare(ROBOT, data, Terms(), considered(SOME)).problem
+    factor = problem.noise(problem.experiment.predict(()))
+    setting = Setting(problem, factor, chain_of(problem))
+    start = Terms(Term(layout, layout.null) for layout in LAYOUTS)
+    state = evaluate(problem, start, factor)
+    return setting, with_noise(setting, tempered(setting, state, widths_of(start), WHITE))
+
+
+def written_off(setting: Setting, joint: JointFit) -> list[int]:
+    """Numbers of the rows that hardly count."""
+    off = outliers(setting.chain, joint.weight, setting.problem.data.n_rows)
+    return np.flatnonzero(off).tolist()
+
+
+@pytest.fixture(scope="module")
+def data() -> Measurements:
+    rng = np.random.default_rng(SEED)
+    hidden = [Term(a, a.null + 0.8 * a.scale * rng.standard_normal(len(a))) for a in LAYOUTS]
+    return measured(ROBOT, hidden, points=20, seed=SEED)
+
+
+@pytest.mark.slow
+def test_rows_that_can_be_explained_come_back(data: Measurements) -> None:
+    setting, joint = fitted(data)
+    assert written_off(setting, joint)  # in a hollow: nothing is far off in these data
+    better = with_rows_back(setting, joint)
+    assert written_off(setting, better) == []
+    assert worth(setting, better) > worth(setting, joint) + 50.0
+    assert np.max(better.colour.scale) < 1.1
+
+
+@pytest.mark.slow
+def test_what_is_far_off_stays_so(data: Measurements) -> None:
+    far = [20, 77, 131]
+    position = data.position.copy()
+    position[far] += 30.0 * 3e-5
+    setting, joint = fitted(replace(data, position=position))
+    better = with_rows_back(setting, joint)
+    assert written_off(setting, better) == far
