@@ -34,6 +34,7 @@ _PART = 5_000
 # Default grid: values along an axis on which something can change.
 _VALUES, _FEW = 33, 13
 _NEVER = -1
+_FREEDOMS = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -52,6 +53,7 @@ class Workspace(Result):
         rotation: (..., 3) [rad] likewise.
         slack: number of slack cables; -1 where it does not rest.
         stiffness: [N/m] smallest eigenvalue, rotations by the robot's length.
+        softest: (..., d) [m, rad] the direction of it, :attr:`Solution.softest_direction`; float32.
         chance: the probability that the pose can be held, by what the model does not know; float32;
             None where the model keeps no covariance, or there is none.
     """
@@ -64,6 +66,7 @@ class Workspace(Result):
     rotation: NDArray[np.float32]
     slack: NDArray[np.int8]
     stiffness: NDArray[np.float32]
+    softest: NDArray[np.float32]
     chance: NDArray[np.float32] | None = None
 
     def likely(self, at_least: float) -> NDArray[np.bool_]:
@@ -140,6 +143,10 @@ class Workspace(Result):
             **{f"d{a}_m": self.deviation[..., k].ravel() for k, a in enumerate("xyz")},
             **{f"r{a}_rad": self.rotation[..., k].ravel() for k, a in enumerate("xyz")},
             "smallest_eigenvalue_N_per_m": self.stiffness.ravel(),
+            **{
+                f"softest_{name}": self.softest[..., k].ravel()
+                for k, name in enumerate([j.name for j in self.robot.joints] or _FREEDOMS)
+            },
         }
         listed = {name: values.tolist() for name, values in columns.items()}
         return [dict(zip(listed, row, strict=True)) for row in zip(*listed.values(), strict=True)]
@@ -203,6 +210,7 @@ def workspace_map(
     margin, slack = np.empty(n), np.full(n, _NEVER, dtype=np.int8)
     likely = np.empty(n, np.float32) if chance else None
     moved, stiffness = np.full((n, 6), np.nan, np.float32), np.full(n, np.nan, np.float32)
+    softest = np.full((n, robot.n_dof), np.nan, np.float32)
 
     def fill(part: slice) -> None:
         rows = np.arange(part.start, part.stop)
@@ -218,6 +226,7 @@ def workspace_map(
             moved[rows[there]] = found.deviation[there]
             slack[rows[there]] = found.slack[there].sum(axis=1)
             stiffness[rows] = np.where(there, found.smallest_eigenvalue, np.nan)
+            softest[rows[there]] = found.softest_direction[there]
 
     at_once = _PART * processors()
     for first in range(0, n, at_once):
@@ -228,7 +237,7 @@ def workspace_map(
     return Workspace(
         robot, axes, np.asarray(turned), margin.reshape(shape),
         moved[:, :3].reshape(*shape, 3), moved[:, 3:].reshape(*shape, 3),
-        slack.reshape(shape), stiffness.reshape(shape),
+        slack.reshape(shape), stiffness.reshape(shape), softest.reshape(*shape, -1),
         None if likely is None else likely.reshape(shape),
     )  # fmt: skip
 

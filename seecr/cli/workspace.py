@@ -81,9 +81,9 @@ def command(
 
     ROBOT is an MJCF file or the name of a shipped robot. The margin is how far inside their limits
     all tensions can stay [N]; the elastic map says, at each command, how far off the platform
-    rests, how tilted, with how many slack cables and how stiff. Robots with fewer cables than
-    freedoms are mapped by position, their orientation solved. With --at-least and a calibrated
-    model, each pose has the probability that it can be held.
+    rests, how tilted, with how many slack cables, how stiff and in which direction softest.
+    Robots with fewer cables than freedoms are mapped by position, their orientation solved. With
+    --at-least and a calibrated model, each pose has the probability that it can be held.
 
     Writes map.npz, map.json, a figure of slices and map.rrd.
 
@@ -96,7 +96,7 @@ def command(
     from seecr.counted import counted
     from seecr.files import json_text, staged, write_text
     from seecr.report.figures import map_figure
-    from seecr.report.maps import document_of, likely_lines, write_arrays
+    from seecr.report.maps import document_of, likely_lines, softest_line, write_arrays
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
@@ -132,7 +132,7 @@ def command(
     if as_json:
         click.echo(text)
         return 0
-    lines = [*found.lines(), *likely_lines(found, at_least)]
+    lines = [*found.lines(), *softest_line(found), *likely_lines(found, at_least)]
     tensions = ("--lowest", lowest) if lowest else ()
     most = () if highest is None else ("--highest", highest)
     then = following("crosscheck", "plan", robot, "--rows", 40, *tensions, *most)

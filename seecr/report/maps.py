@@ -11,8 +11,9 @@ import numpy as np
 from seecr.counted import counted
 from seecr.files import written
 from seecr.maps import Workspace
+from seecr.report.words import direction_words
 
-__all__ = ["document_of", "likely_lines", "write_arrays"]
+__all__ = ["document_of", "likely_lines", "softest_line", "write_arrays"]
 
 
 def likely_lines(found: Workspace, at_least: float | None) -> Iterator[str]:
@@ -23,6 +24,22 @@ def likely_lines(found: Workspace, at_least: float | None) -> Iterator[str]:
             f"with a probability of {at_least:g} or more {counted(poses, 'pose')} can be held"
             f"{found.size_words(poses)}"
         )
+
+
+def softest_line(found: Workspace) -> Iterator[str]:
+    """Where the elastic robot is softest of all poses that can be held, and in which direction."""
+    at = _softest(found)
+    if at is not None:
+        place = " ".join(f"{1e3 * axis[k]:.4g}" for axis, k in zip(found.axes, at, strict=True))
+        way = direction_words(found.robot, found.softest[at])
+        yield f"softest of them at x y z {place} mm: {way}, {found.stiffness[at]:.4g} N/m"
+
+
+def _softest(found: Workspace) -> tuple[np.intp, ...] | None:
+    stiffness = np.where(found.feasible & found.rests, found.stiffness, np.nan)
+    if not np.isfinite(stiffness).any():
+        return None
+    return np.unravel_index(np.nanargmin(stiffness), stiffness.shape)
 
 
 def document_of(found: Workspace, at_least: float | None = None) -> dict[str, Any]:
@@ -41,7 +58,12 @@ def document_of(found: Workspace, at_least: float | None = None) -> dict[str, An
         "deviation_m": np.linalg.norm(found.deviation[where], axis=-1),
         "rotation_rad": np.linalg.norm(found.rotation[where], axis=-1),
     }
-    counts = found.slack[found.rests]
+    counts, at = found.slack[found.rests], _softest(found)
+    softest = at and {
+        "pose_m": [float(axis[k]) for axis, k in zip(found.axes, at, strict=True)],
+        "smallest_eigenvalue_N_per_m": float(found.stiffness[at]),
+        "direction": found.softest[at].tolist(),
+    }
     return {
         "robot": found.robot.name,
         "shape": found.margin.shape,
@@ -56,6 +78,7 @@ def document_of(found: Workspace, at_least: float | None = None) -> dict[str, An
         "worst_where_feasible": {
             name: float(values.max()) if len(values) else None for name, values in worst.items()
         },
+        "softest_where_feasible": softest,
     }
 
 
@@ -71,4 +94,5 @@ def write_arrays(path: Path, found: Workspace) -> None:
             margin_N=found.margin,
             feasible=found.feasible, deviation_m=found.deviation, rotation_rad=found.rotation,
             slack=found.slack, smallest_eigenvalue_N_per_m=found.stiffness,
+            softest_direction=found.softest,
         )  # fmt: skip

@@ -21,6 +21,7 @@ from seecr.planar import bar_tilt
 from seecr.pose import quat_from_rotvec
 from seecr.recording.workspace import write_map_recording
 from seecr.report.figures import map_figure
+from seecr.report.maps import document_of, softest_line
 from seecr.robot import Robot
 from seecr.shipped import model_path
 from seecr.workspace import balance_equations, feasible, tension_margin, unbalanced
@@ -156,7 +157,16 @@ def test_a_map_is_what_each_pose_says(tmp_path: Path) -> None:
     np.testing.assert_allclose(
         found.deviation[1, 0, 1], alone.deviation[0, :3], rtol=1e-6, atol=1e-9
     )
+    np.testing.assert_allclose(
+        np.abs(found.softest[1, 0, 1]), np.abs(alone.softest_direction[0]), rtol=1e-3, atol=1e-4
+    )
+    at = np.unravel_index(np.argmin(np.where(found.feasible, found.stiffness, np.inf)), (5, 2, 2))
+    said, told = next(softest_line(found)), document_of(found)["softest_where_feasible"]
+    assert f"{found.stiffness[at]:.4g} N/m" in said
+    assert f"x y z {1e3 * axes[0][at[0]]:.4g} " in said
+    assert told["direction"] == found.softest[at].tolist()
     assert len(found.records()) == 20
+    assert found.records()[0]["softest_rz_rad"] == found.softest[0, 0, 0, 5]
     assert f"{int(found.feasible.sum())} of 20 poses can be held" in str(found)
     map_figure(tmp_path / "map.svg", found)
     text = (tmp_path / "map.svg").read_text()
@@ -186,7 +196,7 @@ def test_a_map_is_the_same_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(maps, "processors", lambda: 2)
     parts = workspace_map(robot, *axes, progress=done.append)
     assert done == [6, 6, 6, 2]
-    for name in ("margin", "deviation", "rotation", "slack", "stiffness"):
+    for name in ("margin", "deviation", "rotation", "slack", "stiffness", "softest"):
         np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))
 
 
