@@ -24,7 +24,7 @@ def comparison_context(found: Comparison) -> dict[str, Any]:
     """What the template of a comparison asks for."""
     problem, names = found.problem, list(found.terms.names)
     kinds = [kind for kind in KINDS if found.rms.get(kind.key) is not None]
-    model = f"SEECR with {', '.join(names)}" if names else "plain SEECR"
+    model = " + ".join(["SEECR", *names]) if names else "plain SEECR"
     verdict, words = _verdict(found)
     context: dict[str, Any] = {
         "page_title": f"Comparison: {title_of(problem)}",

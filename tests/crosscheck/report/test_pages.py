@@ -51,7 +51,7 @@ def test_a_comparison_has_its_page(comparison):
     problem = comparison.problem
     true = term(problem.robot, "pulley_radius", radius_m=0.01)
     good = render(crosscheck.compare(problem.robot, problem.data, [true]))
-    assert "Model and data agree" in text_of(good) and "SEECR with pulley_radius" in text_of(good)
+    assert "Model and data agree" in text_of(good) and "with SEECR + pulley_radius" in text_of(good)
 
 
 def test_a_plan_has_its_page(plan):
