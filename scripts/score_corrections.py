@@ -15,7 +15,7 @@ import argparse
 import numpy as np
 
 from crosscheck.diagnosis.verdict import diagnose
-from crosscheck.suite.cases import demobot_sweep
+from crosscheck.suite.poses import demobot_sweep
 from crosscheck.twin.make import make_twin
 from crosscheck.twin.measure import measure
 from seecr.commands import Commands

@@ -12,7 +12,16 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 import numpy as np
 
 from crosscheck.errors import CrosscheckError
-from seecr.pose import Array, pose_add, quat_from_rotvec
+from crosscheck.suite.poses import (
+    N_SWEEP,
+    SWEEP_Z,
+    demobot_random,
+    demobot_sweep,
+    demobot_turned_sweep,
+    robot_random,
+    robot_sweep,
+)
+from seecr.pose import Array, quat_from_rotvec
 from seecr.shipped import CABLES, model_path
 
 if TYPE_CHECKING:
@@ -29,18 +38,9 @@ class Named(Protocol):
 
 N = TypeVar("N", bound=Named)
 
-N_SWEEP = 24
 N_RANDOM = 200
-# The paper's trajectories (Fig 12): x from 0.17 to 0.63 m in the middle of the frame.
-_SWEEP_X = (0.17, 0.63)
-_SWEEP_Y = 0.25
-_SWEEP_Z = (0.1, 0.2)
-# Inside DemoBot's frame of 0.80 x 0.50 x 0.50 m, the platform clear of posts and exit points [m].
-_FRAME = ((0.10, 0.10, 0.05), (0.70, 0.40, 0.35))
 # Cogiro withstands moments: its random poses are turned, by up to this about a random axis.
 _COGIRO_TURN = np.deg2rad(12.0)
-# Turned sweeps: by up to this about each axis.
-_SWEEP_TURN = np.deg2rad(6.0)
 # Planar robots: half the width of the sweep [m], tilt of the turned one, and other heights in
 # parts of what is between the reference position and the exit points.
 _PLANAR_HALF_WIDTH = 0.15
@@ -49,9 +49,6 @@ _PLANAR_HEIGHTS = (-0.3, -0.15, 0.2, 0.4)
 # Robots of another size and kind, each with fewer poses: a part of the random ones, of the sweeps.
 _OTHERS = ("cogiro_large", "ipanema", "camera")
 _FEWER = 8
-# Of the way from the reference position to the exit points that a user's robot is sent.
-_USER_REACH = 0.6
-_USER_TURN = np.deg2rad(10.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +95,7 @@ def shipped_cases(seed: int = 0, n_random: int = N_RANDOM) -> list[Case]:
     for robot, turn in (("cogiro", _COGIRO_TURN), ("parallel", 0.0)):
         path = model_path(f"demobot_{robot}")
         for cable in CABLES:
-            for z in _SWEEP_Z:
+            for z in SWEEP_Z:
                 name = f"{robot}-{cable}-z{z:.2f}"
                 cases.append(Case(name, path, path, cable, "sweep", demobot_sweep(z)))
             name = f"{robot}-{cable}-turned"
@@ -158,57 +155,6 @@ def select(cases: Sequence[N], patterns: Sequence[str]) -> list[N]:
     return [c for c in cases if any(fnmatch.fnmatchcase(c.name, p) for p in patterns)]
 
 
-def demobot_sweep(z: float, n: int = N_SWEEP) -> Array:
-    """The paper's trajectory at height z [m], (n, 7): level, x from 0.17 to 0.63 m."""
-    poses = np.zeros((n, 7))
-    poses[:, 0] = np.linspace(*_SWEEP_X, n)
-    poses[:, 1], poses[:, 2], poses[:, 3] = _SWEEP_Y, z, 1.0
-    return poses
-
-
-def demobot_turned_sweep(n: int = N_SWEEP) -> Array:
-    """The same line between the two heights, (n, 7), the platform commanded to turn on the way."""
-    poses = demobot_sweep(0.5 * sum(_SWEEP_Z), n)
-    angle = np.linspace(0.0, 2.0 * np.pi, n)
-    parts = [np.sin(angle), np.sin(angle + 1.0), np.cos(2.0 * angle)]
-    poses[:, 3:] = quat_from_rotvec(_SWEEP_TURN * np.stack(parts, axis=1))
-    return poses
-
-
-def demobot_random(random: np.random.Generator, n: int, turn: float) -> Array:
-    """Poses (n, 7) in DemoBot's frame, turned by up to ``turn`` [rad]."""
-    poses = np.zeros((n, 7))
-    poses[:, :3] = random.uniform(*_FRAME, (n, 3))
-    poses[:, 3:] = quat_from_rotvec(_turns(random, n, turn))
-    return poses
-
-
-def robot_sweep(robot: Robot, n: int = N_SWEEP) -> Array:
-    """A level line (n, 7) through the reference pose, along the robot's widest direction."""
-    exits, middle = robot.exit_points, robot.reference_pose[:3]
-    spread = np.linalg.svd(_level(robot, exits - exits.mean(axis=0)), full_matrices=False)[2][0]
-    along = (exits - middle) @ spread
-    steps = np.linspace(_USER_REACH * min(along.min(), 0.0), _USER_REACH * max(along.max(), 0.0), n)
-    poses = np.tile(robot.reference_pose, (n, 1))
-    poses[:, :3] += steps[:, None] * spread
-    return _reachable(robot, poses)
-
-
-def robot_random(robot: Robot, random: np.random.Generator, n: int) -> Array:
-    """Poses (n, 7) between the reference position and the exit points, slightly turned.
-
-    A convex combination of exit points lies in their hull, flat or not, so does any point
-    between it and the reference position if that one does.
-    """
-    weights = random.dirichlet(np.full(robot.n_cables, 0.5), n)
-    towards = weights @ robot.exit_points - robot.reference_pose[:3]
-    change = np.zeros((n, 6))
-    change[:, :3] = random.uniform(0.0, _USER_REACH, (n, 1)) * towards
-    change[:, 3:] = _turns(random, n, _USER_TURN)
-    poses = pose_add(np.tile(robot.reference_pose, (n, 1)), change)
-    return _reachable(robot, poses)
-
-
 def _planar_cases(robot: str) -> list[Case]:
     """A planar robot of the paper (Figs 2 to 9): along a short sweep, at other heights, turned."""
     from seecr.mjcf import load_robot
@@ -257,33 +203,3 @@ def _other_cases(robot: str, seed: int, n_random: int) -> list[Case]:
 def _generator(seed: int, name: str) -> np.random.Generator:
     """Its own random numbers for each case, whichever others run."""
     return np.random.default_rng([seed, *name.encode()])
-
-
-def _turns(random: np.random.Generator, n: int, largest: float) -> Array:
-    """Rotation vectors (n, 3) [rad] of random axes and angles up to the largest."""
-    axes = random.normal(size=(n, 3))
-    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-    # adding zero makes -0.0, which nobody wants to read, 0.0
-    return np.asarray(axes * random.uniform(0.0, largest, (n, 1))) + 0.0
-
-
-def _level(robot: Robot, vectors: Array) -> Array:
-    """Vectors (k, 3) without their part along gravity."""
-    size = np.linalg.norm(robot.gravity)
-    if size == 0.0:
-        return vectors
-    down = robot.gravity / size
-    return np.asarray(vectors - (vectors @ down)[:, None] * down)
-
-
-def _reachable(robot: Robot, poses: Array) -> Array:
-    """The poses (n, 7), or what a jointed robot can do of them: one Gauss-Newton step's joints."""
-    if not robot.joints:
-        return poses
-    from seecr.joints import motion_columns, pose_of_values
-    from seecr.pose import pose_difference
-
-    start, screws = pose_of_values(robot, np.zeros((1, len(robot.joints))))
-    columns = motion_columns(screws, start[:, :3])[0]
-    values = pose_difference(poses, start) @ np.linalg.pinv(columns).T
-    return pose_of_values(robot, values)[0]

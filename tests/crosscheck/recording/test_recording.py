@@ -18,7 +18,8 @@ from crosscheck.recording.panels import NOW, READ_ME
 from crosscheck.recording.series import Series
 from crosscheck.settle.relax import SettleStatus
 from crosscheck.settle.settler import SettlingBatch
-from crosscheck.suite.cases import Case, demobot_sweep, user_cases
+from crosscheck.suite.cases import Case, user_cases
+from crosscheck.suite.poses import demobot_sweep
 from crosscheck.suite.results import CaseResult
 from crosscheck.suite.run import Run, results_json, run_case
 from crosscheck.suite.thresholds import load_thresholds

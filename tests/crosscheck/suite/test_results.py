@@ -15,8 +15,9 @@ from rich.console import Console
 
 from crosscheck.files import json_text, staged
 from crosscheck.suite import words
-from crosscheck.suite.cases import Case, demobot_sweep
+from crosscheck.suite.cases import Case
 from crosscheck.suite.junit import junit_xml
+from crosscheck.suite.poses import demobot_sweep
 from crosscheck.suite.results import CaseResult
 from crosscheck.suite.run import Run, results_json, run_case
 from crosscheck.suite.summary import summary_md

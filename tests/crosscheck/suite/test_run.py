@@ -12,18 +12,17 @@ import pytest
 import seecr
 from crosscheck.errors import CrosscheckError
 from crosscheck.settle.settler import Settling, SettlingBatch
-from crosscheck.suite import agreement, cases, verdicts, words
+from crosscheck.suite import agreement, verdicts, words
 from crosscheck.suite import run as suite
 from crosscheck.suite.cases import (
     Case,
-    robot_random,
-    robot_sweep,
     select,
     shipped_cases,
     user_cases,
 )
 from crosscheck.suite.mujoco_robot import MujocoRobot, screw_motion
 from crosscheck.suite.outcome import Outcome
+from crosscheck.suite.poses import demobot_random, demobot_sweep, robot_random, robot_sweep
 from crosscheck.suite.results import CaseResult, worst_of
 from crosscheck.suite.run import run_case, run_suite
 from crosscheck.suite.thresholds import SHIPPED, FindingLimits, load_thresholds, thresholds_toml
@@ -69,7 +68,7 @@ def ends() -> dict[tuple[str, float], CaseResult]:
     """Both ends of the parallel configuration's sweeps, on both cables."""
     thresholds = load_thresholds()
     return {
-        (cable, z): run_case(case_of(PARALLEL, cases.demobot_sweep(z, 2), cable=cable), thresholds)
+        (cable, z): run_case(case_of(PARALLEL, demobot_sweep(z, 2), cable=cable), thresholds)
         for cable in CABLES
         for z in (0.1, 0.2)
     }
@@ -272,7 +271,7 @@ def test_a_stiffness_changed_by_a_thousandth_on_one_side_differs(tmp_path, model
 
 def test_another_mjcf_for_mujoco_keeps_its_own_stiffness(tmp_path):
     changed = with_stiffer_cable(COGIRO, tmp_path, 1.001)
-    poses = cases.demobot_sweep(0.1, 1)
+    poses = demobot_sweep(0.1, 1)
     case = case_of(COGIRO, poses, mujoco_model=changed, cable="vectran")
     np.testing.assert_allclose(MujocoRobot(changed, case.mujoco_ea).settler.ea[0], 3003.0)
     assert run_case(case, load_thresholds()).outcome is Outcome.DIFFER
@@ -281,7 +280,7 @@ def test_another_mjcf_for_mujoco_keeps_its_own_stiffness(tmp_path):
 def test_mujoco_measures_the_lengths_it_pays_out_itself(tmp_path):
     side = MujocoRobot(PARALLEL)
     robot = seecr.load_robot(PARALLEL)
-    poses = cases.demobot_random(np.random.default_rng(5), 10, 0.2)
+    poses = demobot_random(np.random.default_rng(5), 10, 0.2)
     expected = robot.commanded_lengths(poses)
     np.testing.assert_allclose(side.rest_lengths(poses), expected, rtol=0, atol=1e-15)
     side.settle(poses[:1])  # changes the springs; the reference must not follow
@@ -290,7 +289,7 @@ def test_mujoco_measures_the_lengths_it_pays_out_itself(tmp_path):
 
 def test_cable_counts_must_match():
     planar = model_path("planar_vertical")
-    case = case_of(COGIRO, cases.demobot_sweep(0.1, 1), mujoco_model=planar, cable=None)
+    case = case_of(COGIRO, demobot_sweep(0.1, 1), mujoco_model=planar, cable=None)
     with pytest.raises(InputFileError, match=r"planar_vertical\.xml: 4 cables; expected 8 as in"):
         run_case(case, load_thresholds())
 
@@ -405,7 +404,7 @@ def test_unsolved_poses_are_neither_passes_nor_differences(monkeypatch):
         return seecr.solve(robot, poses, **{**options, "max_iterations": 2})
 
     monkeypatch.setattr(suite, "seecr_solve", hurried)
-    result = run_case(case_of(PARALLEL, cases.demobot_sweep(0.1, 2)), load_thresholds())
+    result = run_case(case_of(PARALLEL, demobot_sweep(0.1, 2)), load_thresholds())
     assert list(result.verdict) == [Verdict.SEECR_UNSOLVED] * 2
     assert "limit of iterations" in result.findings[0].text
     assert result.outcome is Outcome.NOT_CONVERGED
@@ -420,7 +419,7 @@ def test_mujoco_that_does_not_settle_is_unsolved(monkeypatch):
         self.settler.max_steps = 5
 
     monkeypatch.setattr(MujocoRobot, "__init__", impatient)
-    result = run_case(case_of(COGIRO, cases.demobot_sweep(0.1, 2)), load_thresholds())
+    result = run_case(case_of(COGIRO, demobot_sweep(0.1, 2)), load_thresholds())
     assert list(result.verdict) == [Verdict.MUJOCO_UNSOLVED] * 2
     assert np.isnan(result.difference.position_m).all()
     assert result.outcome is Outcome.NOT_CONVERGED

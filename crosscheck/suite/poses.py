@@ -1,0 +1,106 @@
+"""Poses that the suite sends robots to: along lines, turned on the way, and at random."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from seecr.pose import Array, pose_add, quat_from_rotvec
+
+if TYPE_CHECKING:
+    from seecr.robot import Robot
+
+N_SWEEP = 24
+# The paper's trajectories (Fig 12): x from 0.17 to 0.63 m in the middle of the frame.
+_SWEEP_X = (0.17, 0.63)
+_SWEEP_Y = 0.25
+SWEEP_Z = (0.1, 0.2)
+# Inside DemoBot's frame of 0.80 x 0.50 x 0.50 m, the platform clear of posts and exit points [m].
+_FRAME = ((0.10, 0.10, 0.05), (0.70, 0.40, 0.35))
+# Turned sweeps: by up to this about each axis.
+_SWEEP_TURN = np.deg2rad(6.0)
+# Of the way from the reference position to the exit points that a user's robot is sent.
+_USER_REACH = 0.6
+_USER_TURN = np.deg2rad(10.0)
+
+
+def demobot_sweep(z: float, n: int = N_SWEEP) -> Array:
+    """The paper's trajectory at height z [m], (n, 7): level, x from 0.17 to 0.63 m."""
+    poses = np.zeros((n, 7))
+    poses[:, 0] = np.linspace(*_SWEEP_X, n)
+    poses[:, 1], poses[:, 2], poses[:, 3] = _SWEEP_Y, z, 1.0
+    return poses
+
+
+def demobot_turned_sweep(n: int = N_SWEEP) -> Array:
+    """The same line between the two heights, (n, 7), the platform commanded to turn on the way."""
+    poses = demobot_sweep(0.5 * sum(SWEEP_Z), n)
+    angle = np.linspace(0.0, 2.0 * np.pi, n)
+    parts = [np.sin(angle), np.sin(angle + 1.0), np.cos(2.0 * angle)]
+    poses[:, 3:] = quat_from_rotvec(_SWEEP_TURN * np.stack(parts, axis=1))
+    return poses
+
+
+def demobot_random(random: np.random.Generator, n: int, turn: float) -> Array:
+    """Poses (n, 7) in DemoBot's frame, turned by up to ``turn`` [rad]."""
+    poses = np.zeros((n, 7))
+    poses[:, :3] = random.uniform(*_FRAME, (n, 3))
+    poses[:, 3:] = quat_from_rotvec(_turns(random, n, turn))
+    return poses
+
+
+def robot_sweep(robot: Robot, n: int = N_SWEEP) -> Array:
+    """A level line (n, 7) through the reference pose, along the robot's widest direction."""
+    exits, middle = robot.exit_points, robot.reference_pose[:3]
+    spread = np.linalg.svd(_level(robot, exits - exits.mean(axis=0)), full_matrices=False)[2][0]
+    along = (exits - middle) @ spread
+    steps = np.linspace(_USER_REACH * min(along.min(), 0.0), _USER_REACH * max(along.max(), 0.0), n)
+    poses = np.tile(robot.reference_pose, (n, 1))
+    poses[:, :3] += steps[:, None] * spread
+    return _reachable(robot, poses)
+
+
+def robot_random(robot: Robot, random: np.random.Generator, n: int) -> Array:
+    """Poses (n, 7) between the reference position and the exit points, slightly turned.
+
+    A convex combination of exit points lies in their hull, flat or not, so does any point
+    between it and the reference position if that one does.
+    """
+    weights = random.dirichlet(np.full(robot.n_cables, 0.5), n)
+    towards = weights @ robot.exit_points - robot.reference_pose[:3]
+    change = np.zeros((n, 6))
+    change[:, :3] = random.uniform(0.0, _USER_REACH, (n, 1)) * towards
+    change[:, 3:] = _turns(random, n, _USER_TURN)
+    poses = pose_add(np.tile(robot.reference_pose, (n, 1)), change)
+    return _reachable(robot, poses)
+
+
+def _turns(random: np.random.Generator, n: int, largest: float) -> Array:
+    """Rotation vectors (n, 3) [rad] of random axes and angles up to the largest."""
+    axes = random.normal(size=(n, 3))
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    # adding zero makes -0.0, which nobody wants to read, 0.0
+    return np.asarray(axes * random.uniform(0.0, largest, (n, 1))) + 0.0
+
+
+def _level(robot: Robot, vectors: Array) -> Array:
+    """Vectors (k, 3) without their part along gravity."""
+    size = np.linalg.norm(robot.gravity)
+    if size == 0.0:
+        return vectors
+    down = robot.gravity / size
+    return np.asarray(vectors - (vectors @ down)[:, None] * down)
+
+
+def _reachable(robot: Robot, poses: Array) -> Array:
+    """The poses (n, 7), or what a jointed robot can do of them: one Gauss-Newton step's joints."""
+    if not robot.joints:
+        return poses
+    from seecr.joints import motion_columns, pose_of_values
+    from seecr.pose import pose_difference
+
+    start, screws = pose_of_values(robot, np.zeros((1, len(robot.joints))))
+    columns = motion_columns(screws, start[:, :3])[0]
+    values = pose_difference(poses, start) @ np.linalg.pinv(columns).T
+    return pose_of_values(robot, values)[0]
