@@ -154,7 +154,7 @@ def gather(result: CaseResult) -> Material:
         return Material(result, 0, None)
     lengths = result.mujoco_rest_lengths[watched]
     settler = result.mujoco_robot().settler
-    motion = record_motion(settler, result.case.poses[watched], lengths)
+    motion = record_motion(settler, result.case.begins[watched], lengths)
     return Material(result, watched, motion)
 
 
@@ -167,7 +167,7 @@ def _worth_watching(result: CaseResult) -> int | None:
         if np.any(chosen := settled & (result.verdict == verdict)):
             settled = chosen
             break
-    change = pose_difference(result.settling.pose, result.case.poses)
+    change = pose_difference(result.settling.pose, result.case.begins)
     change[:, 3:] *= result.robot.length
     return int(np.argmax(np.where(settled, np.linalg.norm(change, axis=1), -1.0)))
 
@@ -179,7 +179,7 @@ def record_motion(
 
     Args:
         settler: the robot.
-        pose: (7,) commanded.
+        pose: (7,) where it is let go.
         rest_lengths: (m,) [m].
         max_frames: frames kept, spread evenly over the steps.
     """

@@ -16,7 +16,11 @@ from seecr.recording.stream import Index, Recording, opening
 READ_ME, NOW = "text/read_me", "text/now"
 _LISTED = 12
 _MARKDOWN = rr.MediaType.MARKDOWN
-_KINDS = {"sweep": "poses along a line", "random": "poses at random"}
+_KINDS = {
+    "sweep": "poses along a line",
+    "random": "poses at random",
+    "starts": "starts of one command",
+}
 _TITLES = {
     "position_m": "position",
     "orientation_rad": "orientation",

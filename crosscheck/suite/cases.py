@@ -17,6 +17,7 @@ from crosscheck.suite.poses import (
     SWEEP_Z,
     demobot_random,
     demobot_sweep,
+    demobot_tilted,
     demobot_turned_sweep,
     robot_random,
     robot_sweep,
@@ -60,10 +61,12 @@ class Case:
         model: MJCF file that SEECR reads.
         mujoco_model: MJCF file that MuJoCo settles; the same one, unless the two are to differ.
         cable: name of one of ``seecr.shipped.CABLES``; None leaves the MJCF's stiffness.
-        kind: ``"sweep"``, whose poses follow each other along a line, or ``"random"``.
+        kind: ``"sweep"``, whose poses follow each other along a line, ``"random"``, or
+            ``"starts"``: one command from several.
         poses: (n, 7) commanded.
         has_names: whether thresholds can name its poses: not those of another seed or of a
             user's robot.
+        starts: (n, 7) where both physics begin, each row alone; None begins at the commands.
     """
 
     name: str
@@ -73,10 +76,16 @@ class Case:
     kind: str
     poses: Array
     has_names: bool = True
+    starts: Array | None = None
 
     def __len__(self) -> int:
         """Number of commanded poses."""
         return len(self.poses)
+
+    @property
+    def begins(self) -> Array:
+        """Where MuJoCo lets the platform go, (n, 7), and SEECR's search begins."""
+        return self.poses if self.starts is None else self.starts
 
     @property
     def ea(self) -> float | None:
@@ -90,7 +99,7 @@ class Case:
 
 
 def shipped_cases(seed: int = 0, n_random: int = N_RANDOM) -> list[Case]:
-    """DemoBots along the paper's sweeps, turned and at random; planar, uneven and other robots."""
+    """DemoBots along the paper's sweeps, turned, at random and tilted; planar and other robots."""
     cases = []
     for robot, turn in (("cogiro", _COGIRO_TURN), ("parallel", 0.0)):
         path = model_path(f"demobot_{robot}")
@@ -103,6 +112,7 @@ def shipped_cases(seed: int = 0, n_random: int = N_RANDOM) -> list[Case]:
             name = f"{robot}-{cable}-random"
             poses = demobot_random(_generator(seed, name), n_random, turn)
             cases.append(Case(name, path, path, cable, "random", poses, has_names=seed == 0))
+    cases += [_tilted_case(cable) for cable in CABLES]
     for robot in ("two_cable", "vertical", "horizontal"):
         cases += _planar_cases(robot)
     for robot, turn in (("uneven", 0.0), ("off_centre", _COGIRO_TURN)):
@@ -153,6 +163,21 @@ def select(cases: Sequence[N], patterns: Sequence[str]) -> list[N]:
                 "(--list has all, patterns such as 'cogiro-*' work)"
             )
     return [c for c in cases if any(fnmatch.fnmatchcase(c.name, p) for p in patterns)]
+
+
+def _tilted_case(cable: str) -> Case:
+    """A command with two rests, once let go where it is and once at the reference pose.
+
+    Either start leads to one of the two; either physics has to find the one that its start
+    leads to. Let go from a start alike, they are compared like with like.
+    """
+    from seecr.mjcf import load_robot
+
+    path = model_path("demobot_parallel")
+    command = demobot_tilted(cable)
+    starts = np.stack([command, load_robot(path).reference_pose])
+    commands = np.stack([command, command])
+    return Case(f"parallel-{cable}-tilted", path, path, cable, "starts", commands, starts=starts)
 
 
 def _planar_cases(robot: str) -> list[Case]:

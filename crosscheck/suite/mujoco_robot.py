@@ -49,9 +49,13 @@ class MujocoRobot:
             lengths[i] = physics.data.ten_length
         return np.asarray(lengths + self.pretension)
 
-    def settle(self, poses: Array) -> SettlingBatch:
-        """Bring the platform to rest from commanded poses (n, 7), each by itself."""
-        return settle_batch(self.settler, poses, self.rest_lengths(poses))
+    def settle(self, poses: Array, starts: Array | None = None) -> SettlingBatch:
+        """Bring the platform to rest with the lengths of commanded poses (n, 7), each by itself.
+
+        It is let go at the commands, or at other poses (n, 7).
+        """
+        begins = poses if starts is None else starts
+        return settle_batch(self.settler, begins, self.rest_lengths(poses))
 
     def settle_from(self, start: Array, command: Array) -> Settling:
         """Rest with the lengths of one command (7,), started from another pose (7,)."""

@@ -20,6 +20,12 @@ SWEEP_Z = (0.1, 0.2)
 _FRAME = ((0.10, 0.10, 0.05), (0.70, 0.40, 0.35))
 # Turned sweeps: by up to this about each axis.
 _SWEEP_TURN = np.deg2rad(6.0)
+# Commands of the parallel DemoBot with two rests, 16 mm and 26 degrees or 5 mm and 19 degrees
+# apart, by cable: of some 1,900 tilted by up to 40 degrees these two.
+_TILTED = {
+    "vectran": (0.351, 0.216, 0.109, 0.943, 0.163, -0.288, -0.038),
+    "fishing": (0.189, 0.410, 0.143, 0.956, -0.218, 0.196, -0.001),
+}
 # Of the way from the reference position to the exit points that a user's robot is sent.
 _USER_REACH = 0.6
 _USER_TURN = np.deg2rad(10.0)
@@ -48,6 +54,13 @@ def demobot_random(random: np.random.Generator, n: int, turn: float) -> Array:
     poses[:, :3] = random.uniform(*_FRAME, (n, 3))
     poses[:, 3:] = quat_from_rotvec(_turns(random, n, turn))
     return poses
+
+
+def demobot_tilted(cable: str) -> Array:
+    """The command (7,) at which the parallel DemoBot on that cable has two rests."""
+    pose = np.array(_TILTED[cable])
+    pose[3:] /= np.linalg.norm(pose[3:])
+    return pose
 
 
 def robot_sweep(robot: Robot, n: int = N_SWEEP) -> Array:

@@ -166,6 +166,7 @@ class CaseResult(Result):
             "recording": self.recording,
             "ea_N": self.robot.ea,
             "command": case.poses,
+            "start": case.begins,
             "rest_lengths_m": self.solution.rest_lengths,
             "verdict": [verdict.name.lower() for verdict in self.verdict],
             "seecr": _seecr(self),

@@ -28,7 +28,6 @@ from seecr.counted import counted
 from seecr.equilibrium import solve as seecr_solve
 from seecr.errors import InputFileError
 from seecr.mjcf import load_robot
-from seecr.pose import Array
 from seecr.result import Result
 from seecr.robot import Robot
 from seecr.solution import Solution
@@ -139,10 +138,10 @@ def run_case(case: Case, thresholds: Thresholds, record: Recorder | None = None)
     robot = load_robot(case.model)
     if case.ea is not None:
         robot = replace(robot, ea=np.full(robot.n_cables, case.ea))
-    solution, seecr_s = _solve(robot, case.poses)
+    solution, seecr_s = _solve(robot, case)
     mujoco = MujocoRobot(case.mujoco_model, case.mujoco_ea)
     _check_same_cables(case, robot, mujoco)
-    settling = mujoco.settle(case.poses)
+    settling = mujoco.settle(case.poses, case.begins)
     allowance = allowances(thresholds, solution, settling)
     difference = compare(solution, settling, allowance.tension_N)
     verdict, findings = judge(Answers(mujoco, solution, settling, difference, allowance))
@@ -227,12 +226,12 @@ def _warm_up(case: Case | EffectCase) -> None:
     seecr_solve(robot, robot.reference_pose[None])
 
 
-def _solve(robot: Robot, poses: Array) -> tuple[Solution, float]:
-    seecr_solve(robot, poses[:1])
+def _solve(robot: Robot, case: Case) -> tuple[Solution, float]:
+    seecr_solve(robot, case.poses[:1])
     best = np.inf
     for _ in range(_REPEATS):
         began = time.perf_counter()
-        solution = seecr_solve(robot, poses, threads=1)
+        solution = seecr_solve(robot, case.poses, start=case.starts, threads=1)
         best = min(best, time.perf_counter() - began)
     return solution, best
 

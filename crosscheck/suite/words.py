@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from crosscheck.suite.effects import EffectResult
     from crosscheck.suite.results import CaseResult, Worst
     from crosscheck.suite.run import Run
+    from seecr.pose import Array
 
 HEADS = {
     "settled_position_m": "settled [m]",
@@ -163,8 +164,13 @@ def widened(result: CaseResult) -> list[str]:
 
 
 def command(result: CaseResult, pose: int) -> str:
-    """A commanded pose, position [m] and quaternion."""
-    row = result.case.poses[pose]
+    """A commanded pose, position [m] and quaternion, and where it was begun if elsewhere."""
+    case = result.case
+    begun = "" if case.starts is None else f", begun at {_pose(case.starts[pose])}"
+    return f"{_pose(case.poses[pose])}{begun}"
+
+
+def _pose(row: Array) -> str:
     return f"({' '.join(f'{v:.4g}' for v in row[:3])}; {' '.join(f'{v:.4g}' for v in row[3:])})"
 
 

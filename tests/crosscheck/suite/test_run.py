@@ -127,6 +127,48 @@ def test_planar_robots_run_on_both_cables_at_more_heights(shipped):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("cable", "mm", "degrees"), [("vectran", 15.7, 26.2), ("fishing", 4.7, 19.2)]
+)
+def test_a_tilted_command_is_compared_at_both_of_its_rests(shipped, cable, mm, degrees):
+    (case,) = select(shipped, [f"parallel-{cable}-tilted"])
+    result = run_case(case, load_thresholds())
+    assert result.outcome is Outcome.AGREE and result.compared.all() and not result.findings
+    for answers in (result.solution, result.settling):
+        away = pose_difference(answers.pose[:1], answers.pose[1:])[0]
+        assert 1e3 * np.linalg.norm(away[:3]) == pytest.approx(mm, abs=0.1)
+        assert np.degrees(np.linalg.norm(away[3:])) == pytest.approx(degrees, abs=0.1)
+    # there are no more: what SEECR finds beside its own rest is where the second start leads
+    found = seecr.solve(result.robot, case.poses[0], others=True)
+    np.testing.assert_allclose(found.pose, result.settling.pose[:1], rtol=0, atol=1e-8)
+    (others,) = found.others
+    np.testing.assert_allclose(others.pose, result.settling.pose[1:], rtol=0, atol=1e-8)
+    assert np.array_equal(result.as_json()["start"], case.starts)
+
+
+@pytest.mark.parametrize("cable", CABLES)
+@pytest.mark.parametrize("side", ["SEECR", "MuJoCo"])
+def test_the_other_rest_of_a_tilted_command_does_not_pass(shipped, cable, side, monkeypatch):
+    """A stable equilibrium of that very command, and still not the one that the start leads to."""
+    (case,) = select(shipped, [f"parallel-{cable}-tilted"])
+    if side == "SEECR":
+
+        def solve(robot, poses, *, start=None, **options):
+            other = None if start is None else start[::-1]
+            return seecr.solve(robot, poses, start=other, **options)
+
+        monkeypatch.setattr(suite, "seecr_solve", solve)
+    else:
+        settle = MujocoRobot.settle
+        monkeypatch.setattr(MujocoRobot, "settle", lambda s, p, starts: settle(s, p, starts[::-1]))
+    result = run_case(case, load_thresholds())
+    assert list(result.verdict) == [Verdict.BRANCH] * 2
+    assert result.outcome is Outcome.DIFFER
+    assert words.remarks(result) == "2 two equilibria (2 beyond limits)"
+    assert ", begun at (0.4 0.25 0.15; 1 0 0 0): two stable" in words.failures(result)[1]
+
+
+@pytest.mark.slow
 def test_the_seed_decides_the_random_poses():
     one, same, other = shipped_cases(3), shipped_cases(3), shipped_cases(4)
     for a, b, c in zip(one, same, other, strict=True):

@@ -238,17 +238,17 @@ def wrong_branch(patch: Patch) -> None:
     def solve(robot: Any, poses: np.ndarray, **options: Any) -> Any:
         if robot.joints:
             return honest(robot, poses, **options)
-        return honest(robot, poses, **{"start": rolled(poses), **options})
+        return honest(robot, poses, **{**options, "start": rolled(poses)})
 
     patch.setattr(suite, "seecr_solve", solve)
 
 
 def wrong_branch_of_mujoco(patch: Patch) -> None:
-    def settle(self: MujocoRobot, poses: np.ndarray) -> Any:
+    def settle(self: MujocoRobot, poses: np.ndarray, starts: np.ndarray) -> Any:
         from crosscheck.settle.settler import settle_batch
 
-        starts = rolled(poses) if self.settler.physics.is_free else poses
-        return settle_batch(self.settler, starts, self.rest_lengths(poses))
+        begins = rolled(starts) if self.settler.physics.is_free else starts
+        return settle_batch(self.settler, begins, self.rest_lengths(poses))
 
     patch.setattr(MujocoRobot, "settle", settle)
 
