@@ -88,8 +88,9 @@ class Solution(Result):
         iterations: (n,) evaluations of the wrench.
         residual: (n,) unbalanced force, and torque over the robot's length, relative to the
             load; recomputed at the returned deviation.
-        energy: (n,) [J] elastic energy less the work of the load since the commanded pose;
-            nan where a law has none in closed form.
+        energy: (n,) [J] elastic energy less the work of the load since the commanded pose, and of
+            the cables' weight since it hung straight there; nan under a moment from outside,
+            for laws that are not linear, and for cables with weight over pulleys.
         status: (n,) of :class:`Status`.
         others: the other stable equilibria of each command, where they were asked for.
         jumps: on the way to each command, where it was followed.

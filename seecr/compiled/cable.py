@@ -8,11 +8,9 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from seecr.compiled.algebra import solve_3x3
 from seecr.compiled.bracketed import guess_by_brackets
-from seecr.compiled.catenary import solve_catenary
+from seecr.compiled.catenary import catenary_energy, solve_catenary
 from seecr.compiled.columns import (
     ENERGY,
     GAP,
@@ -69,7 +67,8 @@ def cable_pull(row, start, move, up, guess, work, force, stiffness, gradient, st
             break
         lift -= error / lift_slope(more, up, stiffness)
     soften(more, up, stiffness, gradient, work[33])
-    state[ENERGY] += 0.5 * more * pull * pull
+    # of what yields, and of the cable's weight that is lifted with it
+    state[ENERGY] += lift * (0.5 * pull + hanging)
     return True
 
 
@@ -197,7 +196,8 @@ def _catenary_pull(row, start, move, up, guess, work, force, stiffness, gradient
         change = (h * column[0] + top * (column[1] + w * column[2])) / tension
         g2[k] = change if k == 0 else -change
     _lift(row, flat, rise, e, up, f, k2, g2, force, stiffness, gradient)
-    state[TENSION], state[ENERGY] = tension, np.nan
+    state[TENSION] = tension
+    state[ENERGY] = catenary_energy(row, guess, -rise, along(up, move))
     state[WINCH_TENSION] = winch_tension(row, tension)[0]
     stretch = length_in_plane(row, across, rise) - row[REST]
     state[STRAIN], _slope, state[HYSTERESIS_NOW] = strain_of_tension(row, tension)

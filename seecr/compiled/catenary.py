@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from seecr.compiled.algebra import solve_3x3
 from seecr.compiled.columns import (
     COMPLIANCE,
@@ -20,7 +22,7 @@ from seecr.compiled.columns import (
     WINCH_SIDE,
 )
 from seecr.compiled.jit import jit, jit_inner
-from seecr.compiled.law import strain_of_tension, winch_tension
+from seecr.compiled.law import is_linear, strain_of_tension, winch_tension
 from seecr.compiled.pulley import pulley_geometry
 
 
@@ -34,14 +36,7 @@ def catenary_span(h, v, w, length, ea):
     top = v + w * length
     t_low, t_top = math.sqrt(h * h + v * v), math.sqrt(h * h + top * top)
     rise = length * (v + top) / (t_top + t_low)  # (t_top - t_low)/w
-    # asinh(top/h) - asinh(v/h) as a logarithm, each form where its terms do not cancel
-    # the first two hold for either sign of their end, and cancel only where it is steep
-    if v >= -h:
-        grow = math.log1p(w * (length + rise) / (v + t_low)) / w
-    elif top <= h:
-        grow = math.log1p(w * (length - rise) / (t_top - top)) / w
-    else:
-        grow = math.log((top + t_top) * (t_low - v) / (h * h)) / w
+    grow = _change_of_angle(v, h, w, length)
     turn = _change_of_sine(v, top, h, w, length)
     stretch = length / ea
     x = h * (grow + stretch)
@@ -55,6 +50,20 @@ def catenary_span(h, v, w, length, ea):
 
 
 @jit_inner
+def _change_of_angle(v, h, w, length):
+    """(asinh(top/h) - asinh(v/h))/w as a logarithm, each form where its terms do not cancel."""
+    top = v + w * length
+    t_low, t_top = math.sqrt(h * h + v * v), math.sqrt(h * h + top * top)
+    rise = length * (v + top) / (t_top + t_low)
+    # the first two hold for either sign of their end, and cancel only where it is steep
+    if v >= -h:
+        return math.log1p(w * (length + rise) / (v + t_low)) / w
+    if top <= h:
+        return math.log1p(w * (length - rise) / (t_top - top)) / w
+    return math.log((top + t_top) * (t_low - v) / (h * h)) / w
+
+
+@jit_inner
 def _change_of_sine(v, top, h, w, length):
     """(top/T_top - v/T_low)/w, from (a T_b - b T_a) = h^2 (a^2 - b^2)/(a T_b + b T_a)."""
     t_low, t_top = math.sqrt(h * h + v * v), math.sqrt(h * h + top * top)
@@ -62,6 +71,58 @@ def _change_of_sine(v, top, h, w, length):
         both = (top * t_low + v * t_top) * t_top * t_low
         return h * h * (top + v) * length / both
     return (top / t_top - v / t_low) / w
+
+
+@jit_inner
+def _sag_energy(h, v, w, length):
+    """Energy [J] that sagging sets free, h^2 (sinh D - D)/(2 w) with D = asinh(top/h) - asinh(v/h).
+
+    The trapezium rule's error in the integral of the tension, T'' = w^2 h^2/T^3.
+    """
+    grow = _change_of_angle(v, h, w, length)
+    turned = w * grow
+    if turned > 1.0:
+        top = v + w * length
+        both = math.sqrt(h * h + v * v) * math.sqrt(h * h + top * top)
+        return 0.5 * (_change_of_sine(v, top, h, w, length) * both - h * h * grow)
+    # (sinh D - D)/(D^3/6) from its smallest term on
+    square, share = turned * turned, 1.0
+    for k in (17, 15, 13, 11, 9, 7, 5):
+        share = 1.0 + share * square / (k * (k - 1))
+    return h * h * grow * square * share / 12.0
+
+
+@jit_inner
+def catenary_energy(row, unknown, fall, raised):
+    """Energy [J] of a hanging cable; its derivatives by the anchor point are minus the force.
+
+    What it stores, E = int T^2/(2 EA) ds, what its weight does, both in the complementary form
+    E = h x + v z - int (T + T^2/(2 EA)) ds (Irvine 1981, 1.2) with its large terms cancelled by
+    hand, and what all else in series with the tension T at the exit point stores: length paid out
+    by it does T + T^2/(2 EA) per metre.
+
+    Args:
+        row: the cable (N_COLUMNS,).
+        unknown: (3,) its pull (h, v) [N] and unstretched length [m], solved.
+        fall: [m] height of the exit point above the anchor point.
+        raised: [m] height of the anchor point above where it is at the commanded pose, from which
+            the weight of a cable that hung straight there counts.
+
+    Returns:
+        nan for a law that is not linear, and over a pulley: the weight of the cable that lies on
+        it is left out, by which the pull has no potential.
+    """
+    if row[RADIUS] > 0.0 or not is_linear(row):
+        return np.nan
+    h, v, length = unknown[0], unknown[1], unknown[2]
+    w, ea, rest = row[WEIGHT], row[EA], row[REST]
+    hanging = w * length
+    middle, top = v + 0.5 * hanging, v + hanging
+    stored = 0.5 * length / ea * (h * h + middle * middle - hanging * hanging / 12.0)
+    stored += 0.5 * w * ((rest - length) * fall + rest * raised) - _sag_energy(h, v, w, length)
+    pulled = h * h + top * top
+    soft = rest * row[CREEP_RATE] + row[COMPLIANCE] + (row[WINCH_SIDE] - rest * row[CREEP]) / ea
+    return stored + 0.5 * soft * pulled / (1.0 + math.sqrt(pulled) / ea)
 
 
 @jit_inner

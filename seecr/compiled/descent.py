@@ -63,10 +63,10 @@ def solve_one(
     """Descend from a start to the equilibrium it leads to.
 
     A Newton method on the energy: the exact stiffness, shifted until it is positive definite,
-    steps kept within a trust region, taken where the energy falls. Where a law has no energy
-    in closed form (weight, friction, hysteresis, moments), the work along the step, by the
-    trapezium rule, stands for it. From a stationary point that is no minimum the descent goes
-    on along the softest direction.
+    steps kept within a trust region, taken where the energy falls. Where it has none in closed
+    form (curved laws, friction, hysteresis, weight over pulleys, moments), the work along the
+    step, by the trapezium rule, stands for it. From a stationary point that is no minimum the
+    descent goes on along the softest direction.
 
     Args:
         scale: load [N] that residuals are measured against.

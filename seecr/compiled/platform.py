@@ -250,8 +250,8 @@ def evaluate(
         work: (N_WORK + m, 6) scratch.
 
     Returns:
-        energy [J]; nan where a law has none in closed form; inf where a cable's own
-        equations could not be solved.
+        energy [J]; nan under a moment and where a law has none in closed form; inf where a
+        cable's own equations could not be solved.
     """
     n, m = current.shape[0], cables.shape[0]
     if n == 0:

@@ -136,7 +136,9 @@ class CableWeight(Effect):
 
     With H, V the pulls at the anchor point and w the weight per metre, the span is
     x = H (asinh((V + w L)/H) - asinh(V/H))/w + H L/(E S) and likewise the rise (Irvine, Cable
-    Structures, 1981, section 1.2). The tension reported is that at the exit point.
+    Structures, 1981, section 1.2). The tension reported is that at the exit point. With a linear
+    law it has an energy, H x + V z - int (T + T^2/(2 E S)) ds; not over a pulley, on which the
+    cable is taken to weigh nothing.
     """
 
     name: ClassVar[str] = "cable_weight"

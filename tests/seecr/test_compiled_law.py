@@ -2,84 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
-
 import numpy as np
 import pytest
+from one_cable import cable, in_direction, pull
 from scipy.integrate import quad
 from scipy.optimize import brentq, root
 
-from seecr.compiled import columns
 from seecr.compiled.bracketed import bracketed_pull
-from seecr.compiled.cable import cable_pull
 from seecr.compiled.catenary import catenary_span
 from seecr.compiled.columns import (
     CREEP,
-    EA,
     ENERGY,
-    GAP,
     HYSTERESIS_BEFORE,
-    HYSTERESIS_STRETCH,
-    N_COLUMNS,
-    N_STATE,
     REST,
     SLACK,
     STRAIN,
     STRETCH_BEFORE,
-    TENSION,
     WINCH_TENSION,
 )
 from seecr.compiled.law import dahl, winch_tension
-from seecr.compiled.platform import N_WORK
-from seecr.compiled.pulley import geometric_length, pulley_geometry
-
-UP = np.array([0.0, 0.0, 1.0])
-
-
-@dataclass
-class Pull:
-    """What the compiled law says of one cable."""
-
-    force: np.ndarray
-    stiffness: np.ndarray
-    slope: np.ndarray
-    state: np.ndarray
-    guess: np.ndarray
-    ok: bool
-
-    @property
-    def tension(self) -> float:
-        return float(self.state[TENSION])
-
-
-def cable(**values: Any) -> np.ndarray:
-    """A row of the table: E S = 1000 N, 2 m, from the origin of the base frame."""
-    row = np.zeros(N_COLUMNS)
-    row[EA], row[REST] = 1000.0, 2.0
-    row[HYSTERESIS_STRETCH] = 1.0
-    for name, value in values.items():
-        row[getattr(columns, name)] = value
-    return row
-
-
-def pull(row: np.ndarray, anchor: Any, move: Any = (0.0, 0.0, 0.0)) -> Pull:
-    """The law with the anchor at ``anchor`` + ``move``, the former being the command."""
-    row, start = row.copy(), np.array(anchor, float)
-    row[GAP] = geometric_length(row, start, UP) - row[REST]
-    force, slope, guess = np.zeros(3), np.zeros(3), np.zeros(3)
-    stiffness, state, work = np.zeros((3, 3)), np.zeros(N_STATE), np.zeros((N_WORK, 6))
-    ok = cable_pull(
-        row, start, np.array(move, float), UP, guess, work, force, stiffness, slope, state
-    )
-    return Pull(force, stiffness, slope, state, guess, ok)
-
-
-def in_direction(degrees_below: float, length: float, azimuth: float = 0.7) -> np.ndarray:
-    below = np.deg2rad(degrees_below)
-    flat = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
-    return length * (np.cos(below) * flat - np.sin(below) * UP)
-
+from seecr.compiled.pulley import pulley_geometry
 
 DIRECTIONS = (-40.0, 0.0, 20.0, 60.0, 89.0)
 KINDS: dict[str, dict[str, float]] = {
@@ -94,6 +36,9 @@ KINDS: dict[str, dict[str, float]] = {
     "yielding": {"COMPLIANCE": 2e-4, "LIFT": -1.5e-4},
     "yielding-up": {"LIFT": 3e-4, "QUADRATIC": 3.0},
     "yielding-pulley": {"RADIUS": 0.03, "COMPLIANCE": 2e-4, "LIFT": 3e-4},
+    "hanging-series": {
+        "WEIGHT": 0.4, "WINCH_SIDE": 1.5, "COMPLIANCE": 2e-4, "CREEP": 1e-3, "CREEP_RATE": 1e-6,
+    },
     "yielding-hanging": {"WEIGHT": 0.4, "COMPLIANCE": 2e-4, "LIFT": -1.5e-4},
     "hanging-all": {
         "WEIGHT": 0.4, "QUADRATIC": 3.0, "WINCH_SIDE": 1.5, "COMPLIANCE": 2e-4, "RADIUS": 0.03,
@@ -121,7 +66,9 @@ def test_stiffness_and_slope_against_differences(kind: str, below: float) -> Non
             assert slope == pytest.approx(here.slope[k], rel=1e-5, abs=20 * top)
 
 
-@pytest.mark.parametrize("kind", ["straight", "pulley", "series"])
+@pytest.mark.parametrize(
+    "kind", ["straight", "pulley", "series", "hanging", "hanging-series", "yielding-hanging"]
+)
 def test_force_is_the_gradient_of_the_energy(kind: str) -> None:
     row = cable(**KINDS[kind])
     anchor = in_direction(25.0, 2.03)

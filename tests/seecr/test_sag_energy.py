@@ -1,0 +1,143 @@
+"""The energy of cables that sag: what it is, and that equilibria are told apart by it."""
+
+from __future__ import annotations
+
+import mpmath
+import numpy as np
+import pytest
+from one_cable import cable, in_direction, pull
+from scipy.integrate import quad
+
+from seecr.compiled.columns import EA, ENERGY, REST, WEIGHT
+from seecr.effects import Term
+from seecr.equilibrium import solve
+from seecr.following import evaluated, moved
+from seecr.mjcf import load_robot
+from seecr.multiple import equilibria
+from seecr.passes import barriers
+from seecr.pose import pose_add
+from seecr.report.words import elsewhere, other_lines
+from seecr.shipped import model_path
+from seecr.tables import take
+
+
+def by_quadrature(row: np.ndarray, h: float, v: float, length: float) -> float:
+    """Stretch and weight of each piece from the lower end on, heights from the upper end."""
+    w, ea = row[WEIGHT], row[EA]
+
+    def piece(s: float) -> float:
+        tension = np.hypot(h, v + w * s)
+        steep = (v + w * s) * (1.0 / tension + 1.0 / ea)
+        return float(0.5 * tension**2 / ea - w * s * steep)
+
+    lowest = min(max(-v / w, 0.0), length)
+    return float(quad(piece, 0, length, epsabs=0, epsrel=1e-12, limit=400, points=[lowest])[0])
+
+
+def in_many_digits(row: np.ndarray, h: float, v: float, length: float) -> float:
+    """H x + V z - int (T + T^2/(2 EA)) ds with nothing rearranged, in 120 digits."""
+    with mpmath.workdps(120):
+        h, v, length, w, ea = map(mpmath.mpf, (h, v, length, float(row[WEIGHT]), float(row[EA])))
+        top = v + w * length
+        low, high = mpmath.hypot(h, v), mpmath.hypot(h, top)
+        turned = mpmath.asinh(top / h) - mpmath.asinh(v / h)
+        squares = (top**3 - v**3) / (3 * w) + h**2 * length
+        x = h * turned / w + h * length / ea
+        z = (high - low) / w + (top**2 - v**2) / (2 * w * ea)
+        tensions = (top * high - v * low + h**2 * turned) / (2 * w)
+        return float(h * x + v * z - tensions - squares / (2 * ea))
+
+
+@pytest.mark.parametrize("chord", [2.05, 2.0001, 1.99, 1.7, 0.8], ids=lambda c: f"chord{c}")
+@pytest.mark.parametrize("below", [-50.0, 0.0, 35.0, 80.0])
+def test_what_the_pieces_of_a_cable_hold(below: float, chord: float) -> None:
+    row, anchor = cable(WEIGHT=0.4), in_direction(below, chord)
+    found = pull(row, anchor)
+    where_straight = 0.5 * 0.4 * 2.0 * anchor[2]
+    truth = by_quadrature(row, *found.guess) - where_straight
+    assert found.state[ENERGY] == pytest.approx(truth, rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize("weight", [1e-9, 1e-4, 0.4, 30.0])
+@pytest.mark.parametrize("ea", [1e3, 1e7])
+def test_no_digits_are_lost(weight: float, ea: float) -> None:
+    """Straight, slack, steep and hanging in a loop."""
+    row = cable(WEIGHT=weight, EA=ea)
+    for below in (-89.999, -40.0, 0.0, 60.0, 89.9, 89.999999):
+        for chord in (2.02, 2.0 + 1e-6, 1.999, 1.0, 0.1):
+            anchor = in_direction(below, chord)
+            found = pull(row, anchor)
+            truth = in_many_digits(row, *found.guess) - 0.5 * weight * row[REST] * anchor[2]
+            # the shape that was found ends where it should but for rounding: its weight's height
+            lost = 4e-15 * weight * row[REST] ** 2
+            assert found.state[ENERGY] == pytest.approx(truth, rel=1e-12, abs=lost)
+
+
+@pytest.mark.parametrize("stretch", [0.03, -0.05])
+def test_no_weight_is_the_energy_of_a_straight_cable(stretch: float) -> None:
+    series = {"WINCH_SIDE": 1.5, "COMPLIANCE": 2e-4, "CREEP": 1e-3, "CREEP_RATE": 1e-6}
+    for more in ({}, series, {"LIFT": 3e-4}):
+        anchor = in_direction(30.0, 2.0 + stretch)
+        straight = pull(cable(**more), anchor).state[ENERGY]
+        apart = [
+            pull(cable(WEIGHT=w, **more), anchor).state[ENERGY] - straight for w in (1e-3, 1e-5)
+        ]
+        # of second order where it is taut, of first where it hangs
+        assert 0.0 < abs(apart[0]) < 1e-3 and abs(apart[1]) < 1.05e-2 * abs(apart[0])
+
+
+def around(row: np.ndarray) -> float:
+    """Work [J] of a cable whose anchor point goes once round a circle, taut all the way."""
+    turns = 2.0 * np.pi * (np.arange(200) + 0.5) / 200
+    work = 0.0
+    for c, s in zip(np.cos(turns), np.sin(turns), strict=True):
+        force = pull(row, [1.9 + 0.1 * c, 0.0, -1.0 + 0.1 * s]).force
+        work += force @ [-s, 0.0, c] * 0.1 * 2.0 * np.pi / 200
+    return float(work)
+
+
+def test_there_is_none_over_a_pulley_nor_of_a_curve() -> None:
+    over, beside = cable(WEIGHT=30.0, RADIUS=0.1), cable(WEIGHT=30.0)
+    assert abs(around(over)) > 1e-4 and abs(around(beside)) < 1e-12
+    for row in (over, cable(WEIGHT=0.4, QUADRATIC=3.0), cable(WEIGHT=0.4, FRICTION=0.1)):
+        assert np.isnan(pull(row, in_direction(20.0, 2.03)).state[ENERGY])
+
+
+@pytest.mark.parametrize(
+    ("name", "weight"),
+    [("demobot_parallel", 0.02), ("demobot_cogiro", 0.2), ("cogiro_large", 0.62784)],
+)
+def test_its_slope_is_the_wrench(name: str, weight: float) -> None:
+    robot = load_robot(model_path(name))
+    sag = [Term.of(robot, "cable_weight", weight_N_per_m=weight)]
+    tables = solve(robot, robot.reference_pose, effects=sag).tables
+    random = np.random.default_rng(5)
+    poses = np.tile(robot.reference_pose, (20, 1))
+    spread = 0.1 * np.repeat([robot.length, 1.0], 3)
+    poses = pose_add(poses, random.uniform(-1, 1, (20, 6)) * spread)
+    many = take(tables, np.zeros(20, int))
+    here, size = evaluated(robot, many, poses), 2e-6 * robot.length
+    slopes = np.empty((20, 6))
+    for k, way in enumerate(np.eye(6)):
+        ends = [evaluated(robot, many, moved(robot, poses, s * size * way[None])).energy
+                for s in (1, -1)]  # fmt: skip
+        slopes[:, k] = (ends[0] - ends[1]) / (2 * size)
+    lost = np.linalg.norm(slopes - here.gradient, axis=1)
+    assert np.all(lost < 1e-6 * np.linalg.norm(here.gradient, axis=1))
+
+
+def test_equilibria_of_a_robot_that_sags_are_ranked_with_what_is_between_them() -> None:
+    robot = load_robot(model_path("demobot_parallel"))
+    quat = np.array([0.943, 0.163, -0.288, -0.038])
+    pose = np.array([0.351, 0.216, 0.109, *(quat / np.linalg.norm(quat))])
+    for weight, first, barrier in ((1e-6, -0.01533, 6.80e-5), (2e-3, -0.01544, 6.13e-5)):
+        sag = [Term.of(robot, "cable_weight", weight_N_per_m=weight)]
+        own, every = solve(robot, pose, effects=sag), equilibria(robot, pose, effects=sag)
+        assert np.all(np.diff(every.energy) > 0)
+        assert every.energy[0] == pytest.approx(first, abs=1e-5)
+        other = every.rows(elsewhere(own, every))
+        (way,) = barriers(own, other)
+        assert way.exact and way.energy == pytest.approx(barrier, rel=2e-3)
+        assert way.back - way.energy == pytest.approx(own.energy[0] - other.energy[0], rel=1e-9)
+        (line,) = other_lines(own, every, [way])
+        assert " -1.61" in line and "mJ to get there, 1.68 mJ back" in line
