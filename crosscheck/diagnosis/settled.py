@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from crosscheck.calibration.judgement import SURE
@@ -19,17 +19,19 @@ from crosscheck.fit.problem import rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 
 
-def settled(found: Search, notes: Sequence[str]) -> Diagnosis:
-    """The diagnosis of a search whose last model leaves noise."""
-    rivals = _all_rivals(found)
+def settled(
+    found: Search, notes: Sequence[str], told: Callable[[str], None] = lambda _text: None
+) -> Diagnosis:
+    """The diagnosis of a search whose last model leaves noise; ``told`` what is going on."""
+    rivals = _all_rivals(found, told)
     chances = _chances(found, rivals)
     other = exchanged(found, chances)
     if other is not found:
-        found, rivals = other, _all_rivals(other)
+        found, rivals = other, _all_rivals(other, told)
         chances = _chances(found, rivals)
     way = _sure_part(found, chances)
     if way is not found:
-        rivals = _all_rivals(way)
+        rivals = _all_rivals(way, told)
     missing = [missing_of(way, name, chances, rivals[name]) for name in way.found]
     hints = {name: chances.of(name) for name in found.found if name not in way.found}
     verdict, sentence = DiagnosisVerdict.NO_EFFECT_MISSING, agreement(found.tried, hints)
@@ -53,8 +55,12 @@ def _chances(found: Search, rivals: Mapping[str, Sequence[Rival]]) -> Chances:
     return chances_near(found, {n: [r.name for r in some] for n, some in rivals.items()})
 
 
-def _all_rivals(found: Search) -> dict[str, list[Rival]]:
-    return {name: rivals_of(found, name) for name in found.found}
+def _all_rivals(found: Search, told: Callable[[str], None]) -> dict[str, list[Rival]]:
+    out = {}
+    for name in found.found:
+        told(f"looking for what could be there instead of {name}")
+        out[name] = rivals_of(found, name)
+    return out
 
 
 def _sure_part(found: Search, chances: Chances) -> Search:

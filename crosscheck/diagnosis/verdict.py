@@ -88,7 +88,7 @@ def _searched(
     problem = ready.problem
     found, more = by_steps(problem, base, factor, _part(progress, 0.0, 0.5))
     if found.last.whiteness.is_noise and kinds_stated(problem) == kinds_read(problem):
-        steps = settled(found, (*notes, *more))
+        steps = settled(found, (*notes, *more), lambda text: progress(text, 0.5))
         if all(effect.probability > DOUBTED for effect in steps.missing):
             return steps
     # no few effects one after the other, or one that is less likely than not; noise that goes

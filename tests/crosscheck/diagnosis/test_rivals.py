@@ -22,11 +22,16 @@ def test_equals_of_a_second_effect_are_looked_for_beside_the_first() -> None:
         term(robot, "platform_mass", added_kg=0.1),
     ]
     few = (*(one.name for one in hidden), "stiffness", "centre_of_mass", "cable_length_offset")
-    search = diagnose(robot, measured(robot, hidden, points=8, seed=1), only=few).search
+    told: list[str] = []
+    data = measured(robot, hidden, points=8, seed=1)
+    search = diagnose(robot, data, only=few, progress=lambda text, _part: told.append(text)).search
     assert search is not None
     assert len(search.found) == 2 and search.found[0] == "pulley_radius"
     second = search.found[1]
     equal = {"stiffness": "platform_mass", "platform_mass": "stiffness"}[second]
+    # which takes a while, so that it is said
+    for name in search.found:
+        assert f"looking for what could be there instead of {name}" in told
     first, *others = search.steps
     unsolved = tuple(replace(c, fit=None) if c.name == equal else c for c in first.candidates)
     node = replace(first.node, candidates=unsolved)
