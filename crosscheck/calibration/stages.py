@@ -69,7 +69,7 @@ def fit_everything(
     frozen = replace(setting, frozen=True)
     if given is not None:
         joint = from_given(frozen, joint, start, given)
-    joint = with_rows_back(setting, joint)
+    joint = with_rows_back(frozen, joint)
     if poor(joint):
         progress("trying effects alone", 0.4)
         firm = [a for a in at_once if a.name not in terms and a.name != TRACKER]
