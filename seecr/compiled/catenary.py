@@ -97,9 +97,9 @@ def catenary_energy(row, unknown, fall, raised):
     """Energy [J] of a hanging cable; its derivatives by the anchor point are minus the force.
 
     What it stores, E = int T^2/(2 EA) ds, what its weight does, both in the complementary form
-    E = h x + v z - int (T + T^2/(2 EA)) ds (Irvine 1981, 1.2) with its large terms cancelled by
-    hand, and what all else in series with the tension T at the exit point stores: length paid out
-    by it does T + T^2/(2 EA) per metre.
+    E = h x + v z - int (T + T^2/(2 EA)) ds, our own: by h and v it is stationary where x and z are
+    the catenary's; with its large terms cancelled by hand. And what all else in series with the
+    tension T at the exit point stores: length paid out by it does T + T^2/(2 EA) per metre.
 
     Args:
         row: the cable (N_COLUMNS,).
