@@ -182,33 +182,38 @@ class Solution(Result):
         return replace(self, **values)
 
     @cached_property
-    def _spectrum(self) -> tuple[Array, Array]:
-        hessian = self.evaluation.hessian.copy()
+    def _softest(self) -> tuple[Array, Array]:
+        """Smallest eigenvalue of the scaled stiffness (n,), and a direction of it (n, d)."""
+        from seecr.compiled.softest import softest_batch  # takes a while to import
+
+        hessian = self.evaluation.hessian
         rows = np.flatnonzero(self.status == Status.SINGULAR)
         if len(rows):
             # a cable that is just as long as its rest length resists on one side only
             there = statics.take_evaluation(self.evaluation, rows)
+            hessian = hessian.copy()
             hessian[rows] = statics.without_idle(take(self.tables, rows), there).hessian
-        finite = np.isfinite(hessian)
-        values, vectors = np.empty(hessian.shape[:2]), np.empty_like(hessian)
-        clean = np.where(finite, hessian, 0.0)
+        values, directions = np.empty(len(hessian)), np.empty(hessian.shape[:2])
 
         def run(part: slice) -> None:
-            values[part], vectors[part] = np.linalg.eigh(clean[part])
+            softest_batch(hessian[part], values[part], directions[part])
 
-        in_parts(run, len(clean))
-        values[~finite.all(axis=(1, 2))] = np.nan
-        return values, vectors
+        in_parts(run, len(hessian))
+        return values, directions
 
     @property
     def smallest_eigenvalue(self) -> Array:
         """Of the stiffness, (n,) [N/m], rotations scaled by the robot's length."""
-        return self._spectrum[0][:, 0]
+        return self._softest[0]
 
     @property
     def softest_direction(self) -> Array:
-        """Eigenvector of the smallest eigenvalue, (n, d) [m, rad], a unit step of it."""
-        return self._spectrum[1][:, :, 0] / self._units()
+        """Eigenvector of the smallest eigenvalue, (n, d) [m, rad], a unit step of it.
+
+        Its largest component (rotations by the robot's length) is positive. Where the stiffness is
+        not known, NaN.
+        """
+        return self._softest[1] / self._units()
 
     def _units(self) -> Array:
         """Robot's length for rotations, 1 for translations, (d,)."""
@@ -267,7 +272,7 @@ class Solution(Result):
         if status not in (Status.SINGULAR, Status.UNSTABLE):
             return str(status.value)
         names = [joint.name for joint in self.robot.joints] or ["x", "y", "z", "rx", "ry", "rz"]
-        vector = self._spectrum[1][i, :, 0]
+        vector = self._softest[1][i]
         parts = [
             f"{value:+.2f} {name}"
             for value, name in zip(vector, names, strict=True)

@@ -1,0 +1,112 @@
+"""The compiled smallest eigenvalue and its direction against LAPACK's."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from seecr.compiled.softest import softest_batch
+from seecr.pose import Array
+
+# Parts of the largest entry: a few roundings of six unknowns. LAPACK leaves a quarter of that.
+_VALUE, _RESIDUAL = 1e-14, 4e-14
+SIZES = (1, 2, 3, 6, 9)
+
+
+def softest(matrices: Array) -> tuple[Array, Array]:
+    values, directions = np.empty(len(matrices)), np.empty(matrices.shape[:2])
+    softest_batch(matrices, values, directions)
+    return values, directions
+
+
+def holds(matrices: Array) -> None:
+    """Eigenvalues as LAPACK has them, directions that have them: of repeated ones any will do."""
+    matrices = np.array(matrices, order="C")
+    values, directions = softest(matrices)
+    top = np.abs(matrices).max(axis=(1, 2))
+    expected = np.linalg.eigvalsh(matrices)[:, 0]
+    assert np.all(np.abs(values - expected) <= _VALUE * top)
+    np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1.0, rtol=1e-14)
+    left = np.einsum("nij,nj->ni", matrices, directions) - values[:, None] * directions
+    assert np.all(np.abs(left).max(axis=1) <= _RESIDUAL * top)
+    largest = np.abs(directions).max(axis=1)
+    assert np.all(directions.max(axis=1) >= (1.0 - 2e-6) * largest)
+
+
+def turned(spectrum: Array, n: int = 500) -> Array:
+    """Symmetric matrices (n, d, d) of given eigenvalues in random frames."""
+    random = np.random.default_rng(len(spectrum))
+    frames = np.linalg.qr(random.normal(size=(n, len(spectrum), len(spectrum))))[0]
+    out = frames * spectrum @ frames.swapaxes(1, 2)
+    return 0.5 * (out + out.swapaxes(1, 2))
+
+
+@pytest.mark.parametrize("d", SIZES)
+def test_random_matrices_definite_and_not(d: int) -> None:
+    half = np.random.default_rng(d).normal(size=(3000, d, d))
+    holds(half @ half.swapaxes(1, 2))
+    holds(half + half.swapaxes(1, 2))
+
+
+@pytest.mark.parametrize("d", SIZES)
+@pytest.mark.parametrize("apart", [0.0, 1e-15, 1e-12, 1e-8, 1e-4])
+def test_eigenvalues_that_are_repeated_or_nearly(d: int, apart: float) -> None:
+    steps = np.arange(d, dtype=float)
+    holds(turned(1.0 + apart * steps))
+    holds(turned(-1.0 + apart * steps))
+    holds(turned(np.where(steps < d // 2, apart * steps, 1.0)))
+    holds(turned(np.where(steps < d // 2, 1.0 + apart * steps, -1.0)))
+
+
+@pytest.mark.parametrize("d", SIZES)
+def test_eigenvalues_of_all_sizes(d: int) -> None:
+    sizes = 10.0 ** -np.arange(0.0, 3.0 * d, 3.0)
+    for spectrum in (sizes, -sizes, np.where(np.arange(d) % 2, sizes, -sizes)):
+        holds(turned(spectrum))
+        holds(1e150 * turned(spectrum))
+        holds(1e-150 * turned(spectrum))
+
+
+@pytest.mark.parametrize("d", SIZES)
+def test_badly_scaled_matrices(d: int) -> None:
+    random = np.random.default_rng(d)
+    half = random.normal(size=(2000, d, d))
+    scale = 10.0 ** random.uniform(-12.0, 12.0, (2000, d))
+    holds(half @ half.swapaxes(1, 2) * scale[:, :, None] * scale[:, None])
+    holds((half + half.swapaxes(1, 2)) * scale[:, :, None] * scale[:, None])
+
+
+@pytest.mark.parametrize("d", SIZES)
+def test_matrices_with_zeros_and_whole_numbers(d: int) -> None:
+    random = np.random.default_rng(d)
+    whole = random.integers(-1, 2, (3000, d, d)).astype(float)
+    holds(whole + whole.swapaxes(1, 2))
+    sparse = np.where(random.random((3000, d, d)) < 0.2, whole, 0.0)
+    holds(sparse + sparse.swapaxes(1, 2))
+    holds(np.stack([np.eye(d), -np.eye(d), np.ones((d, d)), -np.ones((d, d)), np.zeros((d, d))]))
+
+
+def test_only_the_lower_triangle_is_read() -> None:
+    matrix = turned(np.arange(6.0), 1)
+    half = np.tril(matrix) + np.triu(np.full((6, 6), np.nan), 1)
+    for found, expected in zip(softest(half), softest(matrix), strict=True):
+        np.testing.assert_array_equal(found, expected)
+
+
+def test_what_is_no_number_has_no_direction() -> None:
+    for bad in (np.nan, np.inf, -np.inf):
+        matrices = np.tile(np.eye(3), (2, 1, 1))
+        matrices[0, 2, 1] = bad
+        values, directions = softest(matrices)
+        assert np.isnan(values[0]) and np.isnan(directions[0]).all()
+        assert values[1] == pytest.approx(1.0, abs=_VALUE)
+
+
+def test_the_sign_is_that_of_the_largest_part() -> None:
+    direction = np.array([0.1, -0.2, 0.3, -0.9, 0.1, 0.2])
+    direction /= np.linalg.norm(direction)
+    matrices = 2.0 * np.eye(6) - np.outer(direction, direction)
+    found = softest(np.array([matrices]))[1][0]
+    np.testing.assert_allclose(found, -direction, atol=1e-14)
+    level = np.full((1, 2, 2), [[1.0, 0.5], [0.5, 1.0]])
+    np.testing.assert_allclose(softest(level)[1][0], [np.sqrt(0.5), -np.sqrt(0.5)], atol=1e-15)
