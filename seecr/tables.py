@@ -79,7 +79,6 @@ def assemble(setup: Setup, strains: Array | None = None) -> Tables:
     _write(setup, QUANTITIES, cables, load, blank=True)
     if setup.laws:
         _linearise(setup, np.zeros((n, m)) if strains is None else strains, cables)
-    rest, gap = cables[..., REST], cables[..., GAP]
     return Tables(
         cables=cables,
         load=load,
@@ -87,9 +86,16 @@ def assemble(setup: Setup, strains: Array | None = None) -> Tables:
         screws=_screws_of(robot, poses.tobytes(), n),
         length=robot.length,
         scale=_load_scale(setup),
-        reach=3.0 * (rest.max(axis=1) + np.abs(gap).max(axis=1)),
+        reach=_reach(cables),
         n_dof=robot.n_dof,
     )
+
+
+def relengthened(tables: Tables, setup: Setup) -> Tables:
+    """The tables of a setup, from those of another that differs in lengths beyond the command."""
+    cables = tables.cables.copy()
+    _write(setup, {"extra_length"}, cables, tables.load)
+    return replace(tables, cables=cables, reach=_reach(cables))
 
 
 def reassembled(tables: Tables, setup: Setup, names: Collection[str]) -> Tables:
@@ -153,6 +159,12 @@ def _hanging(setup: Setup) -> Array:
     if g == 0.0 or np.any(setup.pulley_radius) or np.any(setup.lift):
         return setup.robot.up
     return -setup.gravity / g
+
+
+def _reach(cables: Array) -> Array:
+    """(n,) [m] deviations beyond this are a fall."""
+    rest, gap = cables[..., REST], cables[..., GAP]
+    return np.asarray(3.0 * (rest.max(axis=1) + np.abs(gap).max(axis=1)))
 
 
 def _load_scale(setup: Setup) -> Array:

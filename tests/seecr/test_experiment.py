@@ -176,3 +176,19 @@ def test_temperature_of_one_run_does_not_reach_another() -> None:
     one = Commands(commands.pose[3:], temperature=commands.temperature[3:])
     part = Experiment(experiment.robot, one).predict([warm]).readings.position
     assert part == pytest.approx(whole[3:], abs=1e-12)
+
+
+def test_of_a_prediction_nearby_only_lengths_are_put_anew() -> None:
+    """And of one with another model nothing is kept."""
+    experiment = experiment_of("demobot_cogiro", seed=3)
+    n, m = len(experiment.commands), experiment.robot.n_cables
+    pulleys = effect_named("pulley_radius")(radius=0.01)
+    at = experiment.predict([pulleys])
+    errors = 1e-4 * np.random.default_rng(3).standard_normal((n, m))
+    other = experiment.with_length_errors(errors)
+    for effects in ([pulleys], [], [pulleys, effect_named("stiffness")(factor=1.2)]):
+        near, afresh = other.predict(effects, at), other.predict(effects)
+        for name in ("cables", "load", "poses", "scale", "reach"):
+            assert np.array_equal(getattr(near.tables, name), getattr(afresh.tables, name)), name
+        assert near.pose == pytest.approx(afresh.pose, abs=1e-9)
+        assert not np.array_equal(near.tables.cables, at.tables.cables)
