@@ -51,6 +51,12 @@ def no_lines_of_progress() -> None:
     options.SECONDS_BETWEEN_LINES = float("inf")
 
 
+@pytest.fixture
+def unpaged(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No page is drawn, which takes most of the time of a command, where nobody looks at it."""
+    monkeypatch.setattr("crosscheck.report.write_page", lambda _found, _path, _made: None)
+
+
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
     """The folder with trial data beside the repository, which not every checkout has."""

@@ -32,7 +32,7 @@ def add(effect, files, model, *more):
     return run("add", effect, *files, "--model", model, *more)
 
 
-def test_added_one_after_the_other_the_error_falls_to_the_noise(both, tmp_path):
+def test_added_one_after_the_other_the_error_falls_to_the_noise(both, tmp_path, unpaged):
     model, out = tmp_path / "model.toml", tmp_path / "out"
     gate = ("--max-position", "0.04mm", "--max-orientation", "0.025deg", "--no-recording")
     assert run("compare", *both, *gate, "--out", out).exit_code == 1

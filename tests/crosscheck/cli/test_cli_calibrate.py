@@ -29,6 +29,7 @@ def many(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unpaged")
 def test_all_at_once_the_error_falls_to_the_noise_and_the_model_can_be_used(
     many: tuple[Path, Path], tmp_path: Path
 ) -> None:

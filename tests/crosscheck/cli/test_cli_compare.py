@@ -18,12 +18,6 @@ def stiff(tmp_path_factory):
     return case(tmp_path_factory.mktemp("stiff"), {"stiffness": {"factor": 1.4}})
 
 
-@pytest.fixture
-def unpaged(monkeypatch):
-    """No page is drawn, which takes most of the time, where nobody looks at it."""
-    monkeypatch.setattr("crosscheck.report.write_page", lambda _found, _path, _made: None)
-
-
 def compare(xml, data, *more):
     return run("compare", xml, data, *QUIET, *more)
 
@@ -49,7 +43,7 @@ def test_json_alone_on_standard_output(stiff, tmp_path, unpaged):
     assert json.loads(result.stdout) == json.loads((tmp_path / "comparison.json").read_text())
 
 
-def test_two_files_are_one_comparison_with_runs_that_keep_apart(stiff, tmp_path):
+def test_two_files_are_one_comparison_with_runs_that_keep_apart(stiff, tmp_path, unpaged):
     xml, first = stiff
     second = tmp_path / "second.csv"
     header, *rows = first.read_text().splitlines()

@@ -48,6 +48,7 @@ def test_notes_of_the_model_are_told(planar: tuple[Path, Path], tmp_path: Path) 
     assert "may count twice" in (tmp_path / "o" / "diagnosis.html").read_text()
 
 
+@pytest.mark.usefixtures("unpaged")
 def test_want_of_data_ends_0_and_want_of_solutions_3(tmp_path: Path) -> None:
     xml, data = case(tmp_path, points=3)
     robot = load_robot(xml)
@@ -100,6 +101,7 @@ def test_verdicts_are_the_words_of_the_file_with_a_heading_and_a_meaning() -> No
 QUICK = ("--only", "pulley_radius,stiffness", "--no-recording")
 
 
+@pytest.mark.usefixtures("unpaged")
 def test_the_model_that_was_found_is_written_and_gates_end_1(
     planar: tuple[Path, Path], tmp_path: Path
 ) -> None:
@@ -122,6 +124,7 @@ def test_the_model_that_was_found_is_written_and_gates_end_1(
     assert load_model(again, robot).document["effect"][0]["before"] == table["before"]
 
 
+@pytest.mark.usefixtures("unpaged")
 def test_all_that_a_diagnosis_lists_is_added_at_once(
     planar: tuple[Path, Path], tmp_path: Path
 ) -> None:
@@ -162,6 +165,7 @@ def test_gates_are_named(planar: tuple[Path, Path], tmp_path: Path) -> None:
     assert "no verdict 'unkown_effect'; there are, nearest first: unknown_effect, " in said
 
 
+@pytest.mark.usefixtures("unpaged")
 def test_without_a_verdict_no_model_is_written(tmp_path: Path) -> None:
     xml, data = case(tmp_path, points=3)
     rows = load_measurements(data, load_robot(xml))

@@ -47,7 +47,7 @@ def test_a_plan_says_what_shows_what_is_alike_and_what_to_add(poses, tmp_path):
     assert all(len(p) == 7 for p in added["poses"])
 
 
-def test_json_and_stated_noise(poses, tmp_path):
+def test_json_and_stated_noise(poses, tmp_path, unpaged):
     options = ("--sigma", "position=0.1mm", "--sigma", "orientation=1mrad")
     tension = ("--sigma", "tension=0.05N")
     result = run("plan", *poses, *options, *tension, "--json", "--out", tmp_path)
@@ -69,7 +69,7 @@ def test_noise_without_a_right_unit_is_refused(poses, tmp_path):
     assert not out.exists()
 
 
-def test_a_plan_from_nothing_but_a_robot(tmp_path):
+def test_a_plan_from_nothing_but_a_robot(tmp_path, unpaged):
     xml = model_path("planar_vertical")
     out, again = tmp_path / "plan", tmp_path / "again"
     given = ("--reads", "position,tension", "--sigma", "tension=0.05N", "--highest", "60")

@@ -25,7 +25,7 @@ def last(result):
 
 
 @pytest.mark.slow
-def test_from_a_plan_to_a_model_by_the_commands_that_each_names(tmp_path, monkeypatch):
+def test_from_a_plan_to_a_model_by_the_commands_that_each_names(tmp_path, monkeypatch, unpaged):
     """What a command says next is run as it is said, until nothing is missing."""
     monkeypatch.chdir(tmp_path)
     xml, data = case(Path(), {"pulley_radius": {"radius_m": 0.01}}, points=4)

@@ -72,9 +72,11 @@ def case(tmp_path: Path) -> tuple[Path, Path]:
     return robot_file, data.path
 
 
-def test_compare_diagnose_add_compare(case: tuple[Path, Path], tmp_path: Path) -> None:
+def test_compare_diagnose_add_compare(
+    case: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     robot, data = case
-    model, limit = tmp_path / "model.toml", ("--max-position", "0.1mm")
+    model, limit = tmp_path / "model.toml", ("--max-position", "0.1mm", "--no-recording")
     out = tmp_path / "out"
     assert crosscheck("compare", robot, data, "--out", out, *limit) == 1
     assert crosscheck("diagnose", robot, data, *FEW, "--out", out) == 0
@@ -85,8 +87,10 @@ def test_compare_diagnose_add_compare(case: tuple[Path, Path], tmp_path: Path) -
     assert (out / "diagnosis.rrd").stat().st_size > 1000
     assert crosscheck("add", "pulley_radius", robot, data, "--model", model) == 0
     assert "pulley_radius" in model.read_text()
+    monkeypatch.setattr("crosscheck.report.write_page", lambda _found, _path, _made: None)
     assert crosscheck("compare", robot, data, "--model", model, "--out", out, *limit) == 0
-    assert crosscheck("diagnose", robot, data, *FEW, "--model", model, "--out", out) == 0
+    further = (*FEW, "--model", model, "--no-recording")
+    assert crosscheck("diagnose", robot, data, *further, "--out", out) == 0
     again = json.loads((out / "diagnosis.json").read_text())
     assert again["verdict"] == "no_effect_missing"
     assert again["missing"] == []

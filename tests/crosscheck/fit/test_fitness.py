@@ -102,6 +102,7 @@ def test_two_runs_that_do_not_agree_contradict_each_other(data: Measurements) ->
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unpaged")
 def test_from_the_command_line(tmp_path: Path) -> None:
     xml, data = case(tmp_path, points=3)
     lines = data.read_text().splitlines()
