@@ -230,7 +230,7 @@ def hung(*effects: Effect, robot: Robot = HUNG, **more: object) -> Prediction:
 @pytest.mark.parametrize("kind", ["demobot_cogiro", "demobot_parallel", "planar_vertical"])
 def test_a_frame_yields_sideways_and_upwards_by_what_each_cable_pulls(kind: str) -> None:
     """Against exit points that are moved by C T u, over and over, on the plain robot."""
-    experiment = experiment_of(kind)
+    experiment = experiment_of(kind, rows=2)
     robot = experiment.robot
     sideways, upwards = 0.5 / robot.ea[0], 0.1 / robot.ea[0]
     frame = experiment.predict([effect("frame_compliance", sideways=sideways, upwards=upwards)])

@@ -181,6 +181,7 @@ def test_a_map_is_what_each_pose_says(tmp_path: Path) -> None:
         map_figure(tmp_path / "no.png", workspace_map(robot, 0.4, 0.25, [0.1, 0.2], elastic=False))
 
 
+@pytest.mark.slow
 def test_the_title_of_a_narrow_figure_is_whole(tmp_path: Path) -> None:
     found = workspace_map(robot_named("demobot_cogiro"), [0.3, 0.4], 0.25, [0.1, 0.2])
     map_figure(tmp_path / "narrow.png", found)

@@ -126,6 +126,7 @@ def test_its_slope_is_the_wrench(name: str, weight: float) -> None:
     assert np.all(lost < 1e-6 * np.linalg.norm(here.gradient, axis=1))
 
 
+@pytest.mark.slow
 def test_equilibria_of_a_robot_that_sags_are_ranked_with_what_is_between_them() -> None:
     robot = load_robot(model_path("demobot_parallel"))
     quat = np.array([0.943, 0.163, -0.288, -0.038])

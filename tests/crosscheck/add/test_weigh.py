@@ -58,6 +58,7 @@ def test_within_one_standard_error_is_as_likely_for_several_values_as_for_one() 
     assert not is_nothing(np.inf, 0)
 
 
+@pytest.mark.slow
 def test_an_effect_that_is_nothing_is_not_worth_adding() -> None:
     found = add_effect(robot(), readings(), "tracker_scale")
     assert found.is_nothing and found.from_nothing < 1.0 and not found.pays

@@ -57,6 +57,7 @@ def test_a_joint_fit_begins_where_effects_alone_are_the_better_fit(problem: Prob
     assert from_given(setting, better, start, far_from(HIDDEN)) is better
 
 
+@pytest.mark.slow
 def test_the_best_of_what_was_found_elsewhere_is_tried(
     problem: Problem, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -81,6 +82,7 @@ def test_the_best_of_what_was_found_elsewhere_is_tried(
     assert taken_as_given == [True, True]
 
 
+@pytest.mark.slow
 def test_sets_that_were_found_elsewhere_are_compared_from_their_values(
     problem: Problem, monkeypatch: pytest.MonkeyPatch
 ) -> None:

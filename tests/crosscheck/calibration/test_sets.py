@@ -35,9 +35,16 @@ def every_set(gram: Gram) -> list[Names]:
     return [frozenset(s) for k in range(9) for s in combinations(gram.names, k)]
 
 
+# None, two and most of them; other numbers in a sweep.
+THERE = [
+    (), (0, 5), (0, 2, 3, 5, 7),
+    pytest.param((3,), marks=pytest.mark.sweep), pytest.param((1, 2, 6), marks=pytest.mark.sweep),
+]  # fmt: skip
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("alike", [False, True])
-@pytest.mark.parametrize("there", [(), (3,), (0, 5), (1, 2, 6), (0, 2, 3, 5, 7)])
+@pytest.mark.parametrize("there", THERE)
 def test_the_search_ends_at_the_best_of_all_sets(there: tuple[int, ...], alike: bool) -> None:
     for seed in range(1):
         gram = toy(seed, there, alike)

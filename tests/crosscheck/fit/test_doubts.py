@@ -94,7 +94,8 @@ def test_of_several_files_the_one_of_another_robot_is_named(cogiro):
     assert len(said) == 1 and said[0].startswith("odd.csv: The model is ")
 
 
-def test_newtons_in_a_column_of_kilonewtons(cogiro, tmp_path):
+@pytest.mark.slow
+def test_newtons_in_a_column_of_kilonewtons(cogiro, tmp_path, unpaged):
     assert "Tensions of" not in notes(COGIRO, cogiro)
     assert "where the model expects" in notes(
         COGIRO, replace(cogiro, tensions=1e3 * cogiro.tensions)

@@ -35,7 +35,7 @@ def log_integral(found: Fit) -> float:
     def value(*z: float) -> float:
         # over the largest likelihood, which is put back below
         off = y - x @ np.array(z)
-        prior = np.prod(stats.norm.pdf(z, scale=width))
+        prior = np.exp(-0.5 * np.dot(z, z) / width**2) / (np.sqrt(2.0 * np.pi) * width) ** len(z)
         return float(np.exp(-0.5 * (off @ off - floor)) * prior)
 
     total = 0.0

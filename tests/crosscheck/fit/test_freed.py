@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_data import measured, soft_cogiro, term
+from made_diagnoses import SLOW
 
 import crosscheck
 from crosscheck.fit.prepare import prepare
@@ -54,7 +55,7 @@ def test_a_diagnosis_finds_what_is_missing_beside_the_frame_and_not_the_frame():
     gain = term(ROBOT, "pulley_radius", radius_m=0.01)
     target = term(ROBOT, "tracker_target", **TARGET)
     free = ("tracker_frame", "tracker_target")
-    found = crosscheck.diagnose(ROBOT, far_away(gain, target, free=free))
+    found = crosscheck.diagnose(ROBOT, far_away(gain, target, free=free), exclude=SLOW)
     assert [effect.effect for effect in found.missing] == ["pulley_radius"]
     assert found.missing[0].values[0] == pytest.approx(0.01, abs=4 * found.missing[0].stderr[0])
     assert found.verdict is crosscheck.DiagnosisVerdict.EFFECTS_FOUND

@@ -96,6 +96,7 @@ def test_where_the_model_is_right_their_differences_are(robot: Robot) -> None:
     assert found.is_noise and found.sentence.endswith("times the estimated one).")
 
 
+@pytest.mark.slow
 def test_a_diagnosis_estimates_noise_beside_everything_together() -> None:
     """Steps take what a second effect does for the noise that was estimated."""
     stiff = load_robot(COGIRO)

@@ -179,6 +179,7 @@ def wrong(files, form="poses", commands=None, robot=ROBOT, **choices):
     return str(caught.value)
 
 
+@pytest.mark.slow
 def test_frames_that_cannot_be_aligned(files, made, tmp_path):
     lines = lines_of(files["commands"])
     line, short = tmp_path / "line.csv", tmp_path / "short.csv"

@@ -51,6 +51,7 @@ def test_the_csv_is_read_again_as_commands(sweep: Solution, tmp_path: Path) -> N
     np.testing.assert_array_equal(np.asarray(again), lengths)
 
 
+@pytest.mark.slow
 def test_rows_of_a_file_are_told_by_their_lines(tmp_path: Path) -> None:
     robot = load_robot("planar_vertical")
     path = tmp_path / "poses.csv"
