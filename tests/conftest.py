@@ -11,22 +11,22 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
 from stale import forget_stale
-from warm import compile_all
-
-from seecr.cli import options
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
     """Forget what was compiled from older sources, before any worker starts to use it.
 
-    And compile all where there are workers: each would do so for itself.
+    And compile all where there are workers: each would do so for itself. Continuous integration
+    has it done before, and saves the time that this process alone would take to load it.
     """
     if hasattr(session.config, "workerinput"):
         return
     spec = importlib.util.find_spec("seecr")
     assert spec is not None and spec.origin is not None
     forget_stale(Path(spec.origin).parent)
-    if getattr(session.config.option, "numprocesses", None):
+    if getattr(session.config.option, "numprocesses", None) and "SEECR_COMPILED" not in os.environ:
+        from warm import compile_all
+
         compile_all()
 
 
@@ -48,6 +48,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.fixture(scope="session", autouse=True)
 def no_lines_of_progress() -> None:
     """A busy machine adds none to what commands print: tests of other words read all of it."""
+    from seecr.cli import options
+
     options.SECONDS_BETWEEN_LINES = float("inf")
 
 
