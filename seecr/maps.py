@@ -5,8 +5,10 @@ Grids are gone through in parts, so that a million poses need no more memory tha
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from queue import SimpleQueue
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,7 +23,7 @@ from seecr.pose import Array
 from seecr.result import Record, Result
 from seecr.robot import Robot
 from seecr.starts import commanded_poses, finite
-from seecr.threads import processors, run_parts
+from seecr.threads import run_parts
 from seecr.workspace import load_scale, tension_margin
 
 Progress = Callable[[int], None]
@@ -29,7 +31,7 @@ Progress = Callable[[int], None]
 
 __all__ = ["Workspace", "boundary", "default_axes", "workspace_map"]
 
-# Poses at a time, of each processor.
+# Poses at a time.
 _PART = 5_000
 # Default grid: values along an axis on which something can change.
 _VALUES, _FEW = 33, 13
@@ -228,18 +230,35 @@ def workspace_map(
             stiffness[rows] = np.where(there, found.smallest_eigenvalue, np.nan)
             softest[rows[there]] = found.softest_direction[there]
 
-    at_once = _PART * processors()
-    for first in range(0, n, at_once):
-        last = min(first + at_once, n)
-        run_parts(fill, [slice(k, min(k + _PART, last)) for k in range(first, last, _PART)])
-        if progress is not None:
-            progress(last - first)
+    _run_telling(fill, [slice(k, min(k + _PART, n)) for k in range(0, n, _PART)], progress)
     return Workspace(
         robot, axes, np.asarray(turned), margin.reshape(shape),
         moved[:, :3].reshape(*shape, 3), moved[:, 3:].reshape(*shape, 3),
         slack.reshape(shape), stiffness.reshape(shape), softest.reshape(*shape, -1),
         None if likely is None else likely.reshape(shape),
     )  # fmt: skip
+
+
+def _run_telling(
+    fill: Callable[[slice], None], parts: list[slice], progress: Progress | None
+) -> None:
+    """Fill all parts in several threads; the caller's tells of what is done, in any of them."""
+    if progress is None:
+        return run_parts(fill, parts)
+    here, done = threading.current_thread(), SimpleQueue[int]()
+
+    def tell() -> None:
+        progress(sum(done.get() for _ in range(done.qsize())))
+
+    def one(part: slice) -> None:
+        fill(part)
+        done.put(part.stop - part.start)
+        if threading.current_thread() is here:
+            tell()
+
+    run_parts(one, parts)
+    if not done.empty():
+        tell()
 
 
 def _margins(

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import threading
+from collections import deque
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from functools import lru_cache
 from itertools import pairwise
 
@@ -42,21 +43,37 @@ def in_parts(run: Callable[[slice], None], n: int, threads: int | None = None) -
 
 
 def run_parts(run: Callable[[slice], None], parts: list[slice]) -> None:
-    """Run a job on every part of a batch, the first in this thread."""
+    """Run a job on every part of a batch, in this thread and in as many as have processors.
+
+    Each takes the next part that nobody has taken: none waits for another before the end. After an
+    error no further part is begun.
+    """
     if getattr(_at, "part", False) or len(parts) == 1:
         for part in parts:
             run(part)
         return
+    left = deque(parts)
 
-    def one(part: slice) -> None:
+    def work() -> None:
         _at.part = True
         try:
-            run(part)
+            while True:
+                try:
+                    part = left.popleft()
+                except IndexError:
+                    return
+                run(part)
+        except BaseException:
+            left.clear()
+            raise
         finally:
             _at.part = False
 
-    others = [_pool().submit(one, part) for part in parts[1:]]
-    one(parts[0])
+    others = [_pool().submit(work) for _ in range(min(processors(), len(parts)) - 1)]
+    try:
+        work()
+    finally:
+        wait(others)
     for other in others:
         other.result()
 

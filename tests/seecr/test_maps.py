@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+import threading
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ from PIL import Image
 from random_robots import random_poses, random_robot
 from scipy.optimize import linprog
 
-from seecr import maps
+from seecr import maps, threads
 from seecr.equilibrium import solve
 from seecr.errors import InputError
 from seecr.maps import boundary, default_axes, workspace_map
@@ -193,12 +195,38 @@ def test_a_map_is_the_same_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     robot = robot_named("demobot_parallel")
     axes = np.linspace(0.2, 0.6, 5), np.linspace(0.2, 0.3, 2), np.array([0.1, 0.2])
     whole, done = workspace_map(robot, *axes), list[int]()
+
+    def tell(poses: int) -> None:
+        assert threading.current_thread() is threading.main_thread()
+        done.append(poses)
+
     monkeypatch.setattr(maps, "_PART", 3)
-    monkeypatch.setattr(maps, "processors", lambda: 2)
-    parts = workspace_map(robot, *axes, progress=done.append)
-    assert done == [6, 6, 6, 2]
-    for name in ("margin", "deviation", "rotation", "slack", "stiffness", "softest"):
-        np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))
+    for processors in (1, 2):
+        done.clear()
+        monkeypatch.setattr(threads, "processors", lambda n=processors: n)
+        parts = workspace_map(robot, *axes, progress=tell)
+        assert sum(done) == 20 and min(done) > 0
+        assert processors > 1 or done == [3, 3, 3, 3, 3, 3, 2]
+        for name in ("margin", "deviation", "rotation", "slack", "stiffness", "softest"):
+            np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))
+
+
+def test_a_part_that_takes_long_holds_up_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot, others = robot_named("demobot_parallel"), threading.Semaphore(0)
+    own = maps._margins
+
+    def slow_at_first(robot: Robot, poses: np.ndarray, *rest: Any) -> np.ndarray:
+        if poses[0, 0] > 0.2:
+            others.release()
+        elif not all(others.acquire(timeout=60.0) for _ in range(4)):
+            raise TimeoutError("the other parts waited for this one")
+        return own(robot, poses, *rest)
+
+    monkeypatch.setattr(maps, "_PART", 1)
+    monkeypatch.setattr(maps, "_margins", slow_at_first)
+    monkeypatch.setattr(threads, "processors", lambda: 2)
+    found = workspace_map(robot, np.linspace(0.2, 0.6, 5), 0.25, 0.1, elastic=False)
+    assert found.feasible.any()
 
 
 def test_a_large_robots_map_is_drawn_in_metres_and_its_colours_show_most_margins(

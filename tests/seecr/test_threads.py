@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
+from collections import deque
 
 import numpy as np
 import pytest
@@ -40,13 +41,54 @@ def test_every_row_is_done_once_in_as_many_parts_as_pay(n: int, most: int, parts
     assert np.all(done == 1) and len(seen) == parts
 
 
-def test_an_error_in_another_thread_is_the_callers() -> None:
+def test_an_error_in_another_thread_is_the_callers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(threads, "processors", lambda: 2)
+    both = threading.Barrier(2, timeout=60.0)
+
     def run(part: slice) -> None:
+        both.wait()
         if threading.current_thread() is not threading.main_thread():
             raise ValueError("lost")
 
     with pytest.raises(ValueError, match="lost"):
         threads.run_parts(run, [slice(0, 1), slice(1, 2)])
+
+
+def test_no_part_is_begun_after_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    both, ended, begun = threading.Barrier(2, timeout=60.0), threading.Event(), list[slice]()
+
+    class Parts(deque[slice]):
+        def clear(self) -> None:
+            super().clear()
+            ended.set()
+
+    def run(part: slice) -> None:
+        begun.append(part)
+        if part.start > 1:
+            return
+        both.wait()
+        if threading.current_thread() is threading.main_thread():
+            raise ValueError("lost")
+        ended.wait(10.0)
+
+    monkeypatch.setattr(threads, "processors", lambda: 2)
+    monkeypatch.setattr(threads, "deque", Parts)
+    with pytest.raises(ValueError, match="lost"):
+        threads.run_parts(run, [slice(k, k + 1) for k in range(20)])
+    assert sorted(part.start for part in begun) == [0, 1]
+
+
+def test_no_more_threads_work_than_there_are_processors(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(threads, "processors", lambda: 2)
+    both, seen = threading.Barrier(2, timeout=60.0), set[int]()
+
+    def run(part: slice) -> None:
+        if part.start < 2:
+            both.wait()
+        seen.add(threading.get_ident())
+
+    threads.run_parts(run, [slice(k, k + 1) for k in range(40)])
+    assert len(seen) == 2
 
 
 def test_within_a_part_there_is_one_part_in_the_same_thread(
@@ -56,8 +98,11 @@ def test_within_a_part_there_is_one_part_in_the_same_thread(
     monkeypatch.setattr(threads, "processors", lambda: 4)
     done = np.zeros((2, 1000), dtype=int)
     seen: list[tuple[int, slice]] = []
+    both = threading.Barrier(2, timeout=60.0)
 
     def outer(part: slice) -> None:
+        both.wait()
+
         def inner(own: slice) -> None:
             done[part, own] += 1
             seen.append((threading.get_ident(), own))
