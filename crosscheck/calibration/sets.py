@@ -103,9 +103,9 @@ class Scores:
         return [n for n in order if scores[n] > scores[order[0]] - within][:count]
 
 
-def explore(scores: Scores, starts: Iterable[Names]) -> Names:
-    """The best set that moves from any of the starts lead to."""
-    ends = [climb(scores, start) for start in starts]
+def explore(scores: Scores, starts: Iterable[Names], moves: int = _MOVES) -> Names:
+    """The best set that so many moves from any of the starts lead to."""
+    ends = [climb(scores, start, moves) for start in starts]
     return max(ends, key=scores.score)
 
 
@@ -124,10 +124,10 @@ def thinned(scores: Scores, start: Names) -> Names:
     return frozenset(widths) | (start & scores.always)
 
 
-def climb(scores: Scores, start: Names) -> Names:
-    """Move to the best neighbour while that is better."""
+def climb(scores: Scores, start: Names, moves: int = _MOVES) -> Names:
+    """Move to the best neighbour while that is better, at most so often."""
     at = thinned(scores, start)
-    for _ in range(_MOVES):
+    for _ in range(moves):
         around = scores.neighbours(at)
         scores.near |= {n: s for n, s in around.items() if n not in scores.solved}
         for names in sorted(around, key=lambda n: -around[n])[:2]:

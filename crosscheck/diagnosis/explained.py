@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from crosscheck.calibration.refits import Refit
+from crosscheck.calibration.exact import Refit
 from crosscheck.calibration.search import Sought
 from crosscheck.calibration.sets import Names
 from crosscheck.diagnosis.advice import check_of

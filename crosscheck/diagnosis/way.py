@@ -8,12 +8,13 @@ import numpy as np
 
 from crosscheck.calibration.calibrate import covariance
 from crosscheck.calibration.colour import whitened
+from crosscheck.calibration.exact import Refit
 from crosscheck.calibration.gram import Gram
 from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.later import amplitudes
 from crosscheck.calibration.leave_out import leave_out
 from crosscheck.calibration.linearised import free_of, linearised
-from crosscheck.calibration.refits import Found, Refit
+from crosscheck.calibration.refits import Found
 from crosscheck.calibration.search import Sought
 from crosscheck.calibration.sets import Names
 from crosscheck.diagnosis.node import Node

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from made_data import COGIRO, SIGMA, measured, term
 
-from crosscheck.calibration import refits, stages
+from crosscheck.calibration import exact, refits, stages
 from crosscheck.calibration.catalogue import Catalogue
 from crosscheck.calibration.colour import WHITE, chain_of
 from crosscheck.calibration.joint import JointFit, Setting, settle
 from crosscheck.calibration.later import layouts
 from crosscheck.calibration.priors import widths_of
 from crosscheck.calibration.search import seek
-from crosscheck.calibration.sets import Names
+from crosscheck.calibration.sets import Names, Scores
 from crosscheck.calibration.stages import from_given
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.problem import Problem
@@ -87,9 +89,9 @@ def test_sets_that_were_found_elsewhere_are_compared_from_their_values(
     problem: Problem, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """They end where they begin here: a fit from nothing may end in a hollow."""
-    monkeypatch.setattr(refits, "_STEPS", 0)
+    monkeypatch.setattr(exact, "_STEPS", 0)
     monkeypatch.setattr(
-        refits, "_linear_terms", lambda catalogue, _scores, names: nulls(catalogue, names)
+        exact, "_linear_terms", lambda catalogue, _scores, names: nulls(catalogue, names)
     )
     one = frozenset(HIDDEN.names)
     without, with_ = (seek(problem, SIGMA, given=g).found.refit(one) for g in ([], [HIDDEN]))
@@ -100,3 +102,21 @@ def test_sets_that_were_found_elsewhere_are_compared_from_their_values(
 
 def nulls(catalogue: Catalogue, names: Names) -> Terms:
     return Terms(catalogue.start(name) for name in sorted(names))
+
+
+def test_a_challenger_that_explains_more_is_the_best_set_and_challenged_in_turn(
+    problem: Problem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    challenged: list[Names] = []
+
+    def challenger(sets: exact.Exact, _scores: Scores, best: exact.Refit) -> None:
+        challenged.append(best.names)
+        winner = frozenset({"tracker_frame", "nonlinear_elasticity"})
+        sets.fitted[winner] = replace(best, names=winner, score=best.score + 5.0)
+
+    monkeypatch.setattr(refits, "challenge", challenger)
+    found = seek(problem, SIGMA).found
+    first, *others = challenged
+    assert first >= set(HIDDEN.names)
+    assert others == [{"tracker_frame", "nonlinear_elasticity"}] * len(others) != []
+    assert found.best.names == {"tracker_frame", "nonlinear_elasticity"}

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.calibration.exact import Refit
 from crosscheck.calibration.gram import ColumnGroup, gram_of
 from crosscheck.calibration.judgement import Judgement, judge
 from crosscheck.calibration.probability import all_scores, probabilities
-from crosscheck.calibration.refits import Found, Refit
+from crosscheck.calibration.refits import Found
 from crosscheck.calibration.sets import Scores
 from crosscheck.fit.reasons import DiagnosisVerdict
 

@@ -10,9 +10,10 @@ from made_data import COGIRO, SIGMA, measured, term
 
 from crosscheck.calibration.catalogue import Catalogue, gram_about
 from crosscheck.calibration.colour import WHITE, chain_of
+from crosscheck.calibration.exact import Exact
 from crosscheck.calibration.joint import Setting, settle
 from crosscheck.calibration.priors import widths_of
-from crosscheck.calibration.refits import _Exact
+from crosscheck.calibration.refits import swapped
 from crosscheck.calibration.sets import Scores
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.state import evaluate
@@ -52,11 +53,11 @@ def test_a_swapped_effect_begins_at_the_shape_that_promises_most() -> None:
     joint = settle(setting, evaluate(problem, creep, factor), widths_of(creep), WHITE)
     fixed = replace(setting, weight=joint.weight)
     catalogue = Catalogue(Terms(), Terms([absurd, *creep]))
-    exact = _Exact(fixed, joint, catalogue, plain, lambda _text: None)
+    exact = Exact(fixed, joint, catalogue, plain, lambda _text: None)
     scores = Scores(gram_about(fixed, joint, catalogue), 2, frozenset())
     start = exact.fit(scores, frozenset({"creep"}))
     assert start is not None
-    best = exact.swapped(scores, start)
+    best = swapped(exact, scores, start)
     assert best.names == {"thermal_expansion"}
     assert best.joint.terms["thermal_expansion"].vector == pytest.approx([EXPANSION, 20.0], rel=0.1)
     assert best.score > start.score + 100.0
@@ -73,7 +74,7 @@ def test_what_no_robot_can_have_does_not_take_the_place_of_what_one_can(
     light = heavy.with_vector(np.array([-0.99 * ROBOT.mass]))
     plain = evaluate(problem, Terms(), factor)
     joint = settle(setting, evaluate(problem, heavy, factor), widths_of(heavy), WHITE)
-    exact = _Exact(setting, joint, Catalogue(Terms(), heavy), plain, lambda _text: None)
+    exact = Exact(setting, joint, Catalogue(Terms(), heavy), plain, lambda _text: None)
     scores = Scores(gram_about(setting, joint, exact.catalogue), 1, frozenset())
     names = frozenset(heavy.names)
     kept = exact.fit(scores, names)

@@ -1,0 +1,181 @@
+"""Sets of effects fitted in earnest, each once, with their evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from crosscheck.calibration.catalogue import Catalogue, gram_about, widths_for
+from crosscheck.calibration.gram import Gram, averaged, best_widths, gram_of
+from crosscheck.calibration.joint import JointFit, Setting, settle
+from crosscheck.calibration.linearised import groups_of, linearised
+from crosscheck.calibration.priors import SHAPES
+from crosscheck.calibration.sets import Names, Scores
+from crosscheck.fit.possible import can_be
+from crosscheck.fit.state import State, evaluate
+from seecr.effects import Term, Terms
+from seecr.pose import Array
+
+_STEPS = 12
+# A refit this much worse than its linear evidence may have ended in a hollow: it starts again.
+HOLLOW = 8.0
+# Sets up to this size are tried from more starts, and without each of their members.
+FEW = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Refit:
+    """A set of effects, fitted exactly.
+
+    Attributes:
+        names: the set. joint: its fit.
+        widths: prior width of each member.
+        score: ln evidence and ln prior.
+    """
+
+    names: Names
+    joint: JointFit
+    widths: dict[str, float]
+    score: float
+
+
+@dataclass(eq=False)
+class Exact:
+    """Sets of effects over one noise and one set of weights.
+
+    Attributes:
+        setting, joint, catalogue, plain, told: of the data, of everything, as in
+            :func:`crosscheck.calibration.refits.compare_sets`.
+        given: values that sets have elsewhere.
+        fitted: by set; None where it could not be solved.
+    """
+
+    setting: Setting
+    joint: JointFit
+    catalogue: Catalogue
+    plain: State
+    told: Callable[[str], None]
+    given: Mapping[Names, Terms] = field(default_factory=dict)
+    fitted: dict[Names, Refit | None] = field(default_factory=dict)
+
+    @property
+    def possible(self) -> dict[Names, Refit]:
+        """Those with values that a robot can have (no negative mass); the model as it stands."""
+        always = frozenset(self.plain.terms.names)
+        return {
+            names: found
+            for names, found in self.fitted.items()
+            if found is not None and (names == always or self.can_be(found))
+        }
+
+    def can_be(self, found: Refit) -> bool:
+        """Whether a robot can have all these values."""
+        return can_be(self.setting.problem.robot, found.joint.terms, self.plain.terms)
+
+    def scores_about(self, joint: JointFit) -> Scores:
+        """Linear scores of the whole catalogue about a fit of some of it."""
+        always = frozenset(self.plain.terms.names)
+        gram = gram_about(self.setting, joint, self.catalogue)
+        return Scores(gram, len(set(self.catalogue.names) - always), always)
+
+    def best_of(self, scores: Scores, some: Iterable[Names]) -> Refit:
+        """The best of all that are fitted, these among them."""
+        for names in some:
+            self.fit(scores, names)
+        return max(self.possible.values(), key=lambda r: r.score)
+
+    def take(self, scores: Scores, start: Terms) -> None:
+        """Fit a set from these values, and keep that if it is better than what there is.
+
+        What no robot can have is not, whatever it explains: the set would not be compared.
+        """
+        names = frozenset(start.names)
+        # the linear model may hold at nothing what means something from here on only
+        wide = {name: max(width, 1.0) for name, width in scores.widths(names).items()}
+        found = [self.fitted.get(names), self._from(scores, names, start, wide)]
+        fitted = [refit for refit in found if refit is not None]
+        self.fitted[names] = max(
+            fitted, key=lambda refit: (self.can_be(refit), refit.score), default=None
+        )
+
+    def fit(self, scores: Scores, names: Names) -> Refit | None:
+        """A set fitted exactly; None where that has no solution."""
+        if names not in self.fitted:
+            self.told(" + ".join(sorted(names)) or "none")
+            self._fit(scores, names)
+        return self.fitted[names]
+
+    def _fit(self, scores: Scores, names: Names) -> None:
+        """From its linear values, those given, and from null where that ends badly."""
+        linear, widths = scores.score(names), scores.widths(names)
+        best = self._from(scores, names, _linear_terms(self.catalogue, scores, names), widths)
+        self.fitted[names] = best
+        if names in self.given:
+            self.take(scores, self.given[names])
+        few = 0 < len(names - scores.always) <= FEW
+        if few and (best is None or best.score < linear - HOLLOW):
+            self.take(scores, Terms(_off_bound(self.catalogue.start(name)) for name in names))
+
+    def _from(
+        self, scores: Scores, names: Names, start: Terms, widths: dict[str, float]
+    ) -> Refit | None:
+        state = evaluate(self.setting.problem, start, self.setting.factor, self.plain)
+        if not state.valid:
+            return None
+        found = settle(self.setting, state, _width(start, widths), self.joint.colour, _STEPS)
+        return _scored(self.setting, found, names, widths, scores)
+
+
+def _linear_terms(catalogue: Catalogue, scores: Scores, names: Names) -> Terms:
+    """The set at the values of the linear model."""
+    solved = scores.gram.solved(scores.widths(names))
+    out, first = [], 0
+    for name in solved.chosen:
+        term = catalogue.start(name)
+        layout, start = term.layout, term.vector
+        count = len(scores.gram.groups[name].columns)
+        own = np.flatnonzero(~layout.shape & ~term.knowledge.fixed)
+        if count < len(own):  # the others start where they are
+            own = own[start[own] == layout.null[own]]
+        vector = start.copy()
+        vector[own] = layout.null[own] + solved.values[first : first + count] * layout.scale[own]
+        out.append(_off_bound(term.with_vector(np.clip(vector, layout.lower, layout.upper))))
+        first += count
+    return Terms([*out, *(catalogue.start(name) for name in names if name not in solved.chosen)])
+
+
+def _off_bound(term: Term) -> Term:
+    """Off a bound at null, where a law with history has a derivative on both sides."""
+    layout = term.layout
+    pressed = (term.vector <= layout.lower) & ~layout.shape & ~term.knowledge.fixed
+    return term.with_vector(np.where(pressed, term.vector + 0.03 * layout.scale, term.vector))
+
+
+def _width(terms: Terms, widths: dict[str, float]) -> Array:
+    parts = [np.where(t.layout.shape, SHAPES, widths.get(t.name, 1.0)) for t in terms]
+    return np.where(terms.knowledge.fixed, 0.0, np.concatenate([np.zeros(0), *parts]))
+
+
+def _scored(
+    setting: Setting, joint: JointFit, names: Names, widths: dict[str, float], scores: Scores
+) -> Refit:
+    """A fit with its evidence about its own optimum, averaged over widths."""
+    gram = own_gram(setting, joint)
+    inside = {n: widths[n] for n in gram.names}
+    better = best_widths(gram, inside)
+    score = averaged(gram, better) + scores.log_prior(names)
+    return Refit(names, joint, widths | better, score - 0.5 * joint.state.log_det)
+
+
+def own_gram(setting: Setting, joint: JointFit) -> Gram:
+    """Normal equations of a fit's own effects about its optimum; those on a bound are absent."""
+    groups = groups_of(joint, widths_for)
+    linear = linearised(setting, joint)
+    z = np.zeros(len(joint.z))
+    for group in groups.values():
+        z[group.columns] = joint.z[group.columns]
+    # shapes stay as they are: only amplitudes are explained
+    y = linear.y - linear.x @ (joint.z - z)
+    return gram_of(linear.x, y, groups)

@@ -1,0 +1,125 @@
+"""What would explain the data without a member of the best set: pairs that do what pairs do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+
+from crosscheck.calibration import challenge as module
+from crosscheck.calibration.challenge import challenge, without
+from crosscheck.calibration.exact import Exact, Refit
+from crosscheck.calibration.gram import ColumnGroup, Gram, gram_of
+from crosscheck.calibration.probability import probabilities
+from crosscheck.calibration.sets import Names, Scores, explore
+
+NAMES = "abcdefgh"
+WIDTHS = np.array([0.1, 0.3, 1.0, 3.0, 10.0])
+NO_FIT: Any = None
+
+
+class Linear(Exact):
+    """Sets of a linear model: what is fitted is what the linear scores say."""
+
+    def __init__(self, gram: Gram) -> None:
+        self.scores = Scores(gram, len(NAMES))
+        self.fitted = {}
+        self.fit(self.scores, frozenset())
+
+    @property
+    def possible(self) -> dict[Names, Refit]:
+        return {names: refit for names, refit in self.fitted.items() if refit is not None}
+
+    def fit(self, scores: Scores, names: Names) -> Refit | None:
+        del scores
+        refit = Refit(names, NO_FIT, {}, self.scores.score(names))
+        return self.fitted.setdefault(names, refit)
+
+    def scores_about(self, joint: Any) -> Scores:
+        del joint
+        return Scores(self.scores.gram, len(NAMES))
+
+
+def gram(weights: Mapping[str, float], alike: bool = False) -> Gram:
+    """Eight effects of a column each; together a and b do what c and d do together.
+
+    Where others are alike, e and f do what a does, and g and h what b does.
+    """
+    rng = np.random.default_rng(3)
+    x = rng.normal(size=(120, len(NAMES)))
+    x[:, 3] = x[:, 0] + x[:, 1] - x[:, 2] + 0.01 * rng.normal(size=120)
+    if alike:
+        x[:, 4:] = x[:, [0, 0, 1, 1]] + 0.001 * rng.normal(size=(120, 4))
+    y = rng.normal(size=120)
+    for name, weight in weights.items():
+        y = y + weight * x[:, NAMES.index(name)]
+    groups = {n: ColumnGroup(np.array([k]), WIDTHS) for k, n in enumerate(NAMES)}
+    return gram_of(x, y, groups)
+
+
+def compared(some: Gram, best: Names) -> tuple[Linear, Refit]:
+    """All sets one move away from the best fitted, as a search leaves them."""
+    exact = Linear(some)
+    scores = Scores(some, len(NAMES))
+    explore(scores, [best])
+    for names in scores.best(20, 12.0):
+        exact.fit(scores, names)
+    own = exact.fit(scores, best)
+    assert own is not None
+    return exact, own
+
+
+def chance(exact: Linear, best: Refit, name: str) -> float:
+    scores = {names: refit.score for names, refit in exact.possible.items()}
+    return probabilities(scores, best.names, NAMES).of(name)
+
+
+def test_two_that_do_what_two_others_do_are_not_sure() -> None:
+    exact, best = compared(gram({"a": 2.0, "b": 2.0}), frozenset("ab"))
+    assert chance(exact, best, "a") > 0.99
+    challenge(exact, exact.scores, best)
+    assert frozenset("cd") in exact.fitted
+    assert 0.2 < chance(exact, best, "a") < 0.8
+    assert 0.2 < chance(exact, best, "b") < 0.8
+
+
+def test_an_effect_that_nothing_imitates_stays_sure_and_costs_few_fits() -> None:
+    exact, best = compared(gram({"e": 2.0}), frozenset("e"))
+    fitted = len(exact.fitted)
+    challenge(exact, exact.scores, best)
+    assert len(exact.fitted) <= fitted + 2
+    assert chance(exact, best, "e") > 0.99
+
+
+def test_equals_are_barred_with_the_member_in_whose_place_they_can_stand(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Else the best sets without a are those with its equals, and nothing is learnt."""
+    monkeypatch.setattr(module, "_NEIGHBOURS", 0)
+    exact, best = compared(gram({"a": 2.0, "b": 2.0}, alike=True), frozenset("ab"))
+    challenge(exact, exact.scores, best)
+    assert frozenset("cd") in exact.fitted
+
+
+def test_equals_that_others_know_of_are_barred_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    exact, best = compared(gram({"a": 2.0}), frozenset("a"))
+    tried: list[Names] = []
+    fit = exact.fit
+    monkeypatch.setattr(exact, "fit", lambda s, names: tried.append(names) or fit(s, names))
+    challenge(exact, exact.scores, best, {"a": ["b"]})
+    assert tried
+    assert not any(names & frozenset("ab") for names in tried)
+
+
+def test_large_sets_are_not_challenged(monkeypatch: pytest.MonkeyPatch) -> None:
+    exact, best = compared(gram(dict.fromkeys("abcefg", 2.0)), frozenset("abcefg"))
+    monkeypatch.setattr(exact, "fit", pytest.fail)
+    challenge(exact, exact.scores, best)
+
+
+def test_what_is_barred_is_in_no_set() -> None:
+    scores = without(Scores(gram({"a": 2.0}), len(NAMES)), frozenset("ac"))
+    explore(scores, [frozenset(), frozenset("b")])
+    assert not any(names & frozenset("ac") for names in scores.best(50, 1e9))
