@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.calibration.sets import Names
 from crosscheck.comparison.associations import Association
 from crosscheck.comparison.quantities import QuantityKind
 from crosscheck.diagnosis.result import MissingEffect
@@ -121,8 +122,14 @@ def measure_next(
     missing: Sequence[MissingEffect],
     verdict: DiagnosisVerdict,
     where: Sequence[Association],
+    alternatives: Sequence[Names] = (),
 ) -> list[str]:
-    """What to measure to tell apart, confirm or find, a sentence each."""
+    """What to measure to tell apart, confirm or find, a sentence each.
+
+    Args:
+        found: the way to what is missing. missing, verdict, where: as they stand in the diagnosis.
+        alternatives: sets of effects of which it is one.
+    """
     out = []
     plan = Planned(found.problem, found.last.fit, found.factor, Reads.of(found.problem.data))
     options = list(extensions(plan)) if any(effect.rivals for effect in missing) else []
@@ -131,6 +138,8 @@ def measure_next(
             out += _to_separate(plan, options, effect, rival)
         if not effect.rivals:
             out.append(f"to confirm {effect.effect}: {effect.check}")
+    if len(alternatives) > 1:
+        out += _to_decide(alternatives)
     if verdict is DiagnosisVerdict.MANY_EFFECTS:
         out.append(_CALIBRATE)
     if verdict is DiagnosisVerdict.UNKNOWN_EFFECT:
@@ -138,6 +147,15 @@ def measure_next(
     if verdict is DiagnosisVerdict.NO_EFFECT_MISSING:
         out.append("nothing is missing; to see smaller effects, see crosscheck plan")
     return list(dict.fromkeys(out))
+
+
+def _to_decide(alternatives: Sequence[Names]) -> list[str]:
+    """Checks by hand of what is in some of the sets and not in all."""
+    every, always = frozenset().union(*alternatives), frozenset.intersection(*alternatives)
+    return [
+        f"to find which effects it is: {measured_directly(name)} ({name})"
+        for name in sorted(every - always)
+    ]
 
 
 def measured_directly(effect: str) -> str:

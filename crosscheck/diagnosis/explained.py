@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from crosscheck.calibration.alternatives import alternatives
 from crosscheck.calibration.exact import Refit
 from crosscheck.calibration.search import Sought
 from crosscheck.calibration.sets import Names
@@ -15,7 +16,7 @@ from crosscheck.diagnosis.rivals import Rival
 from crosscheck.diagnosis.search import Search
 from crosscheck.diagnosis.small import share_of
 from crosscheck.diagnosis.way import fit_of, way_of
-from crosscheck.diagnosis.words import agreement, and_what_is_left, words_of
+from crosscheck.diagnosis.words import agreement, and_what_is_left, either, words_of
 from crosscheck.fit.candidates import Candidate
 from crosscheck.fit.prepare import noise_floor
 from crosscheck.fit.problem import KINDS, Rms, rms_by_kind
@@ -34,10 +35,11 @@ def explained(sought: Sought, notes: Sequence[str]) -> Diagnosis:
     verdict = sought.judgement.verdict
     way = way_of(sought, frozenset(sought.judgement.sure))
     chances = chances_of(sought)
+    some = [] if way.found else alternatives(sought.found, sought.classes)
     missing = [_missing(sought, way, chances, name) for name in way.found]
     return diagnosis_of(
         verdict,
-        _sentence(verdict, missing, way.tried, chances),
+        _sentence(verdict, missing, way.tried, chances, some),
         missing,
         way,
         before=sought.calibration.before,
@@ -45,6 +47,7 @@ def explained(sought: Sought, notes: Sequence[str]) -> Diagnosis:
         candidates=_not_listed(way, chances),
         notes=(*notes, *_noise_notes(sought, chances)),
         chances=chances,
+        alternatives=some,
     )
 
 
@@ -118,7 +121,11 @@ def _noise_notes(sought: Sought, chances: Chances) -> list[str]:
 
 
 def _sentence(
-    verdict: DiagnosisVerdict, missing: Sequence[MissingEffect], tried: int, chances: Chances
+    verdict: DiagnosisVerdict,
+    missing: Sequence[MissingEffect],
+    tried: int,
+    chances: Chances,
+    alternatives: Sequence[Names] = (),
 ) -> str:
     if verdict is DiagnosisVerdict.NO_EFFECT_MISSING:
         return agreement(tried)
@@ -126,6 +133,12 @@ def _sentence(
         return and_what_is_left(words_of(missing), "what is left is noise", tried)
     together = chances.together
     assert together is not None
+    if len(alternatives) > 1:
+        return (
+            "Few effects explain the error, but these data leave open which: "
+            f"{either(alternatives)}. All {tried} that were tried, together, take it from "
+            f"{rms_words(together.before)} to {rms_words(together.held_out)} on runs left out."
+        )
     sure = ", ".join(m.effect for m in missing)
     return (
         f"No few effects explain the error, but all {tried} that were tried together do: from "

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from crosscheck.calibration.probability import SMALL
+from crosscheck.calibration.sets import Names
 from crosscheck.comparison.associations import Association
 from crosscheck.diagnosis.advice import check_of, measure_next
 from crosscheck.diagnosis.chances import Chances
@@ -32,6 +33,7 @@ def diagnosis_of(
     chances: Chances,
     shown: Search | None = None,
     where: tuple[Association, ...] = (),
+    alternatives: Sequence[Names] = (),
 ) -> Diagnosis:
     """A diagnosis with a way of steps that leads to it.
 
@@ -40,6 +42,7 @@ def diagnosis_of(
             stand in the diagnosis.
         way: from the model as it stands to what is kept.
         shown: the way whose errors are shown, where the way itself leads to more than is listed.
+        alternatives: sets of effects of which it is one.
     """
     last = (way if shown is None else shown).last
     after = rms_by_kind(way.problem, last.fit.state.raw)
@@ -52,7 +55,7 @@ def diagnosis_of(
         held_out=last.held_out.rms,
         floor=floor,
         candidates=tuple(candidates),
-        measure_next=tuple(measure_next(way, missing, verdict, where)),
+        measure_next=tuple(measure_next(way, missing, verdict, where, alternatives)),
         notes=tuple(dict.fromkeys([*notes, *overestimated(way.problem, after)])),
         search=way,
         whiteness=way.last.whiteness,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from crosscheck.diagnosis.result import MissingEffect
 from crosscheck.fit.reasons import DiagnosisVerdict
@@ -38,6 +38,11 @@ def agreement(tried: int, hints: Mapping[str, float] | None = None) -> str:
         f"Model and data agree: what is left is noise; of {counted(tried, 'effect')} tried "
         f"there is a hint of {some}, too weak to be sure."
     )
+
+
+def either(sets: Sequence[Iterable[str]]) -> str:
+    """Sets of effects of which it is one: "a + b, or c"."""
+    return ", or ".join(" + ".join(sorted(names)) for names in sets)
 
 
 def none_of(tried: int) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.calibration.alternatives import alternatives
 from crosscheck.calibration.exact import Refit
 from crosscheck.calibration.gram import ColumnGroup, gram_of
 from crosscheck.calibration.judgement import Judgement, judge
@@ -107,3 +108,23 @@ def test_a_large_set_is_many_effects_and_names_what_carries_it() -> None:
     without = {"abcdef".replace(x, ""): -40.0 for x in "bcdef"}
     said = judged({"": -90000.0, "abcdef": 0.0, "bcdef": -50000.0, **without})
     assert (said.verdict, said.sure) == (DiagnosisVerdict.MANY_EFFECTS, ("a",))
+
+
+def open_sets(scores: dict[str, float]) -> list[set[str]]:
+    found = found_of(scores)
+    classes = probabilities(all_scores(found), found.best.names, NAMES)
+    return [set(names) for names in alternatives(found, classes)]
+
+
+def test_others_that_explain_as_well_are_alternatives_and_parts_of_a_set_are_not() -> None:
+    others = {"a": -1.0, "abf": -0.5, "cd": -1.2, "cdg": -1.3, "ef": -2.9, "eg": -3.1}
+    assert open_sets({"": -900.0, "ab": 0.0, **others}) == [{*"ab"}, {*"cd"}, {*"ef"}]
+
+
+def test_a_swap_within_a_class_is_no_alternative() -> None:
+    assert open_sets({"": -900.0, "ab": 0.0, "ac": -0.5, "bc": -400.0}) == [{*"ab"}]
+
+
+def test_a_large_best_set_has_no_alternatives_of_few() -> None:
+    assert open_sets({"": -900.0, "abcdef": 0.0, "g": -1.0}) == []
+    assert open_sets({"": 0.0, "a": -1.0}) == []

@@ -48,6 +48,7 @@ def test_two_effects_are_named_and_a_field_makes_the_verdict_unknown() -> None:
     assert values["pulley_radius"].vector[0] == pytest.approx(0.006, rel=0.05)
     assert_shown_as_many(found)
     assert_a_model_by_itself(found)
+    assert_open_which(found)
     unknown = judge(found.found, found.classes, 20.0, 1.0)
     assert unknown.verdict is DiagnosisVerdict.UNKNOWN_EFFECT
     assert judge(found.found, found.classes, -5.0, 9.0).verdict is DiagnosisVerdict.UNKNOWN_EFFECT
@@ -61,6 +62,19 @@ def assert_a_model_by_itself(found: Sought) -> None:
     # the pulleys, which are not listed, are taken in by the tilt
     both = value_of(found, {"gravity_tilt", "pulley_radius"})
     assert listed.values != pytest.approx(both, rel=0.2)
+
+
+def assert_open_which(found: Sought) -> None:
+    """As it is told where others explain as well, so that none is sure."""
+    best = found.found.best
+    pair = frozenset({"backlash", "drum_gain"})
+    refits = {**found.found.refits, pair: replace(best, names=pair)}
+    none = Judgement(DiagnosisVerdict.MANY_EFFECTS, (), 0.0)
+    said = explained(replace(found, found=replace(found.found, refits=refits), judgement=none), [])
+    assert "these data leave open which: " in said.sentence
+    assert "gravity_tilt + pulley_radius" in said.sentence
+    assert "backlash + drum_gain" in said.sentence
+    assert any(line.endswith("(gravity_tilt)") for line in said.measure_next)
 
 
 def value_of(found: Sought, names: set[str]) -> list[float]:

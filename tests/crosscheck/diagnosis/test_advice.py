@@ -56,6 +56,18 @@ def test_without_a_lead_the_same_poses_are_repeated(found: Search) -> None:
     )
 
 
+def test_where_it_is_open_which_effects_it_is_what_is_not_common_is_checked_by_hand(
+    found: Search,
+) -> None:
+    either = [frozenset({"gravity_tilt", "stiffness"}), frozenset({"drum_gain", "stiffness"})]
+    *checks, _calibrate = measure_next(found, [], DiagnosisVerdict.MANY_EFFECTS, (), either)
+    assert checks == [
+        f"to find which effects it is: {measured_directly(name)} ({name})"
+        for name in ("drum_gain", "gravity_tilt")
+    ]
+    assert measure_next(found, [], DiagnosisVerdict.MANY_EFFECTS, (), either[:1]) == [_calibrate]
+
+
 def test_where_nothing_is_missing_the_plan_is_named(found: Search) -> None:
     (line,) = measure_next(found, [], DiagnosisVerdict.NO_EFFECT_MISSING, ())
     assert "crosscheck plan" in line
