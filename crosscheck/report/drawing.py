@@ -123,6 +123,10 @@ def image(figure: Figure, words: str) -> str:
         words: what it shows, for those who cannot see it.
     """
     buffer = io.BytesIO()
+    if (layout := figure.get_layout_engine()) is not None:
+        # else Matplotlib draws all of it once more, to find that out
+        layout.execute(figure)
+        figure.set_layout_engine("none")
     nothing = dict.fromkeys(("Date", "Creator", "Format", "Type"))
     figure.savefig(buffer, format="svg", metadata=nothing)
     _keep(figure, buffer.getvalue(), words)
