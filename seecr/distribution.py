@@ -116,30 +116,3 @@ def balanced(matrix: Array, load: Array, low: Array, high: Array) -> tuple[Array
     aim = np.concatenate([load - matrix @ low, (high - low)[bounded]]) / scale
     found, left = nnls(table, aim, maxiter=100 * (m + k))
     return low + scale * found[:m], float(left)
-
-
-def least_parts(matrix: Array, aim: Array, low: Array, high: Array, m: int) -> Array | None:
-    """Balance with the least sum of parts of the way, where least squares lose it to rounding.
-
-    The first m unknowns are tensions, which cost nothing. A linear program (HiGHS, by SciPy).
-    """
-    from scipy.optimize import linprog
-
-    d = matrix.shape[1] - m
-    unit = np.abs(matrix).max(axis=0)
-    unit = np.where(unit > 0.0, unit, 1.0)
-    scaled = matrix / unit
-    found = linprog(
-        np.concatenate([np.zeros(m), np.tile(1.0 / unit[m:], 2)]),
-        A_eq=np.concatenate([scaled, -scaled[:, m:]], axis=1),
-        b_eq=aim,
-        bounds=[
-            *zip(low[:m] * unit[:m], high[:m] * unit[:m], strict=True),
-            *zip(np.zeros(2 * d), np.tile(high[m:] * unit[m:], 2), strict=True),
-        ],
-        method="highs",
-    )
-    if found.status != 0:
-        return None
-    way = found.x[m : m + d] - found.x[m + d :]
-    return np.asarray(np.concatenate([found.x[:m], way]) / unit)

@@ -25,6 +25,8 @@ _ROUNDS, _BALANCED = 40, 1e-12
 _STEP = 1e-5
 # A slack cable is this much longer than the way it bridges: it needs a margin, not a value.
 _MARGIN = 2e-3
+# A stiffness below this part of the largest is none.
+_FIRM = 1e-12
 # Below this part of the load a tension is none.
 _NONE = 1e-9
 
@@ -97,6 +99,19 @@ def hold(tables: Tables, aim: Array, low: Array, high: Array) -> Held:
     slack = (out.tensions <= _NONE * tables.scale[:, None]) & (low <= 0.0)
     out.rest = np.where(slack & out.fine[:, None], (1.0 + _MARGIN) * bridged, out.rest)
     return out
+
+
+def holds_firmly(tables: Tables, aim: Array, low: Array, high: Array) -> NDArray[np.bool_]:
+    """(n,) whether poses can be held, as :func:`hold` does, and are stable with those lengths.
+
+    All eigenvalues of the stiffness are above rounding of the largest.
+    """
+    found = hold(tables, aim, low, high)
+    now = with_rest(tables, found.rest)
+    at = statics.evaluate(now, _here(now), threads=None)
+    stiffness = np.where(found.fine[:, None, None], at.hessian, 0.0)
+    each = np.linalg.eigvalsh(0.5 * (stiffness + np.swapaxes(stiffness, 1, 2)))
+    return np.asarray(found.fine & (each[:, 0] > _FIRM * each[:, -1]))
 
 
 def with_rest(tables: Tables, rest: Array) -> Tables:

@@ -14,8 +14,8 @@ from seecr.distribution import tension_limits, wanted_tensions
 from seecr.effects.base import Effect
 from seecr.errors import InputError
 from seecr.experiment import Experiment, GivenEffects, Prediction, effects_of
-from seecr.holding import Held, balance_of, hold
-from seecr.nearest import nearest
+from seecr.holding import Held, balance_of, hold, holds_firmly
+from seecr.nearest import Nearest, nearest
 from seecr.pose import Array, pose_difference
 from seecr.result import COORDINATES, Record, Result, named
 from seecr.robot import Robot
@@ -46,6 +46,9 @@ class Correction(Result):
         lengths: (n, m) [m] to tell the winches, counted as the plain robot counts.
         held: (n,) bool, the wanted pose can be held by tensions within the limits.
         found: (n,) bool, there is an answer: lengths for the wanted pose or the nearest.
+        settled: (n,) bool, nothing that can be held is nearer than what is aimed at and but a
+            little away from it: the wanted pose itself, or a local minimum. Among those the
+            nearest of many searches is taken.
         why_not: (n,) sentences, why a wanted pose cannot be held; "" where it can.
         solution: where the platform rests with these lengths, certified.
         commands: the lengths as commands that every function takes, with the runs, times,
@@ -58,6 +61,7 @@ class Correction(Result):
     lengths: Array
     held: NDArray[np.bool_]
     found: NDArray[np.bool_]
+    settled: NDArray[np.bool_]
     solution: Solution
     commands: Commands
     why_not: tuple[str, ...]
@@ -101,6 +105,7 @@ class Correction(Result):
         stays = self.solution.converged
         for rows, text in (
             (lost & ~self.found, "of them: no pose near was found that can be held"),
+            (near & ~self.settled, "of them may have nearer ones beside them"),
             (self.found & ~stays, "are balanced, but the platform would not stay there"),
             (self.held & stays & ~at, "are missed"),
         ):
@@ -198,17 +203,19 @@ class _Search:
 
     def run(self, fix_position: bool) -> Correction:
         held, tables = self._held(self.given)
-        found, aimed = held.fine.copy(), self.given.pose.copy()
+        found, aimed, settled = held.fine.copy(), self.given.pose.copy(), held.fine.copy()
         lost = np.flatnonzero(~held.fine)
         if len(lost):
-            aimed[lost], found[lost] = self._nearest(lost, tables.scale, fix_position)
+            best = self._nearest(lost, tables.scale, fix_position)
+            aimed[lost], found[lost], settled[lost] = best.poses, best.found, best.settled
         commands = replace(self.given, pose=aimed)
         there = self._held(commands)[0] if len(lost) else held
+        found &= there.fine
         lengths, prediction = self._lengths(commands, there)
         lengths[~found] = np.nan
         solution = prediction.solution()
         return Correction(
-            self.robot, self.given.pose, aimed, lengths, held.fine, found,
+            self.robot, self.given.pose, aimed, lengths, held.fine, found, settled & found,
             _without(solution, ~found), replace(commands, lengths=lengths, told=True),
             self._why_not(lost, tables),
         )  # fmt: skip
@@ -233,23 +240,26 @@ class _Search:
         limits = self.limits
         return hold(tables, limits.aim, limits.low, limits.high), tables
 
-    def _nearest(
-        self, rows: NDArray[np.intp], scale: Array, fix_position: bool
-    ) -> tuple[Array, NDArray[np.bool_]]:
+    def _nearest(self, rows: NDArray[np.intp], scale: Array, fix_position: bool) -> Nearest:
         wanted, limits = self.given.pose[rows], self.limits
 
         def balance(poses: Array, some: NDArray[np.intp]) -> tuple[Array, Array]:
             part = replace(self.given.rows(rows[some]), pose=poses)
             return balance_of(self._tables(part), limits.low)
 
-        args = (self.robot, wanted, balance, limits.low, limits.high, scale[rows])
-        poses, found = nearest(*args, fix_position)
-        again = np.flatnonzero(~found)
+        def stays(poses: Array, some: NDArray[np.intp]) -> NDArray[np.bool_]:
+            tables = self._tables(replace(self.given.rows(rows[some]), pose=poses))
+            return holds_firmly(tables, limits.aim[rows[some]], limits.low, limits.high)
+
+        args = (self.robot, wanted, balance, stays, limits.low, limits.high, scale[rows])
+        best = nearest(*args, fix_position)
+        again = np.flatnonzero(~best.found)
         if fix_position and len(again):
             # the position cannot be kept either
-            other = _Search(self.robot, self.given, self.effects, limits)
-            poses[again], found[again] = other._nearest(rows[again], scale, False)
-        return poses, found
+            other = self._nearest(rows[again], scale, False)
+            best.poses[again], best.found[again] = other.poses, other.found
+            best.settled[again] = other.settled
+        return best
 
     def _lengths(self, commands: Commands, held: Held) -> tuple[Array, Prediction]:
         """Lengths to tell for rest lengths that hold, and what comes of them."""

@@ -200,7 +200,10 @@ def test_a_pose_far_above_the_frame_comes_down_to_where_tensions_still_hold_it()
     robot = robot_named("demobot_cogiro")
     found = correct(robot, np.array([0.4, 0.25, 3.0, 1, 0, 0, 0]), highest=30.0)
     assert found.found[0] and found.solution.converged[0]
-    assert found.solution.tensions.max() == pytest.approx(30.0, rel=1e-5)
+    # one cable stops it; level and turned about the vertical alone it is farther, 2.5094
+    assert 29.9 < found.solution.tensions.max() <= 30.0
+    away = found.left[0] * np.repeat([1.0, robot.length], 3)
+    assert np.linalg.norm(away) < 2.5
     assert robot.reference_pose[2] < found.aimed[0, 2] < 0.6
 
 

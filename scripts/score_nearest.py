@@ -1,0 +1,263 @@
+"""The nearest poses that can be held, against brute force: how often are answers farther?
+
+    python scripts/score_nearest.py --robots ipanema --kinds far --poses 20
+    python scripts/score_nearest.py --keep reference.npz      for other versions, too
+
+The reference minimises position^2 + (length x rotation)^2 by SciPy's SLSQP from many poses that are
+held, with equations and derivatives of its own, and takes the nearest of its answers at which the
+platform is stable. Kinds: far (0.1 to 5 frames outside, level), near (within 2 % of a frame),
+turned (over the frame, turned by any angle), both.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import minimize
+
+from seecr.distribution import balanced
+from seecr.inverse import correct
+from seecr.mjcf import load_robot
+from seecr.pose import Array, pose_add, pose_difference, quat_to_matrix
+from seecr.robot import Robot
+from seecr.shipped import model_path
+from seecr.workspace import feasible
+
+LIMITS: dict[str, dict[str, float]] = {
+    "demobot_parallel": {},
+    "demobot_cogiro": {"lowest": 0.3, "highest": 3.0},
+    "cogiro_large": {"highest": 5000.0},
+    "ipanema": {"lowest": 50.0, "highest": 3000.0},
+}
+KINDS = ("far", "near", "turned", "both")
+# Poses tried over the frame, of which this many are gone on with, and from so many SLSQP begins.
+_SAMPLE, _NEAR, _SEEDS = 150000, 150, 16
+_STEPS, _HALVINGS, _BALANCED, _MISSED = 40, 7, 1e-6, 1e-6
+
+
+def _frame(robot: Robot) -> float:
+    return float(np.ptp(robot.exit_points, axis=0).max())
+
+
+def _any_turn(random: np.random.Generator, n: int) -> Array:
+    turn = random.normal(size=(n, 4))
+    return np.asarray(turn / np.linalg.norm(turn, axis=1, keepdims=True))
+
+
+def wanted_poses(robot: Robot, limits: dict[str, float], kind: str, n: int) -> Array:
+    """Poses (n, 7) that cannot be held."""
+    random, out, frame = np.random.default_rng(1), [], _frame(robot)
+    box = np.concatenate([robot.exit_points, robot.reference_pose[None, :3]])
+    while len(out) < n:
+        pose, toward = robot.reference_pose.copy(), random.normal(size=3)
+        toward /= np.linalg.norm(toward)
+        if kind in ("far", "both"):
+            pose[:3] += frame * random.uniform(0.1, 5.0 if kind == "far" else 2.0) * toward
+        elif kind == "near":
+            way = np.tile(pose, (60, 1))
+            way[:, :3] += np.linspace(0.0, 1.5 * frame, 60)[:, None] * toward
+            out_there = np.flatnonzero(~feasible(robot, way, **limits))
+            if len(out_there) == 0:
+                continue
+            pose = way[out_there[0]]
+            pose[:3] += random.uniform(0.0, 0.02 * frame) * toward
+        else:
+            pose[:3] = random.uniform(box.min(axis=0), box.max(axis=0))
+        if kind in ("turned", "both"):
+            pose[3:] = _any_turn(random, 1)[0]
+        if not feasible(robot, pose, **limits)[0]:
+            out.append(pose)
+    return np.array(out)
+
+
+def _skew(v: Array) -> Array:
+    zero = np.zeros_like(v[..., 0])
+    x, y, z = v[..., 0], v[..., 1], v[..., 2]
+    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+class Brute:
+    """One wanted pose; x is the way from it [m, length x rotation] and tensions, both scaled."""
+
+    def __init__(self, robot: Robot, limits: dict[str, float], wanted: Array) -> None:
+        m = robot.n_cables
+        self.robot, self.wanted, self.turn = robot, wanted, quat_to_matrix(wanted[3:])
+        self.weight, self.unit = robot.mass * robot.gravity, np.repeat([1.0, robot.length], 3)
+        self.low = np.full(m, limits.get("lowest", 0.0))
+        self.high = np.full(m, limits.get("highest", np.inf))
+        most = self.high[0] if np.isfinite(self.high[0]) else 0.0
+        self.pull = max(float(np.linalg.norm(self.weight)), 0.2 * most)
+
+    def places(self, away: Array) -> Array:
+        return pose_add(np.tile(self.wanted, (len(away), 1)), away / self.unit)
+
+    def balance(self, away: Array, pulls: Array) -> tuple[Array, Array]:
+        """What is out of balance (6,) [N] and its derivatives (6, 6 + m)."""
+        robot, length = self.robot, self.robot.length
+        angle = float(np.linalg.norm(away[3:])) / length
+        cross = _skew(away[3:] / length)
+        a, b, c = 1.0 - angle**2 / 6.0, 0.5 - angle**2 / 24.0, 1.0 / 6.0 - angle**2 / 120.0
+        if angle > 1e-2:
+            a, b = np.sin(angle) / angle, (1.0 - np.cos(angle)) / angle**2
+            c = (1.0 - a) / angle**2
+        turn = (np.eye(3) + a * cross + b * cross @ cross) @ self.turn
+        spin = (np.eye(3) + b * cross + c * cross @ cross) / length
+        arms, centre = robot.anchor_points @ turn.T, turn @ robot.centre_of_mass
+        ways = robot.exit_points - self.wanted[:3] - away[:3] - arms
+        size = np.linalg.norm(ways, axis=1)
+        unit = ways / size[:, None]
+        forces = unit * pulls[:, None]
+        stiff = (unit[:, :, None] * unit[:, None] - np.eye(3)) * (pulls / size)[:, None, None]
+        lever = _skew(arms)
+        left = np.concatenate([
+            forces.sum(axis=0) + self.weight,
+            (np.cross(arms, forces).sum(axis=0) + np.cross(centre, self.weight)) / length,
+        ])  # fmt: skip
+        turned = _skew(forces) @ lever - lever @ stiff @ lever
+        rates = np.zeros((6, 6 + len(pulls)))
+        rates[:3, :3], rates[:3, 3:6] = stiff.sum(axis=0), -(stiff @ lever).sum(axis=0) @ spin
+        rates[3:, :3] = (lever @ stiff).sum(axis=0) / length
+        bent = turned.sum(axis=0) + _skew(self.weight) @ _skew(centre)
+        rates[3:, 3:6] = bent @ spin / length
+        rates[:3, 6:], rates[3:, 6:] = unit.T, np.cross(arms, unit).T / length
+        return left, rates
+
+    def go(self, start: Array) -> tuple[Array, Array] | None:
+        """The local minimum from a start (6,): way and tensions; None where SLSQP gives up."""
+        far = max(float(np.linalg.norm(start)), 1e-3 * self.robot.length)
+        left, rates = self.balance(start, np.zeros(len(self.low)))
+        first = balanced(rates[:, 6:], -left, self.low, self.high)[0]
+        grade = np.concatenate([np.full(6, far), np.full(len(first), self.pull)])
+        found = minimize(
+            lambda x: (x[:6] @ x[:6], np.concatenate([2.0 * x[:6], np.zeros(len(first))])),
+            np.concatenate([start, first]) / grade, jac=True, method="SLSQP",
+            bounds=[(None, None)] * 6 + [
+                (a / self.pull, b / self.pull) for a, b in zip(self.low, self.high, strict=True)
+            ],
+            constraints={
+                "type": "eq",
+                "fun": lambda x: self.balance(*np.split(x * grade, [6]))[0] / self.pull,
+                "jac": lambda x: self.balance(*np.split(x * grade, [6]))[1] * grade / self.pull,
+            },
+            options={"maxiter": _STEPS, "ftol": 1e-9},
+        )  # fmt: skip
+        away, pulls = np.split(found.x * grade, [6])
+        pulls = np.clip(pulls, self.low, self.high)
+        if not np.isfinite(found.x).all():
+            return None
+        fine = np.abs(self.balance(away, pulls)[0]).max() <= _BALANCED * self.pull
+        return (away, pulls) if fine else None
+
+    def stable(self, away: Array, pulls: Array) -> bool:
+        """Whether the stiffness, with each cable's own, has positive eigenvalues only."""
+        rates, robot = self.balance(away, pulls)[1], self.robot
+        size = robot.nominal_lengths(self.places(away[None]))[0]
+        taut = pulls > 1e-6 * self.pull
+        # a cable's own stiffness EA/l0 with l0 = l/(1 + tau/EA)
+        own = np.where(taut, (robot.ea + pulls) / size, 0.0)
+        stiffness = (rates[:, 6:] * own) @ rates[:, 6:].T - rates[:, :6] @ self._chart(away)
+        return bool(np.linalg.eigvalsh(0.5 * (stiffness + stiffness.T))[0] > 0.0)
+
+    def _chart(self, away: Array) -> Array:
+        """Ways (6, 6) of small turns on top of the rotation, which rates are not by."""
+        there, step = self.places(np.tile(away, (6, 1))), 1e-6
+        plus, minus = (
+            pose_difference(pose_add(there, moves / self.unit), np.tile(self.wanted, (6, 1)))
+            for moves in (step * np.eye(6), -step * np.eye(6))
+        )
+        return np.asarray(((plus - minus) * self.unit / (2.0 * step)).T)
+
+    def nearest(self, sample: Array, limits: dict[str, float]) -> float:
+        """[m] the least way of all answers at which the platform stays; infinite for none."""
+        sizes = [np.inf]
+        for start in self._starts(sample, limits):
+            found = self.go(start)
+            if found is not None and self.stable(*found):
+                sizes.append(float(np.linalg.norm(found[0])))
+        return min(sizes)
+
+    def _starts(self, sample: Array, limits: dict[str, float]) -> Iterator[Array]:
+        random = np.random.default_rng(7)
+        away = pose_difference(sample, np.tile(self.wanted, (len(sample), 1))) * self.unit
+        near = np.argsort(np.linalg.norm(away, axis=1))[:_NEAR]
+        others = random.choice(len(away), min(_NEAR, len(away)), replace=False)
+        away = away[np.concatenate([near, others])]
+        inner, outer = np.zeros(len(away)), np.ones(len(away))
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (inner + outer)
+            ok = feasible(self.robot, self.places(away * (1.0 - middle[:, None])), **limits)
+            inner, outer = np.where(ok, middle, inner), np.where(ok, outer, middle)
+        away *= 1.0 - inner[:, None]
+        order = np.argsort(np.linalg.norm(away, axis=1))
+        yield np.zeros(6)
+        yield from away[order[: _SEEDS // 2]]
+        yield from away[random.choice(order, _SEEDS // 2, replace=False)]
+
+
+def held_sample(robot: Robot, limits: dict[str, float]) -> Array:
+    """Poses over the frame that can be held, half of them turned by all angles."""
+    random = np.random.default_rng(99)
+    box = np.concatenate([robot.exit_points, robot.reference_pose[None, :3]])
+    poses = np.tile(robot.reference_pose, (_SAMPLE, 1))
+    poses[:, :3] = random.uniform(box.min(axis=0), box.max(axis=0), (_SAMPLE, 3))
+    poses[::2, 3:] = _any_turn(random, _SAMPLE // 2)
+    tilts = np.zeros((_SAMPLE // 2, 6))
+    tilts[:, 3:] = random.normal(scale=0.4, size=(_SAMPLE // 2, 3))
+    poses[1::2] = pose_add(poses[1::2], tilts)
+    parts = np.array_split(poses, 30)
+    return np.concatenate([part[feasible(robot, part, **limits)] for part in parts])
+
+
+def score(name: str, kind: str, n: int, kept: dict[str, Array]) -> str:
+    """One line: of how many poses the answer is farther than the reference by 1 %."""
+    robot, limits, key = load_robot(model_path(name)), LIMITS[name], f"{name}-{kind}-{n}"
+    want = wanted_poses(robot, limits, kind, n)
+    correct(robot, want[:1], **limits)
+    began = time.process_time()
+    found = correct(robot, want, **limits)
+    spent = 1e3 * (time.process_time() - began) / n
+    unit = np.repeat([1.0, robot.length], 3)
+    ours = np.linalg.norm(pose_difference(found.aimed, want) * unit, axis=1)
+    off = np.abs(pose_difference(found.solution.pose, found.aimed)).max(axis=1)
+    stays = found.found & found.solution.converged & (off < _MISSED)
+    if key not in kept:
+        sample = held_sample(robot, limits)
+        kept[key] = np.array([Brute(robot, limits, one).nearest(sample, limits) for one in want])
+    with np.errstate(invalid="ignore"):
+        part = np.where(stays, ours / kept[key] - 1.0, np.inf)
+    both = stays & np.isfinite(kept[key])
+    settled = getattr(found, "settled", stays)
+    return (
+        f"{name} {kind}: of {n} poses {int(np.sum(part[both] > 0.01))} farther by more than 1 % "
+        f"(worst {100 * part[both].max(initial=0.0):.1f} %), {int(np.sum(part[both] < -0.01))} "
+        f"nearer; without an answer that stays {int(np.sum(~stays))}, the reference "
+        f"{int(np.sum(np.isinf(kept[key])))}; {int(settled.sum())} local minima; "
+        f"{spent:.0f} ms a pose"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--robots", nargs="*", default=list(LIMITS))
+    parser.add_argument("--kinds", nargs="*", default=list(KINDS), choices=KINDS)
+    parser.add_argument("--poses", type=int, default=100)
+    parser.add_argument("--keep", type=Path, help="file of references, read and written")
+    given = parser.parse_args()
+    kept: dict[str, Array] = {}
+    if given.keep is not None and given.keep.is_file():
+        with np.load(given.keep) as file:
+            kept = {key: file[key] for key in file}
+    for name in given.robots:
+        for kind in given.kinds:
+            print(score(name, kind, given.poses, kept), flush=True)
+            if given.keep is not None:
+                np.savez(given.keep, **kept)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,84 @@
+"""The nearest poses that can be held: against brute force, and held where they are said to be."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import score_nearest
+
+from seecr.inverse import correct
+from seecr.mjcf import load_robot
+from seecr.model import load_model
+from seecr.nearest import search
+from seecr.nearest.problem import Curved, Reaching
+from seecr.pose import pose_difference
+from seecr.shipped import model_path
+from seecr.workspace import balance_equations
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "kind"), [("cogiro_large", "far"), ("ipanema", "both"), ("demobot_parallel", "turned")]
+)
+def test_no_answer_is_farther_than_brute_force_finds(name: str, kind: str) -> None:
+    robot, limits = load_robot(model_path(name)), score_nearest.LIMITS[name]
+    want = score_nearest.wanted_poses(robot, limits, kind, 6)
+    found = correct(robot, want, **limits)
+    assert found.found.all() and not found.held.any() and found.solution.converged.all()
+    assert np.abs(pose_difference(found.solution.pose, found.aimed)).max() < 1e-8
+    sample = score_nearest.held_sample(robot, limits)
+    best = [score_nearest.Brute(robot, limits, one).nearest(sample, limits) for one in want]
+    assert np.isfinite(best).sum() >= 3
+    unit = np.repeat([1.0, robot.length], 3)
+    ours = np.linalg.norm(pose_difference(found.aimed, want) * unit, axis=1)
+    assert np.all(ours < 1.01 * np.array(best))
+
+
+@pytest.mark.slow
+def test_with_cables_that_sag_the_platform_rests_there_within_limits() -> None:
+    path = model_path("cogiro_large")
+    robot = load_robot(path)
+    sag = load_model(path.with_name("sag.toml"), robot)
+    want = np.tile(robot.reference_pose, (3, 1))
+    want[:, :3] += np.array([[9.0, 3.0, 2.0], [-20.0, 10.0, 4.0], [5.0, -14.0, 15.0]])
+    found = correct(robot, want, effects=sag, highest=5000.0)
+    assert found.found.all() and not found.held.any() and found.solution.converged.all()
+    assert np.abs(pose_difference(found.solution.pose, found.aimed)).max() < 1e-6
+    assert found.solution.tensions.max() < 5000.0 * (1.0 + 1e-9)
+
+
+@pytest.mark.slow
+def test_an_answer_that_is_no_local_minimum_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot, want = load_robot(model_path("demobot_parallel")), np.array([1.2, 0.25, 0.1, 1, 0, 0, 0])
+    found = correct(robot, want)
+    assert found.found[0] and found.settled[0] and "nearer ones beside" not in str(found)
+    monkeypatch.setattr(search, "inward", lambda _problem, start: start)
+    cut = correct(robot, want)
+    assert cut.found[0] and not cut.settled[0]
+    assert "1 of them may have nearer ones beside them" in str(cut)
+
+
+def test_balance_bends_as_its_rates_change() -> None:
+    robot = load_robot(model_path("ipanema"))
+    none = np.zeros((1, 8))
+    problem = Reaching(
+        robot, robot.reference_pose[None], None, lambda poses, _: balance_equations(robot, poses),
+        lambda _, rows: np.ones(len(rows), dtype=bool), none, none, np.array([200.0]), np.ones(6),
+    )  # fmt: skip
+    random, row = np.random.default_rng(0), np.zeros(1, dtype=np.intp)
+    away, pulls = 0.3 * random.normal(size=(1, 6)), random.uniform(50.0, 900.0, (1, 8))
+    dual, step = random.normal(size=(1, 6)), 1e-3
+    own, mixed = Curved.about(problem, away, pulls, row).bends(dual)
+
+    def rates(away: np.ndarray, pulls: np.ndarray) -> np.ndarray:
+        at = Curved.about(problem, away, pulls, row)
+        return np.concatenate([dual @ at.turn[0], dual @ at.matrix[0]], axis=1)[0]
+
+    moves = np.concatenate([step * np.eye(6), np.zeros((6, 8))], axis=1)
+    change = [
+        (rates(away + one[:6], pulls + one[6:]) - rates(away - one[:6], pulls - one[6:]))
+        / (2.0 * step)
+        for one in moves
+    ]
+    whole = np.concatenate([own[0], mixed[0]], axis=1)
+    np.testing.assert_allclose(whole, change, atol=1e-4 * np.abs(whole).max())
