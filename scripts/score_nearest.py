@@ -48,9 +48,9 @@ def _any_turn(random: np.random.Generator, n: int) -> Array:
     return np.asarray(turn / np.linalg.norm(turn, axis=1, keepdims=True))
 
 
-def wanted_poses(robot: Robot, limits: dict[str, float], kind: str, n: int) -> Array:
+def wanted_poses(robot: Robot, limits: dict[str, float], kind: str, n: int, seed: int = 1) -> Array:
     """Poses (n, 7) that cannot be held."""
-    random, out, frame = np.random.default_rng(1), [], _frame(robot)
+    random, out, frame = np.random.default_rng(seed), [], _frame(robot)
     box = np.concatenate([robot.exit_points, robot.reference_pose[None, :3]])
     while len(out) < n:
         pose, toward = robot.reference_pose.copy(), random.normal(size=3)
@@ -213,10 +213,10 @@ def held_sample(robot: Robot, limits: dict[str, float]) -> Array:
     return np.concatenate([part[feasible(robot, part, **limits)] for part in parts])
 
 
-def score(name: str, kind: str, n: int, kept: dict[str, Array]) -> str:
+def score(name: str, kind: str, n: int, seed: int, kept: dict[str, Array]) -> str:
     """One line: of how many poses the answer is farther than the reference by 1 %."""
-    robot, limits, key = load_robot(model_path(name)), LIMITS[name], f"{name}-{kind}-{n}"
-    want = wanted_poses(robot, limits, kind, n)
+    robot, limits, key = load_robot(model_path(name)), LIMITS[name], f"{name}-{kind}-{n}-{seed}"
+    want = wanted_poses(robot, limits, kind, n, seed)
     correct(robot, want[:1], **limits)
     began = time.process_time()
     found = correct(robot, want, **limits)
@@ -246,6 +246,7 @@ def main() -> None:
     parser.add_argument("--robots", nargs="*", default=list(LIMITS))
     parser.add_argument("--kinds", nargs="*", default=list(KINDS), choices=KINDS)
     parser.add_argument("--poses", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=1, help="of the poses")
     parser.add_argument("--keep", type=Path, help="file of references, read and written")
     given = parser.parse_args()
     kept: dict[str, Array] = {}
@@ -254,7 +255,7 @@ def main() -> None:
             kept = {key: file[key] for key in file}
     for name in given.robots:
         for kind in given.kinds:
-            print(score(name, kind, given.poses, kept), flush=True)
+            print(score(name, kind, given.poses, given.seed, kept), flush=True)
             if given.keep is not None:
                 np.savez(given.keep, **kept)
 

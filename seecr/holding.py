@@ -14,13 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr import statics
-from seecr.compiled.columns import EA, GAP, REST, STRAIN, TENSION
+from seecr.compiled.columns import EA, GAP, REST, STRAIN, TENSION, WEIGHT
 from seecr.distribution import distribute
 from seecr.pose import Array
 from seecr.tables import Tables, take
 
 # Rounds of Newton's method; balance to this part of the load ends them.
 _ROUNDS, _BALANCED = 40, 1e-12
+# Rounds for whether a pose is firm, asked of many.
+_FEW = 14
 # Step of a rest length for its derivative, relative to the robot's length.
 _STEP = 1e-5
 # A slack cable is this much longer than the way it bridges: it needs a margin, not a value.
@@ -48,22 +50,47 @@ class Held:
     fine: NDArray[np.bool_]
 
 
-def hold(tables: Tables, aim: Array, low: Array, high: Array) -> Held:
+def hold(tables: Tables, aim: Array, low: Array, high: Array, rounds: int = _ROUNDS) -> Held:
     """Find rest lengths with which the poses of ``tables`` are in balance.
 
     Args:
         tables: of n poses, whose own rest lengths do not matter.
         aim: (n, m) tensions wanted [N].
         low, high: (m,) limits [N].
+        rounds: at most, of Newton's method.
     """
+    out, floor = _hold(tables, aim, low, high, rounds), least_of_heavy(tables)
+    # no length takes a hanging cable's tension to nothing: such rows again, with what it needs
+    again = np.flatnonzero(~out.fine & np.any((floor > low) & (floor < high), axis=1))
+    if len(again):
+        least = np.where(floor < high, np.maximum(low, floor), low)[again]
+        other = _hold(take(tables, again), aim[again], least, high, rounds)
+        rows = again[other.fine]
+        out.rest[rows], out.tensions[rows] = other.rest[other.fine], other.tensions[other.fine]
+        out.strains[rows], out.fine[rows] = other.strains[other.fine], True
+    return out
+
+
+def least_of_heavy(tables: Tables) -> Array:
+    """(n, m) [N] tensions that cables with weight are not asked to go below: what each weighs.
+
+    A catenary whose tension is its weight sags by about an eighth of its span. Zero of others.
+    """
+    bridged = tables.cables[..., REST] + tables.cables[..., GAP]
+    return np.asarray(tables.cables[..., WEIGHT] * bridged)
+
+
+def _hold(tables: Tables, aim: Array, low: Array, high: Array, rounds: int) -> Held:
+    """See :func:`hold`; the limits may be (n, m), each row's own."""
     n, m = tables.cables.shape[:2]
     bridged = tables.cables[..., REST] + tables.cables[..., GAP]
+    least, most = np.broadcast_to(low, (n, m)), np.broadcast_to(high, (n, m))
     first = np.maximum(low, tables.scale[:, None] / m)
     rest = bridged / (1.0 + first / tables.cables[..., EA])
     out = Held(rest, np.zeros((n, m)), np.zeros((n, m)), np.zeros(n, dtype=bool))
     rows, known, wanted = np.arange(n), None, out.tensions
     here = _here(tables)
-    for _ in range(_ROUNDS):
+    for _ in range(rounds):
         now = with_rest(take(tables, rows), out.rest[rows])
         at = statics.evaluate(now, statics.take_evaluation(here, rows), threads=None)
         statics.put_evaluation(here, rows, at)
@@ -84,11 +111,11 @@ def hold(tables: Tables, aim: Array, low: Array, high: Array) -> Held:
         known[0][rows], known[1][rows] = by_tension, own
         tensions = at.states[..., TENSION]
         load = np.einsum("ndm,nm->nd", by_tension, tensions) - at.gradient
-        wanted, possible = distribute(by_tension, load, aim[rows], low, high)
+        wanted, possible = distribute(by_tension, load, aim[rows], least[rows], most[rows])
         step = wanted - tensions
         # a plain cable's tension is linear in 1/l0: the slope over the step is exact
         slope = -own * out.rest[rows] * (out.rest[rows] - _STEP * now.length)
-        inverse = 1.0 / out.rest[rows] + step / slope
+        inverse = 1.0 / out.rest[rows] + step / slope * _hanging(now, tensions, wanted)
         inverse = np.clip(inverse * out.rest[rows], 0.5, 2.0) / out.rest[rows]
         going = possible & np.isfinite(inverse).all(axis=1)
         out.rest[rows[going]] = 1.0 / inverse[going]
@@ -106,7 +133,7 @@ def holds_firmly(tables: Tables, aim: Array, low: Array, high: Array) -> NDArray
 
     All eigenvalues of the stiffness are above rounding of the largest.
     """
-    found = hold(tables, aim, low, high)
+    found = hold(tables, aim, low, high, _FEW)
     now = with_rest(tables, found.rest)
     at = statics.evaluate(now, _here(now), threads=None)
     stiffness = np.where(found.fine[:, None, None], at.hessian, 0.0)
@@ -136,6 +163,21 @@ def _rates(tables: Tables, at: statics.Evaluation) -> tuple[Array, Array]:
         return np.where(
             tension[:, None, :] != 0.0, force / tension[:, None, :], 0.0
         ), tension / step
+
+
+def _hanging(tables: Tables, now: Array, wanted: Array) -> Array:
+    """(n, m) by what Newton's steps change for cables that hang; one for those without weight.
+
+    A parabola's strain is T/EA - (w l)^2/(24 T^2) (Irvine 1981, section 1.2): how much more or
+    less of it lies between two tensions than its slope at the first says.
+    """
+    law = tables.cables
+    heavy = (law[..., WEIGHT] * (law[..., REST] + law[..., GAP])) ** 2
+    some = (heavy > 0.0) & (now > 0.0) & (wanted > 0.0)
+    old, new = np.where(some, now, 1.0), np.where(some, wanted, 1.0)
+    between = 1.0 / law[..., EA] + heavy * (new + old) / (24.0 * (old * new) ** 2)
+    slope = 1.0 / law[..., EA] + heavy / (12.0 * old**3)
+    return np.where(some, between / slope, 1.0)
 
 
 def _within(tensions: Array, low: Array, high: Array, scale: Array) -> NDArray[np.bool_]:

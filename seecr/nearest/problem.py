@@ -66,6 +66,15 @@ class Reaching:
         """Whether the poses so far from those of rows can be held."""
         return self.holds(self.placed(away, rows), rows)
 
+    def firm(self, away: Array, rows: Rows) -> NDArray[np.bool_]:
+        """Whether the platform stays at the poses so far from those of rows, checked exactly."""
+        poses = self.placed(away, rows)
+        out = self.holds(poses, rows)
+        some = np.flatnonzero(out)
+        if len(some):
+            out[some] = self.stays(poses[some], rows[some])
+        return out
+
     def holds(self, poses: Array, rows: Rows) -> NDArray[np.bool_]:
         """Whether poses (k, 7) can be held with the loads of rows."""
         if len(rows) == 0:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,8 +25,8 @@ def screened(problem: Reaching, candidates: Candidates, most: int) -> Spots:
     back = _brought_back(problem, candidates, held, most)
     away = np.concatenate([candidates.away[held], back.away])
     rows = np.concatenate([candidates.rows[held], back.rows])
-    away, rows = _toward(problem, away, rows)
-    few = _spread(problem, away, rows, most)
+    away, rows = toward(problem, away, rows, problem.held)
+    few = spread(problem, away, rows, most)
     return problem.start(away[few], rows[few]).only_tight(TIGHT)
 
 
@@ -44,8 +46,13 @@ def _brought_back(
     return restored(problem, start).only_tight(TIGHT)
 
 
-def _toward(problem: Reaching, away: Array, rows: Rows) -> tuple[Array, Rows]:
-    """As far on straight ways to the wanted poses as is held; half of them keep their turn."""
+def toward(
+    problem: Reaching,
+    away: Array,
+    rows: Rows,
+    fine: Callable[[Array, Rows], NDArray[np.bool_]],
+) -> tuple[Array, Rows]:
+    """As far on straight ways to the wanted poses as is fine; half of them keep their turn."""
     inner, outer = np.zeros(len(rows)), np.ones(len(rows))
     turned = np.random.default_rng(4).random(len(rows)) < 0.5
     keeps = turned[:, None] & problem.robot.hinges & ~problem.robot.hinges.all()
@@ -57,8 +64,8 @@ def _toward(problem: Reaching, away: Array, rows: Rows) -> tuple[Array, Rows]:
             away, way, rows = away[few], way[few], rows[few]
             inner, outer = inner[few], outer[few]
         middle = 0.5 * (inner + outer)
-        held = problem.held(away - middle[:, None] * way, rows)
-        inner, outer = np.where(held, middle, inner), np.where(held, outer, middle)
+        ok = fine(away - middle[:, None] * way, rows)
+        inner, outer = np.where(ok, middle, inner), np.where(ok, outer, middle)
     return away - inner[:, None] * way, rows
 
 
@@ -70,7 +77,7 @@ def _nearer_half(size: Array, rows: Rows, n: int) -> Rows:
     return order[place < np.maximum(_KEPT, many[rows[order]] // 2)]
 
 
-def _spread(problem: Reaching, away: Array, rows: Rows, most: int) -> list[int]:
+def spread(problem: Reaching, away: Array, rows: Rows, most: int) -> list[int]:
     """The nearest of each row that are turned otherwise than those before."""
     chosen, size = [], np.linalg.norm(away, axis=1)
     hinges, length = problem.robot.hinges, problem.robot.length

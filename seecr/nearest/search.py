@@ -4,6 +4,7 @@ Least position^2 + (length x rotation)^2 subject to balance, W(q) tau = -w(q), a
 be held is not convex, and turned platforms reach where level ones do not: there are many local
 minima, a few per cent apart. So searches begin at the wanted pose itself; where the ways from a
 sample of poses that are held end to be; and at other rows' answers, those turned by all angles.
+Where the nearest end is one at which the platform would not stay, see :mod:`seecr.nearest.firm`.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.joints import values_of_pose
+from seecr.nearest.firm import at_random, firm_ends, nearest_of, part_of
 from seecr.nearest.inward import ENOUGH, TIGHT, inward, restored
 from seecr.nearest.problem import Balance, Curved, Reaching, Rows, Spots, Stays
 from seecr.nearest.screen import screened
@@ -25,8 +27,8 @@ from seecr.robot import Robot
 _INSIDE = 1e-6
 # Searches of each row from the sample, and from other rows' answers.
 _FIRST, _SHARED = 14, 4
-# Halvings of the way home for an answer that does not stay, and of the last of these.
-_PARTS, _HALVINGS = 16, 4
+# Where a search ended nearer by this part, but the platform would not stay, firm poses are sought.
+_NEARER = 0.01
 # A step of this part of the way, and how much of it may come nearer at a local minimum.
 _PART, _FLAT = 1e-3, 1e-3
 
@@ -80,31 +82,40 @@ def nearest(
     rows = np.arange(len(wanted))
     start = problem.start(np.zeros((len(wanted), robot.n_dof)), rows)
     best.keep(inward(problem, restored(problem, start).only_tight(TIGHT)))
-    first = from_sample(problem, sample(problem)).and_more(about_wanted(problem))
+    poses = sample(problem)
+    first = from_sample(problem, poses).and_more(about_wanted(problem))
     best.search(first, _FIRST)
     if not best.found.any():
         return Nearest(wanted.copy(), best.found, best.found.copy())
     best.search(about_answers(problem, best.away, np.flatnonzero(best.found)), _SHARED)
+    best.firm_ones(poses)
     settled = best.settled() & best.firm
-    best.inward_to_firm()
     return Nearest(problem.placed(best.away, rows), best.found, settled)
 
 
 @dataclass(frozen=True, eq=False)
 class _Best:
-    """The nearest answers so far, changed in place; ``firm`` (n,) bool where the platform stays."""
+    """The nearest answers so far, changed in place.
+
+    Attributes:
+        away: (n, d) [m] from the wanted poses. tensions: (n, m) [N].
+        found: (n,) bool. firm: (n,) bool, the platform stays there.
+        loose: (n, d) [m] the nearest at which it would not, infinitely far where there is none.
+    """
 
     problem: Reaching
     away: Array
     tensions: Array
     found: NDArray[np.bool_]
     firm: NDArray[np.bool_]
+    loose: Array
 
     @classmethod
     def none(cls, problem: Reaching) -> _Best:
         n = len(problem.wanted)
         away, tensions = np.zeros((n, len(problem.free))), np.zeros(problem.least.shape)
-        return cls(problem, away, tensions, np.zeros(n, dtype=bool), np.zeros(n, dtype=bool))
+        loose = np.full(away.shape, np.inf)
+        return cls(problem, away, tensions, np.zeros(n, dtype=bool), np.zeros(n, dtype=bool), loose)
 
     def search(self, candidates: Candidates, most: int) -> None:
         """Searches from the best of candidates, ``most`` of each row."""
@@ -115,7 +126,7 @@ class _Best:
         other = other.only_tight(TIGHT)
         if len(other.rows) == 0:
             return
-        firm = self.problem.stays(self.problem.placed(other.away, other.rows), other.rows)
+        firm = self.problem.firm(other.away, other.rows)
         size = other.size()
         for i in np.argsort(size):
             row = other.rows[i]
@@ -123,27 +134,30 @@ class _Best:
             if firm[i] > self.firm[row] or (firm[i] == self.firm[row] and nearer):
                 self.away[row], self.tensions[row] = other.away[i], other.tensions[i]
                 self.found[row], self.firm[row] = True, firm[i]
+            if not firm[i] and size[i] < np.linalg.norm(self.loose[row]):
+                self.loose[row] = other.away[i]
 
-    def inward_to_firm(self) -> None:
-        """Answers at which the platform would not stay go towards home, by as little as will do."""
-        problem, rows = self.problem, np.flatnonzero(self.found & ~self.firm)
+    def firm_ones(self, poses: Array) -> None:
+        """Where a search ended nearer, but the platform would not stay: the nearest that does.
+
+        Args:
+            poses: (k, 7) a sample of what can be held.
+        """
+        size = np.where(self.firm, np.linalg.norm(self.away, axis=1), np.inf)
+        end = np.linalg.norm(self.loose, axis=1)
+        rows = np.flatnonzero(self.found & (end < (1.0 - _NEARER) * size))
         if len(rows) == 0:
             return
-        reference = np.tile(problem.robot.reference_pose, (len(rows), 1))
-        way = problem.allowed(problem.to(reference, rows) - self.away[rows])
-        parts = 0.5 ** np.arange(_PARTS)
-        many = (self.away[rows][:, None] + parts[:, None] * way[:, None]).reshape(-1, way.shape[1])
-        each = np.repeat(rows, _PARTS)
-        firm = problem.stays(problem.placed(many, each), each).reshape(-1, _PARTS)
-        last = _PARTS - 1 - np.argmax(firm[:, ::-1], axis=1)
-        outer = np.where(firm.any(axis=1), parts[last], 0.0)
-        inner = 0.5 * outer
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (inner + outer)
-            away = self.away[rows] + middle[:, None] * way
-            ok = problem.stays(problem.placed(away, rows), rows)
-            outer, inner = np.where(ok, middle, outer), np.where(ok, inner, middle)
-        self.away[rows] += outer[:, None] * way
+        part = part_of(self.problem, rows)
+        away, some = nearest_of(firm_ends(part, poses, self.loose[rows]))
+        if len(some) == 0:
+            return
+        away = at_random(part, away, some)
+        start = part.start(away, some)
+        better = np.linalg.norm(away, axis=1) < size[rows[some]]
+        to = rows[some[better]]
+        self.away[to], self.tensions[to] = away[better], start.tensions[better]
+        self.firm[to] = True
 
     def settled(self) -> NDArray[np.bool_]:
         """(n,) whether a small step towards the wanted poses is lost on the way back to balance.
