@@ -90,7 +90,8 @@ class Solution(Result):
             load; recomputed at the returned deviation.
         energy: (n,) [J] elastic energy less the work of the load since the commanded pose, and of
             the cables' weight since it hung straight there; nan under a moment from outside,
-            for laws that are not linear, and for cables with weight over pulleys.
+            for laws that are not linear, and for cables with weight over pulleys, which have none
+            (the effect ``cable_weight`` says why).
         status: (n,) of :class:`Status`.
         others: the other stable equilibria of each command, where they were asked for.
         jumps: on the way to each command, where it was followed.

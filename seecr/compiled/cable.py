@@ -46,7 +46,8 @@ def cable_pull(row, start, move, up, guess, work, force, stiffness, gradient, st
         guess: (3,) where the catenary starts and ends up.
         work: (N_WORK, 6) scratch.
         force: (3,) [N], filled.
-        stiffness: (3, 3) [N/m], minus the derivative of the force by ``move``, filled.
+        stiffness: (3, 3) [N/m], minus the derivative of the force by ``move``, filled; with weight
+            over a pulley its symmetric part, see :func:`seecr.compiled.catenary.catenary_energy`.
         gradient: (3,) [N/m], derivative of the reported tension by ``move``, filled.
         state: (N_STATE,), filled.
 

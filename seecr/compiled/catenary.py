@@ -109,8 +109,11 @@ def catenary_energy(row, unknown, fall, raised):
             the weight of a cable that hung straight there counts.
 
     Returns:
-        nan for a law that is not linear, and over a pulley: the weight of the cable that lies on
-        it is left out, by which the pull has no potential.
+        nan for a law that is not linear, and over a pulley, where the pull has no potential.
+        Cable that is paid out to the span brings its height with it, w r sin psi per metre. Of
+        what the wheel's turning pays out, d(psi), that is the work of an unstretched cable's
+        weight on the wheel. What arc and series stretch by, S(T, psi), comes from a cable that is
+        taken to weigh nothing: round a closed way the pull does the work w r int sin psi dS.
     """
     if row[RADIUS] > 0.0 or not is_linear(row):
         return np.nan

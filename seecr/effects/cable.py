@@ -137,8 +137,10 @@ class CableWeight(Effect):
     With H, V the pulls at the anchor point and w the weight per metre, the span is
     x = H (asinh((V + w L)/H) - asinh(V/H))/w + H L/(E S) and likewise the rise (Irvine, Cable
     Structures, 1981, section 1.2). The tension reported is that at the exit point. With a linear
-    law it has an energy, H x + V z - int (T + T^2/(2 E S)) ds; not over a pulley, on which the
-    cable is taken to weigh nothing.
+    law it has an energy, H x + V z - int (T + T^2/(2 E S)) ds. Over a pulley, on which the cable
+    is taken to weigh nothing, it has none: round a closed way it does the work
+    w r int sin(psi) dS, S what arc and series stretch by; on the DemoBot (0.02 N/m, r 30 mm)
+    5e-7 J between two ways to a pose, on CoGiRo (0.63 N/m, r 0.1 m) 1e-6 J.
     """
 
     name: ClassVar[str] = "cable_weight"

@@ -8,17 +8,19 @@ import pytest
 from one_cable import cable, in_direction, pull
 from scipy.integrate import quad
 
-from seecr.compiled.columns import EA, ENERGY, REST, WEIGHT
+from seecr.compiled.columns import EA, ENERGY, RADIUS, REST, WEIGHT
 from seecr.effects import Term
 from seecr.equilibrium import solve
-from seecr.following import evaluated, moved
+from seecr.following import evaluated, moved, step_between
 from seecr.mjcf import load_robot
 from seecr.multiple import equilibria
 from seecr.passes import barriers
-from seecr.pose import pose_add
+from seecr.pose import Array, pose_add
 from seecr.report.words import elsewhere, other_lines
+from seecr.robot import Robot
 from seecr.shipped import model_path
-from seecr.tables import take
+from seecr.solution import Solution
+from seecr.tables import Tables, take
 
 
 def by_quadrature(row: np.ndarray, h: float, v: float, length: float) -> float:
@@ -86,21 +88,104 @@ def test_no_weight_is_the_energy_of_a_straight_cable(stretch: float) -> None:
         assert 0.0 < abs(apart[0]) < 1e-3 and abs(apart[1]) < 1.05e-2 * abs(apart[0])
 
 
-def around(row: np.ndarray) -> float:
-    """Work [J] of a cable whose anchor point goes once round a circle, taut all the way."""
-    turns = 2.0 * np.pi * (np.arange(200) + 0.5) / 200
-    work = 0.0
+def around(row: np.ndarray, place: tuple[float, float]) -> tuple[float, float]:
+    """Work [J] of a cable whose anchor point goes once round a circle, and what is said of it.
+
+    That is w r int sin(psi) dS, S being the length [m], before it is stretched, that the stretch
+    of the arc and of all else behind the span gives to the span.
+    """
+    turns = 2.0 * np.pi * np.arange(400) / 400
+    work, heights, given = 0.0, [], []
     for c, s in zip(np.cos(turns), np.sin(turns), strict=True):
-        force = pull(row, [1.9 + 0.1 * c, 0.0, -1.0 + 0.1 * s]).force
-        work += force @ [-s, 0.0, c] * 0.1 * 2.0 * np.pi / 200
-    return float(work)
+        found = pull(row, [place[0] + 0.1 * c, 0.0, place[1] + 0.1 * s])
+        work += found.force @ [-s, 0.0, c] * 0.1 * 2.0 * np.pi / 400
+        psi = np.arctan2(found.guess[0], found.guess[1] + row[WEIGHT] * found.guess[2])
+        heights.append(row[RADIUS] * np.sin(psi))
+        given.append(found.guess[2] - row[REST] + row[RADIUS] * (np.pi - psi))
+    waves = 1j * np.fft.fftfreq(400, 1.0 / 400)
+    slopes = np.fft.ifft(waves * np.fft.fft(given)).real
+    return float(work), float(row[WEIGHT] * np.mean(heights * slopes) * 2.0 * np.pi)
+
+
+SERIES = {"WINCH_SIDE": 1.5, "COMPLIANCE": 2e-4, "CREEP": 1e-3, "CREEP_RATE": 1e-6}
+
+
+@pytest.mark.parametrize("place", [(1.9, -1.0), (1.74, -0.85), (1.4, -0.7)],
+                         ids=["taut", "barely slack", "hanging"])  # fmt: skip
+@pytest.mark.parametrize("more", [{}, SERIES], ids=["alone", "series"])
+def test_over_a_pulley_a_closed_way_does_work(
+    more: dict[str, float], place: tuple[float, float]
+) -> None:
+    """So that the pull is no gradient, of whatever energy."""
+    row = cable(WEIGHT=30.0, RADIUS=0.1, **more)
+    work, said = around(row, place)
+    assert abs(work) > 1e-4 and work == pytest.approx(said, rel=1e-7)
+    assert abs(around(cable(WEIGHT=30.0, **more), place)[0]) < 1e-11
+    assert abs(around(cable(WEIGHT=30.0, RADIUS=0.1, EA=1e9), (1.4, -0.7))[0]) < 1e-9
 
 
 def test_there_is_none_over_a_pulley_nor_of_a_curve() -> None:
-    over, beside = cable(WEIGHT=30.0, RADIUS=0.1), cable(WEIGHT=30.0)
-    assert abs(around(over)) > 1e-4 and abs(around(beside)) < 1e-12
+    over = cable(WEIGHT=30.0, RADIUS=0.1)
     for row in (over, cable(WEIGHT=0.4, QUADRATIC=3.0), cable(WEIGHT=0.4, FRICTION=0.1)):
         assert np.isnan(pull(row, in_direction(20.0, 2.03)).state[ENERGY])
+
+
+def works(robot: Robot, tables: Tables, poses: Array) -> tuple[float, float]:
+    """Work [J] of the wrench through poses near each other, and w r int sin(psi) dS of all cables.
+
+    Both by the trapezium rule, load and all.
+    """
+    at = evaluated(robot, take(tables, np.zeros(len(poses), int)), poses)
+    steps = step_between(robot, poses[1:], poses[:-1])
+    work = -0.5 * float(np.sum((at.gradient[1:] + at.gradient[:-1]) * steps))
+    row, (h, v, length) = tables.cables[0], np.moveaxis(at.guess, -1, 0)
+    psi = np.arctan2(h, v + row[:, WEIGHT] * length)
+    given = length - row[:, REST] + row[:, RADIUS] * (np.pi - psi)
+    heights = row[:, WEIGHT] * row[:, RADIUS] * np.sin(psi)
+    return work, 0.5 * float(np.sum((heights[1:] + heights[:-1]) * np.diff(given, axis=0)))
+
+
+def over_pulleys(name: str, weight: float, radius: float) -> Solution:
+    robot = load_robot(model_path(name))
+    sag = Term.of(robot, "cable_weight", weight_N_per_m=weight)
+    pulleys = Term.of(robot, "pulley_radius", radius_m=radius)
+    return solve(robot, robot.reference_pose, effects=[sag, pulleys])
+
+
+def test_round_a_circle_a_robot_over_pulleys_does_what_is_said() -> None:
+    turns = 2.0 * np.pi * np.arange(3201) / 3200
+    steps = np.zeros((len(turns), 6))
+    steps[:, 0], steps[:, 2] = 0.1 + 0.05 * np.cos(turns), 0.05 * np.sin(turns)
+    for radius in (0.1, 0.0):
+        own = over_pulleys("cogiro_large", 0.62784, radius)
+        poses = moved(own.robot, np.repeat(own.pose, len(turns), axis=0), steps)
+        work, said = works(own.robot, own.tables, poses)
+        if radius:
+            assert abs(said) > 1e-8 and work == pytest.approx(said, rel=1e-3)
+        else:
+            assert said == 0.0 and abs(work) < 1e-11
+
+
+@pytest.mark.parametrize(
+    ("name", "weight", "radius", "apart"),
+    [("demobot_cogiro", 0.02, 0.03, 5e-7), ("cogiro_large", 0.62784, 0.1, 1e-6)],
+)
+def test_by_how_much_ways_to_one_pose_differ(
+    name: str, weight: float, radius: float, apart: float
+) -> None:
+    own = over_pulleys(name, weight, radius)
+    robot, random = own.robot, np.random.default_rng(0)
+    spread = 0.1 * np.repeat([robot.length, 1.0], 3)
+    by = [moved(robot, own.pose, (random.uniform(-1, 1, 6) * spread)[None]) for _ in range(5)]
+    parts = np.linspace(0.0, 1.0, 2001)[:, None]
+
+    def straight(one: Array, two: Array) -> float:
+        way = parts * step_between(robot, two, one)
+        poses = moved(robot, np.repeat(one, len(parts), axis=0), way)
+        return works(robot, own.tables, poses)[1]
+
+    ways = [straight(own.pose, p) + straight(p, by[0]) for p in by[1:]]
+    assert 0.3 * apart < np.ptp([straight(own.pose, by[0]), *ways]) < 3.0 * apart
 
 
 @pytest.mark.parametrize(
