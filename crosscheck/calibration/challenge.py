@@ -8,14 +8,16 @@ earnest, the catalogue made linear about the best of those again. They count in 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
-from crosscheck.calibration.exact import FEW, Exact, Refit
+from crosscheck.calibration.exact import Exact, Refit
 from crosscheck.calibration.sets import Names, Scores, explore
 
 # Rounds of making the catalogue linear about the best set without a member, at most.
 _ROUNDS = 5
+# Members of a set that is challenged: more of them can do what any of them does, a little worse
+# each, and looking at that takes minutes.
+_FEW = 3
 # Moves in the linear model: a member that is barred is stood in for by ever more others.
 _MOVES = 6
 # A member without which the best fit is this much worse is needed, whatever bends.
@@ -28,31 +30,28 @@ _NEAR, _NEIGHBOURS = 5.0, 6
 _EQUAL = 3.0
 
 
-def challenge(
-    exact: Exact, scores: Scores, best: Refit, alike: Mapping[str, Iterable[str]] | None = None
-) -> None:
+def challenge(exact: Exact, scores: Scores, best: Refit) -> None:
     """Fit the best sets without each member of the best one, where that is of few effects.
 
     Args:
         exact: sets fitted so far; those that are fitted here are added.
         scores: the linear model about the best set.
         best: that.
-        alike: of some members, those that are known to do as well in their place.
     """
     own = best.names - scores.always
-    if len(own) > FEW:
+    if len(own) > _FEW:
         return
     exact.fit(scores, scores.always)  # there is a set without any
     for name in sorted(own):
-        _without(exact, scores, best, name, frozenset((alike or {}).get(name, ())))
+        _without(exact, scores, best, name)
 
 
-def _without(exact: Exact, about: Scores, best: Refit, name: str, alike: Names) -> None:
+def _without(exact: Exact, about: Scores, best: Refit, name: str) -> None:
     """The best sets without a member and without its equals."""
     barred: Names = frozenset()
     top = -float("inf")
     for k in range(_ROUNDS):
-        before, barred = barred, equals_of(exact, best, name) | alike
+        before, barred = barred, equals_of(exact, best, name)
         scores = without(about, barred)
         explore(scores, [scores.always, best.names - barred], _MOVES)
         least = best.score - _HOPELESS

@@ -6,14 +6,12 @@ which effects are equals is known from refits (:mod:`crosscheck.diagnosis.rivals
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from crosscheck.calibration.catalogue import Catalogue, catalogue_columns, gram_with
-from crosscheck.calibration.challenge import challenge
 from crosscheck.calibration.colour import WHITE, chain_of
-from crosscheck.calibration.exact import Exact
 from crosscheck.calibration.joint import JointFit, Setting, settle
 from crosscheck.calibration.later import at_null, layouts, promising_beside
 from crosscheck.calibration.priors import FLAT, widths_of
@@ -33,24 +31,19 @@ from seecr.pose import Array
 _STEPS = 4
 
 
-def chances_near(
-    found: Search,
-    alike: Mapping[str, Sequence[str]],
-    told: Callable[[str], None] = lambda _text: None,
-) -> Chances:
+def chances_near(found: Search, alike: Mapping[str, Sequence[str]]) -> Chances:
     """Probabilities of every effect about the last model of a search.
 
     Args:
         found: a search that ended with noise.
         alike: of each effect that was found, those that cannot be told from it.
-        told: called with the sets that are fitted.
     """
     problem, fit = found.problem, found.last.fit
     setting = Setting(problem, found.factor, chain_of(problem), frozen=True)
     state = evaluate(problem, fit.terms, found.factor, fit.state)
     joint = settle(setting, state, widths_of(fit.terms), WHITE, _STEPS)
+    catalogue = _catalogue(setting, joint)
     always, names = frozenset(found.base), frozenset(fit.terms.names)
-    catalogue = _catalogue(setting, joint, always)
     effects = [n for n in catalogue.names if n not in always]
     columns, z = catalogue_columns(setting, joint, catalogue)
     gram = gram_with(setting, joint, catalogue, columns, z)
@@ -58,8 +51,6 @@ def chances_near(
     explore(scores, [always, names])
     every = scores.near | {n: s for n, (s, _w) in scores.solved.items()}
     every |= _refitted(found, scores, names)
-    exact = Exact(setting, joint, catalogue, found.steps[0].fit.state, told, {names: fit.terms})
-    every |= _challenged(exact, scores, names, alike)
     none = _impossible(found)
     every = {some: score for some, score in every.items() if not some & none}
     shown = shown_from(setting, joint, *_all_of(columns))
@@ -92,18 +83,6 @@ def _refitted(found: Search, scores: Scores, last: Names) -> dict[Names, float]:
     return out
 
 
-def _challenged(
-    exact: Exact, scores: Scores, last: Names, alike: Mapping[str, Sequence[str]]
-) -> dict[Names, float]:
-    """Scores of the best sets without what was found, beside that of the last model."""
-    own = exact.fit(scores, last)
-    if own is None:
-        return {}
-    challenge(exact, scores, own, alike)
-    base = scores.score(last) - own.score
-    return {names: base + refit.score for names, refit in exact.possible.items()}
-
-
 def _all_of(columns: Mapping[str, Array]) -> tuple[Array, Array]:
     """Columns (N, p) of all effects, and prior widths (p,): plausible, or none for the tracker."""
     width = {name: FLAT if name == TRACKER else 1.0 for name in columns}
@@ -113,18 +92,16 @@ def _all_of(columns: Mapping[str, Array]) -> tuple[Array, Array]:
     )
 
 
-def _catalogue(setting: Setting, joint: JointFit, always: Names) -> Catalogue:
-    """All effects as they start: what was found at nothing too, for sets in which it is not."""
+def _catalogue(setting: Setting, joint: JointFit) -> Catalogue:
     at_once, later = layouts(setting.problem)
     inside = joint.terms
     own = {a.name for a in later}
     nulls = (Term(a, a.null) for a in at_once if a.name not in inside)
     absent = [a for a in later if a.name not in inside]
     promising = [term for term, _gain in promising_beside(setting, joint, absent)]
-    there = [t if t.name in always else at_null(t) for t in inside]
+    there = [at_null(t) for t in inside if t.name in own]
     return Catalogue(
-        Terms([*nulls, *(t for t in there if t.name not in own)]),
-        Terms([*(t for t in there if t.name in own), *promising]),
+        Terms([*nulls, *(t for t in inside if t.name not in own)]), Terms([*there, *promising])
     )
 
 

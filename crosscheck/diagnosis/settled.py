@@ -24,11 +24,11 @@ def settled(
 ) -> Diagnosis:
     """The diagnosis of a search whose last model leaves noise; ``told`` what is going on."""
     rivals = _all_rivals(found, told)
-    chances = _chances(found, rivals, told)
+    chances = _chances(found, rivals)
     other = exchanged(found, chances)
     if other is not found:
         found, rivals = other, _all_rivals(other, told)
-        chances = _chances(found, rivals, told)
+        chances = _chances(found, rivals)
     way = _sure_part(found, chances)
     if way is not found:
         rivals = _all_rivals(way, told)
@@ -51,11 +51,8 @@ def settled(
     )
 
 
-def _chances(
-    found: Search, rivals: Mapping[str, Sequence[Rival]], told: Callable[[str], None]
-) -> Chances:
-    alike = {name: [r.name for r in some] for name, some in rivals.items()}
-    return chances_near(found, alike, lambda text: told(f"trying {text}"))
+def _chances(found: Search, rivals: Mapping[str, Sequence[Rival]]) -> Chances:
+    return chances_near(found, {n: [r.name for r in some] for n, some in rivals.items()})
 
 
 def _all_rivals(found: Search, told: Callable[[str], None]) -> dict[str, list[Rival]]:

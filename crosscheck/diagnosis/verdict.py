@@ -7,7 +7,6 @@ from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
 
-from crosscheck.calibration.judgement import SURE
 from crosscheck.calibration.search import seek
 from crosscheck.diagnosis.chances import chances_of
 from crosscheck.diagnosis.exchange import DOUBTED
@@ -86,21 +85,19 @@ def _searched(
     ready: Prepared, base: Fit, factor: Array, notes: Notes, progress: Progress
 ) -> Diagnosis:
     """The verdict of data that are fit for one."""
-    problem, steps = ready.problem, None
+    problem = ready.problem
     found, more = by_steps(problem, base, factor, _part(progress, 0.0, 0.5))
     if found.last.whiteness.is_noise and kinds_stated(problem) == kinds_read(problem):
         steps = settled(found, (*notes, *more), lambda text: progress(text, 0.5))
-        if all(effect.probability > SURE for effect in steps.missing):
+        if all(effect.probability > DOUBTED for effect in steps.missing):
             return steps
-    # no few effects one after the other, or one that is not sure; noise that goes together, is
-    # larger than stated (a few rows far off may have made it so) or was estimated, from what may
-    # be an effect. All at once, in sets
+    # no few effects one after the other, or one that is less likely than not; noise that goes
+    # together, is larger than stated (a few rows far off may have made it so) or was estimated,
+    # from what may be an effect. All at once, in sets
     way = [step.fit.terms for step in found.steps[1:]]
     sought = seek(problem, problem.data.sigma, ready.terms, _part(progress, 0.5, 1.0), way)
     if sought.judgement.verdict is not DiagnosisVerdict.UNKNOWN_EFFECT:
         return explained(sought, notes)
-    if steps is not None and all(effect.probability > DOUBTED for effect in steps.missing):
-        return steps  # which leave noise: nothing is unknown
     return unexplained(found, chances_of(sought), (*notes, *more))
 
 

@@ -103,18 +103,8 @@ def test_equals_are_barred_with_the_member_in_whose_place_they_can_stand(
     assert frozenset("cd") in exact.fitted
 
 
-def test_equals_that_others_know_of_are_barred_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    exact, best = compared(gram({"a": 2.0}), frozenset("a"))
-    tried: list[Names] = []
-    fit = exact.fit
-    monkeypatch.setattr(exact, "fit", lambda s, names: tried.append(names) or fit(s, names))
-    challenge(exact, exact.scores, best, {"a": ["b"]})
-    assert tried
-    assert not any(names & frozenset("ab") for names in tried)
-
-
 def test_large_sets_are_not_challenged(monkeypatch: pytest.MonkeyPatch) -> None:
-    exact, best = compared(gram(dict.fromkeys("abcefg", 2.0)), frozenset("abcefg"))
+    exact, best = compared(gram(dict.fromkeys("abef", 2.0)), frozenset("abef"))
     monkeypatch.setattr(exact, "fit", pytest.fail)
     challenge(exact, exact.scores, best)
 

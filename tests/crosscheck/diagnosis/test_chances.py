@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,14 +9,10 @@ import made_diagnoses
 import pytest
 from made_data import COGIRO, measured, term
 
-from crosscheck.calibration.exact import Exact, Refit
-from crosscheck.calibration.sets import Scores
 from crosscheck.diagnosis import nearby
 from crosscheck.diagnosis.chances import Chances, Together
 from crosscheck.diagnosis.nearby import _impossible, _refitted, chances_near
 from crosscheck.diagnosis.result import Diagnosis
-from crosscheck.diagnosis.rivals import rivals_of
-from crosscheck.diagnosis.search import Search
 from crosscheck.diagnosis.stepwise import by_steps
 from crosscheck.diagnosis.words import probability_words
 from crosscheck.fit.candidates import null_fit
@@ -126,43 +120,16 @@ def test_what_no_robot_can_have_wherever_it_was_fitted_is_out_of_the_question() 
     assert _impossible(found) == {"law"}
 
 
-@cache
-def soft_cables() -> Search:
-    """The steps through data of a robot whose cables are stiffer."""
+@pytest.mark.slow
+def test_effects_out_of_the_question_have_no_part_in_the_probabilities(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     robot = load_robot(COGIRO)
     data = measured(robot, [term(robot, "stiffness", factor=1.4)], points=6)
     problem = prepare(robot, data, Terms()).problem
     factor = problem.noise(problem.experiment.predict(()))
     base = null_fit(problem, Terms(), factor, refit=False)
-    return by_steps(problem, base, factor, lambda _text, _part: None)[0]
-
-
-@pytest.mark.slow
-def test_effects_out_of_the_question_have_no_part_in_the_probabilities(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    found = soft_cables()
+    found, _notes = by_steps(problem, base, factor, lambda _text, _part: None)
     assert chances_near(found, {}).of("platform_mass") > 0.01
     monkeypatch.setattr(nearby, "_impossible", lambda _found: frozenset({"platform_mass"}))
     assert chances_near(found, {}).of("platform_mass") == 0.0
-
-
-@pytest.mark.slow
-def test_a_challenger_that_explains_as_well_halves_the_probability(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    found = soft_cables()
-    alike = {"stiffness": [rival.name for rival in rivals_of(found, "stiffness")]}
-    assert chances_near(found, alike).of("stiffness") > 0.99
-
-    def challenger(exact: Exact, _scores: Scores, best: Refit, given: Any) -> None:
-        assert best.names == {"stiffness"}
-        assert given == alike
-        pair = frozenset({"backlash", "drum_gain"})
-        exact.fitted[pair] = replace(best, names=pair)
-
-    monkeypatch.setattr(nearby, "challenge", challenger)
-    chances = chances_near(found, alike)
-    # the class has the others of its members beside it, the pair stands alone
-    assert 0.4 < chances.of("stiffness") < 0.9
-    assert chances.of("drum_gain") > 0.1

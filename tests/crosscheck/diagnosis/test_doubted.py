@@ -1,28 +1,19 @@
-"""What the steps end with and is not sure is looked at again, in sets."""
+"""What the steps end with and is less likely than not is looked at again, in sets."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from made_data import COGIRO, measured, term
+from made_data import term
 
 import crosscheck
-from crosscheck.calibration.judgement import Judgement
-from crosscheck.calibration.search import Sought, seek
-from crosscheck.diagnosis import verdict
-from crosscheck.diagnosis.result import Diagnosis
-from crosscheck.diagnosis.settled import settled
-from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.measurements.data import Measurements
 from seecr.commands import Commands
 from seecr.experiment import Experiment
 from seecr.mjcf import load_robot
 from seecr.pose import quat_from_rxyz
-from seecr.robot import Robot
 
 PLANAR = """<mujoco model="tri">
   <option gravity="0 0 -9.81"/>
@@ -83,56 +74,3 @@ def test_an_effect_that_is_unlikely_is_not_listed_though_steps_end_with_noise(
     for one in found.missing:
         shown = found.search.last.fit.terms[one.effect].vector
         np.testing.assert_array_equal(one.term.vector, shown)
-
-
-@pytest.fixture(scope="module")
-def pulleys() -> tuple[Robot, Measurements]:
-    robot = load_robot(COGIRO)
-    return robot, measured(robot, [term(robot, "pulley_radius", radius_m=0.01)], points=6)
-
-
-def said_with(probability: float, monkeypatch: pytest.MonkeyPatch) -> list[Diagnosis]:
-    """What the steps end with is said with this probability; collects what that is."""
-    said: list[Diagnosis] = []
-
-    def less_sure(*given: Any) -> Diagnosis:
-        found = settled(*given)
-        some = tuple(replace(one, probability=probability) for one in found.missing)
-        said.append(replace(found, missing=some))
-        return said[-1]
-
-    monkeypatch.setattr(verdict, "settled", less_sure)
-    return said
-
-
-@pytest.mark.parametrize(("probability", "in_sets"), [(0.96, False), (0.9, True)])
-def test_steps_are_the_last_word_only_where_they_are_sure(
-    pulleys: tuple[Robot, Measurements],
-    probability: float,
-    in_sets: bool,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    said_with(probability, monkeypatch)
-    found = crosscheck.diagnose(*pulleys, only=MAY_BE)
-    assert [one.effect for one in found.missing] == ["pulley_radius"]
-    assert found.chances is not None
-    assert (found.chances.together is not None) == in_sets
-
-
-@pytest.mark.parametrize(("probability", "in_sets"), [(0.9, False), (0.4, True)])
-def test_where_steps_leave_noise_and_are_not_doubted_nothing_is_unknown(
-    pulleys: tuple[Robot, Measurements],
-    probability: float,
-    in_sets: bool,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    said_with(probability, monkeypatch)
-
-    def unknown(*given: Any) -> Sought:
-        found = seek(*given)
-        return replace(found, judgement=Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, (), 0.0))
-
-    monkeypatch.setattr(verdict, "seek", unknown)
-    found = crosscheck.diagnose(*pulleys, only=MAY_BE)
-    assert found.chances is not None
-    assert (found.chances.together is not None) == in_sets
