@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from crosscheck.calibration.equals import EQUAL
 from crosscheck.calibration.exact import FEW
-from crosscheck.calibration.probability import EQUAL, Classes
+from crosscheck.calibration.probability import Classes
 from crosscheck.calibration.refits import Found
 from crosscheck.calibration.sets import Names
 

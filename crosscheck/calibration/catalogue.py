@@ -41,6 +41,10 @@ class Catalogue:
         """An effect as it starts."""
         return self.at_once[name] if name in self.at_once else self.later[name]
 
+    def size(self, name: str) -> int:
+        """How many parameters an effect has."""
+        return len(self.start(name).layout)
+
     @property
     def names(self) -> tuple[str, ...]:
         """All effects."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from crosscheck.calibration.equals import are_equals
 from crosscheck.calibration.exact import Exact, Refit
 from crosscheck.calibration.sets import Names, Scores, explore
 
@@ -26,8 +27,6 @@ _NEEDED = 40.0
 _EACH, _HOPELESS = 2, 15.0
 # What is no worse than the best set by this much has its neighbours fitted too.
 _NEAR, _NEIGHBOURS = 5.0, 6
-# A member is in the place of another where the exchange costs less than this.
-_EQUAL = 3.0
 
 
 def challenge(exact: Exact, scores: Scores, best: Refit) -> None:
@@ -41,7 +40,6 @@ def challenge(exact: Exact, scores: Scores, best: Refit) -> None:
     own = best.names - scores.always
     if len(own) > _FEW:
         return
-    exact.fit(scores, scores.always)  # there is a set without any
     for name in sorted(own):
         _without(exact, scores, best, name)
 
@@ -55,8 +53,9 @@ def _without(exact: Exact, about: Scores, best: Refit, name: str) -> None:
         scores = without(about, barred)
         explore(scores, [scores.always, best.names - barred], _MOVES)
         least = best.score - _HOPELESS
-        some = [n for n in scores.best(_EACH, _HOPELESS) if k == 0 or scores.score(n) > least]
-        for names in some[:1] if k == 0 and scores.score(some[0]) < least else some:
+        first, *others = scores.best(_EACH, _HOPELESS)
+        some = [n for n in (first, *others) if scores.score(n) > least]
+        for names in some or ([first] if k == 0 else []):
             exact.fit(scores, names)
         other = max(
             (r for names, r in exact.possible.items() if not names & barred),
@@ -81,9 +80,11 @@ def without(scores: Scores, barred: Names) -> Scores:
 def equals_of(exact: Exact, best: Refit, name: str) -> Names:
     """A member, and those that fitted about as well in its place."""
     rest = best.names - {name}
-    swaps = {
-        next(iter(names - rest))
-        for names, other in exact.possible.items()
-        if len(names) == len(best.names) and rest < names and best.score - other.score < _EQUAL
-    }
-    return frozenset({name, *swaps})
+    equals = {name}
+    for names, other in exact.possible.items():
+        if len(names) != len(best.names) or not rest < names:
+            continue
+        (come,) = names - rest
+        if are_equals(best.score - other.score, exact.size(name), exact.size(come)):
+            equals.add(come)
+    return frozenset(equals)

@@ -70,6 +70,10 @@ class Exact:
             if found is not None and (names == always or self.can_be(found))
         }
 
+    def size(self, name: str) -> int:
+        """How many parameters an effect has."""
+        return self.catalogue.size(name)
+
     def can_be(self, found: Refit) -> bool:
         """Whether a robot can have all these values."""
         return can_be(self.setting.problem.robot, found.joint.terms, self.plain.terms)

@@ -89,7 +89,7 @@ def seek(
 
     found = compare_sets(setting, joint, catalogue, plain, told, most, rounds, given)
     effects = [n for n in catalogue.names if n not in terms]
-    sizes = {name: len(catalogue.start(name).layout) for name in effects}
+    sizes = {name: catalogue.size(name) for name in effects}
     classes = probabilities(all_scores(found), found.best.names, effects, sizes)
     strange = strange or is_strange(setting, found.best.joint, known)
     said = judge(found, classes, odds, surprise, strange)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from crosscheck.calibration.probability import SMALL
+from crosscheck.calibration.equals import SMALL
 from crosscheck.calibration.sets import Names
 from crosscheck.comparison.associations import Association
 from crosscheck.diagnosis.advice import check_of, measure_next

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from crosscheck.calibration.probability import SMALL
+from crosscheck.calibration.equals import SMALL
 from crosscheck.fit.candidates import Candidate, Trials, fit_candidate, screen
 from crosscheck.fit.evidence import FALSE_ALARM, Evidence
 from crosscheck.fit.gauss_newton import Fit

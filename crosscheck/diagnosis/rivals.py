@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from crosscheck.calibration.probability import EQUAL, are_equals
+from crosscheck.calibration.equals import EQUAL, are_equals
 from crosscheck.diagnosis.node import hopeless
 from crosscheck.diagnosis.search import Search
 from crosscheck.fit.candidates import Candidate, try_candidate

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crosscheck.calibration.probability import SMALL
+from crosscheck.calibration.equals import SMALL
 from crosscheck.diagnosis.node import (
     LEAST_GAIN,
     LEAST_PART,

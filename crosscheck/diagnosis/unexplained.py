@@ -12,7 +12,7 @@ from itertools import takewhile
 
 import numpy as np
 
-from crosscheck.calibration.probability import SMALL
+from crosscheck.calibration.equals import SMALL
 from crosscheck.comparison.associations import Association, associations
 from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.listed import diagnosis_of, missing_of, not_listed

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from crosscheck.calibration import challenge as module
-from crosscheck.calibration.challenge import challenge, without
+from crosscheck.calibration.challenge import challenge, equals_of, without
 from crosscheck.calibration.exact import Exact, Refit
 from crosscheck.calibration.gram import ColumnGroup, Gram, gram_of
 from crosscheck.calibration.probability import probabilities
@@ -26,11 +26,15 @@ class Linear(Exact):
     def __init__(self, gram: Gram) -> None:
         self.scores = Scores(gram, len(NAMES))
         self.fitted = {}
+        self.longer = frozenset[str]()
         self.fit(self.scores, frozenset())
 
     @property
     def possible(self) -> dict[Names, Refit]:
         return {names: refit for names, refit in self.fitted.items() if refit is not None}
+
+    def size(self, name: str) -> int:
+        return 2 if name in self.longer else 1
 
     def fit(self, scores: Scores, names: Names) -> Refit | None:
         del scores
@@ -101,6 +105,19 @@ def test_equals_are_barred_with_the_member_in_whose_place_they_can_stand(
     exact, best = compared(gram({"a": 2.0, "b": 2.0}, alike=True), frozenset("ab"))
     challenge(exact, exact.scores, best)
     assert frozenset("cd") in exact.fitted
+
+
+def test_an_equal_may_cost_what_its_further_parameter_does() -> None:
+    """The classes that are printed have it so: with one rule, both bar the same."""
+    exact = Linear(gram({"a": 2.0}))
+    scores = {"a": 0.0, "c": -2.0, "e": -5.0, "f": -5.0}
+    for name, score in scores.items():
+        names = frozenset(name)
+        exact.fitted[names] = Refit(names, NO_FIT, {}, score)
+    exact.longer = frozenset("e")
+    best = exact.fitted[frozenset("a")]
+    assert best is not None
+    assert equals_of(exact, best, "a") == frozenset("ace")
 
 
 def test_large_sets_are_not_challenged(monkeypatch: pytest.MonkeyPatch) -> None:
