@@ -231,12 +231,11 @@ def score(name: str, kind: str, n: int, seed: int, kept: dict[str, Array]) -> st
     with np.errstate(invalid="ignore"):
         part = np.where(stays, ours / kept[key] - 1.0, np.inf)
     both = stays & np.isfinite(kept[key])
-    settled = getattr(found, "settled", stays)
     return (
         f"{name} {kind}: of {n} poses {int(np.sum(part[both] > 0.01))} farther by more than 1 % "
         f"(worst {100 * part[both].max(initial=0.0):.1f} %), {int(np.sum(part[both] < -0.01))} "
         f"nearer; without an answer that stays {int(np.sum(~stays))}, the reference "
-        f"{int(np.sum(np.isinf(kept[key])))}; {int(settled.sum())} local minima; "
+        f"{int(np.sum(np.isinf(kept[key])))}; {int(found.settled.sum())} local minima; "
         f"{spent:.0f} ms a pose"
     )
 

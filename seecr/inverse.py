@@ -46,9 +46,9 @@ class Correction(Result):
         lengths: (n, m) [m] to tell the winches, counted as the plain robot counts.
         held: (n,) bool, the wanted pose can be held by tensions within the limits.
         found: (n,) bool, there is an answer: lengths for the wanted pose or the nearest.
-        settled: (n,) bool, nothing that can be held is nearer than what is aimed at and but a
-            little away from it: the wanted pose itself, or a local minimum. Among those the
-            nearest of many searches is taken.
+        settled: (n,) bool, what is aimed at is the wanted pose itself, or meets the first-order
+            conditions of a local minimum (Karush, Kuhn and Tucker) and the platform stays there.
+            Among those the nearest of many searches is taken.
         why_not: (n,) sentences, why a wanted pose cannot be held; "" where it can.
         solution: where the platform rests with these lengths, certified.
         commands: the lengths as commands that every function takes, with the runs, times,
@@ -72,11 +72,16 @@ class Correction(Result):
         return pose_difference(self.solution.pose, self.wanted)
 
     @property
+    def stays(self) -> NDArray[np.bool_]:
+        """(n,) bool, the platform rests at what is aimed at, stably, to within a micrometre."""
+        size = np.where(np.arange(6) < 3, 1.0, self.robot.length)
+        off = np.abs(pose_difference(self.solution.pose, self.aimed) * size).max(axis=1)
+        return np.asarray(self.found & self.solution.converged & (off < _REACHED))
+
+    @property
     def reached(self) -> NDArray[np.bool_]:
         """(n,) bool, the platform rests at the wanted pose, stably, to within a micrometre."""
-        size = np.where(np.arange(6) < 3, 1.0, self.robot.length)
-        near = np.abs(self.left * size).max(axis=1) < _REACHED
-        return np.asarray(self.held & near & self.solution.converged)
+        return self.held & self.stays
 
     def lines(self) -> list[str]:
         """How many poses are reached, what is left, and what cannot be held."""
@@ -102,12 +107,10 @@ class Correction(Result):
                 f"{1e3 * np.linalg.norm(left[near, :3], axis=1).max():.4g} mm and "
                 f"{np.degrees(np.linalg.norm(left[near, 3:], axis=1).max()):.4g} deg away"
             )
-        stays = self.solution.converged
         for rows, text in (
             (lost & ~self.found, "of them: no pose near was found that can be held"),
             (near & ~self.settled, "of them may have nearer ones beside them"),
-            (self.found & ~stays, "are balanced, but the platform would not stay there"),
-            (self.held & stays & ~at, "are missed"),
+            (self.found & ~self.stays, "are balanced, but the platform does not come to rest there"),
         ):
             if np.any(rows):
                 out.append(f"{int(rows.sum())} {text}")

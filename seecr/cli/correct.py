@@ -66,7 +66,7 @@ def command(
 
     \b
     Exit status: 0 all poses reached or replaced by the nearest, 2 bad input,
-    3 a pose without an answer.
+    3 a pose without an answer, or one at which the platform does not come to rest.
     """  # fmt: skip
     from seecr import InputFileError, correct, kept_chance
     from seecr.command_file import read_commands
@@ -90,7 +90,7 @@ def command(
         )  # fmt: skip
         within = {"lowest": lowest, "highest": limits}
         kept = None if own is None else kept_chance(machine, found.commands, own, **within)
-        status = 0 if (found.found & found.solution.converged).all() else 3
+        status = 0 if found.stays.all() else 3
         notes = [*(own.notes if own else ()), *wanted.notes]
         made = made_by(machine.source, poses, model)
         document = {

@@ -39,7 +39,8 @@ class Nearest:
 
     Attributes:
         poses: (n, 7). found: (n,) bool, there is one that can be held.
-        settled: (n,) bool, it is a local minimum: no small change that can be held comes nearer.
+        settled: (n,) bool, it meets the first-order conditions of a local minimum (Karush, Kuhn
+            and Tucker): to first order no small change that can be held comes nearer.
     """
 
     poses: Array
@@ -64,8 +65,8 @@ def nearest(
         wanted: (n, 7).
         balance: what holds at a pose.
         stays: whether the platform does, exactly. Balance is linear in the tensions here, from
-            where cables just pull: of heavy ones it is not quite right. An answer that does not
-            stay is moved towards home until it does; where it never does it is kept.
+            where cables just pull: of heavy ones it is not quite right. Answers that stay go before
+            all that do not; where none was found that stays, the nearest of the others is kept.
         low, high: (m,) limits [N].
         scale: (n,) [N] load.
         fix_position: the position is kept, only the orientation gives way.

@@ -54,15 +54,40 @@ def test_with_cables_that_sag_the_platform_rests_there_within_limits() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("seed", "row", "reference"), [(1, 9, 0.2009), (2, 11, 0.3890)])
-def test_a_pose_beside_those_where_it_would_not_stay(seed: int, row: int, reference: float) -> None:
+@pytest.mark.parametrize(
+    ("name", "seed", "row", "most"),
+    [
+        ("cogiro_large", 1, 9, 1.01 * 0.2009),
+        ("cogiro_large", 2, 11, 1.01 * 0.3890),
+        # the reference is not the nearest: what goes on at random comes to 0.064
+        ("demobot_parallel", 2, 9, 0.9 * 0.0798),
+    ],
+)
+def test_a_pose_beside_those_where_it_would_not_stay(
+    name: str, seed: int, row: int, most: float
+) -> None:
     # [m] by scripts/score_nearest.py, of 16 poses: all searches end nearer, at unstable ones
-    robot, limits = load_robot(model_path("cogiro_large")), score_nearest.LIMITS["cogiro_large"]
+    robot, limits = load_robot(model_path(name)), score_nearest.LIMITS[name]
     want = score_nearest.wanted_poses(robot, limits, "turned", row + 1, seed)[row:]
     found = correct(robot, want, **limits)
-    assert found.found.all() and found.solution.converged.all()
+    assert found.stays.all()
     unit = np.repeat([1.0, robot.length], 3)
-    assert np.linalg.norm(pose_difference(found.aimed, want) * unit) < 1.01 * reference
+    assert np.linalg.norm(pose_difference(found.aimed, want) * unit) < most
+
+
+@pytest.mark.slow
+def test_a_pose_from_which_the_platform_goes_elsewhere_is_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It comes to rest all the same, but not at what is aimed at."""
+    name = "cogiro_large"
+    robot, limits = load_robot(model_path(name)), score_nearest.LIMITS[name]
+    want = score_nearest.wanted_poses(robot, limits, "turned", 10, 1)[9:]
+    every = lambda _self, _away, rows: np.ones(len(rows), dtype=bool)  # noqa: E731
+    monkeypatch.setattr(Reaching, "firm", every)
+    found = correct(robot, want, **limits)
+    assert found.found.all() and found.solution.converged.all() and not found.stays.any()
+    assert "1 are balanced, but the platform does not come to rest there" in str(found)
 
 
 @pytest.mark.slow
