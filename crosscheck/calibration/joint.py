@@ -146,6 +146,19 @@ def settle(
     return JointFit(state, jacobian, width, colour, weight, settled)
 
 
+def moved_on(setting: Setting, joint: JointFit, weight: Array, steps: int) -> State:
+    """A fit with other weights (N,) of readings: steps with the derivatives that it has."""
+    state, damping = joint.state, 1e-9
+    for _ in range(steps):
+        step = _step(setting, state, joint.jacobian, joint.width, joint.colour, weight, damping)
+        if step is None:
+            break
+        damping, state = step.damping, step.state
+        if step.gain < _GAIN:
+            break
+    return state
+
+
 def scaled_derivatives(setting: Setting, state: State) -> Array:
     """(N, p) derivatives of the prediction by z, in units of the stated noise."""
     return free_derivatives(setting.problem, state, frozen=setting.frozen)

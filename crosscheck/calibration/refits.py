@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 from crosscheck.calibration.catalogue import Catalogue
 from crosscheck.calibration.challenge import challenge
+from crosscheck.calibration.equals import EQUAL
 from crosscheck.calibration.exact import FEW, HOLLOW, Exact, Refit
 from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.later import inside, promising_beside
@@ -23,6 +24,8 @@ from seecr.effects import Terms
 _REFITTED, _WITHIN = 20, 12.0
 # Rounds of making the catalogue linear about the best set.
 ROUNDS = 4
+# Sets beside a large one that are fitted because they may be as good.
+_BESIDE = 6
 # How often the best set is challenged, at most: a challenger that wins is challenged in turn.
 _CHALLENGES = 3
 
@@ -85,6 +88,7 @@ def compare_sets(
             break
         begin = best.names
         scores = exact.scores_about(best.joint)
+    scores, best = looked_about(exact, scores, best)
     other = swapped(exact, scores, best)
     if other.names != best.names:
         scores = exact.scores_about(other.joint)
@@ -114,6 +118,24 @@ def _thinned(exact: Exact, scores: Scores, best: Refit) -> Refit:
             break
         best = better
     return best
+
+
+def looked_about(exact: Exact, scores: Scores, best: Refit) -> tuple[Scores, Refit]:
+    """The best set of one with many members and those beside it, and scores about it.
+
+    What the search ends with was chosen about other sets, where a member may have mattered that
+    does not here; and of a set beside which none is fitted every member would be sure.
+    """
+    while len(best.names - scores.always) > FEW:
+        near, least = scores.neighbours(best.names), scores.score(best.names) - EQUAL
+        beside = [n for n in near if len(n) <= len(best.names) and near[n] > least]
+        beside.sort(key=lambda n: (-near[n], sorted(n)))
+        better = exact.best_of(scores, beside[:_BESIDE])
+        if better.names == best.names:
+            break
+        best = better
+        scores = exact.scores_about(best.joint)
+    return scores, best
 
 
 def swapped(exact: Exact, scores: Scores, best: Refit) -> Refit:

@@ -179,17 +179,12 @@ class Problem:
 
     def noise_about(self, by_length: Array | None) -> Array:
         """The same from the derivative by lengths; None where those are exact."""
-        n, width = self.measured.shape
-        index = np.arange(width)
-        covariance = np.zeros((n, width, width))
-        if by_length is not None and self.sigma.length_m:
-            rate = by_length * self.length_sigma[:, None]
-            covariance = rate @ np.swapaxes(rate, 1, 2)
-        covariance[:, index, index] += self.reading_sigma**2
-        blank = ~self.measured
-        covariance = np.where(blank[:, :, None] | blank[:, None, :], 0.0, covariance)
-        covariance[:, index, index] += np.where(blank, 1.0, 0.0)
-        return np.asarray(np.linalg.cholesky(covariance), float)
+        _n, width = self.measured.shape
+        own = np.where(self.measured, self.reading_sigma, 1.0)
+        if by_length is None or not self.sigma.length_m:
+            return np.asarray(own[:, :, None] * np.eye(width))
+        rate = np.where(self.measured[:, :, None], by_length * self.length_sigma[:, None], 0.0)
+        return noise_factors(own, rate)
 
     def whiten(self, factor: Array, values: Array) -> Array:
         """Counted residuals (N,) or derivatives (N, p), in units of their noise."""
@@ -302,3 +297,23 @@ def rms_by_kind(problem: Problem, raw: Array) -> Rms:
         values = raw[:, kind.columns][counted[:, kind.columns]]
         out[kind.key] = float(np.sqrt((values**2).mean())) if len(values) else None
     return out
+
+
+def noise_factors(own: Array, rate: Array) -> Array:
+    """Cholesky factors (n, k, k) of the covariances diag(own^2) + rate rate^T.
+
+    Args:
+        own: (n, k) deviations of readings by themselves.
+        rate: (n, k, m) what errors common to them do, in their deviations.
+    """
+    covariance = rate @ np.swapaxes(rate, 1, 2)
+    index = np.arange(own.shape[1])
+    covariance[:, index, index] += own**2
+    try:
+        return np.asarray(np.linalg.cholesky(covariance), float)
+    except np.linalg.LinAlgError:
+        # where a platform is all but free to move, rates are so large that squares lose the rest
+        wide = np.concatenate([np.nan_to_num(rate), own[:, :, None] * np.eye(len(index))], axis=2)
+        upper = np.linalg.qr(np.swapaxes(wide, 1, 2), mode="r")
+        sign = np.where(np.diagonal(upper, axis1=1, axis2=2) < 0.0, -1.0, 1.0)
+        return np.asarray(np.swapaxes(upper * sign[:, :, None], 1, 2))

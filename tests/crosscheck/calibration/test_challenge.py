@@ -13,6 +13,7 @@ from crosscheck.calibration.challenge import challenge, equals_of, without
 from crosscheck.calibration.exact import Exact, Refit
 from crosscheck.calibration.gram import ColumnGroup, Gram, gram_of
 from crosscheck.calibration.probability import probabilities
+from crosscheck.calibration.refits import looked_about
 from crosscheck.calibration.sets import Names, Scores, explore
 
 NAMES = "abcdefgh"
@@ -130,3 +131,25 @@ def test_what_is_barred_is_in_no_set() -> None:
     scores = without(Scores(gram({"a": 2.0}), len(NAMES)), frozenset("ac"))
     explore(scores, [frozenset(), frozenset("b")])
     assert not any(names & frozenset("ac") for names in scores.best(50, 1e9))
+
+
+def test_beside_a_large_set_others_are_fitted_before_its_members_are_sure() -> None:
+    """A search may end with a set that was chosen about another one."""
+    exact = Linear(gram(dict.fromkeys("abefgh", 2.0)))
+    begun = exact.fit(exact.scores, frozenset("abcefgh"))
+    assert begun is not None
+    scores, best = looked_about(exact, exact.scores, begun)
+    assert best.score > begun.score
+    assert best.names in (frozenset("abefgh"), frozenset("cdefgh"))
+    assert scores.score(best.names) == best.score
+    beside = [n for n in exact.fitted if len(n ^ best.names) in (1, 2)]
+    assert len(beside) > 2
+
+
+def test_beside_a_small_set_nothing_is_fitted_again() -> None:
+    exact = Linear(gram({"a": 2.0}))
+    best = exact.fit(exact.scores, frozenset("a"))
+    assert best is not None
+    fitted = set(exact.fitted)
+    assert looked_about(exact, exact.scores, best)[1] is best
+    assert set(exact.fitted) == fitted

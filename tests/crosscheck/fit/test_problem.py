@@ -10,7 +10,7 @@ from made_data import COGIRO, SIGMA, measured, term
 
 from crosscheck.fit.gauss_newton import fit
 from crosscheck.fit.noise import whiteness
-from crosscheck.fit.problem import Problem, angle_rates, rms_by_kind
+from crosscheck.fit.problem import Problem, angle_rates, noise_factors, rms_by_kind
 from crosscheck.fit.state import evaluate
 from crosscheck.measurements.data import Sigma
 from seecr.effects import Terms
@@ -57,6 +57,24 @@ def test_noise_of_lengths_reaches_the_readings_and_their_likeliest_errors_are_fo
     before = np.linalg.norm(plain.readings.position[3] - there.readings.position[3])
     assert off < 0.05 * before
     assert np.abs(np.delete(found, 3, axis=0)).max() < 1e-3 * spread
+
+
+def test_noise_has_factors_where_a_platform_is_all_but_free_to_move() -> None:
+    """Squares of large rates lose the noise of the readings: an error in the middle of a search."""
+    rng = np.random.default_rng(2)
+    own, rate = np.full((3, 6), 1e-3), 1e-3 * rng.normal(size=(3, 6, 4))
+    rate[1] *= 1e11
+    factors = noise_factors(own, rate)
+    assert np.all(np.triu(factors, 1) == 0.0)
+    assert np.all(np.diagonal(factors, axis1=1, axis2=2) > 0.0)
+    np.testing.assert_allclose(
+        factors[[0, 2]] @ np.swapaxes(factors[[0, 2]], 1, 2),
+        rate[[0, 2]] @ np.swapaxes(rate[[0, 2]], 1, 2) + 1e-6 * np.eye(6), rtol=1e-9,
+    )  # fmt: skip
+    # four lengths move four directions of six: the others keep the noise of the readings
+    still = np.linalg.qr(rate[1], mode="complete")[0][:, 4:]
+    near = np.linalg.solve(factors[1], still)
+    assert np.linalg.norm(near, axis=0) == pytest.approx(1e3, rel=1e-3)
 
 
 def test_exact_lengths_leave_the_noise_as_stated() -> None:
