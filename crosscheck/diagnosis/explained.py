@@ -16,7 +16,7 @@ from crosscheck.diagnosis.rivals import Rival
 from crosscheck.diagnosis.search import Search
 from crosscheck.diagnosis.small import share_of
 from crosscheck.diagnosis.way import fit_of, way_of
-from crosscheck.diagnosis.words import agreement, and_what_is_left, either, words_of
+from crosscheck.diagnosis.words import agreement, and_what_is_left, either, one_of, words_of
 from crosscheck.fit.candidates import Candidate
 from crosscheck.fit.prepare import noise_floor
 from crosscheck.fit.problem import KINDS, Rms, rms_by_kind
@@ -128,7 +128,8 @@ def _sentence(
     alternatives: Sequence[Names] = (),
 ) -> str:
     if verdict is DiagnosisVerdict.NO_EFFECT_MISSING:
-        return agreement(tried)
+        hints = {one_of(members): p for members, p in chances.classes if p > _PROBABLE}
+        return agreement(tried, hints)
     if verdict is DiagnosisVerdict.EFFECTS_FOUND:
         return and_what_is_left(words_of(missing), "what is left is noise", tried)
     together = chances.together

@@ -40,15 +40,21 @@ class Rival:
         return self.fit.terms[self.name].layout
 
 
-def rivals_of(found: Search, name: str) -> list[Rival]:
-    """Effects that could stand in for ``name`` in the final model, the best first."""
+def rivals_of(found: Search, name: str, apart: float = _TOLD_APART) -> list[Rival]:
+    """Effects that could stand in for ``name`` in the final model, the best first.
+
+    Args:
+        found: the search. name: of the effect.
+        apart: chi2 from which on a rival is too far off whatever its evidence; infinite where the
+            effect is not sure, so that evidence alone decides.
+    """
     final = found.last
     rest = final.fit.terms.without(name)
     without = found.trials.refit(rest, final.fit.state) if rest else found.steps[0].fit
     if not without.valid:
         return []
     own = len(final.fit.terms[name].layout)
-    tried = [_rival(found, c, without, own) for c in _likely(found, name, without)]
+    tried = [_rival(found, c, without, own, apart) for c in _likely(found, name, without)]
     out = [rival for rival in tried if rival is not None]
     # one that contains another (friction on a cable behind the exit point, with no friction)
     # says nothing that the other does not
@@ -57,7 +63,9 @@ def rivals_of(found: Search, name: str) -> list[Rival]:
     return sorted(out, key=lambda r: r.loss)
 
 
-def _rival(found: Search, candidate: Candidate, without: Fit, own: int) -> Rival | None:
+def _rival(
+    found: Search, candidate: Candidate, without: Fit, own: int, apart: float
+) -> Rival | None:
     """The candidate in place of the effect of ``own`` parameters, if it explains as well."""
     trials, final = found.trials, found.last
     # where structure is left over, differences count against that, not against the noise, and
@@ -69,7 +77,7 @@ def _rival(found: Search, candidate: Candidate, without: Fit, own: int) -> Rival
     if trial.fit is None or not trial.fit.valid:
         return None
     if trial.fit.settled and not trial.fit.state.prediction.has_history:
-        far = min(far, final.fit.chi2 + _MENDED * _TOLD_APART * left)
+        far = min(far, final.fit.chi2 + _MENDED * max(apart, _TOLD_APART) * left)
     if trial.fit.chi2 > far:
         return None
     best = trials.refit(trial.fit.terms, trial.fit.state)
@@ -77,7 +85,7 @@ def _rival(found: Search, candidate: Candidate, without: Fit, own: int) -> Rival
         return None
     loss = (final.evidence.log - trials.evidence(best).log) / left
     worse = (best.chi2 - final.fit.chi2) / left
-    alike = loss > -EQUAL and are_equals(loss, own, len(candidate.layout)) and worse < _TOLD_APART
+    alike = loss > -EQUAL and are_equals(loss, own, len(candidate.layout)) and worse < apart
     return Rival(candidate.name, best, loss) if alike else None
 
 

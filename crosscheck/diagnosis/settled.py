@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from crosscheck.calibration.judgement import SURE
 from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.exchange import exchanged
@@ -29,6 +31,9 @@ def settled(
     if other is not found:
         found, rivals = other, _all_rivals(other, told)
         chances = _chances(found, rivals)
+    wider = _by_evidence(found, rivals, chances)
+    if wider != rivals:
+        rivals, chances = wider, _chances(found, wider)
     way = _sure_part(found, chances)
     if way is not found:
         rivals = _all_rivals(way, told)
@@ -60,6 +65,21 @@ def _all_rivals(found: Search, told: Callable[[str], None]) -> dict[str, list[Ri
     for name in found.found:
         told(f"looking for what could be there instead of {name}")
         out[name] = rivals_of(found, name)
+    return out
+
+
+def _by_evidence(
+    found: Search, rivals: Mapping[str, list[Rival]], chances: Chances
+) -> dict[str, list[Rival]]:
+    """Rivals, of effects that are not sure all that evidence alone does not tell apart.
+
+    What they leave more of chi2 may be what a further parameter explains by chance.
+    """
+    out = dict(rivals)
+    for name in found.found:
+        if chances.of(name) < SURE:
+            some = rivals_of(found, name, np.inf)
+            out[name] = some if len(some) > len(rivals[name]) else rivals[name]
     return out
 
 

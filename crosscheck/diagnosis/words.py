@@ -8,6 +8,9 @@ from crosscheck.diagnosis.result import MissingEffect
 from crosscheck.fit.reasons import DiagnosisVerdict
 from seecr.counted import counted
 
+# Effects of a class that are named.
+_FIRST = 2
+
 
 def words_of(missing: Sequence[MissingEffect]) -> str:
     """What adding each effect does."""
@@ -29,7 +32,8 @@ def agreement(tried: int, hints: Mapping[str, float] | None = None) -> str:
 
     Args:
         tried: how many effects were.
-        hints: effects that explain a little, with their probabilities.
+        hints: effects, or several of which it is one, that explain a little, with their
+            probabilities.
     """
     if not hints:
         return f"Model and data agree: what is left is noise, and {none_of(tried)} any of it."
@@ -43,6 +47,14 @@ def agreement(tried: int, hints: Mapping[str, float] | None = None) -> str:
 def either(sets: Sequence[Iterable[str]]) -> str:
     """Sets of effects of which it is one: "a + b, or c"."""
     return ", or ".join(" + ".join(sorted(names)) for names in sets)
+
+
+def one_of(members: Sequence[str]) -> str:
+    """Effects of which it is one, the likeliest first: "a or b", "a, b or one of 4 others"."""
+    some, others = list(members[:_FIRST]), members[_FIRST:]
+    if others:
+        some.append(others[0] if len(others) == 1 else f"one of {len(others)} others")
+    return " or ".join([", ".join(some[:-1]), some[-1]] if len(some) > 1 else some)
 
 
 def none_of(tried: int) -> str:

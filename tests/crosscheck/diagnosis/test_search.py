@@ -100,6 +100,19 @@ def test_exact_equals_are_named_beside_the_one_that_is_listed() -> None:
     assert rivals_of(searched(toy({hidden: 0.5}, NAMES)), hidden) == []
 
 
+def test_evidence_alone_does_not_tell_apart_what_chi2_does() -> None:
+    """A second parameter takes 9 off chi2, which may be chance: evidence pays 2.7 for it."""
+    plain = toy({}, NAMES, seed=1)
+    two = plain.columns["gravity_tilt"] * np.array([1.0, 0.17])
+    columns = {"gravity_tilt": two, "stiffness": two[..., :1]}
+    found = searched(toy({"gravity_tilt": 1.0}, NAMES, seed=1, columns=columns))
+    assert found.found == ("gravity_tilt",)
+    assert rivals_of(found, "gravity_tilt") == []
+    (rival,) = rivals_of(found, "gravity_tilt", np.inf)
+    assert rival.name == "stiffness" and 2.0 < rival.loss < 3.0
+    assert rival.fit.chi2 > found.last.fit.chi2 + 9.0
+
+
 def test_what_explains_far_less_is_not_fitted_to_the_end_to_see_that() -> None:
     """It does nearly what a listed effect does, and leaves of a large one far more than noise."""
     plain = toy({}, NAMES)

@@ -6,10 +6,12 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 
+from crosscheck.diagnosis import settled
 from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.search import Search
-from crosscheck.diagnosis.settled import _sure_part
+from crosscheck.diagnosis.settled import _by_evidence, _sure_part
 
 NOTHING: Any = None
 
@@ -38,6 +40,25 @@ def test_all_that_are_not_sure_go_until_one_is() -> None:
     found = way("mass", "tilt", "creep", noise_from=0)
     assert _sure_part(found, chances(mass=0.6, tilt=0.7, creep=0.8)).found == ()
     assert _sure_part(found, chances(mass=0.6, tilt=0.99, creep=0.8)).found == ("mass", "tilt")
+
+
+def test_of_what_is_not_sure_all_that_evidence_does_not_tell_apart_is_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A mass was told as cables that stiffen, at 74 %, with the mass at 12 % beside it."""
+    asked: Any = []
+
+    def rivals_of(_found: Search, name: str, apart: float) -> list[str]:
+        asked.append((name, apart))
+        return ["mass", "stiffness"]
+
+    monkeypatch.setattr(settled, "rivals_of", rivals_of)
+    rivals: Any = {"curve": ["stiffness"], "tilt": []}
+    found = way("tilt", "curve", noise_from=2)
+    wider: Any = _by_evidence(found, rivals, chances(curve=0.74, tilt=0.99))
+    assert asked == [("curve", np.inf)]
+    assert wider == {"curve": ["mass", "stiffness"], "tilt": []}
+    assert _by_evidence(found, rivals, chances(curve=0.99, tilt=0.99)) == rivals
 
 
 def test_an_effect_without_which_no_noise_is_left_stays() -> None:
