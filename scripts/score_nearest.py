@@ -6,7 +6,8 @@
 The reference minimises position^2 + (length x rotation)^2 by SciPy's SLSQP from many poses that are
 held, with equations and derivatives of its own, and takes the nearest of its answers at which the
 platform is stable. Kinds: far (0.1 to 5 frames outside, level), near (within 2 % of a frame),
-turned (over the frame, turned by any angle), both.
+turned (over the frame, turned by any angle), both; kept (turned, and only the orientation gives
+way: where the reference finds a turn at the wanted position).
 """
 
 from __future__ import annotations
@@ -33,9 +34,11 @@ LIMITS: dict[str, dict[str, float]] = {
     "cogiro_large": {"highest": 5000.0},
     "ipanema": {"lowest": 50.0, "highest": 3000.0},
 }
-KINDS = ("far", "near", "turned", "both")
+KINDS = ("far", "near", "turned", "both", "kept")
 # Poses tried over the frame, of which this many are gone on with, and from so many SLSQP begins.
 _SAMPLE, _NEAR, _SEEDS = 150000, 150, 16
+# Turns tried at one position.
+_TURNS = 20000
 _STEPS, _HALVINGS, _BALANCED, _MISSED = 40, 7, 1e-6, 1e-6
 
 
@@ -67,7 +70,7 @@ def wanted_poses(robot: Robot, limits: dict[str, float], kind: str, n: int, seed
             pose[:3] += random.uniform(0.0, 0.02 * frame) * toward
         else:
             pose[:3] = random.uniform(box.min(axis=0), box.max(axis=0))
-        if kind in ("turned", "both"):
+        if kind in ("turned", "both", "kept"):
             pose[3:] = _any_turn(random, 1)[0]
         if not feasible(robot, pose, **limits)[0]:
             out.append(pose)
@@ -84,8 +87,12 @@ def _skew(v: Array) -> Array:
 class Brute:
     """One wanted pose; x is the way from it [m, length x rotation] and tensions, both scaled."""
 
-    def __init__(self, robot: Robot, limits: dict[str, float], wanted: Array) -> None:
+    def __init__(
+        self, robot: Robot, limits: dict[str, float], wanted: Array, kept: bool = False
+    ) -> None:
         m = robot.n_cables
+        self.ways = [(0.0, 0.0) if kept and k < 3 else (None, None) for k in range(6)]
+        self.kept = kept
         self.robot, self.wanted, self.turn = robot, wanted, quat_to_matrix(wanted[3:])
         self.weight, self.unit = robot.mass * robot.gravity, np.repeat([1.0, robot.length], 3)
         self.low = np.full(m, limits.get("lowest", 0.0))
@@ -136,7 +143,7 @@ class Brute:
         found = minimize(
             lambda x: (x[:6] @ x[:6], np.concatenate([2.0 * x[:6], np.zeros(len(first))])),
             np.concatenate([start, first]) / grade, jac=True, method="SLSQP",
-            bounds=[(None, None)] * 6 + [
+            bounds=self.ways + [
                 (a / self.pull, b / self.pull) for a, b in zip(self.low, self.high, strict=True)
             ],
             constraints={
@@ -183,6 +190,12 @@ class Brute:
 
     def _starts(self, sample: Array, limits: dict[str, float]) -> Iterator[Array]:
         random = np.random.default_rng(7)
+        if self.kept:  # turns at the wanted position
+            sample = np.tile(self.wanted, (_TURNS, 1))
+            sample[:, 3:] = _any_turn(random, len(sample))
+            sample = sample[feasible(self.robot, sample, **limits)]
+            if len(sample) == 0:
+                return
         away = pose_difference(sample, np.tile(self.wanted, (len(sample), 1))) * self.unit
         near = np.argsort(np.linalg.norm(away, axis=1))[:_NEAR]
         others = random.choice(len(away), min(_NEAR, len(away)), replace=False)
@@ -196,7 +209,7 @@ class Brute:
         order = np.argsort(np.linalg.norm(away, axis=1))
         yield np.zeros(6)
         yield from away[order[: _SEEDS // 2]]
-        yield from away[random.choice(order, _SEEDS // 2, replace=False)]
+        yield from away[random.choice(order, min(_SEEDS // 2, len(order)), replace=False)]
 
 
 def held_sample(robot: Robot, limits: dict[str, float]) -> Array:
@@ -219,17 +232,21 @@ def score(name: str, kind: str, n: int, seed: int, kept: dict[str, Array]) -> st
     want = wanted_poses(robot, limits, kind, n, seed)
     correct(robot, want[:1], **limits)
     began = time.process_time()
-    found = correct(robot, want, **limits)
+    kept_position = kind == "kept"
+    found = correct(robot, want, prefer="position" if kept_position else "pose", **limits)
     spent = 1e3 * (time.process_time() - began) / n
     unit = np.repeat([1.0, robot.length], 3)
     ours = np.linalg.norm(pose_difference(found.aimed, want) * unit, axis=1)
     off = np.abs(pose_difference(found.solution.pose, found.aimed)).max(axis=1)
     stays = found.found & found.solution.converged & (off < _MISSED)
+    moved = np.linalg.norm(found.aimed[:, :3] - want[:, :3], axis=1) > _MISSED
     if key not in kept:
         sample = held_sample(robot, limits)
-        kept[key] = np.array([Brute(robot, limits, one).nearest(sample, limits) for one in want])
+        kept[key] = np.array(
+            [Brute(robot, limits, one, kept_position).nearest(sample, limits) for one in want]
+        )
     with np.errstate(invalid="ignore"):
-        part = np.where(stays, ours / kept[key] - 1.0, np.inf)
+        part = np.where(stays & ~(kept_position & moved), ours / kept[key] - 1.0, np.inf)
     both = stays & np.isfinite(kept[key])
     return (
         f"{name} {kind}: of {n} poses {int(np.sum(part[both] > 0.01))} farther by more than 1 % "

@@ -33,7 +33,8 @@ class Barrier:
     """What is between one equilibrium and another.
 
     Attributes:
-        energy: [J] that it takes to get over, from the first.
+        energy: [J] that it takes to get over, from the first. NaN, and with it ``back`` and
+            ``pose``, where there is no energy: under a moment, or where a law has none.
         back: [J] from the other.
         pose: (7,) at the top.
         exact: whether the top is a saddle: balanced, with one falling direction. Else it is the
@@ -70,6 +71,10 @@ def barriers(solution: Solution, others: Solution, i: int = 0) -> tuple[Barrier,
 
 def _barrier(one: Solution, other: Solution) -> Barrier:
     tables, robot = one.tables, one.robot
+    turned = np.linalg.norm(pose_difference(other.pose[0], one.pose[0])[3:])
+    twisted = bool(not robot.joints and turned > _TWISTED)
+    if not (np.isfinite(one.energy[0]) and np.isfinite(other.energy[0])):
+        return Barrier(np.nan, np.nan, np.full(7, np.nan), exact=False, twisted=twisted)
     images = _string(one, other)
     energies = evaluated(robot, take(tables, np.zeros(_IMAGES, int)), images).energy
     top = images[[int(np.argmax(energies))]]
@@ -77,11 +82,8 @@ def _barrier(one: Solution, other: Solution) -> Barrier:
     if exact:
         top = saddle
     height = float(evaluated(robot, tables, top).energy[0])
-    turned = np.linalg.norm(pose_difference(other.pose[0], one.pose[0])[3:])
-    return Barrier(
-        height - float(one.energy[0]), height - float(other.energy[0]), top[0], exact,
-        bool(not robot.joints and turned > _TWISTED),
-    )  # fmt: skip
+    own, there = float(one.energy[0]), float(other.energy[0])
+    return Barrier(height - own, height - there, top[0], exact, twisted)
 
 
 def _string(one: Solution, other: Solution) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from seecr import passes
 from seecr.equilibrium import solve
 from seecr.errors import InputError
 from seecr.following import evaluated, moved
@@ -67,6 +68,23 @@ def test_mirrored_rests_are_twisted_and_as_far_up() -> None:
     one, two = barriers(own, others)
     assert one.twisted and two.twisted and one.energy == pytest.approx(two.energy, rel=1e-6)
     assert one.energy > others.energy[0] - own.energy[0] > 0.01
+
+
+@pytest.mark.slow
+def test_where_there_is_no_energy_no_way_is_looked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Hundreds of rounds ended with the highest of numbers that were none."""
+    robot = load_robot(model_path("demobot_parallel"))
+    pose = np.array([0.351, 0.216, 0.109, 0.943, 0.163, -0.288, -0.038])
+    pose[3:] /= np.linalg.norm(pose[3:])
+    own, every = solve(robot, pose), equilibria(robot, pose)
+    other = every.rows(elsewhere(own, every))
+    monkeypatch.setattr(passes, "_string", pytest.fail)
+    for energy in (own, other):
+        energy.energy[:] = np.nan
+        (way,) = barriers(own, other)
+        assert np.isnan([way.energy, way.back, *way.pose]).all()
+        assert not way.exact and not way.twisted
+        energy.energy[:] = 0.0
 
 
 def test_equilibria_of_something_else_are_refused() -> None:
