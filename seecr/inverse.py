@@ -256,12 +256,14 @@ class _Search:
 
         args = (self.robot, wanted, balance, stays, limits.low, limits.high, scale[rows])
         best = nearest(*args, fix_position)
-        again = np.flatnonzero(~best.found)
+        again = np.flatnonzero(~best.firm)
         if fix_position and len(again):
             # the position cannot be kept either
             other = self._nearest(rows[again], scale, False)
-            best.poses[again], best.found[again] = other.poses, other.found
-            best.settled[again] = other.settled
+            better = other.firm | (other.found & ~best.found[again])
+            to = again[better]
+            best.poses[to], best.found[to] = other.poses[better], other.found[better]
+            best.firm[to], best.settled[to] = other.firm[better], other.settled[better]
         return best
 
     def _lengths(self, commands: Commands, held: Held) -> tuple[Array, Prediction]:

@@ -39,12 +39,14 @@ class Nearest:
 
     Attributes:
         poses: (n, 7). found: (n,) bool, there is one that can be held.
+        firm: (n,) bool, the platform stays there.
         settled: (n,) bool, it meets the first-order conditions of a local minimum (Karush, Kuhn
             and Tucker): to first order no small change that can be held comes nearer.
     """
 
     poses: Array
     found: NDArray[np.bool_]
+    firm: NDArray[np.bool_]
     settled: NDArray[np.bool_]
 
 
@@ -87,11 +89,11 @@ def nearest(
     first = from_sample(problem, poses).and_more(about_wanted(problem))
     best.search(first, _FIRST)
     if not best.found.any():
-        return Nearest(wanted.copy(), best.found, best.found.copy())
+        return Nearest(wanted.copy(), best.found, best.firm, best.found.copy())
     best.search(about_answers(problem, best.away, np.flatnonzero(best.found)), _SHARED)
     best.firm_ones(poses)
     settled = best.settled() & best.firm
-    return Nearest(problem.placed(best.away, rows), best.found, settled)
+    return Nearest(problem.placed(best.away, rows), best.found, best.firm, settled)
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,6 +13,8 @@ from seecr.robot import Robot
 
 # Poses tried over the frame; of those that are held, as many nearest and as many others a row.
 _SAMPLE, _NEAR = 24000, 128
+# Turns tried where only the orientation gives way.
+_IN_PLACE = 8000
 # Turned poses about each wanted one, and about each answer, where as many others are tried.
 _TURNED, _ABOUT = 256, 64
 # Half of the sample is turned by less than this [rad], and poses move inward by up to this part.
@@ -73,14 +75,34 @@ def _on_joints(robot: Robot, random: np.random.Generator) -> Array:
 def from_sample(problem: Reaching, poses: Array) -> Candidates:
     """Home, the poses nearest to each wanted one, and as many of the others."""
     random, out, rows = np.random.default_rng(1), [], []
-    some = min(_NEAR, len(poses))
+    places = problem.robot.hinges | (problem.free > 0.0)
     for row in range(len(problem.wanted)):
         every = problem.to(poses, np.full(len(poses), row))
+        if not places.all():  # which the sample does not hold: turns at the wanted position
+            every = _in_place(problem, row, every[0])
+        some = min(_NEAR, len(every))
         near = np.argsort(np.linalg.norm(every, axis=1))[:some]
-        pick = np.concatenate([[0], near, random.choice(len(poses), some, replace=False)])
+        pick = np.concatenate([[0], near, random.choice(len(every), some, replace=False)])
         out.append(every[pick])
         rows.append(np.full(len(pick), row))
     return Candidates(problem.allowed(np.concatenate(out)), np.concatenate(rows))
+
+
+def _in_place(problem: Reaching, row: int, home: Array) -> Array:
+    """Home's turn, and all turns of a wanted pose that are held (k, d)."""
+    robot, hinges, random = problem.robot, problem.robot.hinges, np.random.default_rng(6)
+    rows = np.full(_IN_PLACE, row)
+    if problem.values is None:
+        poses = np.repeat(problem.wanted[row][None], _IN_PLACE, axis=0)
+        poses[:, 3:] = random.normal(size=(_IN_PLACE, 4))
+        poses[:, 3:] /= np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
+        every = problem.to(poses, rows)
+    else:
+        values = random.uniform(-np.pi, np.pi, (_IN_PLACE, len(hinges)))
+        every = np.where(hinges, values - problem.values[row], 0.0) * robot.length
+    every = problem.allowed(np.concatenate([home[None], every]))
+    held = np.concatenate([[True], problem.held(every[1:], rows)])
+    return np.asarray(every[held])
 
 
 def about_wanted(problem: Reaching) -> Candidates:
