@@ -18,6 +18,8 @@ from seecr.effects.base import Layout
 _LIKELY = 0.9
 # A rival that leaves this much more chi2 has been told apart, whatever its evidence.
 _TOLD_APART = 9.0
+# What the further parameter of one that contains another must explain to say something.
+_FURTHER = 1.0
 # A trial that came to its end this many times as far off is not fitted further.
 _MENDED = 4.0
 
@@ -54,19 +56,28 @@ def rivals_of(found: Search, name: str, apart: float = _TOLD_APART) -> list[Riva
     if not without.valid:
         return []
     own = len(final.fit.terms[name].layout)
-    tried = [_rival(found, c, without, own, apart) for c in _likely(found, name, without)]
-    out = [rival for rival in tried if rival is not None]
+    tried = [_in_its_place(found, c, without, apart) for c in _likely(found, name, without)]
+    every = {rival.name: rival for rival in tried if rival is not None}
+    out = {rival.name for rival in every.values() if _explains_as_well(found, rival, own, apart)}
     # one that contains another (friction on a cable behind the exit point, with no friction)
     # says nothing that the other does not
-    names = {name, *(r.name for r in out)}
-    out = [r for r in out if catalogue()[r.name].parent not in names]
-    return sorted(out, key=lambda r: r.loss)
+    for rival in sorted(out):
+        inner = catalogue()[rival].parent
+        there = inner in {name, *out}
+        if there or (inner in every and every[inner].loss < every[rival].loss + _FURTHER):
+            out = (out - {rival}) | ({inner} - {name})
+    return sorted((every[rival] for rival in out), key=lambda r: r.loss)
 
 
-def _rival(
-    found: Search, candidate: Candidate, without: Fit, own: int, apart: float
-) -> Rival | None:
-    """The candidate in place of the effect of ``own`` parameters, if it explains as well."""
+def _explains_as_well(found: Search, rival: Rival, own: int, apart: float) -> bool:
+    """Whether it does what the effect of ``own`` parameters does."""
+    worse = (rival.fit.chi2 - found.last.fit.chi2) / found.last.whiteness.inflation**2
+    alike = rival.loss > -EQUAL and are_equals(rival.loss, own, len(rival.layout))
+    return alike and worse < apart
+
+
+def _in_its_place(found: Search, candidate: Candidate, without: Fit, apart: float) -> Rival | None:
+    """The candidate in place of the effect; None where it leaves far more."""
     trials, final = found.trials, found.last
     # where structure is left over, differences count against that, not against the noise, and
     # residuals that go together count for fewer
@@ -84,9 +95,7 @@ def _rival(
     if not best.valid:
         return None
     loss = (final.evidence.log - trials.evidence(best).log) / left
-    worse = (best.chi2 - final.fit.chi2) / left
-    alike = loss > -EQUAL and are_equals(loss, own, len(candidate.layout)) and worse < apart
-    return Rival(candidate.name, best, loss) if alike else None
+    return Rival(candidate.name, best, loss)
 
 
 def _likely(found: Search, name: str, without: Fit) -> list[Candidate]:

@@ -113,6 +113,20 @@ def test_evidence_alone_does_not_tell_apart_what_chi2_does() -> None:
     assert rival.fit.chi2 > found.last.fit.chi2 + 9.0
 
 
+def test_what_a_rival_contains_stands_in_its_place() -> None:
+    """Friction on a cable behind the exit point was told in place of a mass; not the cable."""
+    hidden, names = "tracker_scale", (*NAMES, "winch_side_length", "exit_friction")
+    plain = toy({}, names, seed=1)
+    nearly = plain.columns[hidden] + 0.2 * plain.columns["winch_side_length"]
+    rubs = nearly * [1.0, 0.0] + plain.columns["exit_friction"] * [0.0, 0.01]
+    columns = {"winch_side_length": nearly, "exit_friction": rubs}
+    found = searched(toy({hidden: 0.5}, names, seed=1, columns=columns))
+    assert found.found == (hidden,)
+    (rival,) = rivals_of(found, hidden)
+    # too far off by itself; but with a parameter more it would not be, which says nothing
+    assert rival.name == "winch_side_length" and 3.0 < rival.loss < 6.0
+
+
 def test_what_explains_far_less_is_not_fitted_to_the_end_to_see_that() -> None:
     """It does nearly what a listed effect does, and leaves of a large one far more than noise."""
     plain = toy({}, NAMES)
