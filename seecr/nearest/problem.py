@@ -56,6 +56,8 @@ class Reaching:
             change = pose_difference(poses, self.wanted[rows])
         else:
             change = values_of_pose(self.robot, poses)[0] - self.values[rows]
+            shorter = np.mod(change + np.pi, 2.0 * np.pi) - np.pi  # either way about a hinge
+            change = np.where(self.robot.hinges, shorter, change)
         return change * np.where(self.robot.hinges, self.robot.length, 1.0)
 
     def at(self, away: Array, rows: Rows) -> tuple[Array, Array]:

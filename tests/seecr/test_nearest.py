@@ -7,6 +7,7 @@ import pytest
 import score_nearest
 
 from seecr.inverse import correct
+from seecr.joints import pose_of_values
 from seecr.mjcf import load_robot
 from seecr.model import load_model
 from seecr.nearest import search
@@ -113,6 +114,19 @@ def test_an_answer_that_is_no_local_minimum_is_told(monkeypatch: pytest.MonkeyPa
     cut = correct(robot, want)
     assert cut.found[0] and not cut.settled[0]
     assert "1 of them may have nearer ones beside them" in str(cut)
+
+
+def test_a_turn_about_a_hinge_is_as_far_as_its_shorter_way() -> None:
+    robot = load_robot(model_path("planar_vertical"))
+    values = np.array([[-0.26, 0.151, 2.588], [-0.251, 0.156, 3.326]])
+    want, there = pose_of_values(robot, values)[0]
+    none = np.zeros((1, 4))
+    problem = Reaching(
+        robot, want[None], values[:1], lambda poses, _: balance_equations(robot, poses),
+        lambda _, rows: np.ones(len(rows), dtype=bool), none, none, np.ones(1), np.ones(3),
+    )  # fmt: skip
+    (away,) = problem.to(there[None], np.zeros(1, dtype=np.intp))
+    assert away == pytest.approx((values[1] - values[0]) * [1.0, 1.0, robot.length])
 
 
 def test_balance_bends_as_its_rates_change() -> None:
