@@ -35,7 +35,7 @@ class Calibrated(Result):
         fitted: the effects with standard errors; those that the data do not see are left out.
         covariance: (p, p) of all their parameters, in their order; SI.
         before: rms errors of the model as it stood. after: of this one.
-        held_out: on runs left out, refitted by linear algebra.
+        held_out: on runs left out, each by a fit without it.
         scale, rho: of each kind of reading, the noise in units of the stated one, and its
             correlation from one row of a run to the next.
         outliers: lines that hardly count.
