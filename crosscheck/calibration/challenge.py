@@ -74,7 +74,7 @@ def _without(exact: Exact, about: Scores, best: Refit, name: str) -> None:
 def without(scores: Scores, barred: Names) -> Scores:
     """Scores of sets in which these effects are not."""
     groups = {n: g for n, g in scores.gram.groups.items() if n not in barred}
-    return Scores(replace(scores.gram, groups=groups), scores.of, scores.always)
+    return replace(scores, gram=replace(scores.gram, groups=groups), solved={}, near={})
 
 
 def equals_of(exact: Exact, best: Refit, name: str) -> Names:

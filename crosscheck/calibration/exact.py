@@ -10,6 +10,7 @@ import numpy as np
 from crosscheck.calibration.catalogue import Catalogue, gram_about, widths_for
 from crosscheck.calibration.gram import Gram, averaged, best_widths, gram_of
 from crosscheck.calibration.joint import JointFit, Setting, settle
+from crosscheck.calibration.later import at_null
 from crosscheck.calibration.linearised import groups_of, linearised
 from crosscheck.calibration.priors import SHAPES
 from crosscheck.calibration.sets import Names, Scores
@@ -23,6 +24,10 @@ _STEPS = 12
 HOLLOW = 8.0
 # Sets up to this size are tried from more starts, and without each of their members.
 FEW = 5
+
+
+# The members of a set, with the terms that have the shape from which it was fitted.
+Shapes = tuple[tuple[str, Term | None], ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +64,7 @@ class Exact:
     told: Callable[[str], None]
     given: Mapping[Names, Terms] = field(default_factory=dict)
     fitted: dict[Names, Refit | None] = field(default_factory=dict)
+    _begun: dict[Names, set[Shapes]] = field(default_factory=dict)
 
     @property
     def possible(self) -> dict[Names, Refit]:
@@ -78,11 +84,19 @@ class Exact:
         """Whether a robot can have all these values."""
         return can_be(self.setting.problem.robot, found.joint.terms, self.plain.terms)
 
-    def scores_about(self, joint: JointFit) -> Scores:
-        """Linear scores of the whole catalogue about a fit of some of it."""
+    def scores_about(self, joint: JointFit, own_shapes: bool = False) -> Scores:
+        """Linear scores of the whole catalogue about a fit of some of it.
+
+        Args:
+            joint: the fit.
+            own_shapes: sets are fitted from the shapes that effects have there, also those that
+                were fitted from others.
+        """
         always = frozenset(self.plain.terms.names)
         gram = gram_about(self.setting, joint, self.catalogue)
-        return Scores(gram, len(set(self.catalogue.names) - always), always)
+        own = joint.terms if own_shapes else ()
+        shapes = {t.name: at_null(t) for t in own if t.name in self.catalogue.later}
+        return Scores(gram, len(set(self.catalogue.names) - always), always, shapes)
 
     def best_of(self, scores: Scores, some: Iterable[Names]) -> Refit:
         """The best of all that are fitted, these among them."""
@@ -105,11 +119,25 @@ class Exact:
         )
 
     def fit(self, scores: Scores, names: Names) -> Refit | None:
-        """A set fitted exactly; None where that has no solution."""
+        """A set fitted exactly; None where that has no solution.
+
+        One that was is fitted anew from other shapes where those promise more.
+        """
+        shapes = tuple((name, scores.shapes.get(name)) for name in sorted(names))
         if names not in self.fitted:
             self.told(" + ".join(sorted(names)) or "none")
             self._fit(scores, names)
+        elif shapes not in self._begun.get(names, set()) and self._promises_more(scores, names):
+            self.told(" + ".join(sorted(names)))
+            self.take(scores, _linear_terms(self.catalogue, scores, names))
+        self._begun.setdefault(names, set()).add(shapes)
         return self.fitted[names]
+
+    def _promises_more(self, scores: Scores, names: Names) -> bool:
+        """Whether another shape of its members may explain far more than the fit there is."""
+        own = self.fitted[names]
+        other = names & scores.shapes.keys()
+        return bool(other) and (own is None or own.score < scores.score(names) - HOLLOW)
 
     def _fit(self, scores: Scores, names: Names) -> None:
         """From its linear values, those given, and from null where that ends badly."""
@@ -137,7 +165,7 @@ def _linear_terms(catalogue: Catalogue, scores: Scores, names: Names) -> Terms:
     solved = scores.gram.solved(scores.widths(names))
     out, first = [], 0
     for name in solved.chosen:
-        term = catalogue.start(name)
+        term = scores.shapes.get(name, catalogue.start(name))
         layout, start = term.layout, term.vector
         count = len(scores.gram.groups[name].columns)
         own = np.flatnonzero(~layout.shape & ~term.knowledge.fixed)

@@ -88,6 +88,7 @@ def compare_sets(
             break
         begin = best.names
         scores = exact.scores_about(best.joint)
+    scores, best = about_given(exact, scores, best, known)
     scores, best = looked_about(exact, scores, best)
     other = swapped(exact, scores, best)
     if other.names != best.names:
@@ -118,6 +119,28 @@ def _thinned(exact: Exact, scores: Scores, best: Refit) -> Refit:
             break
         best = better
     return best
+
+
+def about_given(
+    exact: Exact, scores: Scores, best: Refit, known: Iterable[Names]
+) -> tuple[Scores, Refit]:
+    """The best set, also of those about a given one that the linear model knows nothing of.
+
+    An effect with a shape (drums out of round, creep) does nothing at another one: beside it the
+    linear model about everything looks for what imitates it.
+    """
+    later = set(exact.catalogue.later.names)
+    for names in [n for n in known if n & later and len(n - scores.always) <= FEW][-1:]:
+        refit, seen = exact.fit(scores, names), scores.score(names) - scores.score(best.names)
+        if refit is None or refit.score - best.score < seen + HOLLOW:
+            continue
+        near = exact.scores_about(refit.joint, own_shapes=True)
+        other = _searched(exact, near, names, _BESIDE)
+        if other.names != best.names:
+            best, scores = other, exact.scores_about(other.joint, own_shapes=True)
+            best = _searched(exact, scores, best.names, _BESIDE)
+            scores = exact.scores_about(best.joint, own_shapes=True)
+    return scores, best
 
 
 def looked_about(exact: Exact, scores: Scores, best: Refit) -> tuple[Scores, Refit]:

@@ -7,13 +7,14 @@ Annals of Statistics 38, 2010). One solve of a set gives the score of every set 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from scipy import special
 
 from crosscheck.calibration.gram import Gram, averaged, best_widths
+from seecr.effects import Term
 
 Names = frozenset[str]
 _MOVES = 60
@@ -39,6 +40,7 @@ class Scores:
         gram: of all effects.
         of: how many effects the prior counts.
         always: effects that the model has: in every set, and not counted.
+        shapes: effects with a shape as the fit has it about which this is, amplitudes at null.
         solved: sets whose widths were looked for: score and widths.
         near: sets one effect away from those: score with the neighbour's widths.
     """
@@ -46,6 +48,7 @@ class Scores:
     gram: Gram
     of: int
     always: Names = frozenset()
+    shapes: Mapping[str, Term] = field(default_factory=dict)
     solved: dict[Names, tuple[float, dict[str, float]]] = field(default_factory=dict)
     near: dict[Names, float] = field(default_factory=dict)
 

@@ -120,3 +120,30 @@ def test_a_challenger_that_explains_more_is_the_best_set_and_challenged_in_turn(
     assert first >= set(HIDDEN.names)
     assert others == [{"tracker_frame", "nonlinear_elasticity"}] * len(others) != []
     assert found.best.names == {"tracker_frame", "nonlinear_elasticity"}
+
+
+@pytest.mark.slow
+def test_about_a_given_set_with_a_shape_others_are_looked_for_at_that_shape(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """At another one it does nothing, and what imitates it is found beside it."""
+    # which would find it here, but not where it is in the best set at the wrong shape
+    monkeypatch.setattr(refits, "swapped", lambda _exact, _scores, best: best)
+    random = np.random.default_rng(4)
+    every = [f"{kind}_{i}_m" for i in range(1, 9) for kind in ("sine", "cosine")]
+    small = {name: 6e-5 * random.normal() for name in every}
+    uneven = term(ROBOT, "drum_eccentricity", drum_radius_m=0.03, **small)
+    hidden = [uneven, term(ROBOT, "tracker_scale", factor=1.002)]
+    data = measured(ROBOT, hidden, points=12, seed=2)
+    problem = Problem(ROBOT, data, SIGMA, np.ones(data.n_rows, dtype=bool))
+    factor = problem.noise(problem.experiment.predict(()))
+    setting = Setting(problem, factor, chain_of(problem), frozen=True)
+    names = ("drum_gain", "tracker_scale", "gravity_tilt", "cable_length_offset")
+    there = Terms(term(ROBOT, name) for name in names)
+    joint = settle(setting, evaluate(problem, there, factor), widths_of(there), WHITE)
+    plain = evaluate(problem, Terms(), factor)
+    catalogue = Catalogue(there, Terms([term(ROBOT, "drum_eccentricity", drum_radius_m=0.004)]))
+    found = refits.compare_sets(setting, joint, catalogue, plain, given=[Terms([uneven])])
+    assert found.best.names == {"drum_eccentricity", "tracker_scale"}
+    radius = found.best.joint.terms["drum_eccentricity"].vector[-1]
+    assert radius == pytest.approx(0.03, rel=0.06)
