@@ -130,17 +130,20 @@ def about_given(
     linear model about everything looks for what imitates it.
     """
     later = set(exact.catalogue.later.names)
-    for names in [n for n in known if n & later and len(n - scores.always) <= FEW][-1:]:
-        refit, seen = exact.fit(scores, names), scores.score(names) - scores.score(best.names)
-        if refit is None or refit.score - best.score < seen + HOLLOW:
-            continue
-        near = exact.scores_about(refit.joint, own_shapes=True)
-        other = _searched(exact, near, names, _BESIDE)
-        if other.names != best.names:
-            best, scores = other, exact.scores_about(other.joint, own_shapes=True)
-            best = _searched(exact, scores, best.names, _BESIDE)
-            scores = exact.scores_about(best.joint, own_shapes=True)
-    return scores, best
+    few = [names for names in known if names & later and len(names - scores.always) <= FEW]
+    last = exact.fit(scores, few[-1]) if few else None
+    if last is None:
+        return scores, best
+    seen = scores.score(last.names) - scores.score(best.names)
+    if last.score - best.score < seen + HOLLOW:
+        return scores, best
+    near = exact.scores_about(last.joint, own_shapes=True)
+    other = _searched(exact, near, last.names, _BESIDE)
+    if other.names == best.names:
+        return scores, best
+    near = exact.scores_about(other.joint, own_shapes=True)
+    best = _searched(exact, near, other.names, _BESIDE)
+    return exact.scores_about(best.joint, own_shapes=True), best
 
 
 def looked_about(exact: Exact, scores: Scores, best: Refit) -> tuple[Scores, Refit]:

@@ -75,11 +75,10 @@ def _on_joints(robot: Robot, random: np.random.Generator) -> Array:
 def from_sample(problem: Reaching, poses: Array) -> Candidates:
     """Home, the poses nearest to each wanted one, and as many of the others."""
     random, out, rows = np.random.default_rng(1), [], []
-    places = problem.robot.hinges | (problem.free > 0.0)
+    places = bool(np.all(problem.robot.hinges | (problem.free > 0.0)))
     for row in range(len(problem.wanted)):
-        every = problem.to(poses, np.full(len(poses), row))
-        if not places.all():  # which the sample does not hold: turns at the wanted position
-            every = _in_place(problem, row, every[0])
+        # the sample holds none at the wanted position
+        every = problem.to(poses, np.full(len(poses), row)) if places else _in_place(problem, row)
         some = min(_NEAR, len(every))
         near = np.argsort(np.linalg.norm(every, axis=1))[:some]
         pick = np.concatenate([[0], near, random.choice(len(every), some, replace=False)])
@@ -88,9 +87,9 @@ def from_sample(problem: Reaching, poses: Array) -> Candidates:
     return Candidates(problem.allowed(np.concatenate(out)), np.concatenate(rows))
 
 
-def _in_place(problem: Reaching, row: int, home: Array) -> Array:
-    """Home's turn, and all turns of a wanted pose that are held (k, d)."""
-    robot, hinges, random = problem.robot, problem.robot.hinges, np.random.default_rng(6)
+def _in_place(problem: Reaching, row: int) -> Array:
+    """Home's turn, and of all turns of a wanted pose those that are held (k, d)."""
+    robot, random = problem.robot, np.random.default_rng(6)
     rows = np.full(_IN_PLACE, row)
     if problem.values is None:
         poses = np.repeat(problem.wanted[row][None], _IN_PLACE, axis=0)
@@ -98,9 +97,9 @@ def _in_place(problem: Reaching, row: int, home: Array) -> Array:
         poses[:, 3:] /= np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
         every = problem.to(poses, rows)
     else:
-        values = random.uniform(-np.pi, np.pi, (_IN_PLACE, len(hinges)))
-        every = np.where(hinges, values - problem.values[row], 0.0) * robot.length
-    every = problem.allowed(np.concatenate([home[None], every]))
+        every = robot.length * random.uniform(-np.pi, np.pi, (_IN_PLACE, robot.n_dof))
+    home = problem.to(robot.reference_pose[None], rows[:1])
+    every = problem.allowed(np.concatenate([home, every]))
     held = np.concatenate([[True], problem.held(every[1:], rows)])
     return np.asarray(every[held])
 

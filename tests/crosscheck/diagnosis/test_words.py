@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from crosscheck.diagnosis.words import agreement, one_of
+from crosscheck.diagnosis.chances import Chances
+from crosscheck.diagnosis.explained import _sentence
+from crosscheck.diagnosis.words import one_of
+from crosscheck.fit.reasons import DiagnosisVerdict
 
 
 @pytest.mark.parametrize(
@@ -22,6 +25,9 @@ def test_effects_of_which_it_is_one(members: list[str], words: str) -> None:
 
 def test_what_is_probable_but_not_sure_is_no_none_of_all() -> None:
     """A class at 88 % stood beside "none of 26 effects tried explains any of it"."""
-    told = agreement(26, {one_of(["anchor_point_error", "exit_point_error"]): 0.88})
+    classes = ((("anchor_point_error", "exit_point_error"), 0.88), (("creep",), 0.3))
+    nothing = DiagnosisVerdict.NO_EFFECT_MISSING
+    told = _sentence(nothing, [], 26, Chances({}, classes, None, None))
     assert "a hint of anchor_point_error or exit_point_error (88 %), too weak to be sure" in told
-    assert "none of 26" not in told and "none of 26 effects" in agreement(26)
+    assert "none of 26" not in told and "creep" not in told
+    assert "none of 26 effects" in _sentence(nothing, [], 26, Chances({}, classes[1:], None, None))
