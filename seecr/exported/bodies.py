@@ -15,7 +15,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from seecr.exported.chain import hanging
+from seecr.compiled.columns import UP
+from seecr.exported.chain import HangingCable, HangingChain, hanging
 from seecr.exported.scene import cable, dot, numbers, scene, text_of
 from seecr.joints import values_of_pose
 from seecr.pose import Array, transform_points
@@ -24,7 +25,8 @@ from seecr.setup import Setup
 from seecr.solution import Solution
 
 SEGMENTS = 24
-"""Of a cable with weight; what is left of the catenary goes with one over its square."""
+"""Of a cable with weight. At the pose of the file they hang as the catenary does, elsewhere
+nearly."""
 
 # Mass of what carries exit points and winches over the platform's: gravcomp takes its weight away.
 _SMALL = 0.01
@@ -84,45 +86,86 @@ class _Cable:
 
     def __init__(self, setup: Setup, solution: Solution, i: int, end: Array) -> None:
         self.i, self.end, self.robot = i, end, setup.robot
-        self.exit, self.up = setup.exit_points[i], setup.robot.up
-        self.anchor = setup.anchor_points[i]
+        self.exit, self.anchor = setup.exit_points[i], setup.anchor_points[i]
+        # the vertical of the planes in which cables hang and sheaves stand
+        self.up = solution.tables.load[0, UP : UP + 3]
         self.length, self.ea = float(solution.rest_lengths[0, i]), float(setup.ea[i])
         self.law = (1.0, float(setup.quadratic[i]), float(setup.cubic[i]))
         self.radius = float(setup.pulley_radius[i])
-        sideways, upwards = setup.compliance[i], setup.compliance[i] + setup.lift[i]
+        self.sideways = float(setup.compliance[i])
+        upwards = self.sideways + float(setup.lift[i])
         self.series = float(setup.winch_side[i]) / self.ea
         self.yields: list[tuple[Array, float]] = []
         if self.radius > 0.0:
-            self.series += float(sideways)
+            self.series += self.sideways
         else:
             across = np.linalg.svd(self.up[None])[2][1:]
-            soft = [(axis, float(sideways)) for axis in across] + [(self.up, float(upwards))]
+            soft = [(axis, self.sideways) for axis in across] + [(self.up, upwards)]
             self.yields = [(axis, by) for axis, by in soft if by > 0.0]
         self.tail = self.length if self.radius > 0.0 or self.series > 0.0 else 0.0
-        self.weight = float(setup.cable_weight[i])
         self.gravity = float(np.linalg.norm(setup.gravity))
-        self.tension = float(solution.tensions[0, i])
         self.small = _SMALL * setup.mass
         self.at_rest: list[float] = []
+        along = (end - self.exit) / np.linalg.norm(end - self.exit)
+        self.tension = float(solution.tensions[0, i])
+        self.pull, self.weight = self.tension * along, 0.0
+        self.chain: HangingChain | None = None
+        if setup.cable_weight[i] > 0.0:
+            self.weight = float(setup.cable_weight[i]) * self.length
+            self._hang(float(setup.cable_weight[i]), *solution.evaluation.guess[0, i])
+
+    def _hang(self, weight: float, flat: float, steep: float, free: float) -> None:
+        """As a chain, by its weight [N/m], pull on the anchor point [N] and free length [m]."""
+        self.pull = flat * self._ahead() - (steep + self.weight) * self.up
+        if self.yields:
+            # the catenary has it paid out, here the exit point itself comes nearer
+            free -= self.sideways * self.tension / (1.0 + self.tension / self.ea)
+        away = self.end - self.exit - self._given_way()
+        span = np.array([away @ self._ahead(), away @ self.up])
+        pull = np.array([-flat, steep])
+        cable = HangingCable(span, pull, weight * free, free, self.ea, self.law, self.radius)
+        self.chain, self.free = hanging(cable, SEGMENTS), free
+        self.tension = float(self.chain.tension[0])
+        self.exit = self.exit + self._by(self.chain.beside)
+
+    def _by(self, way: Array) -> Array:
+        """(3,) of (across, up) in the cable's vertical plane."""
+        return np.asarray(way[0] * self._ahead() + way[1] * self.up)
+
+    def _given_way(self) -> Array:
+        """How far the exit point has moved, (3,) [m]."""
+        moved = np.zeros(3)
+        for axis, by in self.yields:
+            moved += by * float(self.pull @ axis) * axis
+        return moved
 
     def write(self, world: ET.Element, body: ET.Element, tendons: ET.Element) -> list[float]:
         """Write it; returns where its joints are at rest."""
-        self._exit(world)
-        nodes = self._chain(world, body) if self.weight > 0.0 else []
+        carrier = self._exit(world)
+        nodes = [] if self.chain is None else self._chain(self.chain, world, body, carrier)
         points = [*nodes, f"anchor{self.i + 1}"]
-        n, free = len(points), self._free_share()
         name = self.robot.cable_names[self.i]
         for j, point in enumerate(points):
             start = [("site", {"site": nodes[j - 1]})] if j else self._behind()
-            part = free / n + (0.0 if j else 1.0 - free)
-            own = self.length * part
+            own, rest = self._spring_of_cable(j)
             curved = [self.ea * c / own ** (k + 1) for k, c in enumerate(self.law)]
             cable(
-                tendons, name if n == 1 else f"{name}-{j + 1}",
-                [*start, ("site", {"site": point})], own + (0.0 if j else self.tail),
+                tendons, name if self.chain is None else f"{name}-{j + 1}",
+                [*start, ("site", {"site": point})], rest,
                 curved if any(self.law[1:]) else curved[:1], 0.01 * self.robot.length,
             )  # fmt: skip
         return self.at_rest
+
+    def _spring_of_cable(self, j: int) -> tuple[float, float]:
+        """Lengths [m] of the j-th spring from the exit point: that which stretches, and at rest."""
+        if self.chain is None:
+            return self.length, self.length + self.tail
+        own, way, strain = self.free / SEGMENTS, self.chain.length[j], self.chain.strain[j]
+        if j == 0:
+            arc = self.radius * (np.pi - self.chain.leaning)
+            own += arc / (1.0 + strain)
+            way += arc + (self.tail - self.series * self.tension if self.tail else 0.0)
+        return own, way - own * strain
 
     def _carrier(self, parent: ET.Element, name: str, place: Array) -> ET.Element:
         """A body of next to no mass that springs hold, and no gravity."""
@@ -141,14 +184,13 @@ class _Cable:
         )
         self.at_rest.append(compliance * pull)
 
-    def _exit(self, world: ET.Element) -> None:
-        """Exit point, winch and sheave, each on what holds it."""
+    def _exit(self, world: ET.Element) -> ET.Element:
+        """Exit point, winch and sheave, each on what holds it; returns what holds the first."""
         number, parent, place = self.i + 1, world, self.exit
-        along = (self.end - place) / np.linalg.norm(self.end - place)
         if self.yields:
             parent, place = self._carrier(world, f"frame{number}", place), np.zeros(3)
             for axis, by in self.yields:
-                self._spring(parent, axis, by, self.tension * float(axis @ along))
+                self._spring(parent, axis, by, float(self.pull @ axis))
         ET.SubElement(
             parent, "site", name=f"exit{number}", pos=numbers(place), size=dot(self.robot)
         )
@@ -161,6 +203,7 @@ class _Cable:
             ET.SubElement(parent, "site", name=f"winch{number}", pos=numbers(below))
         if self.radius > 0.0:
             self._sheave(world)
+        return parent
 
     def _sheave(self, world: ET.Element) -> None:
         r, number = self.radius, self.i + 1
@@ -194,44 +237,30 @@ class _Cable:
             return [*winch, ("geom", {"geom": f"sheave{number}", "sidesite": f"over{number}"})]
         return [*winch, ("site", {"site": f"exit{number}"})]
 
-    def _free_share(self) -> float:
-        """Part of the cable that is not on its sheave, as a straight cable has it."""
-        if self.radius == 0.0:
-            return 1.0
-        free, arc = self._leaving()[1:]
-        return free / (free + arc)
-
-    def _leaving(self) -> tuple[Array, float, float]:
-        """Where it leaves its sheave (3,) [m], and its lengths [m] from there on and before."""
-        way, r = self.end - self.exit, self.radius
-        rise = float(way @ self.up)
-        across = float(np.linalg.norm(way - rise * self.up))
-        free = float(np.sqrt((across - r) ** 2 + rise**2 - r**2))
-        psi = np.arctan2(rise, across - r) + np.arctan2(free, r)
-        out = r * (1.0 + np.cos(psi)) * self._ahead() + r * np.sin(psi) * self.up
-        return self.exit + out, free, float(r * (np.pi - psi))
-
-    def _chain(self, world: ET.Element, body: ET.Element) -> list[str]:
-        """Point masses between segments, and half a one on the platform; names of their sites."""
-        start = self._leaving()[0] if self.radius > 0.0 else self.exit
-        free = self.length * self._free_share()
-        mass = self.weight * free / SEGMENTS / self.gravity
-        hung = hanging(start, self.end, free, self.ea, self.weight * self.up, SEGMENTS)
+    def _chain(
+        self, chain: HangingChain, world: ET.Element, body: ET.Element, carrier: ET.Element
+    ) -> list[str]:
+        """Point masses between springs and at their ends; names of the sites between."""
+        start = self.exit - self._by(chain.beside) + self._given_way()
         names = []
-        for j, place in enumerate(hung, start=1):
+        for j, place in enumerate(chain.places, start=1):
             name = f"node{self.i + 1}-{j}"
-            node = ET.SubElement(world, "body", name=name, pos=numbers(place))
+            there = start + self._by(place)
+            node = ET.SubElement(world, "body", name=name, pos=numbers(there))
             for axis in np.eye(3):
                 ET.SubElement(node, "joint", type="slide", axis=numbers(axis))
-            self._point(node, mass)
+            self._point(node, chain.between)
             ET.SubElement(node, "site", name=name, size=dot(self.robot))
             names.append(name)
             self.at_rest += [0.0, 0.0, 0.0]
-        half = ET.SubElement(body, "body", pos=numbers(self.anchor))
-        self._point(half, 0.5 * mass)
+        self._point(ET.SubElement(body, "body", pos=numbers(self.anchor)), chain.end)
+        if self.yields:
+            rest = self.weight - (SEGMENTS - 1) * chain.between - chain.end
+            self._point(ET.SubElement(carrier, "body"), rest)
         return names
 
-    def _point(self, body: ET.Element, mass: float) -> None:
+    def _point(self, body: ET.Element, weight: float) -> None:
+        mass = weight / self.gravity
         turning = 1e-3 * mass * self.robot.length**2
         ET.SubElement(
             body, "inertial", pos="0 0 0", mass=numbers(mass), diaginertia=numbers([turning] * 3)

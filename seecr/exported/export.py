@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seecr.commands import Commands
+from seecr.compiled.columns import FORCE_OF_WEIGHT, UP
 from seecr.effects import Effect
 from seecr.effects.checked import edit_setup
 from seecr.equilibrium import solve
@@ -22,6 +23,9 @@ from seecr.robot import Robot
 from seecr.setup import Setup, plain_setup
 from seecr.solution import Solution
 from seecr.starts import commanded_poses
+
+# Directions whose sine is smaller are one.
+_ALONG = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +53,16 @@ class Export:
     lengths: tuple[str, ...]
     nowhere: tuple[tuple[str, str], ...]
 
+    @property
+    def leans(self) -> bool:
+        """Whether cables hang along gravity in the file, and in seecr along another vertical."""
+        if self.solution is None or "cable_weight" not in self.bodies:
+            return False
+        load = self.solution.tables.load[0]
+        weight = load[FORCE_OF_WEIGHT : FORCE_OF_WEIGHT + 3]
+        across = np.cross(weight, load[UP : UP + 3])
+        return bool(np.linalg.norm(across) > _ALONG * np.linalg.norm(weight))
+
     def lines(self, name: str = "the file", mujoco_name: str = "the file for MuJoCo") -> list[str]:
         """What is in which file, and what is in none."""
         return list(self._lines(name, mujoco_name))
@@ -70,10 +84,14 @@ class Export:
         if self.bodies:
             yield f"{mujoco_name}, for MuJoCo alone: {', '.join(self.bodies)} too"
         if "cable_weight" in self.bodies:
-            sheaves = "; they leave their pulleys as straight ones do"
             yield (
-                f"  cables hang as {SEGMENTS} springs with masses between, not as catenaries"
-                + (sheaves if "pulley_radius" in self.bodies else "")
+                f"  cables hang as {SEGMENTS} springs with masses between: as catenaries do at "
+                "this pose, nearly so elsewhere"
+            )
+        if self.leans:
+            yield (
+                "  its cables hang along the tilted gravity, in seecr along the vertical of "
+                "their pulleys and frame: the rest differs by a part of the tilt"
             )
         if self.lengths:
             yield (
