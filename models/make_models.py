@@ -404,7 +404,7 @@ def _exit_points(model: Model) -> Iterator[str]:
 
 
 def _brackets(model: Model) -> Iterator[str]:
-    """What holds the exit points: a plate a corner and a pin a point, or a pin to the portal."""
+    """What holds the exit points: a plate per corner, a pin per point, or a pin to the portal."""
     x, y, z = model.frame
     if not model.planar:
         for px in (0.055, x - 0.055):

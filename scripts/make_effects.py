@@ -15,12 +15,12 @@ from pathlib import Path
 
 import numpy as np
 
+from crosscheck.terminal.effects import EACH
 from seecr.effects import BUILT_IN, PLACES, Effect
 from seecr.setup import QUANTITIES, History
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "effects.md"
 NUMBERS = PAGE.parent / "pictures" / "effects" / "numbers.json"
-_SIZES = {"one": "", "cable": ", one per cable", "vector": ", x y z", "point": ", x y z per cable"}
 
 
 def quantities() -> str:
@@ -64,7 +64,7 @@ def _parameters(effect: type[Effect]) -> str:
     for item in fields(effect):
         meta = item.metadata
         unit = meta["unit"].replace("_per_", "/") or "no unit"
-        notes = [unit + _SIZES[meta["size"]]]
+        notes = [unit + EACH[meta["size"]]]
         if meta["null"] != 0.0:
             notes.append(f"{'start' if meta['shape'] else 'absent at'} {meta['null']:g}")
         limits = [b for b in meta["bounds"] if not callable(b)]

@@ -253,7 +253,7 @@ def score(name: str, kind: str, n: int, seed: int, kept: dict[str, Array]) -> st
         f"(worst {100 * part[both].max(initial=0.0):.1f} %), {int(np.sum(part[both] < -0.01))} "
         f"nearer; without an answer that stays {int(np.sum(~stays))}, the reference "
         f"{int(np.sum(np.isinf(kept[key])))}; {int(found.settled.sum())} local minima; "
-        f"{spent:.0f} ms a pose"
+        f"{spent:.0f} ms per pose"
     )
 
 

@@ -197,8 +197,8 @@ def workspace_map(
             keeps its covariance, and as many cables as freedoms, each pose has its ``chance`` too,
             if asked for.
         elastic: whether to solve where the elastic robot comes to rest.
-        chance: whether to find how likely each pose can be held; takes a millisecond or so a pose
-            near the edge.
+        chance: whether to find how likely each pose can be held; takes a millisecond or so per
+            pose near the edge.
         progress: called as poses are done.
 
     Raises:

@@ -69,7 +69,7 @@ class Setting:
         problem, factor: the data and their noise factors, :meth:`Problem.noise`.
         chain: how the readings follow one another.
         frozen: take rows' history as given when deriving.
-        watch: called after each step with chi2 a reading.
+        watch: called after each step with chi2 per reading.
         weight: (N,) how much each reading counts; None to find that from what is left.
     """
 

@@ -37,7 +37,7 @@ class LeftOut:
         chi2: (blocks,) whitened, of the readings in each block; readings: (blocks,) their number.
         values: (blocks, p) parameters fitted without each block.
         surprise: (blocks,) chi2 of straight lines to it in units of noise and of what the fit
-            without the block did not know of it, a reading: about 1 where the model is right,
+            without the block did not know of it, per reading: about 1 where the model is right,
             however far it had to reach.
     """
 

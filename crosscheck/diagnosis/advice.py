@@ -160,7 +160,7 @@ def _to_decide(alternatives: Sequence[Names]) -> list[str]:
 
 def measured_directly(effect: str) -> str:
     """How to settle an effect without the robot's poses, in a few words."""
-    return catalogue()[effect].advice.split(":")[0]
+    return catalogue()[effect].by_hand()
 
 
 def _to_separate(

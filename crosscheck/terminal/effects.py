@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import fields
-from typing import Any
 
 from rich.table import Table
 
@@ -13,10 +12,14 @@ from crosscheck.fit.words import belongs, shown
 from crosscheck.terminal.lines import console_for, say
 from crosscheck.units import in_unit, parameter_name
 from seecr.effects import BUILT_IN, PLACES, Effect, effect_named, layout_of
+from seecr.result import Record
 from seecr.robot import Robot
 
+EACH = {"one": "", "cable": ", one per cable", "vector": ", x y z", "point": ", x y z per cable"}
+"""What a parameter's size says in words."""
 
-def effect_record(effect: type[Effect], robot: Robot | None) -> dict[str, Any]:
+
+def effect_record(effect: type[Effect], robot: Robot | None) -> Record:
     """An effect as JSON, SI; the parameters' limits and plausible sizes where there is a robot."""
     return {
         "effect": effect.name,
@@ -25,12 +28,12 @@ def effect_record(effect: type[Effect], robot: Robot | None) -> dict[str, Any]:
         "own": effect not in BUILT_IN,
         "needs": list(effect.needs),
         "formula": inspect.getdoc(effect) or "",
-        "check": effect.advice.split(":")[0],
+        "check": effect.by_hand(),
         "parameters": _parameters(effect, robot),
     }
 
 
-def _parameters(effect: type[Effect], robot: Robot | None) -> list[dict[str, Any]]:
+def _parameters(effect: type[Effect], robot: Robot | None) -> list[Record]:
     if robot is None:
         return [
             {"name": f.name, "unit": f.metadata["unit"], "each": f.metadata["size"]}
@@ -72,24 +75,33 @@ def print_effects(effects: list[type[Effect]]) -> None:
 def print_effect(effect: type[Effect], robot: Robot | None) -> None:
     """One effect: formula, parameters, what it needs, how to check it by hand."""
     console = console_for(None)
-    about = effect_record(effect, robot)
-    own = ", of your own" if about["own"] else ""
+    own = "" if effect in BUILT_IN else ", of your own"
     say(console, f"{effect.name}: {effect.title} ({effect.place}{own})", "bold")
-    for line in about["formula"].splitlines():
+    for line in (inspect.getdoc(effect) or "").splitlines():
         say(console, line)
-    for row in about["parameters"]:
-        if robot is None:
-            each = {"one": "", "cable": ", one a cable", "vector": ", x y z"}.get(
-                row["each"], ", x y z a cable"
-            )
-            say(console, f"  {row['name']} [{row['unit'] or 'no unit'}]{each}")
-            continue
-        factor, unit = in_unit(row["unit"])
-        size, absent = factor * row["plausible_size"], factor * row["absent"]
+    for line in _plain_sizes(effect) if robot is None else _sizes_for(effect, robot):
+        say(console, f"  {line}")
+    if effect.needs:
+        say(console, f"needs: {', '.join(effect.needs)}")
+    say(console, f"check by hand: {effect.by_hand()}")
+
+
+def _plain_sizes(effect: type[Effect]) -> Iterator[str]:
+    """A line for each parameter of any robot."""
+    for item in fields(effect):
+        unit = in_unit(item.metadata["unit"])[1] or "no unit"
+        yield f"{item.name} [{unit}]{EACH[item.metadata['size']]}"
+
+
+def _sizes_for(effect: type[Effect], robot: Robot) -> Iterator[str]:
+    """A line for each parameter of a robot, with its plausible size."""
+    layout = layout_of(effect, robot)
+    for name, si, null, scale, shape in zip(
+        layout.names, layout.units, layout.null, layout.scale, layout.shape, strict=True
+    ):
+        factor, unit = in_unit(si)
+        size, absent = factor * scale, factor * null
         words = f"absent at {absent:.4g}, plausible size {size:.3g} {unit}"
-        if row["shapes_the_others"]:
+        if shape:
             words = f"shapes the others, from {absent:.3g} {unit}"
-        say(console, f"  {parameter_name(row['name'], row['unit'])}: {words}".rstrip())
-    if about["needs"]:
-        say(console, f"needs: {', '.join(about['needs'])}")
-    say(console, f"check by hand: {about['check']}")
+        yield f"{parameter_name(name, si)}: {words}".rstrip()

@@ -115,9 +115,10 @@ class Effect:
         needs: what the data must have: any of "time", "temperature", "poses" (commands in
             poses), "tensions".
         parent: an effect that this one only makes sense beside or contains, or "".
-        advice: how to measure it on its own; ``{name}`` is filled with a parameter in
-            millimetres or degrees where those are its units, ``{largest}`` and ``{which}`` with
-            the parameter that is the most plausible sizes from null, and others by :meth:`totals`.
+        advice: how to measure it on its own, and after a colon what to expect. ``{name}`` is
+            filled with a parameter in millimetres or degrees where those are its units,
+            ``{largest}`` and ``{which}`` with the parameter that is the most plausible sizes from
+            null, and others by :meth:`totals`.
         renamed: of parameters in model files written before: each old key, and those that have
             its value now.
     """
@@ -129,6 +130,11 @@ class Effect:
     parent: ClassVar[str] = ""
     advice: ClassVar[str] = ""
     renamed: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+
+    @classmethod
+    def by_hand(cls) -> str:
+        """The check that ``advice`` names, without what to expect of it."""
+        return cls.advice.split(":")[0]
 
     def edit_setup(self, setup: Setup) -> None:
         """Change numbers of the setup, in place."""

@@ -11,7 +11,7 @@ from seecr.nearest.problem import Reaching, Rows
 from seecr.pose import Array, quat_from_rotvec
 from seecr.robot import Robot
 
-# Poses tried over the frame; of those that are held, as many nearest and as many others a row.
+# Poses tried over the frame; of those that are held, as many nearest and as many others per row.
 _SAMPLE, _NEAR = 24000, 128
 # Turns tried where only the orientation gives way.
 _IN_PLACE = 8000

@@ -33,5 +33,5 @@ def test_corrections_and_margins(capsys: pytest.CaptureFixture[str]) -> None:
     corrected = microseconds(lambda: seecr.correct(robot, poses), len(poses))
     tested = microseconds(lambda: seecr.tension_margin(robot, poses), len(poses))
     with capsys.disabled():
-        print(f"\ncorrect {corrected:.1f} µs a pose, tension_margin {tested:.1f} µs a pose")
+        print(f"\ncorrect {corrected:.1f} µs per pose, tension_margin {tested:.1f} µs per pose")
     assert corrected < 100.0 and tested < 10.0

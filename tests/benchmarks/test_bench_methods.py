@@ -27,7 +27,7 @@ def poses_of(robot: str, cable: str) -> np.ndarray:
 
 
 def timed(robot: seecr.Robot, poses: np.ndarray, method: str) -> tuple[seecr.Solution, float]:
-    """Answers, and microseconds a pose on one processor."""
+    """Answers, and microseconds per pose on one processor."""
     best = np.inf
     for _ in range(5 if method == "newton" else 1):
         start = time.perf_counter()
@@ -51,7 +51,7 @@ def test_methods(name, cable, capsys):
         same = solution.converged & newton.converged & (away < SAME)
         count = {s.name: int(np.sum(solution.status == s)) for s in set(solution.status)}
         lines.append(
-            f"{name:9s} {cable:8s} {method:14s} {microseconds:9.1f} µs a pose  "
+            f"{name:9s} {cable:8s} {method:14s} {microseconds:9.1f} µs per pose  "
             f"{np.mean(solution.iterations):6.1f} evaluations  "
             f"converged {np.mean(solution.converged):6.1%}  as newton {np.mean(same):6.1%}  {count}"
         )

@@ -152,7 +152,7 @@ def toy(
     noise: float = 1.0,
     columns: Mapping[str, Array] | None = None,
 ) -> LinearToy:
-    """Effects with random columns of one sigma a reading and plausible size, some of them hidden.
+    """Effects with random columns of one sigma per reading and plausible size, some of them hidden.
 
     Args:
         hidden: effects that are there, with all their parameters at so many plausible sizes.

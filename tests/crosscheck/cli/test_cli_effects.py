@@ -29,6 +29,15 @@ def test_one_effect_has_its_formula_and_its_size_for_a_robot() -> None:
     assert "check by hand: measure a sheave with a caliper" in result.stdout
 
 
+def test_what_every_cable_has_is_told_as_one_per_cable() -> None:
+    assert "gain [no unit], one per cable" in run("effects", "drum_gain").stdout
+    assert ", x y z per cable" in run("effects", "exit_point_error").stdout
+
+
+def test_units_are_those_that_people_read() -> None:
+    assert "sideways [mm/N]" in run("effects", "frame_compliance").stdout
+
+
 @pytest.mark.parametrize("name", list(catalogue()))
 def test_every_effect_can_be_described(name: str) -> None:
     result = run("effects", name)

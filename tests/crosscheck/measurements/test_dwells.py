@@ -107,7 +107,7 @@ def test_another_load_and_a_long_rest_are_other_rows(white):
     mass = np.zeros(data.n_rows)
     mass[READINGS // 2 : READINGS] = 1.0
     assert averaged_dwells(replace(data, loads=Loads.of(len(mass), mass=mass))).n_rows == 61
-    slow = replace(data, t_s=data.t_s * 20.0)  # a reading every 0.2 s, eight seconds a dwell
+    slow = replace(data, t_s=data.t_s * 20.0)  # a reading every 0.2 s, eight seconds per dwell
     assert averaged_dwells(slow).n_rows == DWELLS
     hour = replace(data, command_pose=np.tile(data.command_pose[:1], (data.n_rows, 1)))
     hour = replace(hour, t_s=0.5 * np.arange(data.n_rows))
