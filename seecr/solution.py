@@ -220,8 +220,12 @@ class Solution(Result):
         """Robot's length for rotations, 1 for translations, (d,)."""
         return np.where(self.robot.hinges, self.robot.length, 1.0)
 
-    def lines(self) -> list[str]:
-        """How many poses came to rest, how far from their commands, and the cables' tensions."""
+    def lines(self, commanded: bool = True) -> list[str]:
+        """How many poses came to rest, how far from their commands, and the cables' tensions.
+
+        Args:
+            commanded: whether poses were commanded, and not lengths.
+        """
         there = f"{int(self.converged.sum())} of {counted(len(self), 'pose')}"
         out = [f"{self.robot.name}: {there} at rest"]
         for status in dict.fromkeys(self.status):
@@ -231,13 +235,14 @@ class Solution(Result):
         known = np.flatnonzero(np.isfinite(self.pose).all(axis=1))
         if len(known) == 0:
             return out
-        away = np.linalg.norm(self.deviation[:, :3], axis=1)
-        turned = np.degrees(np.linalg.norm(self.deviation[:, 3:], axis=1))
-        k = int(known[np.argmax(away[known])])
-        out.append(
-            f"furthest from its command: {self.place(k)}, by {1e3 * away[k]:.4g} mm "
-            f"and {turned[k]:.4g} deg"
-        )
+        if commanded:
+            away = np.linalg.norm(self.deviation[:, :3], axis=1)
+            turned = np.degrees(np.linalg.norm(self.deviation[:, 3:], axis=1))
+            k = int(known[np.argmax(away[known])])
+            out.append(
+                f"furthest from its command: {self.place(k)}, by {1e3 * away[k]:.4g} mm "
+                f"and {turned[k]:.4g} deg"
+            )
         pulls, slack = self.tensions[known], self.slack[known].sum(axis=1)
         out.append(
             f"tensions {between(pulls.min(), pulls.max(), lead='from ')} N; slack cables: "

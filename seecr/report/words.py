@@ -255,9 +255,7 @@ def sweep_lines(
     solution: Solution, commanded: bool = True, spread: Spread | None = None
 ) -> list[str]:
     """A sweep in a few lines."""
-    lines = solution.lines()
-    if not commanded:
-        lines = [line for line in lines if not line.startswith("furthest from")]
+    lines = solution.lines(commanded)
     counts = solution.slack[solution.converged].sum(axis=1)
     if len(counts) and counts.max() > 0:
         parts = [f"{int(np.sum(counts == k))} with {k}" for k in np.unique(counts)]
