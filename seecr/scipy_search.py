@@ -29,8 +29,7 @@ def first_guess(setup: Setup) -> Array:
     tables = assemble(setup)
     anchors = tables.cables[0, :, ANCHOR : ANCHOR + 3]
     vertical = (setup.exit_points - transform_points(poses, anchors)) @ up
-    weight = setup.carried()[0] * np.linalg.norm(setup.gravity)
-    return np.asarray(weight * vertical.mean(axis=1) / float(np.mean(setup.ea)))
+    return np.asarray(setup.weight() * vertical.mean(axis=1) / float(np.mean(setup.ea)))
 
 
 def solve_with_scipy(

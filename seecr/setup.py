@@ -215,6 +215,10 @@ class Setup:
         share = np.divide(loads.mass, total, out=np.zeros_like(total), where=total != 0.0)
         return total, self.centre_of_mass + share[:, None] * lever
 
+    def weight(self) -> Array:
+        """Weight (n,) [N] of the platform with its known payloads."""
+        return np.asarray(self.carried()[0] * np.linalg.norm(self.gravity))
+
     def geometric_lengths(self, poses: Array) -> Array:
         """Lengths (k, m) [m] of straight cables over their pulleys at poses (k, 7)."""
         from seecr.compiled.pulley import lengths_at  # takes a while to import

@@ -169,10 +169,9 @@ def _reach(cables: Array) -> Array:
 
 def _load_scale(setup: Setup) -> Array:
     """Load [N] of each pose: weight, external force and moment over the robot's length."""
-    weight = setup.carried()[0] * np.linalg.norm(setup.gravity)
     force = np.linalg.norm(setup.wrench[:, :3], axis=1)
     moment = np.linalg.norm(setup.wrench[:, 3:], axis=1) / setup.robot.length
-    scale = weight + force + moment
+    scale = setup.weight() + force + moment
     # nothing loads the platform: measure against what a strain of 1e-3 would pull
     return np.where(scale > 0.0, scale, 1e-3 * float(np.max(setup.ea)))
 

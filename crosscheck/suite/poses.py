@@ -99,11 +99,9 @@ def _turns(random: np.random.Generator, n: int, largest: float) -> Array:
 
 def _level(robot: Robot, vectors: Array) -> Array:
     """Vectors (k, 3) without their part along gravity."""
-    size = np.linalg.norm(robot.gravity)
-    if size == 0.0:
+    if not np.any(robot.gravity):
         return vectors
-    down = robot.gravity / size
-    return np.asarray(vectors - (vectors @ down)[:, None] * down)
+    return np.asarray(vectors - np.outer(vectors @ robot.up, robot.up))
 
 
 def _reachable(robot: Robot, poses: Array) -> Array:

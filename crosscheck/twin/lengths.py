@@ -47,21 +47,18 @@ def way_of(true: TrueRobot, commands: Commands, waypoints: tuple[int, int] = WAY
     A run that starts at its first row is there at once; a load is changed before setting out.
     """
     robot, n = true.robot, len(commands)
-    run = np.zeros(n, dtype=int) if commands.run is None else commands.run
-    stands = np.zeros(n, dtype=bool) if commands.stands is None else commands.stands
     clock = np.zeros(n) if commands.time is None else commands.time
     points: list[tuple[Array, Array, int, bool, bool, float]] = []
     none = np.zeros(0)
     guide = _guide(true)
-    for k in range(n):
-        starts = k == 0 or run[k] != run[k - 1]
+    for k, starts, here in zip(range(n), commands.starts, commands.starts_here, strict=True):
         passed = max(float(clock[k] - clock[k - 1]), 0.0) if k else 0.0
         before = robot.reference_pose if starts else commands.pose[k - 1]
         paid, told = none, none
         if commands.lengths is not None:
             told = commands.lengths[k]
             paid = robot.rest_lengths if starts else commands.lengths[k - 1]
-        if starts and stands[k]:
+        if here:
             points.append((commands.pose[k], told, k, True, True, passed))
             continue
         if starts:

@@ -49,8 +49,7 @@ def trajectory(robot: Robot, points: int = 18, extent: float = 1.0) -> Trajector
 
 def _frame(robot: Robot) -> tuple[Array, Array]:
     """Directions along, across and up as rows (3, 3), and the room (3, 2) [m] on either side."""
-    g = float(np.linalg.norm(robot.gravity))
-    up = -robot.gravity / g if g > 0 else np.array([0.0, 0.0, 1.0])
+    up = robot.up
     exits = robot.exit_points - robot.reference_pose[:3]
     level = exits - np.outer(exits @ up, up)
     along = np.linalg.svd(level - level.mean(axis=0))[2][0]

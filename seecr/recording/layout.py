@@ -10,7 +10,6 @@ import rerun.blueprint as rrb
 
 from seecr.pose import Array
 from seecr.recording import scene as scenes
-from seecr.recording import shapes
 from seecr.recording.stream import POSE
 from seecr.robot import Robot
 
@@ -35,7 +34,7 @@ def eye(robot: Robot, low: Array, high: Array, aspect: float) -> rrb.EyeControls
         high: (3,) the opposite corner [m].
         aspect: width over height of the view.
     """
-    up, span = -shapes.down(robot), high - low
+    up, span = robot.up, high - low
     across = np.eye(3)[int(np.argmax(span - np.abs(up) * span))]
     towards = np.cross(across, up)
     towards = towards / max(float(np.linalg.norm(towards)), 1e-9)
@@ -90,7 +89,7 @@ def scene_view(
 
 
 def _floor(robot: Robot, low: Array, high: Array) -> rrb.LineGrid3D:
-    up = -shapes.down(robot)
+    up = robot.up
     lowest = min(float(up @ low), float(up @ high))
     spacing = 10.0 ** np.floor(np.log10(0.5 * float(np.linalg.norm(high - low))))
     return rrb.LineGrid3D(

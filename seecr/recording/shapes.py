@@ -124,19 +124,13 @@ def slack_strips(
     sag = np.minimum(np.sqrt(3.0 * span * loose / 8.0), _DEEPEST * span)
     part = _dash_grid()[None, :, :, None]
     chord = start[:, None, None] + part * (end - start)[:, None, None]
-    drop = sag[:, None, None, None] * 4.0 * part * (1.0 - part) * down(robot)
+    drop = sag[:, None, None, None] * 4.0 * part * (1.0 - part) * -robot.up
     return list((chord + drop).reshape(-1, _DASH_POINTS, 3))
 
 
 def dashes_per_cable() -> int:
     """How many strips :func:`slack_strips` makes of one cable."""
     return _DASHES
-
-
-def down(robot: Robot) -> Array:
-    """Unit vector (3,) of gravity; -z where there is none."""
-    size = float(np.linalg.norm(robot.gravity))
-    return robot.gravity / size if size > 0.0 else np.array([0.0, 0.0, -1.0])
 
 
 def _dash_grid() -> Array:
