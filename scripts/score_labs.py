@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.calibration.calibrate import Calibration, calibrate
+from crosscheck.calibration.all_effects import Calibration, fit_all_effects
 from crosscheck.calibration.search import Sought, seek
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.problem import Problem, kinds_read, rms_by_kind
@@ -120,7 +120,7 @@ def main() -> None:
             print(f"{name}: {ready.refusal}", flush=True)
             continue
         sought = seek(ready.problem, data.sigma) if chosen.sets else None
-        found = calibrate(ready.problem) if sought is None else sought.calibration
+        found = fit_all_effects(ready.problem) if sought is None else sought.calibration
         spent = time.process_time() - start
         if (folder / "validation.csv").exists():
             print(line(name, answers[name], found, folder, spent), flush=True)

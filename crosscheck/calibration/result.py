@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from crosscheck.calibration.calibrate import Calibration
-from crosscheck.calibration.calibrate import calibrate as calibrated
+from crosscheck.calibration.all_effects import Calibration, fit_all_effects
 from crosscheck.errors import CrosscheckError, UnsolvedError
 from crosscheck.fit.prepare import Progress, prepare
 from crosscheck.fit.problem import Rms
@@ -152,7 +151,7 @@ def calibrate(
         raise kind(f"{data.path}: {why}")
     # BLAS on several threads takes longer for matrices as narrow as these
     with threadpool_limits(limits=1, user_api="blas"):
-        found = calibrated(ready.problem, ready.terms, progress)
+        found = fit_all_effects(ready.problem, ready.terms, progress)
     return _result(found, terms, (*said, *ready.all_notes))
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crosscheck.calibration.calibrate import PLAIN, Calibration, calibrate
+from crosscheck.calibration.all_effects import PLAIN, Calibration, fit_all_effects
 from crosscheck.calibration.catalogue import Catalogue
 from crosscheck.calibration.field import UNKNOWN, log_odds
 from crosscheck.calibration.judgement import SURPRISE, Judgement, judge
@@ -67,7 +67,7 @@ def seek(
             too.
     """
     first = given[-1] if given else None
-    whole = calibrate(problem, terms, lambda text, part: progress(text, 0.5 * part), first)
+    whole = fit_all_effects(problem, terms, lambda text, part: progress(text, 0.5 * part), first)
     setting, joint = whole.setting, whole.joint
     known = [k.name for k in kinds_read(problem) if getattr(stated, k.sigma) is not None]
     odds = log_odds(setting, joint, len(known) == len(kinds_read(problem)))

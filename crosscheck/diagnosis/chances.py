@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from crosscheck.calibration.calibrate import Calibration
+from crosscheck.calibration.all_effects import Calibration
 from crosscheck.calibration.search import Sought
 from crosscheck.fit.problem import Rms
 from crosscheck.fit.words import rms_words

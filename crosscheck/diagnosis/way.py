@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from crosscheck.calibration.calibrate import covariance
+from crosscheck.calibration.all_effects import covariance
 from crosscheck.calibration.colour import whitened
 from crosscheck.calibration.exact import Refit
 from crosscheck.calibration.gram import Gram

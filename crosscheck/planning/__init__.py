@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from crosscheck.planning.compose import compose
+from crosscheck.planning.choosing import compose
 from crosscheck.planning.design import make_plan
 from crosscheck.planning.result import Plan
 from crosscheck.planning.write import box_of, write_plan

@@ -98,7 +98,9 @@ def allowances(thresholds: Thresholds, solution: Solution, settling: SettlingBat
     return Allowance(**wide, widened=widened)
 
 
-def compare(solution: Solution, settling: SettlingBatch, tension_allowed: Array) -> Differences:
+def differences_of(
+    solution: Solution, settling: SettlingBatch, tension_allowed: Array
+) -> Differences:
     """MuJoCo's answers against SEECR's.
 
     Args:

@@ -15,7 +15,7 @@ import numpy as np
 
 from crosscheck.files import json_text
 from crosscheck.settle.model import ignored_note
-from crosscheck.suite.agreement import allowances, compare
+from crosscheck.suite.agreement import allowances, differences_of
 from crosscheck.suite.cases import Case, shipped_cases
 from crosscheck.suite.effects import EffectCase, EffectResult, run_effects, shipped_effect_cases
 from crosscheck.suite.mujoco_robot import MujocoRobot
@@ -143,7 +143,7 @@ def run_case(case: Case, thresholds: Thresholds, record: Recorder | None = None)
     _check_same_cables(case, robot, mujoco)
     settling = mujoco.settle(case.poses, case.begins)
     allowance = allowances(thresholds, solution, settling)
-    difference = compare(solution, settling, allowance.tension_N)
+    difference = differences_of(solution, settling, allowance.tension_N)
     verdict, findings = judge(Answers(mujoco, solution, settling, difference, allowance))
     result = CaseResult(
         case=case,

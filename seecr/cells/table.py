@@ -13,8 +13,8 @@ import tomlkit
 from seecr.cells.cell import Where, cell_of
 from seecr.counted import some
 from seecr.effects import Knowledge, Own, Term, Values, effect_named, layout_of
-from seecr.effects.apart import KINDS
 from seecr.effects.base import Layout
+from seecr.effects.own_values import KINDS
 from seecr.errors import InputError
 from seecr.pose import Array
 

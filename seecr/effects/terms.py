@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seecr.effects.apart import Own
 from seecr.effects.base import Effect, Layout, layout_of
 from seecr.effects.knowledge import Knowledge
+from seecr.effects.own_values import Own
 from seecr.effects.registry import catalogue, effect_named
 from seecr.errors import InputError
 from seecr.pose import Array

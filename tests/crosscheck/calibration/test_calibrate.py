@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from made_data import COGIRO, SIGMA, measured, term
 
-from crosscheck.calibration.calibrate import Calibration, calibrate
+from crosscheck.calibration.all_effects import Calibration, fit_all_effects
 from crosscheck.calibration.joint import cost
 from crosscheck.calibration.leave_out import surprise_of, without
 from crosscheck.calibration.linearised import Linear
@@ -47,7 +47,7 @@ def problem_of(data: Measurements) -> Problem:
 @cache
 def calibrated() -> Calibration:
     """From many small errors."""
-    return calibrate(problem_of(measured(ROBOT, hidden(), points=14)))
+    return fit_all_effects(problem_of(measured(ROBOT, hidden(), points=14)))
 
 
 @pytest.mark.slow
@@ -92,7 +92,7 @@ def test_a_tracker_that_stands_askew_is_registered_first(angle: float) -> None:
         frame = registered(seen, at)
         assert frame is not None
         assert frame.vector[3:] == pytest.approx(angle * np.array([0.6, -0.64, 0.48]), abs=2e-3)
-    found = calibrate(problem_of(turned))
+    found = fit_all_effects(problem_of(turned))
     assert (found.after["position_rms_m"] or 1.0) < 1.1 * (SIGMA.position_m or 0.0)
 
 

@@ -16,7 +16,7 @@ from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import load_commands
 from crosscheck.measurements.write import write_measurements
 from crosscheck.planning.adding import Adding
-from crosscheck.planning.compose import compose
+from crosscheck.planning.choosing import compose
 from crosscheck.planning.design import make_plan
 from crosscheck.planning.detours import detours
 from crosscheck.planning.planned import Reads, planned

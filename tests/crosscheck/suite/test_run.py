@@ -414,7 +414,7 @@ def seesaw_answers(path: Path) -> verdicts.Answers:
     solution = seecr.solve(robot, command, start=left[None])
     settling = SettlingBatch([side.settle_from(right, command[0])])
     allowance = agreement.allowances(load_thresholds(), solution, settling)
-    difference = agreement.compare(solution, settling, allowance.tension_N)
+    difference = agreement.differences_of(solution, settling, allowance.tension_N)
     return verdicts.Answers(side, solution, settling, difference, allowance)
 
 
@@ -500,7 +500,7 @@ def test_a_cable_slack_for_one_only_matters_when_the_other_pulls(ends):
         tensions, mask = result.solution.tensions.copy(), result.solution.slack.copy()
         tensions[0, slack], mask[0, slack] = tension, False
         changed = replace(result.solution, tensions=tensions, slack=mask)
-        difference = agreement.compare(changed, result.settling, np.full(2, 1e-6))
+        difference = agreement.differences_of(changed, result.settling, np.full(2, 1e-6))
         assert difference.slack_same[0] == same
         assert difference.tension_N[0] == pytest.approx(tension, rel=1e-3)
         # also where tensions may differ by that much

@@ -62,7 +62,7 @@ class Calibration:
         return covariance(self.setting, self.joint)
 
 
-def calibrate(
+def fit_all_effects(
     problem: Problem,
     terms: Terms = PLAIN,
     progress: Progress = lambda _text, _part: None,

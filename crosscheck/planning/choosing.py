@@ -103,7 +103,7 @@ def compose(
 def _candidates(robot: Robot, box: Array | None) -> Array:
     low, high = _room(robot) if box is None else box
     if robot.joints:
-        slides = np.array([joint.kind == "slide" for joint in robot.joints])
+        slides = ~robot.hinges
         axes = np.array([joint.axis for joint in robot.joints])
         reach = np.where(slides, 0.5 * np.abs(axes @ (high - low)), _TURN)
         middle = np.where(slides, axes @ (0.5 * (low + high) - robot.reference_pose[:3]), 0.0)
