@@ -82,14 +82,6 @@ def test_a_private_name_is_seen() -> None:
     assert is_public("crosscheck.files", "staged") and is_public("crosscheck", "diagnose")
 
 
-def test_only_commands_use_the_faces() -> None:
-    """They stand on all floors: through them anything could import anything."""
-    public = {(face.__name__, name) for face in FACES for name in face.__all__}
-    for path in modules("seecr") + modules("crosscheck"):
-        if path not in COMMANDS:
-            assert taken(path) & public == set(), path
-
-
 @pytest.mark.parametrize("result", RESULTS, ids=lambda result: result.__name__)
 def test_results_show_themselves(result: type) -> None:
     assert issubclass(result, Result)

@@ -48,6 +48,11 @@ FLOORS = {
     "crosscheck.cli": 28,
 }  # fmt: skip
 
+# Packages, whose faces stand on all floors: through them anything could import anything.
+FACES = ("seecr", "crosscheck")
+# What is no face's alone: the version, which a package has before it imports anything.
+PLAIN = {f"{face}.__version__" for face in FACES}
+
 # What stands against the floors today; each is to go, none is to come.
 KNOWN: set[tuple[str, str]] = set()
 
@@ -73,8 +78,9 @@ def imports_of(tree: ast.Module) -> set[str]:
     typing_only = {
         id(inner)
         for node in every
-        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test)
-        for inner in ast.walk(node)
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+        for part in node.body
+        for inner in ast.walk(part)
     }
     found: set[str] = set()
     for node in every:
@@ -111,6 +117,21 @@ def upward(name: str, targets: Iterable[str]) -> set[tuple[str, str]]:
     return out
 
 
+def through_faces(tree: ast.Module) -> set[str]:
+    """What a source takes of a package's face instead of a module's own names.
+
+    ``import seecr.pose`` too: the name that it binds is ``seecr``, and that has all of it.
+    """
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names if alias.name.split(".")[0] in FACES}
+        elif isinstance(node, ast.ImportFrom) and node.module in FACES:
+            names = {f"{node.module}.{alias.name}" for alias in node.names}
+            found |= names - set(FLOORS) - PLAIN
+    return found
+
+
 def uses(path: Path, package: str) -> bool:
     return any(name == package or name.startswith(f"{package}.") for name in imports(path))
 
@@ -138,6 +159,40 @@ def test_an_upward_import_is_seen_also_a_lazy_one() -> None:
     }
     only_types = f"if TYPE_CHECKING:\n{lazy.replace('def late():', '    pass').split('return')[0]}"
     assert upward("crosscheck.fit.problem", imports_of(ast.parse(only_types))) == set()
+
+
+def test_only_commands_use_the_faces() -> None:
+    taken = {
+        name_of(path): through_faces(tree_of(path))
+        for face in FACES
+        for path in modules(face)
+        if place(name_of(path)) != f"{face}.cli"
+    }
+    assert {name: found for name, found in taken.items() if found} == {}
+
+
+@pytest.mark.parametrize(
+    ("source", "taken"),
+    [
+        ("def late():\n    import crosscheck\n    crosscheck.compare('r', 'm')", "crosscheck"),
+        ("def late():\n    import seecr\n    seecr.solve(robot, poses)", "seecr"),
+        ("import seecr.pose", "seecr.pose"),
+        ("from crosscheck import compare", "crosscheck.compare"),
+    ],
+)
+def test_an_import_through_a_face_is_seen(source: str, taken: str) -> None:
+    assert through_faces(ast.parse(source)) == {taken}
+    assert through_faces(ast.parse("from seecr import __version__, statics")) == set()
+
+
+def test_nothing_of_crosscheck_is_in_seecr() -> None:
+    assert [name_of(path) for path in modules("seecr") if uses(path, "crosscheck")] == []
+
+
+def test_modules_are_imported_by_name() -> None:
+    """Where the name is computed nobody can hold it against a floor: in two places alone."""
+    users = [name_of(p) for f in FACES for p in modules(f) if uses(p, "importlib.import_module")]
+    assert users == ["seecr.cli.group", "seecr.lazy"]
 
 
 def test_no_two_modules_import_each_other() -> None:
@@ -175,18 +230,46 @@ DESCRIPTION = {
 }
 
 
+# Beside it: what winches are told, how results print and how things are counted.
+BESIDE = {"seecr.commands", "seecr.loads", "seecr.counted"}
+# A trajectory is poses that the robot's joints can reach: what is commanded, no physics.
+OF_ITS_OWN = {"crosscheck.twin.trajectory": {"seecr.joints"}}
+
+
+def physics_taken(name: str, targets: Iterable[str]) -> set[str]:
+    """What a module of MuJoCo's side takes of seecr beyond the description of the robot."""
+    allowed = DESCRIPTION | BESIDE | OF_ITS_OWN.get(name, set())
+    return {t for t in targets if t.split(".")[0] == "seecr" and (place(t) or t) not in allowed}
+
+
 @pytest.mark.parametrize("folder", ["settle", "twin"])
 def test_mujocos_side_takes_the_description_of_seecr_alone(folder: str) -> None:
-    # a trajectory is poses that the robot's joints can reach: what is commanded, no physics
-    files = [p for p in (ROOT / "crosscheck" / folder).glob("*.py") if p.stem != "trajectory"]
-    taken = {t for path in files for t in imports(path) if t.startswith("seecr.")}
-    commands = {"seecr.commands", "seecr.commands.Commands", "seecr.loads", "seecr.loads.Loads"}
-    how_results_print = {"seecr.result", "seecr.result.Record", "seecr.result.Result"}
-    words = {"seecr.counted", "seecr.counted.counted"}
-    allowed = commands | how_results_print | words
-    assert {t for t in taken if place(t) not in DESCRIPTION} <= allowed
+    files = modules(f"crosscheck/{folder}")
+    taken = {name_of(path): physics_taken(name_of(path), imports(path)) for path in files}
+    assert {name: found for name, found in taken.items() if found} == {}
     text = "".join(path.read_text(encoding="utf-8") for path in files)
     assert "edit_setup" not in text and "edit_readings" not in text
+
+
+@pytest.mark.parametrize(
+    ("module", "source", "taken"),
+    [
+        ("crosscheck.settle.newton", "def late():\n    import seecr\n    seecr.solve()", "seecr"),
+        (
+            "crosscheck.twin.trajectory",
+            "from seecr.equilibrium import solve",
+            "seecr.equilibrium seecr.equilibrium.solve",
+        ),
+        ("crosscheck.twin.trajectory", "from seecr.joints import motion_columns", ""),
+        (
+            "crosscheck.twin.world",
+            "from seecr.joints import motion_columns",
+            "seecr.joints seecr.joints.motion_columns",
+        ),
+    ],
+)
+def test_physics_of_seecr_on_mujocos_side_is_seen(module: str, source: str, taken: str) -> None:
+    assert physics_taken(module, imports_of(ast.parse(source))) == set(taken.split())
 
 
 def test_mujoco_is_imported_in_one_place_of_seecr() -> None:
