@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterable
+from dataclasses import fields
 from pathlib import Path
 from typing import TypeAlias
 
@@ -11,16 +12,23 @@ import numpy as np
 
 from crosscheck.errors import CrosscheckError
 from seecr.effects import Term, Terms, catalogue, effect_named
+from seecr.errors import InputError
+from seecr.given import GivenRobot, robot_of
 from seecr.mjcf import load_robot
-from seecr.model import Model, load_model
+from seecr.model import Model, effects_given, no_effects
 from seecr.pose import Array
 from seecr.robot import Robot
 from seecr.shipped import robot_file
 
-__all__ = ["GivenModel", "GivenRobot", "considered", "copy_robot", "model_of", "robot_of"]
-
-GivenRobot: TypeAlias = Robot | str | Path
-"""A robot, the path of its MJCF, or the name of a shipped one."""
+__all__ = [
+    "GivenModel",
+    "GivenRobot",
+    "considered",
+    "copy_robot",
+    "file_of",
+    "model_of",
+    "robot_of",
+]
 
 GivenModel: TypeAlias = Model | Iterable[Term] | str | Path
 """A model, its effects alone, or the path of its TOML; ``()`` is the plain model."""
@@ -65,13 +73,25 @@ def copy_robot(source: Path, copy: Path) -> None:
         ) from None
 
 
-def robot_of(given: GivenRobot) -> Robot:
-    """The robot, read if need be.
+def file_of(given: GivenRobot) -> Path:
+    """The MJCF of a robot, for what reads the file itself.
 
     Raises:
         RobotError: no such file, or no cable robot in it.
+        InputError: a robot of no file, or one whose numbers are no more those of its file.
     """
-    return load_robot(given) if isinstance(given, str | Path) else given
+    robot = robot_of(given)
+    wanted = "expected one as seecr.load_robot reads it; seecr.export writes its MJCF"
+    if robot.source is None:
+        raise InputError(f"robot {robot.name} was read from no file; {wanted}")
+    if isinstance(given, Robot) and not _same_numbers(given, load_robot(robot.source)):
+        raise InputError(f"robot {robot.name} has other numbers than {robot.source}; {wanted}")
+    return robot.source
+
+
+def _same_numbers(one: Robot, other: Robot) -> bool:
+    pairs = [(getattr(one, field.name), getattr(other, field.name)) for field in fields(Robot)]
+    return all(np.array_equal(a, b) for a, b in pairs if isinstance(a, np.ndarray | float))
 
 
 def model_of(given: GivenModel, robot: Robot) -> tuple[Terms, tuple[str, ...]]:
@@ -79,11 +99,13 @@ def model_of(given: GivenModel, robot: Robot) -> tuple[Terms, tuple[str, ...]]:
 
     Raises:
         InputFileError: no such file, or no model of this robot in it.
+        InputError: something else than effects with values.
     """
-    model = load_model(given, robot) if isinstance(given, str | Path) else given
-    if isinstance(model, Model):
-        return model.terms, model.notes
-    return Terms(model), ()
+    effects, notes = effects_given(given, robot)
+    terms = [one for one in effects if isinstance(one, Term)]
+    if len(terms) < len(effects):
+        raise no_effects(next(one for one in effects if not isinstance(one, Term)))
+    return Terms(terms), notes
 
 
 def numbers_of(option: str, text: str, count: int = 3, expected: str = "") -> Array:

@@ -27,8 +27,11 @@ first used. Every result prints as a few readable lines, shows itself in a noteb
 data frame with `to_frame()`: pyarrow's `Table`, or pandas' `DataFrame` where there is no pyarrow.
 SI and radians throughout; quaternions are scalar first.
 
-`GivenRobot` is a `Robot` or the path of its MJCF; `GivenModel` is a `Model`, its `Terms`, or the
-path of its TOML.
+Paths and loaded objects both work. `GivenRobot` is a `Robot`, the path of its MJCF, or the name of
+a shipped one; `GivenModel` and `GivenEffects` are a `Model`, the path of its TOML, or a list of
+`Term`s; `GivenData` is `Measurements`, their file, or several files; `GivenCommands` is poses
+(n, 7), a file of commands, or what was read from it; `GivenCase` is a case of the suite, the name
+of shipped ones or a pattern such as `"cogiro-*"`, or a robot.
 
 Written by `scripts/make_api.py` from the docstrings. Words that are ours are in the
 [glossary](glossary.md).

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,9 +12,10 @@ from scipy.special import ndtri
 from seecr.commands import Commands
 from seecr.distribution import tension_limits
 from seecr.errors import InputError
-from seecr.experiment import Experiment, GivenEffects, effects_of
+from seecr.experiment import Experiment, effects_of
+from seecr.given import GivenRobot, robot_of
 from seecr.holding import balance_of
-from seecr.model import Model
+from seecr.model import GivenEffects, Model, model_given
 from seecr.pose import Array
 from seecr.robot import Robot
 from seecr.sensitivity import sensitivities
@@ -32,9 +34,9 @@ _PART = 64
 
 
 def kept_chance(
-    robot: Robot,
+    robot: GivenRobot,
     commands: Commands,
-    model: Model,
+    model: Model | str | Path,
     *,
     lowest: ArrayLike = 0.0,
     highest: ArrayLike = np.inf,
@@ -45,15 +47,16 @@ def kept_chance(
     of zero; one that is slack stays so.
 
     Args:
-        robot: as described.
+        robot: as described, or its MJCF.
         commands: n rows, such as those of a correction; NaN in lengths where there are none.
-        model: as ``crosscheck calibrate`` writes it.
+        model: as ``crosscheck calibrate`` writes it, or its file.
         lowest, highest: (m,) or one [N].
 
     Returns:
         (n,), NaN where a row has no rest; None where the model keeps no covariance.
     """
-    known = moving_covariance(model)
+    robot = robot_of(robot)
+    known = moving_covariance(model_given(model, robot))
     if known is None:
         return None
     terms, covariance = known
@@ -82,9 +85,9 @@ def kept_chance(
 
 
 def held_chance(
-    robot: Robot,
+    robot: GivenRobot,
     poses: ArrayLike,
-    model: Model,
+    model: Model | str | Path,
     *,
     lowest: ArrayLike = 0.0,
     highest: ArrayLike = np.inf,
@@ -96,9 +99,9 @@ def held_chance(
     on one side.
 
     Args:
-        robot: as described.
+        robot: as described, or its MJCF.
         poses: (n, 7).
-        model: as ``crosscheck calibrate`` writes it.
+        model: as ``crosscheck calibrate`` writes it, or its file.
         lowest, highest, wrenches: as in :func:`seecr.tension_margin`.
 
     Returns:
@@ -107,7 +110,8 @@ def held_chance(
     Raises:
         InputError: fewer cables than freedoms.
     """
-    known = moving_covariance(model)
+    robot = robot_of(robot)
+    known = moving_covariance(model_given(model, robot))
     if known is None:
         return None
     if robot.n_cables < robot.n_dof:
@@ -173,7 +177,7 @@ def margins_with(
     """
     low, high = tension_limits(robot, lowest, highest)
     told = Commands(poses, lengths=robot.commanded_lengths(poses), told=True)
-    tables = assemble(Experiment(robot, told).setup(effects_of(effects)))
+    tables = assemble(Experiment(robot, told).setup(effects_of(effects, robot)))
     matrices, load = balance_of(tables, low)
     # of -W tau = w: the signs are those of the gradient
     loads = load[:, None]

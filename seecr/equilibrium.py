@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,8 +12,9 @@ from seecr.commands import Commands
 from seecr.counted import counted
 from seecr.effects.checked import edit_setup
 from seecr.errors import InputError
-from seecr.experiment import Experiment, GivenEffects, effects_of
+from seecr.experiment import Experiment, effects_of
 from seecr.following import follow_commands
+from seecr.given import GivenRobot, robot_of
 from seecr.multiple import other_rests
 from seecr.pose import Array
 from seecr.robot import Robot
@@ -21,11 +23,14 @@ from seecr.setup import Setup, plain_setup
 from seecr.solution import Solution
 from seecr.starts import commanded_poses, finite
 
+if TYPE_CHECKING:
+    from seecr.model import GivenEffects
+
 METHODS = ("newton", "fsolve", "least_squares")
 
 
 def solve(
-    robot: Robot,
+    robot: GivenRobot,
     poses: Commands | ArrayLike | None = None,
     *,
     rest_lengths: ArrayLike | None = None,
@@ -42,13 +47,13 @@ def solve(
     """Find where the platform rests (paper, section III-B) for a batch of commands.
 
     Args:
-        robot: from :func:`seecr.load_robot`, or made by hand.
+        robot: from :func:`seecr.load_robot`, its MJCF, or made by hand.
         poses: (n, 7) or (7,) commanded poses; the winches pay out the straight lengths there
             (eqs 1, 2). Or :class:`seecr.Commands` with runs, times, lengths.
         rest_lengths: (n, m) or (m,) [m] instead of, or beside, the poses: then the poses are
             only where the search starts, the reference pose by default.
-        effects: what the robot has beyond the paper's plain one: a model, or effects with
-            values. Where one has history, rows are solved in order.
+        effects: what the robot has beyond the paper's plain one: a model, its file, or effects
+            with values. Where one has history, rows are solved in order.
         method: ``"newton"`` follows the energy downhill, compiled; ``"fsolve"`` and
             ``"least_squares"`` are the paper's own, on SciPy with its first guess (step 4).
         wrench: (6,) or (n, 6) external force [N] at the platform origin and moment [N m].
@@ -67,16 +72,17 @@ def solve(
 
     Raises:
         InputError: shapes, values that are not finite, an unknown method, arguments that do not
-            go together.
+            go together or are something else.
     """
     if method not in METHODS:
         raise InputError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
     if max_iterations < 1:
         raise InputError(f"max_iterations must be at least 1, got {max_iterations}")
+    robot = robot_of(robot)
     if gravity is not None:
         robot = replace(robot, gravity=_array(gravity, (3,), "gravity"))
     commands = _commands(robot, poses, rest_lengths)
-    acting = effects_of(effects)
+    acting = effects_of(effects, robot)
     pushed = None if wrench is None else finite(wrench, "wrench")
 
     def setup_of(rows: Commands, push: Array | None) -> Setup:

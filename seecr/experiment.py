@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,7 +16,8 @@ from seecr.compiled.outcomes import CONVERGED, ITERATIONS, SINGULAR, STALLED, TO
 from seecr.edits import Edits
 from seecr.effects.base import Effect, Readings
 from seecr.effects.checked import edit_readings
-from seecr.effects.terms import Term, Terms
+from seecr.effects.terms import Term
+from seecr.given import GivenRobot, robot_of
 from seecr.path import Path, path_of
 from seecr.pose import Array
 from seecr.result import COORDINATES, Record, Result, named
@@ -27,10 +28,7 @@ from seecr.starts import commanded_poses, start_of
 from seecr.tables import Tables, assemble, relengthened, take
 
 if TYPE_CHECKING:
-    from seecr.model import Model
-
-GivenEffects: TypeAlias = "Model | Terms | Iterable[Term | Effect]"
-"""A model, or effects with their values."""
+    from seecr.model import GivenEffects
 
 # Rounds of linearising users' laws about the strains found with them.
 _LAW_ROUNDS = 30
@@ -274,33 +272,42 @@ class Experiment:
 
 
 def predict(
-    robot: Robot,
+    robot: GivenRobot,
     commands: Commands | ArrayLike,
     model: GivenEffects = (),
 ) -> Prediction:
     """Where a robot with effects comes to rest, and what its sensors would report.
 
     Args:
-        robot: as described.
+        robot: as described, or its MJCF.
         commands: commanded poses (n, 7), or :class:`seecr.Commands` with runs, times, lengths.
-        model: from :func:`seecr.load_model`, or effects with values; none by default.
+        model: from :func:`seecr.load_model`, its file, or effects with values; none by default.
 
     Returns:
         a :class:`Prediction`; look at ``solved`` before using a row.
 
+    Raises:
+        InputError: poses, a robot or effects that are none.
+
     Example:
         ``seecr.predict(robot, poses, [seecr.Term.of(robot, "pulley_radius", radius_m=0.01)])``
     """
+    robot = robot_of(robot)
     if not isinstance(commands, Commands):
         commands = Commands(commanded_poses(commands))
-    return Experiment(robot, commands).predict(effects_of(model))
+    return Experiment(robot, commands).predict(effects_of(model, robot))
 
 
-def effects_of(model: GivenEffects) -> list[Effect]:
-    """The effects of a model, of terms with values, or as they are."""
-    from seecr.model import Model  # takes a while to import
+def effects_of(given: GivenEffects, robot: Robot) -> list[Effect]:
+    """The effects of a model or of its file, of terms with values, or as they are.
 
-    terms: Iterable[Term | Effect] = model.terms if isinstance(model, Model) else model
+    Raises:
+        InputFileError: no such file, or no model of this robot in it.
+        InputError: something else than effects with values.
+    """
+    from seecr.model import effects_given  # takes a while to import
+
+    terms, _notes = effects_given(given, robot)
     return [one.effect() if isinstance(one, Term) else one for one in terms]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,7 +14,8 @@ from seecr.counted import between, counted, rows_words
 from seecr.distribution import tension_limits, wanted_tensions
 from seecr.effects.base import Effect
 from seecr.errors import InputError
-from seecr.experiment import Experiment, GivenEffects, Prediction, effects_of
+from seecr.experiment import Experiment, Prediction, effects_of
+from seecr.given import GivenRobot, robot_of
 from seecr.holding import Held, balance_of, hold, holds_firmly
 from seecr.nearest import Nearest, nearest
 from seecr.pose import Array, pose_difference
@@ -24,6 +26,9 @@ from seecr.starts import commanded_poses
 from seecr.tables import Tables, assemble, take
 from seecr.told import told_lengths
 from seecr.unheld import why_not_held
+
+if TYPE_CHECKING:
+    from seecr.model import GivenEffects
 
 PREFERENCES = ("pose", "position")
 """What may give way at a pose that cannot be held: both, or the orientation alone."""
@@ -146,7 +151,7 @@ class Correction(Result):
 
 
 def correct(
-    robot: Robot,
+    robot: GivenRobot,
     poses: Commands | ArrayLike,
     *,
     effects: GivenEffects = (),
@@ -162,10 +167,10 @@ def correct(
     nearest one that can is aimed at.
 
     Args:
-        robot: as described.
+        robot: as described, or its MJCF.
         poses: (n, 7) wanted, or :class:`seecr.Commands` with runs and times, for effects that
             depend on them.
-        effects: a model, or effects with values.
+        effects: a model, its file, or effects with values.
         lowest: (m,) or one [N], not negative. A cable that may have none gets a margin.
         highest: (m,) or one [N]; infinite for none.
         aim: "minimum", "middle" (of the limits), or tensions (m,) or (n, m) [N].
@@ -177,6 +182,7 @@ def correct(
     """
     if prefer not in PREFERENCES:
         raise InputError(f"prefer must be one of {', '.join(PREFERENCES)}, got {prefer!r}")
+    robot = robot_of(robot)
     given = poses if isinstance(poses, Commands) else Commands(commanded_poses(poses))
     if given.lengths is not None:
         raise InputError("correct needs wanted poses (n, 7); got lengths")
@@ -185,7 +191,7 @@ def correct(
     if target.ndim == 2 and len(target) != len(given):
         raise InputError(f"aim must have {counted(len(given), 'row')}, got {len(target)}")
     limits = _Limits(np.broadcast_to(target, (len(given), robot.n_cables)), low, high)
-    return _Search(robot, given, effects_of(effects), limits).run(prefer == "position")
+    return _Search(robot, given, effects_of(effects, robot), limits).run(prefer == "position")
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from queue import SimpleQueue
 
 import numpy as np
@@ -17,8 +18,10 @@ from seecr.chances import asked_chance, margins_with
 from seecr.counted import counted
 from seecr.equilibrium import solve
 from seecr.errors import InputError
-from seecr.experiment import GivenEffects, effects_of
+from seecr.experiment import effects_of
+from seecr.given import GivenRobot, robot_of
 from seecr.inverse import correct
+from seecr.model import GivenEffects, model_given
 from seecr.pose import Array
 from seecr.result import Record, Result
 from seecr.robot import Robot
@@ -154,8 +157,9 @@ class Workspace(Result):
         return [dict(zip(listed, row, strict=True)) for row in zip(*listed.values(), strict=True)]
 
 
-def default_axes(robot: Robot, values: int | None = None) -> tuple[Array, Array, Array]:
+def default_axes(robot: GivenRobot, values: int | None = None) -> tuple[Array, Array, Array]:
     """A grid between the exit points, as far below the reference pose as they are above it."""
+    robot = robot_of(robot)
     if values is None:
         # robots with too few cables are solved for their orientation, which takes a while
         values = _VALUES if robot.n_cables >= robot.n_dof else _FEW
@@ -171,7 +175,7 @@ def default_axes(robot: Robot, values: int | None = None) -> tuple[Array, Array,
 
 
 def workspace_map(
-    robot: Robot,
+    robot: GivenRobot,
     x: ArrayLike,
     y: ArrayLike,
     z: ArrayLike,
@@ -188,7 +192,7 @@ def workspace_map(
     """The static-feasible and the elastic workspace on a grid of positions.
 
     Args:
-        robot: as described.
+        robot: as described, or its MJCF.
         x, y, z: (nx,), (ny,), (nz,) or numbers [m].
         orientation: (4,) quaternion of all poses; that of the reference pose by default.
         lowest, highest: (m,) or one [N], limits of the tensions for what can be held.
@@ -205,6 +209,8 @@ def workspace_map(
         InputError: an axis without values, an orientation that the joints do not allow; a chance
             asked of something without a covariance.
     """
+    robot = robot_of(robot)
+    effects = _read_once(effects, robot)
     axes = (_axis("x", x), _axis("y", y), _axis("z", z))
     turned = robot.reference_pose[3:] if orientation is None else finite(orientation, "orientation")
     shape = (len(axes[0]), len(axes[1]), len(axes[2]))
@@ -239,6 +245,11 @@ def workspace_map(
     )  # fmt: skip
 
 
+def _read_once(effects: GivenEffects, robot: Robot) -> GivenEffects:
+    """The same, a model read from its file: the parts of a map all ask for it."""
+    return model_given(effects, robot) if isinstance(effects, str | Path) else effects
+
+
 def _run_telling(
     fill: Callable[[slice], None], parts: list[slice], progress: Progress | None
 ) -> None:
@@ -266,7 +277,7 @@ def _margins(
     wrenches: ArrayLike | None, effects: GivenEffects,
 ) -> Array:  # fmt: skip
     """Margins (n,) [N]; of robots with too few cables by position, the orientation solved."""
-    acting = effects_of(effects)
+    acting = effects_of(effects, robot)
     if robot.n_cables >= robot.n_dof:
         if acting:
             return margins_with(robot, poses, acting, lowest, highest, wrenches)
@@ -290,7 +301,7 @@ def _axis(name: str, values: ArrayLike) -> Array:
 
 
 def boundary(
-    robot: Robot,
+    robot: GivenRobot,
     inside: ArrayLike,
     outside: ArrayLike,
     *,
@@ -306,7 +317,7 @@ def boundary(
     By bisection on straight ways of the position.
 
     Args:
-        robot: as described.
+        robot: as described, or its MJCF.
         inside, outside: (n, 7) poses, of the same orientation in each row.
         tolerance: [m] within which the boundary is found.
         lowest, highest, wrenches: as in :func:`seecr.tension_margin`.
@@ -321,6 +332,8 @@ def boundary(
         InputError: a pose that is not on the side it is said to be; a probability asked of
             something without a covariance.
     """
+    robot = robot_of(robot)
+    effects = _read_once(effects, robot)
     near, far = commanded_poses(inside, "inside"), commanded_poses(outside, "outside")
 
     def held(poses: Array) -> NDArray[np.bool_]:

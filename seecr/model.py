@@ -29,10 +29,10 @@ from __future__ import annotations
 import copy
 import difflib
 import math
-from collections.abc import Mapping, MutableMapping, Sequence
+from collections.abc import Iterable, Mapping, MutableMapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeAlias
 
 import tomlkit
 from tomlkit import TOMLDocument
@@ -40,15 +40,14 @@ from tomlkit.exceptions import TOMLKitError
 
 from seecr.cells import Where, term_of
 from seecr.counted import counted
-from seecr.effects import Term, Terms, catalogue
-from seecr.errors import InputFileError
+from seecr.effects import Effect, Term, Terms, catalogue
+from seecr.errors import InputError, InputFileError
 from seecr.files import read_text
 from seecr.fingerprint import check_robot, fingerprint
+from seecr.given import GivenRobot, robot_of
 from seecr.pose import Array
 from seecr.result import Record, Result
-
-if TYPE_CHECKING:
-    from seecr.robot import Robot
+from seecr.robot import Robot
 
 FORMAT = 1
 """Of the file; raised when a key changes its meaning or goes."""
@@ -138,8 +137,55 @@ def _shown(term: Term, stderr: Array, most: int = 3) -> str:
     return f"of its own for each {term.own.kind}, {len(term.own.values)} known; elsewhere {words}"
 
 
-def new_model(robot: Robot) -> Model:
-    """A model without effects: the seed's plain SEECR."""
+GivenEffects: TypeAlias = Model | Iterable[Term | Effect] | str | Path
+"""A model, the path of its TOML, or effects with their values."""
+
+
+def effects_given(
+    given: GivenEffects, robot: Robot
+) -> tuple[tuple[Term | Effect, ...], tuple[str, ...]]:
+    """Effects of a model, of its file, or as they are; and what is to be told of the model.
+
+    Raises:
+        InputFileError: no such file, or no model of this robot in it.
+        InputError: something else than effects with values.
+    """
+    if isinstance(given, Model | str | Path):
+        model = model_given(given, robot)
+        return tuple(model.terms), model.notes
+    every = tuple(given) if isinstance(given, Iterable) else (None,)
+    wrong = [one for one in every if not isinstance(one, Term | Effect)]
+    if wrong:
+        raise no_effects(wrong[0] if isinstance(given, Iterable) else given)
+    return every, ()
+
+
+def no_effects(got: object) -> InputError:
+    """The error about something given in the place of effects with values."""
+    what = repr(got) if isinstance(got, str) else type(got).__name__
+    return InputError(
+        "expected a model, its path, or a list of effects with their values, as "
+        f"seecr.Term.of(robot, name, ...) gives each, got {what}"
+    )
+
+
+def model_given(given: Model | str | Path, robot: Robot) -> Model:
+    """The model, read if need be.
+
+    Raises:
+        InputFileError: no such file, or no model of this robot in it.
+        InputError: no model.
+    """
+    if isinstance(given, Model):
+        return given
+    if isinstance(given, str | Path):
+        return load_model(given, robot)
+    raise InputError(f"expected a model or its path, got {type(given).__name__}")
+
+
+def new_model(robot: GivenRobot) -> Model:
+    """A model without effects of a robot, or of that in an MJCF: the seed's plain SEECR."""
+    robot = robot_of(robot)
     document = tomlkit.document()
     document.add(tomlkit.comment("Effects that this robot has beyond plain SEECR, in the order"))
     document.add(tomlkit.comment("of adding. SI units. Written by crosscheck add; edit freely."))
@@ -148,18 +194,18 @@ def new_model(robot: Robot) -> Model:
     return Model(Terms(), {}, document)
 
 
-def load_model(path: str | Path, robot: Robot) -> Model:
+def load_model(path: str | Path, robot: GivenRobot) -> Model:
     """Read a model for a robot.
 
     Args:
         path: the TOML file.
-        robot: that it must have been made for.
+        robot: that it must have been made for, or its MJCF.
 
     Raises:
         InputFileError: no such file, no TOML, made for another robot, an effect or parameter
             that is unknown, missing, given twice, no number or out of bounds.
     """
-    path = Path(path)
+    path, robot = Path(path), robot_of(robot)
     text = read_text(path, _EXPECTED)
     document = _parse(path, text)
     if not document:

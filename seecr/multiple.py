@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,7 +12,8 @@ from numpy.typing import ArrayLike
 from seecr.commands import Commands
 from seecr.effects.checked import edit_setup
 from seecr.errors import InputError
-from seecr.experiment import GivenEffects, effects_of
+from seecr.experiment import effects_of
+from seecr.given import GivenRobot, robot_of
 from seecr.joints import pose_of_values
 from seecr.pose import Array, pose_difference
 from seecr.robot import Robot
@@ -20,6 +22,9 @@ from seecr.setup import Setup, plain_setup
 from seecr.solution import Solution
 from seecr.starts import commanded_poses
 
+if TYPE_CHECKING:
+    from seecr.model import GivenEffects
+
 # Starts at a time, and at most.
 _PART, _MOST = 256, 4096
 # Poses nearer than this [of the length] are one equilibrium.
@@ -27,7 +32,7 @@ _ALIKE = 1e-5
 
 
 def equilibria(
-    robot: Robot, pose: ArrayLike, *, effects: GivenEffects = (), most: int = _MOST
+    robot: GivenRobot, pose: ArrayLike, *, effects: GivenEffects = (), most: int = _MOST
 ) -> Solution:
     """The stable equilibria that one command has, by energy, the lowest first.
 
@@ -38,9 +43,9 @@ def equilibria(
     not asked.
 
     Args:
-        robot: as described.
+        robot: as described, or its MJCF.
         pose: (7,) commanded.
-        effects: a model, or effects with values, none of them with a memory.
+        effects: a model, its file, or effects with values, none of them with a memory.
         most: starts, at most.
 
     Returns:
@@ -49,10 +54,10 @@ def equilibria(
     Raises:
         InputError: more than one pose, effects with a memory or a law of their own.
     """
-    command = commanded_poses(pose)
+    robot, command = robot_of(robot), commanded_poses(pose)
     if len(command) != 1:
         raise InputError(f"equilibria needs one commanded pose (7,), got {len(command)}")
-    acting = effects_of(effects)
+    acting = effects_of(effects, robot)
 
     def repeated(n: int) -> Setup:
         setup = plain_setup(robot, Commands(np.repeat(command, n, axis=0)))

@@ -31,9 +31,13 @@ def finite(values: ArrayLike, name: str) -> Array:
     """An array of numbers, all finite; ``name`` is what an error calls it.
 
     Raises:
-        InputError: one of them is not.
+        InputError: one of them is not, or it is something else.
     """
-    array = np.asarray(values, dtype=float)
+    try:
+        array = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        got = repr(values) if isinstance(values, str) else f"a {type(values).__name__}"
+        raise InputError(f"{name}: expected numbers, got {got}") from None
     if not all_finite(array):
         raise InputError(
             f"{name} holds numbers that are not finite, or beyond {LARGEST:g}; expected finite ones"

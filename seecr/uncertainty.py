@@ -15,9 +15,9 @@ from seecr.counted import counted
 from seecr.effects import Terms
 from seecr.experiment import Experiment, senses
 from seecr.files import read_text
-from seecr.model import Model
+from seecr.given import GivenRobot, robot_of
+from seecr.model import Model, model_given
 from seecr.pose import Array
-from seecr.robot import Robot
 from seecr.sensitivity import sensitivities
 from seecr.starts import commanded_poses
 
@@ -111,17 +111,21 @@ def _file_of(model: Model) -> Where:
     return Where(model.path, read_text(model.path, "expected a model"))
 
 
-def spread_of(robot: Robot, commands: Commands | ArrayLike, model: Model) -> Spread | None:
+def spread_of(
+    robot: GivenRobot, commands: Commands | ArrayLike, model: Model | str | Path
+) -> Spread | None:
     """How far poses and tensions may be off; None where the model keeps no covariance.
 
     Args:
-        robot: as described.
+        robot: as described, or its MJCF.
         commands: poses (n, 7), or :class:`seecr.Commands`.
-        model: as ``crosscheck calibrate`` writes it.
+        model: as ``crosscheck calibrate`` writes it, or its file.
 
     Raises:
         InputFileError: correlations in the model that are none.
     """
+    robot = robot_of(robot)
+    model = model_given(model, robot)
     whole, known = covariance_of(model), moving_covariance(model)
     if whole is None or known is None:
         return None

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from seecr.distribution import balanced, tension_limits
 from seecr.errors import InputError
+from seecr.given import GivenRobot, robot_of
 from seecr.joints import motion_columns, values_of_pose
 from seecr.pose import Array, all_finite, quat_rotate, transform_points
 from seecr.robot import Robot
@@ -42,7 +43,7 @@ class Zone:
 
 
 def feasible(
-    robot: Robot,
+    robot: GivenRobot,
     poses: ArrayLike,
     *,
     wrench: ArrayLike | None = None,
@@ -52,7 +53,7 @@ def feasible(
     """Whether tensions within bounds can balance the load: W tau + w_e = 0 (paper, eq 3).
 
     Args:
-        robot: whose mass, centre of mass and gravity are the load.
+        robot: as described, or its MJCF; its mass, centre of mass and gravity are the load.
         poses: (n, 7) or (7,), where the platform really is.
         wrench: (6,) or (n, 6) external force [N] at the platform origin and moment [N m].
         lowest: (m,) or one [N], not negative.
@@ -61,12 +62,13 @@ def feasible(
     Returns:
         (n,) bool.
     """
+    robot = robot_of(robot)
     margin = tension_margin(robot, poses, wrench=wrench, lowest=lowest, highest=highest)
     return np.asarray(margin >= -_BALANCED * load_scale(robot))
 
 
 def tension_margin(
-    robot: Robot,
+    robot: GivenRobot,
     poses: ArrayLike,
     *,
     wrench: ArrayLike | None = None,
@@ -80,7 +82,7 @@ def tension_margin(
     where the load cannot be balanced. Infinite where cables can be tightened without end.
 
     Args:
-        robot: whose mass, centre of mass and gravity are the load.
+        robot: as described, or its MJCF; its mass, centre of mass and gravity are the load.
         poses: (n, 7) or (7,), where the platform really is.
         wrench: (6,) or (n, 6) external force [N] at the platform origin and moment [N m].
         wrenches: (k, 6) instead: a set of which each must be balanced, and so can all between
@@ -94,6 +96,7 @@ def tension_margin(
     """
     from seecr.compiled.margin import margins_at  # takes a while to import
 
+    robot = robot_of(robot)
     places = np.array(_poses(poses), order="C")
     low, high = tension_limits(robot, lowest, highest)
     if wrench is not None:

@@ -24,7 +24,7 @@ FLOORS = {
     "seecr.files": 1, "seecr.result": 1, "seecr.made": 1,
     "seecr.shipped": 1, "seecr.pose": 1, "seecr.units": 2,
     "seecr.robot": 2, "seecr.loads": 2, "seecr.commands": 3, "seecr.joints": 3, "seecr.mjcf": 3,
-    "seecr.columns": 4, "seecr.path": 4, "seecr.setup": 4, "seecr.fingerprint": 4,
+    "seecr.columns": 4, "seecr.given": 4, "seecr.path": 4, "seecr.setup": 4, "seecr.fingerprint": 4,
     "seecr.effects": 5, "seecr.tables": 5, "seecr.cells": 6, "seecr.edits": 6, "seecr.shifts": 6,
     "seecr.statics": 6, "seecr.inertia": 6, "seecr.model": 7,
     "seecr.scipy_search": 7, "seecr.solution": 7, "seecr.starts": 7,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -107,31 +106,25 @@ def command(
     Exit status: 0 all agree, 1 a threshold exceeded, 2 bad input, 3 a solve did not converge
     (and nothing exceeded a threshold).
     """
-    from crosscheck.suite import load_thresholds, select, user_cases
+    from crosscheck.suite import (
+        every_shipped,
+        load_thresholds,
+        select,
+        shipped_like,
+        user_cases,
+    )
 
     if mujoco_robot is not None and robot is None:
         raise click.UsageError("--mujoco-robot needs --robot: the MJCF that SEECR reads")
     thresholds = load_thresholds(thresholds_file)
     if robot is None:
-        chosen = _shipped(seed, patterns)
+        chosen = shipped_like(every_shipped(seed), patterns, "--case")
     else:
-        from seecr import load_robot
-        from seecr.shipped import robot_file
-
-        robots = load_robot(robot), robot_file(robot), mujoco_robot
-        chosen = list(select(user_cases(*robots, seed), patterns))
+        chosen = list(select(user_cases(robot, mujoco_robot, seed=seed), patterns, "--case"))
     if list_only:
         _list(chosen)
         return 0
     return _run(chosen, thresholds, seed, jobs or processors(), not no_recordings, out, as_json)
-
-
-def _shipped(seed: int, patterns: Sequence[str]) -> list[Case | EffectCase]:
-    """The selected pose cases and effects; the group's name stands for all its effects."""
-    from crosscheck.suite import GROUP, PREFIX, select, shipped_cases, shipped_effect_cases
-
-    every: list[Case | EffectCase] = [*shipped_cases(seed), *shipped_effect_cases(seed)]
-    return select(every, [f"{PREFIX}*" if name == GROUP else name for name in patterns])
 
 
 def _list(chosen: list[Case | EffectCase]) -> None:

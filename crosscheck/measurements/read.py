@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from crosscheck.given import GivenRobot, robot_of
 from crosscheck.measurements.beside import Beside, read_beside
@@ -25,12 +26,16 @@ from seecr.columns.poses import command_lengths, command_poses, measured_orienta
 from seecr.columns.table import read_table
 from seecr.columns.times import began, runs, temperatures, times
 from seecr.counted import counted
+from seecr.errors import InputError
 
 if TYPE_CHECKING:
     from seecr.robot import Robot
 
 GivenData: TypeAlias = Measurements | str | Path | Sequence[str | Path]
 """Measurements, their file, or several files of one robot."""
+
+GivenCommands: TypeAlias = Measurements | str | Path | ArrayLike
+"""Commands, their file, or commanded poses (n, 7)."""
 
 
 def load_measurements(
@@ -48,9 +53,13 @@ def load_measurements(
 
     Raises:
         InputFileError: anything wrong with either file.
+        InputError: no path.
     """
     robot = robot_of(robot)
-    paths = [path] if isinstance(path, str | Path) else path
+    paths = [path] if isinstance(path, str | Path) or not isinstance(path, Sequence) else path
+    for one in paths:
+        if not isinstance(one, str | Path):
+            raise InputError(f"expected measurements or their files, got {type(one).__name__}")
     return together([_measured(Path(one), robot, sigma_path) for one in paths])
 
 
@@ -88,9 +97,22 @@ def measurements_of(given: GivenData, robot: Robot) -> Measurements:
     return averaged_dwells(whole)
 
 
-def commands_of(given: Measurements | str | Path, robot: Robot) -> Measurements:
-    """The commands, read if need be."""
-    return load_commands(given, robot) if isinstance(given, str | Path) else given
+def commands_of(given: GivenCommands, robot: Robot) -> Measurements:
+    """The commands, read if need be; poses (n, 7) are one run.
+
+    Raises:
+        InputFileError: anything wrong with the file.
+        InputError: something else than commands.
+    """
+    if isinstance(given, Measurements):
+        return given
+    if isinstance(given, str | Path):
+        return load_commands(given, robot)
+    from seecr.starts import commanded_poses  # takes a while to import
+
+    pose = commanded_poses(given)
+    run = np.full(len(pose), "all")
+    return Measurements(Path("poses.csv"), robot.n_cables, run, command_pose=pose)
 
 
 def _open(path: str | Path, robot: Robot) -> Columns:

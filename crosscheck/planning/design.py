@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from pathlib import Path
 
 import numpy as np
 
 from crosscheck.fit.imitation import imitated
 from crosscheck.fit.prepare import Progress
 from crosscheck.given import GivenRobot, robot_of
-from crosscheck.measurements.data import Measurements, Sigma
-from crosscheck.measurements.read import commands_of
+from crosscheck.measurements.data import Sigma
+from crosscheck.measurements.read import GivenCommands, commands_of
 from crosscheck.planning.adding import NO_LIMITS, Limits
 from crosscheck.planning.detours import detours
 from crosscheck.planning.extensions import extensions
@@ -34,7 +33,7 @@ from seecr.pose import Array
 
 def make_plan(
     robot: GivenRobot,
-    commands: Measurements | str | Path,
+    commands: GivenCommands,
     sigma: Sigma | None = None,
     progress: Progress = lambda _text, _part: None,
     *,
@@ -45,7 +44,8 @@ def make_plan(
 
     Args:
         robot: as described, or its MJCF.
-        commands: planned poses or lengths, or their file; readings in it are ignored.
+        commands: planned poses (n, 7), or a file of poses or lengths, or as read from it; readings
+            in it are ignored.
         sigma: noise to expect; the commands' own by default.
         progress: called with what is being done and the part of it that is done.
         reads: kinds of readings there will be, of "position", "orientation" and "tension"; by
@@ -54,6 +54,7 @@ def make_plan(
 
     Raises:
         CrosscheckError: an unknown kind of reading.
+        InputError: no commands.
     """
     robot = robot_of(robot)
     commands = commands_of(commands, robot)

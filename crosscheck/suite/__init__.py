@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from crosscheck.suite.cases import Case, select, shipped_cases, user_cases
+from crosscheck.suite.chosen import GivenCase, every_shipped, shipped_like
 from crosscheck.suite.effects import (
-    GROUP,
-    PREFIX,
     EffectCase,
     EffectResult,
     effect_cases,
@@ -20,16 +19,16 @@ from crosscheck.suite.thresholds import Thresholds, load_thresholds, thresholds_
 from crosscheck.suite.worst_pose import write_worst_pose
 
 __all__ = [
-    "GROUP",
-    "PREFIX",
     "Case",
     "CaseResult",
     "EffectCase",
     "EffectResult",
+    "GivenCase",
     "Outcome",
     "Run",
     "Thresholds",
     "effect_cases",
+    "every_shipped",
     "junit_xml",
     "load_thresholds",
     "results_json",
@@ -37,6 +36,7 @@ __all__ = [
     "select",
     "shipped_cases",
     "shipped_effect_cases",
+    "shipped_like",
     "summary_md",
     "thresholds_toml",
     "user_cases",

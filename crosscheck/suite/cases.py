@@ -7,11 +7,12 @@ import fnmatch
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 
 from crosscheck.errors import CrosscheckError
+from crosscheck.given import GivenRobot, file_of, robot_of
 from crosscheck.suite.poses import (
     N_SWEEP,
     SWEEP_Z,
@@ -23,10 +24,7 @@ from crosscheck.suite.poses import (
     robot_sweep,
 )
 from seecr.pose import Array, quat_from_rotvec
-from seecr.shipped import CABLES, model_path
-
-if TYPE_CHECKING:
-    from seecr.robot import Robot
+from seecr.shipped import CABLES, model_path, robot_file
 
 
 class Named(Protocol):
@@ -123,22 +121,25 @@ def shipped_cases(seed: int = 0, n_random: int = N_RANDOM) -> list[Case]:
 
 
 def user_cases(
-    robot: Robot,
-    model: Path,
-    mujoco_model: Path | None = None,
+    robot: GivenRobot,
+    mujoco_model: str | Path | None = None,
+    *,
     seed: int = 0,
     n_random: int = N_RANDOM,
 ) -> list[Case]:
     """A sweep and random poses for any robot, scaled by its own size.
 
     Args:
-        robot: read from ``model``.
-        model: its MJCF.
+        robot: its MJCF, or as read from that.
         mujoco_model: another MJCF for MuJoCo's side; None takes the same.
         seed: of the random poses.
         n_random: how many.
+
+    Raises:
+        InputError: a robot of no file, or with other numbers than its file has.
     """
-    name, other = model.stem, mujoco_model or model
+    model, robot = file_of(robot), robot_of(robot)
+    name, other = model.stem, model if mujoco_model is None else robot_file(mujoco_model)
     random = robot_random(robot, _generator(seed, f"{name}-random"), n_random)
     return [
         Case(f"{name}-sweep", model, other, None, "sweep", robot_sweep(robot), has_names=False),
@@ -146,8 +147,13 @@ def user_cases(
     ]
 
 
-def select(cases: Sequence[N], patterns: Sequence[str]) -> list[N]:
+def select(cases: Sequence[N], patterns: Sequence[str], option: str = "") -> list[N]:
     """Cases that match any of the shell patterns; all without patterns.
+
+    Args:
+        cases: to choose from.
+        patterns: such as "cogiro-*".
+        option: of the command line that gave them, for the error.
 
     Raises:
         CrosscheckError: a pattern that matches none; names the nearest.
@@ -158,9 +164,10 @@ def select(cases: Sequence[N], patterns: Sequence[str]) -> list[N]:
     for pattern in patterns:
         if not fnmatch.filter(names, pattern):
             near = difflib.get_close_matches(pattern, names, n=3, cutoff=0.0)
+            what = f"{option} {pattern}".lstrip()
             raise CrosscheckError(
-                f"--case {pattern}: no such case; the nearest are {', '.join(near)} "
-                "(--list has all, patterns such as 'cogiro-*' work)"
+                f"{what}: no such case; the nearest are {', '.join(near)} "
+                "(crosscheck run --list has all, patterns such as 'cogiro-*' work)"
             )
     return [c for c in cases if any(fnmatch.fnmatchcase(c.name, p) for p in patterns)]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
@@ -16,8 +16,9 @@ import numpy as np
 from crosscheck.files import json_text
 from crosscheck.settle.model import ignored_note
 from crosscheck.suite.agreement import allowances, differences_of
-from crosscheck.suite.cases import Case, shipped_cases
-from crosscheck.suite.effects import EffectCase, EffectResult, run_effects, shipped_effect_cases
+from crosscheck.suite.cases import Case
+from crosscheck.suite.chosen import GivenCase, chosen_cases
+from crosscheck.suite.effects import EffectCase, EffectResult, run_effects
 from crosscheck.suite.mujoco_robot import MujocoRobot
 from crosscheck.suite.outcome import Outcome
 from crosscheck.suite.pool import Pool
@@ -89,11 +90,12 @@ class Run(Result):
         return sum(result.count(verdict) for result in self.results)
 
     def lines(self) -> list[str]:
-        """The verdict, and what fails."""
+        """The verdict, what fails, and what MuJoCo's side leaves out."""
         from crosscheck.suite import words
 
         failures = [f"{r.case.name}, {line}" for r in self.results for line in words.failures(r)]
-        return [words.verdict_line(self), *failures, *words.effect_failures(self.effects)]
+        notes = [f"note: {note}" for note in self.notes]
+        return [words.verdict_line(self), *failures, *words.effect_failures(self.effects), *notes]
 
     def records(self) -> list[dict[str, Any]]:
         """One row per pose of every case; effects have none."""
@@ -163,7 +165,7 @@ def run_case(case: Case, thresholds: Thresholds, record: Recorder | None = None)
 
 
 def run_suite(
-    cases: Sequence[Case | EffectCase] | None = None,
+    cases: GivenCase | Iterable[GivenCase] | None = None,
     thresholds: Thresholds | str | Path | None = None,
     *,
     seed: int = 0,
@@ -174,7 +176,9 @@ def run_suite(
     """Run cases and effects, several at a time.
 
     Args:
-        cases: what to run; all that are shipped by default.
+        cases: what to run: cases; names of shipped ones, and patterns such as "cogiro-*";
+            robots or their MJCF, each along a sweep and at random poses. All that are shipped by
+            default.
         thresholds: what counts as agreement, or a file of it; the shipped ones by default.
         seed: of the shipped cases' random poses and of the effects' sizes.
         jobs: how many at a time.
@@ -183,17 +187,20 @@ def run_suite(
 
     Returns:
         the results in the order of the cases.
+
+    Raises:
+        InputError: no case, or something that is none.
+        CrosscheckError: a name that no shipped case has.
     """
     began = time.perf_counter()
-    every: list[Case | EffectCase] = [*shipped_cases(seed), *shipped_effect_cases(seed)]
-    chosen = every if cases is None else cases
+    chosen = chosen_cases(cases, seed)
     if not isinstance(thresholds, Thresholds):
         thresholds = load_thresholds(thresholds)
     poses = [case for case in chosen if isinstance(case, Case)]
     effects = [case for case in chosen if isinstance(case, EffectCase)]
     tell = progress or (lambda result: None)
     with Pool(max(min(jobs, len(chosen)), 1)) as pool:
-        if pool.jobs > 1 and chosen:
+        if pool.jobs > 1:
             _warm_up(chosen[0])
         one = partial(run_case, thresholds=thresholds, record=record)
         order = sorted(range(len(poses)), key=lambda i: -len(poses[i]))

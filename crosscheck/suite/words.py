@@ -98,6 +98,8 @@ def verdict_line(run: Run) -> str:
 
     Of effects only those that fail are named here; where nothing else was run, it is theirs.
     """
+    if not run.every:
+        return "Nothing was run."
     if not run.results:
         return effects_line(run.effects)
     total = sum(len(result) for result in run.results)

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.files import staged, write_text
-from crosscheck.given import copy_robot
+from crosscheck.given import GivenRobot, copy_robot, file_of, robot_of
 from crosscheck.measurements.data import Measurements, Sigma
-from crosscheck.measurements.read import commands_of
+from crosscheck.measurements.read import GivenCommands, commands_of
 from crosscheck.measurements.write import write_measurements
 from crosscheck.settle.model import compile_model, hindrances, ignored_note
 from crosscheck.twin.answer import NAME, Answer, Moves, seal
@@ -36,7 +36,6 @@ from crosscheck.twin.lab import (
 )
 from crosscheck.twin.measure import Truth
 from seecr.effects import Term
-from seecr.mjcf import load_robot
 from seecr.result import Record, Result
 from seecr.robot import Robot
 
@@ -88,7 +87,7 @@ class Twin(Result):
 
 
 def make_twin(
-    robot_path: str | Path,
+    robot: GivenRobot,
     seed: int,
     *,
     effects: Sequence[str] | None = None,
@@ -96,31 +95,32 @@ def make_twin(
     out: str | Path | None = None,
     tensions: bool = False,
     points: int = 18,
-    poses: Measurements | str | Path | None = None,
+    poses: GivenCommands | None = None,
     sigma: Sigma | None = None,
     progress: Progress | None = None,
 ) -> Twin:
     """Measure a robot that has effects nobody is told of.
 
     Args:
-        robot_path: its MJCF, without them, or the name of a shipped robot.
+        robot: without them: its MJCF, the name of a shipped one, or as read from its file.
         seed: draws effects, their sizes and the noise.
         effects: names of the effects; None lets the seed choose, ``()`` hides none.
         n_effects: how many the seed chooses; None lets it choose that too.
         out: folder for the case; None writes nothing.
         tensions: record tensions too.
         points: of each sweep; 18 make 144 rows.
-        poses: commands, loads and way points instead of the sweeps, or their file. Rows without
-            readings among others that have some are way points; a list of commands has none.
+        poses: instead of the sweeps: poses (n, 7), or commands, loads and way points, or their
+            file. Rows without readings among others that have some are way points; a list of
+            commands has none.
         sigma: noise; kinds that nobody stated are those of a good tracker.
         progress: called with the number of rows done since the last call, and what is going on.
 
     Raises:
         CrosscheckError: an effect that no twin can hide, or a robot that MuJoCo cannot rest.
         InputFileError: poses that cannot be read.
+        InputError: a robot of no file, or with other numbers than its file has.
     """
-    robot = load_robot(robot_path)
-    robot_path = robot.source or Path(robot_path)
+    path, robot = file_of(robot), robot_of(robot)
     given = None if poses is None else commands_of(poses, robot)
     stated = sigma or (Sigma() if given is None else given.sigma)
     tensions = tensions or stated.tension_N is not None
@@ -140,10 +140,10 @@ def make_twin(
         kept=made.at_rest,
         hidden=tuple(one for one, _ in made.alone),
         answer=_answer(made, robot, seed),
-        notes=(*_notes(robot_path), *(() if given is None else given.notes)),
+        notes=(*_notes(path), *(() if given is None else given.notes)),
     )
     if out is not None:
-        _write(twin, robot_path, Path(out))
+        _write(twin, path, Path(out))
     return twin
 
 

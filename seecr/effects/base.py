@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from seecr.effects.totals import Total
 from seecr.errors import InputError
+from seecr.given import GivenRobot, robot_of
 from seecr.pose import Array
 from seecr.robot import Robot
 from seecr.setup import Setup
@@ -228,8 +229,9 @@ class Layout:
         return vector
 
 
-def layout_of(effect: type[Effect], robot: Robot) -> Layout:
-    """The flat parameters of an effect for a robot."""
+def layout_of(effect: type[Effect], robot: GivenRobot) -> Layout:
+    """The flat parameters of an effect for a robot, or for that in an MJCF."""
+    robot = robot_of(robot)
     names: list[str] = []
     units: list[str] = []
     columns: dict[str, list[float]] = {"null": [], "lower": [], "upper": [], "scale": []}

@@ -16,6 +16,7 @@ from seecr.effects.knowledge import Knowledge
 from seecr.effects.own_values import Own
 from seecr.effects.registry import catalogue, effect_named
 from seecr.errors import InputError
+from seecr.given import GivenRobot
 from seecr.pose import Array
 from seecr.robot import Robot
 
@@ -42,11 +43,11 @@ class Term:
             object.__setattr__(self, "knowledge", Knowledge.nothing(len(self.layout)))
 
     @classmethod
-    def of(cls, robot: Robot, name: str, **values: float) -> Term:
+    def of(cls, robot: GivenRobot, name: str, **values: float) -> Term:
         """An effect by its name, with some parameters; the others are at null.
 
         Args:
-            robot: that it is for.
+            robot: that it is for, or its MJCF.
             name: of the effect, such as ``"pulley_radius"``.
             values: by the parameters' names, such as ``radius_m=0.01`` or ``gain_3=0.002``.
 

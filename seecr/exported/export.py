@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,14 +15,18 @@ from seecr.effects import Effect
 from seecr.effects.checked import edit_setup
 from seecr.equilibrium import solve
 from seecr.errors import InputError
-from seecr.experiment import GivenEffects, effects_of
+from seecr.experiment import effects_of
 from seecr.exported.bodies import SEGMENTS, bodies_text
 from seecr.exported.expressed import expressed
 from seecr.exported.scene import plain_text
+from seecr.given import GivenRobot, robot_of
 from seecr.robot import Robot
 from seecr.setup import Setup, plain_setup
 from seecr.solution import Solution
 from seecr.starts import commanded_poses
+
+if TYPE_CHECKING:
+    from seecr.model import GivenEffects
 
 # Directions whose sine is smaller are one.
 _ALONG = 1e-12
@@ -102,20 +106,21 @@ class Export:
             yield f"in no file: {effect}; {why}"
 
 
-def export(robot: Robot, effects: GivenEffects = (), at: ArrayLike | None = None) -> Export:
+def export(robot: GivenRobot, effects: GivenEffects = (), at: ArrayLike | None = None) -> Export:
     """A robot with its model as MJCF, as far as MJCF can say it.
 
     Given the same rest lengths, MuJoCo comes to rest where :func:`seecr.solve` says.
 
     Args:
-        robot: as described.
-        effects: a model, or effects with values.
+        robot: as described, or its MJCF.
+        effects: a model, its file, or effects with values.
         at: (7,) command that the file for MuJoCo alone is of; the reference pose by default.
 
     Raises:
         InputError: a pose that is none, or one where the platform has no rest.
     """
-    said = expressed(robot, effects_of(effects))
+    robot = robot_of(robot)
+    said = expressed(robot, effects_of(effects, robot))
     plain = _edited(robot, robot.reference_pose[None], (*said.plain, *said.lengths))
     described = replace(
         robot, exit_points=plain.exit_points, anchor_points=plain.anchor_points, ea=plain.ea,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from tempfile import mkdtemp
@@ -87,6 +88,30 @@ def test_objects_give_what_paths_give() -> None:
     assert again.to_frame().equals(result_of("Comparison").to_frame())
     plan = crosscheck.make_plan(robot, crosscheck.load_commands(data_file(), robot))
     assert plan.to_frame().equals(result_of("Plan").to_frame())
+    twin = crosscheck.make_twin(robot, 1, points=4)
+    assert twin.to_frame().equals(result_of("Twin").to_frame())
+    run = crosscheck.run_suite("planar-horizontal-*").to_frame()
+    assert run.slice(0, len(case())).equals(result_of("Run").to_frame())
+
+
+def test_a_plan_is_of_poses_too() -> None:
+    data = crosscheck.load_measurements(data_file(), ROBOT)
+    one_run = replace(data, run=np.full(data.n_rows, "all"), t_s=None)
+    wanted = crosscheck.make_plan(ROBOT, one_run, data.sigma).to_frame()
+    assert data.command_pose is not None
+    assert crosscheck.make_plan(ROBOT, data.command_pose, data.sigma).to_frame().equals(wanted)
+    with pytest.raises(seecr.InputError, match=r"^poses must be \(n, 7\)"):
+        crosscheck.make_plan(ROBOT, [[1.0, 2.0]])
+
+
+def test_what_is_no_model_and_no_data_is_refused() -> None:
+    data = data_file()
+    with pytest.raises(seecr.InputError, match=r"Term\.of\(robot, name.*, got 'stiffness'$"):
+        crosscheck.compare(ROBOT, data, model=["stiffness"])  # type: ignore[list-item]
+    with pytest.raises(seecr.InputError, match=r"^expected measurements or their files, got int$"):
+        crosscheck.compare(ROBOT, 3)  # type: ignore[arg-type]
+    with pytest.raises(seecr.InputError, match=r"^expected a robot, the path .* got NoneType$"):
+        crosscheck.diagnose(None, data)  # type: ignore[arg-type]
 
 
 def test_what_was_found_is_the_next_model() -> None:
@@ -127,6 +152,13 @@ def test_frames_hold_what_the_csv_holds() -> None:
 def test_a_twin_does_not_tell() -> None:
     twin = crosscheck.make_twin(ROBOT, 1, effects=("platform_mass",), points=4)
     assert "platform_mass" not in str(twin) + twin._repr_html_()
+
+
+def test_a_run_tells_what_mujoco_leaves_out() -> None:
+    run = result_of("Run")
+    assert isinstance(run, crosscheck.Run) and "note: " not in str(run)
+    odd = replace(run, results=[replace(run.results[0], ignored=("contacts",))])
+    assert str(odd) == f"{run}\nnote: {odd.notes[0]}" and "contacts" in odd.notes[0]
 
 
 def test_bad_input_is_told_as_by_the_commands(tmp_path: Path) -> None:

@@ -321,7 +321,7 @@ def test_any_robot(size: float, tmp_path: Path) -> None:
     axes = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
     joints = "".join(f'<joint name="{a}" type="slide" axis="{v}"/>' for a, v in axes.items())
     path = odd_robot(tmp_path / "odd.xml", size, joints)
-    case = user_cases(load_robot(path), path, n_random=3)[1]
+    case = user_cases(path, n_random=3)[1]
     write_case_recording(run_case(case, load_thresholds()), tmp_path / "odd.rrd")
     back = Readback(tmp_path / "odd.rrd")
     radius = back.static("/scene/mujoco/cables/taut", "LineStrips3D:radii")[0]

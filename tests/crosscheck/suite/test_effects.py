@@ -109,7 +109,7 @@ def test_a_difference_outweighs_a_solve_without_an_answer():
     every = [Outcome.AGREE, Outcome.NOT_CONVERGED, Outcome.DIFFER]
     assert Outcome.of_all(every) is Outcome.DIFFER
     assert Outcome.of_all(every[:2]) is Outcome.NOT_CONVERGED
-    assert Outcome.of_all([]) is Outcome.AGREE
+    assert Outcome.of_all([]) is Outcome.NOT_CONVERGED
     assert [one.exit_status for one in every] == [0, 3, 1]
 
 
