@@ -20,6 +20,7 @@ from seecr.compiled.outcomes import CONVERGED, SINGULAR
 from seecr.joints import pose_of_values, values_of_pose
 from seecr.path import Path, path_of
 from seecr.pose import Array, pose_add, pose_difference
+from seecr.result import Record
 from seecr.robot import Robot
 from seecr.setup import Setup
 from seecr.solution import Solution, certify
@@ -68,6 +69,16 @@ class Jump:
     def size(self) -> Array:
         """(6,) [m, rad] from before to after."""
         return pose_difference(self.after, self.before)
+
+    def as_json(self) -> Record:
+        """One of a row's ``jumps`` in ``sweep.json``."""
+        return {
+            "command": self.command,
+            "before": self.before,
+            "after": self.after,
+            "energy_J": self.energy,
+            "certain": self.certain,
+        }
 
 
 def follow_commands(robot: Robot, commands: Commands, setup_of: SetupOf) -> Solution:

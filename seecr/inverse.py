@@ -149,6 +149,39 @@ class Correction(Result):
             for i in range(len(self.wanted))
         ]
 
+    def as_json(self, kept: Array | None = None) -> Record:
+        """``correction.json``.
+
+        Args:
+            kept: (n,) probability that tensions stay within their limits, :func:`kept_chance`.
+        """
+        left, line, there = self.left, self.commands.line, self.solution
+        return {
+            "robot": self.robot.name,
+            "cables": self.robot.cable_names,
+            "poses": len(self.wanted),
+            "reached": int(self.reached.sum()),
+            "not_held": int((~self.held).sum()),
+            "without_answer": int((~(self.found & there.converged)).sum()),
+            "rows": [
+                {
+                    **({} if line is None else {"line": line[i]}),
+                    "wanted": self.wanted[i],
+                    "aimed": self.aimed[i] if self.found[i] else None,
+                    "lengths_m": self.lengths[i],
+                    "held": self.held[i],
+                    "why_not": self.why_not[i] or None,
+                    "reached": reached,
+                    "left_m": left[i, :3],
+                    "left_rad": left[i, 3:],
+                    "within_limits_probability": None if kept is None else kept[i],
+                    "tensions_N": there.tensions[i],
+                    "status": there.status[i] if self.found[i] else "no_answer",
+                }
+                for i, reached in enumerate(self.reached)
+            ],
+        }
+
 
 def correct(
     robot: GivenRobot,

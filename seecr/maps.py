@@ -102,6 +102,14 @@ class Workspace(Result):
         steps = [np.ptp(axis) / (len(axis) - 1) for axis in self.axes if len(axis) > 1]
         return float(np.prod(steps))
 
+    @property
+    def softest_at(self) -> tuple[int, ...] | None:
+        """Where of the grid the elastic robot is softest of all poses that can be held."""
+        stiffness = np.where(self.feasible & self.rests, self.stiffness, np.nan)
+        if not np.isfinite(stiffness).any():
+            return None
+        return tuple(map(int, np.unravel_index(np.nanargmin(stiffness), stiffness.shape)))
+
     def size_words(self, poses: int) -> str:
         """The size of so many poses of the grid, for people."""
         along = sum(len(axis) > 1 for axis in self.axes)
@@ -155,6 +163,44 @@ class Workspace(Result):
         }
         listed = {name: values.tolist() for name, values in columns.items()}
         return [dict(zip(listed, row, strict=True)) for row in zip(*listed.values(), strict=True)]
+
+    def as_json(self, at_least: float | None = None) -> Record:
+        """``map.json``: how much of the grid can be held, and the worst of the elastic robot there.
+
+        Args:
+            at_least: a probability with which poses are to be held, of a map that has them.
+        """
+        likely = None
+        if at_least is not None:
+            poses = int(self.likely(at_least).sum())
+            likely = {"at_least": at_least, "poses": poses, "size": poses * self.cell}
+        where = self.rests & self.feasible
+        worst = {
+            "deviation_m": np.linalg.norm(self.deviation[where], axis=-1),
+            "rotation_rad": np.linalg.norm(self.rotation[where], axis=-1),
+        }
+        counts, at = self.slack[self.rests], self.softest_at
+        return {
+            "robot": self.robot.name,
+            "shape": self.margin.shape,
+            "orientation": self.orientation,
+            "poses": self.margin.size,
+            "feasible": int(self.feasible.sum()),
+            "cell": self.cell,
+            "size_feasible": float(self.feasible.sum() * self.cell),
+            "likely": likely,
+            "rests": int(self.rests.sum()),
+            "slack": {k: int(np.sum(counts == k)) for k in np.unique(counts)},
+            "worst_where_feasible": {
+                name: float(values.max()) if len(values) else None for name, values in worst.items()
+            },
+            "softest_where_feasible": at
+            and {
+                "pose_m": [axis[k] for axis, k in zip(self.axes, at, strict=True)],
+                "smallest_eigenvalue_N_per_m": self.stiffness[at],
+                "direction": self.softest[at],
+            },
+        }
 
 
 def default_axes(robot: GivenRobot, values: int | None = None) -> tuple[Array, Array, Array]:

@@ -15,6 +15,7 @@ from seecr.compiled.outcomes import TOLERANCE
 from seecr.errors import InputError
 from seecr.following import evaluated, moved, step_between
 from seecr.pose import Array, pose_difference
+from seecr.result import Record
 from seecr.solution import Solution
 from seecr.tables import Tables, take
 
@@ -48,6 +49,16 @@ class Barrier:
     pose: Array
     exact: bool
     twisted: bool
+
+    def as_json(self) -> Record:
+        """One of ``barriers`` in ``pose.json``."""
+        return {
+            "energy_J": self.energy,
+            "back_J": self.back,
+            "pose": self.pose,
+            "exact": self.exact,
+            "twisted": self.twisted,
+        }
 
 
 def barriers(solution: Solution, others: Solution, i: int = 0) -> tuple[Barrier, ...]:

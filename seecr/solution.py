@@ -268,6 +268,19 @@ class Solution(Result):
             for i in range(len(self))
         ]
 
+    def as_json(self) -> Record:
+        """``seecr`` of a case in ``results.json``: the answers of all poses, by quantity."""
+        return {
+            "pose": self.pose,
+            "deviation": self.deviation,
+            "tensions_N": self.tensions,
+            "slack": self.slack,
+            "residual": self.residual,
+            "smallest_eigenvalue_N_per_m": self.smallest_eigenvalue,
+            "iterations": self.iterations,
+            "status": self.status,
+        }
+
     def place(self, *rows: int) -> str:
         """Rows in words: "line 24" of their file, "pose 3", counted from 0, without one."""
         return rows_words(rows, self.line)

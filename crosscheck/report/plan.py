@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 
+from crosscheck.planning.proposer import Suggestion
 from crosscheck.planning.result import Plan, Visible
 from crosscheck.planning.words import alike, gain_words
 from crosscheck.report.confusion import Confusion, draw_confusion
 from crosscheck.report.drawing import AFTER, BEFORE, INK, blank, grid, image, plain_log, styled
 from crosscheck.report.page import facts, title_of
 from crosscheck.units import short
-from seecr.pose import rotvec_from_quat
+from seecr.pose import Array, rotvec_from_quat
 
 _ROW = 0.19
 
@@ -29,9 +31,9 @@ def plan_context(plan: Plan) -> dict[str, Any]:
         "verdict_meaning": "",
         "sentence": plan.sentence,
         "facts": facts(problem),
-        "effects": [_row(found) for found in plan.effects],
+        "effects": [_Row.of(found) for found in plan.effects],
         "missing": {name: why.words for name, why in plan.missing.items()},
-        "suggestions": [_suggestion(item) for item in plan.suggestions if item.reached],
+        "suggestions": [_Added.of(item) for item in plan.suggestions if item.reached],
         "notes": [
             *(
                 f"line {line}: {cable} is about to go slack or taut; what is said of such poses "
@@ -76,22 +78,37 @@ def draw_sizes(effects: tuple[Visible, ...]) -> str:
         return image(figure, "The smallest sizes that show")
 
 
-def _row(found: Visible) -> dict[str, Any]:
-    return {
-        "name": found.name,
-        "factor": short(found.factor, 2),
-        "shows": found.words(found.factor),
-        "named": "–" if found.twins else found.words(found.identifiable),
-        "alike": alike(found),
-    }
+@dataclass(frozen=True)
+class _Row:
+    """An effect as people read it: from which size on it shows, and can be named."""
+
+    name: str
+    factor: str
+    shows: str
+    named: str
+    alike: str
+
+    @classmethod
+    def of(cls, found: Visible) -> _Row:
+        named = "–" if found.twins else found.words(found.identifiable)
+        shows = found.words(found.factor)
+        return cls(found.name, short(found.factor, 2), shows, named, alike(found))
 
 
-def _suggestion(item: Any) -> dict[str, Any]:
+@dataclass(frozen=True)
+class _Added:
     """What to add, what it brings, and its poses as people read them."""
-    poses = []
-    for pose in item.poses if item.poses is not None else ():
-        turn = np.degrees(rotvec_from_quat(pose[3:]))
-        poses.append([*(f"{v:.4g}" for v in pose[:3]), *(f"{v:.3g}" for v in turn)])
-    return {
-        "words": item.words, "gains": [gain_words(gain) for gain in item.reached], "poses": poses,
-    }  # fmt: skip
+
+    words: str
+    gains: list[str]
+    poses: list[list[str]]
+
+    @classmethod
+    def of(cls, item: Suggestion) -> _Added:
+        poses = [] if item.poses is None else [_cells(pose) for pose in item.poses]
+        return cls(item.words, [gain_words(gain) for gain in item.reached], poses)
+
+
+def _cells(pose: Array) -> list[str]:
+    turn = np.degrees(rotvec_from_quat(pose[3:]))
+    return [*(f"{v:.4g}" for v in pose[:3]), *(f"{v:.3g}" for v in turn)]

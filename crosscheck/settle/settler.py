@@ -21,6 +21,7 @@ from crosscheck.settle.physics import Physics
 from crosscheck.settle.polish import Polished, polish
 from crosscheck.settle.relax import Observer, Rest, SettleStatus, come_to_rest
 from seecr.pose import Array
+from seecr.result import Record
 
 # Relative residual after the polish; where rounding leaves more, that is the limit.
 _POLISHED = 1e-9
@@ -129,6 +130,22 @@ class SettlingBatch(tuple[Settling, ...]):
             stacked[:] = values
             return stacked
         return np.array(values)
+
+    def as_json(self) -> Record:
+        """``mujoco`` of a case in ``results.json``: the answers of all poses, by quantity."""
+        return {
+            "settled_pose": self.settled_pose,
+            "settled_residual": self.settled_residual,
+            "pose": self.pose,
+            "tensions_N": self.tensions,
+            "slack": self.slack,
+            "residual": self.residual,
+            "smallest_eigenvalue_N_per_m": self.smallest_eigenvalue,
+            "energy_J": self.energy,
+            "steps": self.steps,
+            "simulated_s": self.simulated_s,
+            "status": self.status,
+        }
 
 
 _FIELDS = frozenset(Settling.__dataclass_fields__)

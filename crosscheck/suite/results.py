@@ -168,9 +168,9 @@ class CaseResult(Result):
             "command": case.poses,
             "start": case.begins,
             "rest_lengths_m": self.solution.rest_lengths,
-            "verdict": [verdict.name.lower() for verdict in self.verdict],
-            "seecr": _seecr(self),
-            "mujoco": _mujoco(self),
+            "verdict": self.verdict,
+            "seecr": self.solution,
+            "mujoco": {"rest_lengths_m": self.mujoco_rest_lengths, **self.settling.as_json()},
             "difference": asdict(self.difference) | {"tension_N": self.difference.tension_N},
             "allowed": asdict(self.allowance),
         }
@@ -211,36 +211,4 @@ def _timing(result: CaseResult) -> dict[str, float]:
         "mujoco_settle_ms_per_pose": 1e3 * float(settle_s),
         "mujoco_polish_ms_per_pose": 1e3 * float(polish_s),
         "case_s": result.wall_s,
-    }
-
-
-def _seecr(result: CaseResult) -> dict[str, Any]:
-    solution = result.solution
-    return {
-        "pose": solution.pose,
-        "deviation": solution.deviation,
-        "tensions_N": solution.tensions,
-        "slack": solution.slack,
-        "residual": solution.residual,
-        "smallest_eigenvalue_N_per_m": solution.smallest_eigenvalue,
-        "iterations": solution.iterations,
-        "status": [status.name.lower() for status in solution.status],
-    }
-
-
-def _mujoco(result: CaseResult) -> dict[str, Any]:
-    settling = result.settling
-    return {
-        "rest_lengths_m": result.mujoco_rest_lengths,
-        "settled_pose": settling.settled_pose,
-        "settled_residual": settling.settled_residual,
-        "pose": settling.pose,
-        "tensions_N": settling.tensions,
-        "slack": settling.slack,
-        "residual": settling.residual,
-        "smallest_eigenvalue_N_per_m": settling.smallest_eigenvalue,
-        "energy_J": settling.energy,
-        "steps": settling.steps,
-        "simulated_s": settling.simulated_s,
-        "status": [status.name.lower() for status in settling.status],
     }

@@ -71,7 +71,7 @@ def command(
     from seecr import InputFileError, correct, kept_chance
     from seecr.command_file import read_commands
     from seecr.files import json_text, staged, write_texts
-    from seecr.report.corrections import chance_lines, corrected_csv, corrected_toml, document_of
+    from seecr.report.corrections import chance_lines, corrected_csv, corrected_toml
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
@@ -94,7 +94,7 @@ def command(
         notes = [*(own.notes if own else ()), *wanted.notes]
         made = made_by(machine.source, poses, model)
         document = {
-            "made": made, "exit_status": status, "notes": notes, **document_of(found, kept)
+            "made": made, "exit_status": status, "notes": notes, **found.as_json(kept)
         }  # fmt: skip
         files = {
             "corrected.csv": corrected_csv(found, wanted),

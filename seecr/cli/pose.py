@@ -51,7 +51,7 @@ def command(
     """
     from seecr import barriers, equilibria, predict, solve, spread_of
     from seecr.files import json_text, staged, write_text
-    from seecr.report.rows import rows_of
+    from seecr.report.rows import Rows
     from seecr.report.words import (
         at_rest,
         cable_lines,
@@ -79,21 +79,12 @@ def command(
         "exit_status": status,
         "robot": machine.name,
         "cables": machine.cable_names,
-        **rows_of(solution, spread=spread)[0],
+        **Rows(solution, spread=spread).as_json()[0],
         "sentence": solution.sentence(0),
         "softest_direction": softest_words(solution),
         "frequencies_Hz": solution.frequencies[0],
-        "equilibria": None if others is None else rows_of(others),
-        "barriers": [
-            {
-                "energy_J": way.energy,
-                "back_J": way.back,
-                "pose": way.pose,
-                "exact": way.exact,
-                "twisted": way.twisted,
-            }
-            for way in passes
-        ],
+        "equilibria": None if others is None else Rows(others),
+        "barriers": passes,
         "notes": notes,
     }
     if out is not None:

@@ -96,7 +96,7 @@ def command(
     from seecr.counted import counted
     from seecr.files import json_text, staged, write_text
     from seecr.report.figures import map_figure
-    from seecr.report.maps import document_of, likely_lines, softest_line, write_arrays
+    from seecr.report.maps import likely_lines, softest_line, write_arrays
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
@@ -118,7 +118,7 @@ def command(
             )
         text = json_text({
             "made": made_by(machine.source, model), "exit_status": 0,
-            **document_of(found, at_least),
+            **found.as_json(at_least),
         })  # fmt: skip
         write_text(folder / "map.json", text + "\n")
         write_arrays(folder / "map.npz", found)

@@ -10,10 +10,11 @@ import numpy as np
 from seecr.command_file import CommandFile
 from seecr.inverse import Correction
 from seecr.pose import Array
+from seecr.result import COORDINATES
 
-__all__ = ["chance_lines", "corrected_csv", "corrected_toml", "document_of"]
+__all__ = ["chance_lines", "corrected_csv", "corrected_toml"]
 
-_WANT = ("want_x_m", "want_y_m", "want_z_m", "want_qw", "want_qx", "want_qy", "want_qz")
+_WANT = [f"want_{name}" for name in COORDINATES]
 _WRENCH = [
     f"{kind}_{axis}_{unit}" for kind, unit in (("force", "N"), ("moment", "Nm")) for axis in "xyz"
 ]
@@ -78,36 +79,6 @@ def chance_lines(found: Correction, kept: Array | None) -> Iterator[str]:
         f"tensions stay within the limits with probability {np.nanmin(kept):.2f} at "
         f"{found.place(worst)}, the least; below {_LIKELY:g} at {many} of {len(found.wanted)}"
     )
-
-
-def document_of(found: Correction, kept: Array | None = None) -> dict[str, Any]:
-    """``correction.json``; ``kept`` (n,) is how likely tensions stay within their limits."""
-    left, line = found.left, found.commands.line
-    return {
-        "robot": found.robot.name,
-        "cables": found.robot.cable_names,
-        "poses": len(found.wanted),
-        "reached": int(found.reached.sum()),
-        "not_held": int((~found.held).sum()),
-        "without_answer": int((~(found.found & found.solution.converged)).sum()),
-        "rows": [
-            {
-                **({} if line is None else {"line": line[i]}),
-                "wanted": found.wanted[i],
-                "aimed": found.aimed[i] if found.found[i] else None,
-                "lengths_m": found.lengths[i],
-                "held": bool(found.held[i]),
-                "why_not": found.why_not[i] or None,
-                "reached": bool(found.reached[i]),
-                "left_m": left[i, :3],
-                "left_rad": left[i, 3:],
-                "within_limits_probability": None if kept is None else kept[i],
-                "tensions_N": found.solution.tensions[i],
-                "status": found.solution.status[i].name.lower() if found.found[i] else "no_answer",
-            }
-            for i in range(len(found.wanted))
-        ],
-    }
 
 
 def _cell(value: Any) -> str:

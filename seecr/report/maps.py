@@ -1,4 +1,4 @@
-"""The files of a workspace: its arrays, and its numbers in short."""
+"""What is told of a workspace, and the file of its arrays."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from seecr.files import written
 from seecr.maps import Workspace
 from seecr.report.words import direction_words
 
-__all__ = ["document_of", "likely_lines", "softest_line", "write_arrays"]
+__all__ = ["likely_lines", "softest_line", "write_arrays"]
 
 
 def likely_lines(found: Workspace, at_least: float | None) -> Iterator[str]:
@@ -28,58 +28,11 @@ def likely_lines(found: Workspace, at_least: float | None) -> Iterator[str]:
 
 def softest_line(found: Workspace) -> Iterator[str]:
     """Where the elastic robot is softest of all poses that can be held, and in which direction."""
-    at = _softest(found)
+    at = found.softest_at
     if at is not None:
         place = " ".join(f"{1e3 * axis[k]:.4g}" for axis, k in zip(found.axes, at, strict=True))
         way = direction_words(found.robot, found.softest[at])
         yield f"softest of them at x y z {place} mm: {way}, {found.stiffness[at]:.4g} N/m"
-
-
-def _softest(found: Workspace) -> tuple[np.intp, ...] | None:
-    stiffness = np.where(found.feasible & found.rests, found.stiffness, np.nan)
-    if not np.isfinite(stiffness).any():
-        return None
-    return np.unravel_index(np.nanargmin(stiffness), stiffness.shape)
-
-
-def document_of(found: Workspace, at_least: float | None = None) -> dict[str, Any]:
-    """``map.json``: how much of the grid can be held, and the worst of the elastic robot there.
-
-    Args:
-        found: the map.
-        at_least: a probability with which poses are to be held, of a map that has them.
-    """
-    likely = None
-    if at_least is not None:
-        poses = int(found.likely(at_least).sum())
-        likely = {"at_least": at_least, "poses": poses, "size": poses * found.cell}
-    where = found.rests & found.feasible
-    worst = {
-        "deviation_m": np.linalg.norm(found.deviation[where], axis=-1),
-        "rotation_rad": np.linalg.norm(found.rotation[where], axis=-1),
-    }
-    counts, at = found.slack[found.rests], _softest(found)
-    softest = at and {
-        "pose_m": [float(axis[k]) for axis, k in zip(found.axes, at, strict=True)],
-        "smallest_eigenvalue_N_per_m": float(found.stiffness[at]),
-        "direction": found.softest[at].tolist(),
-    }
-    return {
-        "robot": found.robot.name,
-        "shape": found.margin.shape,
-        "orientation": found.orientation,
-        "poses": found.margin.size,
-        "feasible": int(found.feasible.sum()),
-        "cell": found.cell,
-        "size_feasible": float(found.feasible.sum() * found.cell),
-        "likely": likely,
-        "rests": int(found.rests.sum()),
-        "slack": {str(k): int(np.sum(counts == k)) for k in np.unique(counts)},
-        "worst_where_feasible": {
-            name: float(values.max()) if len(values) else None for name, values in worst.items()
-        },
-        "softest_where_feasible": softest,
-    }
 
 
 def write_arrays(path: Path, found: Workspace) -> None:

@@ -5,126 +5,108 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from seecr.pose import Array
-from seecr.result import Record
+from seecr.result import COORDINATES, Record
 from seecr.solution import Solution
 from seecr.uncertainty import Spread
 
-__all__ = ["csv_text", "rows_of"]
-
-_POSE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
+__all__ = ["Rows"]
 
 
-def rows_of(
-    solution: Solution,
-    lengths: Array | None = None,
-    more: Mapping[str, Sequence[Any]] | None = None,
-    spread: Spread | None = None,
-) -> list[Record]:
-    """One row per command, SI units.
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Answers of n commands as files have them, one row per command, SI units.
 
-    Args:
+    Attributes:
         solution: of n commands.
         lengths: (n, m) [m] that were commanded instead of poses.
         more: further values of each row, by name.
         spread: one standard deviation of poses and tensions, where the model says so.
     """
-    names = solution.robot.cable_names
-    eigenvalues, extra = solution.smallest_eigenvalue, more or {}
-    if solution.line is not None:
-        extra = {"line": solution.line.tolist(), **extra}
-    return [
-        {
-            **{name: values[i] for name, values in extra.items()},
-            "command": solution.command[i].tolist() if lengths is None else None,
-            **({} if lengths is None else {"command_lengths_m": lengths[i].tolist()}),
-            "pose": solution.pose[i].tolist(),
-            "deviation_m": solution.deviation[i, :3].tolist() if lengths is None else None,
-            "rotation_rad": solution.deviation[i, 3:].tolist() if lengths is None else None,
-            "tensions_N": solution.tensions[i].tolist(),
-            "slack": [name for name, s in zip(names, solution.slack[i], strict=True) if s],
-            "rest_lengths_m": solution.rest_lengths[i].tolist(),
-            "status": solution.status[i].name.lower(),
-            "iterations": int(solution.iterations[i]),
-            "residual": float(solution.residual[i]),
-            "smallest_eigenvalue": float(eigenvalues[i]),
-            **_jumps_of(solution, i),
-            **_spread_of(spread, i),
+
+    solution: Solution
+    lengths: Array | None = None
+    more: Mapping[str, Sequence[Any]] = field(default_factory=dict)
+    spread: Spread | None = None
+
+    def as_json(self) -> list[Record]:
+        """``rows`` in ``sweep.json``."""
+        found, spread = self.solution, self.spread
+        commanded, none = self.lengths is None, [None] * len(found)
+        columns = {
+            **({} if found.line is None else {"line": found.line}),
+            **self.more,
+            "command": found.command if commanded else none,
+            **({} if self.lengths is None else {"command_lengths_m": self.lengths}),
+            "pose": found.pose,
+            "deviation_m": found.deviation[:, :3] if commanded else none,
+            "rotation_rad": found.deviation[:, 3:] if commanded else none,
+            "tensions_N": found.tensions,
+            "slack": self._slack(),
+            "rest_lengths_m": found.rest_lengths,
+            "status": found.status,
+            "iterations": found.iterations,
+            "residual": found.residual,
+            "smallest_eigenvalue": found.smallest_eigenvalue,
+            **({} if found.jumps is None else {"jumps": found.jumps}),
         }
-        for i in range(len(solution))
-    ]
-
-
-def _jumps_of(solution: Solution, i: int) -> Record:
-    if solution.jumps is None:
-        return {}
-    return {
-        "jumps": [
-            {
-                "command": jump.command.tolist(),
-                "before": jump.before.tolist(),
-                "after": jump.after.tolist(),
-                "energy_J": jump.energy,
-                "certain": jump.certain,
+        if spread is not None:
+            columns |= {
+                "position_stderr_m": spread.position,
+                "rotation_stderr_rad": spread.rotation,
+                "seen_stderr": spread.seen,
+                "tensions_stderr_N": spread.tensions,
             }
-            for jump in solution.jumps[i]
-        ]
-    }
+        return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+    def csv_text(self) -> str:
+        """``sweep.csv``; its commands are read again as a list of commands.
+
+        Numbers have all their digits; cells without a number are empty.
+        """
+        found, spread = self.solution, self.spread
+        cables = [str(k + 1) for k in range(found.robot.n_cables)]
+        columns = {k: self.more[k] for k in ("run", "t_s", "temperature_C") if k in self.more}
+        if self.lengths is None:
+            columns |= _named("cmd_{}", COORDINATES, found.command)
+        else:
+            columns |= _named("length_{}_m", cables, self.lengths)
+        columns |= _named("pose_{}", COORDINATES, found.pose)
+        if self.lengths is None:
+            columns |= _named("deviation_{}_m", "xyz", found.deviation[:, :3])
+            columns |= _named("rotation_{}_rad", "xyz", found.deviation[:, 3:])
+        columns |= _named("tension_{}_N", cables, found.tensions)
+        if spread is not None:
+            columns |= _named("pose_{}_stderr_m", "xyz", spread.position)
+            columns |= _named("rotation_{}_stderr_rad", "xyz", spread.rotation)
+            columns |= _named("cable_{}_stderr_N", cables, spread.tensions)
+        columns |= {
+            "status": [status.name.lower() for status in found.status],
+            "residual": found.residual.tolist(),
+            "smallest_eigenvalue": found.smallest_eigenvalue.tolist(),
+            "slack": [" ".join(names) for names in self._slack()],
+        }
+        out = io.StringIO()
+        writer = csv.writer(out, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(map(_cell, row) for row in zip(*columns.values(), strict=True))
+        return out.getvalue()
+
+    def _slack(self) -> list[list[str]]:
+        """Names of the slack cables of each row."""
+        names = np.array(self.solution.robot.cable_names)
+        return [names[row].tolist() for row in self.solution.slack]
 
 
-def _spread_of(spread: Spread | None, i: int) -> Record:
-    if spread is None:
-        return {}
-    return {
-        "position_stderr_m": spread.position[i].tolist(),
-        "rotation_stderr_rad": spread.rotation[i].tolist(),
-        "seen_stderr": spread.seen[i].tolist(),
-        "tensions_stderr_N": spread.tensions[i].tolist(),
-    }
-
-
-def csv_text(rows: Sequence[Record]) -> str:
-    """Rows as a CSV; its commands are read again as a list of commands.
-
-    Numbers have all their digits; cells without a number are empty.
-    """
-    table = [_flat(row) for row in rows]
-    out = io.StringIO()
-    writer = csv.DictWriter(out, list(table[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(table)
-    return out.getvalue()
-
-
-def _flat(row: Record) -> dict[str, str]:
-    """One row of sweep.json as cells by column."""
-    m = len(row["tensions_N"])
-    cables = [str(i + 1) for i in range(m)]
-    out: dict[str, Any] = {key: row[key] for key in ("run", "t_s", "temperature_C") if key in row}
-    if row["command"] is not None:
-        out |= _named("cmd_{}", _POSE, row["command"])
-    else:
-        out |= _named("length_{}_m", cables, row["command_lengths_m"])
-    out |= _named("pose_{}", _POSE, row["pose"])
-    if row["deviation_m"] is not None:
-        out |= _named("deviation_{}_m", "xyz", row["deviation_m"])
-        out |= _named("rotation_{}_rad", "xyz", row["rotation_rad"])
-    out |= _named("tension_{}_N", cables, row["tensions_N"])
-    if "position_stderr_m" in row:
-        out |= _named("pose_{}_stderr_m", "xyz", row["position_stderr_m"])
-        out |= _named("rotation_{}_stderr_rad", "xyz", row["rotation_stderr_rad"])
-        out |= _named("cable_{}_stderr_N", cables, row["tensions_stderr_N"])
-    out |= {key: row[key] for key in ("status", "residual", "smallest_eigenvalue")}
-    out["slack"] = " ".join(row["slack"])
-    return {name: _cell(value) for name, value in out.items()}
-
-
-def _named(pattern: str, names: Sequence[str], values: Sequence[float]) -> dict[str, Any]:
-    return {pattern.format(name): value for name, value in zip(names, values, strict=True)}
+def _named(pattern: str, names: Sequence[str], values: Array) -> dict[str, Sequence[Any]]:
+    """Columns of a table (n, k) under the pattern's name of each."""
+    columns = zip(names, values.T.tolist(), strict=True)
+    return {pattern.format(name): column for name, column in columns}
 
 
 def _cell(value: Any) -> str:

@@ -16,8 +16,7 @@ from seecr.inverse import correct
 from seecr.maps import boundary, workspace_map
 from seecr.mjcf import load_robot
 from seecr.model import Model
-from seecr.report.corrections import chance_lines, document_of
-from seecr.report.maps import document_of as map_document
+from seecr.report.corrections import chance_lines
 from seecr.report.maps import likely_lines, write_arrays
 from seecr.shipped import model_path
 from seecr.solution import Solution
@@ -72,7 +71,7 @@ def test_tensions_keep_their_limits_as_often_as_drawn_models_say(tmp_path: Path)
     assert 0.02 < said.min() < 0.9
     (line,) = chance_lines(found, said)
     assert line.startswith(f"tensions stay within the limits with probability {said.min():.2f}")
-    assert document_of(found, said)["rows"][1]["within_limits_probability"] == said[1]
+    assert found.as_json(said)["rows"][1]["within_limits_probability"] == said[1]
     assert list(chance_lines(found, None)) == []
 
 
@@ -122,7 +121,7 @@ def test_a_map_has_the_probabilities_of_its_poses(tmp_path: Path) -> None:
     (line,) = likely_lines(found, 0.95)
     expected_line = f"with a probability of 0.95 or more {sure} poses can be held, "
     assert line == f"{expected_line}{0.02 * sure:.4g} m"
-    assert map_document(found, 0.95)["likely"]["size"] == pytest.approx(0.02 * sure)
+    assert found.as_json(0.95)["likely"]["size"] == pytest.approx(0.02 * sure)
     write_arrays(tmp_path / "map.npz", found)
     with np.load(tmp_path / "map.npz") as kept:
         np.testing.assert_array_equal(kept["probability"], found.chance)

@@ -23,7 +23,7 @@ from seecr.planar import bar_tilt
 from seecr.pose import quat_from_rotvec
 from seecr.recording.workspace import write_map_recording
 from seecr.report.figures import map_figure
-from seecr.report.maps import document_of, softest_line
+from seecr.report.maps import softest_line
 from seecr.robot import Robot
 from seecr.shipped import model_path
 from seecr.workspace import balance_equations, feasible, tension_margin, unbalanced
@@ -163,10 +163,10 @@ def test_a_map_is_what_each_pose_says(tmp_path: Path) -> None:
         np.abs(found.softest[1, 0, 1]), np.abs(alone.softest_direction[0]), rtol=1e-3, atol=1e-4
     )
     at = np.unravel_index(np.argmin(np.where(found.feasible, found.stiffness, np.inf)), (5, 2, 2))
-    said, told = next(softest_line(found)), document_of(found)["softest_where_feasible"]
+    said, told = next(softest_line(found)), found.as_json()["softest_where_feasible"]
     assert f"{found.stiffness[at]:.4g} N/m" in said
     assert f"x y z {1e3 * axes[0][at[0]]:.4g} " in said
-    assert told["direction"] == found.softest[at].tolist()
+    assert told["direction"].tolist() == found.softest[at].tolist()
     assert len(found.records()) == 20
     assert found.records()[0]["softest_rz_rad"] == found.softest[0, 0, 0, 5]
     assert f"{int(found.feasible.sum())} of 20 poses can be held" in str(found)
