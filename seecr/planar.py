@@ -29,8 +29,9 @@ def bar_tilt(exit_points: ArrayLike, positions: ArrayLike, half_length: float = 
         A = Y1 X2 + Y2 X1,  B = 2 X1 X2,  X_i = a_ix - p_x,  Y_i = a_iy - p_y,
 
     which the paper gives for any bar but which holds only as the half length goes to zero.
-    Else it is the root of :func:`bar_equation`, to rounding; of several roots the one at which
-    both cables pull and the bar rests stably, the most level of those.
+    Else it is where the lines of both cables and of the weight meet in one point, to rounding; of
+    several such tilts the one at which both cables pull and the bar rests stably, the most level
+    of those.
 
     Args:
         exit_points: a_1, a_2, (2, 2) [m].
@@ -73,8 +74,9 @@ def bar_equilibria(
 ) -> tuple[BarRest, ...]:
     """All tilts at which a bar on two cables is in balance at a position, by tilt.
 
-    The roots of :func:`bar_equation`, whose quartic in exp(i theta) has two or four of them. The
-    paper speaks of a unique one; where there are more, several can be stable.
+    The lines of both cables and of the weight meet in one point there: the roots of a quartic in
+    exp(i theta), two or four. The paper speaks of a unique one; where there are more, several can
+    be stable.
 
     Args:
         exit_points: (2, 2) [m].
@@ -112,27 +114,6 @@ def solution_manifold(
     """
     grid = np.stack(np.meshgrid(np.asarray(x, float), np.asarray(y, float)), axis=-1)
     return bar_tilt(exit_points, grid, half_length)
-
-
-def bar_equation(
-    theta: ArrayLike, exit_points: ArrayLike, positions: ArrayLike, half_length: float = 0.0
-) -> Array:
-    """Zero where the lines of both cables and of the weight meet in one point, (...) [m^2].
-
-        -2 X1 X2 sin + h sin cos (X1 - X2) + cos (Y1 X2 + Y2 X1) + h cos^2 (Y2 - Y1)
-
-    with X_i = a_ix - p_x and Y_i = a_iy - p_y: the torque about the bar's middle of the two
-    forces that balance its weight, cleared of denominators. It replaces eqs 5 and 6 for a bar
-    of half length h.
-
-    Args:
-        theta: (...) [rad].
-        exit_points: (2, 2) [m].
-        positions: (..., 2) [m].
-        half_length: h [m].
-    """
-    to_exit = _points(exit_points, 2) - np.asarray(positions, float)[..., None, :]
-    return _equation(np.asarray(theta, float), to_exit, half_length)[0]
 
 
 def midline_point(exit_points: ArrayLike, anchor_points: ArrayLike) -> Array:
@@ -191,7 +172,14 @@ def _point_tilt(to_exit: Array) -> Array:
 
 
 def _equation(theta: Array, to_exit: Array, h: float) -> tuple[Array, Array]:
-    """Left side of :func:`bar_equation` and its derivative by theta."""
+    """Zero where the lines of both cables and of the weight meet in one point; its derivative.
+
+        -2 X1 X2 sin + h sin cos (X1 - X2) + cos (Y1 X2 + Y2 X1) + h cos^2 (Y2 - Y1)
+
+    with X_i = a_ix - p_x and Y_i = a_iy - p_y: the torque about the bar's middle of the two
+    forces that balance its weight, cleared of denominators. It replaces eqs 5 and 6 for a bar
+    of half length h.
+    """
     x1, y1 = to_exit[..., 0, 0], to_exit[..., 0, 1]
     x2, y2 = to_exit[..., 1, 0], to_exit[..., 1, 1]
     s, c = np.sin(theta), np.cos(theta)

@@ -191,9 +191,6 @@ class Settler:
         pose: Array,
         rest_lengths: Array,
         *,
-        ea: Array | None = None,
-        wrench: Array | None = None,
-        gravity: Array | None = None,
         observe: Observer | None = None,
     ) -> Settling:
         """Bring the platform to rest from a pose.
@@ -201,16 +198,13 @@ class Settler:
         Args:
             pose: (7,) where it starts at rest, the commanded pose.
             rest_lengths: (m,) [m].
-            ea: (m,) [N]; None takes the settler's.
-            wrench: (6,) [N, N m], constant, at the platform's origin in the base frame.
-            gravity: (3,) [m/s^2]; None takes the MJCF's.
             observe: called with the physics after each step of stage 1.
 
         Raises:
             CrosscheckError: a wrong shape, or numbers that are no lengths or stiffnesses.
         """
         physics = self.physics
-        self._prepare(pose, rest_lengths, ea, wrench, gravity)
+        self._prepare(pose, rest_lengths)
         rest = self._rest(observe)
         for nudges in range(1 + _NUDGES):
             if rest.status is not SettleStatus.SETTLED:
@@ -224,29 +218,14 @@ class Settler:
             rest = self._rest(observe).after(rest)
         return _result(physics, rest, polished, settled_pose, nudges)
 
-    def energy(
-        self,
-        pose: Array,
-        rest_lengths: Array,
-        *,
-        ea: Array | None = None,
-        wrench: Array | None = None,
-        gravity: Array | None = None,
-    ) -> float:
+    def energy(self, pose: Array, rest_lengths: Array) -> float:
         """Potential energy [J] in MuJoCo at a pose (7,), see :meth:`Physics.energy`."""
-        self._prepare(pose, rest_lengths, ea, wrench, gravity)
+        self._prepare(pose, rest_lengths)
         return self.physics.energy()
 
-    def _prepare(
-        self,
-        pose: Array,
-        rest_lengths: Array,
-        ea: Array | None,
-        wrench: Array | None,
-        gravity: Array | None,
-    ) -> None:
-        self.physics.set_cables(rest_lengths, self.ea if ea is None else ea)
-        self.physics.set_load(wrench, gravity)
+    def _prepare(self, pose: Array, rest_lengths: Array) -> None:
+        self.physics.set_cables(rest_lengths, self.ea)
+        self.physics.set_load()
         self.physics.place(pose)
 
     def _rest(self, observe: Observer | None) -> Rest:
@@ -254,16 +233,13 @@ class Settler:
         return come_to_rest(self.physics, tolerance, self.max_steps, observe)
 
 
-def settle_batch(
-    settler: Settler, poses: Array, rest_lengths: Array, *, wrench: Array | None = None
-) -> SettlingBatch:
+def settle_batch(settler: Settler, poses: Array, rest_lengths: Array) -> SettlingBatch:
     """Settle many poses, each from its own commanded pose, so that their order is irrelevant.
 
     Args:
         settler: the robot.
         poses: (n, 7).
         rest_lengths: (n, m) [m].
-        wrench: (6,) or (n, 6) [N, N m].
     """
     poses = np.asarray(poses, dtype=float)
     n = len(poses)
@@ -272,9 +248,8 @@ def settle_batch(
             f"poses and rest_lengths: expected (n, 7) and (n, {settler.physics.n_cables}), "
             f"got {poses.shape} and {np.shape(rest_lengths)}"
         )
-    loads = np.broadcast_to(np.zeros(6) if wrench is None else wrench, (n, 6))
-    rows = zip(poses, np.asarray(rest_lengths, dtype=float), loads, strict=True)
-    return SettlingBatch(settler.settle(pose, rest, wrench=load) for pose, rest, load in rows)
+    rows = zip(poses, np.asarray(rest_lengths, dtype=float), strict=True)
+    return SettlingBatch(settler.settle(pose, rest) for pose, rest in rows)
 
 
 def _result(

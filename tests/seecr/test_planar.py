@@ -6,12 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 
 from seecr.equilibrium import solve
 from seecr.errors import InputError
 from seecr.mjcf import load_robot
-from seecr.planar import bar_equation, bar_equilibria, bar_tilt, midline_point, solution_manifold
+from seecr.planar import bar_equilibria, bar_tilt, midline_point, solution_manifold
 from seecr.pose import transform_points
 from seecr.robot import Robot
 from seecr.shipped import model_path
@@ -70,7 +69,6 @@ def test_the_root_is_exact_and_the_forces_really_balance(h: float) -> None:
         exits = np.array([rng.uniform([-1, 0.6], [-0.5, 1.5]), rng.uniform([0.5, 0.6], [1, 1.5])])
         place = rng.uniform([-0.4, -1], [0.4, 0.1])
         theta = float(bar_tilt(exits, place, h))
-        assert abs(float(bar_equation(theta, exits, place, h))) < 1e-14
         ends = h * np.array([[-1.0], [1.0]]) * [np.cos(theta), np.sin(theta)]
         pulls = exits - (place + ends)
         tension = np.linalg.solve(pulls.T, [0.0, 1.0])  # over lengths; weight 1
@@ -100,14 +98,15 @@ def test_of_two_ways_to_hang_the_more_level_one_is_taken() -> None:
     exits, place, h = [[-0.277, 0.974], [0.170, 0.653]], [-0.010, -0.998], 0.011
     theta = float(bar_tilt(exits, place, h))
     assert np.rad2deg(theta) == pytest.approx(43.685, abs=1e-3)
-    below, above = (float(bar_equation(t, exits, place, h)) for t in (-2.5, -2.4))
-    assert below * above < 0  # the other root
+    other = [one for one in bar_equilibria(exits, place, h) if -2.5 < one.theta < -2.4]
+    assert [one.stable for one in other] == [True]
 
 
 def test_a_balanced_bar_that_would_topple_is_no_answer() -> None:
     """Both cables pull at 106.8 degrees and the forces meet, but SEECR leaves the pose."""
     exits, place, h = np.array([[-0.19, 0.55], [0.09, -0.48]]), np.array([0.01, -0.4]), 0.47
-    theta = brentq(bar_equation, np.deg2rad(106), np.deg2rad(107.5), args=(exits, place, h))
+    tilts = [one.theta for one in bar_equilibria(exits, place, h)]
+    (theta,) = [t for t in tilts if 106 < np.rad2deg(t) < 107.5]
     assert np.isnan(bar_tilt(exits, place, h))
     robot = planar("two_cable", 1e5)
     robot = replace(
@@ -307,7 +306,12 @@ def test_all_ways_of_a_bar_to_be_in_balance_are_found() -> None:
     exits, here, h = np.array([[0.0, 1.0], [1.0, 1.0]]), np.array([0.3, 0.5]), 0.1
     found = bar_equilibria(exits, here, h)
     grid = np.linspace(-np.pi, np.pi, 20001)
-    values = bar_equation(grid, exits, here, h)
+    # both cables' forces that lift the weight, and their torque about the middle, cleared of
+    # the determinant that they are divided by
+    arms = h * np.array([[[-1.0]], [[1.0]]]) * np.stack([np.cos(grid), np.sin(grid)], axis=-1)
+    one, two = pulls = exits[:, None] - here - arms
+    turn = arms[..., 0] * pulls[..., 1] - arms[..., 1] * pulls[..., 0]
+    values = one[:, 0] * turn[1] - two[:, 0] * turn[0]
     crossings = np.flatnonzero(np.diff(np.sign(values)) != 0)
     np.testing.assert_allclose([one.theta for one in found], grid[crossings], atol=4e-4)
     assert bar_tilt(exits, here, h) in [one.theta for one in found if one.stable]

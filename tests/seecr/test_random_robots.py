@@ -47,9 +47,9 @@ def test_a_cable_one_per_mille_stiffer_is_seen(tmp_path: Path) -> None:
     pose = random_poses(rng, robot, 1)
     answer = solve(robot, pose)
     taut = int(np.argmax(answer.tensions[0]))
-    settler = Settler(write_mjcf(robot, tmp_path / "robot.xml"))
     ea = robot.ea.copy()
     ea[taut] *= 1.001
-    settled = settler.settle(pose[0], answer.rest_lengths[0], ea=ea)
+    settler = Settler(write_mjcf(robot, tmp_path / "robot.xml"), ea=ea)
+    settled = settler.settle(pose[0], answer.rest_lengths[0])
     away = pose_difference(settled.pose, answer.pose[0])
     assert np.linalg.norm(away[:3]) > 1e-6 * robot.length

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import partial
 from pathlib import Path
 
 import mujoco
@@ -92,6 +93,12 @@ def settler(points, **options):
     keys = ("tolerance", "max_steps")
     own = {k: options.pop(k) for k in keys if k in options}
     return Settler(mujoco.MjModel.from_xml_string(mjcf(*points, **options)), **own)
+
+
+def loaded(one, wrench):
+    """The settler with a wrench on the platform besides the MJCF's own gravity."""
+    one.physics.set_load = partial(Physics.set_load, one.physics, wrench)
+    return one
 
 
 def poses_at(positions):
@@ -212,30 +219,27 @@ def test_very_light_and_very_heavy_platforms(mass):
 def test_wrench_gravity_and_centre_of_mass_balance():
     rng = np.random.default_rng(5)
     com = np.array([0.01, -0.005, 0.008])
-    one = settler(COGIRO, com=com, ea=3000.0)
+    gravity = np.array([1.0, -0.5, -9.0])
+    option = f'<option gravity="{text(gravity)}"/>'
+    one = settler(COGIRO, com=com, ea=3000.0, extra=option)
     pose = poses_at(HOME)[0]
     rest = nominal(COGIRO, pose[None])[0]
-    gravity = np.array([1.0, -0.5, -9.0])
     for _ in range(4):
         load = np.concatenate([rng.uniform(-1, 1, 3), rng.uniform(-0.02, 0.02, 3)])
-        result = one.settle(pose, rest, wrench=load, gravity=gravity)
+        result = loaded(one, load).settle(pose, rest)
         assert result.settled
         force, torque, _ = unbalanced(COGIRO, result, rest, 3000.0, load, com, gravity=gravity)
         assert np.linalg.norm(force) < 1e-8
         assert np.linalg.norm(torque) < 1e-9
-    # The next call is not told of a load: there is none but the MJCF's own gravity.
-    force, torque, _ = unbalanced(COGIRO, one.settle(pose, rest), rest, 3000.0, np.zeros(6), com)
-    assert np.linalg.norm(force) < 1e-8
-    assert np.linalg.norm(torque) < 1e-9
 
 
 def test_a_pretensioned_robot_settles_without_any_load():
     exits = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
     anchors = 0.05 * exits[::-1] * [1, -1, -1]
     pose = np.concatenate([[0.02, 0.01, -0.03], quat_from_rotvec(np.array([0.02, 0.01, 0.0]))])
-    one = settler((exits, anchors), home=(0, 0, 0))
+    one = settler((exits, anchors), home=(0, 0, 0), extra='<option gravity="0 0 0"/>')
     rest = 0.99 * nominal((exits, anchors), poses_at([0, 0, 0]))[0]
-    result = one.settle(pose, rest, gravity=np.zeros(3))
+    result = one.settle(pose, rest)
     assert result.settled
     assert np.linalg.norm(result.pose[:3]) < 1e-9
     assert not result.slack.any()
@@ -419,33 +423,22 @@ def test_the_order_does_not_matter():
     assert backwards.pose[::-1].tolist() == alone.pose.tolist()
     assert alone.slack.shape == (7, 8)
     assert alone.slack.dtype == bool
-
-
-def test_a_batch_takes_one_load_or_one_per_pose():
-    poses = random_poses(2)
-    rest = nominal(COGIRO, poses)
-    one = settler(COGIRO)
-    loads = np.array([[0, 0, -1.0, 0, 0, 0], [0.5, 0, 0, 0, 0, 0]])
-    each = settle_batch(one, poses, rest, wrench=loads)
-    same = settle_batch(one, poses, rest, wrench=loads[0])
-    assert each.pose[0].tolist() == same.pose[0].tolist()
-    assert np.linalg.norm(each.pose[1] - same.pose[1]) > 1e-5
     with pytest.raises(AttributeError, match="a settling has no poses"):
-        _ = each.poses
+        _ = alone.poses
 
 
 def test_energy_is_least_at_rest_and_its_slope_is_the_wrench():
     pose = poses_at([0.17, 0.25, 0.1])[0]
     rest = nominal(PARALLEL, pose[None])[0]
-    one, load = settler(PARALLEL), np.array([0.3, -0.2, 0.5, 0, 0, 0])
-    answer = one.settle(pose, rest, wrench=load).pose
-    assert one.energy(answer, rest, wrench=load) < one.energy(pose, rest, wrench=load)
+    one = loaded(settler(PARALLEL), np.array([0.3, -0.2, 0.5, 0, 0, 0]))
+    answer = one.settle(pose, rest).pose
+    assert one.energy(answer, rest) < one.energy(pose, rest)
     for axis in range(3):
         step = 1e-5 * np.eye(7)[axis]
-        up = one.energy(answer + step, rest, wrench=load)
-        down = one.energy(answer - step, rest, wrench=load)
+        up = one.energy(answer + step, rest)
+        down = one.energy(answer - step, rest)
         assert (up - down) / 2e-5 == pytest.approx(0, abs=1e-5)
-        assert up > one.energy(answer, rest, wrench=load)
+        assert up > one.energy(answer, rest)
 
 
 def test_a_motion_falls_and_comes_to_rest():
@@ -558,17 +551,24 @@ def test_a_missing_file_is_refused(tmp_path):
         ({"rest_lengths": np.ones(7)}, r"rest_lengths: expected shape \(8,\), got \(7,\)"),
         ({"rest_lengths": np.array([1, 1, 0, 1, 1, 1, 1, 1.0])}, "got 0 for cable 3"),
         ({"rest_lengths": np.full(8, np.nan)}, "rest_lengths: expected finite numbers"),
-        ({"ea": np.full(8, -1.0)}, r"ea: expected positive numbers \[N\], got -1 for cable 1"),
         ({"pose": np.zeros(6)}, r"pose: expected shape \(7,\), got \(6,\)"),
         ({"pose": np.zeros(7)}, "quaternion of norm 1, got norm 0"),
-        ({"wrench": np.zeros(3)}, r"wrench: expected shape \(6,\)"),
-        ({"gravity": np.array([0, 0, np.inf])}, "gravity: expected finite numbers"),
     ],
 )
 def test_wrong_numbers_are_refused(change, message):
     inputs = {"pose": poses_at(HOME)[0], "rest_lengths": np.ones(8)} | change
     with pytest.raises(CrosscheckError, match=message):
         settler(COGIRO).settle(**inputs)
+
+
+def test_wrong_stiffness_and_load_are_refused():
+    one = settler(COGIRO)
+    with pytest.raises(CrosscheckError, match=r"ea: expected positive numbers \[N\], got -1 for c"):
+        one.physics.set_cables(np.ones(8), np.full(8, -1.0))
+    with pytest.raises(CrosscheckError, match=r"wrench: expected shape \(6,\)"):
+        one.physics.set_load(np.zeros(3))
+    with pytest.raises(CrosscheckError, match="gravity: expected finite numbers"):
+        one.physics.set_load(gravity=np.array([0, 0, np.inf]))
 
 
 def test_a_batch_of_the_wrong_shape_is_refused():
