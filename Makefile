@@ -33,11 +33,13 @@ docs: ## write the pages and pictures made from the sources, and build the site:
 	$(BIN)/python scripts/make_commands.py
 	$(BIN)/python scripts/draw_floors.py
 	$(BIN)/python scripts/make_paper.py
+	$(BIN)/python scripts/link_words.py
 	$(BIN)/python scripts/draw_fall.py
 	$(BIN)/python -m sphinx -q -W --keep-going -c docs -d build/read . build/site
 
 paper: ## every figure and number of docs/paper.md; three minutes
 	$(BIN)/python scripts/make_paper.py
+	$(BIN)/python scripts/link_words.py
 	$(BIN)/python scripts/explain_figure_12.py
 
 pictures: ## docs/pictures by the viewer and a browser; the pages, light and dark, wide and narrow, in pages/

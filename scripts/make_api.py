@@ -17,6 +17,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from link_words import with_links
+
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "api.md"
 PACKAGES = ("crosscheck", "seecr")
 
@@ -46,7 +48,7 @@ def page() -> str:
     for package in PACKAGES:
         face = import_module(package)
         parts += [f"## {package}\n", *_entries(face)]
-    return "\n".join(parts)
+    return with_links("\n".join(parts))
 
 
 def _entries(face: ModuleType) -> Iterator[str]:

@@ -14,6 +14,7 @@ from inspect import cleandoc
 from pathlib import Path
 
 import click
+from link_words import with_links
 
 import crosscheck.cli
 import seecr.cli
@@ -43,7 +44,7 @@ def page() -> str:
             command = group.get_command(context, name)
             assert command is not None
             parts += _command(click.Context(command, info_name=name, parent=context))
-    return "\n".join(parts)
+    return with_links("\n".join(parts))
 
 
 def _command(context: click.Context) -> Iterator[str]:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import draw_effects
 import draw_floors
+import link_words
 import make_api
 import make_commands
 import make_effects
@@ -38,6 +39,19 @@ def test_links_lead_somewhere(page: Path) -> None:
         other = page.parent / name if name else page
         assert other.exists(), target
         assert not anchor or anchor in anchors(other.read_text(encoding="utf-8")), target
+
+
+@pytest.mark.parametrize("page", link_words.PAGES, ids=lambda p: p.name)
+def test_words_of_the_glossary_are_linked_where_a_page_first_uses_them(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    if page.name != "glossary.md":
+        assert link_words.with_links(text) == text, "run: python scripts/link_words.py"
+
+
+def test_a_word_without_its_link_is_seen() -> None:
+    once = "On `runs left out`, and on [runs left\nout](glossary.md); runs left out."
+    assert link_words.with_links(once.replace("[", "").replace("](glossary.md)", "")) == once
+    assert link_words.with_links(once) == once
 
 
 def test_the_page_about_effects_is_current() -> None:

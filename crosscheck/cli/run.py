@@ -85,9 +85,10 @@ def command(
     fishing line, along the paper's sweeps (x 0.17 to 0.63 m at z 0.1 and 0.2 m), turned on the
     way, and at 200 random poses each; two tilted commands with which the parallel one rests at
     either of two poses, each begun so that it comes to both; three planar robots; a DemoBot with
-    uneven cables, one with its centre of mass off. After them the group 'effects': every effect
-    on both DemoBots, held against a robot in MuJoCo that really has it (--case effects runs only
-    these).
+    uneven cables, one with its centre of mass off; robots of other sizes and kinds, cogiro-large,
+    ipanema and camera, along a sweep and at random poses. After them the group 'effects': every
+    effect on both DemoBots, held against a robot in MuJoCo that really has it (--case effects runs
+    only these).
 
     A pose where the platform is free to move, or has two stable equilibria that both physics
     confirm, is a finding: it is listed, and fails its case where the thresholds' [findings] do

@@ -17,6 +17,7 @@ from click.testing import CliRunner, Result
 from crosscheck.cli import COMMANDS, main
 from crosscheck.suite import effects as effect_suite
 from crosscheck.suite import run as suite
+from crosscheck.suite.cases import shipped_cases
 from crosscheck.twin.robot import TRUE_EFFECTS
 from seecr.cli.group import LazyGroup
 from seecr.shipped import model_path
@@ -308,6 +309,16 @@ def test_help_is_quick_and_imports_nothing_heavy():
     for name, (_, line) in COMMANDS.items():
         assert name in done.stdout
         assert line.split(",")[0].split(":")[0][:20] in done.stdout
+
+
+def test_run_help_names_the_robots_of_all_shipped_cases():
+    words = " ".join(run("run", "--help").stdout.split()).lower()
+    names = {case.model.stem.removeprefix("demobot_") for case in shipped_cases()}
+    told = {"off_centre": "centre of mass off"} | {
+        name: "planar" for name in names if name.startswith("planar")
+    }
+    assert len(names) == 10
+    assert [n for n in names if told.get(n, n.replace("_", "-")) not in words] == []
 
 
 def test_run_help_shows_examples_without_running(monkeypatch):
