@@ -51,7 +51,7 @@ def command(
     """
     from seecr import barriers, equilibria, predict, solve, spread_of
     from seecr.files import json_text, staged, write_text
-    from seecr.report.rows import Rows
+    from seecr.report.rows import SweepRows
     from seecr.report.words import (
         at_rest,
         cable_lines,
@@ -79,11 +79,11 @@ def command(
         "exit_status": status,
         "robot": machine.name,
         "cables": machine.cable_names,
-        **Rows(solution, spread=spread).as_json()[0],
+        **SweepRows(solution, spread=spread).as_json()[0],
         "sentence": solution.sentence(0),
         "softest_direction": softest_words(solution),
         "frequencies_Hz": solution.frequencies[0],
-        "equilibria": None if others is None else Rows(others),
+        "equilibria": None if others is None else SweepRows(others),
         "barriers": passes,
         "notes": notes,
     }

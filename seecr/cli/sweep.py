@@ -93,7 +93,7 @@ def command(
     from seecr import solve, spread_of
     from seecr.files import json_text, staged, write_text
     from seecr.report.figures import sweep_figure
-    from seecr.report.rows import Rows
+    from seecr.report.rows import SweepRows
     from seecr.report.words import at_rest, jump_lines, sweep_lines
 
     machine = robot_at(robot, cable)
@@ -103,7 +103,7 @@ def command(
         solution = solve(machine, commands, effects=own or (), follow=follow)
         spread = None if own is None else spread_of(machine, commands, own)
         commanded = commands.lengths is None
-        rows = Rows(solution, commands.lengths, more, spread)
+        rows = SweepRows(solution, commands.lengths, more, spread)
         status = 0 if at_rest(solution) else 3
         notes = [*(own.notes if own else ()), *said]
         document = {

@@ -15,11 +15,11 @@ from seecr.result import COORDINATES, Record
 from seecr.solution import Solution
 from seecr.uncertainty import Spread
 
-__all__ = ["Rows"]
+__all__ = ["SweepRows"]
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class SweepRows:
     """Answers of n commands as files have them, one row per command, SI units.
 
     Attributes:

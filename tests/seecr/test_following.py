@@ -14,7 +14,7 @@ from seecr.equilibrium import solve
 from seecr.errors import InputError
 from seecr.mjcf import load_robot
 from seecr.pose import Array, pose_difference, quat_from_rotvec
-from seecr.report.rows import Rows
+from seecr.report.rows import SweepRows
 from seecr.report.words import jump_lines
 from seecr.robot import Robot
 from seecr.shipped import model_path
@@ -97,7 +97,7 @@ def test_where_a_rest_ends_the_platform_jumps() -> None:
     assert np.abs(pose_difference(settled.pose, jump.after)).max() < 1e-4
     (line,) = jump_lines(led)
     assert line.startswith("on the way to pose 1, at command 400.0, 250.0, 150.0 mm: its rest ends")
-    assert Rows(led).as_json()[1]["jumps"][0].as_json()["energy_J"] == jump.energy
+    assert SweepRows(led).as_json()[1]["jumps"][0].as_json()["energy_J"] == jump.energy
 
 
 def test_a_way_back_ends_where_it_began_and_lengths_are_followed_alike() -> None:

@@ -13,7 +13,7 @@ from seecr.equilibrium import solve
 from seecr.errors import InputFileError
 from seecr.files import json_text
 from seecr.pose import pose_difference
-from seecr.report.rows import Rows
+from seecr.report.rows import SweepRows
 from seecr.report.words import cable_lines, pose_lines, sweep_lines
 from seecr.uncertainty import covariance_of, spread_of
 from seecr.units import with_error
@@ -123,7 +123,7 @@ def test_it_is_printed_and_written(tmp_path: Path) -> None:
     x, error = with_error(1e3 * found.pose[0, 0], 1e3 * spread.position[0, 0])
     assert f"rests at x y z {x}, " in lines[1] and f"± {error}" in lines[2]
     assert sweep_lines(found, spread=spread)[-1].startswith("off by up to ± 0.")
-    rows = Rows(found, spread=spread)
+    rows = SweepRows(found, spread=spread)
     assert rows.as_json()[1]["position_stderr_m"].tolist() == spread.position[1].tolist()
     assert "pose_z_stderr_m" in rows.csv_text().splitlines()[0]
-    assert "stderr" not in json_text({"rows": Rows(found)})
+    assert "stderr" not in json_text({"rows": SweepRows(found)})

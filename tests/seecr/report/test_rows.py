@@ -1,4 +1,4 @@
-"""Rows, words, figure and recording of a sweep say what the solution says."""
+"""SweepRows, words, figure and recording of a sweep say what the solution says."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from seecr.mjcf import load_robot
 from seecr.recording.sweep import write_sweep_recording
 from seecr.report.corrections import chance_lines
 from seecr.report.figures import sweep_figure
-from seecr.report.rows import Rows
+from seecr.report.rows import SweepRows
 from seecr.report.words import at_rest, cable_lines, pose_lines, sweep_lines
 from seecr.shipped import model_path
 from seecr.solution import Solution, Status
@@ -32,7 +32,7 @@ def sweep() -> Solution:
 
 
 def test_rows_are_the_solution(sweep: Solution) -> None:
-    rows = json.loads(json_text({"rows": Rows(sweep)}))["rows"]
+    rows = json.loads(json_text({"rows": SweepRows(sweep)}))["rows"]
     np.testing.assert_array_equal([row["pose"] for row in rows], sweep.pose)
     np.testing.assert_array_equal([row["command"] for row in rows], POSES)
     away = [[*row["deviation_m"], *row["rotation_rad"]] for row in rows]
@@ -43,10 +43,10 @@ def test_rows_are_the_solution(sweep: Solution) -> None:
 
 def test_the_csv_is_read_again_as_commands(sweep: Solution, tmp_path: Path) -> None:
     path = tmp_path / "sweep.csv"
-    path.write_text(Rows(sweep).csv_text())
+    path.write_text(SweepRows(sweep).csv_text())
     np.testing.assert_array_equal(read_commands(path, sweep.robot).commands.pose, POSES)
     lengths = sweep.rest_lengths
-    path.write_text(Rows(sweep, lengths).csv_text())
+    path.write_text(SweepRows(sweep, lengths).csv_text())
     again = read_commands(path, sweep.robot).commands.lengths
     np.testing.assert_array_equal(np.asarray(again), lengths)
 
@@ -66,10 +66,10 @@ def test_rows_of_a_file_are_told_by_their_lines(tmp_path: Path) -> None:
     (said,) = chance_lines(wanted, np.array([0.9, 0.2, 0.7]))
     assert "with probability 0.20 at line 5, the least" in said
     assert [row["line"] for row in wanted.as_json()["rows"]] == [3, 5, 6]
-    assert [row["line"] for row in Rows(found).as_json()] == [3, 5, 6]
+    assert [row["line"] for row in SweepRows(found).as_json()] == [3, 5, 6]
     # without a file they count as they do in Python
     assert "command: pose 2, by" in solve(robot, commands.pose).lines()[1]
-    assert "line" not in Rows(solve(robot, commands.pose)).as_json()[0]
+    assert "line" not in SweepRows(solve(robot, commands.pose)).as_json()[0]
 
 
 def test_words_of_a_pose(sweep: Solution) -> None:
@@ -85,8 +85,8 @@ def test_a_pose_without_rest_has_no_numbers(sweep: Solution) -> None:
     lost = replace(sweep, pose=np.full((3, 7), np.nan), status=status)
     assert list(pose_lines(lost)) == [f"demobot_parallel: {Status.FALLING.value}"]
     assert at_rest(sweep) and not at_rest(lost)
-    assert Rows(lost).as_json()[0]["status"] is Status.FALLING
-    assert ",,,,,,," in Rows(lost).csv_text()
+    assert SweepRows(lost).as_json()[0]["status"] is Status.FALLING
+    assert ",,,,,,," in SweepRows(lost).csv_text()
 
 
 @pytest.mark.slow
