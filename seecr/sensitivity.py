@@ -25,6 +25,7 @@ from seecr.joints import motion_columns
 from seecr.pose import Array, pose_add, quat_conjugate, quat_multiply, rotvec_from_quat
 from seecr.shifts import Shift, Sides, blocks_of_cables, positions, shifted
 from seecr.tables import Tables
+from seecr.threads import run_parts
 
 # Differencing step of a walk that is repeated, in plausible sizes of a parameter.
 _WALK = 1e-4
@@ -266,16 +267,28 @@ def _inverse_stiffness(at: Prediction) -> Array:
 
 def _by_walking(experiment: Experiment, terms: Terms, at: Prediction, wanted: list[int]) -> Array:
     out = np.zeros((*_shape(at), len(wanted)))
-    for c, (term, k) in enumerate(positions(terms, wanted)):
-        out[..., c] = _difference(experiment, shifted(terms, term, k, _WALK), at)
+    where = positions(terms, wanted)
+
+    def run(part: slice) -> None:
+        for c in range(*part.indices(len(where))):
+            term, k = where[c]
+            out[..., c] = _difference(experiment, shifted(terms, term, k, _WALK), at)
+
+    # one walk cannot be parted where creep goes by one clock: the walks are
+    run_parts(run, [slice(c, c + 1) for c in range(len(where))])
     return out
 
 
 def _difference(experiment: Experiment, shift: Shift, at: Prediction) -> Array:
     """Difference of two predictions that are solved in full."""
-    near = None if at.has_history else at
-    ahead = experiment.predict(shift.plus.effects, near)
-    behind = experiment.predict(shift.minus.effects, near)
+    near, sides = None if at.has_history else at, (shift.plus.effects, shift.minus.effects)
+    both: dict[int, Prediction] = {}
+
+    def run(part: slice) -> None:
+        both[part.start] = experiment.predict(sides[part.start], near)
+
+    run_parts(run, [slice(0, 1), slice(1, 2)])
+    ahead, behind = both[0], both[1]
     change = readings_difference(ahead.readings, behind.readings) / shift.apart
     change[~(ahead.solved & behind.solved)] = 0.0
     return np.asarray(change)

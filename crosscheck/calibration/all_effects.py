@@ -7,6 +7,7 @@ asks for them. Size and correlation of the noise come from the fit's own margina
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,6 +34,7 @@ class Calibration:
     Attributes:
         setting: the data. joint: the fit.
         later: all effects that join later, at their most promising shapes, amplitudes at null.
+        prices: of those that did not, what they gain more there than on average over shapes.
         before: rms errors of the model as it stood. after: of this one.
         held_out: on runs left out.
         outliers: (n,) bool rows that hardly count.
@@ -41,6 +43,7 @@ class Calibration:
     setting: Setting
     joint: JointFit
     later: Terms
+    prices: Mapping[str, float]
     before: Rms
     after: Rms
     held_out: LeftOut
@@ -89,6 +92,7 @@ def fit_all_effects(
         setting,
         joint,
         fitted.later,
+        fitted.prices,
         before=rms_by_kind(problem, stood.raw),
         after=rms_by_kind(problem, joint.state.raw),
         held_out=leave_out(setting, joint),

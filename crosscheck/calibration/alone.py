@@ -34,9 +34,9 @@ def fitted_alone(
         later: effects with history or a shape that may be added.
         others: all other effects that may be.
     """
-    late = [inside(term) for term, _gain in promising_beside(setting, plain, later)]
-    promising = sorted(promising_beside(setting, plain, others), key=lambda one: -one[1])
-    tried = [term for term, _gain in promising[:_TRIED]]
+    late = [inside(one.term) for one in promising_beside(setting, plain, later)]
+    promising = sorted(promising_beside(setting, plain, others), key=lambda one: -one.gain)
+    tried = [one.term for one in promising[:_TRIED]]
     return [*_best(setting, plain, late)[:_LATE], *_best(setting, plain, tried)[:_TAKEN]]
 
 

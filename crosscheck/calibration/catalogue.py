@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -32,10 +32,12 @@ class Catalogue:
     Attributes:
         at_once: without history or shapes, at null.
         later: the others, at their most promising shapes.
+        prices: of some of them, the ln evidence that they gain more there than on average.
     """
 
     at_once: Terms
     later: Terms
+    prices: Mapping[str, float] = field(default_factory=dict)
 
     def start(self, name: str) -> Term:
         """An effect as it starts."""

@@ -11,9 +11,10 @@ from crosscheck.calibration.catalogue import Catalogue, gram_about, widths_for
 from crosscheck.calibration.gram import Gram, averaged, best_widths, gram_of
 from crosscheck.calibration.joint import JointFit, Setting, settle
 from crosscheck.calibration.later import at_null
-from crosscheck.calibration.linearised import groups_of, linearised
+from crosscheck.calibration.linearised import Linear, groups_of, linearised
 from crosscheck.calibration.priors import SHAPES
 from crosscheck.calibration.sets import Names, Scores
+from crosscheck.calibration.shapes import log_shares, prices_about
 from crosscheck.fit.possible import can_be
 from crosscheck.fit.state import State, evaluate
 from seecr.effects import Term, Terms
@@ -96,7 +97,10 @@ class Exact:
         gram = gram_about(self.setting, joint, self.catalogue)
         own = joint.terms if own_shapes else ()
         shapes = {t.name: at_null(t) for t in own if t.name in self.catalogue.later}
-        return Scores(gram, len(set(self.catalogue.names) - always), always, shapes)
+        return Scores(
+            gram, len(set(self.catalogue.names) - always), always, shapes,
+            prices_about(self.setting, joint, self.catalogue),
+        )  # fmt: skip
 
     def best_of(self, scores: Scores, some: Iterable[Names]) -> Refit:
         """The best of all that are fitted, these among them."""
@@ -194,17 +198,18 @@ def _scored(
     setting: Setting, joint: JointFit, names: Names, widths: dict[str, float], scores: Scores
 ) -> Refit:
     """A fit with its evidence about its own optimum, averaged over widths."""
-    gram = own_gram(setting, joint)
+    linear = linearised(setting, joint)
+    gram = own_gram(linear, joint)
     inside = {n: widths[n] for n in gram.names}
     better = best_widths(gram, inside)
-    score = averaged(gram, better) + scores.log_prior(names)
+    share = sum(log_shares(joint, linear).values())
+    score = averaged(gram, better) + share + scores.log_prior(names)
     return Refit(names, joint, widths | better, score - 0.5 * joint.state.log_det)
 
 
-def own_gram(setting: Setting, joint: JointFit) -> Gram:
+def own_gram(linear: Linear, joint: JointFit) -> Gram:
     """Normal equations of a fit's own effects about its optimum; those on a bound are absent."""
     groups = groups_of(joint, widths_for)
-    linear = linearised(setting, joint)
     z = np.zeros(len(joint.z))
     for group in groups.values():
         z[group.columns] = joint.z[group.columns]

@@ -8,10 +8,11 @@ their shapes start.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
+from scipy import linalg, special
 
 from crosscheck.calibration.colour import whitened
 from crosscheck.calibration.joint import JointFit, Setting
@@ -24,8 +25,21 @@ from seecr.pose import Array
 
 # An effect joins where it gains this much evidence.
 PAYS = 2.0
-# Neighbouring shapes are alike: about every third is one more chance of its own.
-_ALIKE = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Promising:
+    """What an effect promises beside a joint fit.
+
+    Attributes:
+        term: it, at the shape that promises most, amplitudes at null.
+        gain: ln evidence that it gains, averaged over its shapes.
+        price: ln evidence by which it gains more at that shape than on average.
+    """
+
+    term: Term
+    gain: float
+    price: float
 
 
 def has_inputs(problem: Problem, layout: Layout) -> bool:
@@ -59,10 +73,8 @@ def _waits(problem: Problem, layout: Layout) -> bool:
     return bool(setup.has_history or np.any(setup.cable_weight))
 
 
-def promising_beside(
-    setting: Setting, joint: JointFit, later: Sequence[Layout]
-) -> list[tuple[Term, float]]:
-    """Each with the ln evidence that it gains, less what looking at many shapes costs."""
+def promising_beside(setting: Setting, joint: JointFit, later: Sequence[Layout]) -> list[Promising]:
+    """Effects that could join, each at its most promising shape."""
     beside = _Beside(setting, joint)
     out = []
     for layout in later:
@@ -70,8 +82,9 @@ def promising_beside(
         if not starts:
             continue
         gains = [beside.gain(Term(layout, start)) for start in starts]
-        price = float(np.log(max(1.0, len(starts) / _ALIKE)))
-        out.append((Term(layout, starts[int(np.argmax(gains))]), max(gains) - price))
+        gain = float(special.logsumexp(gains) - np.log(len(gains)))
+        term = Term(layout, starts[int(np.argmax(gains))])
+        out.append(Promising(term, gain, max(gains) - gain))
     return out
 
 

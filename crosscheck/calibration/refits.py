@@ -178,8 +178,8 @@ def swapped(exact: Exact, scores: Scores, best: Refit) -> Refit:
             continue
         least = best.score - rest.score - HOLLOW
         absent = [layout for layout in shaped if layout.name not in best.names]
-        for term, gain in promising_beside(exact.setting, rest.joint, absent):
-            if gain > max(least, 0.0):
-                exact.told(" + ".join(sorted(rest.names | {term.name})))
-                exact.take(scores, Terms([*rest.joint.terms, inside(term)]))
+        for one in promising_beside(exact.setting, rest.joint, absent):
+            if one.gain > max(least, 0.0):
+                exact.told(" + ".join(sorted(rest.names | {one.term.name})))
+                exact.take(scores, Terms([*rest.joint.terms, inside(one.term)]))
     return exact.best_of(scores, [])

@@ -76,7 +76,7 @@ def seek(
     at_once, _later = layouts(problem)
     nulls = (Term(a, a.null) for a in at_once if a.name not in terms)
     here = Terms([*nulls, *(t for t in terms if t.name not in whole.later)])
-    catalogue = Catalogue(here, whole.later)
+    catalogue = Catalogue(here, whole.later, whole.prices)
     plain = evaluate(problem, terms, setting.factor)
     unknown = strange or odds > UNKNOWN or surprise > SURPRISE
     most, rounds = (_REFITTED_UNKNOWN, 1) if unknown else (_REFITTED, ROUNDS)

@@ -41,6 +41,7 @@ class Scores:
         of: how many effects the prior counts.
         always: effects that the model has: in every set, and not counted.
         shapes: effects with a shape as the fit has it about which this is, amplitudes at null.
+        prices: ln evidence that effects have too much, as their shapes are the best ones.
         solved: sets whose widths were looked for: score and widths.
         near: sets one effect away from those: score with the neighbour's widths.
     """
@@ -49,6 +50,7 @@ class Scores:
     of: int
     always: Names = frozenset()
     shapes: Mapping[str, Term] = field(default_factory=dict)
+    prices: Mapping[str, float] = field(default_factory=dict)
     solved: dict[Names, tuple[float, dict[str, float]]] = field(default_factory=dict)
     near: dict[Names, float] = field(default_factory=dict)
 
@@ -58,13 +60,18 @@ class Scores:
             seen = sorted(names & self.gram.groups.keys())  # all but effects held by the model
             widths = {n: (start or {}).get(n, self.middle(n)) for n in seen}
             widths = best_widths(self.gram, widths)
-            total = averaged(self.gram, widths) + self.log_prior(names)
+            price = sum(self.price(name) for name in names)
+            total = averaged(self.gram, widths) + self.log_prior(names) - price
             self.solved[names] = (total, widths)
         return self.solved[names][0]
 
     def log_prior(self, names: Names) -> float:
         """ln chance of a set before the data."""
         return log_prior(len(names - self.always), self.of)
+
+    def price(self, name: str) -> float:
+        """What the shape of an effect costs."""
+        return self.prices.get(name, 0.0)
 
     def widths(self, names: Names) -> dict[str, float]:
         """The best widths of a set's members."""
@@ -79,7 +86,7 @@ class Scores:
             rest = names - {name}
             fewer = {n: w for n, w in widths.items() if n != name}
             gain = self.gram.solved(widths).gain(name)
-            score = base - gain - self.log_prior(names) + self.log_prior(rest)
+            score = base - gain - self.log_prior(names) + self.log_prior(rest) + self.price(name)
             out[rest] = score
             if len(names - self.always) <= _LARGE:
                 out |= self._more(rest, fewer, score, but=name)
@@ -92,7 +99,7 @@ class Scores:
         own = len(names - self.always)
         step = log_prior(own + 1, self.of) - log_prior(own, self.of)
         others = [n for n in self.gram.names if n not in names and n != but]
-        return {names | {n}: base + step + solved.gain(n) for n in others}
+        return {names | {n}: base + step + solved.gain(n) - self.price(n) for n in others}
 
     def middle(self, name: str) -> float:
         """The width nearest to a plausible size."""

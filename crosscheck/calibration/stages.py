@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -44,11 +44,13 @@ class Everything:
         setting: with rows' history taken as given, where effects with history are in.
         joint: the fit.
         later: all effects that join later, at their most promising shapes, amplitudes at null.
+        prices: of those that did not, what they gain more there than on average over shapes.
     """
 
     setting: Setting
     joint: JointFit
     later: Terms
+    prices: Mapping[str, float]
 
 
 def fit_everything(
@@ -77,7 +79,7 @@ def fit_everything(
     progress("looking at effects with history", 0.6)
     wanted = [a for a in wanted if a.name not in joint.terms]
     looked = promising_beside(frozen, joint, wanted)
-    added = [inside(term) for term, gain in looked if gain > PAYS]
+    added = [inside(one.term) for one in looked if one.gain > PAYS]
     if added:
         progress(f"fitting {', '.join(t.name for t in added)} too", 0.7)
         joint = _joined(frozen, joint, start.terms, added)
@@ -85,8 +87,9 @@ def fit_everything(
         setting = frozen
     best = widened(setting, joint)
     there = [at_null(best.terms[a.name]) for a in later if a.name in best.terms]
-    others = [term for term, _gain in looked if term.name not in best.terms]
-    return Everything(setting, best, Terms([*there, *others]))
+    others = [one for one in looked if one.term.name not in best.terms]
+    prices = {one.term.name: one.price for one in others}
+    return Everything(setting, best, Terms([*there, *(one.term for one in others)]), prices)
 
 
 def poor(joint: JointFit) -> bool:

@@ -17,6 +17,7 @@ from crosscheck.calibration.later import at_null, layouts, promising_beside
 from crosscheck.calibration.priors import FLAT, widths_of
 from crosscheck.calibration.probability import of_classes
 from crosscheck.calibration.sets import Names, Scores, explore
+from crosscheck.calibration.shapes import prices_about
 from crosscheck.calibration.unseen import shown_from
 from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.search import Search
@@ -47,7 +48,8 @@ def chances_near(found: Search, alike: Mapping[str, Sequence[str]]) -> Chances:
     effects = [n for n in catalogue.names if n not in always]
     columns, z = catalogue_columns(setting, joint, catalogue)
     gram = gram_with(setting, joint, catalogue, columns, z)
-    scores = Scores(gram, len(effects), always)
+    prices = prices_about(setting, joint, catalogue)
+    scores = Scores(gram, len(effects), always, prices=prices)
     explore(scores, [always, names])
     every = scores.near | {n: s for n, (s, _w) in scores.solved.items()}
     every |= _refitted(found, scores, names)
@@ -98,10 +100,12 @@ def _catalogue(setting: Setting, joint: JointFit) -> Catalogue:
     own = {a.name for a in later}
     nulls = (Term(a, a.null) for a in at_once if a.name not in inside)
     absent = [a for a in later if a.name not in inside]
-    promising = [term for term, _gain in promising_beside(setting, joint, absent)]
+    promising = promising_beside(setting, joint, absent)
     there = [at_null(t) for t in inside if t.name in own]
     return Catalogue(
-        Terms([*nulls, *(t for t in inside if t.name not in own)]), Terms([*there, *promising])
+        Terms([*nulls, *(t for t in inside if t.name not in own)]),
+        Terms([*there, *(one.term for one in promising)]),
+        {one.term.name: one.price for one in promising},
     )
 
 

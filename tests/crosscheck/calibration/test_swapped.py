@@ -60,7 +60,7 @@ def test_a_swapped_effect_begins_at_the_shape_that_promises_most() -> None:
     best = swapped(exact, scores, start)
     assert best.names == {"thermal_expansion"}
     assert best.joint.terms["thermal_expansion"].vector == pytest.approx([EXPANSION, 20.0], rel=0.1)
-    assert best.score > start.score + 100.0
+    assert best.score > start.score + 90.0
 
 
 def test_what_no_robot_can_have_does_not_take_the_place_of_what_one_can(
