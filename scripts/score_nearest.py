@@ -7,7 +7,8 @@ The reference minimises position^2 + (length x rotation)^2 by SciPy's SLSQP from
 held, with equations and derivatives of its own, and takes the nearest of its answers at which the
 platform is stable. Kinds: far (0.1 to 5 frames outside, level), near (within 2 % of a frame),
 turned (over the frame, turned by any angle), both; kept (turned, and only the orientation gives
-way: where the reference finds a turn at the wanted position).
+way: where the reference finds a turn at the wanted position). With --sag the cables have weight:
+the reference's are catenaries then, with no less tension than SEECR asks of them.
 """
 
 from __future__ import annotations
@@ -15,12 +16,16 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Iterator
+from copy import copy
 from pathlib import Path
 
 import numpy as np
+from brute_cables import Pull, hanging, nearly_straight, straight
+from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from seecr.distribution import balanced
+from seecr.effects.cable import CableWeight
 from seecr.inverse import correct
 from seecr.mjcf import load_robot
 from seecr.pose import Array, pose_add, pose_difference, quat_to_matrix
@@ -33,6 +38,13 @@ LIMITS: dict[str, dict[str, float]] = {
     "demobot_cogiro": {"lowest": 0.3, "highest": 3.0},
     "cogiro_large": {"highest": 5000.0},
     "ipanema": {"lowest": 50.0, "highest": 3000.0},
+}
+# [N/m] of the cables: CoGiRo's own, and what others may have; next to nothing on the DemoBot.
+WEIGHTS = {
+    "demobot_parallel": 0.02,
+    "demobot_cogiro": 0.02,
+    "cogiro_large": 0.62784,
+    "ipanema": 0.05,
 }
 KINDS = ("far", "near", "turned", "both", "kept")
 # Poses tried over the frame, of which this many are gone on with, and from so many SLSQP begins.
@@ -88,9 +100,15 @@ class Brute:
     """One wanted pose; x is the way from it [m, length x rotation] and tensions, both scaled."""
 
     def __init__(
-        self, robot: Robot, limits: dict[str, float], wanted: Array, kept: bool = False
+        self,
+        robot: Robot,
+        limits: dict[str, float],
+        wanted: Array,
+        kept: bool = False,
+        cable_weight: float = 0.0,
     ) -> None:
         m = robot.n_cables
+        self.cable_weight, self.hangs = cable_weight, True  # [N/m], whether all are catenaries
         self.ways = [(0.0, 0.0) if kept and k < 3 else (None, None) for k in range(6)]
         self.kept = kept
         self.robot, self.wanted, self.turn = robot, wanted, quat_to_matrix(wanted[3:])
@@ -116,10 +134,8 @@ class Brute:
         spin = (np.eye(3) + b * cross + c * cross @ cross) / length
         arms, centre = robot.anchor_points @ turn.T, turn @ robot.centre_of_mass
         ways = robot.exit_points - self.wanted[:3] - away[:3] - arms
-        size = np.linalg.norm(ways, axis=1)
-        unit = ways / size[:, None]
-        forces = unit * pulls[:, None]
-        stiff = (unit[:, :, None] * unit[:, None] - np.eye(3)) * (pulls / size)[:, None, None]
+        one = self.cables(ways, pulls)
+        forces, stiff = one.force, one.by_anchor
         lever = _skew(arms)
         left = np.concatenate([
             forces.sum(axis=0) + self.weight,
@@ -131,14 +147,59 @@ class Brute:
         rates[3:, :3] = (lever @ stiff).sum(axis=0) / length
         bent = turned.sum(axis=0) + _skew(self.weight) @ _skew(centre)
         rates[3:, 3:6] = bent @ spin / length
-        rates[:3, 6:], rates[3:, 6:] = unit.T, np.cross(arms, unit).T / length
+        rates[:3, 6:] = one.by_tension.T
+        rates[3:, 6:] = np.cross(arms, one.by_tension).T / length
         return left, rates
 
+    def cables(self, ways: Array, pulls: Array) -> Pull:
+        """Of cables at pulls between the limits; those of hanging ones begin at what they need.
+
+        That is what they weigh as the mean of both ends' tensions.
+        """
+        weight = self.cable_weight
+        if weight == 0.0:
+            return straight(self.robot, ways, pulls)
+        size, up = np.linalg.norm(ways, axis=1), self.robot.up
+        floor = weight * (size + 0.5 * ways @ up)
+        least = np.maximum(self.low, floor)
+        some, room = np.zeros(len(pulls)), np.ones(len(pulls))
+        ends = np.isfinite(self.high)
+        some[ends] = ((pulls - self.low) / (self.high - self.low))[ends]
+        room[ends] = ((self.high - least) / (self.high - self.low))[ends]
+        tensions = least + (pulls - self.low) * room
+        found = hanging(self.robot, ways, tensions, weight)
+        self.hangs = found is not None
+        if found is None:
+            found = nearly_straight(self.robot, ways, tensions, weight)
+        by = np.where(floor > self.low, -weight * (1.0 - some), 0.0)
+        moved = by[:, None] * (ways / size[:, None] + 0.5 * up)
+        by_anchor = found.by_anchor + found.by_tension[:, :, None] * moved[:, None]
+        return Pull(
+            found.force, by_anchor, found.by_tension * room[:, None],
+            (found.grip - moved) / room[:, None],
+        )  # fmt: skip
+
     def go(self, start: Array) -> tuple[Array, Array] | None:
-        """The local minimum from a start (6,): way and tensions; None where SLSQP gives up."""
+        """The local minimum from a start (6,): way and tensions; None where SLSQP gives up.
+
+        Of hanging cables from where straight ones lead to.
+        """
+        if self.cable_weight == 0.0:
+            return self._go(start)
+        light = copy(self)
+        light.cable_weight = 0.0
+        found = light._go(start)
+        found = self._go(start) if found is None else self._go(*found)
+        return found if found is not None and self._hang(*found) else None
+
+    def _hang(self, away: Array, pulls: Array) -> bool:
+        self.balance(away, pulls)
+        return self.hangs
+
+    def _go(self, start: Array, pulls: Array | None = None) -> tuple[Array, Array] | None:
         far = max(float(np.linalg.norm(start)), 1e-3 * self.robot.length)
         left, rates = self.balance(start, np.zeros(len(self.low)))
-        first = balanced(rates[:, 6:], -left, self.low, self.high)[0]
+        first = balanced(rates[:, 6:], -left, self.low, self.high)[0] if pulls is None else pulls
         grade = np.concatenate([np.full(6, far), np.full(len(first), self.pull)])
         found = minimize(
             lambda x: (x[:6] @ x[:6], np.concatenate([2.0 * x[:6], np.zeros(len(first))])),
@@ -162,13 +223,20 @@ class Brute:
 
     def stable(self, away: Array, pulls: Array) -> bool:
         """Whether the stiffness, with each cable's own, has positive eigenvalues only."""
-        rates, robot = self.balance(away, pulls)[1], self.robot
-        size = robot.nominal_lengths(self.places(away[None]))[0]
-        taut = pulls > 1e-6 * self.pull
-        # a cable's own stiffness EA/l0 with l0 = l/(1 + tau/EA)
-        own = np.where(taut, (robot.ea + pulls) / size, 0.0)
-        stiffness = (rates[:, 6:] * own) @ rates[:, 6:].T - rates[:, :6] @ self._chart(away)
+        rates, (arms, ways) = self.balance(away, pulls)[1], self._reach(away)
+        grip = self.cables(ways, pulls).grip * (self._taut(pulls))[:, None]
+        own = np.concatenate([grip, np.cross(arms, grip) / self.robot.length], axis=1)
+        stiffness = -rates[:, 6:] @ own - rates[:, :6] @ self._chart(away)
         return bool(np.linalg.eigvalsh(0.5 * (stiffness + stiffness.T))[0] > 0.0)
+
+    def _taut(self, pulls: Array) -> NDArray[np.bool_]:
+        return np.asarray((pulls > 1e-6 * self.pull) | (self.cable_weight > 0.0))
+
+    def _reach(self, away: Array) -> tuple[Array, Array]:
+        """Arms (m, 3) and ways (m, 3) from anchor to exit points."""
+        pose = self.places(away[None])[0]
+        arms = self.robot.anchor_points @ quat_to_matrix(pose[3:]).T
+        return arms, self.robot.exit_points - pose[:3] - arms
 
     def _chart(self, away: Array) -> Array:
         """Ways (6, 6) of small turns on top of the rotation, which rates are not by."""
@@ -226,14 +294,23 @@ def held_sample(robot: Robot, limits: dict[str, float]) -> Array:
     return np.concatenate([part[feasible(robot, part, **limits)] for part in parts])
 
 
-def score(name: str, kind: str, n: int, seed: int, kept: dict[str, Array]) -> str:
-    """One line: of how many poses the answer is farther than the reference by 1 %."""
-    robot, limits, key = load_robot(model_path(name)), LIMITS[name], f"{name}-{kind}-{n}-{seed}"
-    want = wanted_poses(robot, limits, kind, n, seed)
-    correct(robot, want[:1], **limits)
+def score(name: str, kind: str, n: int, seed: int, kept: dict[str, Array], sag: float = 0.0) -> str:
+    """One line: of how many poses the answer is farther than the reference by 1 %.
+
+    Args:
+        sag: weight of the cables, by the plausible one.
+    """
+    robot, limits, weight = load_robot(model_path(name)), LIMITS[name], sag * WEIGHTS[name]
+    key = f"{name}-{kind}-{n}-{seed}" + (f"-{weight:g}" if sag else "")
+    want, effects = (
+        wanted_poses(robot, limits, kind, n, seed),
+        ([CableWeight(weight)] if sag else []),
+    )
+    correct(robot, want[:1], effects=effects, **limits)
     began = time.process_time()
     kept_position = kind == "kept"
-    found = correct(robot, want, prefer="position" if kept_position else "pose", **limits)
+    prefer = "position" if kept_position else "pose"
+    found = correct(robot, want, effects=effects, prefer=prefer, **limits)
     spent = 1e3 * (time.process_time() - began) / n
     unit = np.repeat([1.0, robot.length], 3)
     ours = np.linalg.norm(pose_difference(found.aimed, want) * unit, axis=1)
@@ -243,7 +320,10 @@ def score(name: str, kind: str, n: int, seed: int, kept: dict[str, Array]) -> st
     if key not in kept:
         sample = held_sample(robot, limits)
         kept[key] = np.array(
-            [Brute(robot, limits, one, kept_position).nearest(sample, limits) for one in want]
+            [
+                Brute(robot, limits, one, kept_position, weight).nearest(sample, limits)
+                for one in want
+            ]
         )
     with np.errstate(invalid="ignore"):
         part = np.where(stays & ~(kept_position & moved), ours / kept[key] - 1.0, np.inf)
@@ -263,6 +343,9 @@ def main() -> None:
     parser.add_argument("--kinds", nargs="*", default=list(KINDS), choices=KINDS)
     parser.add_argument("--poses", type=int, default=100)
     parser.add_argument("--seed", type=int, default=1, help="of the poses")
+    parser.add_argument(
+        "--sag", type=float, default=0.0, help="weight of the cables, by the plausible one"
+    )
     parser.add_argument("--keep", type=Path, help="file of references, read and written")
     given = parser.parse_args()
     kept: dict[str, Array] = {}
@@ -271,7 +354,7 @@ def main() -> None:
             kept = {key: file[key] for key in file}
     for name in given.robots:
         for kind in given.kinds:
-            print(score(name, kind, given.poses, given.seed, kept), flush=True)
+            print(score(name, kind, given.poses, given.seed, kept, given.sag), flush=True)
             if given.keep is not None:
                 np.savez(given.keep, **kept)
 
