@@ -16,11 +16,14 @@ from numpy.typing import NDArray
 from seecr import statics
 from seecr.compiled.columns import EA, GAP, REST, STRAIN, TENSION, WEIGHT
 from seecr.distribution import distribute
+from seecr.hanging import bridged_lengths, least_of_heavy, rest_for
 from seecr.pose import Array
 from seecr.tables import Tables, take
 
 # Rounds of Newton's method; balance to this part of the load ends them.
 _ROUNDS, _BALANCED = 40, 1e-12
+# Where no tensions balance, as linearised, what lacks at least is to fall by this factor.
+_NEARS = 0.5
 # Rounds for whether a pose is firm, asked of many.
 _FEW = 14
 # Step of a rest length for its derivative, relative to the robot's length.
@@ -59,37 +62,33 @@ def hold(tables: Tables, aim: Array, low: Array, high: Array, rounds: int = _ROU
         low, high: (m,) limits [N].
         rounds: at most, of Newton's method.
     """
-    out, floor = _hold(tables, aim, low, high, rounds), least_of_heavy(tables)
-    # no length takes a hanging cable's tension to nothing: such rows again, with what it needs
-    again = np.flatnonzero(~out.fine & np.any((floor > low) & (floor < high), axis=1))
+    least = raised(tables, low, high)
+    out = _hold(tables, aim, least, high, rounds)
+    # some are in balance with less than what is asked of hanging cables
+    again = np.flatnonzero(~out.fine & np.any(least > low, axis=1))
     if len(again):
-        least = np.where(floor < high, np.maximum(low, floor), low)[again]
-        other = _hold(take(tables, again), aim[again], least, high, rounds)
+        other = _hold(take(tables, again), aim[again], low, high, rounds)
         rows = again[other.fine]
         out.rest[rows], out.tensions[rows] = other.rest[other.fine], other.tensions[other.fine]
         out.strains[rows], out.fine[rows] = other.strains[other.fine], True
     return out
 
 
-def least_of_heavy(tables: Tables) -> Array:
-    """(n, m) [N] tensions that cables with weight are not asked to go below: what each weighs.
-
-    A catenary whose tension is its weight sags by about an eighth of its span. Zero of others.
-    """
-    bridged = tables.cables[..., REST] + tables.cables[..., GAP]
-    return np.asarray(tables.cables[..., WEIGHT] * bridged)
+def raised(tables: Tables, low: Array, high: Array) -> Array:
+    """(n, m) [N] lower limits: no length takes a hanging cable's tension to nothing."""
+    floor = least_of_heavy(tables)
+    return np.where(floor < high, np.maximum(low, floor), low)
 
 
 def _hold(tables: Tables, aim: Array, low: Array, high: Array, rounds: int) -> Held:
     """See :func:`hold`; the limits may be (n, m), each row's own."""
     n, m = tables.cables.shape[:2]
-    bridged = tables.cables[..., REST] + tables.cables[..., GAP]
+    bridged = bridged_lengths(tables)
     least, most = np.broadcast_to(low, (n, m)), np.broadcast_to(high, (n, m))
     first = np.maximum(low, tables.scale[:, None] / m)
-    rest = bridged / (1.0 + first / tables.cables[..., EA])
-    out = Held(rest, np.zeros((n, m)), np.zeros((n, m)), np.zeros(n, dtype=bool))
+    out = Held(rest_for(tables, first), np.zeros((n, m)), np.zeros((n, m)), np.zeros(n, dtype=bool))
     rows, known, wanted = np.arange(n), None, out.tensions
-    here = _here(tables)
+    here, short = _here(tables), np.full(n, np.inf)
     for _ in range(rounds):
         now = with_rest(take(tables, rows), out.rest[rows])
         at = statics.evaluate(now, statics.take_evaluation(here, rows), threads=None)
@@ -117,7 +116,11 @@ def _hold(tables: Tables, aim: Array, low: Array, high: Array, rounds: int) -> H
         slope = -own * out.rest[rows] * (out.rest[rows] - _STEP * now.length)
         inverse = 1.0 / out.rest[rows] + step / slope * _hanging(now, tensions, wanted)
         inverse = np.clip(inverse * out.rest[rows], 0.5, 2.0) / out.rest[rows]
-        going = possible & np.isfinite(inverse).all(axis=1)
+        # tensions that come near may balance where pulls are as those make them
+        before, lack = short[rows], np.einsum("ndm,nm->nd", by_tension, wanted) - load
+        short[rows] = np.abs(lack).max(axis=1)
+        nears = possible | (short[rows] < _NEARS * before)
+        going = nears & np.isfinite(inverse).all(axis=1)
         out.rest[rows[going]] = 1.0 / inverse[going]
         rows, wanted = rows[going], wanted[going]
     out.tensions, out.strains = here.states[..., TENSION], here.states[..., STRAIN]
@@ -186,16 +189,42 @@ def _within(tensions: Array, low: Array, high: Array, scale: Array) -> NDArray[n
     return np.asarray(inside.all(axis=1))
 
 
-def balance_of(tables: Tables, low: Array) -> tuple[Array, Array]:
+def balance_of(tables: Tables, low: Array, about: Array | None = None) -> tuple[Array, Array]:
     """Balance A tau = load at the poses of tables: (n, d, m) and (n, d) [N], torques over length.
 
-    Taken where the cables just pull, and linear in the tensions from there.
+    Linear in the tensions from those given, (n, m) [N], or from where the cables just pull. That
+    matters where a pull's direction depends on its size only.
     """
-    m = tables.cables.shape[1]
-    bridged = tables.cables[..., REST] + tables.cables[..., GAP]
-    first = np.maximum(low, tables.scale[:, None] / m)
-    now = with_rest(tables, bridged / (1.0 + first / tables.cables[..., EA]))
+    first = np.maximum(low, tables.scale[:, None] / tables.cables.shape[1])
+    now = with_rest(tables, rest_for(tables, first if about is None else about))
     at = statics.evaluate(now, _here(now), threads=None)
     by_tension, _ = _rates(now, at)
     load = np.einsum("ndm,nm->nd", by_tension, at.states[..., TENSION]) - at.gradient
     return by_tension, load
+
+
+def counted_balance(
+    tables: Tables, low: Array, high: Array, about: Array | None = None
+) -> tuple[Array, Array]:
+    """:func:`balance_of` for tensions counted so that hanging cables have the limits, too.
+
+    Counted tensions go from ``low`` to ``high`` where those go from what such a cable needs, which
+    changes with the pose, to ``high``; those of others are as they are.
+
+    Args:
+        tables: of n poses.
+        low, high: (m,) limits [N].
+        about: (n, m) counted, or None for tensions that come nearest to balance.
+    """
+    least = raised(tables, low, high)
+    if not np.any(least > low):
+        return balance_of(tables, low, about)
+    room = np.ones_like(least)
+    np.divide(high - least, high - low, out=room, where=np.isfinite(high) & (least > low))
+    if about is None:
+        matrix, load = balance_of(tables, least)
+        tensions = distribute(matrix, load, least, least, high)[0]
+    else:
+        tensions = least + room * (about - low)
+    matrix, load = balance_of(tables, low, tensions)
+    return matrix * room[:, None], load - np.einsum("ndm,nm->nd", matrix, least - room * low)

@@ -16,7 +16,7 @@ from seecr.effects.base import Effect
 from seecr.errors import InputError
 from seecr.experiment import Experiment, Prediction, effects_of
 from seecr.given import GivenRobot, robot_of
-from seecr.holding import Held, balance_of, hold, holds_firmly
+from seecr.holding import Held, balance_of, counted_balance, hold, holds_firmly
 from seecr.nearest import Nearest, nearest
 from seecr.pose import Array, pose_difference
 from seecr.result import COORDINATES, Record, Result, named
@@ -285,9 +285,11 @@ class _Search:
     def _nearest(self, rows: NDArray[np.intp], scale: Array, fix_position: bool) -> Nearest:
         wanted, limits = self.given.pose[rows], self.limits
 
-        def balance(poses: Array, some: NDArray[np.intp]) -> tuple[Array, Array]:
+        def balance(
+            poses: Array, some: NDArray[np.intp], about: Array | None = None
+        ) -> tuple[Array, Array]:
             part = replace(self.given.rows(rows[some]), pose=poses)
-            return balance_of(self._tables(part), limits.low)
+            return counted_balance(self._tables(part), limits.low, limits.high, about)
 
         def stays(poses: Array, some: NDArray[np.intp]) -> NDArray[np.bool_]:
             tables = self._tables(replace(self.given.rows(rows[some]), pose=poses))

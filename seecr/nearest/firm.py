@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from seecr.nearest.inward import TIGHT, inward
+from seecr.nearest.inward import inward, tightened
 from seecr.nearest.problem import Reaching, Rows
 from seecr.nearest.screen import spread, toward
 from seecr.nearest.seeds import Candidates, about_wanted, from_sample
@@ -31,7 +31,7 @@ def part_of(problem: Reaching, rows: Rows) -> Reaching:
     return replace(
         problem, wanted=problem.wanted[rows],
         values=None if problem.values is None else problem.values[rows],
-        balance=lambda poses, some: problem.balance(poses, rows[some]),
+        balance=lambda poses, some, about=None: problem.balance(poses, rows[some], about),
         stays=lambda poses, some: problem.stays(poses, rows[some]),
         least=problem.least[rows], most=problem.most[rows], scale=problem.scale[rows],
     )  # fmt: skip
@@ -49,7 +49,7 @@ def firm_ends(problem: Reaching, poses: Array, ends: Array) -> Candidates:
     first = Candidates(*toward(problem, firm.away, firm.rows, problem.firm))
     few = spread(problem, first.away, first.rows, _SEARCHES)
     start = problem.start(first.away[few], first.rows[few])
-    found = inward(problem, start.only_tight(TIGHT))
+    found = inward(problem, tightened(problem, start))
     first = first.and_more(_firm_of(problem, Candidates(found.away, found.rows)))
     return first.and_more(_out_to(problem, first, ends))
 

@@ -133,10 +133,10 @@ def _back(problem: Reaching, at: Curved, start: Spots) -> tuple[Spots, Array]:
     """Back to balance with the rates of before: where, and (k,) all that is left [N]."""
     away, pulls, rows = start.away, start.tensions, start.rows
     for _ in range(_RESTORED):
-        matrix, load = problem.at(away, rows)
+        matrix, load = problem.at(away, rows, pulls)
         new, taut, ok = problem.project(matrix, load, at.turn, away, (away, pulls), rows)
         away, pulls = np.where(ok[:, None], new, away), np.where(ok[:, None], taut, pulls)
-    matrix, load = problem.at(away, rows)
+    matrix, load = problem.at(away, rows, pulls)
     left = np.abs(np.einsum("ndm,nm->nd", matrix, pulls) - load)
     return Spots(away, rows, pulls, left.max(axis=1) / problem.scale[rows]), left.sum(axis=1)
 
@@ -162,3 +162,12 @@ def restored(problem: Reaching, start: Spots) -> Spots:
         still = still[go]
     out.left[still] = np.inf
     return out
+
+
+def tightened(problem: Reaching, start: Spots) -> Spots:
+    """Those that are in balance, and those that come to it."""
+    loose = np.flatnonzero(start.left > TIGHT)
+    if len(loose):
+        start = start.copy()
+        start.put(loose, restored(problem, start.only(loose)))
+    return start.only_tight(TIGHT)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +15,19 @@ from seecr.pose import Array, pose_add, pose_difference
 from seecr.robot import Robot
 
 Rows = NDArray[np.intp]
-Balance = Callable[[Array, Rows], tuple[Array, Array]]
-"""Balance at poses (k, 7) of some rows, which may come again: matrices (k, d, m), loads (k, d)."""
+
+
+class Balance(Protocol):
+    """Balance at poses (k, 7) of some rows, which may come again: matrices (k, d, m), loads (k, d).
+
+    Linear in the tensions from ``about`` (k, m), where pulls of heavy cables depend on it; by
+    default from such that come near to balance.
+    """
+
+    def __call__(
+        self, poses: Array, rows: Rows, about: Array | None = None, /
+    ) -> tuple[Array, Array]: ...
+
 
 Stays = Callable[[Array, Rows], NDArray[np.bool_]]
 """Whether the platform stays at poses (k, 7) of some rows with the rest lengths that hold them."""
@@ -60,9 +72,9 @@ class Reaching:
             change = np.where(self.robot.hinges, shorter, change)
         return change * np.where(self.robot.hinges, self.robot.length, 1.0)
 
-    def at(self, away: Array, rows: Rows) -> tuple[Array, Array]:
-        """Balance (k, d, m) and (k, d) there."""
-        return self.balance(self.placed(away, rows), rows)
+    def at(self, away: Array, rows: Rows, about: Array | None = None) -> tuple[Array, Array]:
+        """Balance (k, d, m) and (k, d) there, linear in the tensions from those about (k, m)."""
+        return self.balance(self.placed(away, rows), rows, about)
 
     def held(self, away: Array, rows: Rows) -> NDArray[np.bool_]:
         """Whether the poses so far from those of rows can be held."""
@@ -70,12 +82,15 @@ class Reaching:
 
     def firm(self, away: Array, rows: Rows) -> NDArray[np.bool_]:
         """Whether the platform stays at the poses so far from those of rows, checked exactly."""
-        poses = self.placed(away, rows)
-        out = self.holds(poses, rows)
+        out = self.held(away, rows)
         some = np.flatnonzero(out)
         if len(some):
-            out[some] = self.stays(poses[some], rows[some])
+            out[some] = self.rests(away[some], rows[some])
         return out
+
+    def rests(self, away: Array, rows: Rows) -> NDArray[np.bool_]:
+        """The same of poses that are in balance, or nearly."""
+        return self.stays(self.placed(away, rows), rows)
 
     def holds(self, poses: Array, rows: Rows) -> NDArray[np.bool_]:
         """Whether poses (k, 7) can be held with the loads of rows."""
@@ -83,6 +98,13 @@ class Reaching:
             return np.zeros(0, dtype=bool)
         least = self.least[rows]
         return distribute(*self.balance(poses, rows), least, least, self.most[rows])[1]
+
+    def lack(self, away: Array, rows: Rows) -> tuple[Array, NDArray[np.bool_]]:
+        """(k,) what lacks of balance about there [of load], roughly; and whether nothing does."""
+        least, (matrix, load) = self.least[rows], self.at(away, rows)
+        tensions, held = distribute(matrix, load, least, least, self.most[rows])
+        left = np.abs(np.einsum("ndm,nm->nd", matrix, tensions) - load).max(axis=1)
+        return left / self.scale[rows], held
 
     def allowed(self, away: Array) -> Array:
         """The same without what may not change."""
@@ -95,7 +117,10 @@ class Reaching:
         each = zip(rows, *self.at(away, rows), strict=True)
         found = [balanced(a, load, self.least[i], self.most[i]) for i, a, load in each]
         tensions = np.array([one for one, _ in found]).reshape(len(rows), self.least.shape[1])
-        return Spots(away, rows, tensions, np.array([left for _, left in found]))
+        # with pulls as these tensions make them
+        matrix, load = self.at(away, rows, tensions)
+        left = np.abs(np.einsum("ndm,nm->nd", matrix, tensions) - load).max(axis=1)
+        return Spots(away, rows, tensions, left / self.scale[rows])
 
     def unit(self, rows: Rows) -> Array:
         """(k, 1) [m/N] that tensions weigh beside ways."""
@@ -185,7 +210,9 @@ class Curved:
         eye, (i, j) = np.eye(d), np.triu_indices(d, 1)
         sides = step * np.concatenate([np.zeros((1, d)), eye, -eye, eye[i] + eye[j]])
         moved = (away[:, None] + sides).reshape(-1, d)
-        matrix, load = problem.at(moved, np.repeat(rows, len(sides)))
+        count = len(sides)
+        pulls = np.repeat(tensions, count, axis=0)
+        matrix, load = problem.at(moved, np.repeat(rows, count), pulls)
         matrix = matrix.reshape(k, len(sides), d, -1)
         load = load.reshape(k, len(sides), d)
         left = np.einsum("nsdm,nm->nsd", matrix, tensions) - load

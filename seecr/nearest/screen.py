@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr.nearest.inward import TIGHT, restored
+from seecr.nearest.inward import tightened
 from seecr.nearest.problem import Reaching, Rows, Spots
 from seecr.nearest.seeds import Candidates
 from seecr.pose import Array
@@ -27,7 +27,7 @@ def screened(problem: Reaching, candidates: Candidates, most: int) -> Spots:
     rows = np.concatenate([candidates.rows[held], back.rows])
     away, rows = toward(problem, away, rows, problem.held)
     few = spread(problem, away, rows, most)
-    return problem.start(away[few], rows[few]).only_tight(TIGHT)
+    return tightened(problem, problem.start(away[few], rows[few]))
 
 
 def _brought_back(
@@ -43,7 +43,7 @@ def _brought_back(
         mine = np.flatnonzero(~held & (candidates.rows == row))
         chosen += mine[:: max(1, len(mine) // (2 * most))].tolist()
     start = problem.start(candidates.away[chosen], candidates.rows[chosen])
-    return restored(problem, start).only_tight(TIGHT)
+    return tightened(problem, start)
 
 
 def toward(

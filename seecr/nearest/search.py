@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from seecr.joints import values_of_pose
 from seecr.nearest.firm import at_random, firm_ends, nearest_of, part_of
-from seecr.nearest.inward import ENOUGH, TIGHT, inward, restored
+from seecr.nearest.inward import ENOUGH, TIGHT, inward, tightened
 from seecr.nearest.problem import Balance, Curved, Reaching, Rows, Spots, Stays
 from seecr.nearest.screen import screened
 from seecr.nearest.seeds import Candidates, about_answers, about_wanted, from_sample, sample
@@ -84,7 +84,7 @@ def nearest(
     best = _Best.none(problem)
     rows = np.arange(len(wanted))
     start = problem.start(np.zeros((len(wanted), robot.n_dof)), rows)
-    best.keep(inward(problem, restored(problem, start).only_tight(TIGHT)))
+    best.keep(inward(problem, tightened(problem, start)))
     poses = sample(problem)
     first = from_sample(problem, poses).and_more(about_wanted(problem))
     best.search(first, _FIRST)
@@ -129,7 +129,7 @@ class _Best:
         other = other.only_tight(TIGHT)
         if len(other.rows) == 0:
             return
-        firm = self.problem.firm(other.away, other.rows)
+        firm = self.problem.rests(other.away, other.rows)
         size = other.size()
         for i in np.argsort(size):
             row = other.rows[i]

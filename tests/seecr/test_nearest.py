@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import score_nearest
 
+from seecr.effects.cable import CableWeight
 from seecr.inverse import correct
 from seecr.joints import pose_of_values
 from seecr.mjcf import load_robot
@@ -55,6 +56,23 @@ def test_with_cables_that_sag_the_platform_rests_there_within_limits() -> None:
 
 
 @pytest.mark.slow
+def test_no_answer_with_cables_that_sag_is_farther_than_brute_force_finds() -> None:
+    name, weight = "cogiro_large", score_nearest.WEIGHTS["cogiro_large"]
+    robot, limits = load_robot(model_path(name)), score_nearest.LIMITS[name]
+    want = score_nearest.wanted_poses(robot, limits, "near", 3)
+    found = correct(robot, want, effects=[CableWeight(weight)], **limits)
+    assert found.stays.all() and found.settled.all() and not found.held.any()
+    sample = score_nearest.held_sample(robot, limits)
+    brute = [score_nearest.Brute(robot, limits, one, cable_weight=weight) for one in want]
+    best = np.array([one.nearest(sample, limits) for one in brute])
+    unit = np.repeat([1.0, robot.length], 3)
+    ours = np.linalg.norm(pose_difference(found.aimed, want) * unit, axis=1)
+    assert np.isfinite(best).all() and np.all(ours < 1.01 * best)
+    # nor nearer, by other catenaries
+    assert np.all(ours > 0.99 * best)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "seed", "row", "most"),
     [
@@ -99,7 +117,7 @@ def test_a_pose_from_which_the_platform_goes_elsewhere_is_told(
     robot, limits = load_robot(model_path(name)), score_nearest.LIMITS[name]
     want = score_nearest.wanted_poses(robot, limits, "turned", 10, 1)[9:]
     every = lambda _self, _away, rows: np.ones(len(rows), dtype=bool)  # noqa: E731
-    monkeypatch.setattr(Reaching, "firm", every)
+    monkeypatch.setattr(Reaching, "rests", every)
     found = correct(robot, want, **limits)
     assert found.found.all() and found.solution.converged.all() and not found.stays.any()
     assert "1 are balanced, but the platform does not rest there" in str(found)
@@ -122,7 +140,7 @@ def test_a_turn_about_a_hinge_is_as_far_as_its_shorter_way() -> None:
     want, there = pose_of_values(robot, values)[0]
     none = np.zeros((1, 4))
     problem = Reaching(
-        robot, want[None], values[:1], lambda poses, _: balance_equations(robot, poses),
+        robot, want[None], values[:1], lambda poses, *_: balance_equations(robot, poses),
         lambda _, rows: np.ones(len(rows), dtype=bool), none, none, np.ones(1), np.ones(3),
     )  # fmt: skip
     (away,) = problem.to(there[None], np.zeros(1, dtype=np.intp))
@@ -133,7 +151,7 @@ def test_balance_bends_as_its_rates_change() -> None:
     robot = load_robot(model_path("ipanema"))
     none = np.zeros((1, 8))
     problem = Reaching(
-        robot, robot.reference_pose[None], None, lambda poses, _: balance_equations(robot, poses),
+        robot, robot.reference_pose[None], None, lambda poses, *_: balance_equations(robot, poses),
         lambda _, rows: np.ones(len(rows), dtype=bool), none, none, np.array([200.0]), np.ones(6),
     )  # fmt: skip
     random, row = np.random.default_rng(0), np.zeros(1, dtype=np.intp)
