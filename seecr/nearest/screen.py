@@ -14,6 +14,8 @@ from seecr.pose import Array
 
 # Halvings of the way to the wanted poses; after some only the nearer half goes on, but not fewer.
 _HALVINGS, _FEWER, _KEPT = 7, (2, 4), 120
+# Where few are held, the starts are of so many times as many that lack least.
+_LEAST = 8
 # How far apart in orientation [rad] starts are to be, but not by more than the nearest's distance
 # over the length; where not enough are: a half, a quarter.
 _APART = (0.7, 0.35, 0.175)
@@ -35,13 +37,18 @@ def _brought_back(
 ) -> Spots:
     """Where few candidates of a row are held, as with fewer cables than freedoms: some near others.
 
-    Every so-many-th of a row's, as they were drawn: all over.
+    Of those that lack least such that are apart, and every so-many-th of a row's, as they were
+    drawn: all over.
     """  # fmt: skip
     many = np.bincount(candidates.rows[held], minlength=len(problem.wanted))
     chosen: list[int] = []
     for row in np.flatnonzero(many < most):
         mine = np.flatnonzero(~held & (candidates.rows == row))
-        chosen += mine[:: max(1, len(mine) // (2 * most))].tolist()
+        lack = problem.lack(candidates.away[mine], candidates.rows[mine])[0]
+        best = mine[np.argsort(lack)[: _LEAST * most]]
+        apart = best[spread(problem, candidates.away[best], candidates.rows[best], most)]
+        all_over = mine[:: max(1, len(mine) // most)]
+        chosen += np.unique(np.concatenate([apart, all_over])).tolist()
     start = problem.start(candidates.away[chosen], candidates.rows[chosen])
     return tightened(problem, start)
 
@@ -85,7 +92,7 @@ def spread(problem: Reaching, away: Array, rows: Rows, most: int) -> list[int]:
         mine = np.flatnonzero(rows == row)
         mine = mine[np.argsort(size[mine])]
         # what cannot turn is told apart by its place
-        least = 1e-300 + size[mine[:1]].sum()
+        least = 1e-9 * length + size[mine[:1]].sum()
         unit = min(length, least) if hinges.any() else least
         place = (away[:, hinges] if hinges.any() else away) / unit
         taken: list[int] = []

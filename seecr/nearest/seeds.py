@@ -13,8 +13,8 @@ from seecr.robot import Robot
 
 # Poses tried over the frame; of those that are held, as many nearest and as many others per row.
 _SAMPLE, _NEAR = 24000, 128
-# Turns tried where only the orientation gives way.
-_IN_PLACE = 8000
+# Turns tried where only the orientation gives way, and those looked at that are nearly held.
+_IN_PLACE, _NEARLY = 8000, 128
 # Turned poses about each wanted one, and about each answer, where as many others are tried.
 _TURNED, _ABOUT = 256, 64
 # Half of the sample is turned by less than this [rad], and poses move inward by up to this part.
@@ -88,7 +88,10 @@ def from_sample(problem: Reaching, poses: Array) -> Candidates:
 
 
 def _in_place(problem: Reaching, row: int) -> Array:
-    """Home's turn, and of all turns of a wanted pose those that are held (k, d)."""
+    """Home's turn, and of all turns of a wanted pose those that are held, or nearly (k, d).
+
+    What is held may be less than a thousandth of all turns, and in parts.
+    """
     robot, random = problem.robot, np.random.default_rng(6)
     rows = np.full(_IN_PLACE, row)
     if problem.values is None:
@@ -100,8 +103,9 @@ def _in_place(problem: Reaching, row: int) -> Array:
         every = robot.length * random.uniform(-np.pi, np.pi, (_IN_PLACE, robot.n_dof))
     home = problem.to(robot.reference_pose[None], rows[:1])
     every = problem.allowed(np.concatenate([home, every]))
-    held = np.concatenate([[True], problem.held(every[1:], rows)])
-    return np.asarray(every[held])
+    lack, held = problem.lack(every[1:], rows)
+    best = np.argsort(np.where(held, 0.0, lack))[: held.sum() + _NEARLY]
+    return np.asarray(np.concatenate([every[:1], every[1:][best]]))
 
 
 def about_wanted(problem: Reaching) -> Candidates:
