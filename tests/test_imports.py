@@ -31,7 +31,7 @@ FLOORS = {
     "seecr.experiment": 8, "seecr.uncertainty": 10, "seecr.search": 8, "seecr.equilibrium": 10,
     "seecr.planar": 9, "seecr.workspace": 9,
     "seecr.sensitivity": 9, "seecr.parted": 10, "seecr.command_file": 5, "seecr.distribution": 7,
-    "seecr.told": 9,
+    "seecr.told": 9, "seecr.hanging": 7,
     "seecr.holding": 8, "seecr.nearest": 8, "seecr.unheld": 8, "seecr.inverse": 10,
     "seecr.chances": 11, "seecr.maps": 12,
     "seecr.multiple": 9, "seecr.following": 8, "seecr.passes": 9, "seecr.exported": 11,
