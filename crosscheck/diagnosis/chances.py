@@ -12,6 +12,9 @@ from crosscheck.calibration.search import Sought
 from crosscheck.fit.problem import Rms
 from crosscheck.fit.words import rms_words
 
+PROBABLE = 0.5
+"""From this probability on an effect that is not listed is called probable."""
+
 
 @dataclass(frozen=True)
 class Together:

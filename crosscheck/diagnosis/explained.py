@@ -9,14 +9,21 @@ from crosscheck.calibration.exact import Refit
 from crosscheck.calibration.search import Sought
 from crosscheck.calibration.sets import Names
 from crosscheck.diagnosis.advice import check_of
-from crosscheck.diagnosis.chances import Chances, chances_of
+from crosscheck.diagnosis.chances import PROBABLE, Chances, chances_of
 from crosscheck.diagnosis.listed import diagnosis_of, left_out
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect, NotListed
 from crosscheck.diagnosis.rivals import Rival
 from crosscheck.diagnosis.search import Search
 from crosscheck.diagnosis.small import share_of
 from crosscheck.diagnosis.way import fit_of, way_of
-from crosscheck.diagnosis.words import agreement, and_what_is_left, either, one_of, words_of
+from crosscheck.diagnosis.words import (
+    agreement,
+    and_what_is_left,
+    either,
+    hints_of,
+    noise_left,
+    words_of,
+)
 from crosscheck.fit.candidates import Candidate
 from crosscheck.fit.prepare import noise_floor
 from crosscheck.fit.problem import KINDS, Rms, rms_by_kind
@@ -26,8 +33,6 @@ from seecr.effects import catalogue
 
 # Noise of another size than stated by more than this part, or correlated by more, is told.
 _OTHER, _ALIKE = 0.25, 0.3
-# From this probability on an effect that is not listed is called probable.
-_PROBABLE = 0.5
 
 
 def explained(sought: Sought, notes: Sequence[str]) -> Diagnosis:
@@ -128,10 +133,10 @@ def _sentence(
     alternatives: Sequence[Names] = (),
 ) -> str:
     if verdict is DiagnosisVerdict.NO_EFFECT_MISSING:
-        hints = {one_of(members): p for members, p in chances.classes if p > _PROBABLE}
-        return agreement(tried, hints)
+        return agreement(tried, hints_of(chances, ()))
     if verdict is DiagnosisVerdict.EFFECTS_FOUND:
-        return and_what_is_left(words_of(missing), "what is left is noise", tried)
+        left = noise_left(hints_of(chances, [m.effect for m in missing]))
+        return and_what_is_left(words_of(missing), left, tried)
     together = chances.together
     assert together is not None
     if len(alternatives) > 1:
@@ -161,6 +166,6 @@ def _why_not(way: Search, chances: Chances, c: Candidate) -> Reason:
         if c.name in members and first is not None:
             return Reason(Why.ALIKE, by=(first,))
     if way.found:
-        why = Why.CARRIES_LITTLE if p > _PROBABLE else Why.NOT_NEEDED_BESIDE
+        why = Why.CARRIES_LITTLE if p > PROBABLE else Why.NOT_NEEDED_BESIDE
         return Reason(why, p=p, by=way.found)
-    return Reason(Why.NOT_SURE if p > _PROBABLE else Why.IMPROBABLE, p=p)
+    return Reason(Why.NOT_SURE if p > PROBABLE else Why.IMPROBABLE, p=p)

@@ -15,7 +15,7 @@ from crosscheck.diagnosis.nearby import chances_near
 from crosscheck.diagnosis.result import Diagnosis, NotListed
 from crosscheck.diagnosis.rivals import Rival, rivals_of
 from crosscheck.diagnosis.search import Search
-from crosscheck.diagnosis.words import agreement, and_what_is_left, words_of
+from crosscheck.diagnosis.words import agreement, and_what_is_left, hints_of, noise_left, words_of
 from crosscheck.fit.prepare import noise_floor
 from crosscheck.fit.problem import rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
@@ -38,11 +38,11 @@ def settled(
     if way is not found:
         rivals = _all_rivals(way, told)
     missing = [missing_of(way, name, chances, rivals[name]) for name in way.found]
-    hints = {name: chances.of(name) for name in found.found if name not in way.found}
+    hints = hints_of(chances, way.found, found.found)
     verdict, sentence = DiagnosisVerdict.NO_EFFECT_MISSING, agreement(found.tried, hints)
     if missing:
         verdict = DiagnosisVerdict.EFFECTS_FOUND
-        sentence = and_what_is_left(words_of(missing), "what is left is noise", found.tried)
+        sentence = and_what_is_left(words_of(missing), noise_left(hints), found.tried)
     return diagnosis_of(
         verdict,
         sentence,
@@ -50,7 +50,10 @@ def settled(
         way,
         before=rms_by_kind(found.problem, found.steps[0].fit.state.raw),
         floor=noise_floor(found.problem, found.last.fit.state),
-        candidates=_with_hints(not_listed(way, way.found), hints),
+        candidates=_with_hints(
+            not_listed(way, way.found),
+            {name: chances.of(name) for name in found.found if name not in way.found},
+        ),
         notes=notes,
         chances=chances,
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
+from crosscheck.diagnosis.chances import PROBABLE, Chances
 from crosscheck.diagnosis.result import MissingEffect
 from crosscheck.fit.reasons import DiagnosisVerdict
 from seecr.counted import counted
@@ -37,11 +38,38 @@ def agreement(tried: int, hints: Mapping[str, float] | None = None) -> str:
     """
     if not hints:
         return f"Model and data agree: what is left is noise, and {none_of(tried)} any of it."
-    some = ", ".join(f"{name} ({probability_words(p)})" for name, p in hints.items())
     return (
         f"Model and data agree: what is left is noise; of {counted(tried, 'effect')} tried "
-        f"there is a hint of {some}, too weak to be sure."
+        f"there is a {_hint_of(hints)}."
     )
+
+
+def hints_of(
+    chances: Chances, listed: Iterable[str], found: Iterable[str] = ()
+) -> dict[str, float]:
+    """Classes that are probable and not listed, in words, with their probabilities.
+
+    Args:
+        chances: probabilities.
+        listed: effects that are.
+        found: effects that a search ended with: their classes are hints, however probable.
+    """
+    listed, found = set(listed), set(found)
+    return {
+        one_of(members): p
+        for members, p in chances.classes
+        if listed.isdisjoint(members) and (p > PROBABLE or not found.isdisjoint(members))
+    }
+
+
+def noise_left(hints: Mapping[str, float]) -> str:
+    """That what was added leaves noise, and what it may hide: ``hints`` as for `agreement`."""
+    return f"what is left is noise{f', with a {_hint_of(hints)}' if hints else ''}"
+
+
+def _hint_of(hints: Mapping[str, float]) -> str:
+    some = ", ".join(f"{name} ({probability_words(p)})" for name, p in hints.items())
+    return f"hint of {some}, too weak to be sure"
 
 
 def either(sets: Sequence[Iterable[str]]) -> str:

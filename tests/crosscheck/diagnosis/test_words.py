@@ -6,7 +6,7 @@ import pytest
 
 from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.explained import _sentence
-from crosscheck.diagnosis.words import one_of
+from crosscheck.diagnosis.words import hints_of, noise_left, one_of
 from crosscheck.fit.reasons import DiagnosisVerdict
 
 
@@ -31,3 +31,20 @@ def test_what_is_probable_but_not_sure_is_no_none_of_all() -> None:
     assert "a hint of anchor_point_error or exit_point_error (88 %), too weak to be sure" in told
     assert "none of 26" not in told and "creep" not in told
     assert "none of 26 effects" in _sentence(nothing, [], 26, Chances({}, classes[1:], None, None))
+
+
+def test_what_is_left_beside_what_was_found_may_hide_something() -> None:
+    """Stiffness at 78 % stood nowhere in the sentence that named the tracker's frame."""
+    classes = ((("tracker_frame",), 1.0), (("stiffness", "platform_mass"), 0.78), (("creep",), 0.3))
+    chances = Chances({}, classes, None, None)
+    hints = hints_of(chances, ["tracker_frame"])
+    assert noise_left(hints) == (
+        "what is left is noise, "
+        "with a hint of stiffness or platform_mass (78 %), too weak to be sure"
+    )
+    assert noise_left({}) == "what is left is noise"
+    # what a search ended with is a hint at any probability, unless it or an equal is listed
+    assert list(hints_of(chances, ["tracker_frame"], ["creep"])) == [
+        "stiffness or platform_mass", "creep",
+    ]  # fmt: skip
+    assert hints_of(chances, ["tracker_frame", "platform_mass"], ["stiffness"]) == {}
