@@ -190,26 +190,6 @@ def _rows(wrench: ArrayLike | None, rows: NDArray[np.intp]) -> ArrayLike | None:
     return wrench if wrench is None or np.ndim(wrench) < 2 else np.asarray(wrench)[rows]
 
 
-def unbalanced(
-    robot: Robot,
-    poses: ArrayLike,
-    *,
-    wrench: ArrayLike | None = None,
-    lowest: ArrayLike = 0.0,
-    highest: ArrayLike = np.inf,
-) -> Array:
-    """What the best tensions leave unbalanced, relative to the load, (n,); 0 when feasible.
-
-    Forces, and torques over the robot's length, weigh alike. Arguments as in :func:`feasible`.
-    """
-    places = _poses(poses)
-    low, high = tension_limits(robot, lowest, highest)
-    matrices, loads = balance_equations(robot, places, wrench)
-    return np.array(
-        [balanced(w, load, low, high)[1] for w, load in zip(matrices, loads, strict=True)]
-    )
-
-
 def slack_zones(solution: Solution) -> list[Zone]:
     """The zones of a trajectory by number of slack cables, in order (paper, Figs 7 and 11)."""
     counts = [

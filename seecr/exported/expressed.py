@@ -23,7 +23,6 @@ _BODIES = frozenset(
 _LENGTHS = frozenset(name for name, item in QUANTITIES.items() if item.paid_out)
 _PAST = frozenset(name for name, item in QUANTITIES.items() if item.history is not History.NONE)
 
-LENGTHS = "it acts on the way from commands to lengths, which is no part of the file"
 PAST = "it depends on the motion before"
 SENSED = "it changes what sensors read, not where the platform rests"
 LAW = "its cables pull by a law of its own"

@@ -13,6 +13,7 @@ import pytest
 from PIL import Image
 from random_robots import random_poses, random_robot
 from scipy.optimize import linprog
+from unbalanced import unbalanced
 
 from seecr import maps, threads
 from seecr.equilibrium import solve
@@ -26,7 +27,7 @@ from seecr.report.figures import map_figure
 from seecr.report.maps import softest_line
 from seecr.robot import Robot
 from seecr.shipped import model_path
-from seecr.workspace import balance_equations, feasible, tension_margin, unbalanced
+from seecr.workspace import balance_equations, feasible, tension_margin
 
 NAMES = ["demobot_cogiro", "demobot_parallel", "demobot_off_centre", "planar_vertical"]
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from random_robots import KINDS, random_poses, random_robot
 from scipy.optimize import linprog
+from unbalanced import unbalanced
 
 from seecr.equilibrium import solve
 from seecr.errors import InputError
@@ -20,7 +21,6 @@ from seecr.workspace import (
     feasible,
     slack_zones,
     tension_margin,
-    unbalanced,
     wrench_matrix,
 )
 
