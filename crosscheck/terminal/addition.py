@@ -21,9 +21,7 @@ def print_addition(
     found: Addition, model: Path, written: bool, console: Console | None = None
 ) -> None:
     """Print values, errors before and after, warnings, and what was written."""
-    console = console_for(console)
-    for note in found.notes:
-        say(console, f"note: {note}", "dim")
+    console = console_for(console, found.notes)
     for fitted in found.fitted:
         _print_values(console, fitted)
     console.print(_table(found))

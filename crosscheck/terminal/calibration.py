@@ -24,9 +24,7 @@ def print_calibration(
     found: Calibrated, model: Path, written: bool, console: Console | None = None
 ) -> None:
     """Print the errors, how far each effect is from nothing, the noise, and what was written."""
-    console = console_for(console)
-    for note in found.notes:
-        say(console, f"note: {note}", "dim")
+    console = console_for(console, found.notes)
     rows = (
         ("before", found.before, ""),
         ("calibrated", found.after, "bold"),

@@ -29,9 +29,7 @@ def print_comparison(
     console: Console | None = None,
 ) -> None:
     """Print the tables, the verdict, what exceeds its limit, and where the files are."""
-    console = console_for(console)
-    for note in found.notes:
-        say(console, f"note: {note}", "dim")
+    console = console_for(console, found.notes)
     if found.coordinates:
         console.print(_coordinates(found))
         console.print(_errors(found))

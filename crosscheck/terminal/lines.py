@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,11 +29,13 @@ def cell(kind: Kind, rms: Rms) -> str:
     return "-" if value is None else f"{kind.factor * value:.4g}"
 
 
-def console_for(console: Console | None) -> Console:
-    """The console to print on; wide where nobody's screen is the limit."""
+def console_for(console: Console | None, notes: Iterable[str] = ()) -> Console:
+    """The console to print on, notes on it; wide where nobody's screen is the limit."""
     console = console or Console(highlight=False)
     if not console.is_terminal:
         console.width = max(console.width, _WIDE)
+    for note in notes:
+        say(console, f"note: {note}", "dim")
     return console
 
 

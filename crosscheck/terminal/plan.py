@@ -23,9 +23,7 @@ def print_plan(
     plan: Plan, out: Path, files: Sequence[str] = (), console: Console | None = None
 ) -> None:
     """Print what will show, what cannot be told apart, what to add, and the files of commands."""
-    console = console_for(console)
-    for note in plan.notes:
-        say(console, f"note: {note}", "dim")
+    console = console_for(console, plan.notes)
     if plan.effects:
         console.print(_table(plan))
     for name, why in plan.missing.items():
