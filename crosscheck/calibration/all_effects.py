@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,33 @@ from seecr.effects import Terms
 from seecr.pose import Array
 
 PLAIN = Terms()
+
+
+@dataclass(frozen=True, eq=False)
+class JointErrors:
+    """What fitting all effects at once gives.
+
+    Attributes:
+        before, after, held_out: rms errors by kind: of the model as it stood, of the joint fit,
+            of fits without a run on that run.
+        scale, rho: of each kind of reading, the noise in units of the stated one, and its
+            correlation from one row of a run to the next.
+    """
+
+    before: Rms
+    after: Rms
+    held_out: Rms
+    scale: dict[str, float]
+    rho: dict[str, float]
+
+    def as_json(self) -> dict[str, Any]:
+        """The item ``calibrated`` of ``diagnosis.json``."""
+        return {
+            "before": self.before,
+            "after": self.after,
+            "held_out": self.held_out,
+            "noise": {"scale": self.scale, "correlation": self.rho},
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +86,12 @@ class Calibration:
     def colour(self) -> Colour:
         """The noise: its size beside the stated one, its correlation along runs."""
         return self.joint.colour
+
+    @property
+    def together(self) -> JointErrors:
+        """Its errors and noise."""
+        noise = self.colour.by_kind(self.setting.problem)
+        return JointErrors(self.before, self.after, self.held_out.rms, *noise)
 
     @property
     def covariance(self) -> Array:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from crosscheck.calibration.colour import whitened
 from crosscheck.calibration.gram import ColumnGroup, Gram, gram_of
 from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.later import added_columns, amplitudes, amplitudes_at_null
@@ -75,18 +74,15 @@ def gram_with(
     for name, x in columns.items():
         count = x.shape[1]
         layout = catalogue.start(name).layout
-        one_sided = count == 1 and bool(layout.lower[0] == layout.null[0])
-        groups[name] = ColumnGroup(np.arange(first, first + count), widths_for(layout), one_sided)
+        own = np.arange(first, first + count)
+        groups[name] = ColumnGroup.of(own, layout, widths_for(layout))
         first += count
     x = np.concatenate(list(columns.values()), axis=1)
     y = joint.state.white + x @ np.concatenate(list(z.values()))
-
-    def white(values: Array) -> Array:
-        return whitened(setting.chain, joint.colour, joint.weight, values)
-
+    white_x, white_y = (joint.whitened(setting.chain, part) for part in (x, y))
     known, readings = known_of(joint, catalogue, tuple(columns))
     return gram_of(
-        np.concatenate([white(x), known]), np.concatenate([white(y), readings]), groups
+        np.concatenate([white_x, known]), np.concatenate([white_y, readings]), groups
     )  # fmt: skip
 
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy import linalg, special
 
 from crosscheck.calibration.worth import log_gains
+from seecr.effects.base import Layout
 from seecr.pose import Array
 
 # A set: the width of each effect in it.
@@ -35,6 +36,11 @@ class ColumnGroup:
     columns: NDArray[np.intp]
     widths: Array
     one_sided: bool = False
+
+    @classmethod
+    def of(cls, columns: NDArray[np.intp], layout: Layout, widths: Array) -> ColumnGroup:
+        """The columns of an effect that has this layout."""
+        return cls(columns, widths, len(columns) == 1 and bool(layout.lower[0] == layout.null[0]))
 
 
 @dataclass(frozen=True, eq=False)

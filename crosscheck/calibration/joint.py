@@ -60,6 +60,10 @@ class JointFit:
         """(p,) values less null in plausible sizes."""
         return self.state.terms.sizes
 
+    def whitened(self, chain: Chain, values: Array) -> Array:
+        """Residuals (N,) or derivatives (N, p), in units of the stated noise, made white."""
+        return whitened(chain, self.colour, self.weight, values)
+
 
 @dataclass(frozen=True, eq=False)
 class Setting:

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg, special
 
-from crosscheck.calibration.colour import whitened
 from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.worth import log_gain
 from crosscheck.fit.problem import Problem
@@ -107,17 +106,15 @@ class _Beside:
 
     def __init__(self, setting: Setting, joint: JointFit) -> None:
         self.setting, self.joint = setting, joint
-        self.left = self._white(joint.state.white)
-        self.columns = self._white(joint.jacobian) * joint.width
+        self.left = joint.whitened(setting.chain, joint.state.white)
+        self.columns = joint.whitened(setting.chain, joint.jacobian) * joint.width
         normal = self.columns.T @ self.columns + np.eye(self.columns.shape[1])
         self.factor = linalg.cho_factor(normal, check_finite=False)
 
-    def _white(self, values: Array) -> Array:
-        return whitened(self.setting.chain, self.joint.colour, self.joint.weight, values)
-
     def gain(self, term: Term) -> float:
         """ln gain of an effect's amplitudes that start at null, the others as they are."""
-        x = self._white(added_columns(self.setting, self.joint, term))
+        setting, joint = self.setting, self.joint
+        x = joint.whitened(setting.chain, added_columns(setting, joint, term))
         cross = self.columns.T @ x
         normal = x.T @ x - cross.T @ linalg.cho_solve(self.factor, cross, check_finite=False)
         layout = term.layout

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.calibration.colour import whitened
 from crosscheck.calibration.joint import JointFit, Setting, moved_on, settle
 from crosscheck.calibration.linearised import Linear, linearised
 from crosscheck.fit.held_out import blocks_of
@@ -64,10 +63,10 @@ def leave_out(setting: Setting, joint: JointFit) -> LeftOut:
         absent = np.concatenate([mine, np.zeros(len(linear.y) - len(mine), dtype=bool)])
         state = _without(setting, joint, mine)
         values[b], raw[rows] = state.terms.vector, state.raw[rows]
-        left = _white(setting, joint, state.white)[mine]
+        left = joint.whitened(setting.chain, state.white)[mine]
         chi2[b], readings[b] = float(left @ left), len(left)
         straight = joint.state.white + joint.jacobian @ (fitted - without(linear, absent))
-        left = _white(setting, joint, straight)[mine]
+        left = joint.whitened(setting.chain, straight)[mine]
         surprise[b] = surprise_of(linear, absent, left) / max(len(left), 1)
     return LeftOut(raw, rms_by_kind(problem, raw), chi2, readings, values, surprise)
 
@@ -81,7 +80,7 @@ def _without(setting: Setting, joint: JointFit, absent: NDArray[np.bool_]) -> St
     cut = replace(setting, chain=chain, weight=weight)
     state = moved_on(cut, joint, weight, _STEPS)
     straight = joint.state.white - joint.jacobian @ (state.terms.sizes - joint.z)
-    bend = _white(setting, joint, state.white - straight)[absent]
+    bend = joint.whitened(setting.chain, state.white - straight)[absent]
     if len(bend) and np.sqrt(np.mean(bend**2)) > _BENT:
         state = settle(cut, state, joint.width, joint.colour, _EARNEST).state
     return state
@@ -95,10 +94,6 @@ def without(linear: Linear, rows: NDArray[np.bool_]) -> Array:
     z = np.zeros(linear.x.shape[1])
     z[free] = np.linalg.solve(normal, kept.T @ linear.y[~rows])
     return z
-
-
-def _white(setting: Setting, joint: JointFit, values: Array) -> Array:
-    return whitened(setting.chain, joint.colour, joint.weight, values)
 
 
 def surprise_of(linear: Linear, rows: NDArray[np.bool_], left: Array) -> float:

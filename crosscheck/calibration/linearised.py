@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.calibration.colour import whitened
 from crosscheck.calibration.gram import ColumnGroup
 from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.fit.known import known_left, known_readings
@@ -60,12 +59,10 @@ def unwhitened(joint: JointFit) -> Linear:
 def linearised(setting: Setting, joint: JointFit) -> Linear:
     """The linear model with the noise made white; what was measured independently comes last."""
     free = free_of(joint)
-    chain, colour, weight = setting.chain, joint.colour, joint.weight
+    chain = setting.chain
     columns = known_readings(joint.terms)[0] * free
-    x = np.concatenate([whitened(chain, colour, weight, joint.jacobian * free), columns])
-    left = np.concatenate(
-        [whitened(chain, colour, weight, joint.state.white), known_left(joint.terms)]
-    )  # fmt: skip
+    x = np.concatenate([joint.whitened(chain, joint.jacobian * free), columns])
+    left = np.concatenate([joint.whitened(chain, joint.state.white), known_left(joint.terms)])
     return Linear(x, left + x @ joint.z, joint.width * free)
 
 
@@ -78,6 +75,5 @@ def groups_of(joint: JointFit, widths: Callable[[Layout], Array]) -> dict[str, C
         own = np.flatnonzero(joint.terms.own(term.name))
         own = own[free[own] & ~layout.shape]
         if len(own):
-            one_sided = len(own) == 1 and bool(layout.lower[0] == layout.null[0])
-            out[term.name] = ColumnGroup(own, widths(layout), one_sided)
+            out[term.name] = ColumnGroup.of(own, layout, widths(layout))
     return out

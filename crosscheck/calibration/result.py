@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from crosscheck.calibration.all_effects import Calibration, fit_all_effects
+from crosscheck.calibration.all_effects import Calibration, JointErrors, fit_all_effects
 from crosscheck.errors import CrosscheckError, UnsolvedError
 from crosscheck.fit.prepare import Progress, prepare
-from crosscheck.fit.problem import Rms
 from crosscheck.fit.words import fitted_lines, fitted_records, rms_words
 from crosscheck.given import GivenModel, GivenRobot, considered, model_of, robot_of
 from crosscheck.measurements.read import GivenData, measurements_of
@@ -27,14 +26,14 @@ _UNSEEN = 0.98
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Calibrated(Result):
+class Calibrated(Result, JointErrors):
     """Every effect that data see, fitted at once.
 
     Attributes:
         fitted: the effects with standard errors; those that the data do not see are left out.
         covariance: (p, p) of all their parameters, in their order; SI.
-        before: rms errors of the model as it stood. after: of this one.
-        held_out: on runs left out, each by a fit without it.
+        before, after, held_out: rms errors by kind: of the model as it stood, of this one, of
+            fits without a run on that run.
         scale, rho: of each kind of reading, the noise in units of the stated one, and its
             correlation from one row of a run to the next.
         outliers: lines that hardly count.
@@ -44,11 +43,6 @@ class Calibrated(Result):
 
     fitted: tuple[Fitted, ...]
     covariance: Array
-    before: Rms
-    after: Rms
-    held_out: Rms
-    scale: dict[str, float]
-    rho: dict[str, float]
     outliers: tuple[int, ...]
     settled: bool
     notes: tuple[str, ...]
@@ -104,10 +98,7 @@ class Calibrated(Result):
     def as_json(self) -> dict[str, Any]:
         """The content of ``calibration.json``, in SI."""
         return {
-            "before": self.before,
-            "after": self.after,
-            "held_out": self.held_out,
-            "noise": {"scale": self.scale, "correlation": self.rho},
+            **super().as_json(),
             "outliers": list(self.outliers),
             "settled": self.settled,
             "improves_held_out": self.pays,
@@ -161,15 +152,10 @@ def _result(found: Calibration, before: Terms, notes: tuple[str, ...]) -> Calibr
     kept = {one.term.name for one in fitted}
     own = np.flatnonzero([name in kept for name, _key in found.terms.labels])
     data = found.setting.problem.data
-    scale, rho = found.colour.by_kind(found.setting.problem)
     return Calibrated(
         fitted=fitted,
         covariance=covariance[np.ix_(own, own)],
-        before=found.before,
-        after=found.after,
-        held_out=found.held_out.rms,
-        scale=scale,
-        rho=rho,
+        **vars(found.together),
         outliers=tuple(int(line) for line in data.line[found.outliers]),
         settled=found.joint.settled,
         notes=notes,

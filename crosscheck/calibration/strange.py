@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from crosscheck.calibration.colour import Colour, whitened
+from crosscheck.calibration.colour import Colour
 from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.robust import outliers
 from crosscheck.fit.noise import nearest_rows, next_rows, whiteness
@@ -72,5 +72,5 @@ def side_by_side(setting: Setting, joint: JointFit) -> bool:
 
 def goes_together(setting: Setting, joint: JointFit) -> bool:
     """Whether residuals that were made white still agree with those nearby."""
-    left = whitened(setting.chain, joint.colour, joint.weight, joint.state.white)
+    left = joint.whitened(setting.chain, joint.state.white)
     return whiteness(setting.problem, left, 0).structured

@@ -10,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 from scipy import linalg, special
 
-from crosscheck.calibration.colour import whitened
 from crosscheck.calibration.field import FIELD_WIDTHS, UNKNOWN, field_of
 from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.worth import gains_along
@@ -53,11 +52,7 @@ def shown_from(setting: Setting, joint: JointFit, columns: Array, width: Array) 
 
 def _left(setting: Setting, joint: JointFit, field: Array, columns: Array, width: Array) -> Array:
     """(k, k) normal matrix of the field's coefficients beside the effects."""
-
-    def white(values: Array) -> Array:
-        return whitened(setting.chain, joint.colour, joint.weight, values)
-
-    x, f = white(columns * width), white(field)
+    x, f = (joint.whitened(setting.chain, part) for part in (columns * width, field))
     factor = linalg.cho_factor(x.T @ x + np.eye(x.shape[1]), check_finite=False)
     cross = x.T @ f
     return np.asarray(f.T @ f - cross.T @ linalg.cho_solve(factor, cross, check_finite=False))

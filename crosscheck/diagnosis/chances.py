@@ -7,40 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from crosscheck.calibration.all_effects import Calibration
+from crosscheck.calibration.all_effects import JointErrors
 from crosscheck.calibration.search import Sought
 from crosscheck.fit.problem import Rms
 from crosscheck.fit.words import rms_words
 
 PROBABLE = 0.5
 """From this probability on an effect that is not listed is called probable."""
-
-
-@dataclass(frozen=True)
-class Together:
-    """What fitting the whole catalogue at once gives.
-
-    Attributes:
-        before, after, held_out: rms errors by kind: of the model as it stood, of the joint fit,
-            of that on runs left out.
-        scale, rho: of each kind of reading, the noise in units of the stated one, and its
-            correlation from one row of a run to the next.
-    """
-
-    before: Rms
-    after: Rms
-    held_out: Rms
-    scale: dict[str, float]
-    rho: dict[str, float]
-
-    def as_json(self) -> dict[str, Any]:
-        """The item ``calibrated`` of ``diagnosis.json``."""
-        return {
-            "before": self.before,
-            "after": self.after,
-            "held_out": self.held_out,
-            "noise": {"scale": self.scale, "correlation": self.rho},
-        }
 
 
 @dataclass(frozen=True)
@@ -62,7 +35,7 @@ class Chances:
     effect: dict[str, float]
     classes: tuple[tuple[tuple[str, ...], float], ...]
     field: float | None
-    together: Together | None
+    together: JointErrors | None
     shown: Rms | None = None
     further: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
@@ -99,13 +72,7 @@ def chances_of(sought: Sought) -> Chances:
     """The probabilities of compared sets."""
     classes = sought.classes
     pairs = zip(classes.members, classes.probability, strict=True)
-    together = together_of(sought.calibration)
     return Chances(
-        classes.effect, tuple(pairs), sought.field_odds, together, sought.shown, classes.further
-    )
-
-
-def together_of(found: Calibration) -> Together:
-    """A calibration's errors and noise."""
-    scale, rho = found.colour.by_kind(found.setting.problem)
-    return Together(found.before, found.after, found.held_out.rms, scale, rho)
+        classes.effect, tuple(pairs), sought.field_odds, sought.calibration.together, sought.shown,
+        classes.further,
+    )  # fmt: skip

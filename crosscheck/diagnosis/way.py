@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from crosscheck.calibration.all_effects import covariance
-from crosscheck.calibration.colour import whitened
 from crosscheck.calibration.exact import Refit
 from crosscheck.calibration.gram import Gram
 from crosscheck.calibration.joint import JointFit, Setting
@@ -75,7 +74,7 @@ def fit_of(setting: Setting, joint: JointFit) -> Fit:
 def _step(setting: Setting, added: str, model: Refit) -> Step:
     joint, problem = model.joint, setting.problem
     fit = fit_of(setting, joint)
-    left = whitened(setting.chain, joint.colour, joint.weight, joint.state.white)
+    left = joint.whitened(setting.chain, joint.state.white)
     seen = directions(setting, joint)
     evidence = Evidence(model.score, joint.state.chi2, seen)
     out = leave_out(setting, joint)

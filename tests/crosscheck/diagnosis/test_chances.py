@@ -9,8 +9,9 @@ import made_diagnoses
 import pytest
 from made_data import COGIRO, measured, term
 
+from crosscheck.calibration.all_effects import JointErrors
 from crosscheck.diagnosis import nearby
-from crosscheck.diagnosis.chances import Chances, Together
+from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.nearby import _impossible, _refitted, chances_near
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.stepwise import by_steps
@@ -60,7 +61,7 @@ def test_where_something_is_unknown_the_joint_fit_is_told() -> None:
 
 
 def test_a_class_has_the_probability_of_all_its_members() -> None:
-    together = Together(RMS, RMS, RMS, {"position": 1.0}, {"position": 0.0})
+    together = JointErrors(RMS, RMS, RMS, {"position": 1.0}, {"position": 0.0})
     chances = Chances(
         {"a": 0.5, "b": 0.45, "c": 0.1}, ((("a", "b"), 0.95), (("c",), 0.1)), -3.0, together
     )

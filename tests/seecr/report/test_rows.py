@@ -1,4 +1,4 @@
-"""SweepRows, words, figure and recording of a sweep say what the solution says."""
+"""Rows, words, figure and recording of a sweep say what the solution says."""
 
 from __future__ import annotations
 
