@@ -8,7 +8,7 @@ Numerical Continuation Methods, 2003, chapter 2); what moves far however small t
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,12 +20,13 @@ from seecr.compiled.outcomes import CONVERGED, SINGULAR
 from seecr.joints import pose_of_values, values_of_pose
 from seecr.path import Path, path_of
 from seecr.pose import Array, pose_add, pose_difference
-from seecr.result import Record
+from seecr.result import COORDINATES, Record, Result, named
 from seecr.robot import Robot
 from seecr.setup import Setup
 from seecr.solution import Solution, certify
 from seecr.starts import start_of
 from seecr.tables import Tables, assemble, take
+from seecr.units import joules
 
 __all__ = ["Jump", "follow_commands", "moved", "step_between"]
 
@@ -46,8 +47,8 @@ SetupOf = Callable[[Commands, NDArray[np.integer]], Setup]
 """From waypoints and the row (N,) that each belongs to, to their setup."""
 
 
-@dataclass(frozen=True, eq=False)
-class Jump:
+@dataclass(frozen=True, eq=False, repr=False)
+class Jump(Result):
     """Where a rest ends on the commanded way.
 
     Attributes:
@@ -79,6 +80,32 @@ class Jump:
             "energy_J": self.energy,
             "certain": self.certain,
         }
+
+    @property
+    def words(self) -> str:
+        """How far it jumps and what that sets free."""
+        if not np.isfinite(self.after).all():
+            return "its rest ends, and nothing holds it then"
+        moved, turned = np.linalg.norm(self.size[:3]), np.linalg.norm(self.size[3:])
+        free = f", {joules(self.energy)} set free" if np.isfinite(self.energy) else ""
+        sure = "" if self.certain else "; where it lands depends on damping"
+        return (
+            f"its rest ends and it jumps by {1e3 * moved:.4g} mm and {np.degrees(turned):.4g} deg"
+            f"{free}{sure}"
+        )
+
+    def lines(self) -> list[str]:
+        """Where it is commanded to, and its words."""
+        place = ", ".join(f"{value:.4g}" for value in self.command[:3])
+        return [f"at command ({place}) m: {self.words}"]
+
+    def records(self) -> Sequence[Record]:
+        """One row: the command, the platform before and after, and what is set free."""
+        poses = (("command_{}", self.command), ("before_{}", self.before), ("after_{}", self.after))
+        record: Record = {}
+        for pattern, pose in poses:
+            record |= named(pattern, COORDINATES, pose)
+        return [{**record, "energy_J": float(self.energy), "certain": self.certain}]
 
 
 def follow_commands(robot: Robot, commands: Commands, setup_of: SetupOf) -> Solution:

@@ -7,6 +7,7 @@ the one falling direction (Cerjan and Miller, J. Chem. Phys. 75, 1981).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,9 +16,10 @@ from seecr.compiled.outcomes import TOLERANCE
 from seecr.errors import InputError
 from seecr.following import evaluated, moved, step_between
 from seecr.pose import Array, pose_difference
-from seecr.result import Record
+from seecr.result import COORDINATES, Record, Result, named
 from seecr.solution import Solution
 from seecr.tables import Tables, take
+from seecr.units import joules
 
 __all__ = ["Barrier", "barriers"]
 
@@ -25,12 +27,14 @@ __all__ = ["Barrier", "barriers"]
 _IMAGES, _ROUNDS, _ACROSS = 33, 300, 1e-3
 # Steps to the saddle at most; the longest, and the softest stiffness, over length and load.
 _STEPS, _LONGEST, _SOFTEST = 200, 0.1, 1e-2
+# Poses nearer than this [of the length] are one equilibrium.
+_ALIKE = 1e-5
 # Turned by more than this [rad] the platform hangs twisted among its cables.
 _TWISTED = 0.5 * np.pi
 
 
-@dataclass(frozen=True, eq=False)
-class Barrier:
+@dataclass(frozen=True, eq=False, repr=False)
+class Barrier(Result):
     """What is between one equilibrium and another.
 
     Attributes:
@@ -60,13 +64,44 @@ class Barrier:
             "twisted": self.twisted,
         }
 
+    @property
+    def words(self) -> str:
+        """Whether pushes lead to the other, and what it takes."""
+        least = "" if self.exact else "at most "
+        twisted = "twisted" if self.twisted else "reachable"
+        if not np.isfinite(self.energy):
+            return (
+                f"{twisted}; what it takes to get there has no number: this load or law has no "
+                "energy"
+            )
+        # the top of a way that was not made exact may be its end, but for rounding
+        back = joules(self.back) if self.back > 1e-12 * self.energy else "next to nothing"
+        return f"{twisted}, {least}{joules(self.energy)} to get there, {back} back"
+
+    def lines(self) -> list[str]:
+        """Its words."""
+        return [self.words]
+
+    def records(self) -> Sequence[Record]:
+        """One row: energies and the pose at the top."""
+        return [
+            {
+                "energy_J": float(self.energy),
+                "back_J": float(self.back),
+                **named("{}", COORDINATES, self.pose),
+                "exact": self.exact,
+                "twisted": self.twisted,
+            }
+        ]
+
 
 def barriers(solution: Solution, others: Solution, i: int = 0) -> tuple[Barrier, ...]:
     """From where a command rests to each of its other equilibria.
 
     Args:
         solution: where commands rest.
-        others: other equilibria of command i, as of :func:`seecr.equilibria`.
+        others: other equilibria of command i, as of :func:`seecr.equilibria`; from the one where
+            it rests to itself it takes nothing.
         i: which of the commands.
 
     Raises:
@@ -86,6 +121,9 @@ def _barrier(one: Solution, other: Solution) -> Barrier:
     twisted = bool(not robot.joints and turned > _TWISTED)
     if not (np.isfinite(one.energy[0]) and np.isfinite(other.energy[0])):
         return Barrier(np.nan, np.nan, np.full(7, np.nan), exact=False, twisted=twisted)
+    size = np.where(np.arange(6) < 3, 1.0 / robot.length, 1.0)
+    if np.linalg.norm(size * pose_difference(other.pose, one.pose)) < _ALIKE:
+        return Barrier(0.0, 0.0, one.pose[0], exact=True, twisted=False)
     images = _string(one, other)
     energies = evaluated(robot, take(tables, np.zeros(_IMAGES, int)), images).energy
     top = images[[int(np.argmax(energies))]]

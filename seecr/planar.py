@@ -7,6 +7,7 @@ is minus the value of the hinge about +y.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from seecr.errors import InputError
 from seecr.pose import Array
+from seecr.result import Record, Result
 
 # A root of the quartic this far off the unit circle is no angle (roots are polished later).
 _OFF_CIRCLE = 1e-5
@@ -54,8 +56,8 @@ def bar_tilt(exit_points: ArrayLike, positions: ArrayLike, half_length: float = 
     return np.array(tilts).reshape(places.shape[:-1])
 
 
-@dataclass(frozen=True)
-class BarRest:
+@dataclass(frozen=True, repr=False)
+class BarRest(Result):
     """One way in which a bar on two inextensible cables is in balance.
 
     Attributes:
@@ -67,6 +69,19 @@ class BarRest:
     theta: float
     tensions: tuple[float, float]
     stable: bool
+
+    def lines(self) -> list[str]:
+        """Tilt, tensions, and whether it stays."""
+        first, second = self.tensions
+        return [
+            f"tilted by {np.degrees(self.theta):.4g} deg, tensions {first:.4g} and {second:.4g} "
+            f"weights, {'stable' if self.stable else 'not stable'}"
+        ]
+
+    def records(self) -> Sequence[Record]:
+        """One row; tensions in weights."""
+        tensions = dict(zip(("tension_1", "tension_2"), self.tensions, strict=True))
+        return [{"theta_rad": self.theta, **tensions, "stable": self.stable}]
 
 
 def bar_equilibria(

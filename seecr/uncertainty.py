@@ -18,15 +18,17 @@ from seecr.files import read_text
 from seecr.given import GivenRobot, robot_of
 from seecr.model import Model, model_given
 from seecr.pose import Array
+from seecr.result import Record, Result, named
 from seecr.sensitivity import sensitivities
 from seecr.starts import commanded_poses
+from seecr.units import short
 
 # An eigenvalue of a correlation this far below zero is no rounding of its six digits.
 _ROUNDED = 1e-3
 
 
-@dataclass(frozen=True, eq=False)
-class Spread:
+@dataclass(frozen=True, eq=False, repr=False)
+class Spread(Result):
     """One standard deviation of where n commands lead, by what the model does not know.
 
     To first order in the parameters, as the covariance itself is. NaN where a row has no rest.
@@ -42,6 +44,44 @@ class Spread:
     rotation: Array
     tensions: Array
     seen: Array
+
+    def lines(self) -> list[str]:
+        """The largest of all rows, of what is there and of what the tracker would read."""
+        n, rests = len(self.position), ~np.isnan(self.position[:, 0])
+        head = f"{counted(n, 'command')}, at rest at {int(rests.sum())}"
+        if not rests.any():
+            return [head]
+        there, seen = (
+            f"{short(1e3 * _longest(place[rests]), 2)} mm and "
+            f"{short(np.degrees(_longest(turn[rests])), 2)} deg"
+            for place, turn in (
+                (self.position, self.rotation),
+                (self.seen[:, :3], self.seen[:, 3:]),
+            )
+        )
+        pulls = short(float(self.tensions[rests].max()), 2)
+        return [
+            f"{head}; one standard deviation: up to {there}, {pulls} N; as the tracker reads it "
+            f"{seen}"
+        ]
+
+    def records(self) -> list[Record]:
+        """One row per command."""
+        cables = [str(k + 1) for k in range(self.tensions.shape[1])]
+        moved = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
+        return [
+            {
+                **named("stderr_{}", moved, np.concatenate([self.position[i], self.rotation[i]])),
+                **named("stderr_seen_{}", moved, self.seen[i]),
+                **named("stderr_tension_{}_N", cables, self.tensions[i]),
+            }
+            for i in range(len(self.position))
+        ]
+
+
+def _longest(vectors: Array) -> float:
+    """Length of the longest of vectors (n, 3)."""
+    return float(np.linalg.norm(vectors, axis=1).max())
 
 
 def covariance_of(model: Model) -> Array | None:

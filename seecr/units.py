@@ -13,7 +13,7 @@ import numpy as np
 
 from seecr.pose import Array
 
-__all__ = ["UNITS", "Unit", "of_columns", "short", "with_error"]
+__all__ = ["UNITS", "Unit", "joules", "of_columns", "short", "with_error"]
 
 Numbers = TypeVar("Numbers", float, Array)
 
@@ -91,6 +91,11 @@ def short(value: float | None, digits: int = 3) -> str:
         return f"{mantissa}e{int(power)}".replace("-", "−")
     decimals = max(digits - size, 0)
     return f"{value:.{decimals}f}".replace("-", "−")
+
+
+def joules(energy: float, form: str = ".3g") -> str:
+    """An energy [J] in mJ, from 1 J on in J."""
+    return f"{energy:{form}} J" if abs(energy) >= 1.0 else f"{1e3 * energy:{form}} mJ"
 
 
 def with_error(value: float, error: float, digits: int = 2) -> tuple[str, str]:

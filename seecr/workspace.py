@@ -7,17 +7,20 @@ do at a pose, not whether the platform comes to rest there when the winches are 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seecr.counted import counted
 from seecr.distribution import balanced, tension_limits
 from seecr.errors import InputError
 from seecr.given import GivenRobot, robot_of
 from seecr.joints import motion_columns, values_of_pose
 from seecr.pose import Array, all_finite, quat_rotate, transform_points
+from seecr.result import Record, Result
 from seecr.robot import Robot
 from seecr.solution import Solution
 from seecr.starts import finite
@@ -27,8 +30,8 @@ from seecr.threads import in_parts
 _BALANCED = 1e-9
 
 
-@dataclass(frozen=True)
-class Zone:
+@dataclass(frozen=True, repr=False)
+class Zone(Result):
     """Consecutive poses of a trajectory with the same number of slack cables.
 
     Attributes:
@@ -40,6 +43,17 @@ class Zone:
     first: int
     last: int
     slack: int | None
+
+    def lines(self) -> list[str]:
+        """Which poses, and how many cables are slack there."""
+        one, last = self.first == self.last, self.last
+        poses = f"pose {last}" if one else f"poses {self.first} to {last}"
+        count = "no answer" if self.slack is None else counted(self.slack, "slack cable")
+        return [f"{poses}: {count}"]
+
+    def records(self) -> Sequence[Record]:
+        """One row."""
+        return [{"first_pose": self.first, "last_pose": self.last, "slack_cables": self.slack}]
 
 
 def feasible(

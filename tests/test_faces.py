@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import re
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -21,15 +22,24 @@ from seecr.result import Result
 ROOT = Path(__file__).resolve().parents[1]
 FACES = [seecr, crosscheck]
 COMMANDS = [p for face in ("seecr", "crosscheck") for p in modules(face) if p.parent.name == "cli"]
-RESULTS = [
-    crosscheck.Addition,
-    crosscheck.CaseResult,
-    crosscheck.Comparison,
-    crosscheck.Diagnosis,
-    crosscheck.Measurements,
-    crosscheck.Plan,
-    crosscheck.Twin,
-]
+# What functions take as well as give, and effects, which are everybody's own classes.
+NO_RESULTS = {seecr.Robot, seecr.Effect}
+# What results hold of more of their kind.
+PARTS = {crosscheck.CaseResult, crosscheck.MissingEffect, seecr.Jump}
+
+
+def returned() -> set[type]:
+    """The classes of which the faces' functions return one, or several."""
+    found = set()
+    for face in FACES:
+        functions = [getattr(face, n) for n in face.__all__ if callable(getattr(face, n))]
+        for function in filter(inspect.isfunction, functions):
+            words = re.findall(r"\w+", str(inspect.signature(function).return_annotation))
+            found |= {getattr(face, word) for word in words if word in face.__all__}
+    return {one for one in found if inspect.isclass(one)}
+
+
+RESULTS = sorted((returned() | PARTS) - NO_RESULTS, key=lambda one: one.__name__)
 
 
 @pytest.mark.parametrize("face", FACES, ids=lambda face: face.__name__)

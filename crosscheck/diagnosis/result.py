@@ -25,8 +25,8 @@ from seecr.pose import Array
 from seecr.result import Record, Result
 
 
-@dataclass(frozen=True, eq=False)
-class MissingEffect:
+@dataclass(frozen=True, eq=False, repr=False)
+class MissingEffect(Result):
     """An effect that the data warrant.
 
     Attributes:
@@ -81,6 +81,12 @@ class MissingEffect:
             names = ", ".join(rival.name for rival in self.rivals)
             out.append(f"    cannot be told from: {names}")
         return [*out, f"    check: {self.check}"]
+
+    def records(self) -> list[Record]:
+        """A record for each of its parameters: value and standard error, SI."""
+        rivals = ", ".join(rival.name for rival in self.rivals)
+        values = value_records(self.layout, self.values, self.stderr, self.at_bound)
+        return [{**record, "cannot_be_told_from": rivals} for record in values]
 
     def as_json(self) -> dict[str, Any]:
         """An item of ``missing``: SI, null where there is no number."""
@@ -185,9 +191,9 @@ class Diagnosis(Result):
     def records(self) -> list[Record]:
         """A record for each parameter of a missing effect: value and standard error, SI."""
         return [
-            {"step": step, **record, "cannot_be_told_from": ", ".join(r.name for r in found.rivals)}
+            {"step": step, **record}
             for step, found in enumerate(self.missing, 1)
-            for record in value_records(found.layout, found.values, found.stderr, found.at_bound)
+            for record in found.records()
         ]
 
     def as_json(self) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from seecr.exported.bodies import SEGMENTS, bodies_text
 from seecr.exported.expressed import expressed
 from seecr.exported.scene import plain_text
 from seecr.given import GivenRobot, robot_of
+from seecr.result import Record, Result
 from seecr.robot import Robot
 from seecr.setup import Setup, plain_setup
 from seecr.solution import Solution
@@ -32,8 +33,8 @@ if TYPE_CHECKING:
 _ALONG = 1e-12
 
 
-@dataclass(frozen=True, eq=False)
-class Export:
+@dataclass(frozen=True, eq=False, repr=False)
+class Export(Result):
     """A robot's MJCF.
 
     Attributes:
@@ -70,6 +71,19 @@ class Export:
     def lines(self, name: str = "the file", mujoco_name: str = "the file for MuJoCo") -> list[str]:
         """What is in which file, and what is in none."""
         return list(self._lines(name, mujoco_name))
+
+    def records(self) -> list[Record]:
+        """One row per effect: which file has it, and why none does."""
+        places = (
+            ("the file", self.plain),
+            ("the file for MuJoCo", self.bodies),
+            ("the rest lengths", self.lengths),
+        )
+        inside = [(name, place, "") for place, names in places for name in names]
+        nowhere = [(name, "nowhere", why) for name, why in self.nowhere]
+        return [
+            {"effect": name, "where": place, "why": why} for name, place, why in inside + nowhere
+        ]
 
     def as_json(self) -> dict[str, Any]:
         """Where each effect is, the rest lengths at the reference pose, and the rest exported."""

@@ -12,7 +12,7 @@ from seecr.pose import Array, pose_difference, rxyz_from_quat
 from seecr.robot import Robot
 from seecr.solution import Solution, Status
 from seecr.uncertainty import Spread
-from seecr.units import short, with_error
+from seecr.units import joules, short, with_error
 
 __all__ = [
     "at_rest",
@@ -201,29 +201,12 @@ def other_lines(
             f"{_more_energy(others.energy[k] - solution.energy[i])}"
             f"slack: {' '.join(slack) or 'none'}"
         )
-        yield f"{line}; {_pass_words(passes[n])}" if passes else line
+        yield f"{line}; {passes[n].words}" if passes else line
 
 
 def _more_energy(more: float) -> str:
     """A moment from outside and a law in strain alone have no energy."""
-    return f"{_joules(more, '+.4g')}, " if np.isfinite(more) else ""
-
-
-def _joules(energy: float, form: str = ".3g") -> str:
-    """An energy in mJ, from 1 J on in J."""
-    return f"{energy:{form}} J" if abs(energy) >= 1.0 else f"{1e3 * energy:{form}} mJ"
-
-
-def _pass_words(way: Barrier) -> str:
-    least = "" if way.exact else "at most "
-    twisted = "twisted" if way.twisted else "reachable"
-    if not np.isfinite(way.energy):
-        return (
-            f"{twisted}; what it takes to get there has no number: this load or law has no energy"
-        )
-    # the top of a way that was not made exact may be its end, but for rounding
-    back = _joules(way.back) if way.back > 1e-12 * way.energy else "next to nothing"
-    return f"{twisted}, {least}{_joules(way.energy)} to get there, {back} back"
+    return f"{joules(more, '+.4g')}, " if np.isfinite(more) else ""
 
 
 def jump_lines(solution: Solution) -> Iterator[str]:
@@ -236,19 +219,7 @@ def jump_lines(solution: Solution) -> Iterator[str]:
         for jump in jumps:
             command = _three(1e3 * jump.command[:3], ".1f")
             at = f"on the way to {solution.place(i)}, at command {command} mm"
-            if not np.isfinite(jump.after).all():
-                yield f"{at}: its rest ends, and nothing holds it then"
-                continue
-            moved, turned = np.linalg.norm(jump.size[:3]), np.linalg.norm(jump.size[3:])
-            sure = "" if jump.certain else "; where it lands depends on damping"
-            yield (
-                f"{at}: its rest ends and it jumps by {1e3 * moved:.4g} mm and "
-                f"{np.degrees(turned):.4g} deg{_set_free(jump.energy)}{sure}"
-            )
-
-
-def _set_free(energy: float) -> str:
-    return f", {_joules(energy)} set free" if np.isfinite(energy) else ""
+            yield f"{at}: {jump.words}"
 
 
 def sweep_lines(

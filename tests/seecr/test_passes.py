@@ -28,6 +28,8 @@ def test_the_pass_between_the_two_rests_of_the_tilted_command() -> None:
     (way,) = barriers(own, other)
     assert way.exact and not way.twisted
     assert way.energy == pytest.approx(6.80e-5, rel=1e-3)
+    # of all equilibria one is the rest itself
+    assert sorted(w.energy for w in barriers(own, every)) == [0.0, way.energy]
     assert way.back - way.energy == pytest.approx(own.energy[0] - other.energy[0], rel=1e-9)
     # a saddle: balanced, one direction falls, and leads to one rest on either side
     there = evaluated(robot, own.tables, way.pose[None])

@@ -121,6 +121,33 @@ def test_a_model_prints_its_effects(tmp_path: Path) -> None:
     assert table["stderr"] == [1e-4, None, None, None]
 
 
+def test_small_results_are_a_line_each_and_a_row_for_each_thing() -> None:
+    robot, up = "demobot_cogiro", np.array(HOME, dtype=float)
+    off = np.array([[3e-4, 4e-4, 0.0], [np.nan] * 3])
+    fall = seecr.Jump(up, up, np.full(7, np.nan), np.nan, certain=True)
+    results: dict[str, Result] = {
+        "the file for MuJoCo, for MuJoCo alone: pulley_radius too": seecr.export(
+            robot, [seecr.Term.of(robot, "pulley_radius", radius_m=0.01)]
+        ),
+        "2 commands, at rest at 1; one standard deviation: up to 0.50 mm and 0.029 deg, "
+        "0.00040 N; as the tracker reads it 0.50 mm and 0.029 deg": seecr.Spread(
+            off, off, off, np.hstack([off, off])
+        ),
+        "poses 3 to 5: 2 slack cables": seecr.Zone(3, 5, 2),
+        "pose 3: no answer": seecr.Zone(3, 3, None),
+        "reachable, 2 J to get there, 1 mJ back": seecr.Barrier(2.0, 1e-3, up, True, False),
+        "at command (0.4, 0.25, 0.1) m: its rest ends, and nothing holds it then": fall,
+        "tilted by 0 deg, tensions 0.5 and 0.5 weights, stable": seecr.BarRest(
+            0.0, (0.5, 0.5), True
+        ),
+    }
+    for line, result in results.items():
+        assert repr(result).splitlines()[-1] == line
+        assert f"<div>{line}</div>" in result._repr_html_()
+        rows = 2 if isinstance(result, seecr.Spread) else 1
+        assert result.to_frame().num_rows == len(result.records()) == rows
+
+
 class Two(Result):
     """Two rows, one without a number."""
 
