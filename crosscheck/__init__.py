@@ -24,11 +24,17 @@ if TYPE_CHECKING:
     from crosscheck.errors import CrosscheckError
     from crosscheck.fit.reasons import DiagnosisVerdict
     from crosscheck.fit.tolerance import Tolerance
+    from crosscheck.importing.case import Imported, import_case
+    from crosscheck.importing.choices import ImportChoices
     from crosscheck.measurements.data import Measurements, Sigma
     from crosscheck.measurements.read import load_commands, load_measurements
     from crosscheck.measurements.write import write_measurements
+    from crosscheck.model.write import save_model
+    from crosscheck.planning.choosing import choose_poses
     from crosscheck.planning.design import make_plan
     from crosscheck.planning.result import Plan
+    from crosscheck.planning.write import write_plan
+    from crosscheck.suite.cases import Case, shipped_cases, user_cases
     from crosscheck.suite.results import CaseResult
     from crosscheck.suite.run import Run, run_suite
     from crosscheck.twin.make import Twin, make_twin
@@ -37,11 +43,14 @@ if TYPE_CHECKING:
 _WHERE = {
     "Addition": "add",
     "Calibrated": "calibration.result",
+    "Case": "suite.cases",
     "CaseResult": "suite.results",
     "Comparison": "comparison.result",
     "CrosscheckError": "errors",
     "Diagnosis": "diagnosis.result",
     "DiagnosisVerdict": "fit.reasons",
+    "ImportChoices": "importing.choices",
+    "Imported": "importing.case",
     "Measurements": "measurements.data",
     "MissingEffect": "diagnosis.result",
     "Plan": "planning.result",
@@ -52,24 +61,33 @@ _WHERE = {
     "add_effect": "add",
     "add_effects": "add",
     "calibrate": "calibration.result",
+    "choose_poses": "planning.choosing",
     "compare": "comparison.residuals",
     "diagnose": "diagnosis.verdict",
+    "import_case": "importing.case",
     "load_commands": "measurements.read",
     "load_measurements": "measurements.read",
     "make_plan": "planning.design",
     "make_twin": "twin.make",
     "run_suite": "suite.run",
+    "save_model": "model.write",
+    "shipped_cases": "suite.cases",
+    "user_cases": "suite.cases",
     "write_measurements": "measurements.write",
+    "write_plan": "planning.write",
 }
 
 __all__ = [
     "Addition",
     "Calibrated",
+    "Case",
     "CaseResult",
     "Comparison",
     "CrosscheckError",
     "Diagnosis",
     "DiagnosisVerdict",
+    "ImportChoices",
+    "Imported",
     "Measurements",
     "MissingEffect",
     "Plan",
@@ -80,14 +98,20 @@ __all__ = [
     "add_effect",
     "add_effects",
     "calibrate",
+    "choose_poses",
     "compare",
     "diagnose",
+    "import_case",
     "load_commands",
     "load_measurements",
     "make_plan",
     "make_twin",
     "run_suite",
+    "save_model",
+    "shipped_cases",
+    "user_cases",
     "write_measurements",
+    "write_plan",
 ]
 
 __getattr__ = lazily(__name__, _WHERE)

@@ -15,7 +15,7 @@ from seecr.effects import Term, Terms, catalogue, effect_named
 from seecr.errors import InputError
 from seecr.given import GivenRobot, robot_of
 from seecr.mjcf import load_robot
-from seecr.model import Model, effects_given, no_effects
+from seecr.model import Model, effects_given, model_given, new_model, no_effects
 from seecr.pose import Array
 from seecr.robot import Robot
 from seecr.shipped import robot_file
@@ -23,6 +23,7 @@ from seecr.shipped import robot_file
 __all__ = [
     "GivenModel",
     "GivenRobot",
+    "basis_of",
     "considered",
     "copy_robot",
     "file_of",
@@ -87,6 +88,15 @@ def file_of(given: GivenRobot) -> Path:
     if isinstance(given, Robot) and not _same_numbers(given, load_robot(robot.source)):
         raise InputError(f"robot {robot.name} has other numbers than {robot.source}; {wanted}")
     return robot.source
+
+
+def basis_of(given: GivenModel, robot: Robot) -> Model:
+    """The model that fitted values are written into: the one given, or a new one of the robot.
+
+    Raises:
+        InputFileError: no such file, or no model of this robot in it.
+    """
+    return model_given(given, robot) if isinstance(given, Model | str | Path) else new_model(robot)
 
 
 def _same_numbers(one: Robot, other: Robot) -> bool:

@@ -22,8 +22,8 @@ from seecr.result import Result
 ROOT = Path(__file__).resolve().parents[1]
 FACES = [seecr, crosscheck]
 COMMANDS = [p for face in ("seecr", "crosscheck") for p in modules(face) if p.parent.name == "cli"]
-# What functions take as well as give, and effects, which are everybody's own classes.
-NO_RESULTS = {seecr.Robot, seecr.Effect}
+# What functions take and others give, and effects, which are everybody's own classes.
+NO_RESULTS = {seecr.Robot, seecr.Effect, crosscheck.Case}
 # What results hold of more of their kind.
 PARTS = {crosscheck.CaseResult, crosscheck.MissingEffect, seecr.Jump}
 

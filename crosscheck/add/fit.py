@@ -15,7 +15,7 @@ from crosscheck.fit.prepare import Progress, outlying_rows, prepare
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.reasons import Why
 from crosscheck.fit.state import State
-from crosscheck.given import GivenModel, GivenRobot, model_of, robot_of
+from crosscheck.given import GivenModel, GivenRobot, basis_of, model_of, robot_of
 from crosscheck.measurements.read import GivenData, measurements_of
 from seecr.effects import ApartLayout, Own, Term, Terms, effect_named, layout_of
 from seecr.effects.base import Layout
@@ -128,7 +128,7 @@ def _added(
     progress("predicting runs left out", 0.6)
     # what belongs to files or runs was fitted to them already: before that it was not there
     before = terms.only(name for name in terms.names if name in had or name not in names)
-    return weigh(problem, before, names, factor, best, notes)
+    return weigh(problem, before, names, factor, best, notes, basis_of(model, robot))
 
 
 def _apart(terms: Terms, layout: Layout, kind: str) -> Term:

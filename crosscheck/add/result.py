@@ -10,6 +10,7 @@ from crosscheck.fit.problem import Rms
 from crosscheck.fit.words import fitted_lines, fitted_records, rms_words
 from crosscheck.model.fitted import Fitted
 from seecr.effects import Terms
+from seecr.model import Model
 from seecr.result import Record, Result
 
 
@@ -30,6 +31,7 @@ class Addition(Result):
         is_nothing: whether that is no further than one standard error of one value.
         whiteness: of what is left.
         warnings: about the values. notes: about the data.
+        model: the robot's, with all of this; :func:`crosscheck.save_model` keeps it.
     """
 
     names: tuple[str, ...]
@@ -46,6 +48,7 @@ class Addition(Result):
     whiteness: Whiteness
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
+    model: Model
 
     @property
     def name(self) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +15,14 @@ from crosscheck.fit.evidence import FALSE_ALARM, p_value
 from crosscheck.fit.gauss_newton import Fit, fit
 from crosscheck.fit.held_out import HeldOut, hold_out, improves, pays, unfitted
 from crosscheck.fit.noise import whiteness
-from crosscheck.fit.problem import Problem, rms_by_kind
+from crosscheck.fit.problem import Problem, Rms, rms_by_kind
 from crosscheck.fit.state import evaluate
 from crosscheck.fit.systematic import moved_by_others
 from crosscheck.model.fitted import Fitted
+from crosscheck.model.write import provenance_of, renewed, with_fit
 from seecr.counted import counted, some
 from seecr.effects import Terms
+from seecr.model import Model
 from seecr.pose import Array
 from seecr.robot import Robot
 
@@ -36,7 +38,7 @@ _HOLLOW = 0.9
 
 def weigh(
     problem: Problem, terms: Terms, names: Sequence[str], factor: Array, best: Fit,
-    notes: Sequence[str],
+    notes: Sequence[str], basis: Model,
 ) -> Addition:  # fmt: skip
     """What the named effects are worth in the best fit, against the model without them.
 
@@ -58,11 +60,16 @@ def weigh(
     drop = (base.chi2 - best.chi2) / max(1.0, white.scale) ** 2
     p = p_value(drop, seen_directions(best, own), False)
     distance, count = distance_from_nothing(best.terms, covariance, own)
+    before, after = (
+        rms_by_kind(problem, evaluate(problem, terms, factor).raw),
+        rms_by_kind(problem, best.state.raw),
+    )
+    errors = {"before": before, "after": after, "held_out": held.rms}
     return Addition(
         names=tuple(names),
         fitted=fitted,
-        before=rms_by_kind(problem, evaluate(problem, terms, factor).raw),
-        after=rms_by_kind(problem, best.state.raw),
+        before=before,
+        after=after,
         held_out_before=without.rms,
         held_out=held.rms,
         fall=improves(without, held),
@@ -73,7 +80,18 @@ def weigh(
         whiteness=white,
         warnings=(*_warnings(problem.robot, best, fitted, own), *_widened(best, moved, own)),
         notes=tuple(dict.fromkeys(notes)),
+        model=_model(problem, basis, fitted, names, errors),
     )
+
+
+def _model(
+    problem: Problem, basis: Model, fitted: Sequence[Fitted], names: Sequence[str],
+    errors: Mapping[str, Rms],
+) -> Model:  # fmt: skip
+    """The model with the effects; those given without one are as new to it as the named ones."""
+    source = provenance_of(problem.data.path, f"crosscheck add {' + '.join(names)}")
+    fresh = [f.term.name for f in fitted if f.term.name not in (*basis.names, *names)]
+    return renewed(with_fit(basis, fitted, [*names, *fresh], source, errors), problem.robot)
 
 
 def base_of(problem: Problem, terms: Terms, names: Sequence[str], factor: Array) -> Fit:

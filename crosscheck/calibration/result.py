@@ -13,11 +13,13 @@ from crosscheck.calibration.all_effects import Calibration, JointErrors, fit_all
 from crosscheck.errors import CrosscheckError, UnsolvedError
 from crosscheck.fit.prepare import Progress, prepare
 from crosscheck.fit.words import fitted_lines, fitted_records, rms_words
-from crosscheck.given import GivenModel, GivenRobot, considered, model_of, robot_of
+from crosscheck.given import GivenModel, GivenRobot, basis_of, considered, model_of, robot_of
 from crosscheck.measurements.read import GivenData, measurements_of
 from crosscheck.model.fitted import Fitted
+from crosscheck.model.write import calibrated, provenance_of, renewed
 from seecr.counted import counted, plural
 from seecr.effects import Terms
+from seecr.model import Model
 from seecr.pose import Array
 from seecr.result import Record, Result
 
@@ -39,6 +41,7 @@ class Calibrated(Result, JointErrors):
         outliers: lines that hardly count.
         settled: the fit came to an end; what did not is not to be used.
         notes: about the data.
+        model: the robot's, with all of this; :func:`crosscheck.save_model` keeps it.
     """
 
     fitted: tuple[Fitted, ...]
@@ -46,6 +49,7 @@ class Calibrated(Result, JointErrors):
     outliers: tuple[int, ...]
     settled: bool
     notes: tuple[str, ...]
+    model: Model
 
     @property
     def terms(self) -> Terms:
@@ -143,22 +147,26 @@ def calibrate(
     # BLAS on several threads takes longer for matrices as narrow as these
     with threadpool_limits(limits=1, user_api="blas"):
         found = fit_all_effects(ready.problem, ready.terms, progress)
-    return _result(found, terms, (*said, *ready.all_notes))
+    return _result(found, terms, (*said, *ready.all_notes), basis_of(model, robot))
 
 
-def _result(found: Calibration, before: Terms, notes: tuple[str, ...]) -> Calibrated:
-    covariance = found.covariance
-    fitted = _fitted(found, covariance, before)
+def _result(found: Calibration, before: Terms, notes: tuple[str, ...], basis: Model) -> Calibrated:
+    fitted = _fitted(found, found.covariance, before)
     kept = {one.term.name for one in fitted}
     own = np.flatnonzero([name in kept for name, _key in found.terms.labels])
-    data = found.setting.problem.data
+    covariance = found.covariance[np.ix_(own, own)]
+    data, robot = found.setting.problem.data, found.setting.problem.robot
+    source = provenance_of(data.path, "crosscheck calibrate")
+    rms = found.together
+    errors = {"before": rms.before, "after": rms.after, "held_out": rms.held_out}
     return Calibrated(
         fitted=fitted,
-        covariance=covariance[np.ix_(own, own)],
-        **vars(found.together),
+        covariance=covariance,
+        **vars(rms),
         outliers=tuple(int(line) for line in data.line[found.outliers]),
         settled=found.joint.settled,
         notes=notes,
+        model=renewed(calibrated(basis, fitted, covariance, source, errors), robot),
     )
 
 

@@ -15,7 +15,7 @@ from seecr.cli.options import FILE, json_option, made_by, progress_share
 
 if TYPE_CHECKING:
     from crosscheck import Addition
-    from seecr import Model, Robot
+    from seecr import Model
     from seecr.made import Made
 
 
@@ -74,7 +74,7 @@ def command(
     Exit status: 0 added, 1 not added since it does not pay, 2 bad input, 3 rows without an
     equilibrium or a fit that does not come to an end.
     """
-    from crosscheck import add_effect, add_effects, load_measurements
+    from crosscheck import add_effect, add_effects, load_measurements, save_model
     from crosscheck.files import check_writable
     from crosscheck.measurements.stated import with_stated
     from crosscheck.model import load_diagnosed
@@ -97,16 +97,16 @@ def command(
     with result_in(out, "add.json") as keep:
         with progress_share(f"adding {' + '.join(names)}") as progress:
             if effect is not None:
-                found = add_effect(machine, measured, effect, old.terms, progress, per=per)
+                found = add_effect(machine, measured, effect, old, progress, per=per)
             else:
-                found = add_effects(machine, measured, listed, old.terms, progress)
+                found = add_effects(machine, measured, listed, old, progress)
         found = replace(found, notes=(*said, *found.notes))
         written = found.pays or force
         made = made_by(machine.source, *data, all_from, model)  # of the model as it was read
         text = _text(found, old, model, written, made)
         keep(text)
         if written:
-            _write(found, old, machine, measured.path, model)
+            save_model(model, found.model)
     if as_json:
         click.echo(text)
     else:
@@ -142,14 +142,6 @@ def _check_names(old: Model, effect: str, refit: bool, path: Path) -> None:
         )
 
 
-def _write(found: Addition, old: Model, robot: Robot, data: Path, path: Path) -> None:
-    from crosscheck.model import provenance_of, renewed, save_model, with_fit
-
-    source = provenance_of(data, f"crosscheck add {found.name}")
-    errors = {"before": found.before, "after": found.after, "held_out": found.held_out}
-    save_model(path, renewed(with_fit(old, found.fitted, found.names, source, errors), robot))
-
-
 def _text(found: Addition, old: Model, model: Path, written: bool, made: Made) -> str:
     from crosscheck.files import json_text
 
@@ -160,6 +152,4 @@ def _text(found: Addition, old: Model, model: Path, written: bool, made: Made) -
 def _tell(found: Addition, old: Model, model: Path, written: bool) -> None:
     from crosscheck.terminal import print_addition
 
-    for note in old.notes:
-        click.echo(f"note: {note}")
     print_addition(found, model, written)

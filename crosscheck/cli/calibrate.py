@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from crosscheck.cli.choices import exclude_option, only_option, result_in, sigma_option
 from crosscheck.cli.following import Given, after_fit
 from seecr.cli.options import FILE, json_option, made_by, progress_share
-
-if TYPE_CHECKING:
-    from crosscheck import Calibrated
-    from seecr import Model, Robot
 
 
 @click.command(
@@ -56,7 +51,7 @@ def command(
     Exit status: 0 written, 1 not written since runs left out are not predicted any better, 2 bad
     input, 3 rows without an equilibrium, or a fit that did not settle.
     """
-    from crosscheck import calibrate, load_measurements
+    from crosscheck import calibrate, load_measurements, save_model
     from crosscheck.files import check_writable, json_text
     from crosscheck.given import considered
     from crosscheck.measurements.stated import with_stated
@@ -77,7 +72,7 @@ def command(
         text = json_text(document)
         keep(text)
         if written:
-            _write(found, old, machine, measured.path, model)
+            save_model(model, found.model)
     if as_json:
         click.echo(text)
     else:
@@ -87,12 +82,3 @@ def command(
     if not found.settled:
         return 3
     return 0 if written else 1
-
-
-def _write(found: Calibrated, old: Model, robot: Robot, data: Path, path: Path) -> None:
-    from crosscheck.model import calibrated, provenance_of, renewed, save_model
-
-    source = provenance_of(data, "crosscheck calibrate")
-    errors = {"before": found.before, "after": found.after, "held_out": found.held_out}
-    new = calibrated(old, found.fitted, found.covariance, source, errors)
-    save_model(path, renewed(new, robot))

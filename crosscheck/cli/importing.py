@@ -108,11 +108,11 @@ def command(
       import.json      what was done
     """
     from crosscheck.files import json_text
-    from crosscheck.importing import Choices, import_case, write_case
+    from crosscheck.importing import ImportChoices, import_case, write_case
     from seecr import load_robot
 
     machine = load_robot(robot)
-    choices = Choices.said(machine, **options)
+    choices = ImportChoices.said(machine, **options)
     found = import_case(form, files, machine, logs, choices)
     made = made_by(machine.source, *files, *logs)
     write_case(found, robot, out, made)

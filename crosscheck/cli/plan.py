@@ -80,10 +80,10 @@ def command(
     if (poses is None) == (rows is None):
         got = "neither" if poses is None else "both"
         raise click.UsageError(f"expected POSES.csv or --rows N, got {got}")
-    from crosscheck import Sigma, load_commands, make_plan
+    from crosscheck import Sigma, choose_poses, load_commands, make_plan, write_plan
     from crosscheck.files import json_text, staged, write_text
     from crosscheck.measurements.stated import stated
-    from crosscheck.planning import box_of, compose, write_plan
+    from crosscheck.planning import box_of
     from crosscheck.report import write_page
     from crosscheck.terminal import print_plan
     from seecr import load_robot
@@ -97,7 +97,7 @@ def command(
     sigma = stated(Sigma() if given is None else given.sigma, sigmas)
     with staged(out) as folder:
         with progress_share("planning") as progress:
-            commands = given or compose(
+            commands = given or choose_poses(
                 machine, rows or 0, sigma=sigma, reads=reads, limits=limits, progress=progress,
                 box=room,
             )  # fmt: skip
@@ -108,7 +108,7 @@ def command(
         write_text(folder / "plan.json", text + "\n")
         with figures_in(figures):
             write_page(plan, folder / "plan.html", made)
-        files = write_plan(plan, folder, chosen=given is None)
+        files = write_plan(plan, folder, own=given is None)
     if as_json:
         click.echo(text)
     else:

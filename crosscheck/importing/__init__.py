@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from crosscheck.importing.case import Imported, import_case, write_case
-from crosscheck.importing.choices import Choices
+from crosscheck.importing.choices import ImportChoices
 
-__all__ = ["Choices", "Imported", "import_case", "write_case"]
+__all__ = ["ImportChoices", "Imported", "import_case", "write_case"]

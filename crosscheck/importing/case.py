@@ -11,7 +11,7 @@ import numpy as np
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.files import json_text, staged, write_text
-from crosscheck.given import GivenRobot, copy_robot, numbers_of, robot_of
+from crosscheck.given import GivenRobot, copy_robot, file_of, numbers_of, robot_of
 from crosscheck.importing.align import (
     Frames,
     as_they_are,
@@ -20,16 +20,17 @@ from crosscheck.importing.align import (
     to_commands,
     with_target,
 )
-from crosscheck.importing.choices import Choices
+from crosscheck.importing.choices import ImportChoices
 from crosscheck.importing.join import commanded, joined
 from crosscheck.importing.logged import Logged
-from crosscheck.importing.take import Take, take_of
+from crosscheck.importing.take import READERS, Take, take_of
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import load_commands
 from crosscheck.measurements.together import together
 from crosscheck.measurements.write import write_measurements
 from crosscheck.units import LEAST
 from seecr.counted import counted
+from seecr.errors import InputError
 from seecr.made import Made
 from seecr.pose import Array
 from seecr.result import Record, Result
@@ -105,26 +106,38 @@ class Imported(Result):
 
 def import_case(
     form: str,
-    files: Sequence[str | Path],
+    files: str | Path | Sequence[str | Path],
     robot: GivenRobot,
-    commands: Sequence[str | Path],
-    choices: Choices | None = None,
+    commands: str | Path | Sequence[str | Path],
+    choices: ImportChoices | None = None,
+    *,
+    out: str | Path | None = None,
 ) -> Imported:
-    """Make measurements of recordings.
+    """Make measurements of other people's recordings: of motion capture, or plain logs.
 
     Args:
-        form: one of :data:`READERS`.
-        files: recordings of one tracker that stood still between them.
+        form: "motive" (CSV exports of OptiTrack), "vicon" (of Nexus), or "poses" (a log with the
+            columns t_s, x_mm, y_mm, z_mm, qw, qx, qy, qz).
+        files: a recording, or several of one tracker that stood still between them.
         robot: whose they are, or its MJCF.
         commands: of each recording a log of commands with times by the same clock, or one row
             per dwell without times.
         choices: what else the user says of the files.
+        out: folder for the case, as ``crosscheck import`` writes it; None writes nothing.
+
+    Returns:
+        an :class:`Imported`, whose ``measured`` every other function takes.
 
     Raises:
         InputFileError, CrosscheckError: whatever is wrong with the files.
+        InputError: another form, or a case of a robot that was read from no file.
     """
-    choices = choices or Choices()
-    robot = robot_of(robot)
+    if form not in READERS:
+        raise InputError(f"form must be one of {', '.join(READERS)}, got {form!r}")
+    choices = choices or ImportChoices()
+    source, robot = None if out is None else file_of(robot), robot_of(robot)
+    files = [files] if isinstance(files, str | Path) else files
+    commands = [commands] if isinstance(commands, str | Path) else commands
     if len(files) != len(commands):
         raise CrosscheckError(
             f"expected a log of commands for each of {len(files)} recordings, got {len(commands)}; "
@@ -145,7 +158,11 @@ def import_case(
     measured = replace(
         measured, sigma=sigma, free=frames.free, stands=np.ones(measured.n_rows, dtype=bool)
     )
-    return Imported(robot, measured, frames, tuple(takes), (*said, frames.how, _noise(measured)))
+    notes = (*said, frames.how, _noise(measured))
+    found = Imported(robot, measured, frames, tuple(takes), notes)
+    if source is not None:
+        write_case(found, source, Path(str(out)))
+    return found
 
 
 def write_case(found: Imported, robot_path: Path, out: Path, made: Made | None = None) -> None:
@@ -164,7 +181,7 @@ def _cell(value: object) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value).replace(",", " ")
 
 
-def _frames(robot: Robot, takes: Sequence[Take], choices: Choices) -> Frames:
+def _frames(robot: Robot, takes: Sequence[Take], choices: ImportChoices) -> Frames:
     position = np.concatenate([take.dwells.position[take.used] for take in takes])
     quats = [take.dwells.quat_wxyz for take in takes]
     turned = [q[take.used] for q, take in zip(quats, takes, strict=True) if q is not None]

@@ -17,7 +17,7 @@ from seecr.robot import Robot
 
 
 @dataclass(frozen=True, eq=False)
-class Choices:
+class ImportChoices:
     """What the user says of the files.
 
     Attributes:
@@ -51,8 +51,8 @@ class Choices:
     def said(
         cls, robot: Robot, *, markers: str | None, shape: Path | None, points: Sequence[str],
         target: str | None, rest_speed: str | None, **others: Any,
-    ) -> Choices:  # fmt: skip
-        """Choices as people type them; see ``crosscheck import --help``.
+    ) -> ImportChoices:  # fmt: skip
+        """ImportChoices as people type them; see ``crosscheck import --help``.
 
         Raises:
             CrosscheckError, InputFileError: something else than that.

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.importing.choices import Choices
+from crosscheck.importing.choices import ImportChoices
 from crosscheck.importing.clock import Clock, find_clock
 from crosscheck.importing.dwells import Dwells, find_dwells
 from crosscheck.importing.join import HeldCommands, commanded, held_commands, matched
@@ -24,7 +24,7 @@ from crosscheck.measurements.data import Measurements
 from seecr.counted import between, counted
 from seecr.robot import Robot
 
-READERS: Mapping[str, Callable[[Path, Choices], Logged]] = {
+READERS: Mapping[str, Callable[[Path, ImportChoices], Logged]] = {
     "motive": lambda path, choices: read_motive(path),
     "vicon": lambda path, choices: read_vicon(
         path, choices.rotation, bodies_too=not choices.markers
@@ -51,7 +51,7 @@ class Take:
 
 
 def take_of(
-    form: str, path: Path, robot: Robot, log: Measurements, choices: Choices, said: list[str]
+    form: str, path: Path, robot: Robot, log: Measurements, choices: ImportChoices, said: list[str]
 ) -> Take:
     export = READERS[form](path, choices)
     export = replace(export, up=choices.up or export.up).upright()
@@ -79,7 +79,12 @@ def _apart(tracker: datetime | None, commands: datetime | None) -> float:
 
 
 def _clock(
-    stream: Stream, robot: Robot, log: Measurements, choices: Choices, arm: float, apart: float
+    stream: Stream,
+    robot: Robot,
+    log: Measurements,
+    choices: ImportChoices,
+    arm: float,
+    apart: float,
 ) -> Clock:
     """As the user says, or found; beyond what times of day (``apart`` [s]) say."""
     if choices.clock is not None or log.t_s is None:
@@ -112,7 +117,7 @@ def _told(take: Take) -> list[str]:
     return out
 
 
-def _stream(export: Logged, choices: Choices) -> tuple[Stream, tuple[str, ...]]:
+def _stream(export: Logged, choices: ImportChoices) -> tuple[Stream, tuple[str, ...]]:
     if not choices.markers:
         return export.body(choices.body), ()
     lacking = [name for name in choices.markers if choices.shape and name not in choices.shape]

@@ -20,6 +20,7 @@ from seecr import __version__
 from seecr.cells import UNSEEN
 from seecr.effects import Knowledge, Terms
 from seecr.effects.base import Layout
+from seecr.errors import InputError
 from seecr.fingerprint import fingerprint
 from seecr.model import Model
 from seecr.pose import Array
@@ -259,11 +260,22 @@ def renewed(model: Model, robot: Robot) -> Model:
 
 
 def save_model(path: str | Path, model: Model) -> None:
-    """Write a model through a temporary file, so that the old one stays whole until then.
+    """Write a model, such as a calibration's ``model``, with the comments that its file had.
+
+    Through a temporary file, so that the old one stays whole until then.
+
+    Args:
+        path: of the TOML; its folder is made if need be.
+        model: as read, or the ``model`` that a calibration or an addition has.
 
     Raises:
         InputFileError: the file cannot be written.
+        InputError: no model.
     """
+    if not isinstance(model, Model):
+        raise InputError(
+            f"expected a model, such as the .model of a calibration, got {type(model).__name__}"
+        )
     path = Path(path)
     with written(path, failure="the model cannot be written") as (partial,):
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -38,7 +38,7 @@ _SAMPLE = 40
 _ROWS_A_RUN, _LEAST_RUNS = 12, 3
 
 
-def compose(
+def choose_poses(
     robot: GivenRobot,
     rows: int,
     *,

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from crosscheck.errors import CrosscheckError
+from crosscheck.files import check_writable
 from crosscheck.given import numbers_of
 from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.write import write_measurements
@@ -17,17 +18,28 @@ from seecr.pose import Array
 __all__ = ["box_of", "write_plan"]
 
 
-def write_plan(plan: Plan, folder: Path, chosen: bool) -> tuple[str, ...]:
-    """Write the commands of each thing to add, and those of the plan if it chose them.
+def write_plan(plan: Plan, folder: str | Path, own: bool = True) -> tuple[str, ...]:
+    """Write the commands of a plan, and those of each thing to add, for a controller to take.
+
+    Args:
+        plan: what :func:`make_plan` gave.
+        folder: where to; made if need be.
+        own: whether to write the plan's own commands, ``poses.csv``, or only ``add-KIND.csv``.
 
     Returns:
         names of the files.
+
+    Raises:
+        InputFileError: the folder cannot be made or written to.
     """
-    files = {"poses.csv": plan.planned.problem.data} if chosen else {}
+    folder = Path(folder)
+    files = {"poses.csv": plan.planned.problem.data} if own else {}
     for item in plan.suggestions:
         if item.reached and item.commands is not None:
             files[f"add-{item.kind.value}.csv"] = item.commands
     for name, commands in files.items():
+        check_writable(folder / name)
+        folder.mkdir(parents=True, exist_ok=True)
         write_measurements(folder / name, _unread(commands), remark_of(commands))
     return tuple(files)
 

@@ -130,6 +130,32 @@ def test_what_was_found_is_the_next_model() -> None:
     assert crosscheck.diagnose(ROBOT, data_file(), path).missing == ()
 
 
+def test_what_was_fitted_is_a_model_to_keep(tmp_path: Path) -> None:
+    calibration = result_of("Calibrated")
+    addition = crosscheck.add_effect(ROBOT, data_file(), "stiffness", found().terms)
+    assert isinstance(calibration, crosscheck.Calibrated)
+    assert addition.model.names == ("stiffness", "pulley_radius")
+    for number, result in enumerate((calibration, addition)):
+        path = tmp_path / "models" / f"{number}.toml"
+        crosscheck.save_model(path, result.model)
+        again = seecr.load_model(path, ROBOT)
+        assert np.allclose(again.terms.vector, result.terms.vector) and again.notes == ()
+        left = crosscheck.compare(ROBOT, data_file(), result.model).rms
+        assert crosscheck.compare(ROBOT, data_file(), path).rms == pytest.approx(left, rel=1e-6)
+        assert data_file().name in path.read_text()
+    with pytest.raises(seecr.InputError, match=r"^expected a model, .* got Calibrated$"):
+        crosscheck.save_model(tmp_path / "m.toml", calibration)  # type: ignore[arg-type]
+
+
+def test_a_plan_is_written_as_commands(tmp_path: Path) -> None:
+    plan = result_of("Plan")
+    assert isinstance(plan, crosscheck.Plan)
+    names = crosscheck.write_plan(plan, tmp_path / "plan")
+    assert sorted(names) == sorted(p.name for p in (tmp_path / "plan").glob("*.csv"))
+    commands = crosscheck.load_commands(tmp_path / "plan" / "poses.csv", ROBOT)
+    assert commands.n_rows == plan.planned.problem.data.n_rows and not commands.has_position
+
+
 def test_a_diagnosis_reads_like_one() -> None:
     text = str(found())
     assert text.startswith("These data would show ") and "\neffects_found: " in text

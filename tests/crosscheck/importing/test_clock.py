@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from made_data import run, soft_cogiro, soft_xml
 
-from crosscheck.importing import Choices, import_case
+from crosscheck.importing import ImportChoices, import_case
 from crosscheck.importing.clock import find_clock
 from crosscheck.importing.dwells import find_dwells
 from crosscheck.importing.join import HeldCommands
@@ -40,7 +40,7 @@ def test_the_shift_is_found_and_said(made, tmp_path, clock):
     truth, measured = made.truth, found.measured
     assert measured.command_pose == pytest.approx(truth.command_pose, abs=1e-8)
     assert found.takes[0].held.clock == pytest.approx(clock, abs=0.3)  # as soon as it moves
-    alone = taken(made, tmp_path, clock, Choices(clock=clock))
+    alone = taken(made, tmp_path, clock, ImportChoices(clock=clock))
     assert measured.position == pytest.approx(alone.measured.position, abs=3e-5)
     assert f"{abs(found.takes[0].held.clock):.3f} s {'more' if clock > 0 else 'less'}" in str(found)
 
@@ -55,7 +55,7 @@ def test_times_of_day_are_one_clock(made, tmp_path):
     there = datetime(2025, 11, 3, 10)
     tracked = made_of.poses_csv(tmp_path / "log.csv", made, began=there)
     told = made_of.commands_csv(tmp_path / "told.csv", made, clock=-7.5, began=there)
-    given = import_case("poses", [tracked], ROBOT, [told], Choices(clock=-7.5))
+    given = import_case("poses", [tracked], ROBOT, [told], ImportChoices(clock=-7.5))
     assert given.takes[0].held.begin_s == pytest.approx(made.sent_s, abs=1e-6)
     plain = taken(made, tmp_path, 0.0).measured
     assert given.measured.position == pytest.approx(plain.position, abs=3e-5)
@@ -65,9 +65,9 @@ def test_times_of_day_are_one_clock(made, tmp_path):
 def test_a_wrong_clock_that_is_given_is_refused(made, tmp_path):
     for wrong in (2.0, -2.0):
         with pytest.raises(SeecrError, match=r"cannot be aligned: .*\(--clock\)"):
-            taken(made, tmp_path, 0.0, Choices(clock=wrong))
+            taken(made, tmp_path, 0.0, ImportChoices(clock=wrong))
     with pytest.raises(SeecrError, match="cannot be aligned by 1 dwell: expected 3 or more"):
-        taken(made, tmp_path, 0.0, Choices(clock=made.t_s[-1] - 1.4))
+        taken(made, tmp_path, 0.0, ImportChoices(clock=made.t_s[-1] - 1.4))
 
 
 def going_round(told, clock):

@@ -11,7 +11,7 @@ import pytest
 from made_data import refused, soft_cogiro, soft_xml
 
 from crosscheck.importing import import_case
-from crosscheck.importing.choices import Choices
+from crosscheck.importing.choices import ImportChoices
 from seecr.errors import SeecrError
 from seecr.mjcf import load_robot
 from seecr.shipped import model_path
@@ -175,7 +175,9 @@ def test_mixed_ends_of_lines_and_a_mark_at_the_beginning_do_no_harm(files, tmp_p
 
 def wrong(files, form="poses", commands=None, robot=ROBOT, **choices):
     with pytest.raises(SeecrError) as caught:
-        import_case(form, [files[form]], robot, [commands or files["commands"]], Choices(**choices))
+        import_case(
+            form, [files[form]], robot, [commands or files["commands"]], ImportChoices(**choices)
+        )
     return str(caught.value)
 
 

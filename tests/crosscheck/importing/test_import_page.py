@@ -9,7 +9,7 @@ import click
 import pytest
 
 from crosscheck.cli.importing import command
-from crosscheck.importing.choices import Choices
+from crosscheck.importing.choices import ImportChoices
 from crosscheck.importing.take import READERS
 
 PAGE = (Path(__file__).resolve().parents[3] / "docs" / "import.md").read_text(encoding="utf-8")
@@ -26,7 +26,7 @@ def test_every_option_and_format_is_on_the_page():
 def test_samples_of_the_page_are_read(form, sample, tmp_path):
     file = tmp_path / "sample.csv"
     file.write_text(sample)
-    export = READERS[form](file, Choices(rotation="vector")).upright()
+    export = READERS[form](file, ImportChoices(rotation="vector")).upright()
     ((position, quat),) = export.bodies.values()
     assert position[1] == pytest.approx([0.2, 0.25, 0.1])
     assert quat[1] == pytest.approx([1.0, 0.0, 0.0, 0.0])

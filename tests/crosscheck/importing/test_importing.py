@@ -14,11 +14,12 @@ from scipy.spatial.transform import Rotation
 
 import crosscheck
 from crosscheck.importing import import_case
-from crosscheck.importing.choices import Choices
+from crosscheck.importing.choices import ImportChoices
 from crosscheck.importing.dwells import find_dwells
 from crosscheck.importing.logged import Logged, Stream
 from crosscheck.importing.markers import aligning, body_of_markers
 from crosscheck.measurements.dwells import mean_error
+from seecr.errors import InputError
 from seecr.pose import quat_rotate, rotvec_from_quat
 
 pytestmark = pytest.mark.slow
@@ -60,26 +61,29 @@ def has_the_noise_of_means(found, made, samples=60):
 
 
 FORMATS = {
-    "poses": ("poses", lambda p, m: made_of.poses_csv(p, m), Choices()),
+    "poses": ("poses", lambda p, m: made_of.poses_csv(p, m), ImportChoices()),
     "motive 1.22 in mm": (
         "motive", lambda p, m: made_of.motive_csv(p, m, version="1.22", unit="Millimeters"),
-        Choices(),
+        ImportChoices(),
     ),
     "motive 1.24 in cm, hidden at times": (
         "motive",
         lambda p, m: made_of.motive_csv(p, m, version="1.24", unit="Centimeters", hidden=9),
-        Choices(body="platform"),
+        ImportChoices(body="platform"),
     ),
-    "motive 1.25": ("motive", lambda p, m: made_of.motive_csv(p, m, version="1.25"), Choices()),
+    "motive 1.25": (
+        "motive", lambda p, m: made_of.motive_csv(p, m, version="1.25"), ImportChoices()
+    ),
     "vicon, rotation vectors": (
-        "vicon", lambda p, m: made_of.vicon_csv(p, m), Choices(rotation="vector")
+        "vicon", lambda p, m: made_of.vicon_csv(p, m), ImportChoices(rotation="vector")
     ),
     "vicon, Euler angles, tabs": (
         "vicon", lambda p, m: made_of.vicon_csv(p, m, sep="\t", rotation="XYZ"),
-        Choices(rotation="XYZ"),
+        ImportChoices(rotation="XYZ"),
     ),
     "vicon, quaternions, semicolons": (
-        "vicon", lambda p, m: made_of.vicon_csv(p, m, sep=";", rotation="quaternion"), Choices()
+        "vicon", lambda p, m: made_of.vicon_csv(p, m, sep=";", rotation="quaternion"),
+        ImportChoices(),
     ),
 }  # fmt: skip
 
@@ -96,12 +100,14 @@ def test_markers_make_the_body(made, commands, tmp_path):
     file = made_of.vicon_csv(tmp_path / "a.csv", made)
     by_shape = import_case(
         "vicon", [file], ROBOT, [commands],
-        Choices(markers=POINTS, shape=SHAPE),
+        ImportChoices(markers=POINTS, shape=SHAPE),
     )  # fmt: skip
     # where they sit was said: only the tracker is free, and the body is the platform
     assert by_shape.measured.free == ("tracker_frame",)
     assert crosscheck.compare(ROBOT, by_shape.measured, TRUE).is_noise
-    swallowed_nothing(import_case("vicon", [file], ROBOT, [commands], Choices(markers=POINTS[:3])))
+    swallowed_nothing(
+        import_case("vicon", [file], ROBOT, [commands], ImportChoices(markers=POINTS[:3]))
+    )
 
 
 @pytest.mark.parametrize("count", [3, 5])
@@ -131,7 +137,7 @@ def test_poses_in_the_base_frame_stay_what_they_are(home, tmp_path):
     commands = made_of.commands_csv(tmp_path / "c.csv", home, clock=3.25)
     found = import_case(
         "poses", [made_of.poses_csv(tmp_path / "a.csv", home)], ROBOT, [commands],
-        Choices(aligned=True, clock=3.25),
+        ImportChoices(aligned=True, clock=3.25),
     )  # fmt: skip
     data = found.measured
     assert data.free == () and data.stands.all()
@@ -150,11 +156,24 @@ def test_frames_align_by_points_that_the_user_names(made, tmp_path):
     points = {",".join(map(str, a)): b for a, b in zip(there, here, strict=True)}
     commands = made_of.commands_csv(tmp_path / "c.csv", made, times=False)
     log = made_of.poses_csv(tmp_path / "a.csv", made)
-    found = import_case("poses", [log], ROBOT, [commands], Choices(points=points))
+    found = import_case("poses", [log], ROBOT, [commands], ImportChoices(points=points))
     assert found.measured.n_rows == 21  # three commands repeat the one before them
     assert np.linalg.norm(found.frames.shift - made_of.SHIFT) < 0.01
     assert np.linalg.norm(found.frames.target_shift - made_of.TARGET) < 0.01
     swallowed_nothing(found)
+
+
+def test_recordings_are_a_case_folder_in_one_call(made, commands, tmp_path):
+    log, robot = made_of.poses_csv(tmp_path / "a.csv", made), tmp_path / "robot.xml"
+    robot.write_text(soft_xml(), encoding="utf-8")
+    found = crosscheck.import_case("poses", log, robot, commands, out=tmp_path / "case")
+    case = tmp_path / "case"
+    again = crosscheck.load_measurements(case / "measured.csv", case / "robot.xml")
+    assert again.n_rows == found.measured.n_rows
+    with pytest.raises(InputError, match=r"^form must be one of motive, vicon, poses, got 'csv'$"):
+        crosscheck.import_case("csv", log, robot, commands)
+    with pytest.raises(InputError, match=r"has other numbers than .*\.xml"):
+        crosscheck.import_case("poses", log, ROBOT, commands, out=tmp_path / "other")
 
 
 def test_positions_alone_and_level_commands(tmp_path):
@@ -172,13 +191,13 @@ def test_what_commands_leave_open_and_orientations_leave_is_said(made, tmp_path)
     file = made_of.vicon_csv(tmp_path / "a.csv", made, rotation="XYZ")
     left = []
     for order in ("XYZ", "ZYX"):
-        found = import_case("vicon", [file], ROBOT, [commands], Choices(rotation=order))
+        found = import_case("vicon", [file], ROBOT, [commands], ImportChoices(rotation=order))
         left.append(float(re.search(r"platform's: (\S+) deg rms are left", str(found))[1]))
         assert np.nanmin(found.measured.quat_wxyz[:, 0]) > 0.9
     assert left[0] < 0.7 * left[1]
     rows = [line.split(",")[:5] for line in commands.read_text().splitlines()]
     commands.write_text("\n".join(",".join([*row, "1"]) for row in rows).replace("z_m,1", "z_m,a"))
-    notes = import_case("vicon", [file], ROBOT, [commands], Choices(rotation="XYZ")).notes
+    notes = import_case("vicon", [file], ROBOT, [commands], ImportChoices(rotation="XYZ")).notes
     assert "c.csv: Not used: a." in notes
     assert "c.csv: No commanded orientation: that of the reference pose is used." in notes
 
@@ -259,7 +278,7 @@ def test_what_only_the_last_digit_shows_is_not_stated(tmp_path, flicker, digits)
     heads = ("t_s,x_mm,y_mm,z_mm,qw,qx,qy,qz", "t_s,cmd_x_m,cmd_y_m,cmd_z_m")
     for path, head, table in zip((log, commands), heads, (rows, told), strict=True):
         path.write_text("\n".join([head, *(",".join(map(str, row)) for row in table)]))
-    found = import_case("poses", [log], ROBOT, [commands], Choices(aligned=True))
+    found = import_case("poses", [log], ROBOT, [commands], ImportChoices(aligned=True))
     sigma = found.measured.sigma
     assert sigma.orientation_rad is None
     assert sigma.position_m is None if digits == 0 else 1e-6 < sigma.position_m < 1e-4

@@ -16,7 +16,7 @@ from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import load_commands
 from crosscheck.measurements.write import write_measurements
 from crosscheck.planning.adding import Adding
-from crosscheck.planning.choosing import compose
+from crosscheck.planning.choosing import choose_poses
 from crosscheck.planning.design import make_plan
 from crosscheck.planning.detours import detours
 from crosscheck.planning.planned import Reads, planned
@@ -44,7 +44,7 @@ def power_of(plan):
 
 @pytest.fixture(scope="module")
 def chosen():
-    return compose(PLANAR, 12)
+    return choose_poses(PLANAR, 12)
 
 
 def test_chosen_poses_are_held_in_runs(chosen):
@@ -65,16 +65,16 @@ def test_chosen_poses_show_more_than_as_many_along_a_sweep(chosen):
 
 def test_tensions_stay_within_limits():
     low, high = 2.0, 6.0
-    poses = compose(PLANAR, 6, limits=(low, high)).command_pose
+    poses = choose_poses(PLANAR, 6, limits=(low, high)).command_pose
     tensions = solve(PLANAR, poses).tensions
     assert tensions.min() >= low and tensions.max() <= high
-    wide = solve(PLANAR, compose(PLANAR, 6).command_pose).tensions
+    wide = solve(PLANAR, choose_poses(PLANAR, 6).command_pose).tensions
     assert wide.min() < low or wide.max() > high  # without limits they do not
 
 
 def test_a_robot_with_fewer_cables_than_freedoms_is_planned_too():
     robot = load_robot(model_path("planar_two_cable"))
-    assert compose(robot, 6).n_rows == 6
+    assert choose_poses(robot, 6).n_rows == 6
 
 
 def test_a_set_up_sees_what_it_reads(cogiro):
@@ -153,12 +153,12 @@ def test_a_diagnosis_begins_with_it(cogiro):
 
 def test_a_robot_that_holds_nowhere_is_told_and_a_box_keeps_poses_in(cogiro):
     with pytest.raises(crosscheck.CrosscheckError, match="holds still at 0 of 432 poses"):
-        compose(cogiro, 10, limits=(0.0, 1e-6))
+        choose_poses(cogiro, 10, limits=(0.0, 1e-6))
     box = np.array([[0.3, 0.0, 0.1], [0.5, 0.0, 0.2]])
-    pose = compose(PLANAR, 6, box=box).command_pose
+    pose = choose_poses(PLANAR, 6, box=box).command_pose
     assert np.all(pose[:, :3] >= box[0] - 1e-9) and np.all(pose[:, :3] <= box[1] + 1e-9)
 
 
 def test_a_robot_that_holds_few_poses_is_planned_where_it_rests():
     """With no more cables than freedoms it comes near the others: they were refused once."""
-    assert feasible(THREE, compose(THREE, 18).command_pose).sum() < 18
+    assert feasible(THREE, choose_poses(THREE, 18).command_pose).sum() < 18
