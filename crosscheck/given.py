@@ -12,7 +12,7 @@ import numpy as np
 
 from crosscheck.errors import CrosscheckError
 from seecr.effects import Term, Terms, catalogue, effect_named
-from seecr.errors import InputError
+from seecr.errors import InputError, RobotError
 from seecr.given import GivenRobot, robot_of
 from seecr.mjcf import load_robot
 from seecr.model import Model, effects_given, model_given, new_model, no_effects
@@ -67,7 +67,7 @@ def copy_robot(source: Path, copy: Path) -> None:
     shutil.copyfile(robot_file(source), copy)
     try:
         load_robot(copy)
-    except Exception:
+    except RobotError:
         raise CrosscheckError(
             f"{source}: needs files beside it, which a case folder does not have; expected an "
             "MJCF that stands alone"

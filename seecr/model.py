@@ -42,7 +42,7 @@ from seecr.cells import Where, term_of
 from seecr.counted import counted
 from seecr.effects import Effect, Term, Terms, catalogue
 from seecr.errors import InputError, InputFileError
-from seecr.files import read_text
+from seecr.files import Toml, read_toml
 from seecr.fingerprint import check_robot, fingerprint
 from seecr.given import GivenRobot, robot_of
 from seecr.pose import Array
@@ -206,8 +206,8 @@ def load_model(path: str | Path, robot: GivenRobot) -> Model:
             that is unknown, missing, given twice, no number or out of bounds.
     """
     path, robot = Path(path), robot_of(robot)
-    text = read_text(path, _EXPECTED)
-    document = _parse(path, text)
+    toml = read_toml(path, _EXPECTED)
+    text, document = toml.text, _with_comments(toml)
     if not document:
         raise InputFileError.at(path, f"is empty; {_EXPECTED}")
     where = Where(path, text)
@@ -225,13 +225,12 @@ def load_model(path: str | Path, robot: GivenRobot) -> Model:
     return Model(Terms(terms), errors, document, notes, path)
 
 
-def _parse(path: Path, text: str) -> TOMLDocument:
+def _with_comments(toml: Toml) -> TOMLDocument:
+    """The tree that is written again as it was read."""
     try:
-        return tomlkit.parse(text)
-    except TOMLKitError as error:
-        line = getattr(error, "line", None)
-        text = f"is not TOML: {error}; {_EXPECTED}"
-        raise InputFileError.at(path, text, line=line) from None
+        return tomlkit.parse(toml.text)
+    except TOMLKitError as error:  # TOML that only this parser does not take
+        raise toml.error(f"cannot be kept with its comments: {error}; {_EXPECTED}") from None
 
 
 def _check_tables(where: Where, document: Mapping[str, Any]) -> None:

@@ -243,7 +243,9 @@ def _read_parquet(path: Path) -> Table:
     try:
         import pyarrow
         from pyarrow import parquet
-    except ImportError:
+    except ModuleNotFoundError as error:
+        if error.name != "pyarrow":  # it is there, and something of it is not
+            raise
         raise MissingPackageError(
             f"{path}: is Parquet, which needs pyarrow; pip install pyarrow, or save it as CSV"
         ) from None

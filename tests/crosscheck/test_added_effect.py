@@ -14,6 +14,7 @@ from made_data import measured
 
 import seecr
 from crosscheck.add import add_effect
+from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.model.write import Provenance, save_model, with_fit
 from seecr.effects import registry
 from seecr.model import new_model
@@ -55,6 +56,13 @@ def test_one_class_is_all_it_takes(registered: None, tmp_path: Path) -> None:
     angle, error = found.own.term.vector[0], found.own.stderr[0]
     assert found.pays and abs(angle - 0.004) < 4.0 * error < 2e-3
     assert found.after["orientation_rms_rad"] < found.before["orientation_rms_rad"]
+    # a diagnosis names it among others
+    diagnosis = diagnose(robot, data, only=("mounted_turned", "pulley_radius", "tracker_scale"))
+    assert [missing.effect for missing in diagnosis.missing] == ["mounted_turned"]
+    (missing,) = diagnosis.missing
+    assert missing.values == pytest.approx([0.004], abs=4.0 * missing.stderr[0])
+    expected = np.degrees(missing.values[0])
+    assert missing.check == f"hold a square to the platform: expect {expected:.2f} deg"
     # and a model keeps it
     errors = {"before": found.before, "after": found.after, "held_out": found.held_out}
     source = Provenance("measured.csv", "2026-01-01", "1", "a test")

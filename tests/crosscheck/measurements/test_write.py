@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import builtins
 import time
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import pytest
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import load_measurements
 from crosscheck.measurements.write import write_measurements
-from seecr.errors import InputFileError
+from seecr.errors import InputFileError, MissingPackageError
 
 
 def everything(path: Path) -> Measurements:
@@ -153,3 +154,27 @@ def test_hundred_thousand_rows_load_in_seconds(tmp_path, robot):
     began = time.process_time()
     assert load_measurements(made.path, robot).n_rows == n
     assert time.process_time() - began < 5.0
+
+
+@pytest.mark.parametrize(
+    ("raised", "expected", "words"),
+    [
+        (ModuleNotFoundError("no", name="pyarrow"), MissingPackageError, "which needs pyarrow"),
+        (ModuleNotFoundError("no dateutil", name="dateutil"), ModuleNotFoundError, "no dateutil"),
+        (ImportError("undefined symbol", name="pyarrow.lib"), ImportError, "undefined symbol"),
+    ],
+)
+def test_a_broken_pyarrow_is_not_called_missing(
+    tmp_path, robot, monkeypatch, raised, expected, words
+):
+    real = builtins.__import__
+
+    def fail(name, *others, **more):
+        if name == "pyarrow":
+            raise raised
+        return real(name, *others, **more)
+
+    (tmp_path / "measured.parquet").write_bytes(b"PAR1")
+    monkeypatch.setattr(builtins, "__import__", fail)
+    with pytest.raises(expected, match=words):
+        load_measurements(tmp_path / "measured.parquet", robot)

@@ -145,7 +145,7 @@ def test_no_model_is_no_effect(robot, tmp_path):
 
 
 BAD = {
-    "broken": ("name = ", "name = = ", r"line \d+: is not TOML"),
+    "broken": ("name = ", "name = = ", r"is not TOML: Invalid value \(at line \d+, column 8\);"),
     "unknown effect": (
         '"pulley_radius"', '"pully_radius"',
         r"line \d+: no effect 'pully_radius'; known, nearest first: pulley_radius, ",
