@@ -7,14 +7,14 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from seecr.commands import Commands
 from seecr.effects.checked import edit_setup
 from seecr.errors import InputError
 from seecr.experiment import effects_of
 from seecr.given import GivenRobot, robot_of
-from seecr.joints import pose_of_values
+from seecr.joints import pose_of_values, values_of_pose
 from seecr.pose import Array, pose_difference
 from seecr.robot import Robot
 from seecr.search import solve_setup
@@ -26,7 +26,12 @@ if TYPE_CHECKING:
     from seecr.model import GivenEffects
 
 # Starts at a time, and at most.
-_PART, _MOST = 256, 4096
+_PART, _MOST = 256, 8192
+# Starts go on while one in fewer than so many may lead to a rest that nobody has met.
+_RARE = 2000
+# Starts fill boxes about the command from this part of the robot's size to all of it: of one large
+# box half the volume lies beyond four fifths of its reach, and its middle is hardly tried.
+_NEAREST = 0.2
 # Poses nearer than this [of the length] are one equilibrium.
 _ALIKE = 1e-5
 
@@ -36,11 +41,11 @@ def equilibria(
 ) -> Solution:
     """The stable equilibria that one command has, by energy, the lowest first.
 
-    Descents from starts that fill position and orientation evenly (Sobol; Shoemake 1992 for
-    rotations) until equilibria that nobody has met have become unlikely: Boender and Rinnooy
-    Kan's rule (Mathematical Programming 37, 1987) expects fewer than w (w + 1)/(n - w - 2) more
-    after n descents that led to w of them. Whether the platform can get from one to another is
-    not asked.
+    Descents from starts near and far, turned in every way (Sobol; Shoemake 1992 for rotations),
+    until a next one is unlikely to lead to an equilibrium that nobody has met: that chance is
+    about the part of the descents that led where no other did (Good, Biometrika 40, 1953). They
+    end where that, one more counted, is below 1 in 2000. Whether the platform can get from one
+    to another is not asked.
 
     Args:
         robot: as described, or its MJCF.
@@ -90,7 +95,7 @@ def other_rests(
         other = [
             k
             for k in np.flatnonzero(whole.converged)
-            if not _known(found.robot, whole.pose[k], found.pose[i : i + 1])
+            if not _alike(found.robot, whole.pose[[k]], found.pose[i])[0]
         ]
         out.append(whole.rows(np.array(other, dtype=int)))
     return tuple(out)
@@ -101,20 +106,17 @@ def _all_rests(own: Solution, repeated: Callable[[int], Setup], most: int) -> So
     robot, command = own.robot, own.command
     from scipy.stats import qmc  # takes a second to import
 
-    sampler = qmc.Sobol(robot.n_dof, seed=0)
-    poses, starts = own.pose[own.converged], [own.pose[own.converged]]
-    count, many = len(poses), repeated(_PART)
-    for _ in range(0, most, _PART):
+    sampler = qmc.Sobol(robot.n_dof + 1, seed=0)
+    poses, starts, met = own.pose[own.converged], [own.pose[own.converged]], np.zeros(0, int)
+    many = repeated(_PART)
+    for done in range(0, most, _PART):
         tried = _spread(robot, command[0], sampler.random(_PART))
         found = solve_setup(many, start=tried)
-        rests = found.pose[found.converged]
-        count += len(rests)
-        for row, start in zip(rests, tried[found.converged], strict=True):
-            if not _known(robot, row, poses):
-                poses = np.concatenate([poses, row[None]])
-                starts.append(start[None])
-        met = len(poses)
-        if count > met + 2 and met * (met + 1) / (count - met - 2) < 0.05:
+        which, new = _told_apart(robot, found.pose[found.converged], poses)
+        poses = np.concatenate([poses, found.pose[found.converged][new]])
+        starts.append(tried[found.converged][new])
+        met = np.bincount(which, minlength=len(poses)) + np.pad(met, (0, len(poses) - len(met)))
+        if done + _PART >= _RARE * (1 + np.count_nonzero(met == 1)):
             break
     if len(poses) == 0:
         return own
@@ -123,21 +125,37 @@ def _all_rests(own: Solution, repeated: Callable[[int], Setup], most: int) -> So
     return whole.rows(np.argsort(whole.energy, kind="stable"))
 
 
-def _known(robot: Robot, pose: Array, among: Array) -> bool:
-    if len(among) == 0:
-        return False
-    apart = pose_difference(np.repeat(pose[None], len(among), axis=0), among)
-    apart[:, 3:] *= robot.length
-    return bool((np.linalg.norm(apart, axis=1) < _ALIKE * robot.length).any())
+def _told_apart(robot: Robot, rests: Array, known: Array) -> tuple[NDArray[np.intp], list[int]]:
+    """Which equilibrium each of n rests (n, 7) is, and which of the rests are new ones.
+
+    Those that are known come first, then the new ones in their order.
+    """
+    which, new = np.full(len(rests), -1), list[int]()
+    for k in range(len(known)):
+        which[_alike(robot, rests, known[k])] = k
+    while len(left := np.flatnonzero(which < 0)):
+        which[left[_alike(robot, rests[left], rests[left[0]])]] = len(known) + len(new)
+        new.append(int(left[0]))
+    return which, new
+
+
+def _alike(robot: Robot, poses: Array, one: Array) -> NDArray[np.bool_]:
+    """Which of n poses (n, 7) are the same rest as one (7,)."""
+    apart = pose_difference(poses, one) * np.repeat([1.0, robot.length], 3)
+    return np.asarray(np.linalg.norm(apart, axis=1) < _ALIKE * robot.length)
 
 
 def _spread(robot: Robot, command: Array, unit: Array) -> Array:
-    """Starts (n, 7) from numbers (n, d) in [0, 1): around the command, turned in every way."""
+    """Starts (n, 7) from numbers (n, d + 1) in [0, 1): about the command, turned in every way.
+
+    The last number says how far about; near and far alike, so its logarithm is spread evenly.
+    """
     points = np.concatenate([robot.exit_points, command[None, :3]])
-    size = 0.5 * float(np.max(np.ptp(points, axis=0)))
+    size = 0.5 * float(np.max(np.ptp(points, axis=0))) * _NEAREST ** unit[:, -1:]
     if robot.joints:
+        middle = values_of_pose(robot, command[None])[0]
         reach = np.where(robot.hinges, np.pi, size)
-        return pose_of_values(robot, (2.0 * unit - 1.0) * reach)[0]
+        return pose_of_values(robot, middle + (2.0 * unit[:, :-1] - 1.0) * reach)[0]
     place = command[:3] + (2.0 * unit[:, :3] - 1.0) * size
     a, b, c = unit[:, 3], 2.0 * np.pi * unit[:, 4], 2.0 * np.pi * unit[:, 5]
     quat = np.stack([
