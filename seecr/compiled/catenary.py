@@ -22,7 +22,13 @@ from seecr.compiled.columns import (
     WINCH_SIDE,
 )
 from seecr.compiled.jit import jit, jit_inner
-from seecr.compiled.law import is_linear, strain_of_tension, winch_tension
+from seecr.compiled.law import (
+    has_energy,
+    is_linear,
+    stored_per_metre,
+    strain_of_tension,
+    winch_tension,
+)
 from seecr.compiled.pulley import pulley_geometry
 
 
@@ -109,13 +115,13 @@ def catenary_energy(row, unknown, fall, raised):
             the weight of a cable that hung straight there counts.
 
     Returns:
-        nan for a law that is not linear, and over a pulley, where the pull has no potential.
+        nan for a law without energy, and over a pulley, where the pull has no potential.
         Cable that is paid out to the span brings its height with it, w r sin psi per metre. Of
         what the wheel's turning pays out, d(psi), that is the work of an unstretched cable's
         weight on the wheel. What arc and series stretch by, S(T, psi), comes from a cable that is
         taken to weigh nothing: round a closed way the pull does the work w r int sin psi dS.
     """
-    if row[RADIUS] > 0.0 or not is_linear(row):
+    if row[RADIUS] > 0.0 or not has_energy(row):
         return np.nan
     h, v, length = unknown[0], unknown[1], unknown[2]
     w, ea, rest = row[WEIGHT], row[EA], row[REST]
@@ -124,8 +130,14 @@ def catenary_energy(row, unknown, fall, raised):
     stored = 0.5 * length / ea * (h * h + middle * middle - hanging * hanging / 12.0)
     stored += 0.5 * w * ((rest - length) * fall + rest * raised) - _sag_energy(h, v, w, length)
     pulled = h * h + top * top
+    tension = math.sqrt(pulled)
     soft = rest * row[CREEP_RATE] + row[COMPLIANCE] + (row[WINCH_SIDE] - rest * row[CREEP]) / ea
-    return stored + 0.5 * soft * pulled / (1.0 + math.sqrt(pulled) / ea)
+    if not is_linear(row):
+        # the curve's own stretch, rest (eps - T/EA), is one more in the series
+        strain = strain_of_tension(row, tension)[0]
+        soft -= rest * (strain - tension / ea) / ea
+        stored += rest * (stored_per_metre(row, strain) - 0.5 * pulled / ea)
+    return stored + 0.5 * soft * pulled / (1.0 + tension / ea)
 
 
 @jit_inner

@@ -64,7 +64,7 @@ def solve_one(
 
     A Newton method on the energy: the exact stiffness, shifted until it is positive definite,
     steps kept within a trust region, taken where the energy falls. Where it has none in closed
-    form (curved laws, friction, hysteresis, weight over pulleys, moments), the work along the
+    form (friction, hysteresis, laws of users, weight over pulleys, moments), the work along the
     step, by the trapezium rule, stands for it. From a stationary point that is no minimum the
     descent goes on along the softest direction.
 

@@ -63,12 +63,32 @@ def dahl(row, strain):
 
 @jit_inner
 def _polynomial(ea, q, c, strain):
-    """Tension and slope of EA (eps + q eps^2 + c eps^3), kept from losing its stiffness.
+    """Tension, slope and energy per metre [N] of EA (eps + q eps^2 + c eps^3), kept stiff.
 
     Where the slope would fall below a hundredth of EA it stays there, so that the tension is the
-    integral of the slope: a softening cable still carries more when it is stretched further.
+    integral of the slope: a softening cable still carries more when it is stretched further. The
+    energy is the integral of the tension.
     """
     share = strain + q * strain**2 + c * strain**3
+    work = strain**2 * (0.5 + q * strain / 3.0 + 0.25 * c * strain**2)
+    low, high = _soft_part(q, c)
+    if strain > low:
+        # what a hundredth carries over the soft part more than the polynomial does there
+        top = min(strain, high)
+        more = LEAST * (top - low)
+        more -= (top - low) + q * (top**2 - low**2) + c * (top**3 - low**3)
+        share += more
+        start = low + q * low**2 + c * low**3
+        work += (start + 0.5 * LEAST * (top - low)) * (top - low) + more * (strain - top)
+        work -= 0.5 * (top**2 - low**2) + q * (top**3 - low**3) / 3.0 + 0.25 * c * (top**4 - low**4)
+    firm = strain <= low or strain >= high
+    slope = 1.0 + 2.0 * q * strain + 3.0 * c * strain**2 if firm else LEAST
+    return ea * share, ea * slope, ea * work
+
+
+@jit_inner
+def _soft_part(q, c):
+    """From where to where the slope 1 + 2 q eps + 3 c eps^2 is less than a hundredth."""
     low, high = np.inf, np.inf
     disc = q * q - 3.0 * c * (1.0 - LEAST)
     if disc > 0.0:
@@ -78,13 +98,25 @@ def _polynomial(ea, q, c, strain):
         first = first if first > 0.0 else np.inf
         second = second if second > 0.0 else np.inf
         low, high = min(first, second), max(first, second)
-    if strain > low:
-        top = min(strain, high)
-        share += LEAST * (top - low)
-        share -= (top - low) + q * (top**2 - low**2) + c * (top**3 - low**3)
-    firm = strain <= low or strain >= high
-    slope = 1.0 + 2.0 * q * strain + 3.0 * c * strain**2 if firm else LEAST
-    return ea * share, ea * slope
+    return low, high
+
+
+@jit_inner
+def stored_per_metre(row, strain):
+    """Energy [N] that a metre of cable holds at a strain; nan where its law has none.
+
+    Hysteresis and friction lose some on the way, and of a user's law only the slope is known.
+    """
+    if not has_energy(row):
+        return np.nan
+    return _polynomial(row[EA], row[QUADRATIC], row[CUBIC], strain)[2]
+
+
+@jit_inner
+def has_energy(row):
+    """Whether what the law holds depends on where it is alone, not on how it came there."""
+    lost = row[HYSTERESIS] != 0.0 or row[FRICTION] != 0.0
+    return not lost and row[EXTRA] == 0.0 and row[EXTRA_SLOPE] == 0.0
 
 
 @jit_inner
@@ -96,7 +128,7 @@ def tension_of_strain(row, strain):
     tension = ea * strain
     slope = ea
     if q != 0.0 or c != 0.0:
-        tension, slope = _polynomial(ea, q, c, strain)
+        tension, slope, _work = _polynomial(ea, q, c, strain)
     tension += z + row[EXTRA] + row[EXTRA_SLOPE] * strain
     slope += z_slope + row[EXTRA_SLOPE]
     return tension, slope, z
@@ -123,14 +155,7 @@ def winch_tension(row, tension):
 @jit_inner
 def is_linear(row):
     """Whether the straight law has a closed form."""
-    return (
-        row[QUADRATIC] == 0.0
-        and row[CUBIC] == 0.0
-        and row[HYSTERESIS] == 0.0
-        and row[FRICTION] == 0.0
-        and row[EXTRA] == 0.0
-        and row[EXTRA_SLOPE] == 0.0
-    )
+    return row[QUADRATIC] == 0.0 and row[CUBIC] == 0.0 and has_energy(row)
 
 
 @jit_inner
@@ -169,9 +194,9 @@ def straight_law(row, stretch, state):
         state[SLACK] = 0.0
         state[ENERGY] = 0.5 * tension * elastic
         return tension, row[EA] / soft
-    state[ENERGY] = np.nan
     length, rate, tension, slope, z = series_length(row, 0.0)
     if stretch < length:
+        state[ENERGY] = 0.0 if has_energy(row) else np.nan
         state[TENSION], state[WINCH_TENSION], state[SLACK] = 0.0, 0.0, 1.0
         state[STRAIN], state[HYSTERESIS_NOW] = min(elastic / soft, 0.0), 0.0
         return 0.0, 0.0
@@ -180,6 +205,8 @@ def straight_law(row, stretch, state):
     state[TENSION], state[STRAIN], state[HYSTERESIS_NOW] = tension, strain, z
     state[WINCH_TENSION] = winch_tension(row, tension)[0]
     state[SLACK] = 1.0 if tension <= 0.0 else 0.0
+    yields = row[REST] * row[CREEP_RATE] + row[COMPLIANCE] + row[WINCH_SIDE] / row[EA]
+    state[ENERGY] = row[REST] * stored_per_metre(row, strain) + 0.5 * yields * tension**2
     return tension, slope / rate
 
 

@@ -87,7 +87,8 @@ class NonlinearElasticity(Effect):
     """Cables stiffen (or soften) as they stretch.
 
     T = E S (eps + quadratic eps^2 + cubic eps^3), a polynomial in the strain (Kraus, Force
-    control of cable-driven parallel robots, 2016). Positive: stiffening.
+    control of cable-driven parallel robots, 2016). Positive: stiffening. A metre holds the energy
+    E S (eps^2/2 + quadratic eps^3/3 + cubic eps^4/4).
     """
 
     name: ClassVar[str] = "nonlinear_elasticity"
@@ -136,9 +137,9 @@ class CableWeight(Effect):
 
     With H, V the pulls at the anchor point and w the weight per metre, the span is
     x = H (asinh((V + w L)/H) - asinh(V/H))/w + H L/(E S) and likewise the rise (Irvine, Cable
-    Structures, 1981, section 1.2). The tension reported is that at the exit point. With a linear
-    law it has an energy, H x + V z - int (T + T^2/(2 E S)) ds. Over a pulley, on which the cable
-    is taken to weigh nothing, it has none: round a closed way it does the work
+    Structures, 1981, section 1.2). The tension reported is that at the exit point. It has an
+    energy, H x + V z - int (T + T^2/(2 E S)) ds and what all else stores. Over a pulley, on which
+    the cable is taken to weigh nothing, it has none: round a closed way it does the work
     w r int sin(psi) dS, S what arc and series stretch by; on the DemoBot (0.02 N/m, r 30 mm)
     5e-7 J between two ways to a pose, on CoGiRo (0.63 N/m, r 0.1 m) 1e-6 J.
     """

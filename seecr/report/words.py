@@ -205,7 +205,7 @@ def other_lines(
 
 
 def _more_energy(more: float) -> str:
-    """A moment from outside and a law in strain alone have no energy."""
+    """A moment from outside and a law of a user have no energy."""
     return f"{joules(more, '+.4g')}, " if np.isfinite(more) else ""
 
 

@@ -66,17 +66,44 @@ def test_stiffness_and_slope_against_differences(kind: str, below: float) -> Non
             assert slope == pytest.approx(here.slope[k], rel=1e-5, abs=20 * top)
 
 
-@pytest.mark.parametrize(
-    "kind", ["straight", "pulley", "series", "hanging", "hanging-series", "yielding-hanging"]
-)
-def test_force_is_the_gradient_of_the_energy(kind: str) -> None:
-    row = cable(**KINDS[kind])
-    anchor = in_direction(25.0, 2.03)
+WITH_ENERGY = {
+    **{k: KINDS[k] for k in ("straight", "pulley", "series", "hanging", "hanging-series")},
+    **{k: KINDS[k] for k in ("yielding-hanging", "nonlinear", "yielding-up")},
+    "softening": {"QUADRATIC": -30.0, "CUBIC": 400.0},
+    "hardly soft": {"QUADRATIC": -80.0},
+    "nonlinear-series": {**KINDS["series"], "QUADRATIC": 3.0, "CUBIC": 40.0},
+    "nonlinear-pulley": {**KINDS["series"], "RADIUS": 0.03, "QUADRATIC": -20.0, "CUBIC": 900.0},
+    "nonlinear-hanging": {**KINDS["hanging-series"], "QUADRATIC": 3.0, "CUBIC": 40.0},
+    "softening-hanging": {**KINDS["hanging-series"], "QUADRATIC": -30.0, "CUBIC": 400.0},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("chord", [2.03, 2.004, 2.15, 1.9])
+@pytest.mark.parametrize("kind", WITH_ENERGY)
+def test_force_is_the_gradient_of_the_energy(kind: str, chord: float) -> None:
+    row = cable(**WITH_ENERGY[kind])
+    anchor = in_direction(25.0, chord)
     here = pull(row, anchor)
     for k in range(3):
         step = 1e-5 * np.eye(3)[k]
         energies = [pull(row, anchor, s).state[ENERGY] for s in (step, -step)]
-        assert -(energies[0] - energies[1]) / 2e-5 == pytest.approx(here.force[k], rel=1e-7)
+        slope = -(energies[0] - energies[1]) / 2e-5
+        assert slope == pytest.approx(here.force[k], rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["softening", "hardly soft", "nonlinear-series"])
+def test_energy_of_a_curved_law_is_the_work_of_pulling(kind: str) -> None:
+    """Through the soft part and beyond it, against a quadrature of the tension."""
+    row = cable(**WITH_ENERGY[kind])
+
+    def tension(stretch: float) -> float:
+        return pull(row, [2.0 + stretch, 0, 0]).tension
+
+    kinks = [2.0 * e for e in (0.0134, 0.0366, 0.0062)]  # of strains where a slope ends
+    for stretch in (-0.1, 1e-4, 0.02, 0.06, 0.3):
+        work, _ = quad(tension, 0.0, stretch, epsabs=1e-10, epsrel=1e-10, limit=300, points=kinks)
+        energy = pull(row, [2.0 + stretch, 0, 0]).state[ENERGY]
+        assert energy == pytest.approx(max(work, 0.0), rel=1e-7, abs=1e-9)
 
 
 # --- straight ----------------------------------------------------------------------------------

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from seecr import passes
+from seecr.effects import Term, effect_named, layout_of
 from seecr.equilibrium import solve
 from seecr.errors import InputError
 from seecr.following import evaluated, moved
@@ -56,6 +57,22 @@ def test_the_pass_between_the_two_rests_of_the_tilted_command() -> None:
         assert highest - own.energy[0] >= way.energy
     (line,) = other_lines(own, every, [way])
     assert line.endswith("; reachable, 0.068 mJ to get there, 1.68 mJ back")
+
+
+@pytest.mark.slow
+def test_cables_that_stiffen_have_energies_and_a_pass_between_rests() -> None:
+    robot = load_robot(model_path("demobot_parallel"))
+    pose = np.array([0.351, 0.216, 0.109, 0.943, 0.163, -0.288, -0.038])
+    pose[3:] /= np.linalg.norm(pose[3:])
+    for part, apart in ((1e-3, 2e-3), (1.0, 1.0)):
+        stiffer = layout_of(effect_named("nonlinear_elasticity"), robot)
+        model = [Term(stiffer, part * stiffer.scale)]
+        own, every = solve(robot, pose, effects=model), equilibria(robot, pose, effects=model)
+        assert len(every) == 2 and np.all(np.diff(every.energy) > 0)
+        other = every.rows(elsewhere(own, every))
+        (way,) = barriers(own, other)
+        assert way.exact and way.energy == pytest.approx(6.80e-5, rel=apart)
+        assert way.back - way.energy == pytest.approx(own.energy[0] - other.energy[0], rel=1e-9)
 
 
 @pytest.mark.slow
