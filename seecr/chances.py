@@ -9,18 +9,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtri
 
+from seecr.balance import balance_of, bends
 from seecr.commands import Commands
+from seecr.compiled.columns import EXTERNAL_FORCE, EXTERNAL_MOMENT
 from seecr.distribution import tension_limits
 from seecr.errors import InputError
 from seecr.experiment import Experiment, effects_of
 from seecr.given import GivenRobot, robot_of
-from seecr.holding import balance_of
+from seecr.inside import farthest_inside
 from seecr.model import GivenEffects, Model, model_given
 from seecr.pose import Array
 from seecr.robot import Robot
 from seecr.sensitivity import sensitivities
 from seecr.starts import commanded_poses
-from seecr.tables import assemble
+from seecr.tables import Tables, assemble
 from seecr.uncertainty import moving_covariance
 from seecr.workspace import load_scale, margins_from
 
@@ -178,15 +180,26 @@ def margins_with(
     low, high = tension_limits(robot, lowest, highest)
     told = Commands(poses, lengths=robot.commanded_lengths(poses), told=True)
     tables = assemble(Experiment(robot, told).setup(effects_of(effects, robot)))
+    some = np.zeros((1, 6)) if wrenches is None else np.atleast_2d(np.asarray(wrenches, float))
+    if robot.joints and wrenches is not None:
+        raise InputError(f"{robot.name} stands on joints: expected no set of wrenches")
+    if bends(tables):
+        every = [farthest_inside(_pushed(tables, one), low, high).margins for one in some]
+        return np.asarray(np.min(every, axis=0))
     matrices, load = balance_of(tables, low)
     # of -W tau = w: the signs are those of the gradient
     loads = load[:, None]
     if wrenches is not None:
-        if robot.joints:
-            raise InputError(f"{robot.name} stands on joints: expected no set of wrenches")
-        unit = np.where(robot.hinges, 1.0 / robot.length, 1.0)
-        loads = loads + np.atleast_2d(np.asarray(wrenches, float)) * unit
+        loads = loads + some * np.where(robot.hinges, 1.0 / robot.length, 1.0)
     return margins_from(matrices, np.ascontiguousarray(loads), low, high, load_scale(robot))
+
+
+def _pushed(tables: Tables, wrench: Array) -> Tables:
+    """The same with one more external wrench (6,) [N, N m] at the platform's origin."""
+    load = tables.load.copy()
+    load[:, EXTERNAL_FORCE : EXTERNAL_FORCE + 3] += wrench[:3]
+    load[:, EXTERNAL_MOMENT : EXTERNAL_MOMENT + 3] += wrench[3:]
+    return replace(tables, load=load)
 
 
 def _drawn(covariance: Array, count: int) -> Array:

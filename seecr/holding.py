@@ -8,15 +8,17 @@ both together, with the law's own derivatives.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from seecr import statics
-from seecr.compiled.columns import EA, GAP, REST, STRAIN, TENSION, WEIGHT
+from seecr.balance import Rates, bends, first_tensions, here, next_rest, rates_of, with_rest
+from seecr.compiled.columns import STRAIN, TENSION
 from seecr.distribution import distribute
-from seecr.hanging import bridged_lengths, least_of_heavy, rest_for
+from seecr.hanging import bridged_lengths, rest_for
+from seecr.inside import Inside, farthest_inside, limits_of
 from seecr.pose import Array
 from seecr.tables import Tables, take
 
@@ -26,14 +28,16 @@ _ROUNDS, _BALANCED = 40, 1e-12
 _NEARS = 0.5
 # Rounds for whether a pose is firm, asked of many.
 _FEW = 14
-# Step of a rest length for its derivative, relative to the robot's length.
-_STEP = 1e-5
 # A slack cable is this much longer than the way it bridges: it needs a margin, not a value.
 _MARGIN = 2e-3
 # A stiffness below this part of the largest is none.
 _FIRM = 1e-12
 # Below this part of the load a tension is none.
 _NONE = 1e-9
+# Parts of the way from an aim to the tensions farthest inside, at which a pose is tried once more.
+_PARTS = (0.0, 0.5, 0.75, 0.9, 1.0)
+# Limits without an end are so many loads apart; a pose this part of the load outside is left.
+_TIGHT, _HOPELESS = 30.0, 0.1
 
 
 @dataclass(eq=False)
@@ -52,6 +56,15 @@ class Held:
     strains: Array
     fine: NDArray[np.bool_]
 
+    def only(self, rows: NDArray[np.bool_]) -> Held:
+        """Some rows (n,)."""
+        return Held(self.rest[rows], self.tensions[rows], self.strains[rows], self.fine[rows])
+
+    def put(self, rows: NDArray[np.intp], other: Held) -> None:
+        """Put rows of another in their place."""
+        self.rest[rows], self.tensions[rows] = other.rest, other.tensions
+        self.strains[rows], self.fine[rows] = other.strains, other.fine
+
 
 def hold(tables: Tables, aim: Array, low: Array, high: Array, rounds: int = _ROUNDS) -> Held:
     """Find rest lengths with which the poses of ``tables`` are in balance.
@@ -59,75 +72,92 @@ def hold(tables: Tables, aim: Array, low: Array, high: Array, rounds: int = _ROU
     Args:
         tables: of n poses, whose own rest lengths do not matter.
         aim: (n, m) tensions wanted [N].
-        low, high: (m,) limits [N].
+        low, high: (m,) limits [N]; no cable hangs with less tension than it weighs.
         rounds: at most, of Newton's method.
     """
-    least = raised(tables, low, high)
-    out = _hold(tables, aim, least, high, rounds)
-    # some are in balance with less than what is asked of hanging cables
-    again = np.flatnonzero(~out.fine & np.any(least > low, axis=1))
-    if len(again):
-        other = _hold(take(tables, again), aim[again], low, high, rounds)
-        rows = again[other.fine]
-        out.rest[rows], out.tensions[rows] = other.rest[other.fine], other.tensions[other.fine]
-        out.strains[rows], out.fine[rows] = other.strains[other.fine], True
+    least, most = limits_of(tables, low, high)
+    out = _hold(tables, aim, least, most, rounds, rest_for(tables, first_tensions(tables, least)))
+    lost = np.flatnonzero(~out.fine)
+    if len(lost) and tables.cables.shape[1] >= tables.n_dof and bends(tables):
+        _from_inside(out, lost, tables, aim, rounds, low, (least, most))
     return out
 
 
-def raised(tables: Tables, low: Array, high: Array) -> Array:
-    """(n, m) [N] lower limits: no length takes a hanging cable's tension to nothing."""
-    floor = least_of_heavy(tables)
-    return np.where(floor < high, np.maximum(low, floor), low)
+def _from_inside(
+    out: Held, rows: NDArray[np.intp], tables: Tables, aim: Array, rounds: int,
+    low: Array, limits: tuple[Array, Array],
+) -> None:  # fmt: skip
+    """Hold rows from tensions farthest inside the limits, where these bend on the way to others.
+
+    The aim comes to those tensions, which hold, as far as it has to.
+    """
+    least, most = limits
+    # without an end, far enough for every cable to be tight
+    end = np.minimum(most, least + _TIGHT * tables.scale[:, None])
+    start = farthest_inside(take(tables, rows), low, end[rows], _HOPELESS)
+    _put_loose(out, rows[start.loose], take(tables, rows[start.loose]), start)
+    held = ~start.loose & (start.margins >= -_NONE * tables.scale[rows])
+    some, inside, rest = rows[held], start.tensions[held], start.rest[held]
+    for part in _PARTS:
+        if len(some) == 0:
+            return
+        wanted = (1.0 - part) * np.clip(aim[some], least[some], most[some]) + part * inside
+        found = _hold(take(tables, some), wanted, least[some], most[some], rounds, rest)
+        out.put(some[found.fine], found.only(found.fine))
+        some, inside, rest = some[~found.fine], inside[~found.fine], rest[~found.fine]
 
 
-def _hold(tables: Tables, aim: Array, low: Array, high: Array, rounds: int) -> Held:
-    """See :func:`hold`; the limits may be (n, m), each row's own."""
+def _put_loose(out: Held, rows: NDArray[np.intp], tables: Tables, start: Inside) -> None:
+    """Put rows that are held with cables that hang loosely: as tight as they can."""
+    if len(rows):
+        now = with_rest(tables, start.rest[start.loose])
+        at = statics.evaluate(now, here(now), threads=None)
+        states = at.states[..., TENSION], at.states[..., STRAIN]
+        out.put(rows, Held(start.rest[start.loose], *states, np.ones(len(rows), dtype=bool)))
+
+
+def _hold(tables: Tables, aim: Array, least: Array, most: Array, rounds: int, rest: Array) -> Held:
+    """See :func:`hold`, with limits (n, m) and rest lengths (n, m) [m] to start from."""
     n, m = tables.cables.shape[:2]
-    bridged = bridged_lengths(tables)
-    least, most = np.broadcast_to(low, (n, m)), np.broadcast_to(high, (n, m))
-    first = np.maximum(low, tables.scale[:, None] / m)
-    out = Held(rest_for(tables, first), np.zeros((n, m)), np.zeros((n, m)), np.zeros(n, dtype=bool))
+    out = Held(rest.copy(), np.zeros((n, m)), np.zeros((n, m)), np.zeros(n, dtype=bool))
     rows, known, wanted = np.arange(n), None, out.tensions
-    here, short = _here(tables), np.full(n, np.inf)
+    start, short = here(tables), np.full(n, np.inf)
     for _ in range(rounds):
         now = with_rest(take(tables, rows), out.rest[rows])
-        at = statics.evaluate(now, statics.take_evaluation(here, rows), threads=None)
-        statics.put_evaluation(here, rows, at)
+        at = statics.evaluate(now, statics.take_evaluation(start, rows), threads=None)
+        statics.put_evaluation(start, rows, at)
         missed = np.abs(at.states[..., TENSION] - wanted).max(axis=1)
         fine = (at.residual <= _BALANCED) & (missed <= _NONE * now.scale)
         out.fine[rows] = fine
         rows, now, at = rows[~fine], take(now, ~fine), statics.take_evaluation(at, ~fine)
         if len(rows) == 0:
             break
-        by_tension, own = _rates(now, at)
+        rates = rates_of(now, at)
         if known is not None:
             # a cable that is just slack has no rates: those of when it pulled are near
-            idle = own >= 0.0
-            by_tension = np.where(idle[:, None, :], known[0][rows], by_tension)
-            own = np.where(idle, known[1][rows], own)
+            idle = rates.by_length >= 0.0
+            rates.by_tension = np.where(idle[:, None, :], known.by_tension[rows], rates.by_tension)
+            rates.by_length = np.where(idle, known.by_length[rows], rates.by_length)
         else:
-            known = by_tension.copy(), own.copy()
-        known[0][rows], known[1][rows] = by_tension, own
+            known = Rates(rates.by_tension.copy(), rates.by_length.copy(), rates.pull)
+        known.by_tension[rows], known.by_length[rows] = rates.by_tension, rates.by_length
+        load = rates.load(at)
+        wanted, possible = distribute(rates.by_tension, load, aim[rows], least[rows], most[rows])
         tensions = at.states[..., TENSION]
-        load = np.einsum("ndm,nm->nd", by_tension, tensions) - at.gradient
-        wanted, possible = distribute(by_tension, load, aim[rows], least[rows], most[rows])
-        step = wanted - tensions
-        # a plain cable's tension is linear in 1/l0: the slope over the step is exact
-        slope = -own * out.rest[rows] * (out.rest[rows] - _STEP * now.length)
-        inverse = 1.0 / out.rest[rows] + step / slope * _hanging(now, tensions, wanted)
-        inverse = np.clip(inverse * out.rest[rows], 0.5, 2.0) / out.rest[rows]
+        longer = next_rest(now, out.rest[rows], rates.by_length, tensions, wanted)
         # tensions that come near may balance where pulls are as those make them
-        before, lack = short[rows], np.einsum("ndm,nm->nd", by_tension, wanted) - load
+        before, lack = short[rows], np.einsum("ndm,nm->nd", rates.by_tension, wanted) - load
         short[rows] = np.abs(lack).max(axis=1)
         nears = possible | (short[rows] < _NEARS * before)
-        going = nears & np.isfinite(inverse).all(axis=1)
-        out.rest[rows[going]] = 1.0 / inverse[going]
+        going = nears & np.isfinite(longer).all(axis=1)
+        out.rest[rows[going]] = longer[going]
         rows, wanted = rows[going], wanted[going]
-    out.tensions, out.strains = here.states[..., TENSION], here.states[..., STRAIN]
+    out.tensions, out.strains = start.states[..., TENSION], start.states[..., STRAIN]
     # rounding may keep a row that is in balance to nine digits from the last ones
-    out.fine |= (here.residual < 1e-10) & _within(out.tensions, low, high, tables.scale)
-    slack = (out.tensions <= _NONE * tables.scale[:, None]) & (low <= 0.0)
-    out.rest = np.where(slack & out.fine[:, None], (1.0 + _MARGIN) * bridged, out.rest)
+    out.fine |= (start.residual < 1e-10) & _within(out.tensions, least, most, tables.scale)
+    slack = (out.tensions <= _NONE * tables.scale[:, None]) & (least <= 0.0)
+    longer = (1.0 + _MARGIN) * bridged_lengths(tables)
+    out.rest = np.where(slack & out.fine[:, None], longer, out.rest)
     return out
 
 
@@ -138,93 +168,13 @@ def holds_firmly(tables: Tables, aim: Array, low: Array, high: Array) -> NDArray
     """
     found = hold(tables, aim, low, high, _FEW)
     now = with_rest(tables, found.rest)
-    at = statics.evaluate(now, _here(now), threads=None)
+    at = statics.evaluate(now, here(now), threads=None)
     stiffness = np.where(found.fine[:, None, None], at.hessian, 0.0)
     each = np.linalg.eigvalsh(0.5 * (stiffness + np.swapaxes(stiffness, 1, 2)))
     return np.asarray(found.fine & (each[:, 0] > _FIRM * each[:, -1]))
-
-
-def with_rest(tables: Tables, rest: Array) -> Tables:
-    """The same tables with other rest lengths (n, m) [m]."""
-    cables = tables.cables.copy()
-    cables[..., GAP] += cables[..., REST] - rest
-    cables[..., REST] = rest
-    return replace(tables, cables=cables)
-
-
-def _here(tables: Tables) -> statics.Evaluation:
-    """The platform at the poses of the tables."""
-    n, m = tables.cables.shape[:2]
-    return statics.Evaluation.empty(n, m, tables.n_dof)
-
-
-def _rates(tables: Tables, at: statics.Evaluation) -> tuple[Array, Array]:
-    """Gradient (n, d, m) by each cable's tension, and tension (n, m) by its rest length [N/m]."""
-    step = _STEP * tables.length
-    force, tension = statics.change_by_cable(tables, tables.lengthened(-step), at)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(
-            tension[:, None, :] != 0.0, force / tension[:, None, :], 0.0
-        ), tension / step
-
-
-def _hanging(tables: Tables, now: Array, wanted: Array) -> Array:
-    """(n, m) by what Newton's steps change for cables that hang; one for those without weight.
-
-    A parabola's strain is T/EA - (w l)^2/(24 T^2) (Irvine 1981, section 1.2): how much more or
-    less of it lies between two tensions than its slope at the first says.
-    """
-    law = tables.cables
-    heavy = (law[..., WEIGHT] * (law[..., REST] + law[..., GAP])) ** 2
-    some = (heavy > 0.0) & (now > 0.0) & (wanted > 0.0)
-    old, new = np.where(some, now, 1.0), np.where(some, wanted, 1.0)
-    between = 1.0 / law[..., EA] + heavy * (new + old) / (24.0 * (old * new) ** 2)
-    slope = 1.0 / law[..., EA] + heavy / (12.0 * old**3)
-    return np.where(some, between / slope, 1.0)
 
 
 def _within(tensions: Array, low: Array, high: Array, scale: Array) -> NDArray[np.bool_]:
     room = 1e-9 * scale[:, None]
     inside = (tensions >= low - room) & (tensions <= high + room)
     return np.asarray(inside.all(axis=1))
-
-
-def balance_of(tables: Tables, low: Array, about: Array | None = None) -> tuple[Array, Array]:
-    """Balance A tau = load at the poses of tables: (n, d, m) and (n, d) [N], torques over length.
-
-    Linear in the tensions from those given, (n, m) [N], or from where the cables just pull. That
-    matters where a pull's direction depends on its size only.
-    """
-    first = np.maximum(low, tables.scale[:, None] / tables.cables.shape[1])
-    now = with_rest(tables, rest_for(tables, first if about is None else about))
-    at = statics.evaluate(now, _here(now), threads=None)
-    by_tension, _ = _rates(now, at)
-    load = np.einsum("ndm,nm->nd", by_tension, at.states[..., TENSION]) - at.gradient
-    return by_tension, load
-
-
-def counted_balance(
-    tables: Tables, low: Array, high: Array, about: Array | None = None
-) -> tuple[Array, Array]:
-    """:func:`balance_of` for tensions counted so that hanging cables have the limits, too.
-
-    Counted tensions go from ``low`` to ``high`` where those go from what such a cable needs, which
-    changes with the pose, to ``high``; those of others are as they are.
-
-    Args:
-        tables: of n poses.
-        low, high: (m,) limits [N].
-        about: (n, m) counted, or None for tensions that come nearest to balance.
-    """
-    least = raised(tables, low, high)
-    if not np.any(least > low):
-        return balance_of(tables, low, about)
-    room = np.ones_like(least)
-    np.divide(high - least, high - low, out=room, where=np.isfinite(high) & (least > low))
-    if about is None:
-        matrix, load = balance_of(tables, least)
-        tensions = distribute(matrix, load, least, least, high)[0]
-    else:
-        tensions = least + room * (about - low)
-    matrix, load = balance_of(tables, low, tensions)
-    return matrix * room[:, None], load - np.einsum("ndm,nm->nd", matrix, least - room * low)

@@ -16,7 +16,9 @@ from seecr.effects.base import Effect
 from seecr.errors import InputError
 from seecr.experiment import Experiment, Prediction, effects_of
 from seecr.given import GivenRobot, robot_of
-from seecr.holding import Held, balance_of, counted_balance, hold, holds_firmly
+from seecr.hanging import least_of_heavy
+from seecr.holding import Held, hold, holds_firmly
+from seecr.inside import balances, counted_balance
 from seecr.nearest import Nearest, nearest
 from seecr.pose import Array, pose_difference
 from seecr.result import COORDINATES, Record, Result, named
@@ -267,8 +269,11 @@ class _Search:
         out, limits = [""] * len(self.given), self.limits
         if len(lost) == 0:
             return tuple(out)
-        for i, matrix, load in zip(lost, *balance_of(take(tables, lost), limits.low), strict=True):
-            out[i] = why_not_held(matrix, load, limits.low, limits.high, self.robot.cable_names)
+        some = take(tables, lost)
+        weighs, names = least_of_heavy(some), self.robot.cable_names
+        for i, w, row in zip(lost, weighs, balances(some, limits.low, limits.high), strict=True):
+            matrix, load, low, high = row
+            out[i] = why_not_held(matrix, load, low, high, names, w)
         return tuple(out)
 
     def _tables(self, commands: Commands) -> Tables:

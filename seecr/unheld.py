@@ -19,22 +19,37 @@ _ROUNDING = 1e-7
 _MOST = 3
 
 
-def why_not_held(matrix: Array, load: Array, low: Array, high: Array, names: Sequence[str]) -> str:
+def why_not_held(
+    matrix: Array,
+    load: Array,
+    low: Array,
+    high: Array,
+    names: Sequence[str],
+    weighs: Array | float = 0.0,
+) -> str:
     """A sentence on one pose.
 
     Args:
         matrix: (d, m) balance, load: (d,) [N], torques over a length.
         low, high: (m,) limits of the tensions [N].
         names: of the m cables.
+        weighs: (m,) [N] what each cable weighs, where that is its lowest limit.
     """
+    if np.any(low > high):
+        k = int(np.argmax(low - high))
+        return f"{_who(names[k])} weighs {low[k]:.3g} N, more than the {high[k]:.3g} N it may pull"
     beyond = _least_beyond(matrix, load, low, high)
     if beyond is None:
         return "no pulls of the cables, however large, balance the load there"
     rounding = _ROUNDING * max(float(np.abs(load).max()), 1e-300)
     order = [k for k in np.argsort(-np.abs(beyond)) if abs(beyond[k]) > rounding]
     if not order:
-        return "held only just: the tensions are at their limits"
-    said = [_of_cable(names[k], beyond[k], low[k], high[k]) for k in order[:_MOST]]
+        return (
+            "tensions at their limits would balance the load there, but no lengths were found that "
+            "keep them"
+        )
+    of_weight = (low > 0.0) & (low <= weighs)
+    said = [_of_cable(names[k], beyond[k], low[k], high[k], of_weight[k]) for k in order[:_MOST]]
     more = len(order) - _MOST
     if more > 0:
         said[-1] += (
@@ -43,13 +58,18 @@ def why_not_held(matrix: Array, load: Array, low: Array, high: Array, names: Seq
     return "; ".join(said)
 
 
-def _of_cable(name: str, beyond: float, low: float, high: float) -> str:
-    who = name if "cable" in name.lower() else f"cable {name}"
+def _who(name: str) -> str:
+    return name if "cable" in name.lower() else f"cable {name}"
+
+
+def _of_cable(name: str, beyond: float, low: float, high: float, of_weight: bool) -> str:
+    who = _who(name)
     if beyond > 0.0:
         return f"{who} would have to pull {high + beyond:.3g} N, more than {high:.3g} N"
     pull = low + beyond
     if pull >= 0.0:
-        return f"{who} would have to pull {pull:.3g} N, less than {low:.3g} N"
+        least = f"the {low:.3g} N that it weighs" if of_weight else f"{low:.3g} N"
+        return f"{who} would have to pull {pull:.3g} N, less than {least}"
     return f"{who} would have to push with {-pull:.3g} N"
 
 

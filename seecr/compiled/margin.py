@@ -107,14 +107,15 @@ def _rows(particular, null, low, high, top, a, b):
 
 
 @jit_allocating
-def _largest_least(a, b, count, r, scale):
+def _largest_least(a, b, count, r, scale, answer):
     """max over nu of min_i (a_i nu + b_i) by the dual simplex; nan where it does not end.
 
     Infinite where artificial functions, the first r + 1, hold it: it would go on with them.
+    ``answer`` (r + 1,) is nu and the least, there as far as those let them go.
     """
     k = r + 1
     basis = np.arange(k)
-    system, right, answer = np.empty((k, k)), np.empty(k), np.empty(k)
+    system, right = np.empty((k, k)), np.empty(k)
     # of the basis: they make nothing of nu and one of the margin
     weights, change = np.full(k, 1.0 / k), np.empty(k)
     for _ in range(_PIVOTS):
@@ -169,20 +170,20 @@ def _space(d, m):
     rows = m - d + 1 + 2 * m
     return (
         np.empty((m, d + 1)), np.empty(m), np.empty((m, m - d)),
-        np.empty((rows, max(m - d, 1))), np.empty(rows),
+        np.empty((rows, max(m - d, 1))), np.empty(rows), np.empty(m - d + 1),
     )  # fmt: skip
 
 
 @jit_inner
 def _least_margin(matrix, loads, low, high, scale, space):
     """The least margin [N] over loads (k, d); nan where the matrix is singular."""
-    work, particular, null, a, b = space
+    work, particular, null, a, b, answer = space
     least = np.inf
     for k in range(len(loads)):
         if not null_space(matrix, loads[k], work, particular, null):
             return np.nan
         count = _rows(particular, null, low, high, _TOP * scale, a, b)
-        found = _largest_least(a, b, count, null.shape[1], scale)
+        found = _largest_least(a, b, count, null.shape[1], scale, answer)
         if np.isnan(found):
             return np.nan
         least = min(least, found)
@@ -195,6 +196,22 @@ def margins_of(matrices, loads, low, high, scale, out):
     space = _space(*matrices.shape[1:])
     for r in range(len(matrices)):
         out[r] = _least_margin(matrices[r], loads[r], low, high, scale, space)
+
+
+@jit_allocating
+def innermost_of(matrices, loads, low, high, scale, out, tensions):
+    """As :func:`margins_of` with one load (n, d) and limits (n, m) each; the tensions besides.
+
+    ``tensions`` (n, m) are those that stay farthest inside; nan where there is no end to that.
+    """
+    space = _space(*matrices.shape[1:])
+    null, particular, answer = space[2], space[1], space[5]
+    for r in range(len(matrices)):
+        out[r] = _least_margin(matrices[r], loads[r : r + 1], low[r], high[r], scale[r], space)
+        for i in range(matrices.shape[2]):
+            tensions[r, i] = particular[i] if np.isfinite(out[r]) else np.nan
+            for k in range(null.shape[1]):
+                tensions[r, i] += null[i, k] * answer[k]
 
 
 @jit_allocating

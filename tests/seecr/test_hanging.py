@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from seecr import statics
+from seecr.balance import balance_of, with_rest
 from seecr.commands import Commands
 from seecr.compiled.columns import TENSION
 from seecr.effects.cable import CableWeight
 from seecr.experiment import Experiment
 from seecr.hanging import bridged_lengths, least_of_heavy, rest_for
-from seecr.holding import balance_of, hold, with_rest
+from seecr.holding import hold
 from seecr.mjcf import load_robot
 from seecr.robot import Robot
 from seecr.shipped import model_path
