@@ -51,6 +51,8 @@ def choose(
 ) -> list[Term]:
     """Draw the effects of a twin.
 
+    What a seed hides does not depend on the commands: measured again, it is the same robot.
+
     Args:
         robot: whose plausible sizes count.
         random: of the twin's seed.
@@ -60,15 +62,19 @@ def choose(
         lacking: what the commands have not of what effects need, in words.
 
     Raises:
-        CrosscheckError: an effect that MuJoCo has no truth for, or more than there are.
+        CrosscheckError: an effect that MuJoCo has no truth for, more than there are, or effects
+            that these commands lack something of; those that the seed chose are not named.
     """
     lacking = lacking or {}
     if names is None:
-        names = _drawn(robot, random, count, tensions, lacking)
+        names = _drawn(robot, random, count, tensions)
+        if want := _wanted(names, lacking):
+            raise CrosscheckError(
+                f"what this seed hides needs {want}; expected commands that have them, or another "
+                "seed"
+            )
     for name in names:
-        needs = effect_named(name).needs  # says which are known, nearest first
-        if set(needs) & set(lacking):
-            want = " and ".join(lacking[need] for need in needs if need in lacking)
+        if want := _wanted([name], lacking):  # says which effects are known, nearest first
             raise CrosscheckError(f"effect {name}: needs {want}; expected commands that have them")
         if name not in TRUE_EFFECTS:
             raise CrosscheckError(f"effect {name}: no truth with MuJoCo, so no twin can hide it")
@@ -85,12 +91,15 @@ def _alike_both_ways(hidden: Term) -> Term:
     return Term(hidden.layout, np.full(2, hidden.vector[0]))
 
 
-def _drawn(
-    robot: Robot, random: Generator, count: int | None, tensions: bool, lacking: Mapping[str, str]
-) -> list[str]:
+def _wanted(names: Sequence[str], lacking: Mapping[str, str]) -> str:
+    """What effects need of what is lacking, in words; "" where nothing is."""
+    needs = {need for name in names for need in effect_named(name).needs}
+    return " and ".join(words for need, words in lacking.items() if need in needs)
+
+
+def _drawn(robot: Robot, random: Generator, count: int | None, tensions: bool) -> list[str]:
     without = set() if tensions else {"tension_scale"}
     without |= {*CONTAINED} | (set() if _room_for_sheaves(robot) else {"pulley_radius"})
-    without |= {name for name in TRUE_EFFECTS if set(effect_named(name).needs) & set(lacking)}
     known = [name for name in TRUE_EFFECTS if name not in without]
     if count is None:
         count = int(random.choice(len(_SHARES), p=_SHARES))

@@ -102,6 +102,27 @@ def test_the_command_takes_poses_and_noise(tmp_path):
     assert "payload_kg,force_x_N" in header and "tension_8_N" in header
 
 
+def test_a_seed_hides_the_same_whatever_its_commands_have():
+    robot = load_robot(COGIRO)
+    none = {"time": "the time of each row (t_s)", "temperature": "temperature_C"}
+    refused = 0
+    for seed in range(60):
+        own = choose(robot, np.random.default_rng([seed, 0]))
+        needs = {need for one in own for need in effect_named(one.name).needs}
+        try:
+            lacking = choose(robot, np.random.default_rng([seed, 0]), lacking=none)
+        except CrosscheckError as error:
+            refused += 1
+            wanted = " and ".join(none[need] for need in none if need in needs)
+            assert str(error).startswith(f"what this seed hides needs {wanted}; expected commands")
+            assert not any(one.name in str(error) for one in own)
+            continue
+        assert [one.name for one in lacking] == [one.name for one in own] and not needs & set(none)
+        for one, other in zip(lacking, own, strict=True):
+            np.testing.assert_array_equal(one.vector, other.vector)
+    assert 0 < refused < 20
+
+
 def test_commands_that_cannot_show_an_effect_hide_none_of_it(tmp_path):
     path = users_poses(tmp_path, way_points=False)
     with pytest.raises(CrosscheckError, match="effect thermal_expansion: needs temperature_C; exp"):
