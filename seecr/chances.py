@@ -13,6 +13,7 @@ from seecr.balance import balance_of, bends
 from seecr.commands import Commands
 from seecr.compiled.columns import EXTERNAL_FORCE, EXTERNAL_MOMENT
 from seecr.distribution import tension_limits
+from seecr.effects.terms import Terms
 from seecr.errors import InputError
 from seecr.experiment import Experiment, effects_of
 from seecr.given import GivenRobot, robot_of
@@ -33,6 +34,13 @@ __all__ = ["asked_chance", "held_chance", "kept_chance", "margins_with"]
 _LINEAR, _FIRST, _DRAWS, _SURE = 4096, 16, 256, 6.0
 # Rows at a time.
 _PART = 64
+_HOLDS_NONE = (
+    "{} has fewer cables than freedoms: it holds no poses; expected a map without probabilities"
+)
+_NO_COVARIANCE = (
+    "how likely poses can be held is said by a model that keeps its covariance; expected one that "
+    "crosscheck calibrate wrote"
+)
 
 
 def kept_chance(
@@ -71,7 +79,7 @@ def kept_chance(
         commands = replace(commands, lengths=lengths)
     experiment = Experiment(robot, commands)
     at = experiment.predict(terms.effects)
-    drawn = _drawn(covariance, _LINEAR)
+    drawn = _drawn(terms, covariance, _LINEAR) - terms.vector
     out = np.ones(len(commands))
     room = 1e-9 * load_scale(robot)
     slopes = np.zeros((len(out), robot.n_cables, 0))
@@ -98,7 +106,8 @@ def held_chance(
     """The probability that poses can be held within limits, with what the model does not know.
 
     The part of 256 models drawn from its covariance that hold them; of 16, where these are all far
-    on one side.
+    on one side. No value is drawn beyond its bounds; a model with which a cable's equations have no
+    answer holds nothing.
 
     Args:
         robot: as described, or its MJCF.
@@ -117,13 +126,10 @@ def held_chance(
     if known is None:
         return None
     if robot.n_cables < robot.n_dof:
-        raise InputError(
-            f"{robot.name} has fewer cables than freedoms: it holds no poses; "
-            "expected a map without probabilities"
-        )
+        raise InputError(_HOLDS_NONE.format(robot.name))
     terms, covariance = known
     places, limits = commanded_poses(poses), (lowest, highest, wrenches)
-    vectors = terms.vector + _drawn(covariance, _DRAWS)
+    vectors = _drawn(terms, covariance, _DRAWS)
     edge = -1e-9 * load_scale(robot)
 
     def held(rows: Array, some: Array) -> Array:
@@ -134,14 +140,27 @@ def held_chance(
     out = np.asarray((first >= edge).mean(axis=0))
     # limits of no end, or poses out of all reach, are far from any
     finite = np.where(np.isfinite(first), first, np.nan)
-    far = np.abs(np.nanmean(finite, axis=0)) > _SURE * np.nanstd(finite, axis=0)
-    far |= ~np.isfinite(first).all(axis=0)
+    far: NDArray[np.bool_] = np.asarray(~np.isfinite(first).all(axis=0))
+    mean, spread = finite[:, ~far].mean(axis=0), finite[:, ~far].std(axis=0)
+    far[~far] = np.abs(mean) > _SURE * spread
     near = np.flatnonzero(~(far & np.isin(out, (0.0, 1.0))))
     if len(near):
         rest = held(places[near], vectors[_FIRST:])
         count = (first[:, near] >= edge).sum(axis=0) + (rest >= edge).sum(axis=0)
         out[near] = count / _DRAWS
     return out
+
+
+def check_chance(robot: Robot, model: GivenEffects) -> None:
+    """That a robot's poses can have probabilities, before hours are spent on them.
+
+    Raises:
+        InputError: fewer cables than freedoms, or something else than a model with a covariance.
+    """
+    if robot.n_cables < robot.n_dof:
+        raise InputError(_HOLDS_NONE.format(robot.name))
+    if not isinstance(model, Model) or moving_covariance(model) is None:
+        raise InputError(_NO_COVARIANCE)
 
 
 def asked_chance(
@@ -157,10 +176,7 @@ def asked_chance(
     if isinstance(model, Model):
         found = held_chance(robot, poses, model, lowest=lowest, highest=highest, wrenches=wrenches)
     if found is None:
-        raise InputError(
-            "how likely poses can be held is said by a model that keeps its covariance; expected "
-            "one that crosscheck calibrate wrote"
-        )
+        raise InputError(_NO_COVARIANCE)
     return found
 
 
@@ -202,13 +218,20 @@ def _pushed(tables: Tables, wrench: Array) -> Tables:
     return replace(tables, load=load)
 
 
-def _drawn(covariance: Array, count: int) -> Array:
-    """Evenly spread draws (count, p) of a normal distribution about zero."""
-    if len(covariance) == 0:
+def _drawn(terms: Terms, covariance: Array, count: int) -> Array:
+    """Evenly spread draws (count, p) of a normal distribution about the terms' values, in bounds.
+
+    A value beyond its bound is put on it, as a fit to such data would have: many effects begin at
+    a bound, where they are absent, and draws that all are inside by chance are as good as never.
+    """
+    own = terms.vector
+    if len(own) == 0:
         return np.zeros((count, 0))
     values, vectors = np.linalg.eigh(covariance)
     from scipy.stats import qmc  # takes a second to import
 
     unit = qmc.Sobol(len(covariance), seed=0).random(count)
     drawn = ndtri(np.clip(unit, 1e-9, 1.0 - 1e-9))
-    return np.asarray(drawn * np.sqrt(np.maximum(values, 0.0)) @ vectors.T)
+    drawn = own + drawn * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
+    lower, upper = np.minimum(terms.lower, own), np.maximum(terms.upper, own)
+    return np.asarray(np.clip(drawn, lower, upper))

@@ -2,7 +2,9 @@
 
 The static-feasible workspace (SFW) are the poses at which tensions that only pull balance the
 load (paper, eq 3, Figs 10 and 11). Elastic cables do not change it: it asks what tensions could
-do at a pose, not whether the platform comes to rest there when the winches are told to.
+do at a pose, not whether the platform comes to rest there when the winches are told to. Whole grids
+of poses, ``workspace_map``, and edges, ``boundary``, are in :mod:`seecr.maps`; they can be had from
+here as well.
 """
 
 from __future__ import annotations
@@ -19,12 +21,16 @@ from seecr.distribution import balanced, tension_limits
 from seecr.errors import InputError
 from seecr.given import GivenRobot, robot_of
 from seecr.joints import motion_columns, values_of_pose
+from seecr.lazy import lazily
 from seecr.pose import Array, all_finite, quat_rotate, transform_points
 from seecr.result import Record, Result
 from seecr.robot import Robot
 from seecr.solution import Solution
 from seecr.starts import finite
 from seecr.threads import in_parts
+
+# They stand on what is here, so that they are imported when asked for.
+__getattr__ = lazily("seecr", dict.fromkeys(("Workspace", "boundary", "workspace_map"), "maps"))
 
 # Part of the load that may stay unbalanced: rounding of the tensions found.
 _BALANCED = 1e-9
@@ -177,11 +183,18 @@ def _loads(
 
 
 def _by_search(matrices: Array, loads: Array, low: Array, high: Array) -> Array:
-    """Margins (n,) where W has no inverse: zero where a search finds tensions, else none."""
+    """Margins (n,) where W has no inverse: zero where a search finds tensions, else none.
+
+    None, too, where a cable's equations have no answer, which leaves numbers that are not finite.
+    """
+    sound = np.atleast_1d(np.isfinite(matrices).all(axis=(1, 2)))
+    sound &= np.isfinite(loads).all(axis=(1, 2))
     return np.array(
         [
-            0.0 if all(balanced(w, load, low, high)[1] < _BALANCED for load in some) else -np.inf
-            for w, some in zip(matrices, loads, strict=True)
+            0.0
+            if fine and all(balanced(w, load, low, high)[1] < _BALANCED for load in some)
+            else -np.inf
+            for w, some, fine in zip(matrices, loads, sound, strict=True)
         ]
     )
 
