@@ -14,11 +14,12 @@ from queue import SimpleQueue
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seecr.chances import asked_chance, margins_with
+from seecr.chances import asked_chance, check_chance, margins_with
+from seecr.commands import Commands
 from seecr.counted import counted
 from seecr.equilibrium import solve
 from seecr.errors import InputError
-from seecr.experiment import effects_of
+from seecr.experiment import Experiment, effects_of
 from seecr.given import GivenRobot, robot_of
 from seecr.inverse import correct
 from seecr.model import GivenEffects, model_given
@@ -103,6 +104,22 @@ class Workspace(Result):
         return float(np.prod(steps))
 
     @property
+    def shares(self) -> Array:
+        """(nx, ny, nz) size of the grid's box that each pose stands for, [m^3], [m^2] or [m].
+
+        Half a cell at the ends of an axis: all of them together are the box between the ends.
+        """
+        along = []
+        for axis in self.axes:
+            step = np.abs(np.diff(axis))
+            along.append(0.5 * (np.r_[step, 0.0] + np.r_[0.0, step]) if len(step) else np.ones(1))
+        return np.asarray(np.einsum("i,j,k->ijk", *along))
+
+    def size(self, poses: NDArray[np.bool_]) -> float:
+        """Size of the part of the grid's box that some poses (nx, ny, nz) stand for."""
+        return float(self.shares[poses].sum())
+
+    @property
     def softest_at(self) -> tuple[int, ...] | None:
         """Where of the grid the elastic robot is softest of all poses that can be held."""
         stiffness = np.where(self.feasible & self.rests, self.stiffness, np.nan)
@@ -110,18 +127,17 @@ class Workspace(Result):
             return None
         return tuple(map(int, np.unravel_index(np.nanargmin(stiffness), stiffness.shape)))
 
-    def size_words(self, poses: int) -> str:
-        """The size of so many poses of the grid, for people."""
+    def size_words(self, poses: NDArray[np.bool_]) -> str:
+        """The size of some poses (nx, ny, nz) of the grid, for people."""
         along = sum(len(axis) > 1 for axis in self.axes)
         unit = {1: " m", 2: " m^2", 3: " m^3"}.get(along)
-        return "" if unit is None else f", {poses * self.cell:.4g}{unit}"
+        return "" if unit is None else f", {self.size(poses):.4g}{unit}"
 
     def lines(self) -> list[str]:
         """How much of the grid can be held, and how far off the elastic robot is there."""
         n, held = self.margin.size, int(self.feasible.sum())
-        out = [
-            f"{self.robot.name}: {held} of {counted(n, 'pose')} can be held{self.size_words(held)}"
-        ]
+        size = self.size_words(self.feasible)
+        out = [f"{self.robot.name}: {held} of {counted(n, 'pose')} can be held{size}"]
         half = float(np.median(self.margin[self.feasible])) if held else 0.0
         if half == np.inf:
             out.append("at half of them or more all cables can be tightened without end")
@@ -172,8 +188,8 @@ class Workspace(Result):
         """
         likely = None
         if at_least is not None:
-            poses = int(self.likely(at_least).sum())
-            likely = {"at_least": at_least, "poses": poses, "size": poses * self.cell}
+            some = self.likely(at_least)
+            likely = {"at_least": at_least, "poses": int(some.sum()), "size": self.size(some)}
         where = self.rests & self.feasible
         worst = {
             "deviation_m": np.linalg.norm(self.deviation[where], axis=-1),
@@ -187,7 +203,7 @@ class Workspace(Result):
             "poses": self.margin.size,
             "feasible": int(self.feasible.sum()),
             "cell": self.cell,
-            "size_feasible": float(self.feasible.sum() * self.cell),
+            "size_feasible": self.size(self.feasible),
             "likely": likely,
             "rests": int(self.rests.sum()),
             "slack": {k: int(np.sum(counts == k)) for k in np.unique(counts)},
@@ -243,7 +259,8 @@ def workspace_map(
         orientation: (4,) quaternion of all poses; that of the reference pose by default.
         lowest, highest: (m,) or one [N], limits of the tensions for what can be held.
         wrenches: (k, 6) set of external wrenches that it must be held under, each of them.
-        effects: of the robot, besides; none may have a memory of rows before. With a model that
+        effects: of the robot, besides; where the elastic robot is solved none may have a memory of
+            rows before, since poses of a grid are in no order. With a model that
             keeps its covariance, and as many cables as freedoms, each pose has its ``chance`` too,
             if asked for.
         elastic: whether to solve where the elastic robot comes to rest.
@@ -252,12 +269,16 @@ def workspace_map(
         progress: called as poses are done.
 
     Raises:
-        InputError: an axis without values, an orientation that the joints do not allow; a chance
-            asked of something without a covariance.
+        InputError: an axis without values, an orientation that the joints do not allow; effects
+            with a memory; a chance asked of something without a covariance.
     """
     robot = robot_of(robot)
     effects = _read_once(effects, robot)
     axes = (_axis("x", x), _axis("y", y), _axis("z", z))
+    if chance:
+        check_chance(robot, effects)
+    if elastic or robot.n_cables < robot.n_dof:
+        _refuse_memory(robot, effects)
     turned = robot.reference_pose[3:] if orientation is None else finite(orientation, "orientation")
     shape = (len(axes[0]), len(axes[1]), len(axes[2]))
     n = int(np.prod(shape))
@@ -294,6 +315,18 @@ def workspace_map(
 def _read_once(effects: GivenEffects, robot: Robot) -> GivenEffects:
     """The same, a model read from its file: the parts of a map all ask for it."""
     return model_given(effects, robot) if isinstance(effects, str | Path) else effects
+
+
+def _refuse_memory(robot: Robot, effects: GivenEffects) -> None:
+    """Refuse what would go along the grid from pose to pose, and come out by the grid's order."""
+    home = Commands(robot.reference_pose[None])
+    acting = effects_of(effects, robot)
+    if Experiment(robot, home).setup(acting).has_history:
+        names = [one.name for one in acting if Experiment(robot, home).setup([one]).has_history]
+        raise InputError(
+            f"a map's poses are in no order, and {', '.join(names)} would go by the rows before; "
+            "expected a model without them, or for what can be held alone no elastic map"
+        )
 
 
 def _run_telling(

@@ -187,9 +187,9 @@ def map_figure(path: Path, found: Workspace, most: int = 4) -> None:
     unit, per_metre = ("m", 1.0) if metres else ("mm", 1e3)
     extents = per_metre * found.axes[wide], per_metre * found.axes[high]
     with figure(path, len(panels), len(picked), sharex=True, sharey=True, figsize=size) as axes:
+        number = np.arange(found.margin.size).reshape(lengths)
+        slices = [np.take(number, k, across) for k in picked]
         for row, panel in zip(axes, panels, strict=True):
-            number = np.arange(found.margin.size).reshape(lengths)
-            slices = [np.take(number, k, across) for k in picked]
             shown = panel(found, row, *extents, slices)
             row[0].figure.colorbar(shown, ax=list(row), **_bar_of(panel, found))
             row[0].set_ylabel(f"{'xyz'[high]} [{unit}]")
@@ -197,7 +197,7 @@ def map_figure(path: Path, found: Workspace, most: int = 4) -> None:
             ax.set_title(f"{'xyz'[across]} = {per_metre * found.axes[across][k]:.4g} {unit}")
         for ax in axes[-1]:
             ax.set_xlabel(f"{'xyz'[wide]} [{unit}]")
-        if len(panels) > 1:
+        if len(panels) > 1 and any(_has_edge(inside) for inside in _inside(found, slices)):
             words = "orange: the edge of what tensions within the limits can hold"
             words = textwrap.fill(words, int(_LETTERS * size[0]))
             axes[0, 0].figure.suptitle(words, fontsize=9)
@@ -266,13 +266,22 @@ def _colours(
 ) -> Any:  # fmt: skip
     """Coloured cells of each slice; with the workspace's boundary over them where it is given."""
     shown = None
+    inside = [] if found is None or slices is None else _inside(found, slices)
     for k, (ax, value) in enumerate(zip(row, values, strict=True)):
         shown = ax.pcolormesh(x, y, value.T, vmin=low, vmax=high, cmap=colours, shading="nearest")
-        if found is not None and slices is not None:
-            inside = np.where(found.feasible, np.maximum(found.margin, 0.0), found.margin)
-            inside = np.clip(inside.ravel()[slices[k]].T, -1e3, 1e3)
-            if inside.min() < 0.0 < inside.max():
-                ax.contour(x, y, inside, levels=[0.0], colors="#D55E00", linewidths=1.2)
+        if inside and _has_edge(inside[k]):
+            ax.contour(x, y, inside[k].T, levels=[0.0], colors="#D55E00", linewidths=1.2)
         ax.set_aspect("equal")
         ax.grid(False)
     return shown
+
+
+def _inside(found: Workspace, slices: Slices) -> list[Array]:
+    """Margins of each slice, as far as a line at zero between them takes them."""
+    inside = np.where(found.feasible, np.maximum(found.margin, 0.0), found.margin)
+    return [np.clip(inside.ravel()[one], -1e3, 1e3) for one in slices]
+
+
+def _has_edge(inside: Array) -> bool:
+    """Whether margins of a slice have an edge between them: of robots with few cables none has."""
+    return bool(inside.min() < 0.0 < inside.max())

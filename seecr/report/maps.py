@@ -19,10 +19,10 @@ __all__ = ["likely_lines", "softest_line", "write_arrays"]
 def likely_lines(found: Workspace, at_least: float | None) -> Iterator[str]:
     """How much of the grid can be held with a probability of at least that."""
     if at_least is not None:
-        poses = int(found.likely(at_least).sum())
+        likely = found.likely(at_least)
         yield (
-            f"with a probability of {at_least:g} or more {counted(poses, 'pose')} can be held"
-            f"{found.size_words(poses)}"
+            f"with a probability of {at_least:g} or more {counted(int(likely.sum()), 'pose')} can "
+            f"be held{found.size_words(likely)}"
         )
 
 

@@ -120,8 +120,8 @@ def test_a_map_has_the_probabilities_of_its_poses(tmp_path: Path) -> None:
     assert 0 < sure < int(found.likely(0.05).sum())
     (line,) = likely_lines(found, 0.95)
     expected_line = f"with a probability of 0.95 or more {sure} poses can be held, "
-    assert line == f"{expected_line}{0.02 * sure:.4g} m"
-    assert found.as_json(0.95)["likely"]["size"] == pytest.approx(0.02 * sure)
+    assert line == f"{expected_line}{0.02 * (sure - 0.5):.4g} m"
+    assert found.as_json(0.95)["likely"]["size"] == pytest.approx(0.02 * (sure - 0.5))
     write_arrays(tmp_path / "map.npz", found)
     with np.load(tmp_path / "map.npz") as kept:
         np.testing.assert_array_equal(kept["probability"], found.chance)
@@ -159,3 +159,40 @@ def test_maps_that_can_have_no_probabilities_are_refused(tmp_path: Path) -> None
     two = load_robot(model_path("planar_two_cable"))
     with pytest.raises(InputError, match="fewer cables than freedoms: it holds no poses"):
         held_chance(two, two.reference_pose, model_of(tmp_path, MODEL + KEPT))
+
+
+def test_no_value_is_drawn_beyond_its_bounds(tmp_path: Path) -> None:
+    """Half of the draws of a wheel at zero would have a negative radius, which no cable runs on."""
+    beside = """[[effect]]
+name = "pulley_radius"
+[effect.parameters]
+radius_m = { value = 0.0, stderr = 0.01 }
+[[effect]]
+name = "frame_compliance"
+[effect.parameters]
+sideways_m_per_N = { value = 0.0, stderr = 1e-3 }
+upwards_m_per_N = { value = 0.0, stderr = 1e-3 }
+"""
+    keys = [f"{e}.{k}" for e, k in model_of(tmp_path, MODEL + beside).terms.labels]
+    rows = [[0.0] * k + [1.0] for k in range(len(keys))]
+    kept = f"[calibration]\nparameters = {keys}\ncorrelation = {rows}\n".replace("'", '"')
+    model = model_of(tmp_path, MODEL + beside + kept)
+    said = held_chance(ROBOT, POSES, model, lowest=0.02)
+    assert said is not None and np.all((said >= 0.0) & (said <= 1.0))
+    found = correct(ROBOT, POSES, effects=model)
+    assert np.isfinite(kept_chance(ROBOT, found.commands, model)).all()
+    # out of all reach no pose is held by any of them
+    far = POSES + np.array([9.0, 0, 0, 0, 0, 0, 0])
+    np.testing.assert_array_equal(held_chance(ROBOT, far, model, lowest=0.02), 0.0)
+
+
+def test_what_can_have_no_probabilities_is_refused_before_the_map(tmp_path: Path) -> None:
+    def told(_done: int) -> None:
+        raise AssertionError("a part was mapped")
+
+    two = load_robot(model_path("planar_two_cable"))
+    with pytest.raises(InputError, match="fewer cables than freedoms"):
+        workspace_map(two, *[np.linspace(0.0, 0.1, 9)] * 3, chance=True, progress=told)
+    with pytest.raises(InputError, match="keeps its covariance"):
+        workspace_map(ROBOT, 0.3, 0.2, 0.1, effects=model_of(tmp_path, MODEL), chance=True,
+                      progress=told)  # fmt: skip

@@ -15,7 +15,8 @@ from random_robots import random_poses, random_robot
 from scipy.optimize import linprog
 from unbalanced import unbalanced
 
-from seecr import maps, threads
+from seecr import maps, threads, workspace
+from seecr.effects import Term
 from seecr.equilibrium import solve
 from seecr.errors import InputError
 from seecr.maps import boundary, default_axes, workspace_map
@@ -259,3 +260,49 @@ def test_the_default_grid_lies_between_the_exit_points() -> None:
     x, y, z = default_axes(robot_named("demobot_cogiro"), 3)
     np.testing.assert_allclose([x[0], x[-1], y[0], y[-1], z[-1]], [0.04, 0.76, 0.04, 0.46, 0.485])
     assert [len(axis) for axis in default_axes(robot_named("planar_vertical"), 3)] == [3, 1, 3]
+
+
+def test_all_of_a_grid_is_as_large_as_its_box() -> None:
+    robot = robot_named("demobot_cogiro")
+    axes = np.linspace(0.1, 0.7, 7), np.array([0.1, 0.2, 0.4]), np.linspace(0.05, 0.25, 2)
+    found = workspace_map(robot, *axes, elastic=False)
+    everywhere = np.ones(found.margin.shape, dtype=bool)
+    assert found.size(everywhere) == pytest.approx(0.6 * 0.3 * 0.2)
+    line = workspace_map(robot, np.linspace(0.3, 0.55, 5), 0.25, 0.1, elastic=False)
+    assert line.feasible.all()
+    assert "5 of 5 poses can be held, 0.25 m" in str(line)
+    assert line.as_json()["size_feasible"] == pytest.approx(0.25)
+
+
+def test_the_size_of_a_ball_is_that_of_a_ball() -> None:
+    """Cut by the grid's end through its middle, too: half of it is left."""
+    robot = robot_named("demobot_cogiro")
+    for first, part in ((-1.2, 1.0), (0.0, 0.5)):
+        axes = np.linspace(first, 1.2, 61), np.linspace(-1.2, 1.2, 61), np.linspace(-1.2, 1.2, 61)
+        x, y, z = np.meshgrid(*axes, indexing="ij")
+        found = workspace_map(robot, 0.4, 0.25, 0.1, elastic=False)
+        ball = replace(found, axes=axes, margin=1.0 - np.sqrt(x**2 + y**2 + z**2))
+        assert ball.size(ball.feasible) == pytest.approx(part * 4.0 / 3.0 * np.pi, rel=0.01)
+
+
+def test_effects_with_a_memory_have_no_elastic_map() -> None:
+    robot = robot_named("demobot_cogiro")
+    slow = [Term.of(robot, "hysteresis", amplitude_N=0.05)]
+    with pytest.raises(InputError, match="poses are in no order, and hysteresis would go by"):
+        workspace_map(robot, [0.3, 0.4], 0.25, 0.1, effects=slow)
+    held = workspace_map(robot, [0.3, 0.4], 0.25, 0.1, effects=slow, elastic=False)
+    assert held.feasible.all()
+
+
+def test_maps_are_where_workspaces_are() -> None:
+    assert workspace.workspace_map is workspace_map and workspace.boundary is boundary
+
+
+def test_a_figure_promises_an_edge_only_where_it_draws_one(tmp_path: Path) -> None:
+    robot = robot_named("demobot_cogiro")
+    found = workspace_map(robot, np.linspace(0.3, 0.5, 3), np.linspace(0.2, 0.3, 3), 0.1)
+    margin = np.linspace(-1.0, 1.0, 9).reshape(3, 3, 1)
+    for name, margins in (("edge", margin), ("few", np.where(margin < 0.0, -np.inf, 0.0))):
+        path = tmp_path / f"{name}.svg"
+        map_figure(path, replace(found, margin=margins))
+        assert ("orange" in path.read_text()) == (name == "edge")
