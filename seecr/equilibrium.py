@@ -93,10 +93,15 @@ def solve(
 
     setup = setup_of(commands, pushed)
     if setup.has_history or setup.laws:
-        if method != "newton" or start is not None or wrench is not None or others or follow:
+        if follow:
+            raise InputError(
+                "effects with a memory or with a law of their own are solved along the way anyhow; "
+                "expected no follow beside them"
+            )
+        if method != "newton" or start is not None or wrench is not None or others:
             raise InputError(
                 "effects with history or with a law of their own are solved along the way; "
-                "expected no other method, no start, no others, no follow, and external_wrench "
+                "expected no other method, no start, no others, and external_wrench "
                 "among the effects instead of wrench"
             )
         found = Experiment(robot, commands).predict(acting).solution()

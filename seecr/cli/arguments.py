@@ -121,7 +121,7 @@ def robot_at(given: Path, cable: str | None = None) -> Robot:
         ea = CABLES[cable] if cable in CABLES else float(cable)
     except ValueError:
         ea = -1.0
-    if not _LEAST_EA < ea < _MOST_EA:
+    if not _LEAST_EA <= ea <= _MOST_EA:
         raise InputError(
             f"--cable: expected {', '.join(CABLES)} or k_c from {_LEAST_EA:g} to {_MOST_EA:g} N, "
             f"got {cable!r}"

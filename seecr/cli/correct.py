@@ -62,7 +62,7 @@ def command(
 
     Writes corrected.csv and corrected.toml, which every command reads as commands, and
     correction.json. Poses without any answer are left out of corrected.csv; poses are told by
-    their line in POSES.csv.
+    their line in POSES.csv. Where none has one, correction.json, which says why, is all.
 
     \b
     Exit status: 0 all poses reached or replaced by the nearest, 2 bad input,
@@ -83,7 +83,8 @@ def command(
             "cmd_z_m: lengths are what correct finds",
         )
     limits = float("inf") if highest is None else highest
-    with staged(out) as folder:
+    commands_of_it = ("corrected.csv", "corrected.toml")
+    with staged(out, sometimes=commands_of_it) as folder:
         found = correct(
             machine, wanted.commands, effects=own or (), lowest=lowest, highest=limits, aim=aim,
             prefer=prefer,
@@ -96,11 +97,10 @@ def command(
         document = {
             "made": made, "exit_status": status, "notes": notes, **found.as_json(kept)
         }  # fmt: skip
-        files = {
-            "corrected.csv": corrected_csv(found, wanted),
-            "corrected.toml": corrected_toml(wanted),
-            "correction.json": json_text(document) + "\n",
-        }
+        files = {"correction.json": json_text(document) + "\n"}
+        if found.found.any():  # a list without commands is none that anything reads
+            texts = corrected_csv(found, wanted), corrected_toml(wanted)
+            files |= dict(zip(commands_of_it, texts, strict=True))
         write_texts({folder / name: text for name, text in files.items()})
     if as_json:
         click.echo(json_text(document))

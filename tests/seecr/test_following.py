@@ -119,5 +119,5 @@ def test_what_does_not_go_with_following_is_refused() -> None:
     with pytest.raises(InputError, match="expected no other method and no start"):
         solve(robot, robot.reference_pose, follow=True, method="fsolve")
     friction = [Term.of(robot, "hysteresis", amplitude_N=0.1)]
-    with pytest.raises(InputError, match="no others, no follow"):
+    with pytest.raises(InputError, match="expected no follow beside them"):
         solve(robot, robot.reference_pose, follow=True, effects=friction)

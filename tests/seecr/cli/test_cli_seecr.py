@@ -12,6 +12,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from seecr.cli import COMMANDS, main
+from seecr.cli.arguments import robot_at
 from seecr.mjcf import load_robot
 from seecr.shipped import model_path
 
@@ -179,3 +180,23 @@ def test_map_writes_its_files_or_says_why_not(tmp_path: Path) -> None:
     lost = run("map", "demobot_cogiro", *grid, "--lowest", "90", "--out", tmp_path / "lost")
     assert lost.exit_code == 2 and not (tmp_path / "lost").exists()
     assert "no pose of the grid can be held: no tensions from 90 to inf N" in lost.stderr
+
+
+def test_a_correction_without_answers_leaves_no_list_of_commands(tmp_path: Path) -> None:
+    poses, out = tmp_path / "poses.csv", tmp_path / "out"
+    poses.write_text("cmd_x_m,cmd_y_m,cmd_z_m\n0.4,0.25,0.1\n")
+    args = ["correct", "demobot_cogiro", poses, "--out", out]
+    assert run(*args).exit_code == 0
+    assert {file.name for file in out.iterdir()} == {
+        "corrected.csv", "corrected.toml", "correction.json"
+    }  # fmt: skip
+    # the older list is none of this result
+    assert run(*args, "--highest", "0.01").exit_code == 3
+    assert {file.name for file in out.iterdir()} == {"correction.json"}
+    (row,) = json.loads((out / "correction.json").read_text())["rows"]
+    assert "more than 0.01 N" in row["why_not"]
+
+
+@pytest.mark.parametrize("cable", ["0.001", "1e12"])
+def test_the_ends_of_what_a_cable_may_have_are_in(cable: str) -> None:
+    assert robot_at(Path("demobot_cogiro"), cable).ea[0] == float(cable)
