@@ -2,10 +2,12 @@
 
     python scripts/score_corrections.py --seeds 1 2      some
     python scripts/score_corrections.py                  those of the README, a few minutes
+    python scripts/score_corrections.py --calibrated     with models of crosscheck calibrate
 
 Each twin of Cogiro hides what its seed draws; the diagnosis knows its measurements alone. The
 paper's sweeps at both heights are then commanded as they are, and corrected for what was found;
-MuJoCo, with what is hidden, says where the platform comes to rest.
+MuJoCo, with what is hidden, says where the platform comes to rest. A calibrated model shares errors
+between robot and tracker: corrected are the platform's poses in the base frame, and what is read.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ import argparse
 
 import numpy as np
 
+from crosscheck.calibration.result import calibrate
 from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.suite.poses import demobot_sweep
 from crosscheck.twin.make import make_twin
@@ -21,6 +24,7 @@ from crosscheck.twin.measure import measure
 from seecr.commands import Commands
 from seecr.inverse import correct
 from seecr.pose import Array
+from seecr.sensed import placed
 from seecr.shipped import model_path
 
 ROBOT = "demobot_cogiro"
@@ -54,11 +58,42 @@ def score(seed: int) -> str:
     )
 
 
+def score_calibrated(seed: int) -> str:
+    """The same with a calibrated model, of what is and of what is read, both ways of aiming."""
+    path = model_path(ROBOT)
+    twin = make_twin(path, seed)
+    terms = calibrate(path, twin.measured).terms
+    poses = np.concatenate([demobot_sweep(z, POSES) for z in (0.1, 0.2)])
+    n = len(poses)
+    told = Commands(poses, time=SECONDS * np.arange(n), temperature=np.full(n, WARMTH))
+    based = correct(twin.robot, told, effects=terms)
+    aimed = correct(twin.robot, placed(twin.robot, told, terms), effects=terms)
+    both = based.reached & aimed.reached
+    hidden = [term.effect() for term in twin.hidden]
+
+    def rms(commands: Commands) -> Array:
+        found = measure(twin.robot, commands, hidden)
+        away = [(at - poses[:, :3])[both] for at in (found.pose[:, :3], found.position)]
+        return np.array([1e3 * np.sqrt(np.mean(np.sum(one**2, axis=1))) for one in away])
+
+    names, before = " ".join(sorted(term.name for term in twin.hidden)), rms(told)
+    words = [f"seed {seed}: hidden {names or '-'}; {int(both.sum())} of {n} reached"]
+    for name, found in (("in the base frame", based), ("as read", aimed)):
+        after = rms(found.commands)
+        words += [
+            f"corrected {name}: {what} {old:.4f} mm, then {new:.4f} mm, factor {old / new:.1f}"
+            for what, old, new in zip(("is", "read"), before, after, strict=True)
+        ]
+    return "; ".join(words)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, nargs="*", default=list(SEEDS))
-    for seed in parser.parse_args().seeds:
-        print(score(seed), flush=True)
+    parser.add_argument("--calibrated", action="store_true")
+    given = parser.parse_args()
+    for seed in given.seeds:
+        print((score_calibrated if given.calibrated else score)(seed), flush=True)
 
 
 if __name__ == "__main__":

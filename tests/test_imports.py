@@ -31,7 +31,7 @@ FLOORS = {
     "seecr.experiment": 8, "seecr.uncertainty": 10, "seecr.search": 8, "seecr.equilibrium": 10,
     "seecr.planar": 9, "seecr.workspace": 9,
     "seecr.sensitivity": 9, "seecr.parted": 10, "seecr.command_file": 5, "seecr.distribution": 7,
-    "seecr.told": 9, "seecr.hanging": 6,
+    "seecr.told": 9, "seecr.sensed": 9, "seecr.hanging": 6,
     "seecr.balance": 7, "seecr.inside": 8, "seecr.holding": 9,
     "seecr.nearest": 8, "seecr.unheld": 8, "seecr.inverse": 10,
     "seecr.chances": 11, "seecr.maps": 12,

@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from seecr.cli.arguments import NumbersCommand, limit_options, model_at, robot_at, robot_options
 from seecr.cli.following import following, given_with
 from seecr.cli.options import FILE, json_option, made_by, out_option
+
+if TYPE_CHECKING:
+    from seecr import Model, Robot
+    from seecr.command_file import CommandFile
+
+# A tracker that reads poses off by less [m] is not worth a line.
+_SEEN = 1e-6
 
 
 @click.command(
@@ -38,6 +47,11 @@ Examples:
     show_default=True,
     help="What to keep of a pose that cannot be held.",
 )
+@click.option(
+    "--as-read",
+    is_flag=True,
+    help="The poses are what the model's tracker is to read, not the platform in the base frame.",
+)
 @out_option("seecr-correction")
 @json_option
 def command(
@@ -49,6 +63,7 @@ def command(
     highest: float | None,
     aim: str,
     prefer: str,
+    as_read: bool,
     out: Path,
     as_json: bool,
 ) -> int:
@@ -59,6 +74,10 @@ def command(
     the limits. A pose that cannot be held is replaced by the nearest one that can, and it is told
     which cables would have to push, or pull more than they may. Where the model keeps a covariance,
     correction.json says of each row how likely its tensions stay within the limits.
+
+    Poses are those of the platform in the base frame. A calibration shares errors between robot and
+    tracker as it best can; what is sure is what the tracker will read. With --as-read the platform
+    is brought to where the model's tracker reads the poses of the file.
 
     Writes corrected.csv and corrected.toml, which every command reads as commands, and
     correction.json. Poses without any answer are left out of corrected.csv; poses are told by
@@ -82,6 +101,7 @@ def command(
             "holds rest lengths; expected the poses that are wanted, such as cmd_x_m cmd_y_m "
             "cmd_z_m: lengths are what correct finds",
         )
+    wanted, tracker = _as_tracked(machine, wanted, own, as_read)
     limits = float("inf") if highest is None else highest
     commands_of_it = ("corrected.csv", "corrected.toml")
     with staged(out, sometimes=commands_of_it) as folder:
@@ -92,7 +112,7 @@ def command(
         within = {"lowest": lowest, "highest": limits}
         kept = None if own is None else kept_chance(machine, found.commands, own, **within)
         status = 0 if found.stays.all() else 3
-        notes = [*(own.notes if own else ()), *wanted.notes]
+        notes = [*(own.notes if own else ()), *wanted.notes, *tracker]
         made = made_by(machine.source, poses, model)
         document = {
             "made": made, "exit_status": status, "notes": notes, **found.as_json(kept)
@@ -112,3 +132,34 @@ def command(
     for line in [*notes, *found.lines(), *chance_lines(found, kept), f"Results in {out}/", then]:
         click.echo(line)
     return status
+
+
+def _as_tracked(
+    robot: Robot, wanted: CommandFile, model: Model | None, as_read: bool
+) -> tuple[CommandFile, list[str]]:
+    """Where the platform is to come to, and what the model's tracker has to do with it."""
+    import numpy as np
+
+    from seecr import InputError
+    from seecr.sensed import placed, tracked
+
+    if model is None:
+        if as_read:
+            raise InputError("--as-read needs what the tracker reads; expected --model M.toml")
+        return wanted, []
+    commands = wanted.commands
+    if as_read:
+        at = placed(robot, commands, model)
+        away = np.linalg.norm(at.pose[:, :3] - commands.pose[:, :3], axis=1).max()
+        return replace(wanted, commands=at), [
+            f"as read: the platform is brought to up to {1e3 * away:.3g} mm beside the poses "
+            "wanted, where the model's tracker reads them; want_* are those places"
+        ]
+    read = tracked(robot, commands, model)
+    away = np.linalg.norm(read[:, :3] - commands.pose[:, :3], axis=1).max()
+    if away <= _SEEN:
+        return wanted, []
+    return wanted, [
+        f"the model's tracker reads these poses up to {1e3 * away:.3g} mm off: the platform is "
+        "brought to them in the base frame; --as-read brings the readings to them"
+    ]
