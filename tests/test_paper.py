@@ -93,6 +93,21 @@ def test_what_would_explain_figure_12() -> None:
         assert "| " + " | ".join(one.row()) + " |" in page
 
 
+def test_placing_each_run_by_hand_does_not_take_the_tilt_away() -> None:
+    runs, alone = explain_figure_12.RUNS, ("initial_pose_error",)
+    for words in ("both ends, z 0.1 m", "both ends, z 0.2 m"):
+        one = explain_figure_12.explain(alone, runs[words])
+        assert not one.explains and one.numbers[1] < -10
+        assert one.numbers[0] > explain_figure_12.numbers([], runs[words])[0]
+    far, near = (
+        explain_figure_12.explain(alone, runs[f"left end, z {z} m"]) for z in ("0.1", "0.2")
+    )
+    assert near.explains and near.size < 1.5 and not far.explains and far.size > 3.0
+    page = make_paper.PAGE.read_text(encoding="utf-8")
+    for row in explain_figure_12.placed():
+        assert "| " + " | ".join(row) + " |" in page
+
+
 def test_a_size_that_is_no_use_stays_at_nothing() -> None:
     assert explain_figure_12.explain(("gravity_tilt",)).size == 0.0
 
