@@ -10,7 +10,7 @@ import click
 
 from seecr.cli.arguments import NumbersCommand, limit_options, model_at, robot_at, robot_options
 from seecr.cli.following import following, given_with
-from seecr.cli.options import FILE, json_option, made_by, out_option
+from seecr.cli.options import FILE, json_option, made_by, out_option, progress_share
 
 if TYPE_CHECKING:
     from seecr import Model, Robot
@@ -105,12 +105,16 @@ def command(
     limits = float("inf") if highest is None else highest
     commands_of_it = ("corrected.csv", "corrected.toml")
     with staged(out, sometimes=commands_of_it) as folder:
-        found = correct(
-            machine, wanted.commands, effects=own or (), lowest=lowest, highest=limits, aim=aim,
-            prefer=prefer,
-        )  # fmt: skip
-        within = {"lowest": lowest, "highest": limits}
-        kept = None if own is None else kept_chance(machine, found.commands, own, **within)
+        with progress_share("correcting") as tell:
+            found = correct(
+                machine, wanted.commands, effects=own or (), lowest=lowest, highest=limits,
+                aim=aim, prefer=prefer,
+            )  # fmt: skip
+            within = {"lowest": lowest, "highest": limits}
+            if own is not None:
+                tell("chances", 0.8)
+            kept = None if own is None else kept_chance(machine, found.commands, own, **within)
+            tell("corrected", 1.0)
         status = 0 if found.stays.all() else 3
         notes = [*(own.notes if own else ()), *wanted.notes, *tracker]
         made = made_by(machine.source, poses, model)

@@ -29,6 +29,7 @@ Examples:
 @robot_options
 @click.argument("out", type=FILE, metavar="OUT.xml")
 @click.argument("coordinates", nargs=-1, type=float, metavar="[X Y Z [QW QX QY QZ]]")
+@click.option("--out", "folder", type=FILE, metavar="DIR", help="Write OUT.xml into this folder.")
 @json_option
 def command(
     robot: Path,
@@ -36,6 +37,7 @@ def command(
     coordinates: tuple[float, ...],
     cable: str | None,
     model: Path | None,
+    folder: Path | None,
     as_json: bool,
 ) -> int:
     """Write a robot with the effects of its model as MJCF, as far as MJCF can say them.
@@ -52,10 +54,13 @@ def command(
     from seecr.files import json_text, write_texts
 
     machine = robot_at(robot, cable)
+    out = out if folder is None else folder / out
     if out.suffix.lower() not in (".xml", ".mjcf"):
         raise InputError(f"{out}: expected the name of an MJCF file to write, such as out.xml")
     if out.exists() and machine.source is not None and out.samefile(machine.source):
         raise InputError(f"{out}: is the robot itself; expected another file to write")
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
     own = model_at(model, machine)
     found = export(machine, own or (), pose_of(coordinates, machine) if coordinates else None)
     beside = out.with_name(f"{out.stem}-mujoco{out.suffix}")

@@ -9,7 +9,7 @@ import click
 
 from seecr.cli.arguments import NumbersCommand, model_at, pose_of, robot_at, robot_options
 from seecr.cli.following import after_pose, given_with
-from seecr.cli.options import FILE, json_option, made_by
+from seecr.cli.options import FILE, json_option, made_by, progress_share
 
 if TYPE_CHECKING:
     from seecr import Barrier
@@ -64,14 +64,18 @@ def command(
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
     command = pose_of(coordinates, machine)
-    solution = solve(machine, command, effects=own or ())
-    # effects with a memory lead to one rest alone, along their way
-    memory = own is not None and predict(machine, command, own).has_history
-    others = None if alone or memory else equilibria(machine, command, effects=own or ())
-    passes: tuple[Barrier, ...] = ()
-    if others is not None and solution.converged[0]:
-        passes = barriers(solution, others.rows(elsewhere(solution, others)))
-    spread = None if own is None else spread_of(machine, command, own)
+    with progress_share("solving") as tell:
+        solution = solve(machine, command, effects=own or ())
+        # effects with a memory lead to one rest alone, along their way
+        memory = own is not None and predict(machine, command, own).has_history
+        tell("other equilibria", 0.1)
+        others = None if alone or memory else equilibria(machine, command, effects=own or ())
+        tell("barriers", 0.6)
+        passes: tuple[Barrier, ...] = ()
+        if others is not None and solution.converged[0]:
+            passes = barriers(solution, others.rows(elsewhere(solution, others)))
+        spread = None if own is None else spread_of(machine, command, own)
+        tell("solved", 1.0)
     status = 0 if at_rest(solution) else 3
     notes = list(own.notes) if own else []
     document = {

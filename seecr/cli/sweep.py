@@ -19,7 +19,7 @@ from seecr.cli.arguments import (
     turned_option,
 )
 from seecr.cli.following import after_sweep, given_with
-from seecr.cli.options import FILE, json_option, made_by, out_option
+from seecr.cli.options import FILE, json_option, made_by, out_option, progress_bar
 
 if TYPE_CHECKING:
     import numpy as np
@@ -100,8 +100,12 @@ def command(
     own = model_at(model, machine)
     commands, more, said = _commands(machine, poses, given)
     with staged(out, sometimes=files_of_pictures("sweep")) as folder:
-        solution = solve(machine, commands, effects=own or (), follow=follow)
-        spread = None if own is None else spread_of(machine, commands, own)
+        with progress_bar("solving", len(commands)) as tell:
+            solution = solve(machine, commands, effects=own or (), follow=follow)
+            if own is not None:
+                tell(0, "errors")
+            spread = None if own is None else spread_of(machine, commands, own)
+            tell(len(commands), "solved")
         commanded = commands.lengths is None
         rows = SweepRows(solution, commands.lengths, more, spread)
         status = 0 if at_rest(solution) else 3

@@ -112,6 +112,15 @@ def mirrored(points: np.ndarray, axis: int, middle: float) -> set[tuple[float, .
     return {tuple(p) for p in image.round(9)}
 
 
+def test_half_a_turn_takes_cogiro_to_itself() -> None:
+    """Which gives A4 from A8, whatever the mirror images say: cable i to cable i + 4."""
+    robot = load_robot(model_path("demobot_cogiro"))
+    turned = robot.exit_points * [-1, -1, 1] + [0.8, 0.5, 0.0]
+    np.testing.assert_allclose(np.roll(turned, 4, axis=0), robot.exit_points, atol=1e-12)
+    anchors = robot.anchor_points * [-1, -1, 1]
+    np.testing.assert_allclose(np.roll(anchors, 4, axis=0), robot.anchor_points, atol=1e-12)
+
+
 def test_cogiro_a4_is_corrected_to_the_mirror_image_of_a1() -> None:
     printed, _ = table_ii("demobot_cogiro", corrected=False)
     assert np.array_equal(printed[3], printed[0])  # two cables from one hole

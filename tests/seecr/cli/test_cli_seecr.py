@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +28,32 @@ def run(*args: str | Path) -> Result:
 def unmade(document: dict[str, Any]) -> dict[str, Any]:
     """Without how it came about, which is the command's own."""
     return {key: value for key, value in document.items() if key != "made"}
+
+
+def test_export_writes_into_a_folder(tmp_path: Path) -> None:
+    got = run("export", "demobot_cogiro", "there.xml", "--out", tmp_path / "new")
+    assert got.exit_code == 0 and (tmp_path / "new" / "there.xml").exists(), got.output
+    assert f"seecr pose {tmp_path}/new/there.xml" in got.output
+
+
+@pytest.mark.parametrize("command", ["pose", "sweep", "correct"])
+def test_a_bar_is_told_what_is_done(command: str, tmp_path: Path, monkeypatch: Any) -> None:
+    """As that of maps, which tests of its own look at."""
+    said: list[tuple[str, int]] = []
+
+    @contextmanager
+    def bar(text: str, total: int) -> Iterator[Any]:
+        yield lambda steps, now: said.append((now, steps))
+
+    for module in ("seecr.cli.options", "seecr.cli.sweep"):
+        monkeypatch.setattr(f"{module}.progress_bar", bar)
+    poses = tmp_path / "poses.csv"
+    poses.write_text("cmd_x_m,cmd_y_m,cmd_z_m\n0.4,0.25,0.2\n0.45,0.25,0.2\n")
+    given = ("0.4", "0.25", "0.2") if command == "pose" else (poses, "--out", tmp_path / "out")
+    got = run(command, "demobot_cogiro", *given)
+    assert got.exit_code == 0, got.output
+    assert said[-1][0] in ("solved", "corrected")
+    assert sum(steps for _, steps in said) == (2 if command == "sweep" else 100)
 
 
 def test_every_command_has_help_with_examples() -> None:
