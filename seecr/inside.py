@@ -48,6 +48,8 @@ _LOOSEST = 12.0**-0.5
 _GAINED = 2.0
 # Rounds with cables that hang loosely, balance [of load] at the end, what tensions may be off.
 _NEWTON, _EXACT, _OFF = 30, 1e-12, 1e-9
+# Attempts with fewer and fewer of them.
+_AGAIN = 4
 
 
 @dataclass(eq=False)
@@ -222,30 +224,52 @@ def _loosen(
         loose: (k, m) cables that may, low, high: (k, m) [N] the tensions that are asked for.
     """
     weight = tables.cables[..., WEIGHT] * bridged_lengths(tables)
-    least = np.where(loose, _LOOSEST * weight, out.low[rows])
-    size, rest = np.where(loose, tightness(tables, out.rest[rows]), np.nan), out.rest[rows]
-    left, start = np.arange(len(rows)), here(tables)
+    least, first = np.where(loose, _LOOSEST * weight, out.low[rows]), out.rest[rows]
+    room, left = _OFF * tables.scale[:, None], np.arange(len(rows))
+    for _ in range(_AGAIN):
+        part = take(tables, left)
+        rest, tension, held = _hang(part, loose[left], least[left], high[left], first[left])
+        under = tension < low[left] - room[left]
+        fine = held & ~(under | (tension > high[left] + room[left])).any(axis=1)
+        to = rows[left[fine]]
+        out.margins[to], out.loose[to] = 0.0, True
+        out.rest[to], out.tensions[to] = rest[fine], tension[fine]
+        # once more, with those that pulled too little as tight as they have to be
+        under &= loose[left] & ~fine[:, None]
+        again = under.any(axis=1)
+        left, under = left[again], under[again]
+        if len(left) == 0:
+            return
+        loose[left] &= ~under
+        least[left] = np.where(under, low[left], least[left])
+
+
+def _hang(
+    tables: Tables, loose: NDArray[np.bool_], least: Array, high: Array, first: Array
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Newton's method for :func:`_loosen`, from rest lengths (n, m) [m].
+
+    Returns:
+        rest lengths, tensions (n, m) [N], and (n,) whether they are in balance.
+    """
+    size, rest = np.where(loose, tightness(tables, first), np.nan), first.copy()
+    left, start = np.arange(len(rest)), here(tables)
     for _ in range(_NEWTON):
         now = with_rest(take(tables, left), rest[left])
         at = statics.evaluate(now, statics.take_evaluation(start, left), threads=None)
         statics.put_evaluation(start, left, at)
         line = _line_about(now, at, size[left])
         upper = np.where(line.loose, line.value + high[left] - line.tension, high[left])
-        value, possible = distribute(
-            line.matrix, line.load, line.value, least[left], np.maximum(upper, least[left])
-        )
+        upper = np.maximum(upper, least[left])
+        value, possible = distribute(line.matrix, line.load, line.value, least[left], upper)
         longer = line.rest_for(value)
         go = possible & np.isfinite(longer).all(axis=1) & (at.residual > _EXACT)
         left = left[go]
         if len(left) == 0:
             break
         rest[left], size[left] = longer[go], np.where(line.loose, value, np.nan)[go]
-    tension, room = start.states[..., TENSION], _OFF * tables.scale[:, None]
-    fine = ((tension >= low - room) & (tension <= high + room)).all(axis=1)
-    fine &= (start.residual <= _EXACT) & np.all(~(size < least), axis=1)
-    to = rows[fine]
-    out.margins[to], out.loose[to] = 0.0, True
-    out.rest[to], out.tensions[to] = rest[fine], tension[fine]
+    held = (start.residual <= _EXACT) & np.all(~(size < least), axis=1)
+    return rest, start.states[..., TENSION], held
 
 
 def innermost(

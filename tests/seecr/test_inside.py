@@ -82,8 +82,19 @@ def test_maps_and_corrections_agree(low: float, high: float) -> None:
 
 
 def test_wider_limits_hold_what_narrower_do() -> None:
-    limits = [(30, 520), (20, 550), (10, 600), (8, 700), (5, 1000), (2, 1800), (0, np.inf)]
-    held = np.array([held_at(GRID, low, high) for low, high in limits])
+    limits = [
+        (30, 520),
+        (20, 550),
+        (10, 600),
+        (9, 650),
+        (8, 700),
+        (5, 1000),
+        (2, 1800),
+        (0, np.inf),
+    ]
+    # the last two were held with nine newtons at least and not with eight
+    poses = np.concatenate([GRID, level([(-7, 5, 0.3), (-6.3, 5, 0.8625)])])
+    held = np.array([held_at(poses, low, high) for low, high in limits])
     assert np.all(held[1:] >= held[:-1]) and np.all(np.diff(held.sum(axis=1)) >= 0)
     assert held[0].any() and held[-1].sum() > held[0].sum()
 
