@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 from made_data import SIGMA, case, refused, run
 
+from seecr.chances import held_chance
 from seecr.mjcf import load_robot
-from seecr.model import load_model
+from seecr.model import Model, load_model
+from seecr.robot import Robot
 
 HIDDEN = {
     "pulley_radius": {"radius_m": 0.006},
@@ -49,6 +51,7 @@ def test_all_at_once_the_error_falls_to_the_noise_and_the_model_can_be_used(
     again = run("compare", *many, "--model", model, "--no-recording", "--out", tmp_path / "cmp")
     assert again.exit_code == 0 and "what is left is noise" in again.stdout
     the_covariance_is_there(model)
+    how_likely_poses_are_held(load_robot(many[0]), known)
     # from its own model on there is nothing more to gain: nothing is lost either
     second = run("calibrate", *many, "--model", model, "--force", "--json")
     assert second.exit_code == 0
@@ -65,6 +68,15 @@ def the_covariance_is_there(model: Path) -> None:
     assert np.linalg.eigvalsh(whole).min() > -1e-4
     assert table["provenance"]["by"] == "crosscheck calibrate"
     assert table["after"]["position_rms_m"] < table["before"]["position_rms_m"]
+
+
+def how_likely_poses_are_held(robot: Robot, model: Model) -> None:
+    """Also where values, such as the frame's compliance, stand on their bounds."""
+    assert np.any(model.terms.vector <= model.terms.lower + 1e-9)
+    poses = np.tile(robot.reference_pose, (2, 1))
+    poses[1, 0] += 9.0
+    said = held_chance(robot, poses, model, lowest=0.02)
+    assert said is not None and said[0] > 0.9 and said[1] == 0.0
 
 
 @pytest.mark.slow
