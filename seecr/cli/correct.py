@@ -35,10 +35,10 @@ Examples:
 @limit_options
 @click.option(
     "--aim",
-    type=click.Choice(["minimum", "middle"]),
     default="minimum",
     show_default=True,
-    help="Where between the limits tensions should be.",
+    metavar="minimum|middle|N,N,...",
+    help="Where between the limits tensions should be, or tensions wanted, one a cable or for all.",
 )
 @click.option(
     "--prefer",
@@ -103,12 +103,13 @@ def command(
         )
     wanted, tracker = _as_tracked(machine, wanted, own, as_read)
     limits = float("inf") if highest is None else highest
+    near = _aim(aim)
     commands_of_it = ("corrected.csv", "corrected.toml")
     with staged(out, sometimes=commands_of_it) as folder:
         with progress_share("correcting") as tell:
             found = correct(
                 machine, wanted.commands, effects=own or (), lowest=lowest, highest=limits,
-                aim=aim, prefer=prefer,
+                aim=near, prefer=prefer,
             )  # fmt: skip
             within = {"lowest": lowest, "highest": limits}
             if own is not None:
@@ -136,6 +137,21 @@ def command(
     for line in [*notes, *found.lines(), *chance_lines(found, kept), f"Results in {out}/", then]:
         click.echo(line)
     return status
+
+
+def _aim(text: str) -> str | list[float] | float:
+    """The name of an aim, or tensions [N]."""
+    from seecr import InputError
+
+    if text in ("minimum", "middle"):
+        return text
+    try:
+        tensions = [float(part) for part in text.split(",")]
+    except ValueError:
+        raise InputError(
+            f"--aim {text}: expected minimum, middle, or tensions [N] such as 5 or 5,5,8,8"
+        ) from None
+    return tensions if len(tensions) > 1 else tensions[0]
 
 
 def _as_tracked(

@@ -56,6 +56,7 @@ def command(
         at_rest,
         cable_lines,
         elsewhere,
+        midline_lines,
         other_lines,
         pose_lines,
         softest_words,
@@ -100,6 +101,7 @@ def command(
     lines = [
         *pose_lines(solution, spread=spread),
         *cable_lines(solution, spread=spread),
+        *midline_lines(solution),
         *other_lines(solution, others, passes),
         after_pose(solution, robot, coordinates[3:], given_with(cable, model)),
     ]

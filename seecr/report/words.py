@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.passes import Barrier
-from seecr.pose import Array, pose_difference, rxyz_from_quat
+from seecr.planar import midline_point
+from seecr.pose import Array, pose_difference, rxyz_from_quat, transform_points
 from seecr.robot import Robot
 from seecr.solution import Solution, Status
 from seecr.uncertainty import Spread
@@ -20,6 +21,7 @@ __all__ = [
     "direction_words",
     "elsewhere",
     "jump_lines",
+    "midline_lines",
     "other_lines",
     "pose_lines",
     "softest_words",
@@ -167,6 +169,27 @@ def direction_words(robot: Robot, direction: Array) -> str:
             axes = [a for a, v in zip("xyz", part / size, strict=True) if abs(v) > 2 * _PART]
             words.append(f"{verb} {' and '.join(axes)}")
     return ", ".join(words)
+
+
+def midline_lines(solution: Solution, i: int = 0) -> Iterator[str]:
+    """Where the midlines of two pairs of parallel cables in a plane meet, the paper's V or H."""
+    robot = solution.robot
+    anchors = transform_points(
+        np.stack([robot.reference_pose, solution.pose[i]]), robot.anchor_points
+    )
+    points = np.concatenate([robot.exit_points, *anchors])
+    plane = np.flatnonzero(np.ptp(points, axis=0) > 1e-9 * robot.length)
+    if robot.n_cables != 4 or len(plane) != 2 or not np.isfinite(points).all():
+        return
+    ways = (anchors[0] - robot.exit_points)[:, plane]
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    if np.abs(ways[0::2] - ways[1::2]).max() > 1e-9:
+        return
+    where = " and ".join("xyz"[k] for k in plane)
+    met = midline_point(robot.exit_points[:, plane], anchors[1][:, plane])
+    place = " ".join(f"{1e3 * value:.2f}" for value in met)
+    if np.isfinite(met).all():
+        yield f"midlines of both pairs of cables meet at {where} {place} mm (the paper's V or H)"
 
 
 def elsewhere(solution: Solution, others: Solution, i: int = 0) -> NDArray[np.intp]:

@@ -15,7 +15,10 @@ from click.testing import CliRunner, Result
 
 from seecr.cli import COMMANDS, main
 from seecr.cli.arguments import robot_at
+from seecr.equilibrium import solve
 from seecr.mjcf import load_robot
+from seecr.planar import midline_point
+from seecr.pose import transform_points
 from seecr.shipped import model_path
 
 PLACE = ["0.17", "0.25", "0.1"]
@@ -28,6 +31,30 @@ def run(*args: str | Path) -> Result:
 def unmade(document: dict[str, Any]) -> dict[str, Any]:
     """Without how it came about, which is the command's own."""
     return {key: value for key, value in document.items() if key != "made"}
+
+
+@pytest.mark.parametrize("name", ["planar_vertical", "planar_horizontal"])
+def test_the_papers_points_are_printed(name: str) -> None:
+    got = run("pose", name, "--alone", *map(str, load_robot(model_path(name)).reference_pose[:3]))
+    (line,) = [x for x in got.output.splitlines() if x.startswith("midlines")]
+    found = solve(name, load_robot(model_path(name)).reference_pose)
+    ends = transform_points(found.pose, found.robot.anchor_points)[0]
+    point = 1e3 * midline_point(found.robot.exit_points[:, [0, 2]], ends[:, [0, 2]])
+    assert f"meet at x and z {point[0]:.2f} {point[1]:.2f} mm" in line
+    assert "midlines" not in run("pose", "planar_two_cable", "--alone", "0.4", "0", "0.2").output
+
+
+def test_wanted_tensions_are_an_aim(tmp_path: Path) -> None:
+    poses = tmp_path / "poses.csv"
+    place = load_robot(model_path("ipanema")).reference_pose[:3]
+    poses.write_text("cmd_x_m,cmd_y_m,cmd_z_m\n{},{},{}\n".format(*place))
+    args = ("correct", "ipanema", poses, "--lowest", "1", "--json", "--out", tmp_path / "out")
+    pulls = [
+        np.mean(json.loads(run(*args, "--aim", aim).stdout)["rows"][0]["tensions_N"])
+        for aim in ("minimum", "900", ",".join(8 * ["900"]))
+    ]
+    assert pulls[0] < 0.8 * pulls[1] and pulls[1] == pytest.approx(pulls[2])
+    assert "expected minimum, middle, or tensions" in run(*args, "--aim", "most").output
 
 
 def test_export_writes_into_a_folder(tmp_path: Path) -> None:
