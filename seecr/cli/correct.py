@@ -38,7 +38,7 @@ Examples:
     default="minimum",
     show_default=True,
     metavar="minimum|middle|N,N,...",
-    help="Where between the limits tensions should be, or tensions wanted, one a cable or for all.",
+    help="Where between the limits tensions should be, or tensions wanted: one, or one per cable.",
 )
 @click.option(
     "--prefer",

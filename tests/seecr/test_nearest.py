@@ -20,7 +20,12 @@ from seecr.workspace import balance_equations
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "kind"), [("cogiro_large", "far"), ("ipanema", "both"), ("demobot_parallel", "turned")]
+    ("name", "kind"),
+    [
+        ("cogiro_large", "far"),
+        pytest.param("ipanema", "both", marks=pytest.mark.sweep),
+        pytest.param("demobot_parallel", "turned", marks=pytest.mark.sweep),
+    ],
 )
 def test_no_answer_is_farther_than_brute_force_finds(name: str, kind: str) -> None:
     robot, limits = load_robot(model_path(name)), score_nearest.LIMITS[name]
