@@ -103,7 +103,7 @@ def command(
         )
     wanted, tracker = _as_tracked(machine, wanted, own, as_read)
     limits = float("inf") if highest is None else highest
-    near = _aim(aim)
+    near = _aim(aim, machine.n_cables)
     commands_of_it = ("corrected.csv", "corrected.toml")
     with staged(out, sometimes=commands_of_it) as folder:
         with progress_share("correcting") as tell:
@@ -139,8 +139,10 @@ def command(
     return status
 
 
-def _aim(text: str) -> str | list[float] | float:
+def _aim(text: str, cables: int) -> str | list[float] | float:
     """The name of an aim, or tensions [N]."""
+    from math import isfinite
+
     from seecr import InputError
 
     if text in ("minimum", "middle"):
@@ -148,9 +150,12 @@ def _aim(text: str) -> str | list[float] | float:
     try:
         tensions = [float(part) for part in text.split(",")]
     except ValueError:
+        tensions = []
+    if len(tensions) not in (1, cables) or not all(map(isfinite, tensions)):
         raise InputError(
-            f"--aim {text}: expected minimum, middle, or tensions [N] such as 5 or 5,5,8,8"
-        ) from None
+            f"--aim {text}: expected minimum, middle, or tensions [N]: one, or {cables} with "
+            "commas between, one per cable"
+        )
     return tensions if len(tensions) > 1 else tensions[0]
 
 

@@ -59,10 +59,10 @@ def command(
         raise InputError(f"{out}: expected the name of an MJCF file to write, such as out.xml")
     if out.exists() and machine.source is not None and out.samefile(machine.source):
         raise InputError(f"{out}: is the robot itself; expected another file to write")
-    if folder is not None:
-        folder.mkdir(parents=True, exist_ok=True)
     own = model_at(model, machine)
     found = export(machine, own or (), pose_of(coordinates, machine) if coordinates else None)
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
     beside = out.with_name(f"{out.stem}-mujoco{out.suffix}")
     files = {out: found.text} | ({beside: found.mujoco_text} if found.mujoco_text else {})
     write_texts(files, "cannot write the MJCF")

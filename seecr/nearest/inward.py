@@ -19,6 +19,8 @@ from seecr.pose import Array
 
 # Balance that an answer has [of load], and a step over the length that ends a search.
 TIGHT, ENOUGH = 1e-9, 1e-7
+# Balance to rounding [of load].
+_EXACT = 1e-13
 # Most steps, how often each goes back to balance, and what may be left of that [of load].
 _STEPS, _RESTORED, _LOOSE = 60, 3, 1e-3
 # Damping: least of the first, its factor, the least it rises from, what is none, and the most.
@@ -141,8 +143,25 @@ def _back(problem: Reaching, at: Curved, start: Spots) -> tuple[Spots, Array]:
     return Spots(away, rows, pulls, left.max(axis=1) / problem.scale[rows]), left.sum(axis=1)
 
 
-def restored(problem: Reaching, start: Spots) -> Spots:
-    """Where searches that are not in balance come to it, by Newton's method; some may not."""
+def to_rounding(problem: Reaching, ends: Spots) -> Spots:
+    """Ends of searches, balanced to rounding where there are fewer cables than freedoms.
+
+    No tensions make up for what the pose of such a robot lacks: it is held as it is, or not.
+    """
+    if ends.tensions.shape[1] >= ends.away.shape[1]:
+        return ends
+    out, back = ends.copy(), restored(problem, ends, _EXACT)
+    better = np.flatnonzero(back.left <= ends.left)
+    out.put(better, back.only(better))
+    return out
+
+
+def restored(problem: Reaching, start: Spots, enough: float = 0.1 * TIGHT) -> Spots:
+    """Where searches that are not in balance come to it, by Newton's method; some may not.
+
+    Args:
+        enough: what may be left [of load].
+    """
     out, still = start.copy(), np.arange(len(start.rows))
     for _ in range(_BACK):
         if len(still) == 0:
@@ -155,7 +174,7 @@ def restored(problem: Reaching, start: Spots) -> Spots:
         step = to - here.away
         size = np.maximum(np.linalg.norm(step, axis=1), 1e-300)
         part = np.minimum(1.0, _LONGEST * problem.robot.length / size)[:, None]
-        go = ok & (here.left > 0.1 * TIGHT)
+        go = ok & (here.left > enough)
         here.away[go] += (part * step)[go]
         here.tensions[go] += (part * (taut - here.tensions))[go]
         out.put(still, here)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from seecr.joints import values_of_pose
 from seecr.nearest.firm import at_random, firm_ends, nearest_of, part_of
-from seecr.nearest.inward import ENOUGH, TIGHT, inward, tightened
+from seecr.nearest.inward import ENOUGH, TIGHT, inward, tightened, to_rounding
 from seecr.nearest.problem import Balance, Curved, Reaching, Rows, Spots, Stays
 from seecr.nearest.screen import screened
 from seecr.nearest.seeds import Candidates, about_answers, about_wanted, from_sample, sample
@@ -126,7 +126,7 @@ class _Best:
 
     def keep(self, other: Spots) -> None:
         """Take what is held and nearer, and what stays rather than what does not."""
-        other = other.only_tight(TIGHT)
+        other = to_rounding(self.problem, other.only_tight(TIGHT))
         if len(other.rows) == 0:
             return
         firm = self.problem.rests(other.away, other.rows)

@@ -13,6 +13,7 @@ from seecr.mjcf import load_robot
 from seecr.model import load_model
 from seecr.nearest import search
 from seecr.nearest.problem import Curved, Reaching
+from seecr.planar import bar_equilibria
 from seecr.pose import pose_difference
 from seecr.shipped import model_path
 from seecr.workspace import balance_equations
@@ -176,3 +177,15 @@ def test_balance_bends_as_its_rates_change() -> None:
     ]
     whole = np.concatenate([own[0], mixed[0]], axis=1)
     np.testing.assert_allclose(whole, change, atol=1e-4 * np.abs(whole).max())
+
+
+def test_every_position_at_which_a_bar_can_rest_is_kept() -> None:
+    """Two cables do not make up for a tilt that is nearly right: ends were lost to rounding."""
+    bar = load_robot(model_path("planar_two_cable"))
+    half = 0.5 * float(np.linalg.norm(np.ptp(bar.anchor_points, axis=0)))
+    places = [(0.7, 0.95), (0.3, 0.95), (0.8, 0.95), (0.2, 0.95), (0.0833333, 0.9166667)]
+    for x, z in places:
+        roots = [r for r in bar_equilibria(bar.exit_points[:, [0, 2]], [x, z], half) if r.stable]
+        found = correct(bar, [x, 0.0, z, 1.0, 0.0, 0.0, 0.0], prefer="position")
+        assert len(roots) == 1 and found.stays.all()
+        assert np.abs(found.solution.pose[0, :3] - [x, 0.0, z]).max() < 1e-9

@@ -54,13 +54,24 @@ def test_wanted_tensions_are_an_aim(tmp_path: Path) -> None:
         for aim in ("minimum", "900", ",".join(8 * ["900"]))
     ]
     assert pulls[0] < 0.8 * pulls[1] and pulls[1] == pytest.approx(pulls[2])
-    assert "expected minimum, middle, or tensions" in run(*args, "--aim", "most").output
+    for wrong in ("most", "1,2", "nan"):
+        got = run(*args, "--aim", wrong)
+        assert got.exit_code == 2
+        assert (
+            f"--aim {wrong}: expected minimum, middle, or tensions [N]: one, or 8 with commas" in
+            got.output
+        )  # fmt: skip
 
 
 def test_export_writes_into_a_folder(tmp_path: Path) -> None:
     got = run("export", "demobot_cogiro", "there.xml", "--out", tmp_path / "new")
     assert got.exit_code == 0 and (tmp_path / "new" / "there.xml").exists(), got.output
     assert f"seecr pose {tmp_path}/new/there.xml" in got.output
+    # and makes none where there is nothing to write
+    model = tmp_path / "none.toml"
+    model.write_text("abc")
+    args = ("demobot_cogiro", "there.xml", "--out", tmp_path / "other", "--model", model)
+    assert run("export", *args).exit_code == 2 and not (tmp_path / "other").exists()
 
 
 @pytest.mark.parametrize("command", ["pose", "sweep", "correct"])
