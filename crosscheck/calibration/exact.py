@@ -200,7 +200,8 @@ def _scored(
     """A fit with its evidence about its own optimum, averaged over widths."""
     linear = linearised(setting, joint)
     gram = own_gram(linear, joint)
-    inside = {n: widths[n] for n in gram.names}
+    # the linear model may not see at all what moves readings where it was fitted
+    inside = {n: widths.get(n, 1.0) for n in gram.names}
     better = best_widths(gram, inside)
     share = sum(log_shares(joint, linear).values())
     score = averaged(gram, better) + share + scores.log_prior(names)

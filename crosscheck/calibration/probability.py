@@ -83,7 +83,8 @@ def of_classes(
 
     def chance(some: Iterable[str], least: int = 1) -> float:
         wanted = set(some)
-        return float(sum(p for n, p in zip(names, share, strict=True) if len(wanted & n) >= least))
+        total = sum(p for n, p in zip(names, share, strict=True) if len(wanted & n) >= least)
+        return min(float(total), 1.0)  # a sum of shares is 1 but for rounding
 
     order = sorted(members, key=lambda c: -chance(c))
     effect = {e: chance([e]) for e in effects}

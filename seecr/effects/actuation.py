@@ -191,7 +191,7 @@ class ThermalExpansion(Effect):
     advice: ClassVar[str] = "repeat one pose at two temperatures and compare the platform's height"
 
     expansion: float = parameter("1_per_K", 5e-5)
-    zero_temperature: float = parameter("C", 5.0, null=20.0, bounds=(-100.0, 200.0), shape=True)
+    zero_temperature: float = parameter("C", 5.0, null=20.0, bounds=(-40.0, 60.0), shape=True)
 
     def edit_setup(self, setup: Setup) -> None:
         if self.expansion == 0.0 or setup.commands.temperature is None:

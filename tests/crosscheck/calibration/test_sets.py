@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from crosscheck.calibration.gram import ColumnGroup, Gram, gram_of
-from crosscheck.calibration.probability import probabilities
+from crosscheck.calibration.probability import of_classes, probabilities
 from crosscheck.calibration.sets import Names, Scores, explore, log_prior, thinned
 
 WIDTHS = np.array([0.1, 0.3, 1.0, 3.0, 10.0])
@@ -106,6 +106,15 @@ def test_probabilities_are_sums_over_sets_and_equals_are_one_class() -> None:
     assert found.members[0] == (a, b)
     assert found.probability[0] == pytest.approx(1.0)
     assert found.undecided == pytest.approx(0.25 / total)
+
+
+def test_no_probability_is_more_than_one() -> None:
+    """Printed once: 1.0000000000000242."""
+    random = np.random.default_rng(0)
+    for count in range(2, 60):
+        scores = {frozenset({"a", str(k)}): float(random.uniform(-9.0, 0.0)) for k in range(count)}
+        found = of_classes(scores, frozenset({"a", "0"}), ["a"], [("a",)])
+        assert 1.0 - 1e-12 < found.effect["a"] <= 1.0 and found.probability[0] <= 1.0
 
 
 def test_a_second_of_a_class_has_a_probability_of_its_own() -> None:

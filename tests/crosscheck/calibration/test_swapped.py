@@ -63,6 +63,26 @@ def test_a_swapped_effect_begins_at_the_shape_that_promises_most() -> None:
     assert best.score > start.score + 90.0
 
 
+def test_an_effect_that_the_linear_model_does_not_see_is_fitted() -> None:
+    """It has no width there: hysteresis of cables that do not move, where the fit stands."""
+    problem = warmed()
+    factor = problem.noise(problem.experiment.predict(()))
+    setting = Setting(problem, factor, chain_of(problem), frozen=True)
+    start = Terms([term(ROBOT, "thermal_expansion", expansion_1_per_K=1e-4)])
+    plain = evaluate(problem, Terms(), factor)
+    joint = settle(setting, evaluate(problem, start, factor), widths_of(start), WHITE, 0)
+    exact = Exact(
+        replace(setting, weight=joint.weight), joint, Catalogue(Terms(), start), plain, print
+    )
+    seen = gram_about(setting, joint, exact.catalogue)
+    unseen = Scores(replace(seen, groups={}), 1, frozenset())
+    exact.take(unseen, start)
+    exact_too = replace(exact, fitted={})
+    exact_too.take(Scores(seen, 1, frozenset()), start)
+    names = frozenset(start.names)
+    assert exact.possible[names].score == pytest.approx(exact_too.possible[names].score, abs=0.1)
+
+
 def test_what_no_robot_can_have_does_not_take_the_place_of_what_one_can(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
