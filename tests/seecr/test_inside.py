@@ -81,6 +81,7 @@ def test_maps_and_corrections_agree(low: float, high: float) -> None:
     assert 0 < found.feasible.sum() < 60
 
 
+@pytest.mark.slow
 def test_wider_limits_hold_what_narrower_do() -> None:
     limits = [
         (30, 520),

@@ -94,6 +94,7 @@ def test_tensions_stay_within_limits_and_near_their_aim() -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_parallel_robot_holds_what_its_workspace_says() -> None:
     robot, poses = robot_named("demobot_parallel"), line(24, 0.17, 0.63, 0.1)
     found = correct(robot, poses, prefer="position")

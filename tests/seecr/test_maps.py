@@ -246,6 +246,7 @@ def test_a_large_robots_map_is_drawn_in_metres_and_its_colours_show_most_margins
     assert margins.max() > 1e4 > 1e3 > max(ticks) > np.median(margins)
 
 
+@pytest.mark.slow
 def test_too_few_cables_are_mapped_by_position() -> None:
     robot = robot_named("planar_two_cable")
     x, z = np.linspace(0.2, 0.8, 4), np.array([0.4, 0.6])
@@ -298,6 +299,7 @@ def test_maps_are_where_workspaces_are() -> None:
     assert workspace.workspace_map is workspace_map and workspace.boundary is boundary
 
 
+@pytest.mark.slow
 def test_a_figure_promises_an_edge_only_where_it_draws_one(tmp_path: Path) -> None:
     robot = robot_named("demobot_cogiro")
     found = workspace_map(robot, np.linspace(0.3, 0.5, 3), np.linspace(0.2, 0.3, 3), 0.1)

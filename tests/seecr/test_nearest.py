@@ -179,6 +179,7 @@ def test_balance_bends_as_its_rates_change() -> None:
     np.testing.assert_allclose(whole, change, atol=1e-4 * np.abs(whole).max())
 
 
+@pytest.mark.slow
 def test_every_position_at_which_a_bar_can_rest_is_kept() -> None:
     """Two cables do not make up for a tilt that is nearly right: ends were lost to rounding."""
     bar = load_robot(model_path("planar_two_cable"))

@@ -104,6 +104,7 @@ def nulls(catalogue: Catalogue, names: Names) -> Terms:
     return Terms(catalogue.start(name) for name in sorted(names))
 
 
+@pytest.mark.slow
 def test_a_challenger_that_explains_more_is_the_best_set_and_challenged_in_turn(
     problem: Problem, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -51,6 +51,7 @@ def score_of(setting: Setting, drums: Term) -> float:
     return float(found.score)
 
 
+@pytest.mark.slow
 def test_evidence_is_that_averaged_over_the_shapes() -> None:
     """Against sums over radii that are held, each as likely as the next start of the search."""
     problem = problem_with(2.5e-4)

@@ -22,6 +22,7 @@ def names(given: Any) -> list[str]:
     return [case.name for case in chosen_cases(given, 0)]
 
 
+@pytest.mark.slow
 def test_cases_are_chosen_by_name_by_pattern_and_by_robot() -> None:
     assert names("planar-vertical") == names(["planar-vertical"]) == ["planar-vertical"]
     every = names("planar-vertical*")

@@ -74,6 +74,7 @@ def test_export_writes_into_a_folder(tmp_path: Path) -> None:
     assert run("export", *args).exit_code == 2 and not (tmp_path / "other").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["pose", "sweep", "correct"])
 def test_a_bar_is_told_what_is_done(command: str, tmp_path: Path, monkeypatch: Any) -> None:
     """As that of maps, which tests of its own look at."""
@@ -248,6 +249,7 @@ def test_map_writes_its_files_or_says_why_not(tmp_path: Path) -> None:
     assert "no pose of the grid can be held: no tensions from 90 to inf N" in lost.stderr
 
 
+@pytest.mark.slow
 def test_a_correction_without_answers_leaves_no_list_of_commands(tmp_path: Path) -> None:
     poses, out = tmp_path / "poses.csv", tmp_path / "out"
     poses.write_text("cmd_x_m,cmd_y_m,cmd_z_m\n0.4,0.25,0.1\n")

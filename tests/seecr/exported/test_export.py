@@ -163,6 +163,7 @@ SAG = {"cable_weight": {"weight_N_per_m": 0.1}}
 TURNED = {"gravity_tilt": {"tilt_x_rad": 0.01}}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "given",
     [
