@@ -238,14 +238,14 @@ class _Descent:
             count += 1
             if stale == 0:
                 jacobian = self.jacobian(state)
-            after, damping, gain = self.step(state, jacobian, damping)
+            after, damping, gain, promised = self.step(state, jacobian, damping)
             if after is None:
                 if stale == 0:
                     return _End(state, jacobian, count, True)
                 stale = 0  # not the derivatives' last word: they are of an earlier step
                 continue
             # derivatives cost much more than a trial: they serve again where steps go well
-            if stale < _STALE and after.chi2 < 0.3 * state.chi2:
+            if stale < _STALE and (after.chi2 < 0.3 * state.chi2 or gain > 0.9 * promised):
                 stale += 1
                 jacobian = _corrected(jacobian, state, after)
             else:
@@ -260,7 +260,7 @@ class _Descent:
 
     def step(
         self, state: State, jacobian: Array, damping: float
-    ) -> tuple[State | None, float, float]:
+    ) -> tuple[State | None, float, float, float]:
         """One accepted step (None where none improves), the damping after it, and its gain."""
         terms, z = state.terms, state.terms.sizes
         known, off = known_readings(terms)[0], known_left(terms)
@@ -268,20 +268,20 @@ class _Descent:
         normal = jacobian.T @ jacobian + known.T @ known + np.eye(len(z)) / PRIOR_SIZES**2
         move = self._moving(terms, gradient)
         if len(move) == 0:
-            return None, damping, 0.0
+            return None, damping, 0.0, 0.0
         before = _objective(state)
         for _ in range(_DAMPINGS):
             step = _damped_step(normal, gradient, move, damping)
             values = np.clip(terms.vector + step * terms.scale, terms.lower, terms.upper)
             trial = evaluate(self.problem, terms.with_vector(values), self.factor, state)
             after = _objective(trial) if trial.valid else np.inf
+            promised = -2.0 * float(gradient @ step + 0.5 * step @ normal @ step)
             if after < before:
-                return trial, max(0.2 * damping, 1e-9), before - after
-            expected = -(gradient @ step + 0.5 * step @ normal @ step)
-            if trial.valid and 2.0 * expected < _GAIN:  # nothing left to gain
+                return trial, max(0.2 * damping, 1e-9), before - after, promised
+            if trial.valid and promised < _GAIN:  # nothing left to gain
                 break
             damping = max(10.0 * damping, 1e-4)
-        return None, damping, 0.0
+        return None, damping, 0.0, 0.0
 
     def _moving(self, terms: Terms, gradient: Array) -> NDArray[np.intp]:
         """Parameters that are free and not pushed against a bound."""
