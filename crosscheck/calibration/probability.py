@@ -12,6 +12,9 @@ from crosscheck.calibration.equals import are_equals
 from crosscheck.calibration.refits import Found
 from crosscheck.calibration.sets import Names
 
+# Sets worse than the best by more than this in ln evidence count for nothing.
+_COUNTED = 8.0
+
 
 @dataclass(frozen=True, eq=False)
 class Classes:
@@ -42,14 +45,30 @@ class Classes:
 
 
 def all_scores(found: Found) -> dict[Names, float]:
-    """Exact scores, and linear ones of sets with one effect more than the best."""
+    """Exact scores, and about those of sets with one effect more than a fitted one.
+
+    Each set that counts has as many larger ones about it: were only those of the best set
+    counted, its members would be surer than they are.
+    """
     out = {names: refit.score for names, refit in found.refits.items()}
-    best = found.best.names
-    linear = found.scores.score(best)
-    for names, score in found.scores.neighbours(best).items():
-        if names > best and names not in out:
-            out[names] = found.best.score + score - linear
+    best = found.best
+    own = {n - best.names: gain for n, gain in _larger(found, best.names).items()}
+    out = {best.names | more: best.score + gain for more, gain in own.items()} | out
+    for names, refit in found.refits.items():
+        if names == best.names or refit.score < best.score - _COUNTED:
+            continue
+        for larger, gain in _larger(found, names).items():
+            # one that seemed better than what was fitted would have been fitted
+            about = refit.score + min(gain, 0.0)
+            if larger - names in own and larger not in found.refits and not larger > best.names:
+                out[larger] = max(about, out.get(larger, -np.inf))
     return out
+
+
+def _larger(found: Found, names: Names) -> dict[Names, float]:
+    """What sets with one effect more score more than a set, in the linear model."""
+    linear = found.scores.score(names)
+    return {n: score - linear for n, score in found.scores.larger(names).items()}
 
 
 def probabilities(

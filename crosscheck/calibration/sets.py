@@ -92,6 +92,10 @@ class Scores:
                 out |= self._more(rest, fewer, score, but=name)
         return out
 
+    def larger(self, names: Names) -> dict[Names, float]:
+        """About the scores of sets with one effect more."""
+        return self._more(names, self.widths(names), self.score(names))
+
     def _more(
         self, names: Names, widths: dict[str, float], base: float, but: str = ""
     ) -> dict[Names, float]:
