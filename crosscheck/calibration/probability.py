@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -76,6 +76,7 @@ def probabilities(
     best: Names,
     effects: Iterable[str],
     sizes: Mapping[str, int] | None = None,
+    fitted: Collection[Names] | None = None,
 ) -> Classes:
     """Probabilities of effects and classes: sums over sets.
 
@@ -84,9 +85,12 @@ def probabilities(
         best: the best of them.
         effects: all that may be missing.
         sizes: how many parameters each has; one where not given.
+        fitted: sets whose scores are exact, all by default: only they say what stands in the
+            place of what.
     """
     effects = list(effects)
-    return of_classes(scores, best, effects, _classes(scores, best, effects, sizes or {}))
+    exact = scores if fitted is None else {n: scores[n] for n in fitted}
+    return of_classes(scores, best, effects, _classes(exact, best, effects, sizes or {}))
 
 
 def of_classes(

@@ -90,7 +90,7 @@ def seek(
     found = compare_sets(setting, joint, catalogue, plain, told, most, rounds, given)
     effects = [n for n in catalogue.names if n not in terms]
     sizes = {name: catalogue.size(name) for name in effects}
-    classes = probabilities(all_scores(found), found.best.names, effects, sizes)
+    classes = probabilities(all_scores(found), found.best.names, effects, sizes, found.refits)
     strange = strange or is_strange(setting, found.best.joint, known)
     said = judge(found, classes, odds, surprise, strange)
     listed = found.always | set(said.sure)
@@ -98,7 +98,7 @@ def seek(
     if alone is not None and listed != found.best.names:
         # what could stand in the place of what is listed, not of a larger set
         scores = {**all_scores(found), listed: alone.score}
-        classes = probabilities(scores, listed, effects, sizes)
+        classes = probabilities(scores, listed, effects, sizes, {*found.refits, listed})
     free = free_of(joint)
     shown = shown_from(setting, joint, joint.jacobian * free, joint.width * free)
     return Sought(whole, found, catalogue, classes, odds, shown, said)

@@ -31,7 +31,7 @@ def found_of(scores: dict[str, float]) -> Found:
 
 def judged(scores: dict[str, float], odds: float = -5.0, surprise: float = 1.0) -> Judgement:
     found = found_of(scores)
-    classes = probabilities(all_scores(found), found.best.names, NAMES)
+    classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
     return judge(found, classes, odds, surprise)
 
 
@@ -112,7 +112,7 @@ def test_a_large_set_is_many_effects_and_names_what_carries_it() -> None:
 
 def open_sets(scores: dict[str, float]) -> list[set[str]]:
     found = found_of(scores)
-    classes = probabilities(all_scores(found), found.best.names, NAMES)
+    classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
     return [set(names) for names in alternatives(found, classes)]
 
 
