@@ -22,6 +22,7 @@ from crosscheck.diagnosis.words import (
     either,
     hints_of,
     noise_left,
+    probable_words,
     words_of,
 )
 from crosscheck.fit.candidates import Candidate
@@ -144,6 +145,13 @@ def _sentence(
             "Few effects explain the error, but these data leave open which: "
             f"{either(alternatives)}. All {tried} that were tried, together, take it from "
             f"{rms_words(together.before)} to {rms_words(together.held_out)} on runs left out."
+        )
+    if alternatives:
+        some = probable_words(hints_of(chances, (), alternatives[0]))
+        return (
+            f"Few effects explain the error, though not beyond doubt: {some}. All {tried} that "
+            f"were tried, together, take it from {rms_words(together.before)} to "
+            f"{rms_words(together.held_out)} on runs left out."
         )
     sure = ", ".join(m.effect for m in missing)
     return (

@@ -68,8 +68,12 @@ def noise_left(hints: Mapping[str, float]) -> str:
 
 
 def _hint_of(hints: Mapping[str, float]) -> str:
-    some = ", ".join(f"{name} ({probability_words(p)})" for name, p in hints.items())
-    return f"hint of {some}, too weak to be sure"
+    return f"hint of {probable_words(hints)}, too weak to be sure"
+
+
+def probable_words(hints: Mapping[str, float]) -> str:
+    """Effects, or classes of them in words, each with its probability."""
+    return ", ".join(f"{name} ({probability_words(p)})" for name, p in hints.items())
 
 
 def either(sets: Sequence[Iterable[str]]) -> str:

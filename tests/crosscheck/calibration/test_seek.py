@@ -49,6 +49,7 @@ def test_two_effects_are_named_and_a_field_makes_the_verdict_unknown() -> None:
     assert_shown_as_many(found)
     assert_a_model_by_itself(found)
     assert_open_which(found)
+    assert_not_beyond_doubt(found)
     unknown = judge(found.found, found.classes, 20.0, 1.0)
     assert unknown.verdict is DiagnosisVerdict.UNKNOWN_EFFECT
     assert judge(found.found, found.classes, -5.0, 9.0).verdict is DiagnosisVerdict.UNKNOWN_EFFECT
@@ -75,6 +76,17 @@ def assert_open_which(found: Sought) -> None:
     assert "gravity_tilt + pulley_radius" in said.sentence
     assert "backlash + drum_gain" in said.sentence
     assert any(line.endswith("(gravity_tilt)") for line in said.measure_next)
+
+
+def assert_not_beyond_doubt(found: Sought) -> None:
+    """As it is told where nothing else explains as well, and yet none is sure."""
+    none = Judgement(DiagnosisVerdict.MANY_EFFECTS, (), 0.0)
+    said = explained(replace(found, judgement=none), [])
+    start = "Few effects explain the error, though not beyond doubt: "
+    assert said.sentence.startswith(start) and not said.missing
+    assert "gravity_tilt (" in said.sentence and "pulley_radius (" in said.sentence
+    for name in ("gravity_tilt", "pulley_radius"):
+        assert any(line.endswith(f"({name})") for line in said.measure_next)
 
 
 def value_of(found: Sought, names: set[str]) -> list[float]:
