@@ -65,7 +65,9 @@ def test_where_it_is_open_which_effects_it_is_what_is_not_common_is_checked_by_h
         f"to find which effects it is: {measured_directly(name)} ({name})"
         for name in ("drum_gain", "gravity_tilt")
     ]
-    assert measure_next(found, [], DiagnosisVerdict.MANY_EFFECTS, (), either[:1]) == [_calibrate]
+    *checks, _calibrate = measure_next(found, [], DiagnosisVerdict.MANY_EFFECTS, (), either[:1])
+    assert [check.split()[-1] for check in checks] == ["(gravity_tilt)", "(stiffness)"]
+    assert measure_next(found, [], DiagnosisVerdict.MANY_EFFECTS, (), []) == [_calibrate]
 
 
 def test_where_nothing_is_missing_the_plan_is_named(found: Search) -> None:
