@@ -9,6 +9,7 @@ import numpy as np
 from scipy import special
 
 from crosscheck.calibration.equals import are_equals
+from crosscheck.calibration.exact import Refit
 from crosscheck.calibration.refits import Found
 from crosscheck.calibration.sets import Names
 
@@ -48,27 +49,30 @@ def all_scores(found: Found) -> dict[Names, float]:
     """Exact scores, and about those of sets with one effect more than a fitted one.
 
     Each set that counts has as many larger ones about it: were only those of the best set
-    counted, its members would be surer than they are.
+    counted, its members would be surer than they are. Others that gain a member of the best set,
+    or contain it, are near it: those of them that matter are fitted.
     """
-    out = {names: refit.score for names, refit in found.refits.items()}
-    best = found.best
-    own = {n - best.names: gain for n, gain in _larger(found, best.names).items()}
-    out = {best.names | more: best.score + gain for more, gain in own.items()} | out
+    best, out = found.best, dict[Names, float]()
     for names, refit in found.refits.items():
-        if names == best.names or refit.score < best.score - _COUNTED:
+        if refit.score < best.score - _COUNTED:
             continue
-        for larger, gain in _larger(found, names).items():
-            # one that seemed better than what was fitted would have been fitted
-            about = refit.score + min(gain, 0.0)
-            if larger - names in own and larger not in found.refits and not larger > best.names:
-                out[larger] = max(about, out.get(larger, -np.inf))
-    return out
+        for larger, score in _larger(found, refit).items():
+            near = larger - names <= best.names or larger > best.names
+            if names == best.names or not near:
+                out[larger] = max(score, out.get(larger, -np.inf))
+    return out | {names: refit.score for names, refit in found.refits.items()}
 
 
-def _larger(found: Found, names: Names) -> dict[Names, float]:
-    """What sets with one effect more score more than a set, in the linear model."""
-    linear = found.scores.score(names)
-    return {n: score - linear for n, score in found.scores.larger(names).items()}
+def _larger(found: Found, refit: Refit) -> dict[Names, float]:
+    """Sets with one effect more than a fitted one, with about their scores.
+
+    None is better than that set: it would have been fitted, or no robot can have it.
+    """
+    linear = found.scores.score(refit.names)
+    return {
+        names: refit.score + min(score - linear, 0.0)
+        for names, score in found.scores.larger(refit.names).items()
+    }
 
 
 def probabilities(

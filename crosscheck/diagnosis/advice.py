@@ -138,7 +138,7 @@ def measure_next(
             out += _to_separate(plan, options, effect, rival)
         if not effect.rivals:
             out.append(f"to confirm {effect.effect}: {effect.check}")
-    if len(alternatives) > 1 or verdict is DiagnosisVerdict.MANY_EFFECTS:
+    if len(alternatives) > 1 or (alternatives and verdict is DiagnosisVerdict.MANY_EFFECTS):
         out += _to_decide(alternatives)
     if verdict is DiagnosisVerdict.MANY_EFFECTS:
         out.append(_CALIBRATE)
@@ -151,8 +151,6 @@ def measure_next(
 
 def _to_decide(alternatives: Sequence[Names]) -> list[str]:
     """Checks by hand of what is in some of the sets and not in all; of one set, of all in it."""
-    if not alternatives:
-        return []
     every, always = frozenset().union(*alternatives), frozenset.intersection(*alternatives)
     return [
         f"to find which effects it is: {measured_directly(name)} ({name})"

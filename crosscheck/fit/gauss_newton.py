@@ -218,6 +218,22 @@ class _End:
 
 
 @dataclass(frozen=True, eq=False)
+class _Step:
+    """One step of a descent.
+
+    Attributes:
+        state: where it led; None where no step improves.
+        damping: to begin the next one with.
+        gain: of the objective. promised: the gain that the derivatives foretold.
+    """
+
+    state: State | None
+    damping: float
+    gain: float = 0.0
+    promised: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
 class _Descent:
     """Damped Gauss-Newton on a problem; ``free`` (p,) parameters move."""
 
@@ -238,50 +254,51 @@ class _Descent:
             count += 1
             if stale == 0:
                 jacobian = self.jacobian(state)
-            after, damping, gain, promised = self.step(state, jacobian, damping)
+            step = self.step(state, jacobian, damping)
+            after, damping = step.state, step.damping
             if after is None:
                 if stale == 0:
                     return _End(state, jacobian, count, True)
                 stale = 0  # not the derivatives' last word: they are of an earlier step
                 continue
             # derivatives cost much more than a trial: they serve again where steps go well
-            if stale < _STALE and (after.chi2 < 0.3 * state.chi2 or gain > 0.9 * promised):
+            if stale < _STALE and (
+                after.chi2 < 0.3 * state.chi2 or step.gain > 0.9 * step.promised
+            ):
                 stale += 1
                 jacobian = _corrected(jacobian, state, after)
             else:
                 stale = 0
             state = after
             lost = state.chi2 > (hopeless if count >= _FEW else _FAR * hopeless)
-            if gain < _GAIN:
+            if step.gain < _GAIN:
                 return _End(state, None, count, True)
             if count >= _FEW_FAR and lost:
                 break
         return _End(state, None, count, iterations == 0)
 
-    def step(
-        self, state: State, jacobian: Array, damping: float
-    ) -> tuple[State | None, float, float, float]:
-        """One accepted step (None where none improves), the damping after it, and its gain."""
+    def step(self, state: State, jacobian: Array, damping: float) -> _Step:
+        """The first step that improves, damped more and more."""
         terms, z = state.terms, state.terms.sizes
         known, off = known_readings(terms)[0], known_left(terms)
         gradient = z / PRIOR_SIZES**2 - jacobian.T @ state.white - known.T @ off
         normal = jacobian.T @ jacobian + known.T @ known + np.eye(len(z)) / PRIOR_SIZES**2
         move = self._moving(terms, gradient)
         if len(move) == 0:
-            return None, damping, 0.0, 0.0
+            return _Step(None, damping)
         before = _objective(state)
         for _ in range(_DAMPINGS):
-            step = _damped_step(normal, gradient, move, damping)
-            values = np.clip(terms.vector + step * terms.scale, terms.lower, terms.upper)
+            by = _damped_step(normal, gradient, move, damping)
+            values = np.clip(terms.vector + by * terms.scale, terms.lower, terms.upper)
             trial = evaluate(self.problem, terms.with_vector(values), self.factor, state)
             after = _objective(trial) if trial.valid else np.inf
-            promised = -2.0 * float(gradient @ step + 0.5 * step @ normal @ step)
+            promised = -2.0 * float(gradient @ by + 0.5 * by @ normal @ by)
             if after < before:
-                return trial, max(0.2 * damping, 1e-9), before - after, promised
+                return _Step(trial, max(0.2 * damping, 1e-9), before - after, promised)
             if trial.valid and promised < _GAIN:  # nothing left to gain
                 break
             damping = max(10.0 * damping, 1e-4)
-        return None, damping, 0.0, 0.0
+        return _Step(None, damping)
 
     def _moving(self, terms: Terms, gradient: Array) -> NDArray[np.intp]:
         """Parameters that are free and not pushed against a bound."""

@@ -190,6 +190,13 @@ def test_the_line_is_that_of_the_effect_meant(robot, saved):
     )
 
 
+def test_winches_are_zeroed_where_somebody_can_stand(robot, saved):
+    values = "expansion_1_per_K = 1e-5\nzero_temperature_C = 199\n"
+    extra = f'\n[[effect]]\nname = "thermal_expansion"\n[effect.parameters]\n{values}'
+    saved.write_text(saved.read_text() + extra)
+    assert "zero_temperature_C: 199 is out of bounds; expected -40 to 60" in error_of(saved, robot)
+
+
 def test_an_effect_may_stand_there_once(robot, saved):
     text = saved.read_text()
     saved.write_text(text + text[text.index("[[effect]]") :])
