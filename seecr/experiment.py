@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from seecr import statics
 from seecr.commands import Commands
 from seecr.compiled.columns import STRAIN, TENSION
-from seecr.compiled.outcomes import CONVERGED, ITERATIONS, SINGULAR, STALLED, TOLERANCE
+from seecr.compiled.outcomes import CONVERGED, ITERATIONS, SINGULAR, STALLED
 from seecr.edits import Edits
 from seecr.effects.base import Effect, Readings
 from seecr.effects.checked import edit_readings
@@ -49,6 +49,7 @@ class Prediction(Result):
         readings: what would be read.
         has_history: whether rows depend on the rows before.
         sensors: effects that edit the readings.
+        walk: where all N waypoints of the way came to rest, once it was walked.
         solved: (n,) bool, a stable equilibrium was found.
     """
 
@@ -58,12 +59,12 @@ class Prediction(Result):
     readings: Readings
     has_history: bool
     sensors: tuple[Effect, ...] = ()
+    walk: statics.Evaluation | None = field(default=None, repr=False)
     kept: dict[str, Array] = field(default_factory=dict, repr=False)
 
     @property
     def solved(self) -> NDArray[np.bool_]:
-        fine = (self.found.outcome == CONVERGED) & (self.found.residual < TOLERANCE)
-        return np.asarray(fine)
+        return self.found.solved
 
     @property
     def singular(self) -> NDArray[np.bool_]:
@@ -106,6 +107,7 @@ class Prediction(Result):
             tables=put(self.tables, other.tables, "cables", "load", "scale", "reach"),
             found=put(self.found, other.found, *(f.name for f in fields(statics.Evaluation))),
             readings=put(self.readings, other.readings, *(f.name for f in fields(Readings))),
+            walk=None,
             kept={k: mixed(v, other.kept[k]) for k, v in self.kept.items() if k in other.kept},
         )
 
@@ -199,7 +201,8 @@ class Experiment:
         pose = statics.platform_poses(tables, found.deviation)
         readings = read(effects, setup, pose, found.states[..., TENSION])
         sensors = sensors_among(effects)
-        return Prediction(setup, tables, found, readings, False, sensors, {"pose": pose})
+        kept = {"pose": pose}
+        return Prediction(setup, tables, found, readings, False, sensors, kept=kept)
 
     def from_other_starts(
         self, effects: Sequence[Effect], at: Prediction, rows: NDArray[np.intp], poses: Array
@@ -241,24 +244,26 @@ class Experiment:
             return tables, run(tables, start)
         return _with_laws(setup, run, start)
 
-    def _predict_path(self, effects: Sequence[Effect]) -> Prediction:
+    def walk(self, effects: Sequence[Effect]) -> tuple[Tables, statics.Evaluation]:
+        """Solve all waypoints of the way in order, each from the one before."""
         path = self.path
         setup = self.setup(effects, path.commands)
-        tables, whole = _with_laws(
-            setup, lambda tables, _start: statics.walk(tables, path, _LIMIT), None
-        )
+        return _with_laws(setup, lambda tables, _start: statics.walk(tables, path, _LIMIT), None)
+
+    def _predict_path(self, effects: Sequence[Effect]) -> Prediction:
+        path = self.path
+        tables, whole = self.walk(effects)
         rows = take(tables, path.rows)
         found = statics.take_evaluation(whole, path.rows)
         # a waypoint that was not solved spoils the rows of its run from there on
-        failed = (whole.outcome != CONVERGED) & (whole.outcome != SINGULAR)
-        for k in path.source[failed]:
+        for k in path.source[~whole.at_rest]:
             run = path.commands.run
             assert run is not None
             later = (np.arange(len(found.outcome)) >= k) & (run[path.rows] == run[path.rows[k]])
             found.outcome[later & (found.outcome == CONVERGED)] = STALLED
         own = self.setup(effects)
         readings = self._read(effects, own, rows, found)
-        return Prediction(own, rows, found, readings, True, sensors_among(effects))
+        return Prediction(own, rows, found, readings, True, sensors_among(effects), whole)
 
     @staticmethod
     def _read(

@@ -3,7 +3,8 @@
 At a solved pose the wrench w(q, theta) is zero; so dq/d theta = -K^-1 dg/d theta with g = -w the
 gradient of the energy and K its stiffness. One factorisation of K serves all parameters. dg/d
 theta comes from differencing the effects' edits at the fixed pose: nothing is solved again.
-Rows with history are the exception: their walk is repeated with each parameter shifted.
+Where rows depend on the rows before, so does g: what the cables keep is differentiated forward
+along the way, and nothing is solved there either.
 """
 
 from __future__ import annotations
@@ -23,12 +24,13 @@ from seecr.effects.terms import Terms
 from seecr.experiment import Experiment, Prediction, read, senses
 from seecr.joints import motion_columns
 from seecr.pose import Array, pose_add, quat_conjugate, quat_multiply, rotvec_from_quat
-from seecr.shifts import Shift, Sides, blocks_of_cables, positions, shifted
-from seecr.tables import Tables
+from seecr.shifts import OF_SHAPE, Shift, Sides, blocks_of_cables, positions, shifted
+from seecr.tables import Tables, assemble
 from seecr.threads import run_parts
 
-# Differencing step of a walk that is repeated, in plausible sizes of a parameter.
-_WALK = 1e-4
+# Differencing step of a way, in plausible sizes of a parameter: a cable that is barely taut where
+# the platform rests is slack a little beside it.
+_WAY = 1e-5
 # Differencing step of what the sensors make of a pose: rad, or part of a length or tension.
 _READ = 1e-5
 
@@ -54,10 +56,18 @@ def sensitivities(
         (n, 6 + m, p): position [m], rotation vector [rad], tensions [N], by each parameter.
     """
     wanted = list(columns) if len(columns) else list(range(len(terms)))
-    if at.has_history and not frozen:
-        return _by_walking(experiment, terms, at, wanted)
     out = np.zeros((*_shape(at), len(wanted)))
     by_wrench = _ByWrench(experiment, at, terms)
+    if at.has_history and not frozen:
+        shifts = [shifted(terms, term, k, _WAY) for term, k in positions(terms, wanted)]
+        assert by_wrench.way  # made once, for all threads
+
+        def run(part: slice) -> None:
+            out[..., part.start] = by_wrench.column(shifts[part.start], along=True)
+
+        # a way cannot be parted where creep goes by one clock: the parameters can
+        run_parts(run, [slice(c, c + 1) for c in range(len(wanted))])
+        return out
     todo = {position: c for c, position in enumerate(positions(terms, wanted))}
     for term, group in blocks_of_cables(terms, todo):
         block = by_wrench.block(shifted(terms, term, group))
@@ -152,15 +162,25 @@ class _ByWrench:
     def by_length(self) -> Array:
         return length_sensitivities(self.at)
 
-    def column(self, shift: Shift) -> Array:
-        """Derivative of the readings (n, 6 + m) by the shifted parameter."""
+    @cached_property
+    def way(self) -> _Way:
+        """The way through the rows, for what depends on the rows before."""
+        return _Way.of(self.experiment, self.at, self.terms)
+
+    def column(self, shift: Shift, along: bool = False) -> Array:
+        """Derivative of the readings (n, 6 + m) by the shifted parameter.
+
+        ``along`` the way; where that is not asked, of effects with history alone.
+        """
         n, width = _shape(self.at)
         change = np.zeros((n, width))
         if shift.physical:
             sides = self._sides(shift)
-            if sides.of_history:
-                return _difference(self.experiment, shift, self.at)
-            change = self._physical(sides, shift.apart)
+            change = (
+                self.way.change(shift)
+                if along or sides.of_history
+                else self._physical(sides, shift.apart)
+            )
         if shift.sensing:
             return self._read(shift, change, shift.apart)
         return (self.read_rates @ change[..., None])[..., 0] if self.sensing else change
@@ -235,12 +255,16 @@ def motion_of(at: Prediction) -> Array:
 
 
 def _motion_columns(at: Prediction) -> Array:
-    tables = at.tables
+    return _motion_at(at.tables, at.found)
+
+
+def _motion_at(tables: Tables, found: statics.Evaluation) -> Array:
     if tables.screws.shape[1] == 0:
         return np.diag(1.0 / np.repeat([1.0, tables.length], 3))[None]
-    screws = statics.joints_at_rest(at.tables, at.found)
+    screws = statics.joints_at_rest(tables, found)
     per = np.where(screws[..., 0] == 1.0, 1.0 / tables.length, 1.0)
-    return motion_columns(screws, at.pose[:, :3]) * per[:, None, :]
+    origin = statics.platform_poses(tables, found.deviation)[:, :3]
+    return motion_columns(screws, origin) * per[:, None, :]
 
 
 def with_inverse(at: Prediction, inverse: Array) -> Prediction:
@@ -252,10 +276,14 @@ def with_inverse(at: Prediction, inverse: Array) -> Prediction:
 
 
 def _inverse_stiffness(at: Prediction) -> Array:
+    return _inverse_of(at.tables, at.found)
+
+
+def _inverse_of(tables: Tables, found: statics.Evaluation) -> Array:
     """Inverse of the stiffness of each row; of what is stiff, where a row is singular."""
-    stiffness = statics.stiffness(at.tables, at.found)
+    stiffness = statics.stiffness(tables, found)
     whole = np.where(np.isfinite(stiffness), stiffness, 0.0)
-    solved = at.solved
+    solved = found.solved
     # a stable row's stiffness is far from singular, and inverting takes a fifth of the time
     if solved.all():
         return np.asarray(np.linalg.inv(whole))
@@ -265,33 +293,54 @@ def _inverse_stiffness(at: Prediction) -> Array:
     return out
 
 
-def _by_walking(experiment: Experiment, terms: Terms, at: Prediction, wanted: list[int]) -> Array:
-    out = np.zeros((*_shape(at), len(wanted)))
-    where = positions(terms, wanted)
+@dataclass(frozen=True, eq=False)
+class _Way:
+    """The way through the rows of a prediction: N waypoints, walked and not walked again.
 
-    def run(part: slice) -> None:
-        for c in range(*part.indices(len(where))):
-            term, k = where[c]
-            out[..., c] = _difference(experiment, shifted(terms, term, k, _WALK), at)
+    Attributes:
+        experiment: robot and commands.
+        tables, found: of the waypoints; the columns of the past are not filled.
+        inverse: (N, d, d) of the stiffness there. motion: (N, 6, d), see motion_of; (1, 6, d) where
+            it is the same everywhere.
+    """
 
-    # one walk cannot be parted where creep goes by one clock: the walks are
-    run_parts(run, [slice(c, c + 1) for c in range(len(where))])
-    return out
+    experiment: Experiment
+    tables: Tables
+    found: statics.Evaluation
+    inverse: Array
+    motion: Array
+
+    @classmethod
+    def of(cls, experiment: Experiment, at: Prediction, terms: Terms) -> _Way:
+        found = _walk_of(experiment, at, terms)
+        setup = experiment.setup(terms.effects, experiment.path.commands)
+        tables = assemble(setup, found.states[..., STRAIN])
+        return cls(experiment, tables, found, _inverse_of(tables, found), _motion_at(tables, found))
+
+    def change(self, shift: Shift) -> Array:
+        """Derivative of pose and tensions (n, 6 + m) by the shifted parameter."""
+        path = self.experiment.path
+        ahead = self.experiment.setup(shift.plus.effects, path.commands)
+        behind = self.experiment.setup(shift.minus.effects, path.commands)
+        sides = Sides(ahead, behind, ahead.differs(behind))
+        plus, minus = sides.tables(self.tables, self.found.states[..., STRAIN])
+        step, tension = statics.change_of_walk(plus, minus, path, self.found, self.inverse)
+        change = np.concatenate([(self.motion @ step[..., None])[..., 0], tension], axis=1)
+        return np.asarray(change[path.rows] / shift.apart)
 
 
-def _difference(experiment: Experiment, shift: Shift, at: Prediction) -> Array:
-    """Difference of two predictions that are solved in full."""
-    near, sides = None if at.has_history else at, (shift.plus.effects, shift.minus.effects)
-    both: dict[int, Prediction] = {}
+def _walk_of(experiment: Experiment, at: Prediction, terms: Terms) -> statics.Evaluation:
+    """Where the waypoints come to rest with the terms, kept where the rows do as at the prediction.
 
-    def run(part: slice) -> None:
-        both[part.start] = experiment.predict(sides[part.start], near)
-
-    run_parts(run, [slice(0, 1), slice(1, 2)])
-    ahead, behind = both[0], both[1]
-    change = readings_difference(ahead.readings, behind.readings) / shift.apart
-    change[~(ahead.solved & behind.solved)] = 0.0
-    return np.asarray(change)
+    An effect at its null may have a shape that matters: cable behind the exit point.
+    """
+    setup = experiment.setup(terms.effects)
+    other = at.setup.differs(setup)
+    if other and (setup.has_history or not other <= OF_SHAPE):
+        return experiment.walk(terms.effects)[1]
+    if at.walk is None:
+        at.walk = experiment.walk(terms.effects)[1]
+    return at.walk
 
 
 def readings_difference(a: Readings, b: Readings) -> Array:

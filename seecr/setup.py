@@ -126,7 +126,7 @@ class Setup:
         "by which the paid-out cable has grown", "", ("rows", "cables"), 1.0, paid_out=True
     )
     backlash: Array = quantity(
-        "play between motor and drum", "m", ("cables",), history=History.GIVES
+        "play between motor and drum", "m", ("cables",), paid_out=True, history=History.GIVES
     )
     ea: Array = quantity("E S", "N", ("cables",), "ea", column=columns.EA)
     quadratic: Array = quantity(

@@ -23,6 +23,8 @@ _CENTRAL, _ONE_SIDED = 1e-4, 1e-5
 _PAID_OUT = {name for name, item in QUANTITIES.items() if item.paid_out}
 # Quantities whose change asks for the whole way to be solved again.
 _OF_HISTORY = {name for name, item in QUANTITIES.items() if item.history is not History.NONE}
+# Quantities that mean nothing where nothing has history.
+OF_SHAPE = {name for name, item in QUANTITIES.items() if item.history is History.SHAPES}
 
 
 @dataclass(frozen=True, eq=False)

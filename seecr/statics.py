@@ -22,9 +22,17 @@ from seecr.compiled.columns import (
 )
 from seecr.compiled.descent import STIFF, solve_batch
 from seecr.compiled.joints import place_batch
-from seecr.compiled.outcomes import CABLE_LAW, CONVERGED, IDLE, ITERATIONS, STALLED
+from seecr.compiled.outcomes import (
+    CABLE_LAW,
+    CONVERGED,
+    IDLE,
+    ITERATIONS,
+    SINGULAR,
+    STALLED,
+    TOLERANCE,
+)
 from seecr.compiled.platform import add_skew, evaluate_batch
-from seecr.compiled.walk import walk_in_order
+from seecr.compiled.walk import change_on_the_way, walk_in_order
 from seecr.path import Path
 from seecr.pose import Array, quat_conjugate, quat_multiply
 from seecr.tables import Tables, take
@@ -46,6 +54,16 @@ class Evaluation:
     values: Array  # (n, d) joint values less the commanded ones, hinges times length
     guess: Array  # (n, m, 3) catenaries
     energy: Array
+
+    @property
+    def solved(self) -> NDArray[np.bool_]:
+        """(n,) rows in a stable equilibrium."""
+        return np.asarray((self.outcome == CONVERGED) & (self.residual < TOLERANCE))
+
+    @property
+    def at_rest(self) -> NDArray[np.bool_]:
+        """(n,) rows at rest, those among them that are free to move along some direction."""
+        return np.asarray((self.outcome == CONVERGED) | (self.outcome == SINGULAR))
 
     @classmethod
     def empty(cls, n: int, m: int, d: int) -> Evaluation:
@@ -146,8 +164,6 @@ def walk(tables: Tables, path: Path, limit: int) -> Evaluation:
     n, m = tables.cables.shape[:2]
     out = Evaluation.empty(n, m, tables.n_dof)
     out.energy = np.full(n, np.nan)
-    creeps = bool(np.any(tables.cables[..., CREEP_PART]))
-    edges = [*np.flatnonzero(path.new_clock if creeps else path.fresh).tolist(), n]
 
     def run(part: slice) -> None:
         walk_in_order(
@@ -158,8 +174,39 @@ def walk(tables: Tables, path: Path, limit: int) -> Evaluation:
             out.slopes[part], out.deviation[part], out.values[part], out.guess[part],
         )  # fmt: skip
 
-    run_parts(run, [slice(a, b) for a, b in pairwise(edges)])
+    run_parts(run, _apart(path, tables))
     return out
+
+
+def _apart(path: Path, *tables: Tables) -> list[slice]:
+    """Waypoints that nothing of those before goes with."""
+    creeps = any(np.any(one.cables[..., CREEP_PART]) for one in tables)
+    starts = np.flatnonzero(path.new_clock if creeps else path.fresh).tolist()
+    return [slice(a, b) for a, b in pairwise([*starts, len(path.source)])]
+
+
+def change_of_walk(
+    plus: Tables, minus: Tables, path: Path, at: Evaluation, inverse: Array
+) -> tuple[Array, Array]:
+    """Steps (N, d) [m] and tensions (N, m) of a walk under ``plus`` less those under ``minus``.
+
+    Args:
+        plus, minus: tables of the N waypoints.
+        path: their way.
+        at: where a walk between the two came to rest; nothing is solved.
+        inverse: (N, d, d) [m/N] of the stiffness there.
+    """
+    n, m = plus.cables.shape[:2]
+    step, tension = np.empty((n, plus.n_dof)), np.empty((n, m))
+    solved = at.at_rest
+    for part in _apart(path, plus, minus):
+        change_on_the_way(
+            plus.cables[part], minus.cables[part], plus.load[part], minus.load[part],
+            plus.poses[part], plus.screws[part], at.deviation[part], at.values[part],
+            at.slopes[part], plus.length, at.guess[part], inverse[part], path.fresh[part],
+            path.elapsed[part], solved[part], step[part], tension[part],
+        )  # fmt: skip
+    return step, tension
 
 
 def change(plus: Tables, minus: Tables, at: Evaluation) -> tuple[Array, Array]:

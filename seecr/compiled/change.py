@@ -28,25 +28,25 @@ from seecr.compiled.rotation import rotated_less
 
 
 @jit_allocating
-def _make_space(joints):
+def make_change_space(joints):
     """Scratch: made once for a batch."""
     return (
         np.empty(7), np.zeros((joints, 7)), np.empty((joints, 6)), np.empty(3), np.empty(3),
         np.empty(3), np.empty(3), np.empty((3, 3)), np.empty(3), np.empty(N_STATE),
-        np.empty((N_WORK, 6)), np.empty(6),
+        np.empty((N_WORK, 6)), np.empty(6), np.empty(7), np.zeros(6),
     )  # fmt: skip
 
 
 @jit_inner
-def _differ(a, b):
-    differ = False
+def differ(a, b):
+    found = False
     for c in range(a.shape[0]):
-        differ = differ or a[c] != b[c]
-    return differ
+        found = found or a[c] != b[c]
+    return found
 
 
 @jit_inner
-def _place(screws, values, length, pose, deviation, space):
+def place_platform(screws, values, length, pose, deviation, space):
     """Fill the space with where the platform is, and its joints."""
     place, current, columns = space[0], space[1], space[2]
     copy_vector(deviation, place)
@@ -78,11 +78,10 @@ def _take_force(ax, ay, az, fx, fy, fz, per, gradient):
 
 
 @jit_inner
-def _add_pull(sign, row, pose, up, per, guess, space):
+def add_pull(sign, row, pose, up, per, guess, space):
     """Add what a cable does to the gradient (6,), times a sign; returns that of its tension."""
-    place, _current, _columns, start, move, keep, force, stiffness, slope, state, work, gradient = (
-        space
-    )
+    place, start, move, keep = space[0], space[3], space[4], space[5]
+    force, stiffness, slope, state, work, gradient = space[6:12]
     a, b, c, dx, dy, dz = _moved_arm(row[ANCHOR : ANCHOR + 3], pose, place)
     start[0], start[1], start[2] = pose[0] + a, pose[1] + b, pose[2] + c
     move[0], move[1], move[2] = place[0] + dx, place[1] + dy, place[2] + dz
@@ -96,7 +95,7 @@ def _add_pull(sign, row, pose, up, per, guess, space):
 
 
 @jit_inner
-def _add_load(sign, load, pose, per, space):
+def add_load(sign, load, pose, per, space):
     """The same of the weight and the external wrench."""
     place, gradient = space[0], space[11]
     a, b, c, dx, dy, dz = _moved_arm(load[CENTRE_OF_MASS : CENTRE_OF_MASS + 3], pose, place)
@@ -108,7 +107,7 @@ def _add_load(sign, load, pose, per, space):
 
 
 @jit_inner
-def _put_gradient(space, out):
+def put_gradient(space, out):
     """The gathered gradient, as a platform on joints feels it, into ``out`` (d,)."""
     columns, gradient = space[2], space[11]
     if columns.shape[0] == 0:
@@ -127,22 +126,22 @@ def change_at_rest(
     All outputs are filled.
     """
     n, m = plus.shape[:2]
-    space, per = _make_space(screws.shape[1]), 1.0 / length
+    space, per = make_change_space(screws.shape[1]), 1.0 / length
     for r in range(n):
         space[11][:] = 0.0
-        _place(screws[r], values[r], length, poses[r], deviation[r], space)
+        place_platform(screws[r], values[r], length, poses[r], deviation[r], space)
         up, down = plus_load[r, UP:], minus_load[r, UP:]
-        turned = _differ(up, down)
+        turned = differ(up, down)
         for i in range(m):
             tension[r, i] = 0.0
-            if turned or _differ(plus[r, i], minus[r, i]):
-                ahead = _add_pull(1.0, plus[r, i], poses[r], up, per, guess[r, i], space)
-                behind = _add_pull(-1.0, minus[r, i], poses[r], down, per, guess[r, i], space)
+            if turned or differ(plus[r, i], minus[r, i]):
+                ahead = add_pull(1.0, plus[r, i], poses[r], up, per, guess[r, i], space)
+                behind = add_pull(-1.0, minus[r, i], poses[r], down, per, guess[r, i], space)
                 tension[r, i] = ahead + behind
-        if _differ(plus_load[r], minus_load[r]):
-            _add_load(1.0, plus_load[r], poses[r], per, space)
-            _add_load(-1.0, minus_load[r], poses[r], per, space)
-        _put_gradient(space, gradient[r])
+        if differ(plus_load[r], minus_load[r]):
+            add_load(1.0, plus_load[r], poses[r], per, space)
+            add_load(-1.0, minus_load[r], poses[r], per, space)
+        put_gradient(space, gradient[r])
 
 
 @jit_allocating
@@ -154,13 +153,13 @@ def change_of_each_cable(
     The load is taken to be the same in both.
     """
     n, m = plus.shape[:2]
-    space, per = _make_space(screws.shape[1]), 1.0 / length
+    space, per = make_change_space(screws.shape[1]), 1.0 / length
     for r in range(n):
-        _place(screws[r], values[r], length, poses[r], deviation[r], space)
+        place_platform(screws[r], values[r], length, poses[r], deviation[r], space)
         up = load[r, UP:]
         for i in range(m):
             space[11][:] = 0.0
-            ahead = _add_pull(1.0, plus[r, i], poses[r], up, per, guess[r, i], space)
-            behind = _add_pull(-1.0, minus[r, i], poses[r], up, per, guess[r, i], space)
+            ahead = add_pull(1.0, plus[r, i], poses[r], up, per, guess[r, i], space)
+            behind = add_pull(-1.0, minus[r, i], poses[r], up, per, guess[r, i], space)
             tension[r, i] = ahead + behind
-            _put_gradient(space, gradient[r, i])
+            put_gradient(space, gradient[r, i])

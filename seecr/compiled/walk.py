@@ -1,49 +1,31 @@
-"""Rows that depend on the rows before them: waypoints solved in order, the cables' state carried.
-
-Hysteresis and friction start anew with each run. Creep alone goes by the clock.
-"""
+"""Rows that depend on those before: waypoints solved in order, the cables' state carried."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from seecr.compiled.algebra import copy_vector
-from seecr.compiled.columns import (
-    CREEP,
-    CREEP_PART,
-    CREEP_RATE,
-    CREEP_TIME,
-    EA,
-    FRICTION,
-    HYSTERESIS,
-    HYSTERESIS_BEFORE,
-    HYSTERESIS_NOW,
-    REST,
-    STRAIN,
-    STRETCH_BEFORE,
-    STUCK,
-    TENSION,
-    WINCH_SIDE,
-    WINCH_TENSION,
+from seecr.compiled.change import (
+    add_load,
+    add_pull,
+    differ,
+    make_change_space,
+    place_platform,
+    put_gradient,
 )
+from seecr.compiled.columns import FRICTION, HYSTERESIS, UP
 from seecr.compiled.descent import make_space, solve_in_stages
 from seecr.compiled.jit import jit_allocating, jit_inner
-from seecr.compiled.law import strain_of_tension
 from seecr.compiled.outcomes import CONVERGED, SINGULAR, STALLED
-
-
-@jit_inner
-def _shares(span):
-    """What a load linear in time leaves of itself after ``span`` time constants.
-
-    Of its value before and now: the convolution of a ramp with exp(-t); the rest, exp(-span),
-    is left of the creep there was.
-    """
-    if span < 1e-3:
-        before = span / 2 - span**2 / 3 + span**3 / 8
-        return before, span / 2 - span**2 / 6 + span**3 / 24
-    mean = -np.expm1(-span) / span
-    return mean - np.exp(-span), 1.0 - mean
+from seecr.compiled.past import (
+    N_KEPT,
+    begin,
+    has_stretch_memory,
+    keep_past,
+    keep_tension,
+    take_past,
+)
+from seecr.compiled.steps import advance
 
 
 @jit_allocating
@@ -64,8 +46,7 @@ def walk_in_order(
     n, m = cables.shape[0], cables.shape[1]
     softened = np.empty_like(cables[0])
     start, first = np.zeros(7), np.zeros(gradient.shape[1])
-    crept, stretched = np.zeros(m), np.zeros(m)
-    amplitude, friction = np.empty(m), np.empty(m)
+    kept, amplitude, friction = np.zeros((m, N_KEPT)), np.empty(m), np.empty(m)
     space = make_space(m, gradient.shape[1], screws.shape[1])
     lost = False
     for k in range(n):
@@ -83,23 +64,7 @@ def walk_in_order(
         for i in range(m):
             row = cables[k, i]
             amplitude[i], friction[i] = row[HYSTERESIS], row[FRICTION]
-            before, now = _shares(elapsed[k] / row[CREEP_TIME])
-            share = row[CREEP_PART] / row[EA]
-            row[CREEP] = crept[i] * (1.0 - before - now)
-            if fresh[k]:
-                # waits at the reference pose, history cleared
-                row[CREEP_RATE] = share * (before + now)
-                row[HYSTERESIS], row[FRICTION] = 0.0, 0.0
-                continue
-            row[CREEP] += share * before * states[k - 1, i, TENSION]
-            row[CREEP_RATE] = share * now
-            row[STRETCH_BEFORE], row[HYSTERESIS_BEFORE] = (
-                stretched[i],
-                states[k - 1, i, HYSTERESIS_NOW],
-            )
-            if row[WINCH_SIDE] > 0.0:
-                paid = row[REST] - cables[k - 1, i, REST]
-                row[STUCK] = states[k - 1, i, WINCH_TENSION] - paid * row[EA] / row[WINCH_SIDE]
+            take_past(row, kept[i], elapsed[k], fresh[k])
         outcome[k], count[k], residual[k] = solve_in_stages(
             cables[k], load[k], poses[k], screws[k], start, first, length, scale[k], radius,
             reach[k], limit, guess[k], gradient[k], hessian[k], states[k], slopes[k],
@@ -108,17 +73,128 @@ def walk_in_order(
         lost = outcome[k] != CONVERGED and outcome[k] != SINGULAR
         for i in range(m):
             row = cables[k, i]
-            crept[i] = row[CREEP] + row[CREEP_RATE] * states[k, i, TENSION]
-            strain = states[k, i, STRAIN]
-            if states[k, i, TENSION] == 0.0:
-                # a slack cable keeps the stretch and the friction at which its tension ended
-                strain, _slope, friction_now = strain_of_tension(row, 0.0)
-                if not fresh[k] and strain * row[REST] >= stretched[i]:
-                    strain, friction_now = stretched[i] / row[REST], row[HYSTERESIS_BEFORE]
-                states[k, i, HYSTERESIS_NOW] = friction_now
-            stretched[i] = max(strain, 0.0) * row[REST]
+            keep_past(row, states[k, i], fresh[k], kept[i])
             if fresh[k]:
                 row[HYSTERESIS], row[FRICTION] = amplitude[i], friction[i]
-                row[STRETCH_BEFORE], row[HYSTERESIS_BEFORE] = stretched[i], 0.0
-                row[STUCK] = states[k, i, WINCH_TENSION]
-                states[k, i, HYSTERESIS_NOW] = 0.0
+                begin(row, kept[i])
+
+
+@jit_inner
+def _pull_side(
+    table, load, part, pose, screws, deviation, values, length, guess, elapsed, fresh, side, space
+):
+    """What the cables of one side pull, a part of a step from where the walk came to rest.
+
+    Args:
+        table, load: of that side. part: (d,) [m].
+        side: rows with their past, what they kept, tensions, gradient; all but kept are filled.
+    """
+    rows, kept, pulls, gradient = side
+    advance(deviation, values, part, length, screws, pose, space[12], space[13], space[1])
+    place_platform(screws, space[13], length, pose, space[12], space)
+    space[11][:] = 0.0
+    for i in range(table.shape[0]):
+        copy_vector(table[i], rows[i])
+        take_past(rows[i], kept[i], elapsed, fresh)
+        pulls[i] = add_pull(1.0, rows[i], pose, load[UP:], 1.0 / length, guess[i], space)
+    add_load(1.0, load, pose, 1.0 / length, space)
+    put_gradient(space, gradient)
+
+
+@jit_inner
+def _keep_side(
+    table, load, part, more, slopes, pose, screws, deviation, values, length, guess, fresh, side,
+    space,
+):  # fmt: skip
+    """Keep what the cables of one side need for the next row, where that side is.
+
+    Args:
+        part: (d,) [m] of that from where the walk came to rest. more: from where it pulled.
+        side: as that left it; tensions are brought there.
+    """
+    rows, kept, pulls, _gradient = side
+    placed = False
+    for i in range(table.shape[0]):
+        if not has_stretch_memory(table[i]):
+            for a in range(more.shape[0]):
+                pulls[i] += slopes[i, a] * more[a]
+            keep_tension(rows[i], pulls[i], kept[i])
+            continue
+        if not placed:
+            advance(deviation, values, part, length, screws, pose, space[12], space[13], space[1])
+            place_platform(screws, space[13], length, pose, space[12], space)
+            placed = True
+        pulls[i] = add_pull(1.0, rows[i], pose, load[UP:], 1.0 / length, guess[i], space)
+        keep_past(rows[i], space[9], fresh, kept[i])
+
+
+@jit_inner
+def _stands_still(poses, load, k):
+    """Whether the command and the load of a row are those of the row before."""
+    return k > 0 and not (differ(poses[k], poses[k - 1]) or differ(load[k], load[k - 1]))
+
+
+@jit_allocating
+def change_on_the_way(
+    plus, minus, plus_load, minus_load, poses, screws, deviation, values, slopes, length, guess,
+    inverse, fresh, elapsed, solved, step, tension,
+):  # fmt: skip
+    """How the rests of a walk differ between tables that differ little; nothing is solved.
+
+    Forward through the rows: at each the two sides start from what their cables kept, the wrench
+    by which they differ there moves the platform by the implicit function theorem, and each side
+    keeps what its cables come to where it then is. The wrench is asked where the walk came to
+    rest; where the platform stands still, as far apart as at the row before: there no cable turns
+    round on either side, and the stiffness holds.
+
+    Args:
+        plus, minus: (N, m, N_COLUMNS), the columns OF_THE_PAST do not count.
+        deviation, values: (N, 7), (N, d) where the walk between them came to rest.
+        slopes, inverse: (N, m, d), (N, d, d) of the tensions, of the stiffness there.
+        solved: (N,) rows of the walk; others end their run, and do not change.
+        step: (N, d) [m] in the loop's coordinates, of plus less minus, filled.
+        tension: (N, m) [N], the same, filled.
+    """
+    n, m, d = plus.shape[0], plus.shape[1], step.shape[1]
+    ahead = (np.empty_like(plus[0]), np.zeros((m, N_KEPT)), np.zeros(m), np.zeros(d))
+    behind = (np.empty_like(plus[0]), np.zeros((m, N_KEPT)), np.zeros(m), np.zeros(d))
+    space, half, more = make_change_space(screws.shape[1]), np.zeros(d), np.zeros(d)
+    lost = False
+    for k in range(n):
+        still = not fresh[k] and not lost and _stands_still(poses, plus_load, k)
+        lost = (lost and not fresh[k]) or not solved[k]
+        step[k] = 0.0
+        tension[k] = 0.0
+        if lost:
+            continue
+        for a in range(d):
+            half[a] = 0.5 * step[k - 1, a] if still else 0.0
+        _pull_side(
+            plus[k], plus_load[k], half, poses[k], screws[k], deviation[k], values[k], length,
+            guess[k], elapsed[k], fresh[k], ahead, space,
+        )  # fmt: skip
+        _pull_side(
+            minus[k], minus_load[k], -half, poses[k], screws[k], deviation[k], values[k], length,
+            guess[k], elapsed[k], fresh[k], behind, space,
+        )  # fmt: skip
+        for a in range(d):
+            more[a] = 0.0
+            for b in range(d):
+                more[a] -= 0.5 * inverse[k, a, b] * (ahead[3][b] - behind[3][b])
+            half[a] += more[a]
+            step[k, a] = 2.0 * half[a]
+        _keep_side(
+            plus[k], plus_load[k], half, more, slopes[k], poses[k], screws[k], deviation[k],
+            values[k], length, guess[k], fresh[k], ahead, space,
+        )  # fmt: skip
+        _keep_side(
+            minus[k], minus_load[k], -half, -more, slopes[k], poses[k], screws[k], deviation[k],
+            values[k], length, guess[k], fresh[k], behind, space,
+        )  # fmt: skip
+        for i in range(m):
+            tension[k, i] = ahead[2][i] - behind[2][i]
+            lost = lost or not np.isfinite(tension[k, i])
+        if lost:
+            # a cable's own equations: nothing is known from here on
+            step[k] = 0.0
+            tension[k] = 0.0

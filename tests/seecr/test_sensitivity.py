@@ -136,3 +136,35 @@ def test_the_planes_of_hanging_cables_tilt_with_gravity() -> None:
     at = experiment.predict(terms.effects)
     worst, whose = worst_mismatch(experiment, terms, sensitivities(experiment, terms, at))
     assert worst < 1e-4, whose
+
+
+def test_a_platform_that_stands_still_turns_no_cable_round() -> None:
+    """Where nothing moves a cable is stiff either way, by different amounts."""
+    robot = robot_of("demobot_cogiro")
+    poses = random_poses(np.random.default_rng(3), robot, 3)[[0, 1, 1, 1, 2]]
+    experiment = Experiment(robot, Commands(poses, run=np.zeros(5, dtype=np.int64)))
+    rng = np.random.default_rng(2)
+    names = ("hysteresis", "exit_friction", "pulley_radius", "centre_of_mass", "drum_gain")
+    terms = Terms(random_term(rng, experiment, name) for name in names)
+    at = experiment.predict(terms.effects)
+    assert np.abs(at.pose[1] - at.pose[3]).max() < 1e-12
+    worst, whose = worst_mismatch(experiment, terms, sensitivities(experiment, terms, at))
+    assert worst < 1e-4, whose
+
+
+def test_friction_that_is_not_there_yet_has_its_cable_behind_the_exit_point() -> None:
+    """Beside another effect with history, whose way was walked without that cable."""
+    experiment = experiment_of("demobot_parallel", seed=3)
+    layout = layout_of(effect_named("exit_friction"), experiment.robot)
+    term = Term(layout, layout.start(layout.effect.shapes(experiment.setup([]))[-1]))
+    creep = random_term(np.random.default_rng(1), experiment, "creep")
+    terms = Terms([creep, term])
+    at = experiment.predict([creep.effect()])
+    column = terms.part("exit_friction").start
+    found = sensitivities(experiment, terms, at, columns=[column], frozen=True)[..., 0]
+    step = 1e-4 * layout.scale[0]
+    vector = term.vector.copy()
+    vector[0] = step
+    both = [experiment.predict([creep.effect(), layout.build(v)]) for v in (vector, term.vector)]
+    full = readings_difference(both[0].readings, both[1].readings) / step
+    assert found[:, :3] == pytest.approx(full[:, :3], abs=1e-3 * np.abs(full[:, :3]).max())
