@@ -23,8 +23,9 @@ from seecr.model import Model
 from seecr.pose import Array
 from seecr.result import Record, Result
 
-# A parameter that is not known better than this part of its plausible size is the prior's.
-_UNSEEN = 0.98
+# A parameter that is not known better than this part of its plausible size is the prior's; an
+# effect of such parameters is left out if what it does to all readings is less than this of chi2.
+_UNSEEN, _NOTHING = 0.98, 1e-2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -171,15 +172,19 @@ def _result(found: Calibration, before: Terms, notes: tuple[str, ...], basis: Mo
 
 
 def _fitted(found: Calibration, covariance: Array, before: Terms) -> tuple[Fitted, ...]:
-    """The effects of which the data see something, and those that were there."""
-    error = np.sqrt(np.diag(covariance))
+    """The effects of which the data see something, and those that were there.
+
+    One that others can stand in for may be known no better than before, and still do much.
+    """
+    error, joint = np.sqrt(np.diag(covariance)), found.joint
     fixed = found.terms.knowledge.fixed
     free = error > 0.0
     out = []
     for term in found.terms:
         part = found.terms.part(term.name)
         seen = np.any(free[part] & (error[part] < _UNSEEN * term.layout.scale))
-        if seen or term.name in before:
+        does = np.sum((joint.jacobian[:, part] @ joint.z[part]) ** 2) > _NOTHING
+        if seen or does or term.name in before:
             stderr = np.where(free[part] | fixed[part], error[part], np.inf)
             out.append(Fitted(term, stderr, ~free[part] & ~fixed[part]))
     return tuple(out)

@@ -13,9 +13,10 @@ from crosscheck.calibration.all_effects import Calibration, fit_all_effects
 from crosscheck.calibration.joint import cost
 from crosscheck.calibration.leave_out import surprise_of, without
 from crosscheck.calibration.linearised import Linear
+from crosscheck.calibration.result import calibrate
 from crosscheck.fit.held_out import blocks_of
 from crosscheck.fit.prepare import prepare
-from crosscheck.fit.problem import Problem
+from crosscheck.fit.problem import Problem, rms_by_kind
 from crosscheck.fit.registration import registered
 from crosscheck.fit.state import evaluate
 from crosscheck.measurements.data import Measurements
@@ -64,6 +65,18 @@ def test_many_small_errors_are_fitted_together_and_predict_elsewhere() -> None:
     state = evaluate(elsewhere, found.terms, elsewhere.noise(elsewhere.experiment.predict()))
     assert np.sqrt(np.mean(state.raw[:, :3] ** 2)) < 1.5 * SIGMA.position_m
     assert float(np.max(found.held_out.surprise)) < 2.0
+
+
+def test_what_is_left_out_of_the_model_does_nothing() -> None:
+    """Of a mass beside soft cables the data know no more than before: it still carries much."""
+    data = measured(ROBOT, [term(ROBOT, "stiffness", factor=0.3)], points=6, seed=1)
+    found = calibrate(ROBOT, data)
+    problem = problem_of(data)
+    factor = problem.noise(problem.experiment.predict())
+    rms = rms_by_kind(problem, evaluate(problem, found.terms, factor).raw)
+    assert rms["position_rms_m"] == pytest.approx(found.after["position_rms_m"], rel=1e-3)
+    mass = next(one for one in found.fitted if one.term.name == "platform_mass")
+    assert mass.stderr > 0.98 * mass.term.layout.scale
 
 
 @pytest.mark.slow
