@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from crosscheck.calibration.catalogue import Catalogue
 from crosscheck.calibration.challenge import challenge
-from crosscheck.calibration.equals import EQUAL
+from crosscheck.calibration.equals import are_equals
 from crosscheck.calibration.exact import FEW, HOLLOW, Exact, Refit
 from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.later import inside, promising_beside
@@ -24,7 +24,7 @@ from seecr.effects import Terms
 _REFITTED, _WITHIN = 20, 12.0
 # Rounds of making the catalogue linear about the best set.
 ROUNDS = 4
-# Sets beside a large one that are fitted because they may be as good.
+# Sets beside the best one that are fitted because they may be as good.
 _BESIDE = 6
 # How often the best set is challenged, at most: a challenger that wins is challenged in turn.
 _CHALLENGES = 3
@@ -147,21 +147,31 @@ def about_given(
 
 
 def looked_about(exact: Exact, scores: Scores, best: Refit) -> tuple[Scores, Refit]:
-    """The best set of one with many members and those beside it, and scores about it.
+    """The best set of one and those beside it, and scores about it.
 
     What the search ends with was chosen about other sets, where a member may have mattered that
-    does not here; and of a set beside which none is fitted every member would be sure.
+    does not here; and among the best by linear evidence larger ones crowd out those in which
+    another effect stands in a member's place. Of a set beside which none is fitted every member
+    would be sure.
     """
-    while len(best.names - scores.always) > FEW:
-        near, least = scores.neighbours(best.names), scores.score(best.names) - EQUAL
-        beside = [n for n in near if len(n) <= len(best.names) and near[n] > least]
-        beside.sort(key=lambda n: (-near[n], sorted(n)))
-        better = exact.best_of(scores, beside[:_BESIDE])
+    while True:
+        better = exact.best_of(scores, _beside(exact, scores, best.names))
         if better.names == best.names:
-            break
+            return scores, best
         best = better
         scores = exact.scores_about(best.joint)
-    return scores, best
+
+
+def _beside(exact: Exact, scores: Scores, names: Names) -> list[Names]:
+    """Sets with one member less or exchanged that linear evidence holds for as good."""
+    near, own = scores.neighbours(names), scores.score(names)
+
+    def as_good(other: Names) -> bool:
+        gone, come = (sum(map(exact.size, some)) for some in (names - other, other - names))
+        return are_equals(own - near[other], gone, come)
+
+    some = [other for other in near if len(other) <= len(names) and as_good(other)]
+    return sorted(some, key=lambda other: (-near[other], sorted(other)))[:_BESIDE]
 
 
 def swapped(exact: Exact, scores: Scores, best: Refit) -> Refit:

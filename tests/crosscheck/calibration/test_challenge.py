@@ -145,10 +145,22 @@ def test_beside_a_large_set_others_are_fitted_before_its_members_are_sure() -> N
     assert frozenset("abdefgh") in exact.fitted  # d does with a and b what c does
 
 
-def test_beside_a_small_set_nothing_is_fitted_again() -> None:
+def test_beside_a_set_that_nothing_equals_nothing_is_fitted() -> None:
     exact = Linear(gram({"a": 2.0}))
     best = exact.fit(exact.scores, frozenset("a"))
     assert best is not None
     fitted = set(exact.fitted)
     assert looked_about(exact, exact.scores, best)[1] is best
     assert set(exact.fitted) == fitted
+
+
+def test_who_stands_in_a_members_place_is_fitted_whatever_larger_sets_there_are() -> None:
+    """A cable behind the exit point was sure where a frame that yields explained as well."""
+    exact = Linear(gram({"a": 2.0, "b": 2.0}, alike=True))
+    best = exact.fit(exact.scores, frozenset("ab"))
+    assert best is not None
+    _scores, best = looked_about(exact, exact.scores, best)
+    assert {frozenset("be"), frozenset("bf"), frozenset("ag"), frozenset("ah")} <= {*exact.fitted}
+    found = probabilities({n: r.score for n, r in exact.possible.items()}, best.names, NAMES)
+    assert set(next(c for c in found.members if "a" in c)) == set("aef")
+    assert found.effect["a"] < 0.7 and found.of("a") > 0.99
