@@ -84,8 +84,8 @@ def command(
     their line in POSES.csv. Where none has one, correction.json, which says why, is all.
 
     \b
-    Exit status: 0 all poses reached or replaced by the nearest, 2 bad input,
-    3 a pose without an answer, or one at which the platform does not come to rest.
+    Exit status: 0 all poses reached, or some and the others replaced by the nearest, 2 bad input,
+    3 a pose without an answer, one at which the platform does not come to rest, or none reached.
     """  # fmt: skip
     from seecr import InputFileError, correct, kept_chance
     from seecr.command_file import read_commands
@@ -116,7 +116,7 @@ def command(
                 tell("chances", 0.8)
             kept = None if own is None else kept_chance(machine, found.commands, own, **within)
             tell("corrected", 1.0)
-        status = 0 if found.stays.all() else 3
+        status = 0 if found.stays.all() and found.reached.any() else 3
         notes = [*(own.notes if own else ()), *wanted.notes, *tracker]
         made = made_by(machine.source, poses, model)
         document = {

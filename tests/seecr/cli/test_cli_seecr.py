@@ -265,6 +265,19 @@ def test_a_correction_without_answers_leaves_no_list_of_commands(tmp_path: Path)
     assert "more than 0.01 N" in row["why_not"]
 
 
+@pytest.mark.slow
+def test_a_correction_of_which_nothing_is_reached_is_no_success(tmp_path: Path) -> None:
+    """The nearest poses are written all the same; of some beside others that are, it is one."""
+    poses, out = tmp_path / "poses.csv", tmp_path / "out"
+    for rows, status in (("5,0,0.2\n", 3), ("5,0,0.2\n0.4,0.25,0.1\n", 0)):
+        poses.write_text("cmd_x_m,cmd_y_m,cmd_z_m\n" + rows)
+        got = run("correct", "demobot_cogiro", poses, "--out", out)
+        assert got.exit_code == status and "cannot be held" in got.stdout, got.output
+        document = json.loads((out / "correction.json").read_text())
+        assert document["exit_status"] == status
+        assert len((out / "corrected.csv").read_text().splitlines()) == 1 + rows.count("\n")
+
+
 @pytest.mark.parametrize("cable", ["0.001", "1e12"])
 def test_the_ends_of_what_a_cable_may_have_are_in(cable: str) -> None:
     assert robot_at(Path("demobot_cogiro"), cable).ea[0] == float(cable)
