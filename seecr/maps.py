@@ -90,7 +90,29 @@ class Workspace(Result):
     @property
     def feasible(self) -> NDArray[np.bool_]:
         """Where the pose can be held by tensions within the limits."""
-        return np.asarray(self.margin >= -1e-9 * load_scale(self.robot))
+        return _holds(self.robot, self.margin)
+
+    def crossings(self, poses: NDArray[np.bool_]) -> tuple[Array, Array]:
+        """Neighbours along the grid of which one is among some poses and the other is not.
+
+        Args:
+            poses: (nx, ny, nz) bool, such as ``feasible`` or ``likely(0.95)``.
+
+        Returns:
+            (k, 7) those that are, and (k, 7) those that are not: what :func:`boundary` takes.
+        """
+        number, inside = np.arange(poses.size).reshape(poses.shape), poses.ravel()
+        pairs = np.concatenate([
+            np.stack([np.delete(number, -1, k).ravel(), np.delete(number, 0, k).ravel()], axis=1)
+            for k in range(3)
+        ])  # fmt: skip
+        pairs = pairs[inside[pairs[:, 0]] != inside[pairs[:, 1]]]
+        pairs = np.where(inside[pairs[:, :1]], pairs, pairs[:, ::-1])
+        index = np.unravel_index(pairs, poses.shape)
+        places = np.stack([axis[k] for axis, k in zip(self.axes, index, strict=True)], axis=-1)
+        turned = np.broadcast_to(self.orientation, (*pairs.shape, 4))
+        both = np.concatenate([places, turned], axis=-1)
+        return both[:, 0], both[:, 1]
 
     @property
     def rests(self) -> NDArray[np.bool_]:
@@ -372,6 +394,11 @@ def _margins(
     return np.where(found.found & kept & found.solution.converged, 0.0, -np.inf)
 
 
+def _holds(robot: Robot, margin: Array) -> NDArray[np.bool_]:
+    """Whether margins [N] are those of poses that can be held, but for rounding."""
+    return np.asarray(margin >= -1e-9 * load_scale(robot))
+
+
 def _axis(name: str, values: ArrayLike) -> Array:
     axis = np.atleast_1d(finite(values, name))
     if axis.ndim != 1 or len(axis) == 0:
@@ -408,10 +435,12 @@ def boundary(
         (n, 7), the last poses found that can be held.
 
     Raises:
-        InputError: a pose that is not on the side it is said to be; a probability asked of
-            something without a covariance.
+        InputError: a pose that is not on the side it is said to be; a tolerance that is none; a
+            probability asked of something without a covariance.
     """
     robot = robot_of(robot)
+    if not 0.0 < tolerance < np.inf:
+        raise InputError(f"an edge's tolerance [m] must be above 0 and finite, got {tolerance:g}")
     effects = _read_once(effects, robot)
     near, far = commanded_poses(inside, "inside"), commanded_poses(outside, "outside")
 
@@ -419,7 +448,7 @@ def boundary(
         if at_least is not None:
             chance = asked_chance(robot, poses, effects, lowest, highest, wrenches)
             return np.asarray(chance >= at_least)
-        return _margins(robot, poses, lowest, highest, wrenches, effects) >= 0.0
+        return _holds(robot, _margins(robot, poses, lowest, highest, wrenches, effects))
 
     if not held(near).all() or held(far).any():
         raise InputError("boundary needs poses inside that can be held, and outside that cannot")

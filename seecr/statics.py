@@ -247,7 +247,7 @@ def change_by_cable(plus: Tables, minus: Tables, at: Evaluation) -> tuple[Array,
         )  # fmt: skip
 
     in_parts(run, n)
-    return _solved(np.swapaxes(gradient, 1, 2), tension, gradient.reshape(n, -1))
+    return _solved(np.swapaxes(gradient, 1, 2), tension, gradient.reshape(n, m * plus.n_dof))
 
 
 def _solved(gradient: Array, tension: Array, failed: Array) -> tuple[Array, Array]:

@@ -30,6 +30,7 @@ Examples:
   seecr map demobot_cogiro
   seecr map robot.xml --grid 0:0.8:81 0:0.5:51 0.1:0.3:3 --lowest 1 --highest 50
   seecr map robot.xml --model model.toml --lowest 1 --at-least 0.95
+  seecr map demobot_cogiro --lowest 0.1 --edge 0.0001
   seecr map robot.xml --wrench 1 0 0 0 0 0 --wrench -1 0 0 0 0 0 --model model.toml
 """,
 )
@@ -57,6 +58,12 @@ Examples:
     metavar="P",
     help="Also where poses can be held with that probability, by the model's covariance.",
 )
+@click.option(
+    "--edge",
+    type=click.FloatRange(0.0, min_open=True),
+    metavar="M",
+    help="Also the edge of what can be held, found to so many metres between poses of the grid.",
+)
 @click.option("--no-elastic", is_flag=True, help="Only what can be held; quicker.")
 @picture_options
 @out_option("seecr-map")
@@ -71,6 +78,7 @@ def command(
     highest: float | None,
     wrenches: tuple[tuple[float, ...], ...],
     at_least: float | None,
+    edge: float | None,
     no_elastic: bool,
     figure: str,
     no_recording: bool,
@@ -83,7 +91,8 @@ def command(
     all tensions can stay [N]; the elastic map says, at each command, how far off the platform
     rests, how tilted, with how many slack cables, how stiff and in which direction softest.
     Robots with fewer cables than freedoms are mapped by position, their orientation solved. With
-    --at-least and a calibrated model, each pose has the probability that it can be held.
+    --at-least and a calibrated model, each pose has the probability that it can be held. The edge
+    is that of what can be held, with --at-least with that probability.
 
     Writes map.npz, map.json, a figure of slices and map.rrd.
 
@@ -92,11 +101,11 @@ def command(
     """  # fmt: skip
     import numpy as np
 
-    from seecr import InputError, default_axes, workspace_map
+    from seecr import InputError, boundary, default_axes, workspace_map
     from seecr.counted import counted
     from seecr.files import json_text, staged, write_text
     from seecr.report.figures import map_figure
-    from seecr.report.maps import likely_lines, softest_line, write_arrays
+    from seecr.report.maps import edge_line, likely_lines, softest_line, write_arrays
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
@@ -116,23 +125,34 @@ def command(
                 f"{np.inf if highest is None else highest:g} N balance the load at any of "
                 f"{counted(total, 'pose')}; expected another grid, orientation or wider limits"
             )
+        places = None
+        if edge is not None:
+            inside = found.feasible if at_least is None else found.likely(at_least)
+            places = boundary(
+                machine, *found.crossings(inside), tolerance=edge, lowest=lowest,
+                highest=np.inf if highest is None else highest, wrenches=wrenches or None,
+                effects=own or (), at_least=at_least,
+            )  # fmt: skip
         text = json_text({
             "made": made_by(machine.source, model), "exit_status": 0,
             **found.as_json(at_least),
+            "edge": None if places is None else {"tolerance_m": edge, "places": len(places)},
         })  # fmt: skip
         write_text(folder / "map.json", text + "\n")
-        write_arrays(folder / "map.npz", found)
+        write_arrays(folder / "map.npz", found, places)
         if figure != "none" and sum(len(axis) > 1 for axis in axes) > 1:
-            map_figure(folder / f"map.{figure}", found)
+            map_figure(folder / f"map.{figure}", found, edge=places)
         if not no_recording:
             # takes a second or two to import
             from seecr.recording.workspace import write_map_recording
 
-            write_map_recording(found, folder / "map.rrd")
+            write_map_recording(found, folder / "map.rrd", places)
     if as_json:
         click.echo(text)
         return 0
     lines = [*found.lines(), *softest_line(found), *likely_lines(found, at_least)]
+    if places is not None and edge is not None:
+        lines.append(edge_line(places, edge))
     tensions = ("--lowest", lowest) if lowest else ()
     most = () if highest is None else ("--highest", highest)
     then = following("crosscheck", "plan", robot, "--rows", 40, *tensions, *most)

@@ -9,6 +9,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from seecr.maps import Workspace
+from seecr.pose import Array
 from seecr.recording import colours, layout, shapes
 from seecr.recording.scene import LEGEND, ROOT, Scene, write_scale
 from seecr.recording.stream import recording_file
@@ -21,12 +22,13 @@ _MOST = 200_000
 _SURELY_NOT, _SURELY = 0.05, 0.95
 
 
-def write_map_recording(found: Workspace, path: str | Path) -> None:
+def write_map_recording(found: Workspace, path: str | Path, edge: Array | None = None) -> None:
     """Write the robot and the places at which its platform can be held.
 
     Args:
         found: the workspace.
         path: the ``.rrd`` file.
+        edge: (k, 7) poses at the edge of what can be held.
 
     Raises:
         InputFileError: the file cannot be written.
@@ -58,6 +60,10 @@ def write_map_recording(found: Workspace, path: str | Path) -> None:
         recording.always(f"{ROOT}/held", points)
         if found.chance is not None:
             recording.always(f"{ROOT}/unsure", _unsure(found, 0.004 * scene.size))
+        if edge is not None:
+            some = edge[:: 1 + len(edge) // _MOST, :3]
+            dots = rr.Points3D(some, radii=0.002 * scene.size, colors=colours.VERMILION)
+            recording.always(f"{ROOT}/edge", dots)
 
 
 def _unsure(found: Workspace, radius: float) -> rr.Points3D:

@@ -24,6 +24,8 @@ COLOURS = (
 )  # fmt: skip
 # What says which pose it is, where no coordinate does.
 _NUMBERS = ("line of the file", "pose, counted from 0")
+# Of the edge of what can be held.
+_EDGE = COLOURS[4]
 # A grid of more than this [m] is told in metres.
 _LARGE = 5.0
 # Letters of a title that fit into an inch.
@@ -158,7 +160,7 @@ def _slack(ax: Any, solution: Solution, at: Array, mark: dict[str, Any]) -> None
     ax.yaxis.get_major_locator().set_params(integer=True)
 
 
-def map_figure(path: Path, found: Workspace, most: int = 4) -> None:
+def map_figure(path: Path, found: Workspace, most: int = 4, edge: Array | None = None) -> None:
     """Slices of a workspace: what can be held, slack cables, deviation and tilt at rest.
 
     Where the map has probabilities, they come second.
@@ -167,6 +169,7 @@ def map_figure(path: Path, found: Workspace, most: int = 4) -> None:
         path: the file.
         found: the workspace, with two or three axes of more than one value.
         most: slices drawn; they lie across the last axis, or that with one value.
+        edge: (k, 7) poses at the edge of what can be held; those in a slice are dots on it.
 
     Raises:
         InputError: a grid that goes along fewer than two axes.
@@ -193,6 +196,8 @@ def map_figure(path: Path, found: Workspace, most: int = 4) -> None:
             shown = panel(found, row, *extents, slices)
             row[0].figure.colorbar(shown, ax=list(row), **_bar_of(panel, found))
             row[0].set_ylabel(f"{'xyz'[high]} [{unit}]")
+        if edge is not None:
+            _dots(axes, per_metre * edge[:, [wide, high]], _in_slices(found, edge, across, picked))
         for k, ax in zip(picked, axes[0], strict=True):
             ax.set_title(f"{'xyz'[across]} = {per_metre * found.axes[across][k]:.4g} {unit}")
         for ax in axes[-1]:
@@ -201,6 +206,20 @@ def map_figure(path: Path, found: Workspace, most: int = 4) -> None:
             words = "orange: the edge of what tensions within the limits can hold"
             words = textwrap.fill(words, int(_LETTERS * size[0]))
             axes[0, 0].figure.suptitle(words, fontsize=9)
+
+
+def _in_slices(found: Workspace, edge: Array, across: int, picked: Any) -> list[Any]:
+    """Which of the edge's poses lie in each of some slices: those between two poses of it."""
+    axis = found.axes[across]
+    near = 1e-9 * max(float(np.ptp(axis)), 1e-9)
+    return [np.abs(edge[:, across] - axis[k]) <= near for k in picked]
+
+
+def _dots(axes: Any, places: Array, slices: list[Any]) -> None:
+    """The edge's places (k, 2) on every panel of their slice."""
+    for row in axes:
+        for ax, own in zip(row, slices, strict=True):
+            ax.plot(*places[own].T, ".", color=_EDGE, markersize=2.5)
 
 
 Slices = list[NDArray[np.intp]]
@@ -270,7 +289,7 @@ def _colours(
     for k, (ax, value) in enumerate(zip(row, values, strict=True)):
         shown = ax.pcolormesh(x, y, value.T, vmin=low, vmax=high, cmap=colours, shading="nearest")
         if inside and _has_edge(inside[k]):
-            ax.contour(x, y, inside[k].T, levels=[0.0], colors="#D55E00", linewidths=1.2)
+            ax.contour(x, y, inside[k].T, levels=[0.0], colors=_EDGE, linewidths=1.2)
         ax.set_aspect("equal")
         ax.grid(False)
     return shown

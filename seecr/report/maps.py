@@ -11,9 +11,10 @@ import numpy as np
 from seecr.counted import counted
 from seecr.files import written
 from seecr.maps import Workspace
+from seecr.pose import Array
 from seecr.report.words import direction_words
 
-__all__ = ["likely_lines", "softest_line", "write_arrays"]
+__all__ = ["edge_line", "likely_lines", "softest_line", "write_arrays"]
 
 
 def likely_lines(found: Workspace, at_least: float | None) -> Iterator[str]:
@@ -35,15 +36,22 @@ def softest_line(found: Workspace) -> Iterator[str]:
         yield f"softest of them at x y z {place} mm: {way}, {found.stiffness[at]:.4g} N/m"
 
 
-def write_arrays(path: Path, found: Workspace) -> None:
-    """``map.npz``: axes, and everything that holds at the poses, (nx, ny, nz) each."""
+def edge_line(edge: Array, tolerance: float) -> str:
+    """How many places of the edge there are, and how well they are known."""
+    return f"its edge: {counted(len(edge), 'place')} between poses of the grid, to {tolerance:g} m"
+
+
+def write_arrays(path: Path, found: Workspace, edge: Array | None = None) -> None:
+    """``map.npz``: axes, what holds at the poses, (nx, ny, nz) each, and the edge's (k, 7)."""
     x, y, z = found.axes
     with written(path) as (part,), part.open("wb") as file:
-        likely: dict[str, Any] = {}
+        more: dict[str, Any] = {}
         if found.chance is not None:
-            likely["probability"] = found.chance
+            more["probability"] = found.chance
+        if edge is not None:
+            more["edge"] = edge
         np.savez_compressed(
-            file, **likely, x_m=x, y_m=y, z_m=z, orientation=found.orientation,
+            file, **more, x_m=x, y_m=y, z_m=z, orientation=found.orientation,
             margin_N=found.margin,
             feasible=found.feasible, deviation_m=found.deviation, rotation_rad=found.rotation,
             slack=found.slack, smallest_eigenvalue_N_per_m=found.stiffness,

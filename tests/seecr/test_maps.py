@@ -145,6 +145,25 @@ def test_the_boundary_is_where_the_margin_vanishes() -> None:
     assert found[0, 0] + found[1, 0] == pytest.approx(0.8, abs=1e-8)
     with pytest.raises(InputError, match="boundary needs poses inside that can be held"):
         boundary(robot, outside, inside)
+    for wrong in (0.0, np.nan, np.inf):
+        with pytest.raises(InputError, match="must be above 0 and finite, got"):
+            boundary(robot, inside, outside, tolerance=wrong)
+
+
+def test_the_edge_is_looked_for_between_neighbours_of_the_grid() -> None:
+    robot = robot_named("demobot_parallel")
+    x, y = np.linspace(0.05, 0.75, 8), np.linspace(0.1, 0.4, 5)
+    found = workspace_map(robot, x, y, [0.1, 0.2], elastic=False)
+    inside, outside = found.crossings(found.feasible)
+    assert len(inside) == sum(int(np.abs(np.diff(found.feasible, axis=k)).sum()) for k in range(3))
+    step = np.abs(outside[:, :3] - inside[:, :3])
+    assert np.count_nonzero(step > 1e-12, axis=1).tolist() == [1] * len(step)
+    assert tension_margin(robot, inside).min() > -1e-9 > tension_margin(robot, outside).max()
+    edge = boundary(robot, inside, outside, tolerance=1e-6)
+    assert np.all(np.abs(edge[:, :3] - inside[:, :3]) <= step + 1e-12)
+    out = 1e-6 * (outside - inside)[:, :3] / step.max(axis=1, keepdims=True)
+    beyond = np.concatenate([edge[:, :3] + out, edge[:, 3:]], axis=1)
+    assert tension_margin(robot, beyond).max() < 0.0 <= tension_margin(robot, edge).min() + 1e-9
 
 
 @pytest.mark.slow

@@ -67,6 +67,14 @@ def test_a_row_that_cannot_be_evaluated_changes_nothing() -> None:
     assert np.all(np.isfinite(force)) and np.all(np.abs(force[1:]).max(axis=1) > 0.0)
 
 
+def test_of_no_rows_nothing_changes() -> None:
+    tables, at = solved("demobot_cogiro")
+    none = np.zeros(0, dtype=np.intp)
+    some, there = take(tables, none), statics.take_evaluation(at, none)
+    force, tension = statics.change_by_cable(some, some, there)
+    assert force.shape == (0, 6, 8) and tension.shape == (0, 8)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_walk_of_cables_without_a_past_comes_to_rest_where_each_pose_does(kind: str) -> None:
     experiment = experiment_of(kind)

@@ -244,6 +244,10 @@ def test_map_writes_its_files_or_says_why_not(tmp_path: Path) -> None:
     result = run("map", "demobot_cogiro", *grid, "--out", out, "--json")
     assert result.exit_code == 0 and json.loads(result.stdout)["feasible"] == 6
     assert {file.name for file in out.iterdir()} == {"map.json", "map.npz", "map.png", "map.rrd"}
+    edge = run("map", "planar_vertical", "--edge", "0.001", "--no-elastic", "--out", out)
+    places = json.loads((out / "map.json").read_text())["edge"]["places"]
+    assert edge.exit_code == 0 and f"its edge: {places} places" in edge.output and places > 20
+    assert np.load(out / "map.npz")["edge"].shape == (places, 7)
     lost = run("map", "demobot_cogiro", *grid, "--lowest", "90", "--out", tmp_path / "lost")
     assert lost.exit_code == 2 and not (tmp_path / "lost").exists()
     assert "no pose of the grid can be held: no tensions from 90 to inf N" in lost.stderr
