@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -79,3 +81,37 @@ def test_effects_before_the_one_that_differs_edit_once() -> None:
     assert edits.by([a, c, b]).mass == setup.mass + 3.0
     assert edits.by([]).mass == setup.mass
     assert calls == ["a", "b", "c", "c", "b"]
+
+
+@dataclass(frozen=True, eq=False)
+class Adding(Effect):
+    """One that makes the platform heavier."""
+
+    added: float
+
+    def edit_setup(self, setup: Setup) -> None:
+        setup.mass = setup.mass + self.added
+
+
+def test_threads_may_ask_at_once() -> None:
+    """Derivatives along a way ask for each parameter's setup in threads of their own."""
+    base = plain()
+    edits = Edits(base)
+    pairs = [(Adding(float(k)), Adding(0.01 * k)) for k in range(8)]
+    wrong: list[float] = []
+
+    def ask(first: int) -> None:
+        for k in range(4_000):
+            one, other = pairs[(first + k) % 8], pairs[k % 8]
+            found = edits.by([one[0], other[1]]).mass - base.mass
+            if abs(found - one[0].added - other[1].added) > 1e-9:
+                wrong.append(found)
+
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(4) as pool:
+            list(pool.map(ask, range(4)))
+    finally:
+        sys.setswitchinterval(before)
+    assert not wrong
