@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special
 
-from crosscheck.calibration.equals import are_equals
+from crosscheck.calibration.equals import EQUAL, are_equals
 from crosscheck.calibration.exact import Refit
 from crosscheck.calibration.refits import Found
 from crosscheck.calibration.sets import Names
@@ -130,18 +130,38 @@ def _classes(
 ) -> list[tuple[str, ...]]:
     """Members of the best set with what could stand in their place; the others by themselves."""
     together = {e: {e} for e in effects}
+
+    def join(a: str, b: str) -> None:
+        joined = together[a] | together[b]
+        for e in joined:
+            together[e] = joined
+
+    beside = list[tuple[float, Names, Names]]()
     for names, score in scores.items():
-        gone, come = best - names, names - best
-        if len(gone) != 1 or len(come) != 1:
-            continue
-        (a,), (b,) = gone, come
-        if are_equals(scores[best] - score, sizes.get(a, 1), sizes.get(b, 1)):
-            joined = together[a] | together[b]
-            for e in joined:
-                together[e] = joined
+        gone, come, loss = best - names, names - best, scores[best] - score
+        if len(gone) == len(come) == 1:
+            (a,), (b,) = gone, come
+            if are_equals(loss, sizes.get(a, 1), sizes.get(b, 1)):
+                join(a, b)
+        elif len(gone) == len(come) and loss < EQUAL:
+            beside.append((loss, gone, come))
+    for _loss, gone, come in sorted(beside, key=lambda one: one[0]):
+        # sets that differ in equals and one effect more say that these are equals too
+        left = _left(gone, come, together)
+        if left is not None:
+            join(*left)
     out = []
     for e in effects:
         if together[e] and e == min(together[e], key=effects.index):
             first = sorted(together[e], key=lambda m: (m not in best, effects.index(m)))
             out.append(tuple(first))
     return out
+
+
+def _left(gone: Names, come: Names, together: Mapping[str, set[str]]) -> tuple[str, str] | None:
+    """The two that are exchanged beside equals; None where there are more."""
+    for one in sorted(gone):
+        equal = sorted(come & together[one])
+        if equal and len(gone) > 1:
+            gone, come = gone - {one}, come - {equal[0]}
+    return (next(iter(gone)), next(iter(come))) if len(gone) == 1 else None

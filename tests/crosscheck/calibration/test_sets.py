@@ -122,6 +122,17 @@ def many_weak(seed: int) -> Gram:
 
 
 @pytest.mark.slow
+def test_what_stands_in_a_place_beside_an_equal_is_an_equal_too() -> None:
+    """A curve with a misplaced target did what a stiffness with a tilt does, and no exchange."""
+    scores = {frozenset("ab"): 0.0, frozenset("ac"): -0.8, frozenset("dc"): -0.9}
+    scores |= {frozenset("db"): -9.0, frozenset("ef"): -0.5, frozenset("a"): -20.0}
+    found = probabilities(scores, frozenset("ab"), "abcdef")
+    assert {frozenset(members) for members in found.members} == set(
+        map(frozenset, ("ad", "bc", "e", "f"))
+    )
+    assert found.of("d") == pytest.approx(found.of("a")) and found.of("e") < 0.4
+
+
 def test_members_of_the_best_set_are_as_sure_as_all_sets_say() -> None:
     """Larger sets about the best one alone made them surer: 0.71 for 0.59, 0.96 for 0.94."""
     off = []
