@@ -62,6 +62,7 @@ class Workspace(Result):
         softest: (..., d) [m, rad] the direction of it, :attr:`Solution.softest_direction`; float32.
         chance: the probability that the pose can be held, by what the model does not know; float32;
             None where the model keeps no covariance, or there is none.
+        elastic: whether it was asked where the elastic robot comes to rest.
     """
 
     robot: Robot
@@ -74,6 +75,7 @@ class Workspace(Result):
     stiffness: NDArray[np.float32]
     softest: NDArray[np.float32]
     chance: NDArray[np.float32] | None = None
+    elastic: bool = True
 
     def likely(self, at_least: float) -> NDArray[np.bool_]:
         """Where the pose can be held with a probability of at least that.
@@ -168,13 +170,11 @@ class Workspace(Result):
                 f"at half of them tensions can stay {half:.3g} N or more inside their limits"
             )
         rests = self.rests
-        if np.any(rests):
+        if self.elastic:
             counts = self.slack[rests]
             parts = [f"{k} at {int(np.sum(counts == k))}" for k in np.unique(counts)]
-            out.append(
-                f"elastic: at rest at {int(rests.sum())} of {counted(n, 'command')}; "
-                f"slack cables: {', '.join(parts)}"
-            )
+            slack = f"; slack cables: {', '.join(parts)}" if parts else ""
+            out.append(f"elastic: at rest at {int(rests.sum())} of {counted(n, 'command')}{slack}")
             where = rests & self.feasible
             if np.any(where):
                 away = 1e3 * np.linalg.norm(self.deviation[where], axis=-1).max()
@@ -330,7 +330,7 @@ def workspace_map(
         robot, axes, np.asarray(turned), margin.reshape(shape),
         moved[:, :3].reshape(*shape, 3), moved[:, 3:].reshape(*shape, 3),
         slack.reshape(shape), stiffness.reshape(shape), softest.reshape(*shape, -1),
-        None if likely is None else likely.reshape(shape),
+        None if likely is None else likely.reshape(shape), elastic,
     )  # fmt: skip
 
 
@@ -432,7 +432,7 @@ def boundary(
             covariance does not know; without it, what is held with the model's own values.
 
     Returns:
-        (n, 7), the last poses found that can be held.
+        (n, 7), the last poses found that can be held; of no ways none.
 
     Raises:
         InputError: a pose that is not on the side it is said to be; a tolerance that is none; a
@@ -453,7 +453,7 @@ def boundary(
     if not held(near).all() or held(far).any():
         raise InputError("boundary needs poses inside that can be held, and outside that cannot")
     for _ in range(200):
-        if np.linalg.norm(far[:, :3] - near[:, :3], axis=1).max() <= tolerance:
+        if np.all(np.linalg.norm(far[:, :3] - near[:, :3], axis=1) <= tolerance):
             break
         middle = near.copy()
         middle[:, :3] = 0.5 * (near[:, :3] + far[:, :3])

@@ -25,7 +25,7 @@ _NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 
 _LEAST_EA, _MOST_EA = 1e-3, 1e12  # [N]: a steel rope as thick as an arm has 1e9
-_MOST_POSES = 10_000_000  # of a grid; more would take days, and all memory
+_MOST_POSES = 10_000_000  # of a grid or line; more would take days, and all memory
 
 
 class NumbersCommand(click.Command):
@@ -186,6 +186,18 @@ def check_places(places: ArrayLike, robot: Robot) -> None:
         )
 
 
+def check_count(option: str, poses: int) -> None:
+    """That there are not more poses than can be solved.
+
+    Raises:
+        InputError: there are.
+    """
+    from seecr import InputError
+
+    if poses > _MOST_POSES:
+        raise InputError(f"{option}: expected at most {_MOST_POSES:.0e} poses, got {poses:.1e}")
+
+
 def axes_of(texts: Sequence[str], robot: Robot) -> list[NDArray[np.float64]]:
     """The axes of a grid.
 
@@ -196,12 +208,9 @@ def axes_of(texts: Sequence[str], robot: Robot) -> list[NDArray[np.float64]]:
 
     import numpy as np
 
-    from seecr import InputError
-
     axes = [_axis_of(text) for text in texts]
     total = math.prod(len(axis) for axis in axes)
-    if total > _MOST_POSES:
-        raise InputError(f"--grid: expected at most {_MOST_POSES:.0e} poses, got {total:.1e}")
+    check_count("--grid", total)
     check_places(np.array([[axis[k] for axis in axes] for k in (0, -1)]), robot)
     return axes
 

@@ -51,7 +51,7 @@ def command(
     Exit status: 0 all well, 2 bad input, or a pose without rest.
     """
     from seecr import InputError, export
-    from seecr.files import json_text, write_texts
+    from seecr.files import check_writable, json_text, write_texts
 
     machine = robot_at(robot, cable)
     out = out if folder is None else folder / out
@@ -61,8 +61,8 @@ def command(
         raise InputError(f"{out}: is the robot itself; expected another file to write")
     own = model_at(model, machine)
     found = export(machine, own or (), pose_of(coordinates, machine) if coordinates else None)
-    if folder is not None:
-        folder.mkdir(parents=True, exist_ok=True)
+    check_writable(out)
+    out.parent.mkdir(parents=True, exist_ok=True)
     beside = out.with_name(f"{out.stem}-mujoco{out.suffix}")
     files = {out: found.text} | ({beside: found.mujoco_text} if found.mujoco_text else {})
     write_texts(files, "cannot write the MJCF")

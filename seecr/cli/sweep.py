@@ -10,6 +10,7 @@ import click
 from seecr.cli.arguments import (
     NumbersCommand,
     axes_of,
+    check_count,
     check_places,
     files_of_pictures,
     model_at,
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from seecr import Commands, Robot
 
 
+_WANTED = "Lengths are commanded; what is off is told from the poses wanted, columns want_*."
 _COUNTED = "Poses are counted from 0, as the rows of sweep.json are."
 
 
@@ -98,7 +100,7 @@ def command(
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
-    commands, more, said = _commands(machine, poses, given)
+    commands, more, said, wanted = _commands(machine, poses, given)
     with staged(out, sometimes=files_of_pictures("sweep")) as folder:
         with progress_bar("solving", len(commands)) as tell:
             solution = solve(machine, commands, effects=own or (), follow=follow)
@@ -106,8 +108,8 @@ def command(
                 tell(0, "errors")
             spread = None if own is None else spread_of(machine, commands, own)
             tell(len(commands), "solved")
-        commanded = commands.lengths is None
-        rows = SweepRows(solution, commands.lengths, more, spread)
+        commanded = commands.lengths is None or wanted
+        rows = SweepRows(solution, commands.lengths, more, spread, wanted)
         status = 0 if at_rest(solution) else 3
         notes = [*(own.notes if own else ()), *said]
         document = {
@@ -141,8 +143,8 @@ def command(
 
 def _commands(
     robot: Robot, poses: Path | None, given: dict[str, Any]
-) -> tuple[Commands, dict[str, Any], tuple[str, ...]]:
-    """The commands, what else their file says of each row, and notes on it."""
+) -> tuple[Commands, dict[str, Any], tuple[str, ...], bool]:
+    """The commands, what else their file says, notes on it, whether lengths have poses wanted."""
     from seecr import Commands, InputError
     from seecr.command_file import read_commands
 
@@ -153,7 +155,7 @@ def _commands(
     if poses is not None and given["turned"]:
         raise InputError(f"--turned is of --line and --grid; {poses} has its own orientations")
     if poses is None:
-        return Commands(_along(robot, given)), {}, (_COUNTED,)
+        return Commands(_along(robot, given)), {}, (_COUNTED,), False
     read = read_commands(poses, robot)
     more: dict[str, Any] = {}
     if len(set(read.run)) > 1:
@@ -162,7 +164,9 @@ def _commands(
         more["t_s"] = read.commands.time.tolist()
     if read.commands.temperature is not None:
         more["temperature_C"] = read.commands.temperature.tolist()
-    return read.commands, more, read.notes
+    wanted = read.wanted is not None and read.commands.lengths is not None
+    notes = (*read.notes, _WANTED) if wanted else read.notes
+    return read.commands, more, notes, wanted
 
 
 def _along(robot: Robot, given: dict[str, Any]) -> NDArray[np.float64]:
@@ -173,6 +177,7 @@ def _along(robot: Robot, given: dict[str, Any]) -> NDArray[np.float64]:
 
     if given["line"]:
         check_places(given["line"], robot)
+        check_count("--count", given["count"])
         places = np.linspace(given["line"][:3], given["line"][3:], given["count"])
     else:
         axes = axes_of(given["grid"], robot)

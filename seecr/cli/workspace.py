@@ -90,9 +90,10 @@ def command(
     ROBOT is an MJCF file or the name of a shipped robot. The margin is how far inside their limits
     all tensions can stay [N]; the elastic map says, at each command, how far off the platform
     rests, how tilted, with how many slack cables, how stiff and in which direction softest.
-    Robots with fewer cables than freedoms are mapped by position, their orientation solved. With
-    --at-least and a calibrated model, each pose has the probability that it can be held. The edge
-    is that of what can be held, with --at-least with that probability.
+    Robots with fewer cables than freedoms are mapped by position, their orientation solved; their
+    margin is 0 where they can be held, and says no more. With --at-least and a calibrated model,
+    each pose has the probability that it can be held. The edge is that of what can be held, with
+    --at-least with that probability.
 
     Writes map.npz, map.json, a figure of slices and map.rrd.
 

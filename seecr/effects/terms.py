@@ -38,6 +38,11 @@ class Term:
     own: Own | None = None
 
     def __post_init__(self) -> None:
+        if not isinstance(self.layout, Layout):
+            raise InputError(
+                f"Term: expected an effect's layout and its values, got {self.layout!r}; "
+                "seecr.Term.of(robot, 'pulley_radius', radius_m=0.01) makes one of a name"
+            )
         given: Any = self.knowledge
         if given is None:
             object.__setattr__(self, "knowledge", Knowledge.nothing(len(self.layout)))

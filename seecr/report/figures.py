@@ -202,7 +202,8 @@ def map_figure(path: Path, found: Workspace, most: int = 4, edge: Array | None =
             ax.set_title(f"{'xyz'[across]} = {per_metre * found.axes[across][k]:.4g} {unit}")
         for ax in axes[-1]:
             ax.set_xlabel(f"{'xyz'[wide]} [{unit}]")
-        if len(panels) > 1 and any(_has_edge(inside) for inside in _inside(found, slices)):
+        drawn = len(panels) > 1 and any(_has_edge(inside) for inside in _inside(found, slices))
+        if drawn or (edge is not None and len(edge)):
             words = "orange: the edge of what tensions within the limits can hold"
             words = textwrap.fill(words, int(_LETTERS * size[0]))
             axes[0, 0].figure.suptitle(words, fontsize=9)

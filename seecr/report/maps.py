@@ -38,6 +38,8 @@ def softest_line(found: Workspace) -> Iterator[str]:
 
 def edge_line(edge: Array, tolerance: float) -> str:
     """How many places of the edge there are, and how well they are known."""
+    if len(edge) == 0:
+        return "no edge: all poses of the grid can be held"
     return f"its edge: {counted(len(edge), 'place')} between poses of the grid, to {tolerance:g} m"
 
 

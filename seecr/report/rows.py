@@ -25,6 +25,7 @@ class SweepRows:
     Attributes:
         solution: of n commands.
         lengths: (n, m) [m] that were commanded instead of poses.
+        wanted: whether poses were wanted with these lengths; deviations are from them.
         more: further values of each row, by name.
         spread: one standard deviation of poses and tensions, where the model says so.
     """
@@ -33,19 +34,22 @@ class SweepRows:
     lengths: Array | None = None
     more: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     spread: Spread | None = None
+    wanted: bool = False
 
     def as_json(self) -> list[Record]:
         """``rows`` in ``sweep.json``."""
         found, spread = self.solution, self.spread
         commanded, none = self.lengths is None, [None] * len(found)
+        aimed = commanded or self.wanted
         columns = {
             **({} if found.line is None else {"line": found.line}),
             **self.more,
             "command": found.command if commanded else none,
             **({} if self.lengths is None else {"command_lengths_m": self.lengths}),
+            **({"wanted": found.command} if self.wanted else {}),
             "pose": found.pose,
-            "deviation_m": found.deviation[:, :3] if commanded else none,
-            "rotation_rad": found.deviation[:, 3:] if commanded else none,
+            "deviation_m": found.deviation[:, :3] if aimed else none,
+            "rotation_rad": found.deviation[:, 3:] if aimed else none,
             "tensions_N": found.tensions,
             "slack": self._slack(),
             "rest_lengths_m": found.rest_lengths,
@@ -76,8 +80,10 @@ class SweepRows:
             columns |= _named("cmd_{}", COORDINATES, found.command)
         else:
             columns |= _named("length_{}_m", cables, self.lengths)
+        if self.wanted:
+            columns |= _named("want_{}", COORDINATES, found.command)
         columns |= _named("pose_{}", COORDINATES, found.pose)
-        if self.lengths is None:
+        if self.lengths is None or self.wanted:
             columns |= _named("deviation_{}_m", "xyz", found.deviation[:, :3])
             columns |= _named("rotation_{}_rad", "xyz", found.deviation[:, 3:])
         columns |= _named("tension_{}_N", cables, found.tensions)

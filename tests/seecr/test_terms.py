@@ -107,3 +107,8 @@ def test_the_effects_have_the_values() -> None:
     gain, pulley, _target = some().effects
     assert gain.gain == pytest.approx(np.full(8, 2.5e-3))  # type: ignore[attr-defined]
     assert type(pulley) is effect_named("pulley_radius")
+
+
+def test_a_term_without_a_layout_is_refused() -> None:
+    with pytest.raises(InputError, match="expected an effect's layout and its values, got 'creep'"):
+        Term("creep", np.zeros(2))  # type: ignore[arg-type]

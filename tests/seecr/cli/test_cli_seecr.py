@@ -67,6 +67,8 @@ def test_export_writes_into_a_folder(tmp_path: Path) -> None:
     got = run("export", "demobot_cogiro", "there.xml", "--out", tmp_path / "new")
     assert got.exit_code == 0 and (tmp_path / "new" / "there.xml").exists(), got.output
     assert f"seecr pose {tmp_path}/new/there.xml" in got.output
+    got = run("export", "demobot_cogiro", tmp_path / "newer" / "there.xml")
+    assert got.exit_code == 0 and (tmp_path / "newer" / "there.xml").exists(), got.output
     # and makes none where there is nothing to write
     model = tmp_path / "none.toml"
     model.write_text("abc")
@@ -132,8 +134,8 @@ def test_export_writes_a_description_and_what_mujoco_alone_reads(tmp_path: Path)
     said = json.loads(plain.stdout)
     assert said["files"] == [str(tmp_path / "plain.xml")] and said["nowhere"] == {}
     assert said["rest_lengths_m"] == pytest.approx(robot.rest_lengths)
-    nowhere = run("export", "demobot_cogiro", tmp_path / "no" / "out.xml")
-    assert nowhere.exit_code == 2 and "out.xml: cannot write the MJCF" in nowhere.stderr
+    nowhere = run("export", "demobot_cogiro", tmp_path / "plain.xml" / "out.xml")
+    assert nowhere.exit_code == 2 and "out.xml: cannot be written: " in nowhere.stderr
 
 
 def test_negative_numbers_are_coordinates() -> None:
@@ -226,11 +228,15 @@ def test_correct_writes_commands_that_every_command_reads(tmp_path: Path) -> Non
     document = json.loads(result.stdout)
     assert document["reached"] == document["poses"] == 2
     again = ["sweep", "demobot_cogiro", tmp_path / "out" / "corrected.csv", "--model", model]
+    told = run(*again, "--figure", "none", "--no-recording", "--out", tmp_path).output
+    assert "what is off is told from the poses wanted" in told and "furthest from" in told
     said = run(*again, "--figure", "none", "--no-recording", "--out", tmp_path, "--json")
     rows = json.loads(said.stdout)["rows"]
     assert [row["run"] for row in rows] == ["a", "b"]
     for row, wanted in zip(rows, ([0.4, 0.25, 0.1], [0.45, 0.2, 0.15]), strict=True):
         assert row["pose"][:3] == pytest.approx(wanted, abs=1e-12)
+        assert row["wanted"][:3] == wanted and row["command"] is None
+        assert row["deviation_m"] == pytest.approx([0.0] * 3, abs=1e-12)
         assert min(row["tensions_N"]) > 0.2 - 1e-9
     lost = run(*args, "--lowest", "0", "--highest", "0.4", "--out", tmp_path / "lost")
     assert lost.exit_code == 3
@@ -248,6 +254,10 @@ def test_map_writes_its_files_or_says_why_not(tmp_path: Path) -> None:
     places = json.loads((out / "map.json").read_text())["edge"]["places"]
     assert edge.exit_code == 0 and f"its edge: {places} places" in edge.output and places > 20
     assert np.load(out / "map.npz")["edge"].shape == (places, 7)
+    none = run("map", "demobot_cogiro", *grid, "--edge", "0.001", "--no-elastic", "--out", out)
+    assert none.exit_code == 0 and "no edge: all poses of the grid can be held" in none.output
+    soft = run("map", "demobot_cogiro", *grid, "--cable", "0.001", "--out", out)
+    assert "elastic: at rest at 0 of 6 commands" in soft.output
     lost = run("map", "demobot_cogiro", *grid, "--lowest", "90", "--out", tmp_path / "lost")
     assert lost.exit_code == 2 and not (tmp_path / "lost").exists()
     assert "no pose of the grid can be held: no tensions from 90 to inf N" in lost.stderr

@@ -44,6 +44,8 @@ ROBOT = "planar_vertical"
         ("sweep demobot_parallel --grid 0:1:100000 0:1:100000 0.1 --out o",
          "--grid: expected at most 1e+07 poses, got 1.0e+10"),
         ("sweep demobot_parallel --grid 0:1:99999999999999 0 0.1 --out o", "at most 1e+07 poses"),
+        ("sweep demobot_parallel --line 0.1 0.2 0.1 0.4 0.2 0.1 --count 100000000 --out o",
+         "--count: expected at most 1e+07 poses, got 1.0e+08"),
         ("sweep demobot_parallel here.csv --turned 1 0 0 0 --out o",
          "--turned is of --line and --grid; here.csv has its own orientations"),
         ("map demobot_parallel --grid 200:300:3 0.25 0.1 --out o", "X: expected metres"),
