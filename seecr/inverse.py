@@ -114,6 +114,8 @@ class Correction(Result):
                 f"{1e3 * np.linalg.norm(left[near, :3], axis=1).max():.4g} mm and "
                 f"{np.degrees(np.linalg.norm(left[near, 3:], axis=1).max()):.4g} deg away"
             )
+            pulls = self.solution.tensions[near]
+            out.append(f"tensions there {between(pulls.min(), pulls.max(), lead='from ')} N")
         for rows, text in (
             (lost & ~self.found, "of them: no pose near was found that can be held"),
             (near & ~self.settled, "of them may have nearer ones beside them"),

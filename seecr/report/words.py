@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr.passes import Barrier
+from seecr.passes import TWISTED, Barrier
 from seecr.planar import midline_point
 from seecr.pose import Array, pose_difference, rxyz_from_quat, transform_points
 from seecr.robot import Robot
@@ -69,6 +69,11 @@ def pose_lines(
             f"{np.round(np.degrees(np.linalg.norm(away[3:])), _DECIMALS):.4g} deg"
             f" ({_three(np.degrees(away[3:]), '+.4f')} deg about x y z)"
         )
+        if np.linalg.norm(away[3:]) > TWISTED and not solution.robot.joints:
+            yield (
+                "hangs twisted, more than a right angle from its command: another rest may be "
+                "where the way there leads (seecr sweep --follow)"
+            )
     yield from stiffness_lines(solution, i)
     yield f"forces balance to {solution.residual[i]:.1g} of the load"
 

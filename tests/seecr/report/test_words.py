@@ -21,6 +21,14 @@ def test_rounding_is_no_turn() -> None:
     assert re.search(r"\(0\.2 mm\), turned by 0 deg \(", text), text
 
 
+def test_a_platform_that_hangs_twisted_is_told_so() -> None:
+    """It may rest where no way leads from the reference pose."""
+    robot = seecr.load_robot(model_path("ipanema"))
+    text = "\n".join(pose_lines(seecr.solve(robot, [[0.0, 0, 0, 1, 0, 0, 0]])))
+    assert "hangs twisted, more than a right angle from its command" in text
+    assert "twisted" not in "\n".join(pose_lines(seecr.solve(robot, [robot.reference_pose])))
+
+
 def test_what_has_no_energy_gets_no_number() -> None:
     """A moment from outside has no energy: no nan is said, here or of what is between two rests."""
     robot = seecr.load_robot(model_path("demobot_parallel"))
