@@ -152,7 +152,7 @@ __all__ = [
 ]
 
 
-__getattr__ = lazily(__name__, _WHERE)
+__getattr__ = lazily(__name__, _WHERE, modules=("inverse", "workspace"))
 
 
 def __dir__() -> list[str]:

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from importlib import import_module
 from typing import Any
 
 
-def lazily(package: str, where: Mapping[str, str]) -> Callable[[str], Any]:
+def lazily(
+    package: str, where: Mapping[str, str], modules: Collection[str] = ()
+) -> Callable[[str], Any]:
     """The package's ``__getattr__``.
 
     Args:
         package: its full name.
         where: public names, each with the module of the package that defines it.
+        modules: of the package, themselves to be had by their name.
     """
 
     def get(name: str) -> Any:
+        if name in modules:
+            return import_module(f"{package}.{name}")
         if name not in where:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         return getattr(import_module(f"{package}.{where[name]}"), name)

@@ -36,6 +36,12 @@ def test_types_are_told_of_the_same_names() -> None:
     assert sorted(names) == sorted(seecr.__all__) == sorted(seecr._WHERE)
 
 
+def test_workspaces_and_the_inverse_are_there_as_modules() -> None:
+    words = "import seecr; print(seecr.workspace.feasible.__name__, seecr.inverse.correct.__name__)"
+    got = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, check=True)
+    assert got.stdout.split() == ["feasible", "correct"]
+
+
 def test_a_name_that_is_not_there_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="module 'seecr' has no attribute 'Solver'"):
         _ = seecr.Solver
