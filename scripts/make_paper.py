@@ -126,17 +126,22 @@ def figure_4(path: Path) -> None:
 
 def _zones(ax: Any, x: Array, solution: Solution) -> None:
     edges = np.concatenate([[x[0]], 0.5 * (x[1:] + x[:-1]), [x[-1]]])
+    said = set[int]()
     for zone in slack_zones(solution):
         if zone.slack in _ZONES:
-            colour = _ZONES[zone.slack]
-            ax.axvspan(edges[zone.first], edges[zone.last + 1], color=colour, alpha=0.3, lw=0)
+            label = None if zone.slack in said else f"{zone.slack} slack"
+            said.add(zone.slack)
+            ax.axvspan(
+                edges[zone.first], edges[zone.last + 1], color=_ZONES[zone.slack], alpha=0.3, lw=0,
+                label=label,
+            )  # fmt: skip
 
 
 def _along(path: Path, name: str, z: float, workspace: bool, tops: tuple[str, ...] = ()) -> None:
     """Platform poses at rest with the cables that pull; tensions along the sweep."""
     one, found = robot(name), sweep(name, z)
     x = found.command[:, 0]
-    with figure(path, 1, 2, figsize=(10.5, 3.9)) as axes:
+    with figure(path, 1, 2, figsize=(11.4, 3.9)) as axes:
         left, right = axes[0]
         if workspace:
             _feasible(left, one)
@@ -156,7 +161,8 @@ def _along(path: Path, name: str, z: float, workspace: bool, tops: tuple[str, ..
                 point = midline_point(one.exit_points[:, [0, 2]], ends[:, [0, 2]])
                 left.plot(*point, "x", color=COLOURS[4], markersize=5)
         left.set(xlabel="x [m]", ylabel="z [m]", aspect="equal", ylim=(0.0, 0.52))
-        left.set_title("at rest; + commanded" + (f"; × point {tops[0]}" if tops else ""))
+        more = (f"; × point {tops[0]}" if tops else "") + ("; green: can be held" * workspace)
+        left.set_title(f"at rest; + commanded{more}")
         _zones(right, x, found)
         names: dict[str, str] = {}
         for k, cable in enumerate(one.cable_names):
@@ -166,12 +172,7 @@ def _along(path: Path, name: str, z: float, workspace: bool, tops: tuple[str, ..
         for i, (k, label) in enumerate(names.items()):
             right.plot(x, found.tensions[:, int(k)], color=COLOURS[i], label=label)
         right.set(xlabel="commanded x [m]", ylabel="tension [N]")
-        if found.slack.any():
-            pairs = one.n_cables == 8
-            right.set_title(
-                "orange: two slack, red: four" if pairs else "yellow: one slack, orange: two"
-            )
-        right.legend(fontsize=8)
+        right.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
 def _feasible(ax: Any, one: Robot) -> None:
