@@ -40,7 +40,7 @@ def edge_line(edge: Array, tolerance: float) -> str:
     """How many places of the edge there are, and how well they are known."""
     if len(edge) == 0:
         return "no edge: all poses of the grid can be held"
-    return f"its edge: {counted(len(edge), 'place')} between poses of the grid, to {tolerance:g} m"
+    return f"its edge, to {tolerance:g} m: {counted(len(edge), 'place')}"
 
 
 def write_arrays(path: Path, found: Workspace, edge: Array | None = None) -> None:

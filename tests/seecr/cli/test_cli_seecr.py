@@ -252,7 +252,11 @@ def test_map_writes_its_files_or_says_why_not(tmp_path: Path) -> None:
     assert {file.name for file in out.iterdir()} == {"map.json", "map.npz", "map.png", "map.rrd"}
     edge = run("map", "planar_vertical", "--edge", "0.001", "--no-elastic", "--out", out)
     places = json.loads((out / "map.json").read_text())["edge"]["places"]
-    assert edge.exit_code == 0 and f"its edge: {places} places" in edge.output and places > 20
+    assert (
+        edge.exit_code == 0
+        and f"its edge, to 0.001 m: {places} places" in edge.output
+        and places > 20
+    )
     assert np.load(out / "map.npz")["edge"].shape == (places, 7)
     none = run("map", "demobot_cogiro", *grid, "--edge", "0.001", "--no-elastic", "--out", out)
     assert none.exit_code == 0 and "no edge: all poses of the grid can be held" in none.output
