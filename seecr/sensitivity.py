@@ -175,12 +175,11 @@ class _ByWrench:
         n, width = _shape(self.at)
         change = np.zeros((n, width))
         if shift.physical:
-            sides = self._sides(shift)
-            change = (
-                self.way.change(shift)
-                if along or sides.of_history
-                else self._physical(sides, shift.apart)
-            )
+            sides = None if along else self._sides(shift)
+            if sides is None or sides.of_history:
+                change = self.way.change(shift)
+            else:
+                change = self._physical(sides, shift.apart)
         if shift.sensing:
             return self._read(shift, change, shift.apart)
         return (self.read_rates @ change[..., None])[..., 0] if self.sensing else change
