@@ -161,8 +161,8 @@ def _along(path: Path, name: str, z: float, workspace: bool, tops: tuple[str, ..
                 point = midline_point(one.exit_points[:, [0, 2]], ends[:, [0, 2]])
                 left.plot(*point, "x", color=COLOURS[4], markersize=5)
         left.set(xlabel="x [m]", ylabel="z [m]", aspect="equal", ylim=(0.0, 0.52))
-        more = (f"; × point {tops[0]}" if tops else "") + ("; green: can be held" * workspace)
-        left.set_title(f"at rest; + commanded{more}")
+        shown = ["at rest", "+ commanded", *(f"× point {name}" for name in tops)]
+        left.set_title("; ".join([*shown, "green: can be held"] if workspace else shown))
         _zones(right, x, found)
         names: dict[str, str] = {}
         for k, cable in enumerate(one.cable_names):

@@ -60,7 +60,7 @@ def sensitivities(
     by_wrench = _ByWrench(experiment, at, terms)
     if at.has_history and not frozen:
         shifts = [shifted(terms, term, k, _WAY) for term, k in positions(terms, wanted)]
-        assert by_wrench.way  # made once, for all threads
+        _ = by_wrench.way  # made once, for all threads
 
         def run(part: slice) -> None:
             out[..., part.start] = by_wrench.column(shifts[part.start], along=True)

@@ -21,7 +21,7 @@ _CENTRAL, _ONE_SIDED = 1e-4, 1e-5
 
 # Quantities that reach the statics through the rest lengths alone.
 _PAID_OUT = {name for name, item in QUANTITIES.items() if item.paid_out}
-# Quantities whose change asks for the whole way to be solved again.
+# Quantities whose change reaches a row through the rows before it as well.
 _OF_HISTORY = {name for name, item in QUANTITIES.items() if item.history is not History.NONE}
 # Quantities that mean nothing where nothing has history.
 OF_SHAPE = {name for name, item in QUANTITIES.items() if item.history is History.SHAPES}
@@ -60,7 +60,7 @@ class Sides:
 
     @property
     def of_history(self) -> bool:
-        """Whether the whole way is to be solved again."""
+        """Whether what differs reaches a row through the rows before it as well."""
         return not self.differing.isdisjoint(_OF_HISTORY)
 
     @property
