@@ -9,7 +9,7 @@ equation error, in place of the output error.)
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -30,6 +30,7 @@ from seecr.parted import PartedPrediction
 from seecr.pose import Array, pose_add, pose_difference
 from seecr.sensitivity import motion_of, sensitivities, with_inverse
 from seecr.tables import assemble
+from seecr.threads import run_parts
 
 # Most times that the forces are evaluated; a fall of their squares by less ends the search.
 _EVALUATIONS, _FALL = 15, 1e-3
@@ -45,6 +46,8 @@ _START_SIZES = 3.0
 _SLACK_PART = 0.02
 # Effects that shift no reading by this part of its noise, for plausible sizes, are not seen.
 _UNSEEN = 0.02
+# Fewer rows than this are not worth a second thread for the shapes of an effect.
+_MANY_ROWS = 600
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,37 +80,71 @@ class Starts:
 def starts_of(problem: Problem, base: Fit, layout: Layout, factor: Array) -> Starts:
     """The most promising starts of an effect beside the base model."""
     shapes = layout.effect.shapes(base.state.prediction.setup)
-    scored: list[tuple[float, int, Array, dict[str, float]]] = []
-    seen = False
-    orthogonal = base.span
-    for shape in shapes:
-        null = layout.start(shape)
-        scale = layout.scale * ~layout.shape
-        white = amplitude_columns(problem, base, layout, null) * scale
-        seen = seen or bool(np.max(np.abs(white), initial=0.0) > _UNSEEN)
-        left = white - orthogonal @ (orthogonal.T @ white)
-        z, gain, directions = _linear(left, base.state.white)
-        z = np.clip(z, -_START_SIZES, _START_SIZES)
-        vector = np.clip(null + z * scale, layout.lower, layout.upper)
-        scored.append((gain, directions, vector, shape))
-    if not scored:
+    if not shapes:
         return Starts((), 0.0, 1, 1.0, False)
-    scored.sort(key=lambda item: -item[0])
-    gain, directions = scored[0][:2]
-    vectors = [vector for _g, _d, vector, _s in scored[:2]]
+    scored = _scored(problem, base, layout, shapes)
+    seen = any(one.seen for one in scored)
+    scored.sort(key=lambda one: -one.gain)
+    best = scored[0]
+    gain, directions = best.gain, best.directions
+    vectors = [one.vector for one in scored[:2]]
     if np.any((layout.lower == layout.null) & ~layout.shape):
         # the derivative at a bound can point the wrong way: start inside as well
-        inside, across = _across(problem, base, Term(layout, layout.start(scored[0][3])), factor)
+        inside, across = _across(problem, base, Term(layout, best.null), factor)
         vectors = [vectors[0], inside] if across < gain else [inside, vectors[0]]
         gain = max(gain, across)
     elif len(shapes) == 1:
         vectors = vectors[:1]
     balanced = None
     if int(np.sum(~layout.shape)) > 1 and _some_slack(base):
-        start = layout.start(scored[0][3])
-        balanced = partial(equation_start, problem, base.state, layout, start, factor)
+        balanced = partial(equation_start, problem, base.state, layout, best.null, factor)
     # neighbouring shapes are alike: about every third is one more chance of its own
     return Starts(tuple(vectors), gain, directions, max(1.0, len(shapes) / 3.0), seen, balanced)
+
+
+@dataclass(frozen=True, eq=False)
+class _Scored:
+    """What the linear model promises of an effect at one shape.
+
+    Attributes:
+        null: (p,) values that do nothing, at the shape. vector: those that explain most.
+        gain: fall of chi2. directions: of the parameters that the data see. seen: whether any is.
+    """
+
+    null: Array
+    vector: Array
+    gain: float
+    directions: int
+    seen: bool
+
+
+def _scored(
+    problem: Problem, base: Fit, layout: Layout, shapes: Sequence[dict[str, float]]
+) -> list[_Scored]:
+    """Every shape of an effect, in their order."""
+    span = base.span  # made once, for all threads
+    scale = layout.scale * ~layout.shape
+
+    def score(shape: dict[str, float]) -> _Scored:
+        null = layout.start(shape)
+        white = amplitude_columns(problem, base, layout, null) * scale
+        seen = bool(np.max(np.abs(white), initial=0.0) > _UNSEEN)
+        z, gain, directions = _linear(beside(white, span), base.state.white)
+        z = np.clip(z, -_START_SIZES, _START_SIZES)
+        vector = np.clip(null + z * scale, layout.lower, layout.upper)
+        return _Scored(null, vector, gain, directions, seen)
+
+    out: list[_Scored] = [score(shapes[0])]  # makes what all of them ask for
+    rest = shapes[1:]
+    if problem.data.n_rows < _MANY_ROWS:
+        return out + [score(shape) for shape in rest]
+    found: dict[int, _Scored] = {}
+
+    def run(part: slice) -> None:
+        found[part.start] = score(rest[part.start])
+
+    run_parts(run, [slice(k, k + 1) for k in range(len(rest))])
+    return out + [found[k] for k in range(len(rest))]
 
 
 def _across(problem: Problem, base: Fit, null: Term, factor: Array) -> tuple[Array, float]:

@@ -135,12 +135,13 @@ class DrumEccentricity(Effect):
     )
 
     def edit_setup(self, setup: Setup) -> None:
-        if not (np.any(self.sine) or np.any(self.cosine)):
-            return
         angle = setup.commanded_change / self.drum_radius
         zero = 0.0 if setup.commands.absolute else 1.0
-        wave = self.sine * np.sin(angle) + self.cosine * (np.cos(angle) - zero)
-        setup.extra_length = setup.extra_length + wave
+        # many radii are tried, and waves of thousands of rows take as long as what follows them
+        if np.any(self.sine):
+            setup.extra_length = setup.extra_length + self.sine * np.sin(angle)
+        if np.any(self.cosine):
+            setup.extra_length = setup.extra_length + self.cosine * (np.cos(angle) - zero)
 
     @classmethod
     def shapes(cls, setup: Setup) -> list[dict[str, float]]:
