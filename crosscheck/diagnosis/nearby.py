@@ -51,8 +51,8 @@ def chances_near(found: Search, alike: Mapping[str, Sequence[str]]) -> Chances:
     prices = prices_about(setting, joint, catalogue)
     scores = Scores(gram, len(effects), always, prices=prices)
     explore(scores, [always, names])
-    every = scores.near | {n: s for n, (s, _w) in scores.solved.items()}
-    every |= _refitted(found, scores, names)
+    refitted = _refitted(found, scores, names)
+    every = corrected(scores, refitted, names) | refitted
     none = _impossible(found)
     every = {some: score for some, score in every.items() if not some & none}
     shown = shown_from(setting, joint, *_all_of(columns))
@@ -82,6 +82,23 @@ def _refitted(found: Search, scores: Scores, last: Names) -> dict[Names, float]:
         if fit.valid and every != last:
             score = base + found.trials.evidence(fit).log + scores.log_prior(every)
             out[every] = max(score, out.get(every, -np.inf))
+    return out
+
+
+def corrected(scores: Scores, refitted: Mapping[Names, float], last: Names) -> dict[Names, float]:
+    """Linear scores of sets; of those with another explanation than the last model's, by refits.
+
+    The linear model is about the last one, with whose cables taut and slack: what a refit of a
+    part of a set is better or worse than linear algebra says, the set is too.
+    """
+    every = scores.near | {n: s for n, (s, _w) in scores.solved.items()}
+    off = {names: score - scores.score(names) for names, score in refitted.items()}
+    out = dict(every)
+    for names, score in every.items():
+        parts = [] if last <= names else [part for part in refitted if part < names]
+        if parts:
+            nearest = max(parts, key=lambda part: (len(part), refitted[part]))
+            out[names] = score + off[nearest]
     return out
 
 
