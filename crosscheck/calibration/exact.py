@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from crosscheck.calibration.bounds import log_absent
 from crosscheck.calibration.catalogue import Catalogue, gram_about, widths_for
 from crosscheck.calibration.gram import Gram, averaged, best_widths, gram_of
 from crosscheck.calibration.joint import JointFit, Setting, settle
@@ -203,7 +204,7 @@ def _scored(
     # the linear model may not see at all what moves readings where it was fitted
     inside = {n: widths.get(n, 1.0) for n in gram.names}
     better = best_widths(gram, inside)
-    share = sum(log_shares(joint, linear).values())
+    share = sum(log_shares(joint, linear).values()) + log_absent(setting, joint, linear, better)
     score = averaged(gram, better) + share + scores.log_prior(names)
     return Refit(names, joint, widths | better, score - 0.5 * joint.state.log_det)
 

@@ -16,9 +16,9 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import special, stats
+from scipy import special
 
-from crosscheck.fit.evidence import WIDTHS
+from crosscheck.fit.evidence import WIDTHS, half_gaussian
 from seecr.pose import Array
 
 
@@ -33,12 +33,9 @@ def log_gains(normal: Array, gradient: Array, widths: ArrayLike, one_sided: bool
     """
     power, axes = np.linalg.eigh(normal)
     power = np.maximum(power, 0.0)
-    out = gains_along(power, axes.T @ gradient, widths)
     if one_sided and len(gradient) == 1:
-        square = np.asarray(widths, float) ** 2
-        mean_over_error = float(gradient[0]) * np.sqrt(square / (1.0 + square * power[0]))
-        out = out + np.log(2.0) + stats.norm.logcdf(mean_over_error)
-    return out
+        return half_gaussian(power, gradient, np.asarray(widths, float))
+    return gains_along(power, axes.T @ gradient, widths)
 
 
 def gains_along(power: Array, along: Array, widths: ArrayLike) -> Array:

@@ -8,7 +8,9 @@ derivatives X by plausible sizes z ~ N(0, lambda^2),
     A = 1 + L X^T X L,  b = L X^T y,  L = diag(lambda)
 
 averaged over lambda, which each effect has for itself, so that a plausible size that is off by far
-does not decide. A parameter the data do not see costs nothing and gains nothing.
+does not decide. A parameter the data do not see costs nothing and gains nothing. One that cannot be
+negative and is nothing is charged for what it might have been, by the integral over half a
+Gaussian: friction that these data would show and do not is less likely than none.
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ from scipy import special, stats
 
 from crosscheck.fit.gauss_newton import Fit
 from crosscheck.fit.known import known_readings
+from seecr.effects import Terms
 from seecr.pose import Array
 
 # Family-wise chance of a false alarm, over all candidates of a step.
@@ -59,51 +62,87 @@ def evidence(fit: Fit) -> Evidence:
     if p == 0:
         return Evidence(-0.5 * (float(white @ white) + fit.state.log_det), fit.chi2, 0)
     # a parameter stopped by its bound is not at the optimum the formula is about
-    free = ~fit.at_bound
+    free, absent = ~fit.at_bound, held_at_nothing(fit.terms)
     columns, readings = known_readings(fit.terms)
     x = np.concatenate([fit.jacobian, columns])
     left = np.concatenate([white, readings - columns @ fit.terms.sizes])
-    x = x[:, free]
-    y = left + x @ fit.terms.sizes[free]
+    y = left + x[:, free] @ fit.terms.sizes[free]
+    x, absent = x[:, free | absent], absent[free | absent]
     normal, gradient = x.T @ x, x.T @ y
-    power = np.linalg.eigvalsh(normal)
-    groups = [one for one in (fit.terms.own(n)[free] for n in fit.terms.names) if one.any()]
-    gain = _averaged(normal, gradient, groups)
+    power = np.linalg.eigvalsh(normal[np.ix_(~absent, ~absent)])
+    own = (fit.terms.own(n)[free | held_at_nothing(fit.terms)] for n in fit.terms.names)
+    gain = _averaged(normal, gradient, [one for one in own if one.any()], absent)
     log = gain - 0.5 * (float(y @ y) + fit.state.log_det)
     return Evidence(log, fit.chi2, int(np.sum(power > 1e-4)))
 
 
-def _averaged(normal: Array, gradient: Array, groups: Sequence[NDArray[np.bool_]]) -> float:
+def held_at_nothing(terms: Terms) -> NDArray[np.bool_]:
+    """(p,) amplitudes that cannot be negative, would be, and so are nothing."""
+    there = (terms.vector <= terms.lower) & (terms.lower == terms.null)
+    shapes = np.concatenate([np.zeros(0, dtype=bool), *(t.layout.shape for t in terms)])
+    return np.asarray(there & ~shapes & ~terms.knowledge.fixed)
+
+
+def half_gaussian(power: Array, along: Array, width: Array) -> Array:
+    """ln gain of a parameter that cannot be negative, for prior standard deviations ``width``.
+
+    Args:
+        power: what others leave of its normal matrix. along: of its gradient.
+        width: of z; its prior is half a Gaussian.
+    """
+    square = width**2
+    grown = 1.0 + square * power
+    gain = 0.5 * (square * along**2 / grown - np.log(grown))
+    return np.asarray(gain + np.log(2.0) + special.log_ndtr(along * np.sqrt(square / grown)))
+
+
+def _averaged(
+    normal: Array, gradient: Array, groups: Sequence[NDArray[np.bool_]], absent: NDArray[np.bool_]
+) -> float:
     """ln evidence over that of no effects, each effect's own width averaged over.
 
     Several effects: the others keep the widths that serve best, found one effect at a time from
     the best width that all share.
     """
+
+    def gains(widths: Array) -> Array:
+        return _gains(normal, gradient, widths, absent)
+
+    def gains_with(own: NDArray[np.bool_]) -> Array:
+        """(k,) with one effect at each of its widths."""
+        return gains(np.where(own, np.array(WIDTHS)[:, None], best))
+
     shared = np.tile(np.array(WIDTHS)[:, None], (1, len(gradient)))
-    logs = _gains(normal, gradient, shared)
+    logs = gains(shared)
     if len(groups) == 1:
         return float(special.logsumexp(logs) - np.log(len(WIDTHS)))
     best = shared[int(np.argmax(logs))]
     for _ in range(_ROUNDS):
         for own in groups:
-            best = np.where(own, WIDTHS[int(np.argmax(_with(normal, gradient, best, own)))], best)
-    top = float(_gains(normal, gradient, best[None])[0])
-    means = [special.logsumexp(_with(normal, gradient, best, own)) for own in groups]
+            best = np.where(own, WIDTHS[int(np.argmax(gains_with(own)))], best)
+    top = float(gains(best[None])[0])
+    means = [special.logsumexp(gains_with(own)) for own in groups]
     return top + float(np.sum(np.array(means) - np.log(len(WIDTHS)) - top))
 
 
-def _with(normal: Array, gradient: Array, widths: Array, own: NDArray[np.bool_]) -> Array:
-    """Gains (k,) with one effect at each of its widths."""
-    return _gains(normal, gradient, np.where(own, np.array(WIDTHS)[:, None], widths))
+def _gains(normal: Array, gradient: Array, widths: Array, absent: NDArray[np.bool_]) -> Array:
+    """(k,) ln evidence over that of no effects, for prior standard deviations (k, p).
 
-
-def _gains(normal: Array, gradient: Array, widths: Array) -> Array:
-    """(k,) ln evidence over that of no effects, for prior standard deviations (k, p)."""
-    inside = np.eye(len(gradient)) + widths[:, :, None] * normal * widths[:, None, :]
+    What is ``absent`` (p,) could have been there, and is charged beside the others.
+    """
+    free = np.flatnonzero(~absent)
+    wide = widths[:, free]
+    inside = np.eye(len(free)) + wide[:, :, None] * normal[np.ix_(free, free)] * wide[:, None, :]
     root = np.linalg.cholesky(inside)
-    half = np.linalg.solve(root, (widths * gradient)[..., None])[..., 0]
+    half = np.linalg.solve(root, (wide * gradient[free])[..., None])[..., 0]
     diagonal = np.diagonal(root, axis1=1, axis2=2)
-    return np.asarray(0.5 * np.sum(half**2, axis=1) - np.sum(np.log(diagonal), axis=1))
+    out = 0.5 * np.sum(half**2, axis=1) - np.sum(np.log(diagonal), axis=1)
+    for k in np.flatnonzero(absent):
+        shared = np.linalg.solve(root, (wide * normal[free, k])[..., None])[..., 0]
+        power = np.maximum(normal[k, k] - np.sum(shared**2, axis=1), 0.0)
+        along = gradient[k] - np.sum(shared * half, axis=1)
+        out = out + half_gaussian(power, along, widths[:, k])
+    return np.asarray(out)
 
 
 def p_value(drop: float, parameters: int, one_sided: bool) -> float:

@@ -111,7 +111,7 @@ def test_widths_of_effects_that_go_together_are_found_beside_each_other() -> Non
         best = np.linalg.solve(inside, scaled[..., None])[..., 0]
         logs = 0.5 * np.sum(scaled * best, axis=1) - 0.5 * np.linalg.slogdet(inside)[1]
         exact = float(special.logsumexp(logs) - np.log(len(pairs)))
-        off.append(abs(_averaged(normal, gradient, [own, ~own]) - exact))
+        off.append(abs(_averaged(normal, gradient, [own, ~own], own & ~own) - exact))
     assert max(off) < 0.6
 
 
@@ -152,3 +152,43 @@ def test_chances_of_a_fall_of_chi2_are_uniform_under_noise() -> None:
     low = np.array([p for p in one_sided if p < 0.5])
     assert stats.kstest(2.0 * low, "uniform").pvalue > 0.01
     assert one_sided.count(1.0) / 3000 == pytest.approx(0.5, abs=0.04)
+
+
+@pytest.mark.parametrize(("seen", "least", "most"), [(0.03, -0.1, 0.1), (3.0, -7.0, -4.0)])
+def test_what_cannot_be_negative_and_is_nothing_is_charged(
+    seen: float, least: float, most: float
+) -> None:
+    """Against the integral over half a Gaussian of friction, and over the cable's length."""
+    names = ("exit_friction",)
+    made = toy({}, names, seed=4)
+    columns = made.columns["exit_friction"] * [seen, 0.1]
+    table = made.table + columns @ [-0.02, 5.0]
+    made = LinearToy(made.problem, {"exit_friction": columns}, table)
+    null = made.terms(*names)
+    x, y = columns[made.problem.counted], made.state(made.problem, null).white
+    # the best length without friction
+    length = float(x[:, 1] @ y / (x[:, 1] @ x[:, 1]))
+    best = null.with_vector(null.scale * [0.0, length])
+    state = made.state(made.problem, best)
+    found = replace(
+        made.fit(made.problem, null), state=state, derive=lambda: x,
+        at_bound=np.array([True, False]),
+    )  # fmt: skip
+
+    def value(length: float, friction: float, width: float) -> float:
+        off = y - x @ [friction, length]
+        prior = 2.0 * np.exp(-0.5 * (friction**2 + length**2) / width**2)
+        return float(np.exp(-0.5 * (off @ off - state.chi2)) * prior / (2.0 * np.pi * width**2))
+
+    error = 1.0 / np.sqrt(np.sum(x**2, axis=0))
+    total = 0.0
+    for width in LAMBDAS:
+        middle = best.sizes[1] / (1.0 + (error[1] / width) ** 2)
+        spread = 12.0 / np.hypot(1.0 / error, 1.0 / width)
+        total += integrate.dblquad(
+            value, 0.0, spread[0], middle - spread[1], middle + spread[1], (width,), epsabs=0.0
+        )[0]
+    expected = float(np.log(total / len(LAMBDAS)) - 0.5 * state.chi2)
+    assert evidence(found).log == pytest.approx(expected, abs=1e-3)
+    one = replace(found, derive=lambda: x * [0.0, 1.0])
+    assert least < evidence(found).log - evidence(one).log < most
