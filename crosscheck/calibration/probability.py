@@ -9,7 +9,7 @@ import numpy as np
 from scipy import special
 
 from crosscheck.calibration.equals import EQUAL, are_equals
-from crosscheck.calibration.exact import Refit
+from crosscheck.calibration.exact import HOLLOW, Refit
 from crosscheck.calibration.refits import Found
 from crosscheck.calibration.sets import Names
 
@@ -66,13 +66,20 @@ def all_scores(found: Found) -> dict[Names, float]:
 def _larger(found: Found, refit: Refit) -> dict[Names, float]:
     """Sets with one effect more than a fitted one, with about their scores.
 
-    None is better than that set: it would have been fitted, or no robot can have it.
+    None is better than that set: it would have been fitted, or no robot can have it. Where the
+    linear model does not know what the set explains, others explain it there: they are taken to
+    add nothing.
     """
-    linear = found.scores.score(refit.names)
-    return {
-        names: refit.score + min(score - linear, 0.0)
-        for names, score in found.scores.larger(refit.names).items()
-    }
+    scores, best = found.scores, found.best
+    linear = scores.score(refit.names)
+    known = refit.score - linear < best.score - scores.score(best.names) + HOLLOW
+
+    def gain(names: Names, score: float) -> float:
+        if known:
+            return min(score - linear, 0.0)
+        return scores.log_prior(names) - scores.log_prior(refit.names)
+
+    return {n: refit.score + gain(n, s) for n, s in scores.larger(refit.names).items()}
 
 
 def probabilities(

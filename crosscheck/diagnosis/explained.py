@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from crosscheck.calibration.alternatives import alternatives
+from crosscheck.calibration.equals import EQUAL
 from crosscheck.calibration.exact import Refit
 from crosscheck.calibration.search import Sought
 from crosscheck.calibration.sets import Names
@@ -12,7 +13,7 @@ from crosscheck.diagnosis.advice import check_of
 from crosscheck.diagnosis.chances import PROBABLE, Chances, chances_of
 from crosscheck.diagnosis.listed import diagnosis_of, left_out
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect, NotListed
-from crosscheck.diagnosis.rivals import Rival
+from crosscheck.diagnosis.rivals import Rival, loss_of_its_part
 from crosscheck.diagnosis.search import Search
 from crosscheck.diagnosis.small import share_of
 from crosscheck.diagnosis.way import fit_of, way_of
@@ -30,7 +31,6 @@ from crosscheck.fit.prepare import noise_floor
 from crosscheck.fit.problem import KINDS, Rms, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 from crosscheck.fit.words import rms_words
-from seecr.effects import catalogue
 
 # Noise of another size than stated by more than this part, or correlated by more, is told.
 _OTHER, _ALIKE = 0.25, 0.3
@@ -84,13 +84,15 @@ def _rivals(sought: Sought, names: Names, name: str) -> list[Rival]:
     found = sought.found
     members = next((m for m in sought.classes.members if name in m), (name,))
     own = found.refit(names)
-    out = []
+    if own is None:
+        return []
+    every: dict[str, Rival] = {}
     for other in members:
         swapped = found.refit((names - {name}) | {other}) if other not in names else None
-        # one that contains another says nothing that the other does not
-        if swapped is None or own is None or catalogue()[other].parent in members:
-            continue
-        out.append(_rival(sought, own, swapped, other))
+        if swapped is not None:
+            every[other] = _rival(sought, own, swapped, other)
+    # one that contains another does all that it does: its further parameters may be there too
+    out = [r for r in every.values() if r.loss <= loss_of_its_part(r.name, name, every) + EQUAL]
     return sorted(out, key=lambda r: r.loss)
 
 

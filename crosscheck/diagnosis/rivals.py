@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from crosscheck.calibration.equals import EQUAL, are_equals
 from crosscheck.diagnosis.node import hopeless
@@ -59,14 +61,23 @@ def rivals_of(found: Search, name: str, apart: float = _TOLD_APART) -> list[Riva
     tried = [_in_its_place(found, c, without, apart) for c in _likely(found, name, without)]
     every = {rival.name: rival for rival in tried if rival is not None}
     out = {rival.name for rival in every.values() if _explains_as_well(found, rival, own, apart)}
-    # one that contains another (friction on a cable behind the exit point, with no friction)
-    # says nothing that the other does not
     for rival in sorted(out):
-        inner = catalogue()[rival].parent
-        there = inner in {name, *out}
-        if there or (inner in every and every[inner].loss < every[rival].loss + _FURTHER):
-            out = (out - {rival}) | ({inner} - {name})
+        # one that contains another (friction on a cable behind the exit point, with no friction)
+        # does all that the other does: it stays where its further parameters may be there too
+        loss, alone = every[rival].loss, loss_of_its_part(rival, name, every)
+        if alone < loss + _FURTHER:
+            out |= {catalogue()[rival].parent} - {name}
+        if loss > alone + EQUAL:
+            out -= {rival}
     return sorted((every[rival] for rival in out), key=lambda r: r.loss)
+
+
+def loss_of_its_part(rival: str, name: str, every: Mapping[str, Rival]) -> float:
+    """Evidence lost with the effect that a rival of ``name`` contains; infinite if not tried."""
+    inner = catalogue()[rival].parent
+    if inner == name:
+        return 0.0
+    return every[inner].loss if inner in every else np.inf
 
 
 def _explains_as_well(found: Search, rival: Rival, own: int, apart: float) -> bool:

@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from crosscheck.calibration import challenge as module
+from crosscheck.calibration.catalogue import Catalogue
 from crosscheck.calibration.challenge import challenge, equals_of, without
 from crosscheck.calibration.exact import Exact, Refit
 from crosscheck.calibration.gram import ColumnGroup, Gram, gram_of
 from crosscheck.calibration.probability import probabilities
-from crosscheck.calibration.refits import looked_about
+from crosscheck.calibration.refits import containing, looked_about
 from crosscheck.calibration.sets import Names, Scores, explore
+from seecr.effects import Term, Terms, effect_named, layout_of
+from seecr.mjcf import load_robot
+from seecr.shipped import model_path
 
 NAMES = "abcdefgh"
 WIDTHS = np.array([0.1, 0.3, 1.0, 3.0, 10.0])
 NO_FIT: Any = None
+PLAIN: Any = SimpleNamespace(terms=Terms())
 
 
 class Linear(Exact):
@@ -28,6 +34,7 @@ class Linear(Exact):
         self.scores = Scores(gram, len(NAMES))
         self.fitted = {}
         self.longer = frozenset[str]()
+        self.catalogue, self.plain = Catalogue(Terms(), Terms()), PLAIN
         self.fit(self.scores, frozenset())
 
     @property
@@ -164,3 +171,21 @@ def test_who_stands_in_a_members_place_is_fitted_whatever_larger_sets_there_are(
     found = probabilities({n: r.score for n, r in exact.possible.items()}, best.names, NAMES)
     assert set(next(c for c in found.members if "a" in c)) == set("aef")
     assert found.effect["a"] < 0.7 and found.of("a") > 0.99
+
+
+def test_what_contains_a_member_and_joins_late_is_fitted_too() -> None:
+    """Of friction the cable behind the exit point was told, and of both friction never."""
+    exact = Linear(gram({"a": 2.0}))
+    rubs = layout_of(effect_named("exit_friction"), load_robot(model_path("demobot_cogiro")))
+    exact.catalogue = Catalogue(Terms(), Terms([Term(rubs, rubs.null)]))
+    scores = {"a": 0.0, "winch_side_length": -2.0, "b": -9.0}
+    for name, score in scores.items():
+        exact.fitted[frozenset({name})] = Refit(frozenset({name}), NO_FIT, {}, score)
+    exact.fitted[frozenset({"b", "winch_side_length"})] = Refit(
+        frozenset({"b", "winch_side_length"}), NO_FIT, {}, -0.5
+    )
+    best = exact.fitted[frozenset("a")]
+    assert best is not None
+    assert containing(exact, best) == [frozenset({"exit_friction"})]
+    exact.plain = SimpleNamespace(terms=SimpleNamespace(names=("winch_side_length",)))
+    assert containing(exact, best) == []

@@ -121,7 +121,6 @@ def many_weak(seed: int) -> Gram:
     return gram_of(x, y, {f"e{k}": ColumnGroup(np.array([k]), WIDTHS) for k in range(14)})
 
 
-@pytest.mark.slow
 def test_what_stands_in_a_place_beside_an_equal_is_an_equal_too() -> None:
     """A curve with a misplaced target did what a stiffness with a tilt does, and no exchange."""
     scores = {frozenset("ab"): 0.0, frozenset("ac"): -0.8, frozenset("dc"): -0.9}
@@ -133,6 +132,7 @@ def test_what_stands_in_a_place_beside_an_equal_is_an_equal_too() -> None:
     assert found.of("d") == pytest.approx(found.of("a")) and found.of("e") < 0.4
 
 
+@pytest.mark.slow
 def test_members_of_the_best_set_are_as_sure_as_all_sets_say() -> None:
     """Larger sets about the best one alone made them surer: 0.71 for 0.59, 0.96 for 0.94."""
     off = []
@@ -151,6 +151,26 @@ def test_members_of_the_best_set_are_as_sure_as_all_sets_say() -> None:
         said = of_classes(found, best.names, gram.names, alone).effect
         off += [said[e] - true[e] for e in best.names]
     assert len(off) == 5 and np.max(off) < 0.03 and np.min(off) > -0.08
+
+
+def test_beside_what_the_linear_model_does_not_know_a_further_effect_adds_nothing() -> None:
+    """All that explain there what it explains here were counted as if they cost nothing."""
+    gram = many_weak(0)
+    scores = Scores(gram, 14)
+    best, other = frozenset({"e0"}), frozenset({"e9"})
+    fit: Any = None
+    top = scores.score(best)
+    some = {
+        NONE: Refit(NONE, fit, {}, top - 20.0), best: Refit(best, fit, {}, top),
+        other: Refit(other, fit, {}, top - 1.0),
+    }  # fmt: skip
+    # about the best set the linear model sees little of what the other does
+    scores.solved[other] = (top - 60.0, {"e9": 1.0})
+    found = all_scores(Found(some, some[best], scores, some.get))
+    larger = [score for names, score in found.items() if other < names and not best < names]
+    step = scores.log_prior(frozenset({"e9", "e1"})) - scores.log_prior(other)
+    assert len(larger) == 12 and step < -1.0
+    assert larger == pytest.approx([top - 1.0 + step] * 12)
 
 
 def test_no_probability_is_more_than_one() -> None:

@@ -113,18 +113,36 @@ def test_evidence_alone_does_not_tell_apart_what_chi2_does() -> None:
     assert rival.fit.chi2 > found.last.fit.chi2 + 9.0
 
 
-def test_what_a_rival_contains_stands_in_its_place() -> None:
+def test_a_rival_is_told_with_what_it_contains() -> None:
     """Friction on a cable behind the exit point was told in place of a mass; not the cable."""
-    hidden, names = "tracker_scale", (*NAMES, "winch_side_length", "exit_friction")
+    found = searched(rubbing(0.01))
+    assert found.found == ("tracker_scale",)
+    loss = {rival.name: rival.loss for rival in rivals_of(found, "tracker_scale")}
+    assert set(loss) == {CABLE, "exit_friction"}
+    # the cable is too far off by itself; but with a parameter more it would not be
+    assert 3.0 < loss[CABLE] < 6.0
+    # the friction may be there or not: it moves nothing
+    assert abs(loss["exit_friction"] - loss[CABLE]) < 0.5
+
+
+def test_a_rival_whose_further_parameter_would_show_is_not_told() -> None:
+    """Friction that would move readings by a hundred times their noise, and is not there."""
+    assert rivals_of(searched(rubbing(100.0)), "tracker_scale") == []
+    assert rivals_of(searched(rubbing(100.0, nearly=0.05)), "tracker_scale")[0].name == CABLE
+    assert len(rivals_of(searched(rubbing(100.0, nearly=0.05)), "tracker_scale")) == 1
+
+
+CABLE = "winch_side_length"
+
+
+def rubbing(seen: float, nearly: float = 0.2) -> LinearToy:
+    """A cable behind the exit point does nearly what is hidden; friction beside it what it may."""
+    hidden, names = "tracker_scale", (*NAMES, CABLE, "exit_friction")
     plain = toy({}, names, seed=1)
-    nearly = plain.columns[hidden] + 0.2 * plain.columns["winch_side_length"]
-    rubs = nearly * [1.0, 0.0] + plain.columns["exit_friction"] * [0.0, 0.01]
-    columns = {"winch_side_length": nearly, "exit_friction": rubs}
-    found = searched(toy({hidden: 0.5}, names, seed=1, columns=columns))
-    assert found.found == (hidden,)
-    (rival,) = rivals_of(found, hidden)
-    # too far off by itself; but with a parameter more it would not be, which says nothing
-    assert rival.name == "winch_side_length" and 3.0 < rival.loss < 6.0
+    as_cable = plain.columns[hidden] + nearly * plain.columns[CABLE]
+    rubs = as_cable * [1.0, 0.0] + plain.columns["exit_friction"] * [0.0, seen]
+    columns = {CABLE: as_cable, "exit_friction": rubs}
+    return toy({hidden: 0.5}, names, seed=1, columns=columns)
 
 
 def test_what_explains_far_less_is_not_fitted_to_the_end_to_see_that() -> None:
