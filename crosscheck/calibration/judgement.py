@@ -30,6 +30,8 @@ SURPRISE = 2.0
 # imitate what is missing.
 _PART, _WORTH = 0.1, 25.0
 
+NONE: Names = frozenset()
+
 
 @dataclass(frozen=True, eq=False)
 class Judgement:
@@ -39,15 +41,22 @@ class Judgement:
         verdict: of the data.
         sure: effects that are missing beyond doubt, each the first of its class.
         undecided: how many classes are open.
+        doubted: members of the best set of a size that hardly happens.
     """
 
     verdict: DiagnosisVerdict
     sure: tuple[str, ...]
     undecided: float
+    doubted: Names = NONE
 
 
 def judge(
-    found: Found, classes: Classes, field_odds: float, surprise: float, strange: bool = False
+    found: Found,
+    classes: Classes,
+    field_odds: float,
+    surprise: float,
+    strange: bool = False,
+    doubted: Names = NONE,
 ) -> Judgement:
     """The verdict.
 
@@ -57,18 +66,21 @@ def judge(
         field_odds: ln odds of a smooth field beside the whole catalogue.
         surprise: of the worst run left out of the joint fit, a reading.
         strange: what was taken for noise is none.
+        doubted: members of the best set of a size that hardly happens.
     """
     best, undecided = found.best.names - found.always, classes.undecided
     unknown = strange or field_odds > UNKNOWN or surprise > SURPRISE
     sure = sure_effects(found, classes, True)
     few = len(best) <= _FEW and undecided < (_OPEN_BESIDE if set(sure) == best else _OPEN)
+    few = few and not doubted
     sure = adequate(found, sure) if few and sure else sure_effects(found, classes, False)
+    sure = tuple(name for name in sure if name not in doubted)
     if unknown:  # known effects imitate it: none of them is sure
         return Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, (), undecided)
     if not sure and undecided < _OPEN and explained(found) < _OWED:
         return Judgement(DiagnosisVerdict.NO_EFFECT_MISSING, (), undecided)
     verdict = DiagnosisVerdict.EFFECTS_FOUND if few and sure else DiagnosisVerdict.MANY_EFFECTS
-    return Judgement(verdict, sure, undecided)
+    return Judgement(verdict, sure, undecided, doubted)
 
 
 def sure_effects(found: Found, classes: Classes, few: bool) -> tuple[str, ...]:

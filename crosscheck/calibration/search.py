@@ -15,9 +15,11 @@ from crosscheck.calibration.later import layouts
 from crosscheck.calibration.linearised import free_of
 from crosscheck.calibration.probability import Classes, all_scores, probabilities
 from crosscheck.calibration.refits import ROUNDS, Found, compare_sets
+from crosscheck.calibration.sets import Names
 from crosscheck.calibration.stages import Progress
 from crosscheck.calibration.strange import is_strange
 from crosscheck.calibration.unseen import shown_from
+from crosscheck.fit.possible import hardly_happens
 from crosscheck.fit.problem import Problem, Rms, kinds_read
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.fit.state import evaluate
@@ -92,7 +94,7 @@ def seek(
     sizes = {name: catalogue.size(name) for name in effects}
     classes = probabilities(all_scores(found), found.best.names, effects, sizes, found.refits)
     strange = strange or is_strange(setting, found.best.joint, known)
-    said = judge(found, classes, odds, surprise, strange)
+    said = judge(found, classes, odds, surprise, strange, _doubted(found))
     listed = found.always | set(said.sure)
     alone = found.refit(listed) if said.verdict is DiagnosisVerdict.EFFECTS_FOUND else None
     if alone is not None and listed != found.best.names:
@@ -102,3 +104,9 @@ def seek(
     free = free_of(joint)
     shown = shown_from(setting, joint, joint.jacobian * free, joint.width * free)
     return Sought(whole, found, catalogue, classes, odds, shown, said)
+
+
+def _doubted(found: Found) -> Names:
+    """Members of the best set of a size that hardly happens."""
+    own = (term for term in found.best.joint.terms if term.name not in found.always)
+    return frozenset(term.name for term in own if hardly_happens(term))

@@ -27,6 +27,7 @@ from crosscheck.diagnosis.words import (
     words_of,
 )
 from crosscheck.fit.candidates import Candidate
+from crosscheck.fit.possible import largest_size
 from crosscheck.fit.prepare import noise_floor
 from crosscheck.fit.problem import KINDS, Rms, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
@@ -51,7 +52,7 @@ def explained(sought: Sought, notes: Sequence[str]) -> Diagnosis:
         before=sought.calibration.before,
         floor=_floor(sought),
         candidates=_not_listed(way, chances),
-        notes=(*notes, *_noise_notes(sought, chances)),
+        notes=(*notes, *_noise_notes(sought, chances), *_doubt_notes(sought)),
         chances=chances,
         alternatives=some,
     )
@@ -126,6 +127,16 @@ def _noise_notes(sought: Sought, chances: Chances) -> list[str]:
         lines = sought.calibration.setting.problem.data.lines_of(rows)
         out.append(f"hardly counted, and not in these errors, as far from all others: {lines}")
     return out
+
+
+def _doubt_notes(sought: Sought) -> list[str]:
+    """Effects that explain only with values that hardly any robot has."""
+    terms = sought.found.best.joint.terms
+    return [
+        f"{name} would be {largest_size(terms[name]):.3g} times a plausible size, which hardly "
+        "happens: check it by hand before anything else, it may stand for what is not tried here"
+        for name in sorted(sought.judgement.doubted)
+    ]
 
 
 def _sentence(

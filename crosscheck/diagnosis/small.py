@@ -17,11 +17,8 @@ from crosscheck.diagnosis.search import MOST_EFFECTS, Search
 from crosscheck.fit.candidates import Candidate, try_candidate
 from crosscheck.fit.gauss_newton import Fit
 from crosscheck.fit.held_out import significantly_improves
+from crosscheck.fit.possible import is_plausible
 from crosscheck.fit.smooth import beyond_smooth
-from seecr.effects import Term
-
-# Where structure is left over, an effect of more plausible sizes than this is not believed.
-PLAUSIBLE = 20.0
 
 
 def small_effects_alone(
@@ -88,12 +85,6 @@ def _contradicted(candidate: Candidate, others: Sequence[Candidate]) -> bool:
 
 def _happens(found: Fit, candidate: Candidate) -> bool:
     return is_plausible(found.terms[candidate.name])
-
-
-def is_plausible(term: Term) -> bool:
-    """Whether an effect is of a size that happens; what shapes it has no such size."""
-    amplitudes = ~term.layout.shape
-    return bool(np.all(np.abs(term.sizes)[amplitudes] < PLAUSIBLE))
 
 
 def _small_candidates(way: Search, parameters: int) -> list[Candidate]:

@@ -18,8 +18,9 @@ from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.listed import diagnosis_of, missing_of, not_listed
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
 from crosscheck.diagnosis.search import Search
-from crosscheck.diagnosis.small import is_plausible, share_of, small_effects_alone
+from crosscheck.diagnosis.small import share_of, small_effects_alone
 from crosscheck.diagnosis.words import and_what_is_left, none_of, words_of
+from crosscheck.fit.possible import is_plausible
 from crosscheck.fit.prepare import noise_floor
 from crosscheck.fit.problem import rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict

@@ -12,12 +12,13 @@ from crosscheck.diagnosis.chances import chances_of
 from crosscheck.diagnosis.exchange import DOUBTED
 from crosscheck.diagnosis.explained import explained
 from crosscheck.diagnosis.importance import weighed
-from crosscheck.diagnosis.result import Diagnosis
+from crosscheck.diagnosis.result import Diagnosis, MissingEffect
 from crosscheck.diagnosis.settled import settled
 from crosscheck.diagnosis.stepwise import by_steps
 from crosscheck.diagnosis.unexplained import unexplained
 from crosscheck.fit.candidates import null_fit
 from crosscheck.fit.gauss_newton import Fit
+from crosscheck.fit.possible import hardly_happens
 from crosscheck.fit.prepare import Prepared, Progress, noise_floor, prepare
 from crosscheck.fit.problem import Problem, kinds_read, kinds_stated, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Refusal, Unfit
@@ -89,7 +90,7 @@ def _searched(
     found, more = by_steps(problem, base, factor, _part(progress, 0.0, 0.5))
     if found.last.whiteness.is_noise and kinds_stated(problem) == kinds_read(problem):
         steps = settled(found, (*notes, *more), lambda text: progress(text, 0.5))
-        if all(effect.probability > DOUBTED for effect in steps.missing):
+        if all(_believed(effect) for effect in steps.missing):
             return steps
     # no few effects one after the other, or one that is less likely than not; noise that goes
     # together, is larger than stated (a few rows far off may have made it so) or was estimated,
@@ -99,6 +100,11 @@ def _searched(
     if sought.judgement.verdict is not DiagnosisVerdict.UNKNOWN_EFFECT:
         return explained(sought, notes)
     return unexplained(found, chances_of(sought), (*notes, *more))
+
+
+def _believed(effect: MissingEffect) -> bool:
+    """Whether it is likely, and of a size that happens."""
+    return effect.probability > DOUBTED and not hardly_happens(effect.term)
 
 
 def _part(progress: Progress, first: float, last: float) -> Progress:

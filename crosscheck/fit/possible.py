@@ -1,9 +1,18 @@
-"""Values that no robot can have: a fit may come to them, an answer may not."""
+"""Values that no robot can have, or hardly any: a fit may come to them, an answer may not."""
 
 from __future__ import annotations
 
-from seecr.effects import Terms
+import numpy as np
+
+from crosscheck.fit.registration import NAME as TRACKER
+from seecr.effects import Term, Terms
 from seecr.robot import Robot
+
+# Where structure is left over, an effect of more plausible sizes than this is not believed.
+PLAUSIBLE = 20.0
+# Nor anywhere one of more than this, five standard deviations of the widest prior there is: a
+# builder's lines were 20 plausible sizes longer than told, and it was so.
+_EVER = 50.0
 
 
 def can_be(robot: Robot, terms: Terms, stood: Terms) -> bool:
@@ -15,3 +24,18 @@ def can_be(robot: Robot, terms: Terms, stood: Terms) -> bool:
     """
     own = {term.name for term in stood if not term.is_possible(robot)}
     return all(term.name in own or term.is_possible(robot) for term in terms)
+
+
+def is_plausible(term: Term) -> bool:
+    """Whether an effect is of a size that happens where others may imitate it."""
+    return largest_size(term) < PLAUSIBLE
+
+
+def hardly_happens(term: Term) -> bool:
+    """Whether an effect is larger than any; a tracker may stand anywhere."""
+    return term.name != TRACKER and largest_size(term) > _EVER
+
+
+def largest_size(term: Term) -> float:
+    """The largest of an effect's values in plausible sizes; what shapes it has none."""
+    return float(np.max(np.abs(term.sizes[~term.layout.shape]), initial=0.0))

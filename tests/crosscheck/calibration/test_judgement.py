@@ -97,6 +97,16 @@ def test_what_is_listed_explains_about_as_much_as_the_best_set() -> None:
     assert judged({**open_, "a": -100.0}).verdict is DiagnosisVerdict.EFFECTS_FOUND
 
 
+def test_what_is_of_a_size_that_does_not_happen_is_not_sure() -> None:
+    """A frame tilted by eleven degrees was listed: what it imitates is something else."""
+    found = found_of({"": -900.0, "a": -300.0, "b": -500.0, "ab": 0.0})
+    classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
+    said = judge(found, classes, -5.0, 1.0)
+    assert (said.verdict, said.sure) == (DiagnosisVerdict.EFFECTS_FOUND, ("a", "b"))
+    said = judge(found, classes, -5.0, 1.0, doubted=frozenset("b"))
+    assert (said.verdict, said.sure) == (DiagnosisVerdict.MANY_EFFECTS, ("a",))
+
+
 def test_a_field_or_runs_left_out_make_it_unknown() -> None:
     scores = {"": -900.0, "a": 0.0}
     assert judged(scores, odds=6.0).verdict is DiagnosisVerdict.UNKNOWN_EFFECT

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_data import term
+from made_data import COGIRO, measured, term
 
 import crosscheck
 from crosscheck.measurements.data import Measurements
@@ -74,3 +74,15 @@ def test_an_effect_that_is_unlikely_is_not_listed_though_steps_end_with_noise(
     for one in found.missing:
         shown = found.search.last.fit.terms[one.effect].vector
         np.testing.assert_array_equal(one.term.vector, shown)
+
+
+def test_what_explains_only_with_a_size_that_hardly_happens_is_said_to() -> None:
+    """A frame tilted by twenty-nine degrees explains everything, and may stand for anything."""
+    robot = load_robot(COGIRO)
+    data = measured(robot, [term(robot, "gravity_tilt", tilt_x_rad=0.51)], points=18, seed=3)
+    found = crosscheck.diagnose(robot, data, only=["gravity_tilt", "stiffness", "pulley_radius"])
+    assert found.verdict is crosscheck.DiagnosisVerdict.MANY_EFFECTS and not found.missing
+    assert "gravity_tilt (> 99 %)" in found.sentence
+    assert any(
+        note.startswith("gravity_tilt would be 51 times a plausible size") for note in found.notes
+    )

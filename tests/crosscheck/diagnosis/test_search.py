@@ -12,9 +12,10 @@ from crosscheck.diagnosis.node import LEAST_GAIN, explored, node_of
 from crosscheck.diagnosis.order import fitted_to_the_end, in_order, without_needless
 from crosscheck.diagnosis.rivals import rivals_of
 from crosscheck.diagnosis.search import Search, search
-from crosscheck.diagnosis.small import is_plausible, share_of, small_effects_alone
+from crosscheck.diagnosis.small import share_of, small_effects_alone
 from crosscheck.fit.evidence import FALSE_ALARM
 from crosscheck.fit.gauss_newton import Fit
+from crosscheck.fit.possible import is_plausible
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.reasons import Why
 from crosscheck.fit.starts import Starts
