@@ -104,9 +104,7 @@ class Correction(Result):
             out.append(f"tensions there {between(pulls.min(), pulls.max(), lead='from ')} N")
         near = lost & self.found
         if np.any(lost):
-            out.append(
-                f"{int(lost.sum())} cannot be held: no tensions within the limits balance the load"
-            )
+            out.append(f"{int(lost.sum())} cannot be held with tensions within the limits:")
             out += self._reasons()
         if np.any(near):
             out.append(

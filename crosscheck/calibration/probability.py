@@ -68,18 +68,18 @@ def _larger(found: Found, refit: Refit) -> dict[Names, float]:
 
     None is better than that set: it would have been fitted, or no robot can have it. Where the
     linear model does not know what the set explains, others explain it there: they are taken to
-    add nothing.
+    gain beside it what they gain beside the best set.
     """
     scores, best = found.scores, found.best
-    linear = scores.score(refit.names)
-    known = refit.score - linear < best.score - scores.score(best.names) + HOLLOW
-
-    def gain(names: Names, score: float) -> float:
-        if known:
-            return min(score - linear, 0.0)
-        return scores.log_prior(names) - scores.log_prior(refit.names)
-
-    return {n: refit.score + gain(n, s) for n, s in scores.larger(refit.names).items()}
+    off = (refit.score - scores.score(refit.names)) - (best.score - scores.score(best.names))
+    about = refit.names if off < HOLLOW else best.names
+    base, there = scores.score(about), scores.larger(about)
+    gains = {next(iter(names - about)): min(s - base, 0.0) for names, s in there.items()}
+    return {
+        refit.names | {name}: refit.score + gain
+        for name, gain in gains.items()
+        if name not in refit.names
+    }
 
 
 def probabilities(

@@ -19,7 +19,7 @@ from crosscheck.calibration.sets import Names
 from crosscheck.calibration.stages import Progress
 from crosscheck.calibration.strange import is_strange
 from crosscheck.calibration.unseen import shown_from
-from crosscheck.fit.possible import hardly_happens
+from crosscheck.fit.possible import can_be, hardly_happens
 from crosscheck.fit.problem import Problem, Rms, kinds_read
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.fit.state import evaluate
@@ -99,11 +99,26 @@ def seek(
     alone = found.refit(listed) if said.verdict is DiagnosisVerdict.EFFECTS_FOUND else None
     if alone is not None and listed != found.best.names:
         # what could stand in the place of what is listed, not of a larger set
-        scores = {**all_scores(found), listed: alone.score}
-        classes = probabilities(scores, listed, effects, sizes, {*found.refits, listed})
+        further = {**in_place(found, listed, classes), listed: alone.score}
+        scores = {**all_scores(found), **further}
+        classes = probabilities(scores, listed, effects, sizes, {*found.refits, *further})
     free = free_of(joint)
     shown = shown_from(setting, joint, joint.jacobian * free, joint.width * free)
     return Sought(whole, found, catalogue, classes, odds, shown, said)
+
+
+def in_place(found: Found, listed: Names, classes: Classes) -> dict[Names, float]:
+    """Scores of what is listed with an equal in a member's place: one in a larger set, so far."""
+    stood, out = found.none.joint.state, dict[Names, float]()
+    for members in classes.members:
+        for name in listed.intersection(members) - found.always:
+            for other in set(members) - listed:
+                swapped = found.refit((listed - {name}) | {other})
+                if swapped is None:
+                    continue
+                if can_be(stood.experiment.robot, swapped.joint.terms, stood.terms):
+                    out[swapped.names] = swapped.score
+    return out
 
 
 def _doubted(found: Found) -> Names:

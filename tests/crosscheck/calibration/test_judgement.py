@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import combinations
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,10 @@ from crosscheck.calibration.gram import ColumnGroup, gram_of
 from crosscheck.calibration.judgement import Judgement, judge
 from crosscheck.calibration.probability import all_scores, probabilities
 from crosscheck.calibration.refits import Found
-from crosscheck.calibration.sets import Scores
+from crosscheck.calibration.search import in_place
+from crosscheck.calibration.sets import Names, Scores
 from crosscheck.fit.reasons import DiagnosisVerdict
+from seecr.effects import Terms
 
 NAMES = ("a", "b", "c", "d", "e", "f", "g")
 NO_FIT: Any = None
@@ -138,3 +141,27 @@ def test_a_swap_within_a_class_is_no_alternative() -> None:
 def test_a_large_best_set_has_no_alternatives_of_few() -> None:
     assert open_sets({"": -900.0, "abcdef": 0.0, "g": -1.0}) == []
     assert open_sets({"": 0.0, "a": -1.0}) == []
+
+
+def test_equals_in_a_larger_set_are_looked_for_in_what_is_listed() -> None:
+    """A mass did what a cable does beside gains; the gains were not listed, nor the mass named."""
+    state: Any = SimpleNamespace(experiment=SimpleNamespace(robot=None), terms=Terms())
+    joint: Any = SimpleNamespace(terms=Terms(), state=state)
+    scores = {"": -900.0, "abg": 0.0, "cbg": -0.3, "ab": -0.7}
+    refits = {frozenset(k): Refit(frozenset(k), joint, {}, s) for k, s in scores.items()}
+    fitted: list[Names] = []
+
+    def refit(names: Names) -> Refit | None:
+        fitted.append(names)
+        return None if names == frozenset("ac") else Refit(names, joint, {}, -1.0)
+
+    base = found_of(scores)
+    found = Found(refits, refits[frozenset("abg")], base.scores, refit)
+    classes = probabilities(scores_of(refits), found.best.names, NAMES, fitted=refits)
+    assert classes.members[0] == ("a", "c")
+    assert in_place(found, frozenset("ab"), classes) == {frozenset("cb"): -1.0}
+    assert fitted == [frozenset("cb")]
+
+
+def scores_of(refits: dict[Names, Refit]) -> dict[Names, float]:
+    return {names: one.score for names, one in refits.items()}

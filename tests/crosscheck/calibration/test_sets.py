@@ -153,7 +153,7 @@ def test_members_of_the_best_set_are_as_sure_as_all_sets_say() -> None:
     assert len(off) == 5 and np.max(off) < 0.03 and np.min(off) > -0.08
 
 
-def test_beside_what_the_linear_model_does_not_know_a_further_effect_adds_nothing() -> None:
+def test_beside_what_the_linear_model_does_not_know_others_gain_what_they_do_elsewhere() -> None:
     """All that explain there what it explains here were counted as if they cost nothing."""
     gram = many_weak(0)
     scores = Scores(gram, 14)
@@ -167,10 +167,11 @@ def test_beside_what_the_linear_model_does_not_know_a_further_effect_adds_nothin
     # about the best set the linear model sees little of what the other does
     scores.solved[other] = (top - 60.0, {"e9": 1.0})
     found = all_scores(Found(some, some[best], scores, some.get))
-    larger = [score for names, score in found.items() if other < names and not best < names]
-    step = scores.log_prior(frozenset({"e9", "e1"})) - scores.log_prior(other)
-    assert len(larger) == 12 and step < -1.0
-    assert larger == pytest.approx([top - 1.0 + step] * 12)
+    larger = {names - other: s for names, s in found.items() if other < names and not best < names}
+    assert len(larger) == 12
+    for one, score in larger.items():
+        assert score + 1.0 == pytest.approx(found[best | one])
+    assert np.median([*larger.values()]) < top - 1.5
 
 
 def test_no_probability_is_more_than_one() -> None:
