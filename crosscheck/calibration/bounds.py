@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, special
+from scipy import special
 
 from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.linearised import Linear
@@ -38,10 +38,10 @@ def log_absent(
     wide = np.where(linear.width > 0.0, _each(joint, widths), 0.0)
     free = np.flatnonzero(wide > 0.0)
     columns = linear.x[:, free]
-    normal = linalg.cho_factor(columns.T @ columns + np.diag(wide[free] ** -2.0))
+    inverse = np.linalg.inv(columns.T @ columns + np.diag(wide[free] ** -2.0))
     cross = columns.T @ x
-    left = linear.y - columns @ linalg.cho_solve(normal, columns.T @ linear.y)
-    power = np.sum(x**2, axis=0) - np.sum(cross * linalg.cho_solve(normal, cross), axis=0)
+    left = linear.y - columns @ (inverse @ (columns.T @ linear.y))
+    power = np.sum(x**2, axis=0) - np.sum(cross * (inverse @ cross), axis=0)
     along = x.T @ left
     of_parameter = zip(_owners(joint, held), np.maximum(power, 0.0), along, strict=True)
     return float(sum(_gain(p, a, widths.get(term.name)) for term, p, a in of_parameter))

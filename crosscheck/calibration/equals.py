@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from seecr.effects.base import Layout
+
 # Effects whose exchange costs less evidence than this are equals.
 EQUAL = 3.0
 # A small effect (of up to so many parameters) with one more costs about so much evidence though it
@@ -19,3 +21,13 @@ def are_equals(loss: float, own: int, other: int) -> bool:
     """
     more = max(0, other - own) if other <= SMALL else 0
     return loss < EQUAL + _ONE_MORE * more
+
+
+def parameters_told(layout: Layout) -> int:
+    """Parameters of an effect that say what others do not: of a small one that contains another.
+
+    Friction comes with cable behind the exit point; that it has two numbers is no excuse for it
+    to explain less than the cable alone.
+    """
+    inner = layout.effect.parent
+    return 1 if inner and len(layout) <= SMALL else len(layout)

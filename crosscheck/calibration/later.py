@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, special
+from scipy import special
 
 from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.worth import log_gain
@@ -109,14 +109,14 @@ class _Beside:
         self.left = joint.whitened(setting.chain, joint.state.white)
         self.columns = joint.whitened(setting.chain, joint.jacobian) * joint.width
         normal = self.columns.T @ self.columns + np.eye(self.columns.shape[1])
-        self.factor = linalg.cho_factor(normal, check_finite=False)
+        self.inverse = np.linalg.inv(normal)
 
     def gain(self, term: Term) -> float:
         """ln gain of an effect's amplitudes that start at null, the others as they are."""
         setting, joint = self.setting, self.joint
         x = joint.whitened(setting.chain, added_columns(setting, joint, term))
         cross = self.columns.T @ x
-        normal = x.T @ x - cross.T @ linalg.cho_solve(self.factor, cross, check_finite=False)
+        normal = x.T @ x - cross.T @ self.inverse @ cross
         layout = term.layout
         one_sided = bool(np.any(layout.lower == layout.null)) and x.shape[1] == 1
         return log_gain(normal, x.T @ self.left, one_sided=one_sided)

@@ -11,10 +11,14 @@ from scipy import special
 from crosscheck.calibration.equals import EQUAL, are_equals
 from crosscheck.calibration.exact import HOLLOW, Refit
 from crosscheck.calibration.refits import Found
-from crosscheck.calibration.sets import Names
+from crosscheck.calibration.sets import Names, Scores
 
 # Sets worse than the best by more than this in ln evidence count for nothing.
 _COUNTED = 8.0
+# Beside an effect that does the same another gains less than this part of what it does alone.
+_SAME = 0.5
+# As many effects beyond what is listed are looked at for being alike.
+_HINTS = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,13 +77,14 @@ def _larger(found: Found, refit: Refit) -> dict[Names, float]:
     scores, best = found.scores, found.best
     off = (refit.score - scores.score(refit.names)) - (best.score - scores.score(best.names))
     about = refit.names if off < HOLLOW else best.names
-    base, there = scores.score(about), scores.larger(about)
-    gains = {next(iter(names - about)): min(s - base, 0.0) for names, s in there.items()}
-    return {
-        refit.names | {name}: refit.score + gain
-        for name, gain in gains.items()
-        if name not in refit.names
-    }
+    base, out = scores.score(about) - scores.log_prior(about), dict[Names, float]()
+    for names, score in scores.larger(about).items():
+        larger = refit.names | names - about
+        if larger != refit.names:
+            gain = score - scores.log_prior(names) - base
+            step = scores.log_prior(larger) - scores.log_prior(refit.names)
+            out[larger] = refit.score + min(gain + step, 0.0)
+    return out
 
 
 def probabilities(
@@ -88,6 +93,7 @@ def probabilities(
     effects: Iterable[str],
     sizes: Mapping[str, int] | None = None,
     fitted: Collection[Names] | None = None,
+    hints: Iterable[tuple[str, ...]] = (),
 ) -> Classes:
     """Probabilities of effects and classes: sums over sets.
 
@@ -98,10 +104,56 @@ def probabilities(
         sizes: how many parameters each has; one where not given.
         fitted: sets whose scores are exact, all by default: only they say what stands in the
             place of what.
+        hints: effects beyond the best set that do the same, from :func:`alike_beyond`.
     """
     effects = list(effects)
     exact = scores if fitted is None else {n: scores[n] for n in fitted}
-    return of_classes(scores, best, effects, _classes(exact, best, effects, sizes or {}))
+    members = with_hints(_classes(exact, best, effects, sizes or {}), hints)
+    return of_classes(scores, best, effects, members)
+
+
+def with_hints(
+    members: Iterable[tuple[str, ...]], hints: Iterable[tuple[str, ...]]
+) -> list[tuple[str, ...]]:
+    """Classes, with those put together that are of one effect each and hint at the same."""
+    members = list(members)
+    alone = {names[0] for names in members if len(names) == 1}
+    groups = [tuple(name for name in names if name in alone) for names in hints]
+    taken = {name for names in groups for name in names}
+    return [*filter(None, groups), *(names for names in members if taken.isdisjoint(names))]
+
+
+def alike_beyond(scores: Scores, listed: Names, sizes: Mapping[str, int]) -> list[tuple[str, ...]]:
+    """Effects that are not listed and hint at the same, in the linear model about what is.
+
+    Each explains something beside what is listed (prior odds left out), about as well as the best
+    of them does, and beside that one not half as much.
+    """
+
+    def gains(names: Names, some: Iterable[str]) -> dict[str, float]:
+        def gain(more: Names) -> float:
+            return scores.score(more, widths) - scores.log_prior(more)
+
+        widths, base = scores.widths(names), scores.score(names) - scores.log_prior(names)
+        return {e: gain(names | {e}) - base for e in some}
+
+    near = scores.larger(listed)
+    likely = sorted(near, key=lambda names: -near[names])[:_HINTS]
+    alone = gains(listed, [next(iter(names - listed)) for names in likely])
+    left = sorted((e for e in alone if alone[e] > EQUAL), key=lambda e: -alone[e])
+    out = []
+    while left:
+        first, *others = left
+        beside = gains(listed | {first}, others)
+        group = [
+            e for e in others
+            if are_equals(alone[first] - alone[e], sizes.get(first, 1), sizes.get(e, 1))
+            and beside[e] < _SAME * alone[e]
+        ]  # fmt: skip
+        left = [e for e in others if e not in group]
+        if group:
+            out.append((first, *group))
+    return out
 
 
 def of_classes(

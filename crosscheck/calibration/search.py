@@ -9,11 +9,17 @@ import numpy as np
 
 from crosscheck.calibration.all_effects import PLAIN, Calibration, fit_all_effects
 from crosscheck.calibration.catalogue import Catalogue
+from crosscheck.calibration.equals import parameters_told
 from crosscheck.calibration.field import UNKNOWN, log_odds
 from crosscheck.calibration.judgement import SURPRISE, Judgement, judge
 from crosscheck.calibration.later import layouts
 from crosscheck.calibration.linearised import free_of
-from crosscheck.calibration.probability import Classes, all_scores, probabilities
+from crosscheck.calibration.probability import (
+    Classes,
+    alike_beyond,
+    all_scores,
+    probabilities,
+)
 from crosscheck.calibration.refits import ROUNDS, Found, compare_sets
 from crosscheck.calibration.sets import Names
 from crosscheck.calibration.stages import Progress
@@ -25,6 +31,7 @@ from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.fit.state import evaluate
 from crosscheck.measurements.data import Sigma
 from seecr.effects import Term, Terms
+from seecr.robot import Robot
 
 # Sets refitted about one linear model; fewer where something unknown leaves no hope of an end.
 _REFITTED, _REFITTED_UNKNOWN = 20, 4
@@ -91,32 +98,35 @@ def seek(
 
     found = compare_sets(setting, joint, catalogue, plain, told, most, rounds, given)
     effects = [n for n in catalogue.names if n not in terms]
-    sizes = {name: catalogue.size(name) for name in effects}
-    classes = probabilities(all_scores(found), found.best.names, effects, sizes, found.refits)
+    sizes = {name: parameters_told(catalogue.start(name).layout) for name in effects}
+    own = found.best.names
+    hints = alike_beyond(found.scores, own, sizes)
+    classes = probabilities(all_scores(found), own, effects, sizes, found.refits, hints)
     strange = strange or is_strange(setting, found.best.joint, known)
     said = judge(found, classes, odds, surprise, strange, _doubted(found))
     listed = found.always | set(said.sure)
     alone = found.refit(listed) if said.verdict is DiagnosisVerdict.EFFECTS_FOUND else None
     if alone is not None and listed != found.best.names:
         # what could stand in the place of what is listed, not of a larger set
-        further = {**in_place(found, listed, classes), listed: alone.score}
+        further = {**in_place(found, listed, classes, problem.robot, terms), listed: alone.score}
         scores = {**all_scores(found), **further}
-        classes = probabilities(scores, listed, effects, sizes, {*found.refits, *further})
+        hints = alike_beyond(found.scores, listed, sizes)
+        classes = probabilities(scores, listed, effects, sizes, {*found.refits, *further}, hints)
     free = free_of(joint)
     shown = shown_from(setting, joint, joint.jacobian * free, joint.width * free)
     return Sought(whole, found, catalogue, classes, odds, shown, said)
 
 
-def in_place(found: Found, listed: Names, classes: Classes) -> dict[Names, float]:
+def in_place(
+    found: Found, listed: Names, classes: Classes, robot: Robot, stood: Terms
+) -> dict[Names, float]:
     """Scores of what is listed with an equal in a member's place: one in a larger set, so far."""
-    stood, out = found.none.joint.state, dict[Names, float]()
+    out = dict[Names, float]()
     for members in classes.members:
         for name in listed.intersection(members) - found.always:
             for other in set(members) - listed:
                 swapped = found.refit((listed - {name}) | {other})
-                if swapped is None:
-                    continue
-                if can_be(stood.experiment.robot, swapped.joint.terms, stood.terms):
+                if swapped is not None and can_be(robot, swapped.joint.terms, stood):
                     out[swapped.names] = swapped.score
     return out
 

@@ -24,10 +24,10 @@ from crosscheck.diagnosis.words import (
     hints_of,
     noise_left,
     probable_words,
+    size_notes,
     words_of,
 )
 from crosscheck.fit.candidates import Candidate
-from crosscheck.fit.possible import largest_size
 from crosscheck.fit.prepare import noise_floor
 from crosscheck.fit.problem import KINDS, Rms, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
@@ -52,7 +52,7 @@ def explained(sought: Sought, notes: Sequence[str]) -> Diagnosis:
         before=sought.calibration.before,
         floor=_floor(sought),
         candidates=_not_listed(way, chances),
-        notes=(*notes, *_noise_notes(sought, chances), *_doubt_notes(sought)),
+        notes=(*notes, *_noise_notes(sought, chances), *_size_notes(sought)),
         chances=chances,
         alternatives=some,
     )
@@ -129,14 +129,9 @@ def _noise_notes(sought: Sought, chances: Chances) -> list[str]:
     return out
 
 
-def _doubt_notes(sought: Sought) -> list[str]:
-    """Effects that explain only with values that hardly any robot has."""
+def _size_notes(sought: Sought) -> list[str]:
     terms = sought.found.best.joint.terms
-    return [
-        f"{name} would be {largest_size(terms[name]):.3g} times a plausible size, which hardly "
-        "happens: check it by hand before anything else, it may stand for what is not tried here"
-        for name in sorted(sought.judgement.doubted)
-    ]
+    return size_notes(terms[name] for name in sorted(sought.judgement.doubted))
 
 
 def _sentence(

@@ -12,10 +12,11 @@ import numpy as np
 
 from crosscheck.calibration.catalogue import Catalogue, catalogue_columns, gram_with
 from crosscheck.calibration.colour import WHITE, chain_of
+from crosscheck.calibration.equals import parameters_told
 from crosscheck.calibration.joint import JointFit, Setting, settle
 from crosscheck.calibration.later import at_null, layouts, promising_beside
 from crosscheck.calibration.priors import FLAT, widths_of
-from crosscheck.calibration.probability import of_classes
+from crosscheck.calibration.probability import alike_beyond, of_classes, with_hints
 from crosscheck.calibration.sets import Names, Scores, explore
 from crosscheck.calibration.shapes import prices_about
 from crosscheck.calibration.unseen import shown_from
@@ -51,12 +52,14 @@ def chances_near(found: Search, alike: Mapping[str, Sequence[str]]) -> Chances:
     prices = prices_about(setting, joint, catalogue)
     scores = Scores(gram, len(effects), always, prices=prices)
     explore(scores, [always, names])
-    refitted = _refitted(found, scores, names)
-    every = corrected(scores, refitted, names) | refitted
+    every = scores.near | {n: s for n, (s, _w) in scores.solved.items()}
+    every |= _refitted(found, scores, names)
     none = _impossible(found)
     every = {some: score for some, score in every.items() if not some & none}
     shown = shown_from(setting, joint, *_all_of(columns))
-    return _with_equals(every, effects, alike, shown)
+    sizes = {name: parameters_told(catalogue.start(name).layout) for name in effects}
+    hints = alike_beyond(scores, names, sizes)
+    return _with_equals(every, effects, alike, hints, shown)
 
 
 def _impossible(found: Search) -> Names:
@@ -82,23 +85,6 @@ def _refitted(found: Search, scores: Scores, last: Names) -> dict[Names, float]:
         if fit.valid and every != last:
             score = base + found.trials.evidence(fit).log + scores.log_prior(every)
             out[every] = max(score, out.get(every, -np.inf))
-    return out
-
-
-def corrected(scores: Scores, refitted: Mapping[Names, float], last: Names) -> dict[Names, float]:
-    """Linear scores of sets; of those with another explanation than the last model's, by refits.
-
-    The linear model is about the last one, with whose cables taut and slack: what a refit of a
-    part of a set is better or worse than linear algebra says, the set is too.
-    """
-    every = scores.near | {n: s for n, (s, _w) in scores.solved.items()}
-    off = {names: score - scores.score(names) for names, score in refitted.items()}
-    out = dict(every)
-    for names, score in every.items():
-        parts = [] if last <= names else [part for part in refitted if part < names]
-        if parts:
-            nearest = max(parts, key=lambda part: (len(part), refitted[part]))
-            out[names] = score + off[nearest]
     return out
 
 
@@ -130,13 +116,15 @@ def _with_equals(
     scores: Mapping[Names, float],
     effects: Sequence[str],
     alike: Mapping[str, Sequence[str]],
+    hints: Sequence[tuple[str, ...]],
     shown: Rms | None,
 ) -> Chances:
     """The classes as refits know them: equals share the probability that one of them is missing."""
     classes = [(name, *others) for name, others in alike.items()]
     known = {member for members in classes for member in members}
     alone = [(name,) for name in effects if name not in known]
-    found = of_classes(scores, frozenset(alike), effects, [*classes, *alone])
+    beyond = with_hints(alone, hints)
+    found = of_classes(scores, frozenset(alike), effects, [*classes, *beyond])
     pairs = dict(zip(found.members, found.probability, strict=True))
     effect = dict(found.effect)
     for members in classes:

@@ -7,21 +7,22 @@ from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
 
+from crosscheck.calibration.judgement import SURE
 from crosscheck.calibration.search import seek
 from crosscheck.diagnosis.chances import chances_of
-from crosscheck.diagnosis.exchange import DOUBTED
 from crosscheck.diagnosis.explained import explained
 from crosscheck.diagnosis.importance import weighed
-from crosscheck.diagnosis.result import Diagnosis, MissingEffect
+from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.settled import settled
 from crosscheck.diagnosis.stepwise import by_steps
 from crosscheck.diagnosis.unexplained import unexplained
+from crosscheck.diagnosis.words import size_notes
 from crosscheck.fit.candidates import null_fit
 from crosscheck.fit.gauss_newton import Fit
 from crosscheck.fit.possible import hardly_happens
 from crosscheck.fit.prepare import Prepared, Progress, noise_floor, prepare
 from crosscheck.fit.problem import Problem, kinds_read, kinds_stated, rms_by_kind
-from crosscheck.fit.reasons import DiagnosisVerdict, Refusal, Unfit
+from crosscheck.fit.reasons import DiagnosisVerdict, Refusal, Unfit, Why
 from crosscheck.fit.tolerance import HALF_THE_NOISE, Tolerance
 from crosscheck.given import GivenModel, GivenRobot, considered, model_of, robot_of
 from crosscheck.measurements.read import GivenData, measurements_of
@@ -90,11 +91,12 @@ def _searched(
     found, more = by_steps(problem, base, factor, _part(progress, 0.0, 0.5))
     if found.last.whiteness.is_noise and kinds_stated(problem) == kinds_read(problem):
         steps = settled(found, (*notes, *more), lambda text: progress(text, 0.5))
-        if all(_believed(effect) for effect in steps.missing):
-            return steps
-    # no few effects one after the other, or one that is less likely than not; noise that goes
-    # together, is larger than stated (a few rows far off may have made it so) or was estimated,
-    # from what may be an effect. All at once, in sets
+        if is_clear(steps):
+            large = [e.term for e in steps.missing if hardly_happens(e.term)]
+            return replace(steps, notes=(*steps.notes, *size_notes(large)))
+    # no few effects one after the other, or one that is not sure, in a linear model about the
+    # last; noise that goes together, is larger than stated (a few rows far off may have made it
+    # so) or was estimated, from what may be an effect. All at once, in sets
     way = [step.fit.terms for step in found.steps[1:]]
     sought = seek(problem, problem.data.sigma, ready.terms, _part(progress, 0.5, 1.0), way)
     if sought.judgement.verdict is not DiagnosisVerdict.UNKNOWN_EFFECT:
@@ -102,9 +104,16 @@ def _searched(
     return unexplained(found, chances_of(sought), (*notes, *more))
 
 
-def _believed(effect: MissingEffect) -> bool:
-    """Whether it is likely, and of a size that happens."""
-    return effect.probability > DOUBTED and not hardly_happens(effect.term)
+def is_clear(steps: Diagnosis) -> bool:
+    """Whether all that steps found is sure, and nothing else is.
+
+    Several may hint at the same, of which none pays for itself.
+    """
+    listed = {effect.effect for effect in steps.missing}
+    classes = () if steps.chances is None else steps.chances.classes
+    further = any(p > SURE and listed.isdisjoint(members) for members, p in classes)
+    unsure = any(c.why_not is not None and c.why_not.why is Why.NOT_SURE for c in steps.candidates)
+    return all(e.probability > SURE for e in steps.missing) and not unsure and not further
 
 
 def _part(progress: Progress, first: float, last: float) -> Progress:

@@ -6,8 +6,10 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from crosscheck.diagnosis.chances import PROBABLE, Chances
 from crosscheck.diagnosis.result import MissingEffect
+from crosscheck.fit.possible import largest_size
 from crosscheck.fit.reasons import DiagnosisVerdict
 from seecr.counted import counted
+from seecr.effects import Term
 
 # Effects of a class that are named.
 _FIRST = 2
@@ -60,6 +62,15 @@ def hints_of(
         for members, p in chances.classes
         if listed.isdisjoint(members) and (p > PROBABLE or not found.isdisjoint(members))
     }
+
+
+def size_notes(terms: Iterable[Term]) -> list[str]:
+    """Of effects that explain only with values that hardly any robot has."""
+    return [
+        f"{term.name} would be {largest_size(term):.3g} times a plausible size, which hardly "
+        "happens: check it by hand before anything else, it may stand for what is not tried here"
+        for term in terms
+    ]
 
 
 def noise_left(hints: Mapping[str, float]) -> str:

@@ -128,7 +128,7 @@ def _averaged(
 def _gains(normal: Array, gradient: Array, widths: Array, absent: NDArray[np.bool_]) -> Array:
     """(k,) ln evidence over that of no effects, for prior standard deviations (k, p).
 
-    What is ``absent`` (p,) could have been there, and is charged beside the others.
+    What is ``absent`` (p,) could have been there, and is charged beside the others, each by itself.
     """
     free = np.flatnonzero(~absent)
     wide = widths[:, free]

@@ -13,6 +13,7 @@ PLAUSIBLE = 20.0
 # Nor anywhere one of more than this, five standard deviations of the widest prior there is: a
 # builder's lines were 20 plausible sizes longer than told, and it was so.
 _EVER = 50.0
+_TARGET = "tracker_target"
 
 
 def can_be(robot: Robot, terms: Terms, stood: Terms) -> bool:
@@ -32,8 +33,8 @@ def is_plausible(term: Term) -> bool:
 
 
 def hardly_happens(term: Term) -> bool:
-    """Whether an effect is larger than any; a tracker may stand anywhere."""
-    return term.name != TRACKER and largest_size(term) > _EVER
+    """Whether an effect is larger than any; a tracker and its target may stand anywhere."""
+    return term.name not in (TRACKER, _TARGET) and largest_size(term) > _EVER
 
 
 def largest_size(term: Term) -> float:

@@ -145,8 +145,8 @@ def test_a_large_best_set_has_no_alternatives_of_few() -> None:
 
 def test_equals_in_a_larger_set_are_looked_for_in_what_is_listed() -> None:
     """A mass did what a cable does beside gains; the gains were not listed, nor the mass named."""
-    state: Any = SimpleNamespace(experiment=SimpleNamespace(robot=None), terms=Terms())
-    joint: Any = SimpleNamespace(terms=Terms(), state=state)
+    joint: Any = SimpleNamespace(terms=Terms())
+    robot: Any = None
     scores = {"": -900.0, "abg": 0.0, "cbg": -0.3, "ab": -0.7}
     refits = {frozenset(k): Refit(frozenset(k), joint, {}, s) for k, s in scores.items()}
     fitted: list[Names] = []
@@ -159,7 +159,7 @@ def test_equals_in_a_larger_set_are_looked_for_in_what_is_listed() -> None:
     found = Found(refits, refits[frozenset("abg")], base.scores, refit)
     classes = probabilities(scores_of(refits), found.best.names, NAMES, fitted=refits)
     assert classes.members[0] == ("a", "c")
-    assert in_place(found, frozenset("ab"), classes) == {frozenset("cb"): -1.0}
+    assert in_place(found, frozenset("ab"), classes, robot, Terms()) == {frozenset("cb"): -1.0}
     assert fitted == [frozenset("cb")]
 
 

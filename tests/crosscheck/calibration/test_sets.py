@@ -10,7 +10,13 @@ import pytest
 
 from crosscheck.calibration.exact import Refit
 from crosscheck.calibration.gram import ColumnGroup, Gram, gram_of
-from crosscheck.calibration.probability import all_scores, of_classes, probabilities
+from crosscheck.calibration.probability import (
+    alike_beyond,
+    all_scores,
+    of_classes,
+    probabilities,
+    with_hints,
+)
 from crosscheck.calibration.refits import Found
 from crosscheck.calibration.sets import Names, Scores, explore, log_prior, thinned
 
@@ -157,7 +163,7 @@ def test_beside_what_the_linear_model_does_not_know_others_gain_what_they_do_els
     """All that explain there what it explains here were counted as if they cost nothing."""
     gram = many_weak(0)
     scores = Scores(gram, 14)
-    best, other = frozenset({"e0"}), frozenset({"e9"})
+    best, other = frozenset({"e0", "e5"}), frozenset({"e9"})
     fit: Any = None
     top = scores.score(best)
     some = {
@@ -168,10 +174,42 @@ def test_beside_what_the_linear_model_does_not_know_others_gain_what_they_do_els
     scores.solved[other] = (top - 60.0, {"e9": 1.0})
     found = all_scores(Found(some, some[best], scores, some.get))
     larger = {names - other: s for names, s in found.items() if other < names and not best < names}
-    assert len(larger) == 12
+    assert len(larger) == 11
+    # what they gain but for the prior, which pays less for a third effect than for a second
+    second, third = (
+        scores.log_prior(some | {"e1"}) - scores.log_prior(some) for some in (other, best)
+    )
+    assert second < third - 0.3
     for one, score in larger.items():
-        assert score + 1.0 == pytest.approx(found[best | one])
-    assert np.median([*larger.values()]) < top - 1.5
+        there = found[best | one] - top
+        assert score - (top - 1.0) <= there + second - third + 1e-9
+    assert np.median([*larger.values()]) < top - 2.0
+
+
+def hinting(same: float) -> Scores:
+    """c is listed; a explains something more, b goes with it, and d something else again."""
+    rng = np.random.default_rng(1)
+    x = rng.normal(size=(200, 6))
+    x[:, 1] = same * x[:, 0] + np.sqrt(1.0 - same**2) * x[:, 1]
+    y = rng.normal(size=200) + 2.0 * x[:, 2] + 0.3 * (x[:, 0] + x[:, 3])
+    groups = {n: ColumnGroup(np.array([k]), WIDTHS) for k, n in enumerate("abcdef")}
+    scores = Scores(gram_of(x, y, groups), 6)
+    scores.score(frozenset("c"))
+    return scores
+
+
+def test_effects_that_hint_at_the_same_are_put_together() -> None:
+    """An exit point at 56 % and an anchor point at 28 %: it is one of them."""
+    listed = frozenset("c")
+    assert alike_beyond(hinting(0.98), listed, {}) == [("a", "b")]
+    assert alike_beyond(hinting(0.3), listed, {}) == []  # a and d both hint, at two things
+
+
+def test_hints_are_classes_beside_those_of_what_is_listed() -> None:
+    members = [("c", "f"), ("a",), ("b",), ("d",)]
+    found = with_hints(members, [("a", "b", "f")])
+    assert found == [("a", "b"), ("c", "f"), ("d",)]
+    assert with_hints(members, []) == members
 
 
 def test_no_probability_is_more_than_one() -> None:

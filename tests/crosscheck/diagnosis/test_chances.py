@@ -12,7 +12,7 @@ from made_data import COGIRO, measured, term
 from crosscheck.calibration.all_effects import JointErrors
 from crosscheck.diagnosis import nearby
 from crosscheck.diagnosis.chances import Chances
-from crosscheck.diagnosis.nearby import _impossible, _refitted, chances_near, corrected
+from crosscheck.diagnosis.nearby import _impossible, _refitted, chances_near
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.stepwise import by_steps
 from crosscheck.diagnosis.words import probability_words
@@ -96,25 +96,6 @@ def test_sets_that_were_fitted_count_with_their_own_evidence() -> None:
     )
     # the last model's 40 is of evidence 10 and of two effects: two less evidence is two less
     assert _refitted(found, scores, last) == {frozenset("ac"): pytest.approx(38.0)}
-
-
-def test_sets_are_as_far_off_the_linear_model_as_a_refitted_part_of_them() -> None:
-    """Friction left far more than play did; friction with anything beside it was half the odds."""
-    last = frozenset({"play"})
-    linear = {
-        "play": 0.0, "play rubs": -2.0, "rubs": -1.0, "rubs creep": -3.0, "creep": -60.0,
-        "creep tilt": -62.0, "tilt mass": -64.0,
-    }  # fmt: skip
-    sets = {frozenset(names.split()): score for names, score in linear.items()}
-    scores: Any = SimpleNamespace(
-        near={}, solved={n: (s, {}) for n, s in sets.items()}, score=sets.__getitem__
-    )
-    refitted = {frozenset({"rubs"}): -23.0, frozenset({"creep"}): -50.0}
-    found = {" ".join(sorted(n)): s for n, s in corrected(scores, refitted, last).items()}
-    assert found["creep rubs"] == -25.0  # as friction alone, which explains the more
-    assert found["creep tilt"] == -52.0
-    # about the last model, and where nothing was refitted, as they were
-    assert found["play"] == 0.0 and found["play rubs"] == -2.0 and found["mass tilt"] == -64.0
 
 
 def fit_of(log: float, valid: bool = True) -> Any:
