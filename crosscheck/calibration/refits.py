@@ -114,11 +114,23 @@ def _searched(exact: Exact, scores: Scores, begin: Names, most: int) -> Refit:
 def _thinned(exact: Exact, scores: Scores, best: Refit) -> Refit:
     """The best set, each of its members dropped in earnest, until none is one too many."""
     while len(own := best.names - scores.always) <= FEW:
+        for name in sorted(own):
+            if does_nothing(exact, best, name):
+                # without it the same values are there; a fit from elsewhere may miss them
+                exact.take(scores, Terms(t for t in best.joint.terms if t.name != name))
         better = exact.best_of(scores, [best.names - {name} for name in sorted(own)])
         if better.names == best.names:
             break
         best = better
     return best
+
+
+def does_nothing(exact: Exact, best: Refit, name: str) -> bool:
+    """Whether a member's values move all readings together by less than noise."""
+    joint = best.joint
+    own = joint.terms.own(name)
+    moved = joint.whitened(exact.setting.chain, joint.jacobian[:, own] @ joint.z[own])
+    return float(moved @ moved) < 1.0
 
 
 def about_given(

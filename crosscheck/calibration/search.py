@@ -35,6 +35,8 @@ from seecr.robot import Robot
 
 # Sets refitted about one linear model; fewer where something unknown leaves no hope of an end.
 _REFITTED, _REFITTED_UNKNOWN = 20, 4
+# Equals that are fitted in a listed member's place, the likeliest.
+_SWAPPED = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +126,8 @@ def in_place(
     out = dict[Names, float]()
     for members in classes.members:
         for name in listed.intersection(members) - found.always:
-            for other in set(members) - listed:
+            likely = sorted(set(members) - listed, key=lambda e: (-classes.effect[e], e))
+            for other in likely[:_SWAPPED]:
                 swapped = found.refit((listed - {name}) | {other})
                 if swapped is not None and can_be(robot, swapped.joint.terms, stood):
                     out[swapped.names] = swapped.score

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from crosscheck.calibration import challenge as module
+from crosscheck.calibration import refits
 from crosscheck.calibration.catalogue import Catalogue
 from crosscheck.calibration.challenge import challenge, equals_of, without
 from crosscheck.calibration.exact import Exact, Refit
 from crosscheck.calibration.gram import ColumnGroup, Gram, gram_of
 from crosscheck.calibration.probability import probabilities
-from crosscheck.calibration.refits import containing, looked_about
+from crosscheck.calibration.refits import containing, does_nothing, looked_about
 from crosscheck.calibration.sets import Names, Scores, explore
 from seecr.effects import Term, Terms, effect_named, layout_of
 from seecr.mjcf import load_robot
@@ -189,3 +190,40 @@ def test_what_contains_a_member_and_joins_late_is_fitted_too() -> None:
     assert containing(exact, best) == [frozenset({"exit_friction"})]
     exact.plain = SimpleNamespace(terms=SimpleNamespace(names=("winch_side_length",)))
     assert containing(exact, best) == []
+
+
+def fitted_to(*values: float) -> Any:
+    """A joint fit of a and b with these values; a plausible size of each moves one reading by 1."""
+    terms: Any = SimpleNamespace(own=lambda name: np.array([name == "a", name == "b"]))
+    return SimpleNamespace(
+        terms=terms, jacobian=np.eye(3)[:, :2], z=np.array(values), whitened=lambda _c, v: v
+    )
+
+
+def test_a_member_that_moves_nothing_is_known_by_its_values() -> None:
+    exact: Any = SimpleNamespace(setting=SimpleNamespace(chain=None))
+    best = Refit(frozenset("ab"), fitted_to(30.0, 0.1), {}, 0.0)
+    assert does_nothing(exact, best, "b") and not does_nothing(exact, best, "a")
+
+
+def test_what_is_left_without_such_a_member_starts_where_it_is(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The set without it had ended in a hollow, so that any third effect seemed to be needed."""
+    exact = Linear(gram({"a": 2.0}))
+    names = [SimpleNamespace(name="a"), SimpleNamespace(name="e")]
+    best = Refit(frozenset("ae"), SimpleNamespace(terms=names), {}, 0.0)  # type: ignore[arg-type]
+    exact.fitted |= {best.names: best, frozenset("a"): Refit(frozenset("a"), NO_FIT, {}, -30.0)}
+    taken: list[Names] = []
+
+    def take(_scores: Scores, start: Any) -> None:
+        taken.append(frozenset(one.name for one in start))
+        exact.fitted[taken[-1]] = Refit(taken[-1], NO_FIT, {}, 2.0)
+
+    monkeypatch.setattr(exact, "take", take)
+    monkeypatch.setattr(refits, "Terms", list)
+    monkeypatch.setattr(
+        refits, "does_nothing", lambda _exact, found, name: found is best and name == "e"
+    )
+    assert refits._thinned(exact, exact.scores, best).names == frozenset("a")
+    assert taken == [frozenset("a")]
