@@ -194,14 +194,14 @@ def containing(exact: Exact, best: Refit) -> list[Names]:
     metre of cable behind the exit points. As it is there it explains as much as what it contains.
     Of few effects: in large sets it fits what others leave.
     """
-    out = list[Names]()
+    always, out = frozenset(exact.plain.terms.names), list[Names]()
     for names, refit in exact.possible.items():
         alike = len(names) == len(best.names) and refit.score > best.score - EQUAL
-        if not alike or len(names - frozenset(exact.plain.terms.names)) > FEW:
+        if not alike or len(names - always) > FEW:
             continue
         for term in exact.catalogue.later:
             inner = term.layout.effect.parent
-            if inner in names - frozenset(exact.plain.terms.names) and term.name not in names:
+            if inner in names - always and term.name not in names:
                 out.append((names - {inner}) | {term.name})
     return out
 

@@ -67,10 +67,11 @@ def evidence(fit: Fit) -> Evidence:
     x = np.concatenate([fit.jacobian, columns])
     left = np.concatenate([white, readings - columns @ fit.terms.sizes])
     y = left + x[:, free] @ fit.terms.sizes[free]
-    x, absent = x[:, free | absent], absent[free | absent]
+    kept = free | absent
+    x, absent = x[:, kept], absent[kept]
     normal, gradient = x.T @ x, x.T @ y
     power = np.linalg.eigvalsh(normal[np.ix_(~absent, ~absent)])
-    own = (fit.terms.own(n)[free | held_at_nothing(fit.terms)] for n in fit.terms.names)
+    own = (fit.terms.own(n)[kept] for n in fit.terms.names)
     gain = _averaged(normal, gradient, [one for one in own if one.any()], absent)
     log = gain - 0.5 * (float(y @ y) + fit.state.log_det)
     return Evidence(log, fit.chi2, int(np.sum(power > 1e-4)))

@@ -192,6 +192,15 @@ def test_what_contains_a_member_and_joins_late_is_fitted_too() -> None:
     assert containing(exact, best) == []
 
 
+def test_looking_about_fits_what_contains_a_member(monkeypatch: pytest.MonkeyPatch) -> None:
+    exact = Linear(gram({"a": 2.0}))
+    best = exact.fit(exact.scores, frozenset("a"))
+    assert best is not None
+    monkeypatch.setattr(refits, "containing", lambda _exact, _best: [frozenset("g")])
+    looked_about(exact, exact.scores, best)
+    assert frozenset("g") in exact.fitted
+
+
 def fitted_to(*values: float) -> Any:
     """A joint fit of a and b with these values; a plausible size of each moves one reading by 1."""
     terms: Any = SimpleNamespace(own=lambda name: np.array([name == "a", name == "b"]))

@@ -7,7 +7,9 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 
+from crosscheck.calibration import search
 from crosscheck.calibration.alternatives import alternatives
 from crosscheck.calibration.exact import Refit
 from crosscheck.calibration.gram import ColumnGroup, gram_of
@@ -143,7 +145,9 @@ def test_a_large_best_set_has_no_alternatives_of_few() -> None:
     assert open_sets({"": 0.0, "a": -1.0}) == []
 
 
-def test_equals_in_a_larger_set_are_looked_for_in_what_is_listed() -> None:
+def test_equals_in_a_larger_set_are_looked_for_in_what_is_listed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """A mass did what a cable does beside gains; the gains were not listed, nor the mass named."""
     joint: Any = SimpleNamespace(terms=Terms())
     robot: Any = None
@@ -161,6 +165,11 @@ def test_equals_in_a_larger_set_are_looked_for_in_what_is_listed() -> None:
     assert classes.members[0] == ("a", "c")
     assert in_place(found, frozenset("ab"), classes, robot, Terms()) == {frozenset("cb"): -1.0}
     assert fitted == [frozenset("cb")]
+    # what has no solution and what no robot can have says nothing
+    unsolved = Found(refits, found.best, base.scores, lambda _names: None)
+    assert in_place(unsolved, frozenset("ab"), classes, robot, Terms()) == {}
+    monkeypatch.setattr(search, "can_be", lambda *_: False)
+    assert in_place(found, frozenset("ab"), classes, robot, Terms()) == {}
 
 
 def scores_of(refits: dict[Names, Refit]) -> dict[Names, float]:

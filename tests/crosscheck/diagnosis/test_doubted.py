@@ -12,6 +12,7 @@ from made_data import COGIRO, measured, term
 
 import crosscheck
 from crosscheck.diagnosis.verdict import is_clear
+from crosscheck.fit.possible import hardly_happens
 from crosscheck.fit.reasons import Reason, Why
 from crosscheck.measurements.data import Measurements
 from seecr.commands import Commands
@@ -89,6 +90,15 @@ def test_what_explains_only_with_a_size_that_hardly_happens_is_said_to() -> None
     assert any(
         note.startswith("gravity_tilt would be 51 times a plausible size") for note in found.notes
     )
+
+
+def test_a_target_may_sit_anywhere() -> None:
+    """Where it sits, a user may have forgotten to say: 0.15 m is sixty plausible sizes."""
+    robot = load_robot(COGIRO)
+    assert not hardly_happens(term(robot, "tracker_target", shift_z_m=0.15))
+    assert not hardly_happens(term(robot, "tracker_frame", shift_z_m=3.0))
+    assert hardly_happens(term(robot, "gravity_tilt", tilt_x_rad=0.51))
+    assert not hardly_happens(term(robot, "gravity_tilt", tilt_x_rad=0.49))
 
 
 def test_what_the_steps_leave_open_is_looked_at_in_sets() -> None:

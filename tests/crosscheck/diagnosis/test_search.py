@@ -133,6 +133,19 @@ def test_a_rival_whose_further_parameter_would_show_is_not_told() -> None:
     assert len(rivals_of(searched(rubbing(100.0, nearly=0.05)), "tracker_scale")) == 1
 
 
+@pytest.mark.parametrize(("seen", "told"), [(1.0, True), (10.0, False)])
+def test_friction_is_told_beside_its_cable_unless_these_data_exclude_it(
+    seen: float, told: bool
+) -> None:
+    """With the cable hidden: friction that would show as much costs evidence, though it fits."""
+    names = (*NAMES, CABLE, "exit_friction")
+    plain = toy({}, names, seed=1).columns
+    rubs = plain[CABLE] * [1.0, 0.0] + plain["exit_friction"] * [0.0, seen]
+    found = searched(toy({CABLE: 0.5}, names, seed=1, columns={"exit_friction": rubs}))
+    assert found.found == (CABLE,)
+    assert ("exit_friction" in [r.name for r in rivals_of(found, CABLE)]) is told
+
+
 CABLE = "winch_side_length"
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from made_data import COGIRO, SIGMA, measured, term
 
+from crosscheck.fit import starts
 from crosscheck.fit.candidates import Trials, candidates_for, fit_candidate, null_fit, screen
 from crosscheck.fit.gauss_newton import fit
 from crosscheck.fit.problem import Problem
@@ -104,3 +105,21 @@ def test_platforms_on_joints_go_without() -> None:
     base = null_fit(problem, Terms(), factor, refit=False)
     layout = layout_named(problem, "cable_length_offset")
     assert equation_start(problem, base.state, layout, layout.start({}), factor) is None
+
+
+def test_shapes_in_two_threads_are_those_of_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of many rows they are looked at side by side, and are told in the same order."""
+    robot = load_robot(COGIRO)
+    data = measured(robot, [term(robot, "pulley_radius", radius_m=0.004)], points=3, seed=3)
+    problem = Problem(robot, data, SIGMA, np.ones(data.n_rows, dtype=bool))
+    factor = problem.noise(problem.experiment.predict(()))
+    base = null_fit(problem, Terms(), factor, refit=False)
+    drums = next(c.layout for c in candidates_for(problem) if c.name == "drum_eccentricity")
+    found = []
+    for rows in (1_000_000, 0):
+        monkeypatch.setattr(starts, "_MANY_ROWS", rows)
+        found.append(starts_of(problem, base, drums, factor))
+    one, two = found
+    np.testing.assert_array_equal(one.vectors, two.vectors)
+    assert (one.gain, one.directions, one.shapes) == (two.gain, two.directions, two.shapes)
+    assert one.shapes > 10.0
