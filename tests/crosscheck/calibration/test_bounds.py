@@ -10,6 +10,7 @@ import pytest
 from scipy import integrate
 
 from crosscheck.calibration.bounds import log_absent
+from crosscheck.calibration.equals import parameters_told
 from crosscheck.calibration.linearised import Linear
 from seecr.effects import Term, Terms, effect_named, layout_of
 from seecr.mjcf import load_robot
@@ -64,3 +65,12 @@ def test_an_effect_that_is_nothing_altogether_may_have_any_width() -> None:
     x = 10.0 * np.eye(3)[:, :2]
     joint, linear = fitted(0.0, 0.0, x, np.zeros(3))
     assert -6.0 < log_absent(SETTING, joint, linear, {}) < -0.5
+
+
+@pytest.mark.parametrize(("name", "count"), [
+    ("exit_friction", 1), ("winch_side_length", 1), ("frame_compliance", 2), ("drum_gain", 8),
+])  # fmt: skip
+def test_what_comes_with_another_is_no_excuse(name: str, count: int) -> None:
+    """Of friction's two numbers one is the cable's; a gain a drum is eight all the same."""
+    layout = layout_of(effect_named(name), load_robot(model_path("demobot_cogiro")))
+    assert parameters_told(layout) == count
