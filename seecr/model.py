@@ -11,6 +11,7 @@
     [effect.before]              # rms errors without it, with it, and on runs left out
     [effect.after]
     [effect.held_out]
+    [fitted_to]                  # how far those data reach: places and tensions
 
 An effect that is another for each file or run, such as a tracker that is set up anew, says
 ``per_file = true`` or ``per_run = true``. Its own values stand in tables named after those,
@@ -32,7 +33,7 @@ import math
 from collections.abc import Iterable, Mapping, MutableMapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import tomlkit
 from tomlkit import TOMLDocument
@@ -40,6 +41,7 @@ from tomlkit.exceptions import TOMLKitError
 
 from seecr.cells import Where, term_of
 from seecr.counted import counted
+from seecr.data_reach import TABLE, DataReach
 from seecr.effects import Effect, Term, Terms, catalogue
 from seecr.errors import InputError, InputFileError
 from seecr.files import Toml, read_toml
@@ -49,11 +51,14 @@ from seecr.pose import Array
 from seecr.result import Record, Result
 from seecr.robot import Robot
 
+if TYPE_CHECKING:
+    from seecr.solution import Solution
+
 FORMAT = 1
 """Of the file; raised when a key changes its meaning or goes."""
 
 _EXPECTED = "expected a model as crosscheck add writes it"
-_TABLES = ("format", "robot", "effect", "calibration")
+_TABLES = ("format", "robot", "effect", "calibration", TABLE)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -69,6 +74,7 @@ class Model(Result):
         document: the file's text as a tree, comments included.
         notes: sentences about what has changed since the model was made.
         path: the file.
+        reach: how far the data reach that the values were fitted to, if the file says so.
     """
 
     terms: Terms
@@ -76,11 +82,22 @@ class Model(Result):
     document: TOMLDocument
     notes: tuple[str, ...] = ()
     path: Path | None = None
+    reach: DataReach | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the effects, in the order of adding."""
         return tuple(self.stderr)
+
+    def beyond(self, solution: Solution) -> tuple[str, ...]:
+        """A sentence about the rows of an answer that are beyond the data, if there are any.
+
+        Args:
+            solution: as :func:`seecr.solve` gives it with this model.
+        """
+        if self.reach is None:
+            return ()
+        return self.reach.beyond(solution.pose[:, :3], solution.tensions, solution.robot.length)
 
     def lines(self) -> list[str]:
         """Whose model it is, and the effects with their first few values."""
@@ -222,7 +239,8 @@ def load_model(path: str | Path, robot: GivenRobot) -> Model:
             raise where.error(f"effect {term.name} is listed twice; expected it once", k, "name")
         terms.append(term)
         errors[term.name] = stderr
-    return Model(Terms(terms), errors, document, notes, path)
+    reach = DataReach.read(where, document)
+    return Model(Terms(terms), errors, document, notes, path, reach)
 
 
 def _with_comments(toml: Toml) -> TOMLDocument:

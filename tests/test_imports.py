@@ -26,7 +26,7 @@ FLOORS = {
     "seecr.robot": 2, "seecr.loads": 2, "seecr.commands": 3, "seecr.joints": 3, "seecr.mjcf": 3,
     "seecr.columns": 4, "seecr.given": 4, "seecr.path": 4, "seecr.setup": 4, "seecr.fingerprint": 4,
     "seecr.effects": 5, "seecr.tables": 5, "seecr.cells": 6, "seecr.edits": 6, "seecr.shifts": 6,
-    "seecr.statics": 6, "seecr.inertia": 6, "seecr.model": 7,
+    "seecr.statics": 6, "seecr.inertia": 6, "seecr.data_reach": 2, "seecr.model": 7,
     "seecr.scipy_search": 7, "seecr.solution": 7, "seecr.starts": 7,
     "seecr.experiment": 8, "seecr.uncertainty": 10, "seecr.search": 8, "seecr.equilibrium": 10,
     "seecr.planar": 9, "seecr.workspace": 9,

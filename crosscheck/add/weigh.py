@@ -91,7 +91,8 @@ def _model(
     """The model with the effects; those given without one are as new to it as the named ones."""
     source = provenance_of(problem.data.path, f"crosscheck add {' + '.join(names)}")
     fresh = [f.term.name for f in fitted if f.term.name not in (*basis.names, *names)]
-    return renewed(with_fit(basis, fitted, [*names, *fresh], source, errors), problem.robot)
+    new = with_fit(basis, fitted, [*names, *fresh], source, errors)
+    return renewed(new, problem.robot, problem.data)
 
 
 def base_of(problem: Problem, terms: Terms, names: Sequence[str], factor: Array) -> Fit:

@@ -167,7 +167,7 @@ def _result(found: Calibration, before: Terms, notes: tuple[str, ...], basis: Mo
         outliers=tuple(int(line) for line in data.line[found.outliers]),
         settled=found.joint.settled,
         notes=notes,
-        model=renewed(calibrated(basis, fitted, covariance, source, errors), robot),
+        model=renewed(calibrated(basis, fitted, covariance, source, errors), robot, data),
     )
 
 

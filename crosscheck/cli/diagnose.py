@@ -20,7 +20,7 @@ from crosscheck.cli.following import Given, after_diagnosis
 from seecr.cli.options import FILE, json_option, made_by, out_option, progress_share
 
 if TYPE_CHECKING:
-    from crosscheck import Diagnosis
+    from crosscheck import Diagnosis, Measurements
     from seecr import Model, Robot
 
 
@@ -103,7 +103,7 @@ def command(
             from crosscheck.recording import write_diagnosis_recording
 
             write_diagnosis_recording(found, folder / "diagnosis.rrd")
-        note = "" if model_out is None else _keep(found, own, machine, measured.path, model_out)
+        note = "" if model_out is None else _keep(found, own, machine, measured, model_out)
     if as_json:
         click.echo(text)
     else:
@@ -120,7 +120,7 @@ def command(
     return 0 if found.converged else 3
 
 
-def _keep(found: Diagnosis, own: Model, robot: Robot, data: Path, path: Path) -> str:
+def _keep(found: Diagnosis, own: Model, robot: Robot, measured: Measurements, path: Path) -> str:
     """Write the model that was found, if there was a verdict; what was done."""
     from crosscheck.diagnosis import found_effects
     from crosscheck.model import provenance_of, renewed, save_model, with_fit
@@ -130,6 +130,7 @@ def _keep(found: Diagnosis, own: Model, robot: Robot, data: Path, path: Path) ->
         return f"{path} not written: there is no verdict"
     names = [effect.effect for effect in found.missing]
     errors = {"before": found.before, "after": found.after, "held_out": found.held_out}
-    source = provenance_of(data, "crosscheck diagnose")
-    save_model(path, renewed(with_fit(own, fitted, names, source, errors), robot))
+    source = provenance_of(measured.path, "crosscheck diagnose")
+    new = with_fit(own, fitted, names, source, errors)
+    save_model(path, renewed(new, robot, measured))
     return f"Written to {path}: {', '.join(names) or 'the model as it stands, nothing is added'}"

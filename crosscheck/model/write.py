@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import tomlkit
@@ -18,13 +18,18 @@ from crosscheck.model.fitted import Fitted
 from crosscheck.model.own import Kept, kept, without_parts
 from seecr import __version__
 from seecr.cells import UNSEEN
+from seecr.data_reach import TABLE, DataReach
 from seecr.effects import Knowledge, Terms
 from seecr.effects.base import Layout
 from seecr.errors import InputError
+from seecr.experiment import predict
 from seecr.fingerprint import fingerprint
 from seecr.model import Model
 from seecr.pose import Array
 from seecr.robot import Robot
+
+if TYPE_CHECKING:
+    from crosscheck.measurements.data import Measurements
 
 Rms = Mapping[str, float | None]
 _ERRORS = ("before", "after", "held_out")
@@ -70,9 +75,7 @@ def with_fit(
         errors: rms by kind: "before", "after", "held_out".
     """
     document = copy.deepcopy(model.document)
-    if "effect" not in document:
-        document.append("effect", tomlkit.aot())
-    tables = {str(table["name"]): table for table in document["effect"]}
+    tables = {str(table["name"]): table for table in document.get("effect", [])}
     order = [*model.names, *(name for name in added if name not in model.names)]
     by_name = {one.usual.term.name: one for one in _kept(model, fitted)}
     for name in order:
@@ -113,9 +116,7 @@ def calibrated(
         errors: rms by kind: "before", "after", "held_out".
     """
     document = copy.deepcopy(model.document)
-    if "effect" not in document:
-        document.append("effect", tomlkit.aot())
-    tables = {str(table["name"]): table for table in document["effect"]}
+    tables = {str(table["name"]): table for table in document.get("effect", [])}
     every = _kept(model, fitted)
     for one in every:
         if one.usual.term.name in tables:
@@ -140,6 +141,8 @@ def _appended(document: Any, one: Kept) -> Any:
     table["name"] = term.name
     table["name"].comment(term.layout.effect.title)
     _fill(table, one)
+    if "effect" not in document:
+        document.append("effect", tomlkit.aot())
     document["effect"].append(table)
     table.trivia.indent = "\n"
     return table
@@ -251,12 +254,24 @@ def _plain(values: Mapping[str, Any]) -> Any:
     return table
 
 
-def renewed(model: Model, robot: Robot) -> Model:
-    """The model with the robot's numbers as they are now: all values have just been fitted."""
+def renewed(model: Model, robot: Robot, data: Measurements) -> Model:
+    """The model with the robot's numbers as they are now: all values have just been fitted.
+
+    Args:
+        model: with its new values.
+        robot, data: that they were fitted to; how far these reach is kept.
+    """
     document = copy.deepcopy(model.document)
     if document.get("robot") is None or model.notes:
         document["robot"] = fingerprint(robot)
-    return replace(model, document=document, notes=())
+    if not model.names:
+        return replace(model, document=document, notes=())
+    there = predict(robot, data.as_commands(robot), model)
+    rows = data.read & there.solved
+    reach = DataReach.of(there.pose[rows, :3], there.tensions[rows])
+    if reach is not None:
+        document[TABLE] = reach.as_toml()
+    return replace(model, document=document, notes=(), reach=reach)
 
 
 def save_model(path: str | Path, model: Model) -> None:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
-    from seecr import Model, Robot
+    from seecr import Model, Robot, Solution
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -137,6 +137,11 @@ def model_at(given: Path | None, robot: Robot) -> Model | None:
         return None
     model = load_model(given, robot)
     return replace(model, notes=(*model.notes, *_usual(model)))
+
+
+def notes_of(model: Model | None, solution: Solution) -> tuple[str, ...]:
+    """What is to be told of a model, and of answers with it that are beyond its data."""
+    return () if model is None else (*model.notes, *model.beyond(solution))
 
 
 def _usual(model: Model) -> list[str]:

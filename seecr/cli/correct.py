@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from seecr.cli.arguments import NumbersCommand, limit_options, model_at, robot_at, robot_options
+from seecr.cli.arguments import (
+    NumbersCommand,
+    limit_options,
+    model_at,
+    notes_of,
+    robot_at,
+    robot_options,
+)
 from seecr.cli.following import following, given_with
 from seecr.cli.options import FILE, json_option, made_by, out_option, progress_share
 
@@ -117,7 +124,7 @@ def command(
             kept = None if own is None else kept_chance(machine, found.commands, own, **within)
             tell("corrected", 1.0)
         status = 0 if found.stays.all() and found.reached.any() else 3
-        notes = [*(own.notes if own else ()), *wanted.notes, *tracker]
+        notes = [*notes_of(own, found.solution), *wanted.notes, *tracker]
         made = made_by(machine.source, poses, model)
         document = {
             "made": made, "exit_status": status, "notes": notes, **found.as_json(kept)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from seecr.cli.arguments import NumbersCommand, model_at, pose_of, robot_at, robot_options
+from seecr.cli.arguments import NumbersCommand, model_at, notes_of, pose_of, robot_at, robot_options
 from seecr.cli.following import after_pose, given_with
 from seecr.cli.options import FILE, json_option, made_by, progress_share
 
@@ -78,7 +78,7 @@ def command(
         spread = None if own is None else spread_of(machine, command, own)
         tell("solved", 1.0)
     status = 0 if at_rest(solution) else 3
-    notes = list(own.notes) if own else []
+    notes = list(notes_of(own, solution))
     document = {
         "made": made_by(machine.source, model),
         "exit_status": status,

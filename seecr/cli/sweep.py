@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
+from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -14,6 +16,7 @@ from seecr.cli.arguments import (
     check_places,
     files_of_pictures,
     model_at,
+    notes_of,
     picture_options,
     robot_at,
     robot_options,
@@ -26,7 +29,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from seecr import Commands, Robot
+    from seecr import Commands, Model, Robot, Solution
 
 
 _WANTED = "Lengths are commanded; what is off is told from the poses wanted, columns want_*."
@@ -41,6 +44,7 @@ Examples:
   seecr sweep demobot_parallel --line 0.17 0.25 0.1 0.63 0.25 0.1
   seecr sweep robot.xml poses.csv --model model.toml
   seecr sweep robot.xml --grid 0.1:0.7:25 0.25 0.05:0.35:13 --json
+  seecr sweep demobot_parallel --line 0.17 0.25 0.1 0.63 0.25 0.1 --method fsolve
 """,
 )
 @robot_options
@@ -62,6 +66,12 @@ Examples:
     is_flag=True,
     help="Go from the reference pose along the commanded way, and tell where the platform jumps.",
 )
+@click.option(
+    "--method",
+    type=click.Choice(["newton", "fsolve", "least_squares"]),
+    help="Tell how often a search evaluates the equations, and its time: the compiled one, or one "
+    "of the paper's two, from SciPy.",
+)
 @turned_option("--line and --grid")
 @picture_options
 @out_option("seecr-sweep")
@@ -72,6 +82,7 @@ def command(
     cable: str | None,
     model: Path | None,
     follow: bool,
+    method: str | None,
     figure: str,
     no_recording: bool,
     out: Path,
@@ -92,7 +103,7 @@ def command(
     \b
     Exit status: 0 all at rest, 2 bad input, 3 a pose without rest.
     """
-    from seecr import solve, spread_of
+    from seecr import spread_of
     from seecr.files import json_text, staged, write_text
     from seecr.report.figures import sweep_figure
     from seecr.report.rows import SweepRows
@@ -103,7 +114,7 @@ def command(
     commands, more, said, wanted = _commands(machine, poses, given)
     with staged(out, sometimes=files_of_pictures("sweep")) as folder:
         with progress_bar("solving", len(commands)) as tell:
-            solution = solve(machine, commands, effects=own or (), follow=follow)
+            solution, search = _solved(machine, commands, own, follow, method)
             if own is not None:
                 tell(0, "errors")
             spread = None if own is None else spread_of(machine, commands, own)
@@ -111,7 +122,7 @@ def command(
         commanded = commands.lengths is None or wanted
         rows = SweepRows(solution, commands.lengths, more, spread, wanted)
         status = 0 if at_rest(solution) else 3
-        notes = [*(own.notes if own else ()), *said]
+        notes = [*notes_of(own, solution), *said]
         document = {
             "made": made_by(machine.source, poses, model),
             "exit_status": status,
@@ -119,6 +130,7 @@ def command(
             "cables": machine.cable_names,
             "model": None if own is None else own.names,
             "notes": notes,
+            **({} if search is None else {"search": vars(search)}),
             "rows": rows,
         }
         text = json_text(document)
@@ -135,10 +147,52 @@ def command(
         click.echo(text)
         return status
     lines = [*sweep_lines(solution, commanded, spread), *jump_lines(solution)]
+    if search is not None:
+        lines.append(search.words)
     then = after_sweep(commands, robot, poses, given_with(cable, model))
     for line in [*notes, *lines, f"Results in {out}/", then]:
         click.echo(line)
     return status
+
+
+@dataclass(frozen=True)
+class Effort:
+    """What solving n poses took: evaluations of the equations and time, one pose's [s]."""
+
+    method: str
+    fewest: int
+    median: float
+    most: int
+    seconds_per_pose: float
+
+    @property
+    def words(self) -> str:
+        """For people."""
+        return (
+            f"{self.method}: {self.fewest} to {self.most} evaluations of the equations per pose, "
+            f"{self.median:g} in the middle; {1e3 * self.seconds_per_pose:.2g} ms per pose"
+        )
+
+
+def _solved(
+    robot: Robot, commands: Commands, model: Model | None, follow: bool, method: str | None
+) -> tuple[Solution, Effort | None]:
+    """Where the commands lead, and what the search took, if its method was asked for."""
+    import numpy as np
+
+    from seecr import solve
+
+    effects = model or ()
+    if method is None:
+        return solve(robot, commands, effects=effects, follow=follow), None
+    # what is compiled or imported at the first call is no part of the search
+    solve(robot, commands.rows(np.arange(1)), effects=effects, follow=follow, method=method)
+    begin = perf_counter()
+    found = solve(robot, commands, effects=effects, follow=follow, method=method)
+    seconds = (perf_counter() - begin) / len(found)
+    counts = found.iterations
+    counted = int(counts.min()), float(np.median(counts)), int(counts.max())
+    return found, Effort(method, *counted, seconds)
 
 
 def _commands(

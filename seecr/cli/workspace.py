@@ -106,7 +106,7 @@ def command(
     from seecr.counted import counted
     from seecr.files import json_text, staged, write_text
     from seecr.report.figures import map_figure
-    from seecr.report.maps import edge_line, likely_lines, softest_line, write_arrays
+    from seecr.report.maps import beyond_line, edge_line, likely_lines, softest_line, write_arrays
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
@@ -134,8 +134,9 @@ def command(
                 highest=np.inf if highest is None else highest, wrenches=wrenches or None,
                 effects=own or (), at_least=at_least,
             )  # fmt: skip
+        notes = [*own.notes, *beyond_line(found, own.reach)] if own else []
         text = json_text({
-            "made": made_by(machine.source, model), "exit_status": 0,
+            "made": made_by(machine.source, model), "exit_status": 0, "notes": notes,
             **found.as_json(at_least),
             "edge": None if places is None else {"tolerance_m": edge, "places": len(places)},
         })  # fmt: skip
@@ -157,6 +158,6 @@ def command(
     tensions = ("--lowest", lowest) if lowest else ()
     most = () if highest is None else ("--highest", highest)
     then = following("crosscheck", "plan", robot, "--rows", 40, *tensions, *most)
-    for line in [*(own.notes if own else ()), *lines, f"Results in {out}/", then]:
+    for line in [*notes, *lines, f"Results in {out}/", then]:
         click.echo(line)
     return 0

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from seecr.counted import counted
+from seecr.data_reach import DataReach
 from seecr.files import written
 from seecr.maps import Workspace
 from seecr.pose import Array
 from seecr.report.words import direction_words
 
-__all__ = ["edge_line", "likely_lines", "softest_line", "write_arrays"]
+__all__ = ["beyond_line", "edge_line", "likely_lines", "softest_line", "write_arrays"]
 
 
 def likely_lines(found: Workspace, at_least: float | None) -> Iterator[str]:
@@ -24,6 +25,20 @@ def likely_lines(found: Workspace, at_least: float | None) -> Iterator[str]:
         yield (
             f"with a probability of {at_least:g} or more {counted(int(likely.sum()), 'pose')} can "
             f"be held{found.size_words(likely)}"
+        )
+
+
+def beyond_line(found: Workspace, reach: DataReach | None) -> Iterator[str]:
+    """How much of what can be held is far from the data that the model was fitted to."""
+    if reach is None:
+        return
+    places = np.stack(np.meshgrid(*found.axes, indexing="ij"), axis=-1)[found.feasible]
+    away = reach.outside(places, found.robot.length)
+    if np.any(away > 0.0):
+        yield (
+            f"the model was fitted to data elsewhere: {counted(int(np.sum(away > 0.0)), 'pose')} "
+            f"of those that can be held {'is' if np.sum(away > 0.0) == 1 else 'are'} up to "
+            f"{1e3 * away.max():.3g} mm outside its places"
         )
 
 

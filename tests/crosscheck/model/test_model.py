@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import tomlkit
-from made_data import COGIRO, term
+from made_data import COGIRO, measured, term
 
 from crosscheck.model.fitted import Fitted
 from crosscheck.model.write import Provenance, renewed, save_model, with_fit
 from seecr.errors import InputFileError
+from seecr.experiment import predict
 from seecr.mjcf import load_robot
 from seecr.model import load_model, new_model
 from seecr.shipped import model_path
@@ -224,7 +225,7 @@ def test_points_that_moved_are_another_robot_and_a_new_mass_is_noted(robot, save
     assert heavier.names == ("pulley_radius",)
     assert "mass_kg of robot demobot_cogiro was 0.4; now it is 0.5" in heavier.notes[0]
     # fitting again takes the numbers as they are now
-    again = renewed(heavier, replace(robot, mass=0.5))
+    again = renewed(heavier, replace(robot, mass=0.5), measured(robot))
     save_model(saved, again)
     assert load_model(saved, replace(robot, mass=0.5)).notes == ()
 
@@ -344,3 +345,32 @@ def test_what_is_known_stays_when_a_model_is_written_again(robot, saved):
     save_model(saved, with_fit(again, [moved, other], ["stiffness"], SOURCE, ERRORS))
     last = load_model(saved, robot).terms["stiffness"]
     assert last.vector == pytest.approx([1.15]) and last.knowledge.value == pytest.approx([1.1])
+
+
+def test_a_fitted_model_keeps_how_far_its_data_reach(robot, tmp_path):
+    data = measured(robot)
+    pulley = fitted(robot, "pulley_radius", radius_m=0.01)
+    added = with_fit(new_model(robot), [pulley], ["pulley_radius"], SOURCE, ERRORS)
+    save_model(tmp_path / "m.toml", renewed(added, robot, data))
+    reach = load_model(tmp_path / "m.toml", robot).reach
+    rests = predict(robot, data.as_commands(robot), added)
+    assert reach.low == pytest.approx(rests.pose[:, :3].min(axis=0), rel=1e-3)
+    assert reach.high == pytest.approx(rests.pose[:, :3].max(axis=0), rel=1e-3)
+    assert reach.largest == pytest.approx(rests.tensions.max(), rel=1e-3)
+    # way points, where nothing was read, are none of the data
+    far = rests.pose[:, 0] > reach.high[0] - 2e-3
+    position, turned = data.position.copy(), data.quat_wxyz.copy()
+    position[far], turned[far] = np.nan, np.nan
+    passed = replace(data, position=position, quat_wxyz=turned)
+    assert renewed(added, robot, passed).reach.high[0] < reach.high[0] - 1e-3
+    # a later fit's data take their place
+    save_model(tmp_path / "m.toml", renewed(renewed(added, robot, data), robot, passed))
+    assert load_model(tmp_path / "m.toml", robot).reach.high[0] < reach.high[0] - 1e-3
+
+
+def test_a_model_to_which_nothing_was_fitted_has_no_reach_and_no_list(robot, tmp_path):
+    empty = renewed(with_fit(new_model(robot), [], [], SOURCE, ERRORS), robot, measured(robot))
+    save_model(tmp_path / "m.toml", empty)
+    text = (tmp_path / "m.toml").read_text()
+    assert "fitted_to" not in text and "effect =" not in text
+    assert load_model(tmp_path / "m.toml", robot).reach is None

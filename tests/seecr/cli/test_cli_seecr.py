@@ -299,3 +299,51 @@ def test_a_correction_of_which_nothing_is_reached_is_no_success(tmp_path: Path) 
 @pytest.mark.parametrize("cable", ["0.001", "1e12"])
 def test_the_ends_of_what_a_cable_may_have_are_in(cable: str) -> None:
     assert robot_at(Path("demobot_cogiro"), cable).ea[0] == float(cable)
+
+
+def test_answers_beyond_the_data_of_a_model_are_told(tmp_path: Path) -> None:
+    model = tmp_path / "m.toml"
+    model.write_text(
+        '[[effect]]\nname = "pulley_radius"\nparameters = { radius_m = 0.01 }\n[fitted_to]\n'
+        "position_m = [[0.3, 0.2, 0.1], [0.5, 0.3, 0.2]]\ntension_N = [0.2, 1.5]\n"
+    )
+    quiet = ("--model", model, "--out", tmp_path / "out")
+    bare = ("--figure", "none", "--no-recording")
+    poses = tmp_path / "poses.csv"
+    poses.write_text("cmd_x_m,cmd_y_m,cmd_z_m\n0.4,0.25,0.15\n0.17,0.25,0.1\n")
+    beyond = "beyond the data that the model was fitted to"
+    robot = "demobot_cogiro"
+    for args, words in (
+        (("pose", robot, *PLACE, "--alone", *quiet), f"{beyond}: up to"),
+        (("sweep", robot, poses, *quiet, *bare), f"{beyond} at 1 of 2 poses"),
+        (("correct", robot, poses, *quiet), f"{beyond} at 1 of 2 poses"),
+        (
+            ("map", robot, "--grid", "0.1:0.7:3", "0.25", "0.15", "--no-elastic", *quiet, *bare),
+            "data elsewhere: 2 poses of those that can be held are up to 200 mm outside its places",
+        ),
+    ):
+        assert words in run(*args).output
+        assert any(words in note for note in json.loads(run(*args, "--json").stdout)["notes"])
+    assert beyond not in run("pose", robot, "0.4", "0.25", "0.15", "--alone", *quiet).output
+
+
+def test_a_search_tells_its_evaluations_when_it_is_asked_for(tmp_path: Path) -> None:
+    args = ("sweep", "demobot_parallel", "--line", *PLACE, "0.63", "0.25", "0.1", "--count", "5")
+    bare = ("--figure", "none", "--no-recording", "--out", tmp_path / "out")
+    assert "evaluations" not in run(*args, *bare).output
+    counts = {}
+    for method in ("newton", "fsolve", "least_squares"):
+        found = json.loads(run(*args, *bare, "--method", method, "--json").stdout)
+        each = [row["iterations"] for row in found["rows"]]
+        search = found["search"]
+        assert search["method"] == method and search["seconds_per_pose"] > 0.0
+        told = search["fewest"], search["median"], search["most"]
+        assert told == (min(each), np.median(each), max(each))
+        counts[method] = search["most"]
+    assert counts["newton"] < counts["fsolve"] < counts["least_squares"]
+    line = run(*args, *bare, "--method", "fsolve").output
+    assert re.search(
+        r"fsolve: \d+ to \d+ evaluations of the equations per pose, .* ms per pose", line
+    )
+    together = run(*args, *bare, "--method", "fsolve", "--follow")
+    assert together.exit_code == 2 and "expected no other method" in together.output
