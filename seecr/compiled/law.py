@@ -69,21 +69,29 @@ def _polynomial(ea, q, c, strain):
     integral of the slope: a softening cable still carries more when it is stretched further. The
     energy is the integral of the tension.
     """
-    share = strain + q * strain**2 + c * strain**3
-    work = strain**2 * (0.5 + q * strain / 3.0 + 0.25 * c * strain**2)
     low, high = _soft_part(q, c)
+    share, work = _bare(q, c, min(strain, low))
+    slope = 1.0 + 2.0 * q * strain + 3.0 * c * strain**2
     if strain > low:
-        # what a hundredth carries over the soft part more than the polynomial does there
-        top = min(strain, high)
-        more = LEAST * (top - low)
-        more -= (top - low) + q * (top**2 - low**2) + c * (top**3 - low**3)
-        share += more
-        start = low + q * low**2 + c * low**3
-        work += (start + 0.5 * LEAST * (top - low)) * (top - low) + more * (strain - top)
-        work -= 0.5 * (top**2 - low**2) + q * (top**3 - low**3) / 3.0 + 0.25 * c * (top**4 - low**4)
-    firm = strain <= low or strain >= high
-    slope = 1.0 + 2.0 * q * strain + 3.0 * c * strain**2 if firm else LEAST
+        # not as the polynomial and what it lacks: far out the two would cancel
+        soft = min(strain, high) - low
+        work += (share + 0.5 * LEAST * soft) * soft
+        share += LEAST * soft
+    if low < strain < high:
+        slope = LEAST
+    if strain > high:
+        there, stored = _bare(q, c, high)
+        bare, held = _bare(q, c, strain)
+        work += held - stored + (share - there) * (strain - high)
+        share += bare - there
     return ea * share, ea * slope, ea * work
+
+
+@jit_inner
+def _bare(q, c, strain):
+    """The polynomial eps + q eps^2 + c eps^3 and its integral."""
+    share = strain * (1.0 + strain * (q + c * strain))
+    return share, strain**2 * (0.5 + strain * (q / 3.0 + 0.25 * c * strain))
 
 
 @jit_inner

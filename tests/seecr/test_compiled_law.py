@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from one_cable import cable, in_direction, pull
@@ -134,6 +136,21 @@ def test_what_is_in_series_adds_its_stretch() -> None:
         stretch = 2.0 * (tension / 1000 + 1e-3 + 1e-6 * tension)
         stretch += 1.5 / 1000 * tension + 2e-4 * tension
         assert pull(row, [2.0 + stretch, 0, 0]).tension == pytest.approx(tension, rel=1e-11)
+
+
+def test_a_soft_cable_keeps_its_digits_far_out() -> None:
+    """Where the polynomial itself would be a thousand times what the cable carries."""
+    quadratic, cubic = -50.0, -2.3e5
+    low = (-quadratic - math.sqrt(quadratic**2 - 3.0 * cubic * 0.99)) / (3.0 * cubic)
+    assert 1.0 + 2.0 * quadratic * low + 3.0 * cubic * low**2 == pytest.approx(0.01)
+    row = cable(QUADRATIC=quadratic, CUBIC=cubic)
+    share = low + quadratic * low**2 + cubic * low**3
+    work = 0.5 * low**2 + quadratic * low**3 / 3.0 + 0.25 * cubic * low**4
+    for strain in (0.01, 0.2, 0.9):
+        found, soft = pull(row, [2.0 * (1.0 + strain), 0, 0]), strain - low
+        assert found.tension == pytest.approx(1000.0 * (share + 0.01 * soft), rel=1e-13)
+        stored = work + share * soft + 0.005 * soft**2
+        assert found.state[ENERGY] == pytest.approx(2000.0 * stored, rel=1e-13)
 
 
 def test_a_curved_law_is_met_at_its_strain() -> None:
