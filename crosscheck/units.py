@@ -33,8 +33,9 @@ SI = {"position": "m", "orientation": "rad", "tension": "N", "length": "m"}
 EXAMPLE = {"position": "0.5mm", "orientation": "0.2deg", "tension": "1N", "length": "0.2mm"}
 """What a person may type for each of them."""
 
-# In SI; beyond them squares, which fits and noise are made of, are lost in rounding.
-LEAST, MOST = 1e-15, 1e15
+# In SI: what anything measures, with room. Beside noise far below, what effects do is so large that
+# rounding leaves nothing of the rest.
+LEAST, MOST = 1e-9, 1e15
 
 _SHOWN = {unit.si: unit for unit in UNITS if unit.shown}
 _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")

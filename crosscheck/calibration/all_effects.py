@@ -20,6 +20,7 @@ from crosscheck.calibration.leave_out import LeftOut, leave_out
 from crosscheck.calibration.linearised import linearised
 from crosscheck.calibration.robust import outliers
 from crosscheck.calibration.stages import Progress, fit_everything
+from crosscheck.fit.definite import inverse_of
 from crosscheck.fit.problem import Problem, Rms, rms_by_kind
 from crosscheck.fit.state import evaluate
 from seecr.effects import Terms
@@ -143,5 +144,5 @@ def covariance(setting: Setting, joint: JointFit) -> Array:
     free = np.flatnonzero(linear.width > 0.0)
     x = linear.x[:, free]
     out = np.zeros((len(linear.width), len(linear.width)))
-    out[np.ix_(free, free)] = np.linalg.inv(x.T @ x + np.diag(linear.width[free] ** -2.0))
+    out[np.ix_(free, free)] = inverse_of(x.T @ x + np.diag(linear.width[free] ** -2.0))
     return np.asarray(out * np.outer(joint.terms.scale, joint.terms.scale))

@@ -14,6 +14,7 @@ from scipy import special
 
 from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.linearised import Linear
+from crosscheck.fit.definite import inverse_of
 from crosscheck.fit.evidence import WIDTHS, half_gaussian, held_at_nothing
 from crosscheck.fit.known import known_readings
 from seecr.effects import Term
@@ -38,7 +39,7 @@ def log_absent(
     wide = np.where(linear.width > 0.0, _each(joint, widths), 0.0)
     free = np.flatnonzero(wide > 0.0)
     columns = linear.x[:, free]
-    inverse = np.linalg.inv(columns.T @ columns + np.diag(wide[free] ** -2.0))
+    inverse = inverse_of(columns.T @ columns + np.diag(wide[free] ** -2.0))
     cross = columns.T @ x
     left = linear.y - columns @ (inverse @ (columns.T @ linear.y))
     power = np.sum(x**2, axis=0) - np.sum(cross * (inverse @ cross), axis=0)

@@ -77,8 +77,9 @@ def gram_with(
         own = np.arange(first, first + count)
         groups[name] = ColumnGroup.of(own, layout, widths_for(layout))
         first += count
-    x = np.concatenate(list(columns.values()), axis=1)
-    y = joint.state.white + x @ np.concatenate(list(z.values()))
+    white = joint.state.white
+    x = np.concatenate([np.zeros((len(white), 0)), *columns.values()], axis=1)
+    y = white + x @ np.concatenate([np.zeros(0), *z.values()])
     white_x, white_y = (joint.whitened(setting.chain, part) for part in (x, y))
     known, readings = known_of(joint, catalogue, tuple(columns))
     return gram_of(
@@ -95,7 +96,8 @@ def known_of(joint: JointFit, catalogue: Catalogue, names: Sequence[str]) -> tup
         term = terms[name]
         own = amplitudes(term) if name in joint.terms else amplitudes_at_null(term)
         order.append(np.flatnonzero(terms.own(name))[own])
-    return columns[:, np.concatenate(order)], readings
+    none = np.zeros(0, dtype=np.intp)
+    return columns[:, np.concatenate([none, *order])], readings
 
 
 def catalogue_columns(

@@ -14,9 +14,10 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, special
+from scipy import special
 
 from crosscheck.calibration.worth import log_gains
+from crosscheck.fit.definite import inverse_of
 from seecr.effects.base import Layout
 from seecr.pose import Array
 
@@ -70,8 +71,7 @@ class Gram:
             np.full(len(self.groups[n].columns), w) for n, w in chosen.items()
         )])  # fmt: skip
         matrix = self.normal[np.ix_(columns, columns)] + np.diag(width**-2.0)
-        inverse = linalg.inv(matrix, check_finite=False) if len(columns) else matrix
-        return Solved(self, dict(chosen), columns, width, inverse)
+        return Solved(self, dict(chosen), columns, width, inverse_of(matrix))
 
 
 def gram_of(x: Array, y: Array, groups: dict[str, ColumnGroup]) -> Gram:
@@ -124,7 +124,7 @@ class Solved:
         gram, own = self.gram, self.gram.groups[name].columns
         if name in self.chosen:
             at = self._place(name)
-            precise = linalg.inv(self.inverse[np.ix_(at, at)], check_finite=False)
+            precise = inverse_of(self.inverse[np.ix_(at, at)])
             left = precise - np.eye(len(at)) / self.chosen[name] ** 2
             return left, precise @ self.values[at]
         cross = gram.normal[np.ix_(self.columns, own)]

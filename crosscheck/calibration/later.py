@@ -16,6 +16,7 @@ from scipy import special
 
 from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.worth import log_gain
+from crosscheck.fit.definite import inverse_of
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.state import derivatives
 from seecr.effects import Term, catalogue, layout_of
@@ -109,7 +110,7 @@ class _Beside:
         self.left = joint.whitened(setting.chain, joint.state.white)
         self.columns = joint.whitened(setting.chain, joint.jacobian) * joint.width
         normal = self.columns.T @ self.columns + np.eye(self.columns.shape[1])
-        self.inverse = np.linalg.inv(normal)
+        self.inverse = inverse_of(normal)
 
     def gain(self, term: Term) -> float:
         """ln gain of an effect's amplitudes that start at null, the others as they are."""

@@ -17,6 +17,8 @@ from seecr.pose import Array
 
 _MOST_ALIKE = 0.97
 _SMALLEST, _LARGEST = 1e-2, 1e3
+# What rounding leaves of a square sum, and some.
+_ROUNDING = 1e-13
 
 
 def log_evidence(
@@ -25,13 +27,21 @@ def log_evidence(
     """ln N(y; 0, X W X^T + Sigma), constants left out; x (N, p), y (N,) in stated noise."""
     columns = whitened(chain, colour, weight, x * width)
     left = whitened(chain, colour, weight, y)
-    normal = columns.T @ columns
-    normal[np.diag_indices_from(normal)] += 1.0
-    factor = linalg.cholesky(normal, lower=True, check_finite=False)
+    factor = _root(columns)
     part = linalg.solve_triangular(factor, columns.T @ left, lower=True, check_finite=False)
     power = float(left @ left) - float(part @ part)
-    volume = 2.0 * float(np.sum(np.log(np.diag(factor))))
+    volume = 2.0 * float(np.sum(np.log(np.abs(np.diag(factor)))))
     return -0.5 * (power + volume + log_det(chain, colour, weight))
+
+
+def _root(columns: Array) -> Array:
+    """Lower triangular L with L L^T = 1 + X^T X, of columns X (N, p)."""
+    normal, one = columns.T @ columns, np.eye(columns.shape[1])
+    if np.max(np.diag(normal), initial=0.0) * _ROUNDING < 1.0:
+        return np.asarray(linalg.cholesky(normal + one, lower=True, check_finite=False))
+    # effects that move the readings by millions of their noise: rounding would swallow the one
+    (upper,) = linalg.qr(np.concatenate([columns, one]), mode="r", check_finite=False)
+    return np.asarray(upper[: len(one)].T)
 
 
 def estimate(

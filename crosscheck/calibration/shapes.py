@@ -15,6 +15,7 @@ import numpy as np
 from crosscheck.calibration.catalogue import Catalogue
 from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.linearised import Linear, linearised
+from crosscheck.fit.definite import inverse_of
 from seecr.effects import Term
 from seecr.pose import Array
 from seecr.setup import Setup
@@ -32,7 +33,7 @@ def log_shares(joint: JointFit, linear: Linear) -> dict[str, float]:
     if not shaped:
         return {}
     x = linear.x[:, free]
-    covariance = np.linalg.inv(x.T @ x + np.diag(linear.width[free] ** -2.0))
+    covariance = inverse_of(x.T @ x + np.diag(linear.width[free] ** -2.0))
     errors = np.zeros(len(linear.width))
     errors[free] = np.sqrt(np.diag(covariance)) * joint.terms.scale[free]
     setup = joint.state.prediction.setup

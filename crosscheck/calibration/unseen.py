@@ -13,6 +13,7 @@ from scipy import linalg, special
 from crosscheck.calibration.field import FIELD_WIDTHS, UNKNOWN, field_of
 from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.worth import gains_along
+from crosscheck.fit.definite import root_of
 from crosscheck.fit.noise import as_table
 from crosscheck.fit.problem import Rms, rms_by_kind
 from seecr.pose import Array
@@ -53,9 +54,9 @@ def shown_from(setting: Setting, joint: JointFit, columns: Array, width: Array) 
 def _left(setting: Setting, joint: JointFit, field: Array, columns: Array, width: Array) -> Array:
     """(k, k) normal matrix of the field's coefficients beside the effects."""
     x, f = (joint.whitened(setting.chain, part) for part in (columns * width, field))
-    factor = linalg.cho_factor(x.T @ x + np.eye(x.shape[1]), check_finite=False)
-    cross = x.T @ f
-    return np.asarray(f.T @ f - cross.T @ linalg.cho_solve(factor, cross, check_finite=False))
+    root = root_of(x.T @ x + np.eye(x.shape[1]))
+    cross = linalg.solve_triangular(root, x.T @ f, lower=True, check_finite=False)
+    return np.asarray(f.T @ f - cross.T @ cross)
 
 
 def _log_odds(power: Array, along: Array) -> Array:

@@ -24,10 +24,14 @@ from crosscheck.fit.prepare import Prepared, Progress, noise_floor, prepare
 from crosscheck.fit.problem import Problem, kinds_read, kinds_stated, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Refusal, Unfit, Why
 from crosscheck.fit.tolerance import HALF_THE_NOISE, Tolerance
+from crosscheck.fit.words import rms_words
 from crosscheck.given import GivenModel, GivenRobot, considered, model_of, robot_of
 from crosscheck.measurements.read import GivenData, measurements_of
 from crosscheck.planning.sight import sight_of
 from seecr.pose import Array
+
+# Data that would show no effect of so many plausible sizes show nothing.
+_BLIND = 10.0
 
 
 def diagnose(
@@ -79,6 +83,9 @@ def _diagnosed(ready: Prepared, said: Notes, progress: Progress) -> Diagnosis:
     if refusal is not None:
         return no_verdict(problem, base, notes, refusal)
     sight = sight_of(problem, base, factor)
+    if sight.effects and all(one.factor > _BLIND for one in sight.effects):
+        blind = Refusal(Unfit.BLIND, problem.data.n_rows, noise=rms_words(noise_floor(problem)))
+        return replace(no_verdict(problem, base, notes, blind), sight=sight)
     found = _searched(ready, base, factor, notes, progress)
     return replace(found, sight=sight)
 

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special, stats
 
+from crosscheck.fit.definite import roots_of
 from crosscheck.fit.gauss_newton import Fit
 from crosscheck.fit.known import known_readings
 from seecr.effects import Terms
@@ -134,7 +135,7 @@ def _gains(normal: Array, gradient: Array, widths: Array, absent: NDArray[np.boo
     free = np.flatnonzero(~absent)
     wide = widths[:, free]
     inside = np.eye(len(free)) + wide[:, :, None] * normal[np.ix_(free, free)] * wide[:, None, :]
-    root = np.linalg.cholesky(inside)
+    root = roots_of(inside)
     half = np.linalg.solve(root, (wide * gradient[free])[..., None])[..., 0]
     diagonal = np.diagonal(root, axis1=1, axis2=2)
     out = 0.5 * np.sum(half**2, axis=1) - np.sum(np.log(diagonal), axis=1)

@@ -106,6 +106,7 @@ class Unfit(Enum):
         "readings contradict each other: lines {lines} have the same command and are far apart, "
         "and they are not alone"
     )
+    BLIND = "noise of {noise} would hide every effect, at ten times its plausible size too"
     UNSOLVED_MODEL = "rows could not be solved with the model's values"
 
 
@@ -123,6 +124,8 @@ _REMEDIES = {
     Unfit.CONTRADICTION: "read these poses again, leave out the wrong rows, or, where the tracker "
     "or the winches were set up anew in between, give each set-up a file of its own and "
     "crosscheck add tracker_frame (or another effect) --per file",
+    Unfit.BLIND: "state the noise as it is, in metres and radians ([sigma] beside the file, or "
+    "--sigma position=0.1mm), or measure with less",
     Unfit.UNSOLVED_MODEL: "check the model's values and the robot's file",
 }
 
@@ -134,7 +137,7 @@ class Refusal:
     Attributes:
         unfit: what is the matter.
         rows: of the data. lost: those without an equilibrium. readings: that are left.
-        lines: of the file that show it.
+        lines: of the file that show it. noise: of the readings, with units.
     """
 
     unfit: Unfit
@@ -142,6 +145,7 @@ class Refusal:
     lost: int = 0
     readings: int = 0
     lines: str = ""
+    noise: str = ""
 
     @property
     def remedy(self) -> str:
@@ -162,6 +166,7 @@ class Refusal:
             lost=self.lost,
             readings=counted(self.readings, "reading"),
             lines=self.lines,
+            noise=self.noise,
         )
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize
 
+from crosscheck.fit.definite import solved
 from crosscheck.fit.gauss_newton import PRIOR_SIZES, Fit
 from crosscheck.fit.imitation import beside
 from crosscheck.fit.problem import Problem
@@ -194,7 +195,7 @@ def amplitude_columns(problem: Problem, base: Fit, layout: Layout, null: Array) 
 def _linear(x: Array, r: Array) -> tuple[Array, float, int]:
     """Linear fit of r by columns x with a weak prior: values, fall of chi2, directions seen."""
     normal = x.T @ x
-    z: Array = np.asarray(np.linalg.solve(normal + 1e-2 * np.eye(x.shape[1]), x.T @ r), float)
+    z: Array = solved(normal + 1e-2 * np.eye(x.shape[1]), x.T @ r)
     left = r - x @ z
     directions = int(np.sum(np.linalg.eigvalsh(normal) > 1e-2))
     return z, float(r @ r - left @ left), max(1, directions)

@@ -87,6 +87,7 @@ def _sigma(toml: Toml, key: str, value: object) -> float:
             raise toml.error(str(error), key) from None
     number = float(value) if isinstance(value, int | float) and value is not True else 0.0
     if not LEAST < number < MOST:
-        text = f'{key} must be a positive number [{unit}] or a text such as "{EXAMPLE[kind]}"'
+        size = f" from {LEAST:g} to {MOST:g}" if number > 0.0 else ""
+        text = f'{key} must be a positive number [{unit}]{size} or a text such as "{EXAMPLE[kind]}"'
         raise toml.error(f"{text}, got {value!r}; leave it out if it is not known", key)
     return number

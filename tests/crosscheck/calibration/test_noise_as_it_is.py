@@ -58,6 +58,20 @@ def test_marginal_evidence_is_that_of_the_whole_covariance() -> None:
     assert log_evidence(c, COLOUR, np.ones(n), x, y, width) == pytest.approx(direct)
 
 
+def test_evidence_of_huge_columns_is_that_of_their_directions() -> None:
+    """Each direction costs ln of its size; rounding must not eat the prior of the others."""
+    rng, c = np.random.default_rng(5), chain(6)
+    n = len(c.row)
+    x, y = rng.normal(size=(n, 4)), np.zeros(n)
+
+    def evidence(size: float) -> float:
+        return log_evidence(c, COLOUR, np.ones(n), x, y, np.full(4, size))
+
+    assert evidence(1e9) - evidence(1e12) == pytest.approx(4.0 * np.log(1e3), rel=1e-6)
+    x[:, 3] = x[:, 0]
+    assert evidence(1e5) - evidence(1e9) == pytest.approx(3.0 * np.log(1e4), rel=1e-6)
+
+
 def test_size_and_correlation_are_found_though_half_the_readings_are_fitted_away() -> None:
     rng = np.random.default_rng(2)
     c = chain(144, runs=6)

@@ -63,6 +63,24 @@ def test_rows_that_are_all_alike_carry_no_verdict(data: Measurements) -> None:
     assert unfit(replace(frozen, tensions=data.tensions)) is None
 
 
+def test_noise_that_hides_all_effects_carries_no_verdict(data: Measurements) -> None:
+    # millimetres in the place of metres
+    sigma = Sigma(position_m=30.0, orientation_rad=3.5, tension_N=1e4)
+    found = diagnose(robot(), replace(data, sigma=sigma))
+    assert found.verdict is DiagnosisVerdict.NO_VERDICT and found.converged
+    assert found.refusal is not None and found.refusal.unfit is Unfit.BLIND
+    assert "noise of 30000 mm, 201 deg, 10000 N would hide every effect" in found.sentence
+    assert "state the noise as it is, in metres and radians" in found.measure_next[0]
+    # sure of what it is, there is nothing to refuse
+    assert diagnose(robot(), data).refusal is None
+
+
+def test_where_nothing_of_the_catalogue_shows_there_are_no_columns(data: Measurements) -> None:
+    """As where one effect is asked for, and the readings do not see it: no traceback."""
+    found = diagnose(robot(), replace(data, tensions=None), only=["tension_scale"])
+    assert not found.missing
+
+
 def twice(data: Measurements, off: float) -> Measurements:
     """Each row read twice without motion in between, the second time off by so much."""
     both = data.rows(np.repeat(np.arange(data.n_rows), 2))
