@@ -137,7 +137,7 @@ def command(
         write_text(folder / "sweep.json", text + "\n")
         write_text(folder / "sweep.csv", rows.csv_text())
         if figure != "none":
-            sweep_figure(folder / f"sweep.{figure}", solution, commanded)
+            sweep_figure(folder / f"sweep.{figure}", solution, commanded, wanted)
         if not no_recording:
             # takes a second or two to import
             from seecr.recording.sweep import write_sweep_recording

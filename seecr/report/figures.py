@@ -68,15 +68,18 @@ def figure(path: Path, rows: int = 1, columns: int = 1, **options: Any) -> Itera
         drawn.savefig(path, metadata=metadata)
 
 
-def sweep_figure(path: Path, solution: Solution, commanded: bool = True) -> None:
+def sweep_figure(
+    path: Path, solution: Solution, commanded: bool = True, wanted: bool = False
+) -> None:
     """Deviation, rotation, tensions and slack cables along a sweep.
 
     Args:
         path: the file.
         solution: of the sweep.
         commanded: whether poses were commanded, and not lengths.
+        wanted: whether they are what lengths were told for.
     """
-    at, label = _along(solution, commanded)
+    at, label = _along(solution, commanded, "wanted" if wanted else "commanded")
     mark: dict[str, Any] = {"marker": "o", "markersize": 2.5, "linewidth": 1.1}
     if label in _NUMBERS:
         mark["linewidth"] = 0.5
@@ -90,14 +93,14 @@ def sweep_figure(path: Path, solution: Solution, commanded: bool = True) -> None
         axes[-1, 0].set_xlabel(label)
 
 
-def _along(solution: Solution, commanded: bool) -> tuple[Array, str]:
+def _along(solution: Solution, commanded: bool, word: str) -> tuple[Array, str]:
     """What to draw over: the coordinate that the sweep goes along, else the file's line."""
     if commanded and len(solution) > 1:
         steps = np.diff(solution.command, axis=0)
         moves = [k for k in range(7) if np.any(np.abs(steps[:, k]) > 1e-12)]
         one_way = len(moves) == 1 and len({*np.sign(steps[:, moves[0]])}) == 1
         if one_way and moves[0] < 3:
-            return 1e3 * solution.command[:, moves[0]], f"commanded {'xyz'[moves[0]]} [mm]"
+            return 1e3 * solution.command[:, moves[0]], f"{word} {'xyz'[moves[0]]} [mm]"
     if solution.line is not None:
         return solution.line.astype(float), _NUMBERS[0]
     return np.arange(float(len(solution))), _NUMBERS[1]

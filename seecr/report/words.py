@@ -110,7 +110,8 @@ def cable_lines(solution: Solution, i: int = 0, spread: Spread | None = None) ->
         tension, rest = solution.tensions[i, k] + 0.0, solution.rest_lengths[i, k]
         shown, off = f"{tension:.4f}", ""
         if spread is not None:
-            shown, error = with_error(tension, spread.tensions[i, k])
+            known = solution.slack[i, k]  # nothing, and that for sure to first order
+            shown, error = (shown, "") if known else with_error(tension, spread.tensions[i, k])
             off = f"  {error:>9}"
         yield f"{name:<{wide}}  {shown:>11}{off}  {rest:15.6f}{slack}"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -120,6 +121,9 @@ def test_it_is_printed_and_written(tmp_path: Path) -> None:
     head, first = list(cable_lines(found, spread=spread))[:2]
     value, error = with_error(found.tensions[0, 0], spread.tensions[0, 0])
     assert "± [N]" in head and first.split()[1:3] == [value, error]
+    slack = replace(found, slack=np.ones_like(found.slack))
+    assert all("±" not in line for line in list(cable_lines(slack, spread=spread))[1:])
+    assert list(cable_lines(slack, spread=spread))[1].split()[1] == f"{found.tensions[0, 0]:.4f}"
     x, error = with_error(1e3 * found.pose[0, 0], 1e3 * spread.position[0, 0])
     assert f"rests at x y z {x}, " in lines[1] and f"± {error}" in lines[2]
     assert sweep_lines(found, spread=spread)[-1].startswith("off by up to ± 0.")

@@ -99,6 +99,8 @@ def test_the_figure_is_written(sweep: Solution, tmp_path: Path, kind: str) -> No
     if kind == "svg":
         for words in (b"commanded x [mm]", b"tension [N]", b"cable2, cable4"):
             assert words in data
+        sweep_figure(path, sweep, wanted=True)
+        assert b"wanted x [mm]" in path.read_bytes()
 
 
 def test_the_recording_holds_the_numbers(sweep: Solution, tmp_path: Path) -> None:
