@@ -16,6 +16,7 @@ from seecr.units import UNITS, short, with_error
 __all__ = [
     "EXAMPLE",
     "LEAST",
+    "LEAST_NOISE",
     "MOST",
     "SI",
     "chance",
@@ -33,9 +34,10 @@ SI = {"position": "m", "orientation": "rad", "tension": "N", "length": "m"}
 EXAMPLE = {"position": "0.5mm", "orientation": "0.2deg", "tension": "1N", "length": "0.2mm"}
 """What a person may type for each of them."""
 
-# In SI: what anything measures, with room. Beside noise far below, what effects do is so large that
-# rounding leaves nothing of the rest.
-LEAST, MOST = 1e-9, 1e15
+# In SI; beyond them squares, which fits and noise are made of, are lost in rounding.
+LEAST, MOST = 1e-15, 1e15
+# Of noise: beside less, what effects do is so large that rounding leaves nothing of the rest.
+LEAST_NOISE = 1e-9
 
 _SHOWN = {unit.si: unit for unit in UNITS if unit.shown}
 _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
@@ -49,21 +51,24 @@ def in_unit(si: str) -> tuple[float, str]:
     return unit.over / unit.times, unit.symbol or unit.suffix
 
 
-def parse_quantity(label: str, kind: str, text: str) -> float:
+def parse_quantity(label: str, kind: str, text: str, least: float = LEAST) -> float:
     """A positive number with its unit, in SI.
 
     Args:
         label: the option or key, to say where.
         kind: one of :data:`SI`.
         text: such as ``0.5mm``.
+        least: in SI; less is none.
 
     Raises:
         CrosscheckError: no number above zero with a unit of that kind.
     """
-    return parse_kind(label, (kind,), text)[1]
+    return parse_kind(label, (kind,), text, least)[1]
 
 
-def parse_kind(label: str, kinds: Sequence[str], text: str) -> tuple[str, float]:
+def parse_kind(
+    label: str, kinds: Sequence[str], text: str, least: float = LEAST
+) -> tuple[str, float]:
     """A positive number with the unit of one of some kinds: which kind, and the number in SI.
 
     Raises:
@@ -86,7 +91,7 @@ def parse_kind(label: str, kinds: Sequence[str], text: str) -> tuple[str, float]
     if not (value > 0 and math.isfinite(value)):
         raise CrosscheckError(f"{label}: expected more than zero, got {text!r}")
     kind, unit = units[name]
-    if not LEAST < unit.to_si(value) < MOST:
+    if not least < unit.to_si(value) < MOST:
         raise CrosscheckError(f"{label}: expected a size that can be measured, got {text!r}")
     return kind, unit.to_si(value)
 

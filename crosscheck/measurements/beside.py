@@ -9,7 +9,7 @@ from pathlib import Path
 from crosscheck.errors import CrosscheckError
 from crosscheck.files import Toml, read_toml
 from crosscheck.measurements.data import Sigma
-from crosscheck.units import EXAMPLE, LEAST, MOST, parse_quantity
+from crosscheck.units import EXAMPLE, LEAST_NOISE, MOST, parse_quantity
 from seecr.columns.beside import CHOICES, choice
 from seecr.effects import catalogue
 
@@ -82,12 +82,12 @@ def _sigma(toml: Toml, key: str, value: object) -> float:
     kind, _, unit = key.rpartition("_")
     if isinstance(value, str):
         try:
-            return parse_quantity(key, kind, value)
+            return parse_quantity(key, kind, value, LEAST_NOISE)
         except CrosscheckError as error:
             raise toml.error(str(error), key) from None
     number = float(value) if isinstance(value, int | float) and value is not True else 0.0
-    if not LEAST < number < MOST:
-        size = f" from {LEAST:g} to {MOST:g}" if number > 0.0 else ""
+    if not LEAST_NOISE < number < MOST:
+        size = f" from {LEAST_NOISE:g} to {MOST:g}" if number > 0.0 else ""
         text = f'{key} must be a positive number [{unit}]{size} or a text such as "{EXAMPLE[kind]}"'
         raise toml.error(f"{text}, got {value!r}; leave it out if it is not known", key)
     return number

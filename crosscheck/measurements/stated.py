@@ -8,7 +8,7 @@ from dataclasses import fields, replace
 
 from crosscheck.errors import CrosscheckError
 from crosscheck.measurements.data import Measurements, Sigma
-from crosscheck.units import SI, parse_quantity
+from crosscheck.units import LEAST_NOISE, SI, parse_quantity
 
 __all__ = ["stated", "with_stated"]
 
@@ -44,5 +44,7 @@ def stated(sigma: Sigma, texts: Iterable[str]) -> Sigma:
                 f"--sigma {text}: expected KIND=QUANTITY such as position=0.1mm, KIND one of "
                 f"{', '.join(near)} (nearest first)"
             )
-        values[f"{kind}_{SI[kind]}"] = parse_quantity(f"--sigma {kind}", kind, quantity)
+        values[f"{kind}_{SI[kind]}"] = parse_quantity(
+            f"--sigma {kind}", kind, quantity, LEAST_NOISE
+        )
     return replace(sigma, **values)

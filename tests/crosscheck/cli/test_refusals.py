@@ -24,6 +24,9 @@ def test_sizes_that_nothing_measures(stiff: tuple[Path, Path], tmp_path: Path) -
     for size in ("1e-300mm", "1e-9mm", "1e300mm"):
         said = refused("compare", *stiff, "--sigma", f"position={size}", "--out", tmp_path / "o")
         assert f"--sigma position: expected a size that can be measured, got '{size}'" in said
+    # a limit may be as small: a model may be as near to another
+    tight = ("--max-position", "1e-9mm", "--no-recording", "--out", tmp_path / "o")
+    assert run("compare", *stiff, *tight).exit_code == 1
     robot, data = stiff
     other = tmp_path / "other.csv"
     other.write_bytes(data.read_bytes())
