@@ -28,7 +28,7 @@ from seecr.pose import Array
 LEVEL, POWER = 0.05, 0.8
 """Family-wise chance of a false alarm, and chance to find what is there."""
 
-NAMED = 2.8
+NAMED = 2.0
 """Times the smallest size that shows at which diagnoses name nine in ten effects, themselves or as
 what the data cannot tell from them: measured, ``scripts/score_success.py``, docs/diagnosis.md."""
 
