@@ -76,8 +76,9 @@ class DataReach:
         """The table of a model."""
         table = tomlkit.table()
         table.add(tomlkit.comment("Where the platform was in the data, and how its cables pulled."))
-        table[_POSITION] = [_rounded(self.low), _rounded(self.high)]
-        table[_TENSION] = _rounded(np.array([self.least, self.largest]))
+        corners, pulls = np.stack([self.low, self.high]), np.array([self.least, self.largest])
+        table[_POSITION] = _rounded(corners).tolist()
+        table[_TENSION] = _rounded(pulls).tolist()
         return table
 
     def outside(self, positions: ArrayLike, length: float) -> NDArray[np.float64]:
@@ -102,7 +103,7 @@ class DataReach:
             length: of the robot [m].
         """
         away = self.outside(positions, length)
-        pulls = np.nan_to_num(tensions).max(axis=1)
+        pulls = np.nan_to_num(tensions).max(axis=1, initial=0.0)
         tense = pulls > _TENSE * self.largest
         rows = (away > 0.0) | tense
         if not np.any(rows):
@@ -122,5 +123,7 @@ class DataReach:
         )
 
 
-def _rounded(values: Array) -> list[float]:
-    return [float(f"{value:.{_DIGITS}g}") + 0.0 for value in values]
+def _rounded(values: Array) -> Array:
+    """To some digits of how far they are apart: a base frame may be far from the robot."""
+    apart = float(np.ptp(values, axis=0).max()) or float(np.abs(values).max()) or 1.0
+    return np.asarray(np.round(values, _DIGITS - int(np.ceil(np.log10(apart)))) + 0.0)

@@ -90,14 +90,16 @@ class Model(Result):
         return tuple(self.stderr)
 
     def beyond(self, solution: Solution) -> tuple[str, ...]:
-        """A sentence about the rows of an answer that are beyond the data, if there are any.
+        """A sentence about the rows at rest that are beyond the data, if there are any.
 
         Args:
             solution: as :func:`seecr.solve` gives it with this model.
         """
         if self.reach is None:
             return ()
-        return self.reach.beyond(solution.pose[:, :3], solution.tensions, solution.robot.length)
+        rests = solution.converged
+        places, tensions = solution.pose[rests, :3], solution.tensions[rests]
+        return self.reach.beyond(places, tensions, solution.robot.length)
 
     def lines(self) -> list[str]:
         """Whose model it is, and the effects with their first few values."""

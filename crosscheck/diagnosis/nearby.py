@@ -56,7 +56,7 @@ def chances_near(found: Search, alike: Mapping[str, Sequence[str]]) -> Chances:
     every |= _refitted(found, scores, names)
     none = _impossible(found)
     every = {some: score for some, score in every.items() if not some & none}
-    shown = shown_from(setting, joint, *_all_of(columns))
+    shown = shown_from(setting, joint, *_all_of(columns, len(joint.state.white)))
     sizes = {name: parameters_told(catalogue.start(name).layout) for name in effects}
     hints = alike_beyond(scores, names, sizes)
     return _with_equals(every, effects, alike, hints, shown)
@@ -88,12 +88,17 @@ def _refitted(found: Search, scores: Scores, last: Names) -> dict[Names, float]:
     return out
 
 
-def _all_of(columns: Mapping[str, Array]) -> tuple[Array, Array]:
-    """Columns (N, p) of all effects, and prior widths (p,): plausible, or none for the tracker."""
+def _all_of(columns: Mapping[str, Array], count: int) -> tuple[Array, Array]:
+    """Columns (N, p) of all effects and prior widths (p,): plausible, or none for the tracker.
+
+    N is the count.
+    """
     width = {name: FLAT if name == TRACKER else 1.0 for name in columns}
     return (
-        np.concatenate(list(columns.values()), axis=1),
-        np.concatenate([np.full(x.shape[1], width[name]) for name, x in columns.items()]),
+        np.concatenate([np.zeros((count, 0)), *columns.values()], axis=1),
+        np.concatenate(
+            [np.zeros(0), *(np.full(x.shape[1], width[name]) for name, x in columns.items())]
+        ),
     )
 
 

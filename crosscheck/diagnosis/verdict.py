@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from crosscheck.calibration.judgement import SURE
@@ -27,7 +28,8 @@ from crosscheck.fit.tolerance import HALF_THE_NOISE, Tolerance
 from crosscheck.fit.words import rms_words
 from crosscheck.given import GivenModel, GivenRobot, considered, model_of, robot_of
 from crosscheck.measurements.read import GivenData, measurements_of
-from crosscheck.planning.sight import sight_of
+from crosscheck.planning.sight import Sight, sight_of
+from seecr.effects import catalogue
 from seecr.pose import Array
 
 # Data that would show no effect of so many plausible sizes show nothing.
@@ -83,11 +85,23 @@ def _diagnosed(ready: Prepared, said: Notes, progress: Progress) -> Diagnosis:
     if refusal is not None:
         return no_verdict(problem, base, notes, refusal)
     sight = sight_of(problem, base, factor)
-    if sight.effects and all(one.factor > _BLIND for one in sight.effects):
+    if _is_blind(problem, base, sight):
         blind = Refusal(Unfit.BLIND, problem.data.n_rows, noise=rms_words(noise_floor(problem)))
         return replace(no_verdict(problem, base, notes, blind), sight=sight)
     found = _searched(ready, base, factor, notes, progress)
     return replace(found, sight=sight)
+
+
+def _is_blind(problem: Problem, base: Fit, sight: Sight) -> bool:
+    """Whether noise hides every effect of the catalogue, and all that there is to see.
+
+    Asked of the plain model alone: what a model has already hides others whatever the noise.
+    """
+    if base.terms or not problem.considered.issuperset(catalogue()):
+        return False
+    factors = [one.factor for one in sight.effects if np.isfinite(one.factor)]
+    is_quiet = base.chi2 <= problem.n_readings
+    return is_quiet and len(factors) > 0 and min(factors) > _BLIND
 
 
 def _searched(

@@ -23,6 +23,8 @@ def root_of(matrix: Array) -> Array:
     Raises:
         LinAlgError: it is not, or has numbers that are none.
     """
+    if not np.all(np.isfinite(matrix)):
+        raise np.linalg.LinAlgError("not a matrix of numbers")
     size = np.sqrt(np.diag(matrix))
     even, one = matrix / np.outer(size, size), np.eye(len(matrix))
     for ridge in _RIDGES[:-1]:

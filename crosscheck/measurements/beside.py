@@ -87,7 +87,7 @@ def _sigma(toml: Toml, key: str, value: object) -> float:
             raise toml.error(str(error), key) from None
     number = float(value) if isinstance(value, int | float) and value is not True else 0.0
     if not LEAST_NOISE < number < MOST:
-        size = f" from {LEAST_NOISE:g} to {MOST:g}" if number > 0.0 else ""
+        size = f" between {LEAST_NOISE:g} and {MOST:g}" if number > 0.0 else ""
         text = f'{key} must be a positive number [{unit}]{size} or a text such as "{EXAMPLE[kind]}"'
         raise toml.error(f"{text}, got {value!r}; leave it out if it is not known", key)
     return number

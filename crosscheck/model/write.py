@@ -269,6 +269,7 @@ def renewed(model: Model, robot: Robot, data: Measurements) -> Model:
     there = predict(robot, data.as_commands(robot), model)
     rows = data.read & there.solved
     reach = DataReach.of(there.pose[rows, :3], there.tensions[rows])
+    document.pop(TABLE, None)
     if reach is not None:
         document[TABLE] = reach.as_toml()
     return replace(model, document=document, notes=(), reach=reach)

@@ -180,15 +180,21 @@ def _solved(
     """Where the commands lead, and what the search took, if its method was asked for."""
     import numpy as np
 
-    from seecr import solve
+    from seecr import InputError, predict, solve
 
     effects = model or ()
     if method is None:
         return solve(robot, commands, effects=effects, follow=follow), None
+    first = commands.rows(np.arange(1))
+    if follow or predict(robot, first, effects).has_history:
+        beside = "--follow" if follow else "a model with a memory, which is solved along the way"
+        raise InputError(
+            f"--method tells of searches from each command by itself; got it beside {beside}"
+        )
     # what is compiled or imported at the first call is no part of the search
-    solve(robot, commands.rows(np.arange(1)), effects=effects, follow=follow, method=method)
+    solve(robot, first, effects=effects, method=method)
     begin = perf_counter()
-    found = solve(robot, commands, effects=effects, follow=follow, method=method)
+    found = solve(robot, commands, effects=effects, method=method)
     seconds = (perf_counter() - begin) / len(found)
     counts = found.iterations
     counted = int(counts.min()), float(np.median(counts)), int(counts.max())

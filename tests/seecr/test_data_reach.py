@@ -81,6 +81,9 @@ def test_a_model_says_what_of_an_answer_is_beyond_its_data(tmp_path: Path, robot
     assert model.beyond(solve(robot, inside, effects=model)) == ()
     (line,) = model.beyond(solve(robot, [inside, outside], effects=model))
     assert "at 1 of 2 poses" in line and "outside the places" in line
+    # a row that is not at rest says nothing, however far it was when the search ended
+    lost = solve(robot, [inside, outside], effects=model, max_iterations=1)
+    assert not lost.converged.any() and model.beyond(lost) == ()
     unknown = model_of(TABLE.split("[fitted_to]")[0], tmp_path, robot)
     assert unknown.beyond(solve(robot, outside, effects=unknown)) == ()
 
@@ -102,3 +105,10 @@ def test_a_table_that_is_none_is_refused(tmp_path: Path, robot: Robot, old: str,
     text = str(error.value)
     assert "\n" not in text and text.startswith(str(tmp_path / "m.toml"))
     assert "line 7: [fitted_to]: expected position_m = [[x, y, z], [x, y, z]]" in text
+
+
+def test_a_base_frame_far_away_keeps_the_box() -> None:
+    far = replace(REACH, low=REACH.low + 123456.0, high=REACH.high + 123456.0)
+    low, high = np.asarray(far.as_toml()["position_m"].unwrap())
+    assert low == pytest.approx(far.low, abs=1e-4) and high == pytest.approx(far.high, abs=1e-4)
+    assert REACH.as_toml()["position_m"].unwrap() == [[0.3, 0.2, 0.1], [0.5, 0.3, 0.2]]

@@ -31,7 +31,7 @@ def test_sizes_that_nothing_measures(stiff: tuple[Path, Path], tmp_path: Path) -
     other = tmp_path / "other.csv"
     other.write_bytes(data.read_bytes())
     other.with_suffix(".toml").write_text("[sigma]\nposition_m = 1e-300\n")
-    assert "position_m must be a positive number [m] from 1e-09 to 1e+15" in refused(
+    assert "position_m must be a positive number [m] between 1e-09 and 1e+15" in refused(
         "compare", robot, other
     )
     header, first, *rows = data.read_text().splitlines()

@@ -39,6 +39,8 @@ def test_columns_alike_and_millions_of_their_noise_have_an_inverse(size: float) 
 def test_what_is_not_definite_at_all_is_an_error() -> None:
     with pytest.raises(np.linalg.LinAlgError):
         root_of(np.array([[1.0, 2.0], [2.0, 1.0]]))
+    with pytest.raises(np.linalg.LinAlgError):
+        root_of(np.array([[1.0, np.nan], [np.nan, 1.0]]))
 
 
 def test_many_roots_and_solutions_are_numbers_too() -> None:

@@ -16,7 +16,7 @@ from crosscheck.errors import CrosscheckError
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.reasons import DiagnosisVerdict, Unfit
 from crosscheck.measurements.data import Measurements, Sigma
-from seecr.effects import Terms
+from seecr.effects import Term, Terms
 
 
 @pytest.fixture(scope="module")
@@ -71,14 +71,28 @@ def test_noise_that_hides_all_effects_carries_no_verdict(data: Measurements) -> 
     assert found.refusal is not None and found.refusal.unfit is Unfit.BLIND
     assert "noise of 30000 mm, 201 deg, 10000 N would hide every effect" in found.sentence
     assert "state the noise as it is, in metres and radians" in found.measure_next[0]
-    # sure of what it is, there is nothing to refuse
-    assert diagnose(robot(), data).refusal is None
+    # one that some effects would show through, or that is no larger than what is there, is none
+    for said in (data, replace(data, sigma=replace(data.sigma, position_m=1e-4))):
+        assert diagnose(robot(), said).refusal is None
+    # of a few effects, or beside some, nobody can say that noise alone hides them
+    dark = replace(data, sigma=sigma)
+    assert diagnose(robot(), dark, only=["pulley_radius"]).refusal is None
+    assert diagnose(robot(), dark, [Term.of(robot(), "stiffness", factor=1.1)]).refusal is None
+    # what is off by more than that noise is no noise
+    off = diagnose(robot(), with_position(dark, data.position + 300.0))
+    assert off.refusal is None
 
 
-def test_where_nothing_of_the_catalogue_shows_there_are_no_columns(data: Measurements) -> None:
+@pytest.mark.parametrize("only", ["tension_scale", "centre_of_mass"])
+def test_where_nothing_of_the_catalogue_shows_there_are_no_columns(
+    data: Measurements, only: str
+) -> None:
     """As where one effect is asked for, and the readings do not see it: no traceback."""
-    found = diagnose(robot(), replace(data, tensions=None), only=["tension_scale"])
-    assert not found.missing
+    clean = readings(radius_m=0.0)
+    assert not diagnose(robot(), replace(clean, tensions=None), only=[only]).missing
+    dark = replace(data, sigma=Sigma(position_m=30.0, orientation_rad=3.5, tension_N=1e4))
+    for blind in (replace(data, tensions=None), dark, replace(dark, tensions=None)):
+        assert {e.effect for e in diagnose(robot(), blind, only=[only]).missing} <= {only}
 
 
 def twice(data: Measurements, off: float) -> Measurements:

@@ -345,5 +345,12 @@ def test_a_search_tells_its_evaluations_when_it_is_asked_for(tmp_path: Path) -> 
     assert re.search(
         r"fsolve: \d+ to \d+ evaluations of the equations per pose, .* ms per pose", line
     )
-    together = run(*args, *bare, "--method", "fsolve", "--follow")
-    assert together.exit_code == 2 and "expected no other method" in together.output
+    together = run(*args, *bare, "--method", "newton", "--follow")
+    assert together.exit_code == 2
+    assert "--method tells of searches from each command by itself; got it beside --follow" in (
+        together.output
+    )
+    model = tmp_path / "m.toml"
+    model.write_text('[[effect]]\nname = "backlash"\n[effect.parameters]\ngap_m = 0.001\n')
+    remembered = run(*args, *bare, "--method", "newton", "--model", model)
+    assert remembered.exit_code == 2 and "got it beside a model with a memory" in remembered.output
