@@ -57,6 +57,7 @@ def judge(
     surprise: float,
     strange: bool = False,
     doubted: Names = NONE,
+    idle: Names = NONE,
 ) -> Judgement:
     """The verdict.
 
@@ -67,14 +68,15 @@ def judge(
         surprise: of the worst run left out of the joint fit, a reading.
         strange: what was taken for noise is none.
         doubted: members of the best set of a size that hardly happens.
+        idle: those that move nothing where the others are; none of them is listed.
     """
-    best, undecided = found.best.names - found.always, classes.undecided
+    best, undecided = found.best.names - found.always - idle, classes.undecided
     unknown = strange or field_odds > UNKNOWN or surprise > SURPRISE
-    sure = sure_effects(found, classes, True)
+    sure = tuple(e for e in sure_effects(found, classes, True) if e not in idle)
     few = len(best) <= _FEW and undecided < (_OPEN_BESIDE if set(sure) == best else _OPEN)
     few = few and not doubted
     sure = adequate(found, sure) if few and sure else sure_effects(found, classes, False)
-    sure = tuple(name for name in sure if name not in doubted)
+    sure = tuple(name for name in sure if name not in doubted | idle)
     if unknown:  # known effects imitate it: none of them is sure
         return Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, (), undecided)
     if not sure and undecided < _OPEN and explained(found) < _OWED:

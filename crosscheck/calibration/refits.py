@@ -115,7 +115,7 @@ def _thinned(exact: Exact, scores: Scores, best: Refit) -> Refit:
     """The best set, each of its members dropped in earnest, until none is one too many."""
     while len(own := best.names - scores.always) <= FEW:
         for name in sorted(own):
-            if does_nothing(exact, best, name):
+            if does_nothing(exact.setting, best, name):
                 # without it the same values are there; a fit from elsewhere may miss them
                 exact.take(scores, Terms(t for t in best.joint.terms if t.name != name))
         better = exact.best_of(scores, [best.names - {name} for name in sorted(own)])
@@ -125,11 +125,11 @@ def _thinned(exact: Exact, scores: Scores, best: Refit) -> Refit:
     return best
 
 
-def does_nothing(exact: Exact, best: Refit, name: str) -> bool:
+def does_nothing(setting: Setting, best: Refit, name: str) -> bool:
     """Whether a member's values move all readings together by less than noise."""
     joint = best.joint
     own = joint.terms.own(name)
-    moved = joint.whitened(exact.setting.chain, joint.jacobian[:, own] @ joint.z[own])
+    moved = joint.whitened(setting.chain, joint.jacobian[:, own] @ joint.z[own])
     return float(moved @ moved) < 1.0
 
 

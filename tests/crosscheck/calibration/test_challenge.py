@@ -34,6 +34,7 @@ class Linear(Exact):
     def __init__(self, gram: Gram) -> None:
         self.scores = Scores(gram, len(NAMES))
         self.fitted = {}
+        self.setting: Any = None
         self.longer = frozenset[str]()
         self.catalogue, self.plain = Catalogue(Terms(), Terms()), PLAIN
         self.fit(self.scores, frozenset())
@@ -210,9 +211,9 @@ def fitted_to(*values: float) -> Any:
 
 
 def test_a_member_that_moves_nothing_is_known_by_its_values() -> None:
-    exact: Any = SimpleNamespace(setting=SimpleNamespace(chain=None))
+    setting: Any = SimpleNamespace(chain=None)
     best = Refit(frozenset("ab"), fitted_to(30.0, 0.1), {}, 0.0)
-    assert does_nothing(exact, best, "b") and not does_nothing(exact, best, "a")
+    assert does_nothing(setting, best, "b") and not does_nothing(setting, best, "a")
 
 
 def test_what_is_left_without_such_a_member_starts_where_it_is(
@@ -232,7 +233,7 @@ def test_what_is_left_without_such_a_member_starts_where_it_is(
     monkeypatch.setattr(exact, "take", take)
     monkeypatch.setattr(refits, "Terms", list)
     monkeypatch.setattr(
-        refits, "does_nothing", lambda _exact, found, name: found is best and name == "e"
+        refits, "does_nothing", lambda _setting, found, name: found is best and name == "e"
     )
     assert refits._thinned(exact, exact.scores, best).names == frozenset("a")
     assert taken == [frozenset("a")]

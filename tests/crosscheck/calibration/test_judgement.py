@@ -112,6 +112,17 @@ def test_what_is_of_a_size_that_does_not_happen_is_not_sure() -> None:
     assert (said.verdict, said.sure) == (DiagnosisVerdict.MANY_EFFECTS, ("a",))
 
 
+@pytest.mark.parametrize("alone", [-3.2, -40.0])
+def test_what_moves_nothing_beside_its_equal_is_not_listed(alone: float) -> None:
+    """Two that act as one, and a wider prior together: one of them stays where it does nothing."""
+    scores = {"": -900.0, "ab": 0.0, "a": alone, "b": alone - 0.2}
+    found = found_of(scores)
+    classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
+    assert set(judge(found, classes, -5.0, 1.0).sure) == {"a", "b"}
+    said = judge(found, classes, -5.0, 1.0, idle=frozenset("b"))
+    assert (said.verdict, said.sure) == (DiagnosisVerdict.EFFECTS_FOUND, ("a",))
+
+
 def test_a_field_or_runs_left_out_make_it_unknown() -> None:
     scores = {"": -900.0, "a": 0.0}
     assert judged(scores, odds=6.0).verdict is DiagnosisVerdict.UNKNOWN_EFFECT
