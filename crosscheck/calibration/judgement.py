@@ -57,7 +57,6 @@ def judge(
     surprise: float,
     strange: bool = False,
     doubted: Names = NONE,
-    idle: Names = NONE,
 ) -> Judgement:
     """The verdict.
 
@@ -68,15 +67,14 @@ def judge(
         surprise: of the worst run left out of the joint fit, a reading.
         strange: what was taken for noise is none.
         doubted: members of the best set of a size that hardly happens.
-        idle: those that move nothing where the others are; none of them is listed.
     """
-    best, undecided = found.best.names - found.always - idle, classes.undecided
+    best, undecided = found.best.names - found.always - found.idle, classes.undecided
     unknown = strange or field_odds > UNKNOWN or surprise > SURPRISE
-    sure = tuple(e for e in sure_effects(found, classes, True) if e not in idle)
+    sure = sure_effects(found, classes, True)
     few = len(best) <= _FEW and undecided < (_OPEN_BESIDE if set(sure) == best else _OPEN)
     few = few and not doubted
     sure = adequate(found, sure) if few and sure else sure_effects(found, classes, False)
-    sure = tuple(name for name in sure if name not in doubted | idle)
+    sure = tuple(name for name in sure if name not in doubted)
     if unknown:  # known effects imitate it: none of them is sure
         return Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, (), undecided)
     if not sure and undecided < _OPEN and explained(found) < _OWED:
@@ -114,12 +112,16 @@ def adequate(found: Found, sure: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def worths(found: Found) -> dict[str, float]:
-    """ln evidence that each member of the best set is worth: refitted without it, or linear."""
+    """ln evidence that each member of the best set is worth: refitted without it, or linear.
+
+    What moves nothing where the others are is worth none, and left out.
+    """
     best = found.best
     linear = found.scores.neighbours(best.names)
     base = found.scores.score(best.names)
     return {
-        name: _worth(found, linear, base, best.names - {name}) for name in best.names - found.always
+        name: _worth(found, linear, base, best.names - {name})
+        for name in best.names - found.always - found.idle
     }
 
 

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
+from scipy import linalg, special
 
 from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.worth import log_gain
-from crosscheck.fit.definite import inverse_of
+from crosscheck.fit.definite import root_beside_one
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.state import derivatives
 from seecr.effects import Term, catalogue, layout_of
@@ -109,15 +109,16 @@ class _Beside:
         self.setting, self.joint = setting, joint
         self.left = joint.whitened(setting.chain, joint.state.white)
         self.columns = joint.whitened(setting.chain, joint.jacobian) * joint.width
-        normal = self.columns.T @ self.columns + np.eye(self.columns.shape[1])
-        self.inverse = inverse_of(normal)
+        self.root = root_beside_one(self.columns)
 
     def gain(self, term: Term) -> float:
         """ln gain of an effect's amplitudes that start at null, the others as they are."""
         setting, joint = self.setting, self.joint
         x = joint.whitened(setting.chain, added_columns(setting, joint, term))
-        cross = self.columns.T @ x
-        normal = x.T @ x - cross.T @ self.inverse @ cross
+        cross = linalg.solve_triangular(
+            self.root, self.columns.T @ x, lower=True, check_finite=False
+        )
+        normal = x.T @ x - cross.T @ cross
         layout = term.layout
         one_sided = bool(np.any(layout.lower == layout.null)) and x.shape[1] == 1
         return log_gain(normal, x.T @ self.left, one_sided=one_sided)

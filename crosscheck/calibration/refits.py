@@ -40,6 +40,7 @@ class Found:
         refit: fits any set exactly, also one that was not compared; None where that has no
             solution.
         always: effects that the model has, in every set: the smallest set there is.
+        idle: members of the best set that move nothing where the others are, as an equal of one.
     """
 
     refits: dict[Names, Refit]
@@ -47,6 +48,7 @@ class Found:
     scores: Scores
     refit: Callable[[Names], Refit | None]
     always: Names = frozenset()
+    idle: Names = frozenset()
 
     @property
     def none(self) -> Refit:
@@ -101,7 +103,8 @@ def compare_sets(
             break
         scores = exact.scores_about(other.joint)
         best = _searched(exact, scores, other.names, most)
-    return Found(exact.possible, best, scores, lambda names: exact.fit(scores, names), always)
+    idle = frozenset(n for n in best.names - always if does_nothing(setting, best, n))
+    return Found(exact.possible, best, scores, lambda names: exact.fit(scores, names), always, idle)
 
 
 def _searched(exact: Exact, scores: Scores, begin: Names, most: int) -> Refit:

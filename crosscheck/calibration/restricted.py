@@ -12,13 +12,12 @@ import numpy as np
 from scipy import linalg, optimize
 
 from crosscheck.calibration.colour import Chain, Colour, log_det, whitened
+from crosscheck.fit.definite import root_beside_one
 from crosscheck.fit.problem import KINDS
 from seecr.pose import Array
 
 _MOST_ALIKE = 0.97
 _SMALLEST, _LARGEST = 1e-2, 1e3
-# What rounding leaves of a square sum, and some.
-_ROUNDING = 1e-13
 
 
 def log_evidence(
@@ -27,21 +26,11 @@ def log_evidence(
     """ln N(y; 0, X W X^T + Sigma), constants left out; x (N, p), y (N,) in stated noise."""
     columns = whitened(chain, colour, weight, x * width)
     left = whitened(chain, colour, weight, y)
-    factor = _root(columns)
+    factor = root_beside_one(columns)
     part = linalg.solve_triangular(factor, columns.T @ left, lower=True, check_finite=False)
     power = float(left @ left) - float(part @ part)
     volume = 2.0 * float(np.sum(np.log(np.abs(np.diag(factor)))))
     return -0.5 * (power + volume + log_det(chain, colour, weight))
-
-
-def _root(columns: Array) -> Array:
-    """Lower triangular L with L L^T = 1 + X^T X, of columns X (N, p)."""
-    normal, one = columns.T @ columns, np.eye(columns.shape[1])
-    if np.max(np.diag(normal), initial=0.0) * _ROUNDING < 1.0:
-        return np.asarray(linalg.cholesky(normal + one, lower=True, check_finite=False))
-    # effects that move the readings by millions of their noise: rounding would swallow the one
-    (upper,) = linalg.qr(np.concatenate([columns, one]), mode="r", check_finite=False)
-    return np.asarray(upper[: len(one)].T)
 
 
 def estimate(

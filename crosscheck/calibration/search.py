@@ -11,7 +11,6 @@ from crosscheck.calibration.all_effects import PLAIN, Calibration, fit_all_effec
 from crosscheck.calibration.catalogue import Catalogue
 from crosscheck.calibration.equals import parameters_told
 from crosscheck.calibration.field import UNKNOWN, log_odds
-from crosscheck.calibration.joint import Setting
 from crosscheck.calibration.judgement import SURPRISE, Judgement, judge
 from crosscheck.calibration.later import layouts
 from crosscheck.calibration.linearised import free_of
@@ -21,7 +20,7 @@ from crosscheck.calibration.probability import (
     all_scores,
     probabilities,
 )
-from crosscheck.calibration.refits import ROUNDS, Found, compare_sets, does_nothing
+from crosscheck.calibration.refits import ROUNDS, Found, compare_sets
 from crosscheck.calibration.sets import Names
 from crosscheck.calibration.stages import Progress
 from crosscheck.calibration.strange import is_strange
@@ -106,7 +105,7 @@ def seek(
     hints = alike_beyond(found.scores, own, sizes)
     classes = probabilities(all_scores(found), own, effects, sizes, found.refits, hints)
     strange = strange or is_strange(setting, found.best.joint, known)
-    said = judge(found, classes, odds, surprise, strange, _doubted(found), _idle(setting, found))
+    said = judge(found, classes, odds, surprise, strange, _doubted(found))
     listed = found.always | set(said.sure)
     alone = found.refit(listed) if said.verdict is DiagnosisVerdict.EFFECTS_FOUND else None
     if alone is not None and listed != found.best.names:
@@ -133,12 +132,6 @@ def in_place(
                 if swapped is not None and can_be(robot, swapped.joint.terms, stood):
                     out[swapped.names] = swapped.score
     return out
-
-
-def _idle(setting: Setting, found: Found) -> Names:
-    """Members of the best set that move nothing where the others are: equals of one that does."""
-    own = found.best.names - found.always
-    return frozenset(name for name in own if does_nothing(setting, found.best, name))
 
 
 def _doubted(found: Found) -> Names:

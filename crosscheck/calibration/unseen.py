@@ -13,7 +13,7 @@ from scipy import linalg, special
 from crosscheck.calibration.field import FIELD_WIDTHS, UNKNOWN, field_of
 from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.worth import gains_along
-from crosscheck.fit.definite import root_of
+from crosscheck.fit.definite import root_beside_one
 from crosscheck.fit.noise import as_table
 from crosscheck.fit.problem import Rms, rms_by_kind
 from seecr.pose import Array
@@ -54,7 +54,7 @@ def shown_from(setting: Setting, joint: JointFit, columns: Array, width: Array) 
 def _left(setting: Setting, joint: JointFit, field: Array, columns: Array, width: Array) -> Array:
     """(k, k) normal matrix of the field's coefficients beside the effects."""
     x, f = (joint.whitened(setting.chain, part) for part in (columns * width, field))
-    root = root_of(x.T @ x + np.eye(x.shape[1]))
+    root = root_beside_one(x)
     cross = linalg.solve_triangular(root, x.T @ f, lower=True, check_finite=False)
     return np.asarray(f.T @ f - cross.T @ cross)
 

@@ -15,6 +15,8 @@ from seecr.pose import Array
 _RIDGES = (0.0, 1e-14, 1e-11, 1e-8)
 # Up to squares of this size, beside prior precisions about one, rounding does no harm.
 _USUAL = 1e9
+# What rounding leaves of a sum of squares, and some.
+_ROUNDING = 1e-13
 
 
 def root_of(matrix: Array) -> Array:
@@ -33,6 +35,16 @@ def root_of(matrix: Array) -> Array:
         except np.linalg.LinAlgError:
             continue
     return np.asarray(size[:, None] * np.linalg.cholesky(even + _RIDGES[-1] * one))
+
+
+def root_beside_one(columns: Array) -> Array:
+    """Lower triangular L (p, p) with L L^T = 1 + X^T X, of columns X (N, p): exact to rounding."""
+    normal, one = columns.T @ columns, np.eye(columns.shape[1])
+    if np.max(np.diag(normal), initial=0.0) * _ROUNDING < 1.0:
+        return np.asarray(linalg.cholesky(normal + one, lower=True, check_finite=False))
+    # rounding of the squares would swallow the one
+    (upper,) = linalg.qr(np.concatenate([columns, one]), mode="r", check_finite=False)
+    return np.asarray(upper[: len(one)].T)
 
 
 def inverse_of(matrix: Array) -> Array:

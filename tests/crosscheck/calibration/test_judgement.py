@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations
 from types import SimpleNamespace
 from typing import Any
@@ -119,7 +120,7 @@ def test_what_moves_nothing_beside_its_equal_is_not_listed(alone: float) -> None
     found = found_of(scores)
     classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
     assert set(judge(found, classes, -5.0, 1.0).sure) == {"a", "b"}
-    said = judge(found, classes, -5.0, 1.0, idle=frozenset("b"))
+    said = judge(replace(found, idle=frozenset("b")), classes, -5.0, 1.0)
     assert (said.verdict, said.sure) == (DiagnosisVerdict.EFFECTS_FOUND, ("a",))
 
 

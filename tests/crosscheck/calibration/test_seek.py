@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 from made_data import COGIRO, SIGMA, measured, term
 
+from crosscheck.calibration import refits
 from crosscheck.calibration.judgement import Judgement, judge
 from crosscheck.calibration.search import Sought, seek
 from crosscheck.diagnosis.explained import explained
@@ -53,6 +54,18 @@ def test_two_effects_are_named_and_a_field_makes_the_verdict_unknown() -> None:
     unknown = judge(found.found, found.classes, 20.0, 1.0)
     assert unknown.verdict is DiagnosisVerdict.UNKNOWN_EFFECT
     assert judge(found.found, found.classes, -5.0, 9.0).verdict is DiagnosisVerdict.UNKNOWN_EFFECT
+
+
+def test_a_member_that_moves_nothing_is_known_and_not_listed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tilt = "gravity_tilt"
+    monkeypatch.setattr(refits, "does_nothing", lambda _setting, _best, name: name == tilt)
+    found = sought([
+        term(ROBOT, "pulley_radius", radius_m=0.006), term(ROBOT, tilt, tilt_x_rad=0.03),
+    ])  # fmt: skip
+    assert found.found.best.names >= {"pulley_radius", tilt} and found.found.idle == {tilt}
+    assert found.judgement.sure == ("pulley_radius",)
 
 
 def assert_a_model_by_itself(found: Sought) -> None:

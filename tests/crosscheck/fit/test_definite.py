@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from crosscheck.fit.definite import inverse_of, root_of, roots_of, solved
+from crosscheck.fit.definite import inverse_of, root_beside_one, root_of, roots_of, solved
 
 
 def columns(size: float, apart: float, count: int = 40) -> np.ndarray:
@@ -52,3 +52,13 @@ def test_many_roots_and_solutions_are_numbers_too() -> None:
     for matrix in (good, normal(columns(1e7, 0.5))):
         assert matrix @ solved(matrix, right) == pytest.approx(right, rel=1e-6)
     assert np.all(np.isfinite(solved(bad, right)))
+
+
+def test_the_root_beside_one_is_exact_where_rounding_would_swallow_the_one() -> None:
+    x = columns(30.0, 0.1)
+    assert root_beside_one(x) == pytest.approx(np.linalg.cholesky(normal(x)), rel=1e-12, abs=1e-12)
+    # the same column twice: what is left of their difference is the one
+    x = columns(1e9, 0.0)
+    root = np.abs(np.diag(root_beside_one(x)))
+    assert np.prod(root[[0, 3]]) ** 2 == pytest.approx(2.0 * float(x[:, 0] @ x[:, 0]), rel=1e-6)
+    assert root[3] == pytest.approx(np.sqrt(2.0), rel=1e-3)
