@@ -8,13 +8,13 @@ from made_data import COGIRO, measured
 
 from crosscheck.calibration.colour import WHITE, Colour, chain_of
 from crosscheck.calibration.joint import Setting, settle
-from crosscheck.calibration.strange import goes_together, too_large
+from crosscheck.calibration.strange import goes_together, most_together, too_large
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.state import evaluate
 from seecr.effects import Terms
 from seecr.mjcf import load_robot
 
-POSITION = np.array([0])
+POSITION = np.array([432, 0, 0])
 
 
 def noise(scale: float, rho: float) -> Colour:
@@ -28,6 +28,8 @@ def noise(scale: float, rho: float) -> Colour:
         (1.0, 0.8, True),  # of the stated size: a tracker is smooth in time
         (2.0, 0.0, True),  # white, and stated too small
         (2.0, 0.8, True),  # coloured, and stated half as large as it is
+        (2.4, 0.8, True),  # the same: how large it is, 432 readings tell to 7 %
+        (2.4, 0.4, False),
         (2.6, 0.8, False),
         (4.0, 0.0, False),
     ],
@@ -36,6 +38,27 @@ def test_stated_noise_may_be_coloured_and_wrong_by_two_but_no_more(
     scale: float, rho: float, is_noise: bool
 ) -> None:
     assert too_large(noise(scale, rho), POSITION, ["position"]) is not is_noise
+
+
+def test_the_size_of_what_goes_together_is_known_as_well_as_its_errors_say() -> None:
+    # 400 runs of AR(1) noise, each of 144 rows of three readings
+    random, rho, rows = np.random.default_rng(5), 0.8, 144
+    noise = random.standard_normal((400, rows, 3))
+    for k in range(1, rows):
+        noise[:, k] = rho * noise[:, k - 1] + np.sqrt(1.0 - rho**2) * noise[:, k]
+    now, before = noise[:, 1:], noise[:, :-1]
+    phi = (now * before).sum(axis=(1, 2)) / (before**2).sum(axis=(1, 2))
+    left = now - phi[:, None, None] * before
+    size = 2.0 * np.sqrt((left**2).mean(axis=(1, 2)) / (1.0 - phi**2))
+    assert 0.01 < np.mean(size > 2.3) < 0.06
+    most = [most_together(float(one), 3 * rows) for one in phi]
+    assert np.mean(size > most) < 0.01
+
+
+def test_few_readings_may_be_three_times_as_noisy_but_no_more() -> None:
+    few = np.array([60, 0, 0])
+    assert not too_large(noise(2.9, 0.9), few, ["position"])
+    assert too_large(noise(3.1, 0.9), few, ["position"])
 
 
 @pytest.mark.parametrize(
