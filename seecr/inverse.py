@@ -19,7 +19,7 @@ from seecr.given import GivenRobot, robot_of
 from seecr.hanging import least_of_heavy
 from seecr.holding import Held, hold, holds_firmly
 from seecr.inside import balances, counted_balance
-from seecr.nearest import Nearest, nearest
+from seecr.nearest import Nearest, Reaching, nearest, nearest_in_place
 from seecr.pose import Array, pose_difference
 from seecr.result import COORDINATES, Record, Result, named
 from seecr.robot import Robot
@@ -81,9 +81,7 @@ class Correction(Result):
     @property
     def stays(self) -> NDArray[np.bool_]:
         """(n,) bool, the platform rests at what is aimed at, stably, to within a micrometre."""
-        size = np.where(np.arange(6) < 3, 1.0, self.robot.length)
-        off = np.abs(pose_difference(self.solution.pose, self.aimed) * size).max(axis=1)
-        return np.asarray(self.found & self.solution.converged & (off < _REACHED))
+        return self.found & _rests_at(self.aimed, self.solution)
 
     @property
     def reached(self) -> NDArray[np.bool_]:
@@ -217,7 +215,30 @@ def correct(
     """
     if prefer not in PREFERENCES:
         raise InputError(f"prefer must be one of {', '.join(PREFERENCES)}, got {prefer!r}")
-    robot = robot_of(robot)
+    search = _search_of(robot_of(robot), poses, effects, lowest, highest, aim)
+    return search.run(prefer == "position")
+
+
+def held_in_place(
+    robot: Robot, poses: Array, effects: GivenEffects, lowest: ArrayLike, highest: ArrayLike
+) -> NDArray[np.bool_]:
+    """(n,) whether positions can be held at some orientation by tensions within the limits.
+
+    As :func:`correct` with ``prefer="position"`` says it, but any orientation will do, and nothing
+    is sought at other positions: for maps.
+    """
+    return _search_of(robot, poses, effects, lowest, highest, "minimum").held_in_place()
+
+
+def _search_of(
+    robot: Robot,
+    poses: Commands | ArrayLike,
+    effects: GivenEffects,
+    lowest: ArrayLike,
+    highest: ArrayLike,
+    aim: str | ArrayLike,
+) -> _Search:
+    """One search, its arguments checked."""
     given = poses if isinstance(poses, Commands) else Commands(commanded_poses(poses))
     if given.lengths is not None:
         raise InputError("correct needs wanted poses (n, 7); got lengths")
@@ -226,7 +247,7 @@ def correct(
     if target.ndim == 2 and len(target) != len(given):
         raise InputError(f"aim must have {counted(len(given), 'row')}, got {len(target)}")
     limits = _Limits(np.broadcast_to(target, (len(given), robot.n_cables)), low, high)
-    return _Search(robot, given, effects_of(effects, robot), limits).run(prefer == "position")
+    return _Search(robot, given, effects_of(effects, robot), limits)
 
 
 @dataclass(frozen=True, eq=False)
@@ -264,6 +285,18 @@ class _Search:
             self._why_not(lost, tables),
         )  # fmt: skip
 
+    def held_in_place(self) -> NDArray[np.bool_]:
+        """(n,) whether some orientation is held, and stays, at each position."""
+        held, tables = self._held(self.given)
+        aimed, lost = self.given.pose.copy(), np.flatnonzero(~held.fine)
+        if len(lost):
+            problem = self._reaching(lost, tables.scale, fix_position=True)
+            aimed[lost] = nearest_in_place(problem).poses
+        commands = replace(self.given, pose=aimed)
+        there = self._held(commands)[0] if len(lost) else held
+        solution = self._lengths(commands, there)[1].solution()
+        return there.fine & _rests_at(aimed, solution)
+
     def _why_not(self, lost: NDArray[np.intp], tables: Tables) -> tuple[str, ...]:
         """(n,) sentences; "" of rows that can be held."""
         out, limits = [""] * len(self.given), self.limits
@@ -287,8 +320,9 @@ class _Search:
         limits = self.limits
         return hold(tables, limits.aim, limits.low, limits.high), tables
 
-    def _nearest(self, rows: NDArray[np.intp], scale: Array, fix_position: bool) -> Nearest:
-        wanted, limits = self.given.pose[rows], self.limits
+    def _reaching(self, rows: NDArray[np.intp], scale: Array, *, fix_position: bool) -> Reaching:
+        """The problem of the nearest poses of some rows."""
+        limits = self.limits
 
         def balance(
             poses: Array, some: NDArray[np.intp], about: Array | None = None
@@ -300,8 +334,13 @@ class _Search:
             tables = self._tables(replace(self.given.rows(rows[some]), pose=poses))
             return holds_firmly(tables, limits.aim[rows[some]], limits.low, limits.high)
 
-        args = (self.robot, wanted, balance, stays, limits.low, limits.high, scale[rows])
-        best = nearest(*args, fix_position)
+        return Reaching.within(
+            self.robot, self.given.pose[rows], balance, stays, (limits.low, limits.high),
+            scale[rows], fix_position=fix_position,
+        )  # fmt: skip
+
+    def _nearest(self, rows: NDArray[np.intp], scale: Array, fix_position: bool) -> Nearest:
+        best = nearest(self._reaching(rows, scale, fix_position=fix_position))
         again = np.flatnonzero(~best.firm)
         if fix_position and len(again):
             # the position cannot be kept either
@@ -325,6 +364,13 @@ class _Search:
                 break
             held, _ = self._held(commands, prediction)
         return told, prediction
+
+
+def _rests_at(poses: Array, solution: Solution) -> NDArray[np.bool_]:
+    """(n,) whether the platform rests at poses (n, 7), to within a micrometre."""
+    size = np.where(np.arange(6) < 3, 1.0, solution.robot.length)
+    off = np.abs(pose_difference(solution.pose, poses) * size).max(axis=1)
+    return np.asarray(solution.converged & (off < _REACHED))
 
 
 def _without(solution: Solution, rows: NDArray[np.bool_]) -> Solution:

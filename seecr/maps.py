@@ -21,7 +21,7 @@ from seecr.equilibrium import solve
 from seecr.errors import InputError
 from seecr.experiment import Experiment, effects_of
 from seecr.given import GivenRobot, robot_of
-from seecr.inverse import correct
+from seecr.inverse import held_in_place
 from seecr.model import GivenEffects, model_given
 from seecr.pose import Array
 from seecr.result import Record, Result
@@ -388,10 +388,7 @@ def _margins(
             f"{robot.name} has fewer cables than freedoms: it holds no set of wrenches; "
             "expected none"
         )
-    limits = {"lowest": lowest, "highest": highest}
-    found = correct(robot, poses, effects=acting, prefer="position", **limits)
-    kept = np.linalg.norm(found.aimed[:, :3] - poses[:, :3], axis=1) < 1e-6 * robot.length
-    return np.where(found.found & kept & found.solution.converged, 0.0, -np.inf)
+    return np.where(held_in_place(robot, poses, acting, lowest, highest), 0.0, -np.inf)
 
 
 def _holds(robot: Robot, margin: Array) -> NDArray[np.bool_]:

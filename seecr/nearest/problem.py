@@ -32,6 +32,8 @@ class Balance(Protocol):
 Stays = Callable[[Array, Rows], NDArray[np.bool_]]
 """Whether the platform stays at poses (k, 7) of some rows with the rest lengths that hold them."""
 
+# A pose this near to the limit is held with something to spare: tensions, relative to the load.
+_INSIDE = 1e-6
 # Weight of a tension of one load, as a displacement over the robot's length: next to none.
 _WEIGHT = 1e-3
 # Difference for derivatives, over the length.
@@ -54,6 +56,39 @@ class Reaching:
     most: Array  # (n, m) [N]
     scale: Array  # (n,) [N] load
     free: Array  # (d,) how far each coordinate may go from its wanted value: none, or infinitely
+
+    @classmethod
+    def within(
+        cls,
+        robot: Robot,
+        wanted: Array,
+        balance: Balance,
+        stays: Stays,
+        limits: tuple[Array, Array],
+        scale: Array,
+        *,
+        fix_position: bool = False,
+    ) -> Reaching:
+        """The problem of wanted poses (n, 7).
+
+        Args:
+            limits: (m,) least and largest tensions [N]. scale: (n,) [N] load.
+            fix_position: the position is kept, only the orientation gives way.
+        """
+        low, high = limits
+        inside = _INSIDE * scale[:, None]
+        least = np.minimum(low + inside, 0.5 * (low + np.minimum(high, 1e300)))
+        most = np.maximum(high - inside, least)
+        values = values_of_pose(robot, wanted)[0] if robot.joints else None
+        free = np.full(robot.n_dof, np.inf)
+        if fix_position:
+            free[~robot.hinges] = 0.0
+        return cls(robot, wanted, values, balance, stays, least, most, scale, free)
+
+    @property
+    def is_in_place(self) -> bool:
+        """Whether positions are kept."""
+        return not np.all(self.robot.hinges | (self.free > 0.0))
 
     def placed(self, away: Array, rows: Rows) -> Array:
         """Poses (k, 7) so far from the wanted ones of rows."""

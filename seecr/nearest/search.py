@@ -14,17 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr.joints import values_of_pose
 from seecr.nearest.firm import at_random, firm_ends, nearest_of, part_of
 from seecr.nearest.inward import ENOUGH, TIGHT, inward, tightened, to_rounding
-from seecr.nearest.problem import Balance, Curved, Reaching, Rows, Spots, Stays
+from seecr.nearest.problem import Curved, Reaching, Rows, Spots
 from seecr.nearest.screen import screened
 from seecr.nearest.seeds import Candidates, about_answers, about_wanted, from_sample, sample
 from seecr.pose import Array
-from seecr.robot import Robot
 
-# A pose this near to the limit is held with something to spare: tensions, relative to the load.
-_INSIDE = 1e-6
 # Searches of each row from the sample, and from other rows' answers.
 _FIRST, _SHARED = 14, 4
 # Where a search ended nearer by this part, but the platform would not stay, firm poses are sought.
@@ -50,54 +46,44 @@ class Nearest:
     settled: NDArray[np.bool_]
 
 
-def nearest(
-    robot: Robot,
-    wanted: Array,
-    balance: Balance,
-    stays: Stays,
-    low: Array,
-    high: Array,
-    scale: Array,
-    fix_position: bool = False,
-) -> Nearest:
+def nearest(problem: Reaching) -> Nearest:
     """The nearest poses that can be held, and whether any were found.
 
     Args:
-        robot: as described.
-        wanted: (n, 7).
-        balance: what holds at a pose.
-        stays: whether the platform does, exactly. Balance is linear in the tensions here, from
-            where cables just pull: of heavy ones it is not quite right. Answers that stay go before
-            all that do not; where none was found that stays, the nearest of the others is kept.
-        low, high: (m,) limits [N].
-        scale: (n,) [N] load.
-        fix_position: the position is kept, only the orientation gives way.
+        problem: the wanted poses, what holds there, and what may give way. Balance is linear in
+            the tensions here, from where cables just pull: of heavy ones it is not quite right.
+            Answers that stay go before all that do not; where none was found that stays, the
+            nearest of the others is kept.
     """
-    inside = _INSIDE * scale[:, None]
-    least = np.minimum(low + inside, 0.5 * (low + np.minimum(high, 1e300)))
-    most = np.maximum(high - inside, least)
-    values = values_of_pose(robot, wanted)[0] if robot.joints else None
-    free = np.full(robot.n_dof, np.inf)
-    if fix_position:
-        free[~robot.hinges] = 0.0
-    problem = Reaching(robot, wanted, values, balance, stays, least, most, scale, free)
-    best = _Best.none(problem)
-    rows = np.arange(len(wanted))
-    start = problem.start(np.zeros((len(wanted), robot.n_dof)), rows)
+    best, rows = Best.none(problem), np.arange(len(problem.wanted))
+    start = problem.start(np.zeros((len(rows), len(problem.free))), rows)
     best.keep(inward(problem, tightened(problem, start)))
     poses = sample(problem)
     first = from_sample(problem, poses).and_more(about_wanted(problem))
     best.search(first, _FIRST)
     if not best.found.any():
-        return Nearest(wanted.copy(), best.found, best.firm, best.found.copy())
+        return Nearest(problem.wanted.copy(), best.found, best.firm, best.found.copy())
     best.search(about_answers(problem, best.away, np.flatnonzero(best.found)), _SHARED)
     best.firm_ones(poses)
     settled = best.settled() & best.firm
     return Nearest(problem.placed(best.away, rows), best.found, best.firm, settled)
 
 
+def any_that_stays(problem: Reaching) -> Best:
+    """Any poses at which the platform is held and stays, near or far, if some are found."""
+    best, poses = Best.none(problem), sample(problem)
+    first = from_sample(problem, poses).and_more(about_wanted(problem))
+    spots = screened(problem, first, _FIRST)
+    best.keep(spots)
+    spots = spots.only(~best.firm[spots.rows])
+    if len(spots.rows):
+        best.keep(inward(problem, spots))
+        best.firm_ones(poses)
+    return best
+
+
 @dataclass(frozen=True, eq=False)
-class _Best:
+class Best:
     """The nearest answers so far, changed in place.
 
     Attributes:
@@ -114,7 +100,7 @@ class _Best:
     loose: Array
 
     @classmethod
-    def none(cls, problem: Reaching) -> _Best:
+    def none(cls, problem: Reaching) -> Best:
         n = len(problem.wanted)
         away, tensions = np.zeros((n, len(problem.free))), np.zeros(problem.least.shape)
         loose = np.full(away.shape, np.inf)
@@ -139,6 +125,11 @@ class _Best:
                 self.found[row], self.firm[row] = True, firm[i]
             if not firm[i] and size[i] < np.linalg.norm(self.loose[row]):
                 self.loose[row] = other.away[i]
+
+    def take(self, rows: Rows, other: Best) -> None:
+        """The answers of another, which is of these rows alone."""
+        self.away[rows], self.tensions[rows] = other.away, other.tensions
+        self.found[rows], self.firm[rows], self.loose[rows] = other.found, other.firm, other.loose
 
     def firm_ones(self, poses: Array) -> None:
         """Where a search ended nearer, but the platform would not stay: the nearest that does.

@@ -37,7 +37,12 @@ class Candidates:
 
 
 def sample(problem: Reaching) -> Array:
-    """Poses (k, 7) that can be held with the first row's load, and home, which may not be."""
+    """Poses (k, 7) that can be held with the first row's load, and home, which may not be.
+
+    Home alone where positions are kept: none of the others is at a wanted one.
+    """
+    if problem.is_in_place:
+        return problem.robot.reference_pose[None]
     random = np.random.default_rng(0)
     draw = _turned if problem.values is None else _on_joints
     poses = draw(problem.robot, random)
@@ -75,10 +80,9 @@ def _on_joints(robot: Robot, random: np.random.Generator) -> Array:
 def from_sample(problem: Reaching, poses: Array) -> Candidates:
     """Home, the poses nearest to each wanted one, and as many of the others."""
     random, out, rows = np.random.default_rng(1), [], []
-    places = bool(np.all(problem.robot.hinges | (problem.free > 0.0)))
     for row in range(len(problem.wanted)):
-        # the sample holds none at the wanted position
-        every = problem.to(poses, np.full(len(poses), row)) if places else _in_place(problem, row)
+        in_place = problem.is_in_place
+        every = _in_place(problem, row) if in_place else problem.to(poses, np.full(len(poses), row))
         some = min(_NEAR, len(every))
         near = np.argsort(np.linalg.norm(every, axis=1))[:some]
         pick = np.concatenate([[0], near, random.choice(len(every), some, replace=False)])

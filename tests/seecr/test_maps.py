@@ -19,6 +19,7 @@ from seecr import maps, threads, workspace
 from seecr.effects import Term
 from seecr.equilibrium import solve
 from seecr.errors import InputError
+from seecr.inverse import correct, held_in_place
 from seecr.maps import boundary, default_axes, workspace_map
 from seecr.mjcf import load_robot
 from seecr.planar import bar_tilt
@@ -268,12 +269,36 @@ def test_a_large_robots_map_is_drawn_in_metres_and_its_colours_show_most_margins
 @pytest.mark.slow
 def test_too_few_cables_are_mapped_by_position() -> None:
     robot = robot_named("planar_two_cable")
-    x, z = np.linspace(0.2, 0.8, 4), np.array([0.4, 0.6])
+    x, z = np.linspace(-0.15, 1.15, 11), np.linspace(0.05, 1.05, 6)
     found = workspace_map(robot, x, 0.0, z, elastic=False)
-    assert found.feasible.all()
-    assert np.isfinite(bar_tilt([[0, 1], [1, 1]], [[0.2, 0.4]], 0.1)).all()
+    places = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1)
+    rests = np.isfinite(bar_tilt([[0, 1], [1, 1]], places, 0.1))
+    assert 0.4 < rests.mean() < 0.9
+    np.testing.assert_array_equal(found.feasible[:, 0], rests)
     with pytest.raises(InputError, match="holds no set of wrenches"):
         workspace_map(robot, x, 0.0, z, wrenches=[[1, 0, 0, 0, 0, 0]])
+
+
+@pytest.mark.slow
+def test_positions_of_four_cables_are_held_where_a_correction_keeps_them() -> None:
+    robot = only_cables(robot_named("demobot_parallel"), [0, 2, 4, 6])
+    places = np.array([[0.4, 0.25, 0.1], [0.3, 0.2, 0.3], [0.03, 0.25, 0.1], [0.2, 0.4, 0.05]])
+    poses = np.column_stack([places, np.tile([1.0, 0.0, 0.0, 0.0], (len(places), 1))])
+    kept = correct(robot, poses, prefer="position", highest=6.0)
+    kept_there = kept.stays & (np.abs(kept.aimed[:, :3] - places).max(axis=1) < 1e-9)
+    assert 0 < kept_there.sum() < len(places)
+    held = held_in_place(robot, poses, (), 0.0, 6.0)
+    np.testing.assert_array_equal(held, kept_there)
+    assert not kept.held[1:].any()  # only the middle is held level
+
+
+def only_cables(robot: Robot, some: list[int]) -> Robot:
+    """The robot with some of its cables."""
+    return replace(
+        robot, exit_points=robot.exit_points[some], anchor_points=robot.anchor_points[some],
+        ea=robot.ea[some], rest_lengths=robot.rest_lengths[some],
+        cable_names=tuple(robot.cable_names[k] for k in some),
+    )  # fmt: skip
 
 
 def test_the_default_grid_lies_between_the_exit_points() -> None:
