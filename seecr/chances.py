@@ -39,7 +39,7 @@ _HOLDS_NONE = (
 )
 _NO_COVARIANCE = (
     "how likely poses can be held is said by a model that keeps its covariance; expected one that "
-    "crosscheck calibrate wrote"
+    "crosscheck calibrate, add or diagnose wrote"
 )
 
 

@@ -11,6 +11,7 @@
     [effect.before]              # rms errors without it, with it, and on runs left out
     [effect.after]
     [effect.held_out]
+    [fit]                        # how the errors of these values go together
     [fitted_to]                  # how far those data reach: places and tensions
 
 An effect that is another for each file or run, such as a tracker that is set up anew, says
@@ -58,7 +59,11 @@ FORMAT = 1
 """Of the file; raised when a key changes its meaning or goes."""
 
 _EXPECTED = "expected a model as crosscheck add writes it"
-_TABLES = ("format", "robot", "effect", "calibration", TABLE)
+CALIBRATION, FIT = "calibration", "fit"
+"""Tables about all values at once: what a calibration was worth, and how the errors of the last
+fit go together (:mod:`seecr.uncertainty`)."""
+
+_TABLES = ("format", "robot", "effect", CALIBRATION, FIT, TABLE)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -5,26 +5,34 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from seecr.cells import Where
+from seecr.cells import Where, number_of
 from seecr.commands import Commands
 from seecr.counted import counted
 from seecr.effects import Terms
 from seecr.experiment import Experiment, senses
 from seecr.files import read_text
 from seecr.given import GivenRobot, robot_of
-from seecr.model import Model, model_given
+from seecr.model import CALIBRATION, FIT, Model, model_given
 from seecr.pose import Array
 from seecr.result import Record, Result, named
 from seecr.sensitivity import sensitivities
 from seecr.starts import commanded_poses
 from seecr.units import short
 
-# An eigenvalue of a correlation this far below zero is no rounding of its six digits.
+PARAMETERS, STDERR, CORRELATION = "parameters", "stderr", "correlation"
+"""Of the table that keeps them: labels, their standard errors in full, and rows up to the diagonal.
+"""
+
+# An eigenvalue of a correlation this far below zero is no rounding of its digits; files of earlier
+# versions have six.
 _ROUNDED = 1e-3
+# A value's own standard error has three digits; where it is another, somebody wrote that.
+_SAME = 0.01
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -87,25 +95,57 @@ def _longest(vectors: Array) -> float:
 def covariance_of(model: Model) -> Array | None:
     """Covariance (p, p) of a model's values, each in its own unit; None where it keeps none.
 
-    The correlations of ``[calibration]`` times the standard errors that stand with the values.
-    What was added to the model later goes with nothing else.
+    The correlations of ``[fit]``, or of ``[calibration]``, times the standard errors that stand
+    with the values, in full where these are the same. What was written into the model later goes
+    with nothing else.
 
     Raises:
         InputFileError: correlations that are none.
     """
-    table = model.document.get("calibration")
-    if not isinstance(table, Mapping) or "correlation" not in table:
+    table = _kept_in(model)
+    if table is None:
         return None
     labels = [f"{effect}.{key}" for effect, key in model.terms.labels]
-    names = [str(name) for name in table.get("parameters", [])]
-    kept = _correlations(model, names, table["correlation"])
+    names = [str(name) for name in table.get(PARAMETERS, [])]
+    kept = _correlations(model, names, table[CORRELATION])
     stderr = np.concatenate([model.stderr[name] for name in model.terms.names])
     out = np.eye(len(labels))
     both = [(labels.index(name), k) for k, name in enumerate(names) if name in labels]
     here, there = np.array(both, dtype=int).reshape(-1, 2).T
     out[np.ix_(here, here)] = kept[np.ix_(there, there)]
+    stderr[here] = _in_full(model, stderr[here], table, there)
     known = np.where(np.isfinite(stderr), stderr, 0.0)
     return np.asarray(out * np.outer(known, known))
+
+
+def _kept_in(model: Model) -> Mapping[str, Any] | None:
+    """The table that keeps correlations."""
+    tables = (model.document.get(name) for name in (FIT, CALIBRATION))
+    return next((t for t in tables if isinstance(t, Mapping) and CORRELATION in t), None)
+
+
+def _in_full(
+    model: Model, short: Array, table: Mapping[str, Any], which: NDArray[np.intp]
+) -> Array:
+    """Standard errors with all their digits where a table has them, and they are the same.
+
+    Combinations of values may be known a hundred times better than each: three digits of errors
+    would tell them wrong.
+    """
+    if STDERR not in table:
+        return short
+    given, count = table[STDERR], len(table[PARAMETERS])
+    if not isinstance(given, list) or len(given) != count:
+        got = len(given) if isinstance(given, list) else given
+        raise _file_of(model).error(
+            f"{STDERR}: expected {counted(count, 'number')}, one for each of {PARAMETERS}, got "
+            f"{got}; fit the model again",
+            key=STDERR,
+        )
+    every = (number_of(cell) for cell in given)
+    full = np.array([np.inf if one is None else one for one in every])[which]
+    with np.errstate(invalid="ignore"):
+        return np.where(np.abs(full - short) <= _SAME * short, full, short)
 
 
 def moving_covariance(model: Model) -> tuple[Terms, Array] | None:
@@ -137,9 +177,9 @@ def _correlations(model: Model, names: list[str], rows: object) -> Array:
         fine = False
     if not fine:
         raise _file_of(model).error(
-            f"correlation: expected {counted(len(names), 'row')} of numbers, one for each of "
-            "parameters, each up to its diagonal, which is 1; calibrate the model again",
-            key="correlation",
+            f"{CORRELATION}: expected {counted(len(names), 'row')} of numbers, one for each of "
+            f"{PARAMETERS}, each up to its diagonal, which is 1; fit the model again",
+            key=CORRELATION,
         )
     return out
 
@@ -159,7 +199,7 @@ def spread_of(
     Args:
         robot: as described, or its MJCF.
         commands: poses (n, 7), or :class:`seecr.Commands`.
-        model: as ``crosscheck calibrate`` writes it, or its file.
+        model: as ``crosscheck calibrate``, ``add`` or ``diagnose`` write it, or its file.
 
     Raises:
         InputFileError: correlations in the model that are none.

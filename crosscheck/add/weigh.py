@@ -80,18 +80,18 @@ def weigh(
         whiteness=white,
         warnings=(*_warnings(problem.robot, best, fitted, own), *_widened(best, moved, own)),
         notes=tuple(dict.fromkeys(notes)),
-        model=_model(problem, basis, fitted, names, errors),
+        model=_model(problem, basis, fitted, names, errors, covariance),
     )
 
 
 def _model(
     problem: Problem, basis: Model, fitted: Sequence[Fitted], names: Sequence[str],
-    errors: Mapping[str, Rms],
+    errors: Mapping[str, Rms], covariance: Array,
 ) -> Model:  # fmt: skip
     """The model with the effects; those given without one are as new to it as the named ones."""
     source = provenance_of(problem.data.path, f"crosscheck add {' + '.join(names)}")
     fresh = [f.term.name for f in fitted if f.term.name not in (*basis.names, *names)]
-    new = with_fit(basis, fitted, [*names, *fresh], source, errors)
+    new = with_fit(basis, fitted, [*names, *fresh], source, errors, covariance)
     return renewed(new, problem.robot, problem.data)
 
 

@@ -122,7 +122,7 @@ def command(
 
 def _keep(found: Diagnosis, own: Model, robot: Robot, measured: Measurements, path: Path) -> str:
     """Write the model that was found, if there was a verdict; what was done."""
-    from crosscheck.diagnosis import found_effects
+    from crosscheck.diagnosis import found_covariance, found_effects
     from crosscheck.model import provenance_of, renewed, save_model, with_fit
 
     fitted = found_effects(found)
@@ -131,6 +131,6 @@ def _keep(found: Diagnosis, own: Model, robot: Robot, measured: Measurements, pa
     names = [effect.effect for effect in found.missing]
     errors = {"before": found.before, "after": found.after, "held_out": found.held_out}
     source = provenance_of(measured.path, "crosscheck diagnose")
-    new = with_fit(own, fitted, names, source, errors)
+    new = with_fit(own, fitted, names, source, errors, found_covariance(found))
     save_model(path, renewed(new, robot, measured))
     return f"Written to {path}: {', '.join(names) or 'the model as it stands, nothing is added'}"

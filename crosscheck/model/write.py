@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
@@ -24,9 +24,10 @@ from seecr.effects.base import Layout
 from seecr.errors import InputError
 from seecr.experiment import predict
 from seecr.fingerprint import fingerprint
-from seecr.model import Model
+from seecr.model import CALIBRATION, FIT, Model
 from seecr.pose import Array
 from seecr.robot import Robot
+from seecr.uncertainty import CORRELATION, PARAMETERS, STDERR
 
 if TYPE_CHECKING:
     from crosscheck.measurements.data import Measurements
@@ -63,6 +64,7 @@ def with_fit(
     added: Sequence[str],
     provenance: Provenance,
     errors: Mapping[str, Rms],
+    covariance: Array | None = None,
 ) -> Model:
     """The model with effects added (or fitted again), and all values as fitted.
 
@@ -73,6 +75,8 @@ def with_fit(
             values have moved with them, get a table ``refitted``.
         provenance: of the fit.
         errors: rms by kind: "before", "after", "held_out".
+        covariance: (p, p) of the values in the order of ``fitted``, inf on the diagonal where
+            unseen; None keeps none, and that of the fit before no longer holds.
     """
     document = copy.deepcopy(model.document)
     tables = {str(table["name"]): table for table in document.get("effect", [])}
@@ -88,6 +92,11 @@ def with_fit(
             _describe(table, provenance, errors)
         elif not by_name[name].usual.term.knowledge.fixed.all():
             table["refitted"] = _plain(vars(provenance))
+    _forget_covariance(document)
+    if covariance is not None:
+        same = without_parts(fitted, covariance)
+        if same[0]:
+            document[FIT] = _with_covariance(_together(), *same)
     return _with_values(replace(model, document=document), [by_name[name].usual for name in order])
 
 
@@ -123,9 +132,12 @@ def calibrated(
             _fill(tables[one.usual.term.name], one)
         else:
             _appended(document, one)
-    document.pop("calibration", None)
-    same = without_parts(fitted, covariance)
-    document["calibration"] = _together(*same, provenance, errors)
+    document.pop(CALIBRATION, None)
+    _forget_covariance(document)
+    table = tomlkit.table()
+    table.trivia.indent = "\n"
+    _describe(table, provenance, errors)
+    document[CALIBRATION] = _with_covariance(table, *without_parts(fitted, covariance))
     return _with_values(replace(model, document=document), [one.usual for one in every])
 
 
@@ -148,38 +160,52 @@ def _appended(document: Any, one: Kept) -> Any:
     return table
 
 
-def _together(
-    fitted: Sequence[Fitted], covariance: Array, provenance: Provenance, errors: Mapping[str, Rms]
-) -> Any:
-    """Where the values come from, what they are worth, and the correlations of their errors.
-
-    The covariance is the correlation times the standard errors; a row ends at its diagonal.
-    Values of single files or runs go with nothing else elsewhere, and are not among them.
-    """
+def _together() -> Any:
+    """The table of what is the same for all values of the last fit."""
     table = tomlkit.table()
     table.trivia.indent = "\n"
-    _describe(table, provenance, errors)
-    if not fitted:
-        return table
-    stderr = np.sqrt(np.diag(covariance))
-    known = np.where(stderr > 0.0, stderr, np.inf)
-    correlation = covariance / np.outer(known, known) + np.diag((stderr == 0.0).astype(float))
-    names = [f"{one.term.name}.{key}" for one in fitted for key in one.term.layout.names]
-    table["parameters"] = _lines([f'"{name}"' for name in names])
-    rows = [", ".join(f"{c:.6g}" for c in row[: i + 1]) for i, row in enumerate(correlation)]
-    table["correlation"] = _lines([f"[{_with_points(row)}]" for row in rows])
+    table.add(tomlkit.comment("Errors of the values above in full, and how they go together."))
     return table
 
 
-def _with_points(row: str) -> str:
+def _forget_covariance(document: Any) -> None:
+    """Leave out what was said of errors that a new fit has changed."""
+    document.pop(FIT, None)
+    for key in (PARAMETERS, STDERR, CORRELATION):
+        document.get(CALIBRATION, {}).pop(key, None)
+
+
+def _with_covariance(table: Any, fitted: Sequence[Fitted], covariance: Array) -> Any:
+    """The table with the errors of the values in full, and their correlations.
+
+    A row ends at its diagonal. Values of single files or runs go with nothing else elsewhere, and
+    are not among them; what is unseen goes with nothing either.
+    """
+    if not fitted:
+        return table
+    stderr = np.sqrt(np.diag(covariance))
+    seen = np.isfinite(stderr) & (stderr > 0.0)
+    known = np.where(seen, stderr, np.inf)
+    correlation = np.where(np.isfinite(covariance), covariance, 0.0) / np.outer(known, known)
+    np.fill_diagonal(correlation, 1.0)
+    names = [f"{one.term.name}.{key}" for one in fitted for key in one.term.layout.names]
+    table[PARAMETERS] = _lines([f'"{name}"' for name in names])
+    errors = [_floats([e]) if np.isfinite(e) else f'"{UNSEEN}"' for e in stderr]
+    table[STDERR] = _lines(errors)
+    table[CORRELATION] = _lines([f"[{_floats(r[: i + 1])}]" for i, r in enumerate(correlation)])
+    return table
+
+
+def _floats(row: Iterable[float]) -> str:
     """Numbers that TOML reads as such: all floats, none an integer."""
-    return ", ".join(c if {".", "e"} & set(c) else f"{c}.0" for c in row.split(", "))
+    cells = (f"{one:.{_VALUE}g}" for one in row)
+    return ", ".join(cell if {".", "e"} & set(cell) else f"{cell}.0" for cell in cells)
 
 
 def _lines(items: Sequence[str]) -> Any:
     """An array with an item on each line."""
     inside = "".join(f"    {item},\n" for item in items)
-    return tomlkit.parse(f"x = [\n{inside}]")["x"]
+    return tomlkit.parse(f"x = [\n{inside}]\n")["x"]
 
 
 def _fill(table: Any, one: Kept) -> None:
@@ -224,7 +250,7 @@ def _known(knowledge: Knowledge, i: int) -> dict[str, Any]:
 def _inline(cell: Mapping[str, Any]) -> Any:
     """A table on one line, with the spaces that people write."""
     parts = [f"{word} = {tomlkit.item(value).as_string()}" for word, value in cell.items()]
-    return tomlkit.parse(f"x = {{ {', '.join(parts)} }}")["x"]
+    return tomlkit.parse(f"x = {{ {', '.join(parts)} }}\n")["x"]
 
 
 def _cell(layout: Layout, i: int, fitted: Fitted) -> dict[str, Any]:
@@ -271,7 +297,9 @@ def renewed(model: Model, robot: Robot, data: Measurements) -> Model:
     reach = DataReach.of(there.pose[rows, :3], there.tensions[rows])
     document.pop(TABLE, None)
     if reach is not None:
-        document[TABLE] = reach.as_toml()
+        table = reach.as_toml()
+        table.trivia.indent = "\n" if FIT in document else ""
+        document[TABLE] = table
     return replace(model, document=document, notes=(), reach=reach)
 
 

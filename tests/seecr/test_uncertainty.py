@@ -111,6 +111,21 @@ def test_correlations_that_are_none_are_one_sentence(tmp_path: Path, old: str, n
         spread_of(ROBOT, POSES, model)
 
 
+def test_errors_in_full_are_one_for_each_parameter(tmp_path: Path) -> None:
+    full = MODEL.replace("correlation =", "stderr = [0.0201, 0.05]\ncorrelation =")
+    with pytest.raises(InputFileError, match=r"line 17: stderr: expected 3 numbers, .* got 2"):
+        covariance_of(model_of(tmp_path, full))
+    with pytest.raises(InputFileError, match="stderr: expected 3 numbers, one for each"):
+        covariance_of(model_of(tmp_path, full.replace("[0.0201, 0.05]", "0.05")))
+    # one of another size than stands with the value is not that of this value
+    found = covariance_of(model_of(tmp_path, full.replace("0.05]", "0.0503, 1.0]")))
+    assert found is not None
+    assert np.sqrt(np.diag(found))[:2] == pytest.approx([0.0503, 0.0201])
+    found = covariance_of(model_of(tmp_path, full.replace("0.05]", '0.06, "unseen"]')))
+    assert found is not None
+    assert np.sqrt(np.diag(found))[:2] == pytest.approx([0.05, 0.0201])
+
+
 def test_it_is_printed_and_written(tmp_path: Path) -> None:
     model = model_of(tmp_path, MODEL)
     found, spread = solve(ROBOT, POSES, effects=model), spread_of(ROBOT, POSES, model)

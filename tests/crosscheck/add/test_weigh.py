@@ -18,6 +18,7 @@ from crosscheck.terminal.addition import why_not
 from seecr.effects import Term, Terms
 from seecr.mjcf import load_robot
 from seecr.shipped import model_path
+from seecr.uncertainty import covariance_of
 
 EVERY = np.ones(4, dtype=bool)
 
@@ -64,6 +65,9 @@ def test_an_effect_that_is_nothing_is_not_worth_adding() -> None:
     assert found.is_nothing and found.from_nothing < 1.0 and not found.pays
     assert "no further from nothing than its standard errors" in why_not(found)
     sure = add_effect(robot(), readings(radius_m=0.01), "pulley_radius")
+    # and the model keeps how well it is known
+    known = covariance_of(sure.model)
+    assert known is not None and np.sqrt(known[0, 0]) == pytest.approx(sure.own.stderr[0], rel=1e-6)
     assert not sure.is_nothing and sure.from_nothing > 50.0 and sure.pays
 
 

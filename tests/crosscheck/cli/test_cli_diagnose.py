@@ -21,6 +21,7 @@ from crosscheck.measurements.write import write_measurements
 from seecr.mjcf import load_robot
 from seecr.model import load_model
 from seecr.shipped import model_path
+from seecr.uncertainty import covariance_of
 
 pytestmark = pytest.mark.slow
 
@@ -115,6 +116,10 @@ def test_the_model_that_was_found_is_written_and_gates_end_1(
     table = model.document["effect"][0]
     assert table["provenance"]["by"] == "crosscheck diagnose"
     assert table["before"]["position_rms_m"] > 5.0 * table["after"]["position_rms_m"]
+    # so that it says how far its predictions may be off
+    known = covariance_of(model)
+    assert known is not None and known.shape == (1, 1)
+    assert np.sqrt(known[0, 0]) == pytest.approx(model.stderr["pulley_radius"][0], rel=5e-3)
     # with it nothing is missing: the gate is open, and the model is written as it stands
     again = tmp_path / "again.toml"
     told = ("--model", first, "--model-out", again, *gate)

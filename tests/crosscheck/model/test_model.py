@@ -11,12 +11,13 @@ import tomlkit
 from made_data import COGIRO, measured, term
 
 from crosscheck.model.fitted import Fitted
-from crosscheck.model.write import Provenance, renewed, save_model, with_fit
+from crosscheck.model.write import Provenance, calibrated, renewed, save_model, with_fit
 from seecr.errors import InputFileError
 from seecr.experiment import predict
 from seecr.mjcf import load_robot
 from seecr.model import load_model, new_model
 from seecr.shipped import model_path
+from seecr.uncertainty import covariance_of
 
 SOURCE = Provenance("measured.csv", "2024-05-13", "seecr 0.1.0", "crosscheck add pulley_radius")
 ERRORS = {
@@ -374,3 +375,65 @@ def test_a_model_to_which_nothing_was_fitted_has_no_reach_and_no_list(robot, tmp
     text = (tmp_path / "m.toml").read_text()
     assert "fitted_to" not in text and "effect =" not in text
     assert load_model(tmp_path / "m.toml", robot).reach is None
+
+
+def together(robot):
+    """Two effects with errors of 1 of which a combination is known to 1e-4."""
+    both = [
+        fitted(robot, "pulley_radius", error=1e-4, radius_m=0.01),
+        fitted(robot, "stiffness", error=0.0123456, factor=1.2),
+    ]
+    sizes = np.array([1e-4, 0.0123456])
+    return both, np.array([[1.0, 1.0 - 5e-9], [1.0 - 5e-9, 1.0]]) * np.outer(sizes, sizes), sizes
+
+
+def known_best(model, sizes):
+    """Variance of the difference of two values, each over its size."""
+    opposite = np.array([1.0, -1.0]) / sizes
+    return opposite @ covariance_of(model) @ opposite
+
+
+def test_how_errors_go_together_is_kept_in_full(robot, tmp_path):
+    both, covariance, sizes = together(robot)
+    names, path = ["pulley_radius", "stiffness"], tmp_path / "m.toml"
+    model = with_fit(new_model(robot), both, names, SOURCE, ERRORS, covariance)
+    save_model(path, model)
+    # in the order in which they act
+    order = [names.index(name) for name in load_model(path, robot).terms.names]
+    assert "stderr = 0.0123," in path.read_text()
+    assert known_best(load_model(path, robot), sizes[order]) == pytest.approx(1e-8, rel=0.05)
+    # an error that somebody wrote there counts, the full one of before no longer
+    changed(path, "stderr = 0.0123,", "stderr = 0.02,")
+    edited = covariance_of(load_model(path, robot))
+    assert np.sqrt(np.diag(edited))[order.index(1)] == pytest.approx(0.02)
+
+
+def test_a_later_fit_puts_its_errors_in_the_place_of_those_before(robot, tmp_path):
+    both, covariance, _sizes = together(robot)
+    names, path = ["pulley_radius", "stiffness"], tmp_path / "m.toml"
+    first = with_fit(new_model(robot), both, names, SOURCE, ERRORS, covariance)
+    again = with_fit(first, both, [], SOURCE, ERRORS, np.diag(np.diag(covariance)))
+    save_model(path, renewed(again, robot, measured(robot)))
+    assert path.read_text().count("[fit]") == 1 and "]\n\n[fitted_to]" in path.read_text()
+    assert covariance_of(load_model(path, robot))[0, 1] == 0.0
+    whole = calibrated(again, both, covariance, SOURCE, ERRORS)
+    save_model(path, whole)
+    assert "[fit]" not in path.read_text()
+    assert covariance_of(load_model(path, robot))[0, 1] == pytest.approx(covariance[0, 1])
+    # what the calibration was worth stays, how its errors went together does not
+    after = with_fit(whole, both, [], SOURCE, ERRORS)
+    save_model(path, after)
+    assert "[calibration.before]" in path.read_text()
+    assert covariance_of(load_model(path, robot)) is None
+
+
+def test_what_is_unseen_goes_with_nothing(robot, tmp_path):
+    both, covariance, sizes = together(robot)
+    both[0] = replace(both[0], stderr=np.array([np.inf]))
+    covariance[0, 0] = np.inf
+    names, path = ["pulley_radius", "stiffness"], tmp_path / "m.toml"
+    save_model(path, with_fit(new_model(robot), both, names, SOURCE, ERRORS, covariance))
+    model = load_model(path, robot)
+    k = model.terms.names.index("stiffness")
+    found = covariance_of(model)
+    assert found[k, k] == pytest.approx(sizes[1] ** 2) and found.sum() == found[k, k]
