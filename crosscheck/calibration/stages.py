@@ -203,10 +203,14 @@ def from_given(setting: Setting, joint: JointFit, start: State, given: Terms) ->
 
 
 def _joined(setting: Setting, joint: JointFit, first: Terms, added: list[Term]) -> JointFit:
-    """The fit with more effects: from where the others ended and, if that was poor, from afar."""
+    """The fit with more effects: from where the others ended and, if that was poor, from afar.
+
+    Those that joined before the others did stay, from null.
+    """
     starts = [Terms([*joint.terms, *added])]
     if float(np.max(joint.colour.scale)) > _POOR:
-        starts.append(Terms([*first, *added]))
+        there = [inside(at_null(t)) for t in joint.terms if t.name not in first]
+        starts.append(Terms([*first, *there, *added]))
     found = [joint]
     for k, terms in enumerate(starts):
         state = evaluate(setting.problem, terms, setting.factor, joint.state)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -57,6 +58,25 @@ def test_a_joint_fit_begins_where_effects_alone_are_the_better_fit(problem: Prob
     assert np.max(better.colour.scale) < 1.1
     # of other data they are no better than what there is
     assert from_given(setting, better, start, far_from(HIDDEN)) is better
+
+
+def test_what_joined_from_elsewhere_stays_where_the_fit_begins_again_from_afar(
+    problem: Problem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A diagnosis of data with a kink in a cable ended with a KeyError: its set was gone."""
+    factor = problem.noise(problem.experiment.predict(()))
+    setting = Setting(problem, factor, chain_of(problem), frozen=True)
+    first = Terms([term(ROBOT, "tracker_scale", factor=1.0)])
+    both = Terms([*first, term(ROBOT, "cable_weight", weight_N_per_m=0.1)])
+    joint = settle(setting, evaluate(problem, both, factor), widths_of(both), WHITE, 0)
+    poor = replace(joint, colour=WHITE.hotter(100.0))
+    # the last, which is from afar, is taken
+    order = itertools.count()
+    monkeypatch.setattr(stages, "worth", lambda _setting, _joint: next(order))
+    monkeypatch.setattr(stages, "with_noise", lambda _setting, one: one)
+    added = [term(ROBOT, "nonlinear_elasticity", quadratic=1.0)]
+    found = stages._joined(setting, poor, first, added)
+    assert {"cable_weight", "nonlinear_elasticity"} <= set(found.terms.names)
 
 
 @pytest.mark.slow
