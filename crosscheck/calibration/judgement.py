@@ -2,7 +2,8 @@
 
 Something unknown is there where a smooth field over the workspace earns more evidence than chance
 gives it, or where runs left out are predicted worse than the fit itself expects. Where the data
-leave open which effects it is, or it takes many, that is a calibration and no diagnosis.
+leave open which effects it is, or it takes many, that is a calibration and no diagnosis; so it is
+where the whole catalogue leaves a field nothing, but the best few do.
 """
 
 from __future__ import annotations
@@ -42,12 +43,14 @@ class Judgement:
         sure: effects that are missing beyond doubt, each the first of its class.
         undecided: how many classes are open.
         doubted: members of the best set of a size that hardly happens.
+        more: whether a smooth field explains what the best set leaves.
     """
 
     verdict: DiagnosisVerdict
     sure: tuple[str, ...]
     undecided: float
     doubted: Names = NONE
+    more: bool = False
 
 
 def judge(
@@ -57,6 +60,7 @@ def judge(
     surprise: float,
     strange: bool = False,
     doubted: Names = NONE,
+    beside: float = -np.inf,
 ) -> Judgement:
     """The verdict.
 
@@ -67,20 +71,22 @@ def judge(
         surprise: of the worst run left out of the joint fit, a reading.
         strange: what was taken for noise is none.
         doubted: members of the best set of a size that hardly happens.
+        beside: ln odds of a smooth field beside the best set.
     """
     best, undecided = found.best.names - found.always - found.idle, classes.undecided
     unknown = strange or field_odds > UNKNOWN or surprise > SURPRISE
     sure = sure_effects(found, classes, True)
     few = len(best) <= _FEW and undecided < (_OPEN_BESIDE if set(sure) == best else _OPEN)
-    few = few and not doubted
+    more = beside > UNKNOWN
+    few = few and not doubted and not more
     sure = adequate(found, sure) if few and sure else sure_effects(found, classes, False)
     sure = tuple(name for name in sure if name not in doubted)
     if unknown:  # known effects imitate it: none of them is sure
         return Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, (), undecided)
-    if not sure and undecided < _OPEN and explained(found) < _OWED:
+    if not sure and not more and undecided < _OPEN and explained(found) < _OWED:
         return Judgement(DiagnosisVerdict.NO_EFFECT_MISSING, (), undecided)
     verdict = DiagnosisVerdict.EFFECTS_FOUND if few and sure else DiagnosisVerdict.MANY_EFFECTS
-    return Judgement(verdict, sure, undecided, doubted)
+    return Judgement(verdict, sure, undecided, doubted, more)
 
 
 def sure_effects(found: Found, classes: Classes, few: bool) -> tuple[str, ...]:

@@ -81,7 +81,8 @@ def seek(
     whole = fit_all_effects(problem, terms, lambda text, part: progress(text, 0.5 * part), first)
     setting, joint = whole.setting, whole.joint
     known = [k.name for k in kinds_read(problem) if getattr(stated, k.sigma) is not None]
-    odds = log_odds(setting, joint, len(known) == len(kinds_read(problem)))
+    all_stated = len(known) == len(kinds_read(problem))
+    odds = log_odds(setting, joint, all_stated)
     strange = is_strange(setting, joint, known)
     surprise = float(np.max(whole.held_out.surprise, initial=0.0))
     at_once, _later = layouts(problem)
@@ -105,7 +106,8 @@ def seek(
     hints = alike_beyond(found.scores, own, sizes)
     classes = probabilities(all_scores(found), own, effects, sizes, found.refits, hints)
     strange = strange or is_strange(setting, found.best.joint, known)
-    said = judge(found, classes, odds, surprise, strange, _doubted(found))
+    beside = log_odds(setting, found.best.joint, all_stated)
+    said = judge(found, classes, odds, surprise, strange, _doubted(found), beside)
     listed = found.always | set(said.sure)
     alone = found.refit(listed) if said.verdict is DiagnosisVerdict.EFFECTS_FOUND else None
     if alone is not None and listed != found.best.names:

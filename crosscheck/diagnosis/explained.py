@@ -36,13 +36,19 @@ from crosscheck.fit.words import rms_words
 # Noise of another size than stated by more than this part, or correlated by more, is told.
 _OTHER, _ALIKE = 0.25, 0.3
 
+MORE = (
+    "what the best few effects leave is smooth over the workspace and no noise: all effects "
+    "together take it in, or one that is not among them would"
+)
+
 
 def explained(sought: Sought, notes: Sequence[str]) -> Diagnosis:
     """The diagnosis of compared sets that leave nothing unknown."""
     verdict = sought.judgement.verdict
     way = way_of(sought, frozenset(sought.judgement.sure))
     chances = chances_of(sought)
-    some = [] if way.found else alternatives(sought.found, sought.classes)
+    more = sought.judgement.more
+    some = [] if way.found or more else alternatives(sought.found, sought.classes)
     missing = [_missing(sought, way, chances, name) for name in way.found]
     return diagnosis_of(
         verdict,
@@ -52,7 +58,7 @@ def explained(sought: Sought, notes: Sequence[str]) -> Diagnosis:
         before=sought.calibration.before,
         floor=_floor(sought),
         candidates=_not_listed(way, chances),
-        notes=(*notes, *_noise_notes(sought, chances), *_size_notes(sought)),
+        notes=(*notes, *_noise_notes(sought, chances), *_size_notes(sought), *([MORE] * more)),
         chances=chances,
         alternatives=some,
     )

@@ -131,6 +131,20 @@ def test_a_field_or_runs_left_out_make_it_unknown() -> None:
     assert judged(scores, surprise=3.0).verdict is DiagnosisVerdict.UNKNOWN_EFFECT
 
 
+def test_a_field_beside_the_best_set_alone_makes_it_many() -> None:
+    """The whole catalogue takes it in: that can be a calibration, few effects it is not."""
+    found = found_of({"": -9000.0, "a": -30.0, "b": -8970.0, "ab": 0.0})
+    classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
+    assert judge(found, classes, -5.0, 1.0, beside=4.0).sure == ("a", "b")
+    said = judge(found, classes, -5.0, 1.0, beside=6.0)
+    # b, which is worth 30 of 9000, may stand for what a field is
+    assert (said.verdict, said.sure) == (DiagnosisVerdict.MANY_EFFECTS, ("a",)) and said.more
+    none = found_of({"": 0.0, "a": -4.0})
+    classes = probabilities(all_scores(none), none.best.names, NAMES, fitted=none.refits)
+    said = judge(none, classes, 1.0, 1.0, beside=6.0)
+    assert (said.verdict, said.sure) == (DiagnosisVerdict.MANY_EFFECTS, ())
+
+
 def test_a_large_set_is_many_effects_and_names_what_carries_it() -> None:
     without = {"abcdef".replace(x, ""): -40.0 for x in "bcdef"}
     said = judged({"": -90000.0, "abcdef": 0.0, "bcdef": -50000.0, **without})

@@ -7,10 +7,11 @@ from dataclasses import replace
 import pytest
 from made_data import COGIRO, SIGMA, measured, term
 
-from crosscheck.calibration import refits
+from crosscheck.calibration import refits, search
+from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.judgement import Judgement, judge
 from crosscheck.calibration.search import Sought, seek
-from crosscheck.diagnosis.explained import explained
+from crosscheck.diagnosis.explained import MORE, explained
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.reasons import DiagnosisVerdict, Why
 from seecr.effects import Term, Terms
@@ -66,6 +67,22 @@ def test_a_member_that_moves_nothing_is_known_and_not_listed(
     ])  # fmt: skip
     assert found.found.best.names >= {"pulley_radius", tilt} and found.found.idle == {tilt}
     assert found.judgement.sure == ("pulley_radius",)
+
+
+def test_what_a_set_leaves_is_asked_of_a_field(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the best set by itself, and the answer is told."""
+    asked: list[JointFit] = []
+
+    def odds(_setting: Setting, joint: JointFit, stated: bool) -> float:
+        asked.append(joint)
+        return 8.0 if len(asked) > 1 else 1.0
+
+    monkeypatch.setattr(search, "log_odds", odds)
+    found = sought([term(ROBOT, "pulley_radius", radius_m=0.006)])
+    assert [joint.terms.names for joint in asked[1:]] == [found.found.best.joint.terms.names]
+    assert found.judgement.verdict is DiagnosisVerdict.MANY_EFFECTS and found.judgement.more
+    assert found.judgement.sure == ("pulley_radius",)
+    assert MORE in explained(found, []).notes
 
 
 def assert_a_model_by_itself(found: Sought) -> None:
