@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from crosscheck.calibration.equals import SMALL
 from crosscheck.calibration.field import UNKNOWN
 from crosscheck.calibration.probability import Classes
 from crosscheck.calibration.refits import Found
@@ -30,6 +31,8 @@ SURPRISE = 2.0
 # In a large set each effect must carry more than this part of what all explain: others may
 # imitate what is missing.
 _PART, _WORTH = 0.1, 25.0
+# Where a field explains what is left, more than this part, and by few parameters.
+_MOST = 0.5
 
 NONE: Names = frozenset()
 
@@ -81,6 +84,8 @@ def judge(
     few = few and not doubted and not more
     sure = adequate(found, sure) if few and sure else sure_effects(found, classes, False)
     sure = tuple(name for name in sure if name not in doubted)
+    if more:
+        sure = tuple(name for name in sure if carries_most(found, name))
     if unknown:  # known effects imitate it: none of them is sure
         return Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, (), undecided)
     if not sure and not more and undecided < _OPEN and explained(found) < _OWED:
@@ -115,6 +120,13 @@ def adequate(found: Found, sure: tuple[str, ...]) -> tuple[str, ...]:
             break
         listed.append(name)
     return tuple(sorted(listed, key=lambda e: -worth[e]))
+
+
+def carries_most(found: Found, name: str) -> bool:
+    """Whether an effect of few parameters carries more than half of what all of its set do."""
+    worth = worths(found)
+    few = len(found.scores.gram.groups[name].columns) <= SMALL
+    return few and worth[name] > _MOST * sum(worth.values())
 
 
 def worths(found: Found) -> dict[str, float]:

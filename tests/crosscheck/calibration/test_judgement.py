@@ -24,6 +24,7 @@ from seecr.effects import Terms
 
 NAMES = ("a", "b", "c", "d", "e", "f", "g")
 NO_FIT: Any = None
+LARGE = ColumnGroup(np.array([0, 2, 3, 4]), np.array([1.0]))
 
 
 def found_of(scores: dict[str, float]) -> Found:
@@ -139,6 +140,13 @@ def test_a_field_beside_the_best_set_alone_makes_it_many() -> None:
     said = judge(found, classes, -5.0, 1.0, beside=6.0)
     # b, which is worth 30 of 9000, may stand for what a field is
     assert (said.verdict, said.sure) == (DiagnosisVerdict.MANY_EFFECTS, ("a",)) and said.more
+    # nor is an effect of many parameters sure then, or one that carries a half
+    grown = replace(found.scores.gram, groups={**found.scores.gram.groups, "a": LARGE})
+    large = replace(found, scores=replace(found.scores, gram=grown))
+    assert judge(large, classes, -5.0, 1.0, beside=6.0).sure == ()
+    halves = found_of({"": -9000.0, "a": -4400.0, "b": -4600.0, "ab": 0.0})
+    assert judge(halves, classes, -5.0, 1.0).sure == ("a", "b")
+    assert judge(halves, classes, -5.0, 1.0, beside=6.0).sure == ("a",)
     none = found_of({"": 0.0, "a": -4.0})
     classes = probabilities(all_scores(none), none.best.names, NAMES, fitted=none.refits)
     said = judge(none, classes, 1.0, 1.0, beside=6.0)
