@@ -8,6 +8,7 @@ where the whole catalogue leaves a field nothing, but the best few do.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +25,9 @@ SURE = 0.95
 # Sets up to this size are a diagnosis; at most this many classes may be open, or so many where
 # every member of the set is sure.
 _FEW, _OPEN, _OPEN_BESIDE = 5, 1.0, 2.0
+# Effects of more numbers than a pose has, one or more for each cable: more than so many of them are
+# a calibration, since together they imitate anything.
+_NUMBERS, _LARGE = 6, 2
 # A name is owed from this much ln evidence; what explains less may be chance.
 _OWED = 12.5
 # Runs left out may be this many times as far off as the fit expected.
@@ -81,7 +85,8 @@ def judge(
     sure = sure_effects(found, classes, True)
     few = len(best) <= _FEW and undecided < (_OPEN_BESIDE if set(sure) == best else _OPEN)
     more = beside > UNKNOWN
-    few = few and not doubted and not more
+    large = too_large(_size(found, name) for name in best)
+    few = few and not doubted and not more and not large
     sure = adequate(found, sure) if few and sure else sure_effects(found, classes, False)
     sure = tuple(name for name in sure if name not in doubted)
     if more:
@@ -92,6 +97,11 @@ def judge(
         return Judgement(DiagnosisVerdict.NO_EFFECT_MISSING, (), undecided)
     verdict = DiagnosisVerdict.EFFECTS_FOUND if few and sure else DiagnosisVerdict.MANY_EFFECTS
     return Judgement(verdict, sure, undecided, doubted, more)
+
+
+def too_large(sizes: Iterable[int]) -> bool:
+    """Whether effects of so many parameters are a calibration together, and no diagnosis."""
+    return sum(size > _NUMBERS for size in sizes) > _LARGE
 
 
 def sure_effects(found: Found, classes: Classes, few: bool) -> tuple[str, ...]:
@@ -125,8 +135,14 @@ def adequate(found: Found, sure: tuple[str, ...]) -> tuple[str, ...]:
 def carries_most(found: Found, name: str) -> bool:
     """Whether an effect of few parameters carries more than half of what all of its set do."""
     worth = worths(found)
-    few = len(found.scores.gram.groups[name].columns) <= SMALL
+    few = _size(found, name) <= SMALL
     return few and worth[name] > _MOST * sum(worth.values())
+
+
+def _size(found: Found, name: str) -> int:
+    """How many numbers an effect has, shapes aside; none where the linear model does not see it."""
+    group = found.scores.gram.groups.get(name)
+    return 0 if group is None else len(group.columns)
 
 
 def worths(found: Found) -> dict[str, float]:

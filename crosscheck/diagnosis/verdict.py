@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from crosscheck.calibration.judgement import SURE
+from crosscheck.calibration.judgement import SURE, too_large
 from crosscheck.calibration.search import seek
 from crosscheck.diagnosis.chances import chances_of
 from crosscheck.diagnosis.explained import explained
@@ -126,10 +126,12 @@ def _searched(
 
 
 def is_clear(steps: Diagnosis) -> bool:
-    """Whether all that steps found is sure, and nothing else is.
+    """Whether all that steps found is sure, is few, and nothing else is sure.
 
     Several may hint at the same, of which none pays for itself.
     """
+    if too_large(len(one.layout) for one in steps.missing):
+        return False
     listed = {effect.effect for effect in steps.missing}
     classes = () if steps.chances is None else steps.chances.classes
     further = any(p > SURE and listed.isdisjoint(members) for members, p in classes)

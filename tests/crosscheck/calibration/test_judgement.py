@@ -14,7 +14,7 @@ from crosscheck.calibration import search
 from crosscheck.calibration.alternatives import alternatives
 from crosscheck.calibration.exact import Refit
 from crosscheck.calibration.gram import ColumnGroup, gram_of
-from crosscheck.calibration.judgement import Judgement, judge
+from crosscheck.calibration.judgement import Judgement, judge, too_large
 from crosscheck.calibration.probability import all_scores, probabilities
 from crosscheck.calibration.refits import Found
 from crosscheck.calibration.search import in_place
@@ -151,6 +151,22 @@ def test_a_field_beside_the_best_set_alone_makes_it_many() -> None:
     classes = probabilities(all_scores(none), none.best.names, NAMES, fitted=none.refits)
     said = judge(none, classes, 1.0, 1.0, beside=6.0)
     assert (said.verdict, said.sure) == (DiagnosisVerdict.MANY_EFFECTS, ())
+
+
+def test_a_large_set_of_large_groups_is_a_calibration() -> None:
+    assert not too_large([24, 8, 6, 6, 6]) and too_large([24, 8, 7])
+    best = {"": -9000.0, "ab": -4000.0, "ac": -4100.0, "bc": -4200.0, "abc": 0.0}
+    found = found_of(best)
+    classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
+    assert judge(found, classes, -5.0, 1.0).verdict is DiagnosisVerdict.EFFECTS_FOUND
+    seven = ColumnGroup(np.arange(7), np.array([1.0]))
+    for names, verdict in (
+        ("ab", DiagnosisVerdict.EFFECTS_FOUND),
+        ("abc", DiagnosisVerdict.MANY_EFFECTS),
+    ):
+        groups = {**found.scores.gram.groups, **dict.fromkeys(names, seven)}
+        grown = replace(found.scores, gram=replace(found.scores.gram, groups=groups))
+        assert judge(replace(found, scores=grown), classes, -5.0, 1.0).verdict is verdict
 
 
 def test_a_large_set_is_many_effects_and_names_what_carries_it() -> None:

@@ -103,12 +103,15 @@ def test_a_target_may_sit_anywhere() -> None:
 
 def test_what_the_steps_leave_open_is_looked_at_in_sets() -> None:
     """Of five effects none paid for itself, and one of them was sure: sets name it."""
-    listed: Any = SimpleNamespace(effect="external_wrench", probability=1.0)
+    listed: Any = SimpleNamespace(effect="external_wrench", probability=1.0, layout=range(6))
+    large: Any = SimpleNamespace(**{**vars(listed), "layout": range(8)})
     unlikely: Any = SimpleNamespace(**{**vars(listed), "probability": 0.9})
     first, more = (("external_wrench",), 1.0), (("stiffness", "platform_mass"), 0.99)
     unsure: Any = SimpleNamespace(why_not=Reason(Why.NOT_SURE, p=0.6))
     for missing, classes, candidates, clear in (
         ([listed], (first,), (), True),
+        ([large, large, listed], (first,), (), True),
+        ([large, large, large], (first,), (), False),
         ([listed], (first, more), (), False),
         ([listed], (first, (("creep",), 0.9)), (), True),
         ([unlikely], (first,), (), False),
