@@ -38,8 +38,9 @@ _HOLDS_NONE = (
     "{} has fewer cables than freedoms: it holds no poses; expected a map without probabilities"
 )
 _NO_COVARIANCE = (
-    "how likely poses can be held is said by a model that keeps its covariance; expected one that "
-    "crosscheck calibrate, add or diagnose wrote"
+    "how likely poses can be held is said by a model that keeps its covariance; expected a table "
+    "[calibration] or [fit], as crosscheck calibrate writes it, and add and diagnose where they "
+    "know it"
 )
 
 

@@ -103,7 +103,7 @@ def covariance_of(model: Model) -> Array | None:
         InputFileError: correlations that are none.
     """
     table = _kept_in(model)
-    if table is None:
+    if table is None or not model.names:
         return None
     labels = [f"{effect}.{key}" for effect, key in model.terms.labels]
     names = [str(name) for name in table.get(PARAMETERS, [])]

@@ -117,7 +117,10 @@ def seek(
         hints = alike_beyond(found.scores, listed, sizes)
         classes = probabilities(scores, listed, effects, sizes, {*found.refits, *further}, hints)
     free = free_of(joint)
-    shown = shown_from(setting, joint, joint.jacobian * free, joint.width * free)
+    # one of that size would have shown: not said where one may have been taken in
+    shown = None if said.more else shown_from(
+        setting, joint, joint.jacobian * free, joint.width * free
+    )  # fmt: skip
     return Sought(whole, found, catalogue, classes, odds, shown, said)
 
 

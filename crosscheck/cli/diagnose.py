@@ -125,12 +125,15 @@ def _keep(found: Diagnosis, own: Model, robot: Robot, measured: Measurements, pa
     from crosscheck.diagnosis import found_covariance, found_effects
     from crosscheck.model import provenance_of, renewed, save_model, with_fit
 
-    fitted = found_effects(found)
     if found.refusal is not None:
         return f"{path} not written: there is no verdict"
+    if not found.missing:
+        save_model(path, own)
+        return f"Written to {path}: the model as it stands, nothing is added"
     names = [effect.effect for effect in found.missing]
     errors = {"before": found.before, "after": found.after, "held_out": found.held_out}
     source = provenance_of(measured.path, "crosscheck diagnose")
-    new = with_fit(own, fitted, names, source, errors, found_covariance(found))
+    fitted, covariance = found_effects(found), found_covariance(found)
+    new = with_fit(own, fitted, names, source, errors, covariance)
     save_model(path, renewed(new, robot, measured))
-    return f"Written to {path}: {', '.join(names) or 'the model as it stands, nothing is added'}"
+    return f"Written to {path}: {', '.join(names)}"

@@ -37,8 +37,8 @@ from crosscheck.fit.words import rms_words
 _OTHER, _ALIKE = 0.25, 0.3
 
 MORE = (
-    "what the best few effects leave is smooth over the workspace and no noise: all effects "
-    "together take it in, or one that is not among them would"
+    "what few effects leave is smooth over the workspace and no noise: all effects together take "
+    "it in, or one that is not among them would"
 )
 
 

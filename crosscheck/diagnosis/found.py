@@ -22,27 +22,34 @@ def found_effects(found: Diagnosis) -> tuple[Fitted, ...]:
         return ()
     listed = [Fitted(one.term, one.stderr, one.at_bound) for one in found.missing]
     names = {one.term.name for one in listed}
-    best = shown_stages(found)[1].step.fit
+    best, wider = shown_stages(found)[1].step.fit, _widened(found)
     own = [(term, best.terms.part(term.name)) for term in best.terms if term.name not in names]
-    had = [Fitted(term, best.stderr[part], best.at_bound[part]) for term, part in own]
+    had = [Fitted(term, wider * best.stderr[part], best.at_bound[part]) for term, part in own]
     return (*had, *listed)
 
 
-def found_covariance(found: Diagnosis) -> Array | None:
-    """(p, p) of the values of :func:`found_effects`, in their order; inf where unseen.
+def _widened(found: Diagnosis) -> float:
+    """How many times as wide as the fit's own the errors of what is listed are."""
+    best = shown_stages(found)[1].step.fit
+    for one in found.missing:
+        own = best.stderr[best.terms.part(one.term.name)]
+        seen = np.isfinite(own) & (own > 0.0) & np.isfinite(one.stderr)
+        if found.verdict is not DiagnosisVerdict.MANY_EFFECTS and seen.any():
+            return float(one.stderr[seen][0] / own[seen][0])
+    return 1.0
 
-    None where there is no verdict, and where many more effects are missing than are listed: what
-    those would move is not known.
+
+def found_covariance(found: Diagnosis) -> Array | None:
+    """(p, p) of the values of :func:`found_effects`, in their order.
+
+    None where it would tell too little: where more is missing than is listed, and where some value
+    is unseen, which is known by no number.
     """
-    if found.search is None or found.verdict is DiagnosisVerdict.MANY_EFFECTS:
+    if found.search is None or found.verdict is not DiagnosisVerdict.EFFECTS_FOUND:
         return None
     best, effects = shown_stages(found)[1].step.fit, found_effects(found)
-    if not effects:
-        return np.zeros((0, 0))
     every = np.arange(len(best.terms))
     order = np.concatenate([every[best.terms.part(one.term.name)] for one in effects])
-    stderr = np.concatenate([one.stderr for one in effects])
-    known = np.where(np.isfinite(stderr), stderr, 0.0)
-    out = best.correlation[np.ix_(order, order)] * np.outer(known, known)
-    np.fill_diagonal(out, stderr**2)
-    return np.asarray(out)
+    if not np.all(np.isfinite(best.stderr)):
+        return None
+    return np.asarray(_widened(found) ** 2 * best.covariance[np.ix_(order, order)])

@@ -70,7 +70,7 @@ def _usual(layout: ApartLayout, values: Mapping[str, Values]) -> tuple[Array, Ar
 
 def without_parts(fitted: Sequence[Fitted], covariance: Array) -> tuple[list[Fitted], Array]:
     """The effects that are the same everywhere, and the covariance of theirs."""
-    same = [not isinstance(one.term.layout, ApartLayout) for one in fitted]
+    same = np.array([not isinstance(one.term.layout, ApartLayout) for one in fitted], dtype=bool)
     own = np.repeat(same, [len(one.term.layout) for one in fitted])
     return (
         [one for one, yes in zip(fitted, same, strict=True) if yes],

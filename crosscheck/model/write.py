@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, MutableMapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
@@ -75,8 +75,8 @@ def with_fit(
             values have moved with them, get a table ``refitted``.
         provenance: of the fit.
         errors: rms by kind: "before", "after", "held_out".
-        covariance: (p, p) of the values in the order of ``fitted``, inf on the diagonal where
-            unseen; None keeps none, and that of the fit before no longer holds.
+        covariance: (p, p) of the values in the order of ``fitted``. It is kept where all of them
+            are seen: of others no number says what they may move. That of the fit before is not.
     """
     document = copy.deepcopy(model.document)
     tables = {str(table["name"]): table for table in document.get("effect", [])}
@@ -95,7 +95,7 @@ def with_fit(
     _forget_covariance(document)
     if covariance is not None:
         same = without_parts(fitted, covariance)
-        if same[0]:
+        if same[0] and np.all(np.isfinite(np.diag(same[1]))):
             document[FIT] = _with_covariance(_together(), *same)
     return _with_values(replace(model, document=document), [by_name[name].usual for name in order])
 
@@ -171,8 +171,10 @@ def _together() -> Any:
 def _forget_covariance(document: Any) -> None:
     """Leave out what was said of errors that a new fit has changed."""
     document.pop(FIT, None)
+    table = document.get(CALIBRATION)
     for key in (PARAMETERS, STDERR, CORRELATION):
-        document.get(CALIBRATION, {}).pop(key, None)
+        if isinstance(table, MutableMapping):
+            table.pop(key, None)
 
 
 def _with_covariance(table: Any, fitted: Sequence[Fitted], covariance: Array) -> Any:

@@ -149,7 +149,7 @@ def test_the_boundary_is_that_of_the_model_and_of_the_probability_asked_for(tmp_
 
 
 def test_maps_that_can_have_no_probabilities_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="by a model that keeps its covariance; expected one"):
+    with pytest.raises(InputError, match="by a model that keeps its covariance; expected a table"):
         workspace_map(ROBOT, 0.3, 0.2, 0.1, elastic=False, chance=True)
     plain = workspace_map(ROBOT, 0.3, 0.2, 0.1, elastic=False)
     with pytest.raises(InputError, match="this map has no probabilities"):

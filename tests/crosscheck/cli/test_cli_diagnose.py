@@ -126,7 +126,14 @@ def test_the_model_that_was_found_is_written_and_gates_end_1(
     done = run("diagnose", *planar, *QUICK, "--out", out, *told)
     assert done.exit_code == 0 and "nothing is added" in done.stdout
     assert load_model(again, robot).names == ("pulley_radius",)
-    assert load_model(again, robot).document["effect"][0]["before"] == table["before"]
+    assert again.read_text() == first.read_text()  # errors, too: nothing was fitted
+    # and what has no model is plain SEECR
+    out = ("--out", tmp_path / "o")
+    done = run(
+        "diagnose", *planar, "--only", "stiffness", "--no-recording", "--model-out", again, *out
+    )
+    assert done.exit_code == 0 and "nothing is added" in done.stdout, done.output
+    assert load_model(again, robot).names == ()
 
 
 @pytest.mark.usefixtures("unpaged")

@@ -427,13 +427,32 @@ def test_a_later_fit_puts_its_errors_in_the_place_of_those_before(robot, tmp_pat
     assert covariance_of(load_model(path, robot)) is None
 
 
-def test_what_is_unseen_goes_with_nothing(robot, tmp_path):
-    both, covariance, sizes = together(robot)
+def test_where_a_value_is_unseen_nothing_is_told_of_what_it_may_move(robot, tmp_path):
+    both, covariance, _sizes = together(robot)
     both[0] = replace(both[0], stderr=np.array([np.inf]))
     covariance[0, 0] = np.inf
     names, path = ["pulley_radius", "stiffness"], tmp_path / "m.toml"
     save_model(path, with_fit(new_model(robot), both, names, SOURCE, ERRORS, covariance))
-    model = load_model(path, robot)
-    k = model.terms.names.index("stiffness")
-    found = covariance_of(model)
-    assert found[k, k] == pytest.approx(sizes[1] ** 2) and found.sum() == found[k, k]
+    assert "[fit]" not in path.read_text()
+    assert covariance_of(load_model(path, robot)) is None
+
+
+def test_a_model_whose_effects_were_taken_out_keeps_no_covariance(robot, tmp_path):
+    both, covariance, _sizes = together(robot)
+    names, path = ["pulley_radius", "stiffness"], tmp_path / "m.toml"
+    save_model(path, with_fit(new_model(robot), both, names, SOURCE, ERRORS, covariance))
+    text = path.read_text()
+    path.write_text(text[: text.index("[[effect]]")] + text[text.index("[fit]") :])
+    assert covariance_of(load_model(path, robot)) is None
+
+
+def test_a_calibration_that_is_no_table_is_left_alone(robot, saved):
+    path = changed(saved, "format = 1\n", "format = 1\ncalibration = 3\n")
+    both, _covariance, _sizes = together(robot)
+    save_model(path, with_fit(load_model(path, robot), both, ["stiffness"], SOURCE, ERRORS))
+    assert "calibration = 3" in path.read_text()
+
+
+def test_no_effects_have_no_covariance(robot):
+    model = with_fit(new_model(robot), [], [], SOURCE, ERRORS, np.zeros((0, 0)))
+    assert "fit" not in model.document
