@@ -105,13 +105,20 @@ def ratio(of: dict[str, float], to: dict[str, float]) -> dict[str, float]:
     return {key.split("_")[0]: round(of[key] / to[key], 3) for key in of}
 
 
-def judged(folder: Path, seed: int, options: bool) -> dict[str, Any]:
-    """One case made, diagnosed, and its model tried elsewhere."""
+def taken(folder: Path, seed: int) -> tuple[Robot, str, str, Sigma]:
+    """The robot of a seed, what it is called, the kind of noise and its size."""
     answers = json.loads((folder / "answers.json").read_text(encoding="utf-8"))
     case = CASES[(seed // 2) % len(CASES)]
     who, noise = answers[case]["robot"], list(NOISES)[(seed // 4) % len(NOISES)]
-    robot, random = load_robot(folder / case / "robot.xml"), random_of(seed, 11)
+    robot = load_robot(folder / case / "robot.xml")
     sigma = Sigma(position_m=3e-4, orientation_rad=2e-4) if who in LARGE else sigma_of(robot)
+    return robot, who, noise, sigma
+
+
+def judged(folder: Path, seed: int, options: bool) -> dict[str, Any]:
+    """One case made, diagnosed, and its model tried elsewhere."""
+    robot, who, noise, sigma = taken(folder, seed)
+    random = random_of(seed, 11)
     hidden = drawn(robot, seed, counted(seed, options))
     acting = [one.effect() for one in Terms(hidden)]
     for extent in (0.75, 0.5, 0.35):

@@ -21,18 +21,17 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from score_chances import NOISES, read, sigma_of
-from score_made_labs import CASES, LARGE
+from score_chances import NOISES, read
+from score_made_labs import taken
 
 from crosscheck.diagnosis.verdict import diagnose
-from crosscheck.measurements.data import Measurements, Sigma
+from crosscheck.measurements.data import Measurements
 from crosscheck.twin.hidden import choose
 from crosscheck.twin.lab import random_of, sweeps
 from crosscheck.twin.measure import measure
 from seecr.commands import Commands
 from seecr.effects import Terms
 from seecr.loads import Loads
-from seecr.mjcf import load_robot
 from seecr.pose import quat_from_rotvec, quat_multiply
 from seecr.robot import Robot
 
@@ -111,11 +110,8 @@ KINDS = (*MOVING, *SEEN)
 
 def judged(folder: Path, seed: int) -> dict[str, Any]:
     """One case made and diagnosed."""
-    answers = json.loads((folder / "answers.json").read_text(encoding="utf-8"))
-    case = CASES[(seed // 2) % len(CASES)]
-    who, noise = answers[case]["robot"], list(NOISES)[(seed // 4) % len(NOISES)]
-    robot, random = load_robot(folder / case / "robot.xml"), random_of(seed, 11)
-    sigma = Sigma(position_m=3e-4, orientation_rad=2e-4) if who in LARGE else sigma_of(robot)
+    robot, who, noise, sigma = taken(folder, seed)
+    random = random_of(seed, 11)
     assert sigma.position_m is not None
     kind = KINDS[(seed + seed // 8) % len(KINDS)]
     times = float(np.exp(random.uniform(np.log(_LEAST), np.log(_MOST))))

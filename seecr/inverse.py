@@ -19,7 +19,7 @@ from seecr.given import GivenRobot, robot_of
 from seecr.hanging import least_of_heavy
 from seecr.holding import Held, hold, holds_firmly
 from seecr.inside import balances, counted_balance
-from seecr.nearest import Nearest, Reaching, nearest, nearest_in_place
+from seecr.nearest import Nearest, Reaching, nearest, poses_in_place
 from seecr.pose import Array, pose_difference
 from seecr.result import COORDINATES, Record, Result, named
 from seecr.robot import Robot
@@ -291,7 +291,7 @@ class _Search:
         aimed, lost = self.given.pose.copy(), np.flatnonzero(~held.fine)
         if len(lost):
             problem = self._reaching(lost, tables.scale, fix_position=True)
-            aimed[lost] = nearest_in_place(problem).poses
+            aimed[lost] = poses_in_place(problem)
         commands = replace(self.given, pose=aimed)
         there = self._held(commands)[0] if len(lost) else held
         solution = self._lengths(commands, there)[1].solution()

@@ -90,7 +90,7 @@ def judge(
     sure = adequate(found, sure) if few and sure else sure_effects(found, classes, False)
     sure = tuple(name for name in sure if name not in doubted)
     if more:
-        sure = tuple(name for name in sure if carries_most(found, name))
+        sure = carrying_most(found, sure)
     if unknown:  # known effects imitate it: none of them is sure
         return Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, (), undecided)
     if not sure and not more and undecided < _OPEN and explained(found) < _OWED:
@@ -132,11 +132,11 @@ def adequate(found: Found, sure: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(sorted(listed, key=lambda e: -worth[e]))
 
 
-def carries_most(found: Found, name: str) -> bool:
-    """Whether an effect of few parameters carries more than half of what all of its set do."""
+def carrying_most(found: Found, sure: tuple[str, ...]) -> tuple[str, ...]:
+    """The one of few parameters that carries more than half of what its set does, if it is sure."""
     worth = worths(found)
-    few = _size(found, name) <= SMALL
-    return few and worth[name] > _MOST * sum(worth.values())
+    least = _MOST * sum(worth.values())
+    return tuple(n for n in sure if _size(found, n) <= SMALL and worth[n] > least)
 
 
 def _size(found: Found, name: str) -> int:

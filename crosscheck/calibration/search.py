@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,6 +35,7 @@ from seecr.robot import Robot
 
 # Sets refitted about one linear model; fewer where something unknown leaves no hope of an end.
 _REFITTED, _REFITTED_UNKNOWN = 20, 4
+NO_MORE: Mapping[Names, float] = {}
 # Equals that are fitted in a listed member's place, the likeliest.
 _SWAPPED = 6
 
@@ -85,10 +86,7 @@ def seek(
     odds = log_odds(setting, joint, all_stated)
     strange = is_strange(setting, joint, known)
     surprise = float(np.max(whole.held_out.surprise, initial=0.0))
-    at_once, _later = layouts(problem)
-    nulls = (Term(a, a.null) for a in at_once if a.name not in terms)
-    here = Terms([*nulls, *(t for t in terms if t.name not in whole.later)])
-    catalogue = Catalogue(here, whole.later, whole.prices)
+    catalogue = _catalogue(problem, terms, whole)
     plain = evaluate(problem, terms, setting.factor)
     unknown = strange or odds > UNKNOWN or surprise > SURPRISE
     most, rounds = (_REFITTED_UNKNOWN, 1) if unknown else (_REFITTED, ROUNDS)
@@ -102,9 +100,7 @@ def seek(
     found = compare_sets(setting, joint, catalogue, plain, told, most, rounds, given)
     effects = [n for n in catalogue.names if n not in terms]
     sizes = {name: parameters_told(catalogue.start(name).layout) for name in effects}
-    own = found.best.names
-    hints = alike_beyond(found.scores, own, sizes)
-    classes = probabilities(all_scores(found), own, effects, sizes, found.refits, hints)
+    classes = _classes(found, found.best.names, sizes)
     strange = strange or is_strange(setting, found.best.joint, known)
     beside = log_odds(setting, found.best.joint, all_stated)
     said = judge(found, classes, odds, surprise, strange, _doubted(found), beside)
@@ -113,15 +109,36 @@ def seek(
     if alone is not None and listed != found.best.names:
         # what could stand in the place of what is listed, not of a larger set
         further = {**in_place(found, listed, classes, problem.robot, terms), listed: alone.score}
-        scores = {**all_scores(found), **further}
-        hints = alike_beyond(found.scores, listed, sizes)
-        classes = probabilities(scores, listed, effects, sizes, {*found.refits, *further}, hints)
+        classes = _classes(found, listed, sizes, further)
     free = free_of(joint)
     # one of that size would have shown: not said where one may have been taken in
     shown = None if said.more else shown_from(
         setting, joint, joint.jacobian * free, joint.width * free
     )  # fmt: skip
     return Sought(whole, found, catalogue, classes, odds, shown, said)
+
+
+def _catalogue(problem: Problem, terms: Terms, whole: Calibration) -> Catalogue:
+    """Every effect, and where it starts: from null, or as the joint fit found it promising."""
+    at_once, _later = layouts(problem)
+    nulls = (Term(a, a.null) for a in at_once if a.name not in terms)
+    here = Terms([*nulls, *(t for t in terms if t.name not in whole.later)])
+    return Catalogue(here, whole.later, whole.prices)
+
+
+def _classes(
+    found: Found, own: Names, sizes: Mapping[str, int], further: Mapping[Names, float] = NO_MORE
+) -> Classes:
+    """Probabilities, and what cannot be told from members of a set.
+
+    Args:
+        found: the compared sets. own: the set.
+        sizes: of all effects, the number of parameters that are told.
+        further: scores of more sets that were fitted.
+    """
+    scores, fitted = {**all_scores(found), **further}, {*found.refits, *further}
+    hints = alike_beyond(found.scores, own, sizes)
+    return probabilities(scores, own, list(sizes), sizes, fitted, hints)
 
 
 def in_place(

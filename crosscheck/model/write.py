@@ -181,19 +181,17 @@ def _with_covariance(table: Any, fitted: Sequence[Fitted], covariance: Array) ->
     """The table with the errors of the values in full, and their correlations.
 
     A row ends at its diagonal. Values of single files or runs go with nothing else elsewhere, and
-    are not among them; what is unseen goes with nothing either.
+    are not among them.
     """
     if not fitted:
         return table
     stderr = np.sqrt(np.diag(covariance))
-    seen = np.isfinite(stderr) & (stderr > 0.0)
-    known = np.where(seen, stderr, np.inf)
-    correlation = np.where(np.isfinite(covariance), covariance, 0.0) / np.outer(known, known)
+    known = np.where(stderr > 0.0, stderr, np.inf)
+    correlation = covariance / np.outer(known, known)
     np.fill_diagonal(correlation, 1.0)
     names = [f"{one.term.name}.{key}" for one in fitted for key in one.term.layout.names]
     table[PARAMETERS] = _lines([f'"{name}"' for name in names])
-    errors = [_floats([e]) if np.isfinite(e) else f'"{UNSEEN}"' for e in stderr]
-    table[STDERR] = _lines(errors)
+    table[STDERR] = _lines([_floats([one]) for one in stderr])
     table[CORRELATION] = _lines([f"[{_floats(r[: i + 1])}]" for i, r in enumerate(correlation)])
     return table
 

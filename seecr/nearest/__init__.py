@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from seecr.nearest.in_place import nearest_in_place
+from seecr.nearest.in_place import poses_in_place
 from seecr.nearest.problem import Reaching
 from seecr.nearest.search import Nearest, nearest
 
-__all__ = ["Nearest", "Reaching", "nearest", "nearest_in_place"]
+__all__ = ["Nearest", "Reaching", "nearest", "poses_in_place"]

@@ -12,15 +12,15 @@ from scipy.spatial import cKDTree
 from seecr.nearest.firm import part_of
 from seecr.nearest.inward import tightened
 from seecr.nearest.problem import Reaching, Rows
-from seecr.nearest.search import Best, Nearest, any_that_stays
+from seecr.nearest.search import Best, any_that_stays
 from seecr.pose import Array
 
 # Answers of the nearest positions that are tried, and how many are searched at once in earnest.
 _NEIGHBOURS, _AT_ONCE = 3, 8
 
 
-def nearest_in_place(problem: Reaching) -> Nearest:
-    """Orientations at which the platform is held, and stays, at wanted positions.
+def poses_in_place(problem: Reaching) -> Array:
+    """Poses (n, 7) at wanted positions at which the platform is held, and stays, if some are found.
 
     Args:
         problem: of which positions may not change.
@@ -36,7 +36,7 @@ def nearest_in_place(problem: Reaching) -> Nearest:
             best.take(some, any_that_stays(part_of(problem, some)))
             left[some], fresh = False, some[best.firm[some]]
         left &= ~best.firm
-    return Nearest(problem.placed(best.away, rows), best.found, best.firm, best.firm.copy())
+    return problem.placed(best.away, rows)
 
 
 def _try_all(best: Best, away: Array, rows: Rows) -> None:

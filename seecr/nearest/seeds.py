@@ -80,8 +80,8 @@ def _on_joints(robot: Robot, random: np.random.Generator) -> Array:
 def from_sample(problem: Reaching, poses: Array) -> Candidates:
     """Home, the poses nearest to each wanted one, and as many of the others."""
     random, out, rows = np.random.default_rng(1), [], []
+    in_place = problem.is_in_place
     for row in range(len(problem.wanted)):
-        in_place = problem.is_in_place
         every = _in_place(problem, row) if in_place else problem.to(poses, np.full(len(poses), row))
         some = min(_NEAR, len(every))
         near = np.argsort(np.linalg.norm(every, axis=1))[:some]
