@@ -42,14 +42,11 @@ def _widened(found: Diagnosis) -> float:
 def found_covariance(found: Diagnosis) -> Array | None:
     """(p, p) of the values of :func:`found_effects`, in their order.
 
-    None where it would tell too little: where more is missing than is listed, and where some value
-    is unseen, which is known by no number.
+    None where it would tell too little: where more is missing than is listed.
     """
     if found.search is None or found.verdict is not DiagnosisVerdict.EFFECTS_FOUND:
         return None
     best, effects = shown_stages(found)[1].step.fit, found_effects(found)
     every = np.arange(len(best.terms))
     order = np.concatenate([every[best.terms.part(one.term.name)] for one in effects])
-    if not np.all(np.isfinite(best.stderr)):
-        return None
     return np.asarray(_widened(found) ** 2 * best.covariance[np.ix_(order, order)])

@@ -22,6 +22,8 @@ from seecr.errors import InputError
 from seecr.inverse import correct, held_in_place
 from seecr.maps import boundary, default_axes, workspace_map
 from seecr.mjcf import load_robot
+from seecr.nearest import Reaching, in_place
+from seecr.nearest.search import Best
 from seecr.planar import bar_tilt
 from seecr.pose import quat_from_rotvec
 from seecr.recording.workspace import write_map_recording
@@ -290,6 +292,35 @@ def test_positions_of_four_cables_are_held_where_a_correction_keeps_them() -> No
     held = held_in_place(robot, poses, (), 0.0, 6.0)
     np.testing.assert_array_equal(held, kept_there)
     assert not kept.held[1:].any()  # only the middle is held level
+
+
+def test_an_orientation_from_which_the_platform_goes_elsewhere_does_not_hold(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    robot = only_cables(robot_named("demobot_parallel"), [0, 2, 4, 6])
+    poses = np.tile([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], (3, 1))
+    # balanced at the first two, at the first stably
+    poses[:, :3] = [[0.4, 0.25, 0.1], [0.1, 0.31, 0.42], [0.03, 0.25, 0.1]]
+    every = lambda _self, _away, rows: np.ones(len(rows), dtype=bool)  # noqa: E731
+    monkeypatch.setattr(Reaching, "rests", every)
+    assert held_in_place(robot, poses, (), 0.0, 6.0).tolist() == [True, False, False]
+
+
+def test_few_positions_are_searched_in_earnest(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The others from their neighbours' orientations."""
+    searched, own = [], in_place.any_that_stays
+
+    def counted(problem: Reaching) -> Best:
+        searched.append(len(problem.wanted))
+        return own(problem)
+
+    monkeypatch.setattr(in_place, "any_that_stays", counted)
+    robot = only_cables(robot_named("demobot_parallel"), [0, 2, 4, 6])
+    x, y = np.meshgrid(np.linspace(0.2, 0.6, 8), np.linspace(0.15, 0.35, 8))
+    poses = np.tile([0.0, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0], (x.size, 1))
+    poses[:, :2] = np.column_stack([x.ravel(), y.ravel()])
+    assert held_in_place(robot, poses, (), 0.0, 6.0).all()
+    assert sum(searched) < 0.3 * len(poses)
 
 
 def only_cables(robot: Robot, some: list[int]) -> Robot:

@@ -83,6 +83,10 @@ def test_what_a_set_leaves_is_asked_of_a_field(monkeypatch: pytest.MonkeyPatch) 
     assert found.judgement.verdict is DiagnosisVerdict.MANY_EFFECTS and found.judgement.more
     assert found.judgement.sure == ("pulley_radius",)
     assert MORE in explained(found, []).notes
+    none = replace(found.judgement, sure=())
+    assert "No few effects" in explained(replace(found, judgement=none), []).sentence
+    few = replace(none, more=False)
+    assert explained(replace(found, judgement=few), []).sentence.startswith("Few effects")
 
 
 def assert_a_model_by_itself(found: Sought) -> None:

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_diagnoses import pulleys
+from made_data import measured, term
+from made_diagnoses import POINTS, SIGMA, diagnose_with, pulleys, robot
 
 from crosscheck.diagnosis import found_covariance, found_effects
 from crosscheck.fit.reasons import DiagnosisVerdict
@@ -22,6 +23,22 @@ def test_the_covariance_is_that_of_the_errors_as_listed() -> None:
         own = np.concatenate([effect.stderr for effect in found_effects(one)])
         assert np.sqrt(np.diag(covariance)) == pytest.approx(own)
         assert own[-1] == pytest.approx(factor * listed.stderr[-1])
+
+
+def test_the_covariance_goes_in_the_order_of_the_effects() -> None:
+    """Which is that of their worth, not of the fit."""
+    hidden = [term(robot(), "pulley_radius", radius_m=0.01)]
+    hidden.append(term(robot(), "stiffness", factor=0.8))
+    data = measured(robot(), hidden, points=POINTS, sigma=SIGMA, tensions=True)
+    found = diagnose_with(robot(), data, only=[one.name for one in hidden])
+    assert len(found.missing) == 2
+    for missing in (found.missing, found.missing[::-1]):
+        one = replace(found, missing=missing)
+        covariance = found_covariance(one)
+        assert covariance is not None
+        own = np.concatenate([effect.stderr for effect in found_effects(one)])
+        assert own[0] != pytest.approx(own[1])
+        assert np.sqrt(np.diag(covariance)) == pytest.approx(own)
 
 
 @pytest.mark.parametrize(
