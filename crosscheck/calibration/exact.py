@@ -9,7 +9,7 @@ import numpy as np
 
 from crosscheck.calibration.bounds import log_absent
 from crosscheck.calibration.catalogue import Catalogue, gram_about, widths_for
-from crosscheck.calibration.gram import Gram, averaged, best_widths, gram_of
+from crosscheck.calibration.gram import ColumnGroup, Gram, averaged, best_widths, gram_of
 from crosscheck.calibration.joint import JointFit, Setting, settle
 from crosscheck.calibration.later import at_null
 from crosscheck.calibration.linearised import Linear, groups_of, linearised
@@ -212,9 +212,12 @@ def _scored(
 def own_gram(linear: Linear, joint: JointFit) -> Gram:
     """Normal equations of a fit's own effects about its optimum; those on a bound are absent."""
     groups = groups_of(joint, widths_for)
+    return gram_of(linear.x, own_readings(linear, joint, groups), groups)
+
+
+def own_readings(linear: Linear, joint: JointFit, groups: Mapping[str, ColumnGroup]) -> Array:
+    """(N,) what the amplitudes of a fit's effects explain, and noise; shapes stay as they are."""
     z = np.zeros(len(joint.z))
     for group in groups.values():
         z[group.columns] = joint.z[group.columns]
-    # shapes stay as they are: only amplitudes are explained
-    y = linear.y - linear.x @ (joint.z - z)
-    return gram_of(linear.x, y, groups)
+    return np.asarray(linear.y - linear.x @ (joint.z - z))

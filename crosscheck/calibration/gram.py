@@ -174,8 +174,11 @@ def averaged(gram: Gram, chosen: Widths) -> float:
     """ln Z of a set, averaged over the width of each member about the best ones."""
     solved = gram.solved(chosen)
     total = solved.log_evidence
-    for name, width in chosen.items():
-        gains = solved.gains(name)
-        at = int(np.argmin(np.abs(gram.groups[name].widths - width)))
-        total += float(special.logsumexp(gains) - np.log(len(gains)) - gains[at])
-    return total
+    return total + sum(averaging(solved, name) for name in chosen)
+
+
+def averaging(solved: Solved, name: str) -> float:
+    """What averaging over the widths of a member, beside the others, changes in ln Z."""
+    gains = solved.gains(name)
+    at = int(np.argmin(np.abs(solved.gram.groups[name].widths - solved.chosen[name])))
+    return float(special.logsumexp(gains) - np.log(len(gains)) - gains[at])

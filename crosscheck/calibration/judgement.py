@@ -1,20 +1,22 @@
 """What the compared sets say: the verdict, the effects that are sure, and what to do.
 
 Something unknown is there where a smooth field over the workspace earns more evidence than chance
-gives it, or where runs left out are predicted worse than the fit itself expects. Where the data
-leave open which effects it is, or it takes many, that is a calibration and no diagnosis; so it is
-where the whole catalogue leaves a field nothing, but the best few do.
+gives it, beside all effects or in the place of some, or where runs left out are predicted worse
+than the fit itself expects. Where the data leave open which effects it is, or it takes many, that
+is a calibration and no diagnosis; so it is where the whole catalogue leaves a field nothing, but
+the best few do.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from crosscheck.calibration.equals import SMALL
 from crosscheck.calibration.field import UNKNOWN
+from crosscheck.calibration.instead import NOT_ASKED, Instead
 from crosscheck.calibration.probability import Classes
 from crosscheck.calibration.refits import Found
 from crosscheck.calibration.sets import Names
@@ -35,8 +37,9 @@ SURPRISE = 2.0
 # In a large set each effect must carry more than this part of what all explain: others may
 # imitate what is missing.
 _PART, _WORTH = 0.1, 25.0
-# Where a field explains what is left, more than this part, and by few parameters.
-_MOST = 0.5
+# Where a field explains what is left, more than this part, and by few parameters; in the place of
+# some, of what the others do nearly all.
+_MOST, _ALL = 0.5, 0.95
 
 NONE: Names = frozenset()
 
@@ -51,6 +54,7 @@ class Judgement:
         undecided: how many classes are open.
         doubted: members of the best set of a size that hardly happens.
         more: whether a smooth field explains what the best set leaves.
+        imitated: something unknown that members of the best set imitate; None where nothing is.
     """
 
     verdict: DiagnosisVerdict
@@ -58,6 +62,7 @@ class Judgement:
     undecided: float
     doubted: Names = NONE
     more: bool = False
+    imitated: Instead | None = None
 
 
 def judge(
@@ -68,6 +73,7 @@ def judge(
     strange: bool = False,
     doubted: Names = NONE,
     beside: float = -np.inf,
+    instead: Instead = NOT_ASKED,
 ) -> Judgement:
     """The verdict.
 
@@ -79,6 +85,7 @@ def judge(
         strange: what was taken for noise is none.
         doubted: members of the best set of a size that hardly happens.
         beside: ln odds of a smooth field beside the best set.
+        instead: of one in the place of some of its members.
     """
     best, undecided = found.best.names - found.always - found.idle, classes.undecided
     unknown = strange or field_odds > UNKNOWN or surprise > SURPRISE
@@ -90,7 +97,14 @@ def judge(
     sure = adequate(found, sure) if few and sure else sure_effects(found, classes, False)
     sure = tuple(name for name in sure if name not in doubted)
     if more:
-        sure = carrying_most(found, sure)
+        worth = worths(found)
+        sure = tuple(name for name in carrying_most(found, worth, _MOST) if name in sure)
+    if instead.chance:
+        # of several that stay some may take in what others of them do
+        kept = carrying_most(found, instead.worth, _ALL)
+        kept = tuple(name for name in kept if name not in doubted)
+        if kept or not unknown:
+            return Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, kept, undecided, imitated=instead)
     if unknown:  # known effects imitate it: none of them is sure
         return Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, (), undecided)
     if not sure and not more and undecided < _OPEN and explained(found) < _OWED:
@@ -132,11 +146,15 @@ def adequate(found: Found, sure: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(sorted(listed, key=lambda e: -worth[e]))
 
 
-def carrying_most(found: Found, sure: tuple[str, ...]) -> tuple[str, ...]:
-    """The one of few parameters that carries more than half of what its set does, if it is sure."""
-    worth = worths(found)
-    least = _MOST * sum(worth.values())
-    return tuple(n for n in sure if _size(found, n) <= SMALL and worth[n] > least)
+def carrying_most(found: Found, worth: Mapping[str, float], part: float) -> tuple[str, ...]:
+    """The one of few parameters that carries more than a part of what its set does, if any.
+
+    Args:
+        found: the compared sets. worth: ln evidence that members of one are worth.
+        part: at least a half.
+    """
+    least = max(_WORTH, part * sum(worth.values()))
+    return tuple(n for n in worth if _size(found, n) <= SMALL and worth[n] > least)
 
 
 def _size(found: Found, name: str) -> int:

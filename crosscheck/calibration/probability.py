@@ -43,6 +43,21 @@ class Classes:
         """Sum of min(P, 1 - P) over classes, and further members: how many of them are open."""
         return float(sum(min(p, 1.0 - p) for p in (*self.probability, *self.further.values())))
 
+    def without(self, imitating: Names, chance: float) -> Classes:
+        """The same where, with some chance, what these explain is something unknown.
+
+        Their equals explain the same.
+        """
+        touched = [not imitating.isdisjoint(members) for members in self.members]
+        less = {m for some, yes in zip(self.members, touched, strict=True) if yes for m in some}
+
+        def of(probabilities: Mapping[str, float]) -> dict[str, float]:
+            return {n: p * (1.0 - chance * (n in less)) for n, p in probabilities.items()}
+
+        pairs = zip(self.probability, touched, strict=True)
+        probability = [p * (1.0 - chance * yes) for p, yes in pairs]
+        return Classes(of(self.effect), self.members, probability, of(self.further))
+
     def of(self, name: str) -> float:
         """Probability that an effect or one of its class is missing, beside those needed more."""
         pairs = zip(self.members, self.probability, strict=True)

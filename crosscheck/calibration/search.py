@@ -11,6 +11,7 @@ from crosscheck.calibration.all_effects import PLAIN, Calibration, fit_all_effec
 from crosscheck.calibration.catalogue import Catalogue
 from crosscheck.calibration.equals import parameters_told
 from crosscheck.calibration.field import UNKNOWN, log_odds
+from crosscheck.calibration.instead import field_instead
 from crosscheck.calibration.judgement import SURPRISE, Judgement, judge
 from crosscheck.calibration.later import layouts
 from crosscheck.calibration.linearised import free_of
@@ -47,7 +48,8 @@ class Sought:
     Attributes:
         calibration: everything at once. found: the sets compared.
         catalogue: effects with the values they start from.
-        classes: probabilities. field_odds: ln odds of something smooth and unknown.
+        classes: probabilities. field_odds: ln odds of something smooth and unknown, beside all
+            effects or in the place of some.
         shown: the size by kind of reading from which on that would show.
         judgement: the verdict.
     """
@@ -100,22 +102,25 @@ def seek(
     found = compare_sets(setting, joint, catalogue, plain, told, most, rounds, given)
     effects = [n for n in catalogue.names if n not in terms]
     sizes = {name: parameters_told(catalogue.start(name).layout) for name in effects}
-    classes = _classes(found, found.best.names, sizes)
-    strange = strange or is_strange(setting, found.best.joint, known)
-    beside = log_odds(setting, found.best.joint, all_stated)
-    said = judge(found, classes, odds, surprise, strange, _doubted(found), beside)
+    best = found.best
+    instead = field_instead(setting, best.joint, best.widths, found.scores)
+    classes = _classes(found, best.names, sizes).without(instead.replaced, instead.chance)
+    strange = strange or is_strange(setting, best.joint, known)
+    beside = log_odds(setting, best.joint, all_stated)
+    said = judge(found, classes, odds, surprise, strange, _doubted(found), beside, instead)
     listed = found.always | set(said.sure)
     alone = found.refit(listed) if said.verdict is DiagnosisVerdict.EFFECTS_FOUND else None
-    if alone is not None and listed != found.best.names:
+    if alone is not None and listed != best.names:
         # what could stand in the place of what is listed, not of a larger set
         further = {**in_place(found, listed, classes, problem.robot, terms), listed: alone.score}
         classes = _classes(found, listed, sizes, further)
+        classes = classes.without(instead.replaced, instead.chance)
     free = free_of(joint)
     # one of that size would have shown: not said where one may have been taken in
-    shown = None if said.more else shown_from(
+    shown = None if said.more or said.imitated else shown_from(
         setting, joint, joint.jacobian * free, joint.width * free
     )  # fmt: skip
-    return Sought(whole, found, catalogue, classes, odds, shown, said)
+    return Sought(whole, found, catalogue, classes, max(odds, instead.odds), shown, said)
 
 
 def _catalogue(problem: Problem, terms: Terms, whole: Calibration) -> Catalogue:

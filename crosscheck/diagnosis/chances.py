@@ -30,6 +30,7 @@ class Chances:
         further: of effects that share a class with one needed more, that both are missing.
         shown: rms size by kind of reading from which on a smooth effect that nobody knows would
             show beside the catalogue; None where it could hide at any size.
+        imitated: that some of what was found imitates something smooth that no effect explains.
     """
 
     effect: dict[str, float]
@@ -38,6 +39,7 @@ class Chances:
     together: JointErrors | None
     shown: Rms | None = None
     further: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    imitated: float = 0.0
 
     @property
     def words(self) -> str:

@@ -1,4 +1,7 @@
-"""What sets of effects say where they explain the data: nothing, a few effects, or many."""
+"""What sets of effects say where they explain the data: nothing, a few effects, or many.
+
+Or something unknown, where a field explains in the place of some of them.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ from collections.abc import Sequence
 from crosscheck.calibration.alternatives import alternatives
 from crosscheck.calibration.equals import EQUAL
 from crosscheck.calibration.exact import Refit
+from crosscheck.calibration.judgement import Judgement
 from crosscheck.calibration.search import Sought
 from crosscheck.calibration.sets import Names
 from crosscheck.diagnosis.advice import check_of
@@ -16,6 +20,7 @@ from crosscheck.diagnosis.result import Diagnosis, MissingEffect, NotListed
 from crosscheck.diagnosis.rivals import Rival, loss_of_its_part
 from crosscheck.diagnosis.search import Search
 from crosscheck.diagnosis.small import share_of
+from crosscheck.diagnosis.unexplained import where_of
 from crosscheck.diagnosis.way import fit_of, way_of
 from crosscheck.diagnosis.words import (
     agreement,
@@ -43,16 +48,16 @@ MORE = (
 
 
 def explained(sought: Sought, notes: Sequence[str]) -> Diagnosis:
-    """The diagnosis of compared sets that leave nothing unknown."""
-    verdict = sought.judgement.verdict
+    """The diagnosis of compared sets that leave noise."""
+    verdict, imitated = sought.judgement.verdict, sought.judgement.imitated
     way = way_of(sought, frozenset(sought.judgement.sure))
     chances = chances_of(sought)
     more = sought.judgement.more
-    some = [] if way.found or more else alternatives(sought.found, sought.classes)
+    some = [] if way.found or more or imitated else alternatives(sought.found, sought.classes)
     missing = [_missing(sought, way, chances, name) for name in way.found]
     return diagnosis_of(
         verdict,
-        _sentence(verdict, missing, way.tried, chances, some),
+        _sentence(sought.judgement, missing, way.tried, chances, some),
         missing,
         way,
         before=sought.calibration.before,
@@ -60,13 +65,14 @@ def explained(sought: Sought, notes: Sequence[str]) -> Diagnosis:
         candidates=_not_listed(way, chances),
         notes=(*notes, *_noise_notes(sought, chances), *_size_notes(sought), *([MORE] * more)),
         chances=chances,
+        where=where_of(way) if imitated else (),
         alternatives=some,
     )
 
 
 def _missing(sought: Sought, way: Search, chances: Chances, name: str) -> MissingEffect:
     best = way.last.fit
-    if sought.judgement.verdict is DiagnosisVerdict.MANY_EFFECTS:
+    if sought.judgement.verdict is not DiagnosisVerdict.EFFECTS_FOUND:
         # others are missing too that are not sure: values beside those are nearer to the truth;
         # elsewhere what is listed has to be a model by itself
         best = fit_of(sought.calibration.setting, sought.found.best.joint)
@@ -141,15 +147,22 @@ def _size_notes(sought: Sought) -> list[str]:
 
 
 def _sentence(
-    verdict: DiagnosisVerdict,
+    said: Judgement,
     missing: Sequence[MissingEffect],
     tried: int,
     chances: Chances,
     alternatives: Sequence[Names] = (),
 ) -> str:
-    if verdict is DiagnosisVerdict.NO_EFFECT_MISSING:
+    if said.verdict is DiagnosisVerdict.NO_EFFECT_MISSING:
         return agreement(tried, hints_of(chances, ()))
-    if verdict is DiagnosisVerdict.EFFECTS_FOUND:
+    if said.imitated is not None:
+        known = " + ".join(sorted(said.imitated.replaced))
+        left = (
+            f"likelier than {known}, which can imitate it, is an effect that is not among them: "
+            f"smooth over the workspace, in {said.imitated.seen}"
+        )
+        return and_what_is_left(words_of(missing), left, tried)
+    if said.verdict is DiagnosisVerdict.EFFECTS_FOUND:
         left = noise_left(hints_of(chances, [m.effect for m in missing]))
         return and_what_is_left(words_of(missing), left, tried)
     together = chances.together

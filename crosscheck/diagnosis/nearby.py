@@ -13,6 +13,7 @@ import numpy as np
 from crosscheck.calibration.catalogue import Catalogue, catalogue_columns, gram_with
 from crosscheck.calibration.colour import WHITE, chain_of
 from crosscheck.calibration.equals import parameters_told
+from crosscheck.calibration.instead import Instead, field_instead
 from crosscheck.calibration.joint import JointFit, Setting, settle
 from crosscheck.calibration.later import at_null, layouts, promising_beside
 from crosscheck.calibration.priors import FLAT, widths_of
@@ -59,7 +60,8 @@ def chances_near(found: Search, alike: Mapping[str, Sequence[str]]) -> Chances:
     shown = shown_from(setting, joint, *_all_of(columns, len(joint.state.white)))
     sizes = {name: parameters_told(catalogue.start(name).layout) for name in effects}
     hints = alike_beyond(scores, names, sizes)
-    return _with_equals(every, effects, alike, hints, shown)
+    instead = field_instead(setting, joint, scores.widths(names), scores)
+    return _with_equals(every, effects, alike, hints, shown, instead)
 
 
 def _impossible(found: Search) -> Names:
@@ -123,6 +125,7 @@ def _with_equals(
     alike: Mapping[str, Sequence[str]],
     hints: Sequence[tuple[str, ...]],
     shown: Rms | None,
+    instead: Instead,
 ) -> Chances:
     """The classes as refits know them: equals share the probability that one of them is missing."""
     classes = [(name, *others) for name, others in alike.items()]
@@ -130,8 +133,9 @@ def _with_equals(
     alone = [(name,) for name in effects if name not in known]
     beyond = with_hints(alone, hints)
     found = of_classes(scores, frozenset(alike), effects, [*classes, *beyond])
+    found = found.without(instead.replaced, instead.chance)
     pairs = dict(zip(found.members, found.probability, strict=True))
     effect = dict(found.effect)
     for members in classes:
         effect.update({m: pairs[members] / len(members) for m in members if m in effect})
-    return Chances(effect, tuple(pairs.items()), None, None, shown)
+    return Chances(effect, tuple(pairs.items()), None, None, shown, imitated=instead.chance)

@@ -48,7 +48,7 @@ def unexplained(found: Search, chances: Chances, notes: Sequence[str]) -> Diagno
         notes=notes,
         chances=chances,
         shown=shown,
-        where=_where(shown),
+        where=where_of(shown),
     )
 
 
@@ -84,6 +84,7 @@ def _sentence(missing: Sequence[MissingEffect], tried: int) -> str:
     return and_what_is_left(words_of(missing), left, tried)
 
 
-def _where(found: Search) -> tuple[Association, ...]:
+def where_of(found: Search) -> tuple[Association, ...]:
+    """What that which is left by the last model goes with."""
     last = found.last.fit.state
     return tuple(associations(found.problem, last.white, last.prediction)[:_MOST_WHERE])

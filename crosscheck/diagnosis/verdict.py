@@ -120,17 +120,20 @@ def _searched(
     # so) or was estimated, from what may be an effect. All at once, in sets
     way = [step.fit.terms for step in found.steps[1:]]
     sought = seek(problem, problem.data.sigma, ready.terms, _part(progress, 0.5, 1.0), way)
-    if sought.judgement.verdict is not DiagnosisVerdict.UNKNOWN_EFFECT:
+    said = sought.judgement
+    if said.verdict is not DiagnosisVerdict.UNKNOWN_EFFECT or said.imitated is not None:
         return explained(sought, notes)
     return unexplained(found, chances_of(sought), (*notes, *more))
 
 
 def is_clear(steps: Diagnosis) -> bool:
-    """Whether all that steps found is sure, is few, and nothing else is sure.
+    """Whether all that steps found is sure, is few, imitates nothing, and nothing else is sure.
 
     Several may hint at the same, of which none pays for itself.
     """
     if too_large(len(one.layout) for one in steps.missing):
+        return False
+    if steps.chances is not None and steps.chances.imitated:
         return False
     listed = {effect.effect for effect in steps.missing}
     classes = () if steps.chances is None else steps.chances.classes

@@ -22,7 +22,7 @@ def words_of(missing: Sequence[MissingEffect]) -> str:
 
 def and_what_is_left(text: str, left: str, tried: int) -> str:
     """A sentence that says what was added, what is left then, and how many effects were tried."""
-    text = f"{text}; {left}"
+    text = f"{text}; {left}" if text else left
     return (
         text[0].upper()
         + text[1:]

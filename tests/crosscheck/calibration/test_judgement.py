@@ -14,6 +14,7 @@ from crosscheck.calibration import search
 from crosscheck.calibration.alternatives import alternatives
 from crosscheck.calibration.exact import Refit
 from crosscheck.calibration.gram import ColumnGroup, gram_of
+from crosscheck.calibration.instead import Instead
 from crosscheck.calibration.judgement import Judgement, judge, too_large
 from crosscheck.calibration.probability import all_scores, probabilities
 from crosscheck.calibration.refits import Found
@@ -151,6 +152,33 @@ def test_a_field_beside_the_best_set_alone_makes_it_many() -> None:
     classes = probabilities(all_scores(none), none.best.names, NAMES, fitted=none.refits)
     said = judge(none, classes, 1.0, 1.0, beside=6.0)
     assert (said.verdict, said.sure) == (DiagnosisVerdict.MANY_EFFECTS, ())
+
+
+def test_a_field_in_the_place_of_members_is_something_unknown() -> None:
+    found = found_of({"": -9000.0, "a": -30.0, "b": -8970.0, "ab": 0.0})
+    classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
+    here = Instead(6.0, frozenset("b"), "", {"a": 800.0})
+
+    def said(instead: Instead, of: Found = found, doubted: Names = frozenset()) -> Judgement:
+        return judge(of, classes, -5.0, 1.0, doubted=doubted, instead=instead)
+
+    assert said(here).verdict is DiagnosisVerdict.UNKNOWN_EFFECT
+    assert (said(here).sure, said(here).imitated) == (("a",), here)
+    assert said(replace(here, odds=4.0)).sure == ("a", "b")
+    # of several that stay none is, nor what is worth little, has many parameters or hardly happens
+    assert said(replace(here, worth={"a": 800.0, "c": 80.0})).sure == ()
+    assert said(replace(here, worth={"a": 20.0})).sure == ()
+    grown = replace(found.scores.gram, groups={**found.scores.gram.groups, "a": LARGE})
+    large = replace(found, scores=replace(found.scores, gram=grown))
+    assert said(here, large).sure == ()
+    assert said(here, doubted=frozenset("a")).sure == ()
+    assert said(replace(here, worth={"a": 800.0, "c": 1.0})).sure == ("a",)
+    # where runs left out are off, too, nothing is said of what imitates what unless one is sure
+    far = judge(found, classes, -5.0, 9.0, instead=here)
+    assert (far.sure, far.imitated) == (("a",), here)
+    far = judge(found, classes, -5.0, 9.0, instead=replace(here, worth={"a": 20.0}))
+    assert (far.verdict, far.sure) == (DiagnosisVerdict.UNKNOWN_EFFECT, ())
+    assert far.imitated is None
 
 
 def test_a_large_set_of_large_groups_is_a_calibration() -> None:

@@ -11,6 +11,7 @@ import pytest
 from made_data import COGIRO, measured, term
 
 import crosscheck
+from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.verdict import is_clear
 from crosscheck.fit.possible import hardly_happens
 from crosscheck.fit.reasons import Reason, Why
@@ -108,8 +109,9 @@ def test_what_the_steps_leave_open_is_looked_at_in_sets() -> None:
     unlikely: Any = SimpleNamespace(**{**vars(listed), "probability": 0.9})
     first, more = (("external_wrench",), 1.0), (("stiffness", "platform_mass"), 0.99)
     unsure: Any = SimpleNamespace(why_not=Reason(Why.NOT_SURE, p=0.6))
-    for missing, classes, candidates, clear in (
+    for missing, classes, candidates, clear, *imitated in (
         ([listed], (first,), (), True),
+        ([listed], (first,), (), False, 0.6),
         ([large, large, listed], (first,), (), True),
         ([large, large, large], (first,), (), False),
         ([listed], (first, more), (), False),
@@ -118,7 +120,6 @@ def test_what_the_steps_leave_open_is_looked_at_in_sets() -> None:
         ([], (), (unsure,), False),
         ([], (), (SimpleNamespace(why_not=Reason(Why.UNSEEN)),), True),
     ):
-        steps: Any = SimpleNamespace(
-            missing=missing, chances=SimpleNamespace(classes=classes), candidates=candidates
-        )
+        chances = Chances({}, classes, None, None, imitated=sum(imitated))
+        steps: Any = SimpleNamespace(missing=missing, chances=chances, candidates=candidates)
         assert is_clear(steps) is clear

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from crosscheck.calibration.instead import Instead
+from crosscheck.calibration.judgement import Judgement
 from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.explained import _sentence
 from crosscheck.diagnosis.words import hints_of, noise_left, one_of
@@ -26,7 +28,7 @@ def test_effects_of_which_it_is_one(members: list[str], words: str) -> None:
 def test_what_is_probable_but_not_sure_is_no_none_of_all() -> None:
     """A class at 88 % stood beside "none of 26 effects tried explains any of it"."""
     classes = ((("anchor_point_error", "exit_point_error"), 0.88), (("creep",), 0.3))
-    nothing = DiagnosisVerdict.NO_EFFECT_MISSING
+    nothing = Judgement(DiagnosisVerdict.NO_EFFECT_MISSING, (), 0.0)
     told = _sentence(nothing, [], 26, Chances({}, classes, None, None))
     assert "a hint of anchor_point_error or exit_point_error (88 %), too weak to be sure" in told
     assert "none of 26" not in told and "creep" not in told
@@ -48,3 +50,12 @@ def test_what_is_left_beside_what_was_found_may_hide_something() -> None:
         "stiffness or platform_mass", "creep",
     ]  # fmt: skip
     assert hints_of(chances, ["tracker_frame", "platform_mass"], ["stiffness"]) == {}
+
+
+def test_what_imitates_something_unknown_is_told_with_where_that_shows() -> None:
+    imitated = Instead(9.0, frozenset({"length_scale", "creep"}), "the position alone")
+    said = Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, (), 0.0, imitated=imitated)
+    assert _sentence(said, [], 26, Chances({}, (), None, None)) == (
+        "Likelier than creep + length_scale, which can imitate it, is an effect that is not among "
+        "them: smooth over the workspace, in the position alone. 26 effects were tried."
+    )

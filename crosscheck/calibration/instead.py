@@ -1,0 +1,149 @@
+"""A smooth field in the place of effects: something unknown that known ones imitate.
+
+Beside the best set a field has nothing left to explain where members of the set have taken in
+what nobody knows: a tracker's picture that widens is a length scale with drums out of round. So
+the field is asked in their place, too, for each kind of readings by itself: what acts on the
+platform moves all of them, what a tracker does wrong only some.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy import special
+
+from crosscheck.calibration.catalogue import widths_for
+from crosscheck.calibration.exact import own_readings
+from crosscheck.calibration.field import FIELD_WIDTHS, UNKNOWN, field_of
+from crosscheck.calibration.gram import ColumnGroup, Gram, Solved, averaging, gram_of
+from crosscheck.calibration.joint import JointFit, Setting
+from crosscheck.calibration.linearised import groups_of, linearised
+from crosscheck.calibration.sets import Names, Scores
+from crosscheck.fit.problem import KINDS
+
+
+@dataclass(frozen=True, eq=False)
+class Instead:
+    """A field in the place of some members of a set.
+
+    Attributes:
+        odds: ln odds of it with the rest of the set over the whole set, an unknown effect thought
+            as likely as none; -inf of a set without members of its own.
+        replaced: the members in whose place it is.
+        seen: the readings in which it shows, in words.
+        worth: ln odds that the other members are worth beside it.
+    """
+
+    odds: float
+    replaced: Names
+    seen: str = ""
+    worth: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def chance(self) -> float:
+        """That it is there, and they are not; none where it is not likelier than they are."""
+        return float(special.expit(self.odds - UNKNOWN)) if self.odds > UNKNOWN else 0.0
+
+
+NOT_ASKED = Instead(-np.inf, frozenset())
+
+
+def field_instead(
+    setting: Setting, joint: JointFit, widths: Mapping[str, float], scores: Scores
+) -> Instead:
+    """The members of a set in whose place a field explains most.
+
+    They are dropped one after the other, each time the one whose loss costs least beside a field.
+
+    Args:
+        setting, joint: the data, and the set as fitted.
+        widths: prior width of each member.
+        scores: says what sets were thought of before, and which effects the model has.
+    """
+    sets, best = _Sets.of(setting, joint, widths, scores), NOT_ASKED
+    whole = rest = frozenset(joint.terms.names)
+    without = sets.whole(whole)
+    while sets.fields and rest - scores.always:
+        tried = {name: sets.beside(rest - {name}) for name in sorted(rest - scores.always)}
+        name = max(tried, key=lambda n: tried[n][0])
+        rest, (total, seen) = rest - {name}, tried[name]
+        if total - without > best.odds:
+            best = Instead(total - without, whole - rest, seen)
+    if not best.chance:
+        return best
+    rest, total = whole - best.replaced, without + best.odds
+    worth = {n: total - sets.beside(rest - {n})[0] for n in sorted(rest - scores.always)}
+    return replace(best, worth=worth)
+
+
+@dataclass(frozen=True, eq=False)
+class _Sets:
+    """Subsets of a set in the linear model about it, with and without a field.
+
+    Attributes:
+        gram, fields: of its members and the fields; names of these.
+        scores: what sets were thought of before.
+        chosen: width of each member.
+        averaged: what averaging over these changes. It stays in subsets, as the widths do: wider
+            ones would take in, each by itself, what only those left out explain.
+    """
+
+    gram: Gram
+    fields: list[str]
+    scores: Scores
+    chosen: Mapping[str, float]
+    averaged: Mapping[str, float]
+
+    @classmethod
+    def of(
+        cls, setting: Setting, joint: JointFit, widths: Mapping[str, float], scores: Scores
+    ) -> _Sets:
+        """Of a set as fitted."""
+        gram, fields = _with_fields(setting, joint)
+        chosen = {n: widths.get(n, 1.0) for n in gram.names if n in joint.terms.names}
+        solved = gram.solved(chosen)
+        averaged = {name: averaging(solved, name) for name in chosen}
+        return cls(gram, fields, scores, chosen, averaged)
+
+    def whole(self, names: Names) -> float:
+        """ln evidence and prior of a subset."""
+        return self._solved(names).log_evidence + self._before(names)
+
+    def beside(self, names: Names) -> tuple[float, str]:
+        """The same with a field, and where that shows."""
+        solved = self._solved(names)
+        gains = [solved.gain(name) for name in self.fields]
+        gain = float(special.logsumexp(gains) - np.log(len(gains)))
+        total = solved.log_evidence + self._before(names) + gain
+        return float(total), self.fields[int(np.argmax(gains))]
+
+    def _solved(self, names: Names) -> Solved:
+        return self.gram.solved({n: w for n, w in self.chosen.items() if n in names})
+
+    def _before(self, names: Names) -> float:
+        """ln prior, and what averaging and shapes change."""
+        price = sum(self.scores.price(name) for name in names)
+        return self.scores.log_prior(names) - price + sum(self.averaged.get(n, 0.0) for n in names)
+
+
+def _with_fields(setting: Setting, joint: JointFit) -> tuple[Gram, list[str]]:
+    """Normal equations of a fit's own effects and of fields; the names of these."""
+    linear, groups = linearised(setting, joint), groups_of(joint, widths_for)
+    columns = field_of(setting.problem, joint.state.prediction.pose[:, :3])
+    if not columns.shape[1]:
+        return gram_of(linear.x, own_readings(linear, joint, groups), groups), []
+    kind_of = setting.chain.kind[np.argmax(columns != 0.0, axis=0)]
+    first, fields = linear.x.shape[1], dict[str, ColumnGroup]()
+    for kind in np.unique(kind_of):
+        own = first + np.flatnonzero(kind_of == kind)
+        fields[f"the {KINDS[kind].name} alone"] = ColumnGroup(own, np.array(FIELD_WIDTHS))
+    if len(fields) > 1:
+        every = first + np.arange(len(kind_of))
+        fields["all readings"] = ColumnGroup(every, np.array(FIELD_WIDTHS))
+    # what was measured independently comes last, and no field moves it
+    known = np.zeros((len(linear.y) - len(columns), columns.shape[1]))
+    white = np.concatenate([joint.whitened(setting.chain, columns), known])
+    y = own_readings(linear, joint, groups)
+    return gram_of(np.concatenate([linear.x, white], axis=1), y, groups | fields), list(fields)
