@@ -43,7 +43,12 @@ class Chances:
 
     @property
     def words(self) -> str:
-        """What these data can show of effects that nobody knows, a sentence."""
+        """What these data can show of effects that nobody knows, a sentence; "" where one is there.
+
+        It may be of any size that known effects can imitate.
+        """
+        if self.imitated:
+            return ""
         if self.shown is None:
             return "these data could not show an unknown effect of any size: the catalogue fits all"
         return (
@@ -74,7 +79,8 @@ def chances_of(sought: Sought) -> Chances:
     """The probabilities of compared sets."""
     classes = sought.classes
     pairs = zip(classes.members, classes.probability, strict=True)
+    imitated = sought.judgement.imitated
     return Chances(
         classes.effect, tuple(pairs), sought.field_odds, sought.calibration.together, sought.shown,
-        classes.further,
+        classes.further, 0.0 if imitated is None else imitated.chance,
     )  # fmt: skip

@@ -88,7 +88,7 @@ def _of_search(found: Diagnosis) -> dict[str, Any]:
 def _unknown_facts(found: Diagnosis) -> list[tuple[str, str]]:
     """How large what is left is, and what could not have been seen."""
     out = [] if found.left is None else [("left beyond noise", found.left.words)]
-    if found.chances is not None:
+    if found.chances is not None and found.chances.words:
         shown = found.chances.shown
         words = "at no size" if shown is None else f"from {rms_words(shown)} rms on"
         out.append(("a smooth unknown effect shows", words))

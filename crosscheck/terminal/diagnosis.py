@@ -38,7 +38,7 @@ def print_diagnosis(found: Diagnosis, out: Path, console: Console | None = None)
         console.print(_way(found))
         if found.left is not None:
             say(console, f"left beyond noise: {found.left.words}", "dim")
-        if found.chances is not None:
+        if found.chances is not None and found.chances.words:
             say(console, f"note: {found.chances.words}", "dim")
         for finding in found.missing:
             _print_finding(console, finding, probability_name(found.verdict))

@@ -96,6 +96,7 @@ def test_a_picture_that_widens_is_unknown_and_what_is_hidden_beside_it_named() -
     assert "the position alone" in found.sentence and found.where
     assert found.chances is not None and found.chances.field is not None
     assert found.chances.field > UNKNOWN and found.chances.shown is None
+    assert found.chances.words == "" and found.chances.imitated > 0.9
     assert found.chances.of("pulley_radius") > 0.95 > 0.05 > found.chances.of("length_scale")
 
 
