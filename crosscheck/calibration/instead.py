@@ -55,7 +55,8 @@ def field_instead(
 ) -> Instead:
     """The members of a set in whose place a field explains most.
 
-    They are dropped one after the other, each time the one whose loss costs least beside a field.
+    What is worth nothing in the set itself is left out first. The others are dropped one after
+    the other, each time the one whose loss costs least beside a field.
 
     Args:
         setting, joint: the data, and the set as fitted.
@@ -63,7 +64,7 @@ def field_instead(
         scores: says what sets were thought of before, and which effects the model has.
     """
     sets, best = _Sets.of(setting, joint, widths, scores), NOT_ASKED
-    whole = rest = frozenset(joint.terms.names)
+    whole = rest = sets.needed(frozenset(joint.terms.names))
     without = sets.whole(whole)
     while sets.fields and rest - scores.always:
         tried = {name: sets.beside(rest - {name}) for name in sorted(rest - scores.always)}
@@ -107,17 +108,29 @@ class _Sets:
         averaged = {name: averaging(solved, name) for name in chosen}
         return cls(gram, fields, scores, chosen, averaged)
 
+    def needed(self, names: Names) -> Names:
+        """A subset without the members that cost more than they explain."""
+        while some := sorted(names - self.scores.always):
+            fewer = max((names - {name} for name in some), key=self.whole)
+            if self.whole(fewer) < self.whole(names):
+                break
+            names = fewer
+        return names
+
     def whole(self, names: Names) -> float:
         """ln evidence and prior of a subset."""
         return self._solved(names).log_evidence + self._before(names)
 
     def beside(self, names: Names) -> tuple[float, str]:
         """The same with a field, and where that shows."""
-        solved = self._solved(names)
-        gains = [solved.gain(name) for name in self.fields]
-        gain = float(special.logsumexp(gains) - np.log(len(gains)))
-        total = solved.log_evidence + self._before(names) + gain
-        return float(total), self.fields[int(np.argmax(gains))]
+        own, every = self._solved(names), list[float]()
+        for name in self.fields:
+            width = self.gram.groups[name].widths[int(np.argmax(own.gains(name)))]
+            # solved with it: a member that cannot be negative may be so without
+            there = self.gram.solved({**own.chosen, name: float(width)})
+            every.append(there.log_evidence + averaging(there, name))
+        total = float(special.logsumexp(every) - np.log(len(every))) + self._before(names)
+        return total, self.fields[int(np.argmax(every))]
 
     def _solved(self, names: Names) -> Solved:
         return self.gram.solved({n: w for n, w in self.chosen.items() if n in names})

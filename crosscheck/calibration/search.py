@@ -104,7 +104,7 @@ def seek(
     sizes = {name: parameters_told(catalogue.start(name).layout) for name in effects}
     best = found.best
     instead = field_instead(setting, best.joint, best.widths, found.scores)
-    classes = _classes(found, best.names, sizes).without(instead.replaced, instead.chance)
+    classes = _classes(found, best.names, sizes)
     strange = strange or is_strange(setting, best.joint, known)
     beside = log_odds(setting, best.joint, all_stated)
     said = judge(found, classes, odds, surprise, strange, _doubted(found), beside, instead)
@@ -114,13 +114,15 @@ def seek(
         # what could stand in the place of what is listed, not of a larger set
         further = {**in_place(found, listed, classes, problem.robot, terms), listed: alone.score}
         classes = _classes(found, listed, sizes, further)
+    if said.imitated is not None:
+        odds = max(odds, instead.odds)
         classes = classes.without(instead.replaced, instead.chance)
     free = free_of(joint)
     # one of that size would have shown: not said where one may have been taken in
     shown = None if said.more or said.imitated else shown_from(
         setting, joint, joint.jacobian * free, joint.width * free
     )  # fmt: skip
-    return Sought(whole, found, catalogue, classes, max(odds, instead.odds), shown, said)
+    return Sought(whole, found, catalogue, classes, odds, shown, said)
 
 
 def _catalogue(problem: Problem, terms: Terms, whole: Calibration) -> Catalogue:

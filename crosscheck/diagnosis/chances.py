@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from crosscheck.calibration.all_effects import JointErrors
+from crosscheck.calibration.instead import Instead
 from crosscheck.calibration.search import Sought
 from crosscheck.fit.problem import Rms
 from crosscheck.fit.words import rms_words
@@ -30,7 +31,7 @@ class Chances:
         further: of effects that share a class with one needed more, that both are missing.
         shown: rms size by kind of reading from which on a smooth effect that nobody knows would
             show beside the catalogue; None where it could hide at any size.
-        imitated: that some of what was found imitates something smooth that no effect explains.
+        imitated: something smooth that no effect explains, and some of what was found imitates.
     """
 
     effect: dict[str, float]
@@ -39,7 +40,7 @@ class Chances:
     together: JointErrors | None
     shown: Rms | None = None
     further: Mapping[str, float] = dataclasses.field(default_factory=dict)
-    imitated: float = 0.0
+    imitated: Instead | None = None
 
     @property
     def words(self) -> str:
@@ -47,7 +48,7 @@ class Chances:
 
         It may be of any size that known effects can imitate.
         """
-        if self.imitated:
+        if self.imitated is not None:
             return ""
         if self.shown is None:
             return "these data could not show an unknown effect of any size: the catalogue fits all"
@@ -63,6 +64,11 @@ class Chances:
 
     def as_json(self) -> dict[str, Any]:
         """``catalogue``, ``classes``, ``calibrated`` and ``unknown`` of ``diagnosis.json``."""
+        unknown: dict[str, Any] = {"log_odds": self.field, "shown_from": self.shown}
+        if self.imitated is not None:
+            unknown |= {
+                "instead_of": sorted(self.imitated.replaced), "seen_in": self.imitated.seen,
+            }  # fmt: skip
         place = {n: k for k, (members, _p) in enumerate(self.classes) for n in members}
         return {
             "catalogue": [
@@ -70,7 +76,7 @@ class Chances:
                 for name, p in sorted(self.effect.items(), key=lambda item: -item[1])
             ],
             "classes": [{"members": list(m), "probability": p} for m, p in self.classes],
-            "unknown": {"log_odds": self.field, "shown_from": self.shown},
+            "unknown": unknown,
             **({} if self.together is None else {"calibrated": self.together.as_json()}),
         }
 
@@ -79,8 +85,7 @@ def chances_of(sought: Sought) -> Chances:
     """The probabilities of compared sets."""
     classes = sought.classes
     pairs = zip(classes.members, classes.probability, strict=True)
-    imitated = sought.judgement.imitated
     return Chances(
         classes.effect, tuple(pairs), sought.field_odds, sought.calibration.together, sought.shown,
-        classes.further, 0.0 if imitated is None else imitated.chance,
+        classes.further, sought.judgement.imitated,
     )  # fmt: skip

@@ -196,6 +196,8 @@ def _not_listed(way: Search, chances: Chances) -> list[NotListed]:
 
 def _why_not(way: Search, chances: Chances, c: Candidate) -> Reason:
     p = chances.effect.get(c.name, 0.0)
+    if chances.imitated is not None and c.name in chances.imitated.replaced:
+        return Reason(Why.MAY_IMITATE)
     for members, _p in chances.classes:
         first = next((m for m in members if m in way.found), None)
         if c.name in members and first is not None:

@@ -138,4 +138,11 @@ def _with_equals(
     effect = dict(found.effect)
     for members in classes:
         effect.update({m: pairs[members] / len(members) for m in members if m in effect})
-    return Chances(effect, tuple(pairs.items()), None, None, shown, imitated=instead.chance)
+    return Chances(
+        effect,
+        tuple(pairs.items()),
+        None,
+        None,
+        shown,
+        imitated=instead if instead.chance else None,
+    )

@@ -133,7 +133,7 @@ def is_clear(steps: Diagnosis) -> bool:
     """
     if too_large(len(one.layout) for one in steps.missing):
         return False
-    if steps.chances is not None and steps.chances.imitated:
+    if steps.chances is not None and steps.chances.imitated is not None:
         return False
     listed = {effect.effect for effect in steps.missing}
     classes = () if steps.chances is None else steps.chances.classes

@@ -40,6 +40,7 @@ class Why(Enum):
     NOT_SURE = "probable ({p:.2g}), but not sure"
     IMPROBABLE = "explains too little (probability {p:.2g})"
     IMITATES = "not sure: its {parameters} can imitate much of what no effect explains"
+    MAY_IMITATE = "not sure: likelier it imitates what no effect explains"
     EXPLAINS_PART = "explains a part, but structure remains: not sure"
 
 

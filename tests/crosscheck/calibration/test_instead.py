@@ -11,8 +11,8 @@ from scipy import special, stats
 
 from crosscheck.calibration.colour import WHITE, chain_of
 from crosscheck.calibration.field import FIELD_WIDTHS, UNKNOWN, field_of
-from crosscheck.calibration.gram import gram_of
-from crosscheck.calibration.instead import NOT_ASKED, field_instead
+from crosscheck.calibration.gram import ColumnGroup, gram_of
+from crosscheck.calibration.instead import NOT_ASKED, _Sets, field_instead
 from crosscheck.calibration.joint import JointFit, Setting, settle
 from crosscheck.calibration.priors import widths_of
 from crosscheck.calibration.probability import Classes
@@ -21,7 +21,7 @@ from crosscheck.calibration.sets import Scores
 from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.fit.evidence import WIDTHS
 from crosscheck.fit.prepare import prepare
-from crosscheck.fit.reasons import DiagnosisVerdict
+from crosscheck.fit.reasons import DiagnosisVerdict, Why
 from crosscheck.fit.state import evaluate
 from crosscheck.measurements.data import Measurements
 from seecr.effects import Term, Terms
@@ -96,7 +96,11 @@ def test_a_picture_that_widens_is_unknown_and_what_is_hidden_beside_it_named() -
     assert "the position alone" in found.sentence and found.where
     assert found.chances is not None and found.chances.field is not None
     assert found.chances.field > UNKNOWN and found.chances.shown is None
-    assert found.chances.words == "" and found.chances.imitated > 0.9
+    assert found.chances.words == "" and found.chances.imitated is not None
+    unknown = found.as_json()["unknown"]
+    assert unknown["seen_in"] == "the position alone" and "length_scale" in unknown["instead_of"]
+    (why,) = (c.why_not for c in found.candidates if c.effect == "length_scale")
+    assert why is not None and why.why is Why.MAY_IMITATE
     assert found.chances.of("pulley_radius") > 0.95 > 0.05 > found.chances.of("length_scale")
 
 
@@ -120,3 +124,37 @@ def test_equals_of_what_imitates_are_doubted_as_well() -> None:
     assert less.effect == pytest.approx({"a": 0.99, "b": 0.15, "c": 0.1, "d": 0.1})
     assert less.further == pytest.approx({"c": 0.125}) and less.members == classes.members
     assert classes.without(frozenset(), 0.75).probability == classes.probability
+
+
+def test_a_member_that_only_the_field_leaves_positive_is_weighed_beside_it() -> None:
+    """Without, what nobody knows pushes it far below nothing, which costs what it should not."""
+    random = np.random.default_rng(3)
+    x = 30.0 * random.standard_normal((80, 2))
+    x[:, 1] = 0.8 * x[:, 0] + 0.2 * x[:, 1]
+    field = x[:, :1] * 1.0 + 0.1 * random.standard_normal((80, 1))
+    groups = {
+        "pulley_radius": ColumnGroup(np.array([1]), np.array([1.0]), one_sided=True),
+        "field": ColumnGroup(np.array([2]), np.array([1.0])),
+    }
+    y = x[:, 1] - 3.0 * field[:, 0] + random.standard_normal(80)
+    gram = gram_of(np.concatenate([x, field], axis=1), y, groups)
+    alone, both = {"pulley_radius": 1.0}, {"pulley_radius": 1.0, "field": 1.0}
+    assert gram.solved(alone).values[0] < -0.5 < 0.5 < gram.solved(both).values[0]
+    sets = _Sets(gram, ["field"], Scores(gram, 26), alone, {"pulley_radius": 0.0})
+    names = frozenset(alone)
+    expected = gram.solved(both).log_evidence + sets.scores.log_prior(names)
+    assert sets.beside(names)[0] == pytest.approx(expected, abs=1e-6)
+
+
+def test_members_worth_nothing_are_left_out_first() -> None:
+    """Each would have its prior counted for what stands in its place."""
+    random = np.random.default_rng(4)
+    x = random.standard_normal((200, 3))
+    names = ("a", "b", "c")
+    groups = {n: ColumnGroup(np.array([k]), np.array([1.0])) for k, n in enumerate(names)}
+    gram = gram_of(x, 3.0 * x[:, 0] + random.standard_normal(200), groups)
+    chosen = dict.fromkeys(names, 1.0)
+    sets = _Sets(gram, [], Scores(gram, 26), chosen, dict.fromkeys(names, 0.0))
+    assert sets.needed(frozenset(names)) == {"a"}
+    kept = replace(sets, scores=Scores(gram, 26, frozenset("b")))
+    assert kept.needed(frozenset(names)) == {"a", "b"}

@@ -11,6 +11,7 @@ import pytest
 from made_data import COGIRO, measured, term
 
 import crosscheck
+from crosscheck.calibration.instead import NOT_ASKED
 from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.verdict import is_clear
 from crosscheck.fit.possible import hardly_happens
@@ -111,7 +112,7 @@ def test_what_the_steps_leave_open_is_looked_at_in_sets() -> None:
     unsure: Any = SimpleNamespace(why_not=Reason(Why.NOT_SURE, p=0.6))
     for missing, classes, candidates, clear, *imitated in (
         ([listed], (first,), (), True),
-        ([listed], (first,), (), False, 0.6),
+        ([listed], (first,), (), False, NOT_ASKED),
         ([large, large, listed], (first,), (), True),
         ([large, large, large], (first,), (), False),
         ([listed], (first, more), (), False),
@@ -120,6 +121,6 @@ def test_what_the_steps_leave_open_is_looked_at_in_sets() -> None:
         ([], (), (unsure,), False),
         ([], (), (SimpleNamespace(why_not=Reason(Why.UNSEEN)),), True),
     ):
-        chances = Chances({}, classes, None, None, imitated=sum(imitated))
+        chances = Chances({}, classes, None, None, imitated=next(iter(imitated), None))
         steps: Any = SimpleNamespace(missing=missing, chances=chances, candidates=candidates)
         assert is_clear(steps) is clear
