@@ -85,7 +85,7 @@ def fit_everything(
         joint = _joined(frozen, joint, start.terms, added)
     if any(a.name in joint.terms for a in later):
         setting = frozen
-    best = widened(setting, joint)
+    best = to_its_end(setting, widened(setting, joint))
     there = [at_null(best.terms[a.name]) for a in later if a.name in best.terms]
     others = [one for one in looked if one.term.name not in best.terms]
     prices = {one.term.name: one.price for one in others}
@@ -118,6 +118,22 @@ def with_noise(setting: Setting, joint: JointFit) -> JointFit:
         joint = settle(setting, joint.state, joint.width, colour, _STEPS, joint.jacobian)
         if float(np.max(change)) < _SETTLED:
             break
+    return joint
+
+
+def to_its_end(setting: Setting, joint: JointFit) -> JointFit:
+    """The fit, or where it goes on to from derivatives of its own.
+
+    A fit begins with derivatives from nearby. Where a cable goes slack in between they are others
+    here, and what looked like the least may be none.
+    """
+    for _ in range(_ROUNDS):
+        here = cost(setting, joint.colour, joint.weight, joint.state, joint.width)
+        further = settle(setting, joint.state, joint.width, joint.colour, _STEPS)
+        there = cost(setting, joint.colour, joint.weight, further.state, joint.width)
+        if here - there < 2.0 * _SURE:
+            break
+        joint = with_noise(setting, further)
     return joint
 
 

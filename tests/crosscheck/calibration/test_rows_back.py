@@ -12,7 +12,7 @@ from crosscheck.calibration.colour import WHITE, chain_of
 from crosscheck.calibration.joint import JointFit, Setting, tempered
 from crosscheck.calibration.priors import widths_of
 from crosscheck.calibration.robust import outliers
-from crosscheck.calibration.stages import with_noise, with_rows_back, worth
+from crosscheck.calibration.stages import to_its_end, with_noise, with_rows_back, worth
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.state import evaluate
 from crosscheck.given import considered
@@ -71,3 +71,16 @@ def test_what_is_far_off_stays_so(data: Measurements) -> None:
     setting, joint = fitted(replace(data, position=position))
     better = with_rows_back(setting, joint)
     assert written_off(setting, better) == far
+
+
+@pytest.mark.slow
+def test_a_fit_that_ended_by_derivatives_from_elsewhere_goes_on(data: Measurements) -> None:
+    """Where cables go slack in between, it stands anywhere and says that it settled."""
+    setting, joint = fitted(data)
+    ended = to_its_end(setting, with_rows_back(setting, joint))
+    assert to_its_end(setting, ended) is ended
+    null, there = Terms(Term(a, a.null) for a in LAYOUTS).vector, ended.terms
+    before = there.with_vector(null + 0.9 * (there.vector - null))
+    stuck = replace(ended, state=evaluate(setting.problem, before, setting.factor, ended.state))
+    assert stuck.settled and stuck.state.chi2 > 10.0 * ended.state.chi2
+    assert to_its_end(setting, stuck).state.chi2 < 1.1 * ended.state.chi2
