@@ -173,8 +173,7 @@ def best_widths(gram: Gram, start: Widths, sweeps: int = 3, price: float = 0.0) 
 def averaged(gram: Gram, chosen: Widths) -> float:
     """ln Z of a set, averaged over the width of each member about the best ones."""
     solved = gram.solved(chosen)
-    total = solved.log_evidence
-    return total + sum(averaging(solved, name) for name in chosen)
+    return solved.log_evidence + sum(averaging(solved, name) for name in chosen)
 
 
 def averaging(solved: Solved, name: str) -> float:

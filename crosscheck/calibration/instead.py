@@ -144,9 +144,10 @@ class _Sets:
 def _with_fields(setting: Setting, joint: JointFit) -> tuple[Gram, list[str]]:
     """Normal equations of a fit's own effects and of fields; the names of these."""
     linear, groups = linearised(setting, joint), groups_of(joint, widths_for)
+    y = own_readings(linear, joint, groups)
     columns = field_of(setting.problem, joint.state.prediction.pose[:, :3])
     if not columns.shape[1]:
-        return gram_of(linear.x, own_readings(linear, joint, groups), groups), []
+        return gram_of(linear.x, y, groups), []
     kind_of = setting.chain.kind[np.argmax(columns != 0.0, axis=0)]
     first, fields = linear.x.shape[1], dict[str, ColumnGroup]()
     for kind in np.unique(kind_of):
@@ -158,5 +159,4 @@ def _with_fields(setting: Setting, joint: JointFit) -> tuple[Gram, list[str]]:
     # what was measured independently comes last, and no field moves it
     known = np.zeros((len(linear.y) - len(columns), columns.shape[1]))
     white = np.concatenate([joint.whitened(setting.chain, columns), known])
-    y = own_readings(linear, joint, groups)
     return gram_of(np.concatenate([linear.x, white], axis=1), y, groups | fields), list(fields)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -12,12 +14,12 @@ from scipy import special, stats
 from crosscheck.calibration.colour import WHITE, chain_of
 from crosscheck.calibration.field import FIELD_WIDTHS, UNKNOWN, field_of
 from crosscheck.calibration.gram import ColumnGroup, gram_of
-from crosscheck.calibration.instead import NOT_ASKED, _Sets, field_instead
+from crosscheck.calibration.instead import NOT_ASKED, Instead, _Sets, _with_fields, field_instead
 from crosscheck.calibration.joint import JointFit, Setting, settle
 from crosscheck.calibration.priors import widths_of
 from crosscheck.calibration.probability import Classes
 from crosscheck.calibration.search import seek
-from crosscheck.calibration.sets import Scores
+from crosscheck.calibration.sets import Scores, log_prior
 from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.fit.evidence import WIDTHS
 from crosscheck.fit.prepare import prepare
@@ -25,6 +27,7 @@ from crosscheck.fit.reasons import DiagnosisVerdict, Why
 from crosscheck.fit.state import evaluate
 from crosscheck.measurements.data import Measurements
 from seecr.effects import Term, Terms
+from seecr.effects.knowledge import Knowledge
 from seecr.mjcf import load_robot
 from seecr.pose import Array
 
@@ -158,3 +161,65 @@ def test_members_worth_nothing_are_left_out_first() -> None:
     assert sets.needed(frozenset(names)) == {"a"}
     kept = replace(sets, scores=Scores(gram, 26, frozenset("b")))
     assert kept.needed(frozenset(names)) == {"a", "b"}
+    priced = replace(sets, scores=Scores(gram, 26, prices={"a": 1e4}))
+    assert "a" not in priced.needed(frozenset(names))
+
+
+def toy(worthless: float = 0.0) -> tuple[_Sets, Array, Array]:
+    """Sets in whose truth a field acts, which "a" and "b" imitate, and "c", and "d" if asked."""
+    random = np.random.default_rng(5)
+    x = 4.0 * random.standard_normal((60, 5))
+    x[:, 4] = x[:, 0] - x[:, 1] + 0.4 * random.standard_normal(60)
+    names = ("a", "b", "c", "d", "field")
+    groups = {n: ColumnGroup(np.array([k]), np.array([1.0])) for k, n in enumerate(names)}
+    y = 2.0 * x[:, 4] + 0.4 * x[:, 2] + worthless * x[:, 3] + random.standard_normal(60)
+    chosen = dict.fromkeys(names[:4], 1.0)
+    gram = gram_of(x, y, groups)
+    return _Sets(gram, ["field"], Scores(gram, 26), chosen, dict.fromkeys(chosen, 0.0)), x, y
+
+
+def asked(sets: _Sets, monkeypatch: pytest.MonkeyPatch, **of: Any) -> Instead:
+    """`field_instead` of given sets."""
+    monkeypatch.setattr(_Sets, "of", lambda *_: sets)
+    joint = SimpleNamespace(terms=SimpleNamespace(names=tuple(sets.chosen)))
+    return field_instead(cast(Setting, None), cast(JointFit, joint), {}, sets.scores)
+
+
+def test_what_it_replaces_and_what_the_others_are_worth_are_those_of_the_covariances(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    sets, x, y = toy()
+    found = asked(sets, monkeypatch)
+
+    def total(*columns: int) -> float:
+        """ln density and prior: the fifth column is the field's, and counts for nothing."""
+        count = len([k for k in columns if k < 4])
+        return averaged_density(y, x[:, list(columns)], (1.0,)) + log_prior(count, 26)
+
+    assert found.replaced == {"a", "b"} and found.seen == "field" and found.chance > 0.9
+    assert found.odds == pytest.approx(total(2, 4) - total(0, 1, 2), abs=1e-6)
+    assert found.worth == pytest.approx({"c": total(2, 4) - total(4)}, abs=1e-6)
+
+
+def test_what_is_worth_nothing_is_not_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its prior would be counted for the field; beside one that explains it, it is kept."""
+    sets, _x, _y = toy()
+    with_all = sets.whole(frozenset("abcd"))
+    assert sets.whole(frozenset("abc")) > with_all + 2.0
+    assert "d" not in asked(sets, monkeypatch).worth
+    there = asked(toy(1.0)[0], monkeypatch)
+    assert there.replaced == {"a", "b"} and sorted(there.worth) == ["c", "d"]
+
+
+def test_no_field_moves_what_was_measured_independently() -> None:
+    alone = term(ROBOT, "tracker_scale", factor=1.003)
+    knowledge = replace(Knowledge.nothing(1), value=np.array([1.002]), stderr=np.array([1e-4]))
+    setting, joint = fitted(replace(alone, knowledge=knowledge))
+    gram, names = _with_fields(setting, joint)
+    own = gram.groups[names[-1]].columns
+    columns = field_of(setting.problem, joint.state.prediction.pose[:, :3])
+    assert names[-1] == "all readings" and len(own) == columns.shape[1]
+    assert gram.normal[np.ix_(own, own)] == pytest.approx(columns.T @ columns, abs=1e-9)
+    assert gram.normal[own, 0] == pytest.approx(columns.T @ joint.jacobian[:, 0], abs=1e-9)
+    # which does count as a reading of the effect itself
+    assert gram.normal[0, 0] > 1.01 * joint.jacobian[:, 0] @ joint.jacobian[:, 0]
