@@ -171,6 +171,12 @@ class Diagnosis(Result):
         return self.refusal is None or not self.refusal.unsolved
 
     @property
+    def within_catalogue(self) -> bool:
+        """Whether probabilities are the catalogue's alone: nothing unknown was weighed in them."""
+        imitated = self.chances is not None and self.chances.imitated is not None
+        return self.verdict is DiagnosisVerdict.UNKNOWN_EFFECT and not imitated
+
+    @property
     def terms(self) -> Terms:
         """The missing effects with their values, as a model for the next call."""
         return Terms(found.term for found in self.missing)

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from crosscheck.diagnosis.chances import PROBABLE, Chances
-from crosscheck.diagnosis.result import MissingEffect
+from crosscheck.diagnosis.result import Diagnosis, MissingEffect
 from crosscheck.fit.possible import largest_size
-from crosscheck.fit.reasons import DiagnosisVerdict
 from seecr.counted import counted
 from seecr.effects import Term
 
@@ -123,10 +122,9 @@ def probability_words(probability: float) -> str:
     return "< 1 %" if probability < 0.01 else f"{100.0 * probability:.0f} %"
 
 
-def probability_name(verdict: DiagnosisVerdict) -> str:
-    """What probabilities are: where something unknown acts, they are the catalogue's alone."""
-    unknown = verdict is DiagnosisVerdict.UNKNOWN_EFFECT
-    return "probability within the catalogue" if unknown else "probability"
+def probability_name(found: Diagnosis) -> str:
+    """What its probabilities are: of an effect, or of one if it is the catalogue's at all."""
+    return f"probability{' within the catalogue' if found.within_catalogue else ''}"
 
 
 WITHIN = (

@@ -41,8 +41,8 @@ def print_diagnosis(found: Diagnosis, out: Path, console: Console | None = None)
         if found.chances is not None and found.chances.words:
             say(console, f"note: {found.chances.words}", "dim")
         for finding in found.missing:
-            _print_finding(console, finding, probability_name(found.verdict))
-        if found.missing and found.verdict is DiagnosisVerdict.UNKNOWN_EFFECT:
+            _print_finding(console, finding, probability_name(found))
+        if found.missing and found.within_catalogue:
             say(console, f"note: {WITHIN}", "dim")
         _print_candidates(console, found)
     for line in found.measure_next:
