@@ -71,7 +71,8 @@ def fit_everything(
     frozen = replace(setting, frozen=True)
     if given is not None:
         joint = from_given(frozen, joint, start, given)
-    joint = with_rows_back(frozen, joint)
+    before, joint = joint, with_rows_back(frozen, joint)
+    back = joint
     if poor(joint):
         progress("trying effects alone", 0.4)
         firm = [a for a in at_once if a.name not in terms and a.name != TRACKER]
@@ -86,6 +87,9 @@ def fit_everything(
     if any(a.name in joint.terms for a in later):
         setting = frozen
     best = to_its_end(setting, widened(setting, joint))
+    if back is not before or joint is not back:
+        # rows had been written off that could be explained, or more can be explained now
+        best = with_rows_back(setting, best)
     there = [at_null(best.terms[a.name]) for a in later if a.name in best.terms]
     others = [one for one in looked if one.term.name not in best.terms]
     prices = {one.term.name: one.price for one in others}
