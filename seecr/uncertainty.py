@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seecr.cells import Where, number_of
+from seecr.cells import UNSEEN, Where, number_of
 from seecr.commands import Commands
 from seecr.counted import counted
 from seecr.effects import Terms
@@ -102,11 +102,12 @@ def covariance_of(model: Model) -> Array | None:
     Raises:
         InputFileError: correlations that are none.
     """
-    table = _kept_in(model)
-    if table is None or not model.names:
+    kept_in = _kept_in(model)
+    if kept_in is None or not model.names:
         return None
+    title, table = kept_in
     labels = [f"{effect}.{key}" for effect, key in model.terms.labels]
-    names = [str(name) for name in table.get(PARAMETERS, [])]
+    names = _names(model, title, table.get(PARAMETERS, []))
     kept = _correlations(model, names, table[CORRELATION])
     stderr = np.concatenate([model.stderr[name] for name in model.terms.names])
     out = np.eye(len(labels))
@@ -118,10 +119,29 @@ def covariance_of(model: Model) -> Array | None:
     return np.asarray(out * np.outer(known, known))
 
 
-def _kept_in(model: Model) -> Mapping[str, Any] | None:
-    """The table that keeps correlations."""
-    tables = (model.document.get(name) for name in (FIT, CALIBRATION))
-    return next((t for t in tables if isinstance(t, Mapping) and CORRELATION in t), None)
+def _names(model: Model, title: str, given: object) -> list[str]:
+    """Labels of the values whose correlations are kept; those of effects that are gone may stay."""
+    names = [str(name) for name in given] if isinstance(given, list) else []
+    for k, label in enumerate(names):
+        effect, _dot, key = label.partition(".")
+        wrong = label in names[:k]
+        if effect in model.names:
+            layout = model.terms[effect].layout
+            wrong = wrong or key not in (*layout.names, *layout.effect.renamed)
+        if wrong:
+            raise _file_of(model).error(
+                f"[{title}] {PARAMETERS}: expected each parameter once, as EFFECT.PARAMETER, got "
+                f"{label!r}; fit the model again",
+                key=title,
+            )
+    return names
+
+
+def _kept_in(model: Model) -> tuple[str, Mapping[str, Any]] | None:
+    """The table that keeps correlations, and its name."""
+    tables = ((name, model.document.get(name)) for name in (FIT, CALIBRATION))
+    own = ((name, t) for name, t in tables if isinstance(t, Mapping) and CORRELATION in t)
+    return next(own, None)
 
 
 def _in_full(
@@ -142,8 +162,15 @@ def _in_full(
             f"{got}; fit the model again",
             key=STDERR,
         )
-    every = (number_of(cell) for cell in given)
-    full = np.array([np.inf if one is None else one for one in every])[which]
+    every = [np.inf if cell == UNSEEN else number_of(cell) for cell in given]
+    for cell, one in zip(given, every, strict=True):
+        if one is None or not one >= 0.0:
+            raise _file_of(model).error(
+                f"{STDERR}: expected numbers from 0 on, or {UNSEEN!r}, got {cell!r}; fit the model "
+                "again",
+                key=STDERR,
+            )
+    full = np.array(every)[which]
     with np.errstate(invalid="ignore"):
         return np.where(np.abs(full - short) <= _SAME * short, full, short)
 

@@ -111,12 +111,25 @@ def test_correlations_that_are_none_are_one_sentence(tmp_path: Path, old: str, n
         spread_of(ROBOT, POSES, model)
 
 
+@pytest.mark.parametrize("label", ["stiffness.foo", "platform_mass.added_kg"])
+def test_correlations_are_of_parameters_that_there_are(tmp_path: Path, label: str) -> None:
+    """Without one, its value would go with nothing, and answers be said to be less sure."""
+    model = model_of(tmp_path, MODEL.replace('"stiffness.factor"', f'"{label}"'))
+    with pytest.raises(
+        InputFileError, match=rf"line 15: \[calibration\] parameters: .* got '{label}'"
+    ):
+        covariance_of(model)
+
+
 def test_errors_in_full_are_one_for_each_parameter(tmp_path: Path) -> None:
     full = MODEL.replace("correlation =", "stderr = [0.0201, 0.05]\ncorrelation =")
     with pytest.raises(InputFileError, match=r"line 17: stderr: expected 3 numbers, .* got 2"):
         covariance_of(model_of(tmp_path, full))
     with pytest.raises(InputFileError, match="stderr: expected 3 numbers, one for each"):
         covariance_of(model_of(tmp_path, full.replace("[0.0201, 0.05]", "0.05")))
+    for wrong in ('"a"', "-0.1", "nan", "inf"):
+        with pytest.raises(InputFileError, match="stderr: expected numbers from 0 on, or 'unseen'"):
+            covariance_of(model_of(tmp_path, full.replace("0.05]", f"0.05, {wrong}]")))
     # one of another size than stands with the value is not that of this value
     found = covariance_of(model_of(tmp_path, full.replace("0.05]", "0.0503, 1.0]")))
     assert found is not None
