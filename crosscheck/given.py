@@ -46,7 +46,7 @@ def considered(only: Iterable[str] = (), exclude: Iterable[str] = ()) -> frozens
         InputError: no effect of a name; the known ones are listed, nearest first.
         CrosscheckError: none is left.
     """
-    chosen, left_out = list(only), list(exclude)
+    chosen, left_out = _names(only, "only"), _names(exclude, "exclude")
     for name in (*chosen, *left_out):
         effect_named(name)
     names = frozenset(chosen or catalogue()) - frozenset(left_out)
@@ -56,6 +56,15 @@ def considered(only: Iterable[str] = (), exclude: Iterable[str] = ()) -> frozens
             f"{', '.join(left_out)}; leave one of them out"
         )
     return names
+
+
+def _names(given: Iterable[str], argument: str) -> list[str]:
+    """A list of names; one name stands for itself."""
+    if isinstance(given, str):
+        return [given]
+    if not isinstance(given, Iterable):
+        raise InputError(f"{argument}: expected names of effects, got {given!r}")
+    return list(given)
 
 
 def copy_robot(source: Path, copy: Path) -> None:

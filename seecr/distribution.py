@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 
+from seecr.arguments import numbers
 from seecr.errors import InputError
 from seecr.pose import LARGEST, Array, all_finite
 from seecr.robot import Robot
@@ -26,7 +27,7 @@ def tension_limits(robot: Robot, lowest: ArrayLike, highest: ArrayLike) -> tuple
     m = robot.n_cables
     bounds = []
     for name, value in (("lowest", lowest), ("highest", highest)):
-        array = np.asarray(value, float)
+        array = numbers(value, name)
         if array.shape not in ((), (m,)):
             raise InputError(f"{name} must be one number or ({m},) [N], got {array.shape}")
         bounds.append(np.array(np.broadcast_to(array, (m,))))

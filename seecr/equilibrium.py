@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from seecr.arguments import finite
 from seecr.commands import Commands
 from seecr.counted import counted
 from seecr.effects.checked import edit_setup
@@ -21,7 +22,7 @@ from seecr.robot import Robot
 from seecr.search import solve_setup
 from seecr.setup import Setup, plain_setup
 from seecr.solution import Solution
-from seecr.starts import commanded_poses, finite
+from seecr.starts import commanded_poses
 
 if TYPE_CHECKING:
     from seecr.model import GivenEffects

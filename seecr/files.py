@@ -123,6 +123,17 @@ class Toml:
         return next((number for number, line in lines if pattern.match(line)), None)
 
 
+def path_of(given: object, what: str) -> Path:
+    """A path; ``what`` says of which file.
+
+    Raises:
+        InputError: none.
+    """
+    if isinstance(given, str | Path):
+        return Path(given)
+    raise InputError(f"expected the path of {what}, got {type(given).__name__}")
+
+
 def read_toml(path: Path, expected: str) -> Toml:
     """A TOML file.
 

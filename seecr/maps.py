@@ -14,6 +14,7 @@ from queue import SimpleQueue
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seecr.arguments import finite
 from seecr.chances import asked_chance, check_chance, margins_with
 from seecr.commands import Commands
 from seecr.counted import counted
@@ -26,7 +27,7 @@ from seecr.model import GivenEffects, model_given
 from seecr.pose import Array
 from seecr.result import Record, Result
 from seecr.robot import Robot
-from seecr.starts import commanded_poses, finite
+from seecr.starts import commanded_poses
 from seecr.threads import run_parts
 from seecr.workspace import load_scale, tension_margin
 

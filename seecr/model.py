@@ -45,7 +45,7 @@ from seecr.counted import counted
 from seecr.data_reach import TABLE, DataReach
 from seecr.effects import Effect, Term, Terms, catalogue
 from seecr.errors import InputError, InputFileError
-from seecr.files import Toml, read_toml
+from seecr.files import Toml, path_of, read_toml
 from seecr.fingerprint import check_robot, fingerprint
 from seecr.given import GivenRobot, robot_of
 from seecr.pose import Array
@@ -229,7 +229,7 @@ def load_model(path: str | Path, robot: GivenRobot) -> Model:
         InputFileError: no such file, no TOML, made for another robot, an effect or parameter
             that is unknown, missing, given twice, no number or out of bounds.
     """
-    path, robot = Path(path), robot_of(robot)
+    path, robot = path_of(path, "a model"), robot_of(robot)
     toml = read_toml(path, _EXPECTED)
     text, document = toml.text, _with_comments(toml)
     if not document:

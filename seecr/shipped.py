@@ -6,6 +6,7 @@ import difflib
 from pathlib import Path
 
 from seecr.errors import InputError
+from seecr.files import path_of
 
 __all__ = ["CABLES", "model_names", "model_path", "robot_file"]
 
@@ -37,10 +38,10 @@ def model_path(name: str) -> Path:
     Raises:
         InputError: no robot of that name; the message lists those there are, nearest first.
     """
-    if name in model_names():
+    if str(name) in model_names():
         files = (place / name / f"{name}.xml" for place in _PLACES)
         return next(file for file in files if file.is_file())
-    raise InputError(f"shipped robot {name!r}: expected one of {_names_near(name)}")
+    raise InputError(f"shipped robot {name!r}: expected one of {_names_near(str(name))}")
 
 
 def robot_file(given: str | Path) -> Path:
@@ -50,7 +51,7 @@ def robot_file(given: str | Path) -> Path:
         InputError: neither, and without a file's ending; the message lists the names, nearest
             first.
     """
-    path = Path(given)
+    path = path_of(given, "an MJCF file, or the name of a shipped robot")
     if path.is_file() or path.suffix:
         return path
     if str(given) in model_names():

@@ -6,13 +6,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seecr import statics
+from seecr.arguments import finite
 from seecr.errors import InputError
 from seecr.joints import values_of_pose
-from seecr.pose import LARGEST, Array, all_finite
+from seecr.pose import Array
 from seecr.robot import Robot
 from seecr.tables import Tables
 
-__all__ = ["commanded_poses", "finite", "start_of"]
+__all__ = ["commanded_poses", "start_of"]
 
 
 def start_of(
@@ -25,24 +26,6 @@ def start_of(
         return statics.deviations(tables, start), None
     change = values_of_pose(robot, start)[0] - values_of_pose(robot, tables.poses)[0]
     return statics.deviations(tables, start), change * np.where(robot.hinges, robot.length, 1.0)
-
-
-def finite(values: ArrayLike, name: str) -> Array:
-    """An array of numbers, all finite; ``name`` is what an error calls it.
-
-    Raises:
-        InputError: one of them is not, or it is something else.
-    """
-    try:
-        array = np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        got = repr(values) if isinstance(values, str) else f"a {type(values).__name__}"
-        raise InputError(f"{name}: expected numbers, got {got}") from None
-    if not all_finite(array):
-        raise InputError(
-            f"{name} holds numbers that are not finite, or beyond {LARGEST:g}; expected finite ones"
-        )
-    return array
 
 
 def commanded_poses(values: ArrayLike, name: str = "poses") -> Array:

@@ -16,6 +16,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seecr.arguments import finite, numbers
 from seecr.counted import counted
 from seecr.distribution import balanced, tension_limits
 from seecr.errors import InputError
@@ -26,7 +27,6 @@ from seecr.pose import Array, all_finite, quat_rotate, transform_points
 from seecr.result import Record, Result
 from seecr.robot import Robot
 from seecr.solution import Solution
-from seecr.starts import finite
 from seecr.threads import in_parts
 
 # They stand on what is here, so that they are imported when asked for.
@@ -262,7 +262,7 @@ def balance_equations(
 
 
 def _poses(values: ArrayLike) -> Array:
-    poses = np.atleast_2d(np.asarray(values, float))
+    poses = np.atleast_2d(numbers(values, "poses"))
     if poses.ndim != 2 or poses.shape[1] != 7 or not all_finite(poses):
         raise InputError(f"poses must be (n, 7) finite numbers, got {np.shape(values)}")
     return poses

@@ -19,6 +19,7 @@ from crosscheck.given import GivenModel, GivenRobot, basis_of, model_of, robot_o
 from crosscheck.measurements.read import GivenData, measurements_of
 from seecr.effects import ApartLayout, Own, Term, Terms, effect_named, layout_of
 from seecr.effects.base import Layout
+from seecr.model import no_effects
 from seecr.pose import Array
 
 # Steps of a fit, and how often it may go on after that many.
@@ -83,7 +84,10 @@ def add_effects(
         CrosscheckError: there are none, or the data cannot carry them.
         UnsolvedError: rows have no equilibrium, or the fit does not come to an end.
     """
-    some = list(effects)
+    some = list(effects) if isinstance(effects, Iterable) else [effects]
+    wrong = [one for one in some if not isinstance(one, Term)]
+    if wrong:
+        raise no_effects(wrong[0])
     if not some:
         raise CrosscheckError("no effects were given; there is nothing to add")
 

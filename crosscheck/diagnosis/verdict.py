@@ -18,7 +18,7 @@ from crosscheck.diagnosis.settled import settled
 from crosscheck.diagnosis.stepwise import by_steps
 from crosscheck.diagnosis.unexplained import unexplained
 from crosscheck.diagnosis.words import size_notes
-from crosscheck.fit.candidates import null_fit
+from crosscheck.fit.candidates import candidates_for, null_fit
 from crosscheck.fit.gauss_newton import Fit
 from crosscheck.fit.possible import hardly_happens
 from crosscheck.fit.prepare import Prepared, Progress, noise_floor, prepare
@@ -30,6 +30,7 @@ from crosscheck.given import GivenModel, GivenRobot, considered, model_of, robot
 from crosscheck.measurements.read import GivenData, measurements_of
 from crosscheck.planning.sight import Sight, sight_of
 from seecr.effects import catalogue
+from seecr.errors import InputError
 from seecr.pose import Array
 
 # Data that would show no effect of so many plausible sizes show nothing.
@@ -53,13 +54,15 @@ def diagnose(
         data: its measurements, or their file.
         model: effects the model has already, or their file; the plain model without.
         progress: called with what is being done and the part of it that is done.
-        only: names of the effects that may be missing; all of the catalogue without.
+        only: names of the effects that may be missing, or one; all of the catalogue without.
         exclude: names of effects that are not considered.
         tolerance: from where on what is left beyond noise counts as missing.
 
     Raises:
         SeecrError: a file that cannot be read, or is of another robot.
     """
+    if not isinstance(tolerance, Tolerance):
+        raise InputError(f"tolerance: expected a crosscheck.Tolerance, got {tolerance!r}")
     robot = robot_of(robot)
     data = measurements_of(data, robot)
     terms, said = model_of(model, robot)
@@ -79,6 +82,7 @@ def _diagnosed(ready: Prepared, said: Notes, progress: Progress) -> Diagnosis:
     factor = problem.noise(problem.experiment.predict(terms.effects))
     base = null_fit(problem, terms, factor, refit=False)
     refusal = ready.refusal
+    refusal = refusal or _nothing_to_try(problem)
     if refusal is None and not base.valid:
         refusal = Refusal(Unfit.UNSOLVED_MODEL, problem.data.n_rows)
     notes = (*said, *ready.all_notes)
@@ -90,6 +94,16 @@ def _diagnosed(ready: Prepared, said: Notes, progress: Progress) -> Diagnosis:
         return replace(no_verdict(problem, base, notes, blind), sight=sight)
     found = _searched(ready, base, factor, notes, progress)
     return replace(found, sight=sight)
+
+
+def _nothing_to_try(problem: Problem) -> Refusal | None:
+    """That the data lack what each effect needs, where that is so."""
+    effects = candidates_for(problem)
+    if any(one.why_not is None for one in effects):
+        return None
+    asked = [(one.name, one.why_not) for one in effects if one.name in problem.considered]
+    lacking = "; ".join(f"{name} ({why.words})" for name, why in asked if why is not None)
+    return Refusal(Unfit.NOTHING_TO_TRY, problem.data.n_rows, lacking=lacking)
 
 
 def _is_blind(problem: Problem, base: Fit, sight: Sight) -> bool:

@@ -108,6 +108,7 @@ class Unfit(Enum):
         "and they are not alone"
     )
     BLIND = "noise of {noise} would hide every effect, at ten times its plausible size too"
+    NOTHING_TO_TRY = "these data can show none of the effects to consider: {lacking}"
     UNSOLVED_MODEL = "rows could not be solved with the model's values"
 
 
@@ -127,6 +128,7 @@ _REMEDIES = {
     "crosscheck add tracker_frame (or another effect) --per file",
     Unfit.BLIND: "state the noise as it is, in metres and radians ([sigma] beside the file, or "
     "--sigma position=0.1mm), or measure with less",
+    Unfit.NOTHING_TO_TRY: "record what they need, or let other effects be considered",
     Unfit.UNSOLVED_MODEL: "check the model's values and the robot's file",
 }
 
@@ -139,6 +141,7 @@ class Refusal:
         unfit: what is the matter.
         rows: of the data. lost: those without an equilibrium. readings: that are left.
         lines: of the file that show it. noise: of the readings, with units.
+        lacking: effects, and what the data lack for each.
     """
 
     unfit: Unfit
@@ -147,6 +150,7 @@ class Refusal:
     readings: int = 0
     lines: str = ""
     noise: str = ""
+    lacking: str = ""
 
     @property
     def remedy(self) -> str:
@@ -168,6 +172,7 @@ class Refusal:
             readings=counted(self.readings, "reading"),
             lines=self.lines,
             noise=self.noise,
+            lacking=self.lacking,
         )
 
 

@@ -60,6 +60,8 @@ def load_measurements(
     for one in paths:
         if not isinstance(one, str | Path):
             raise InputError(f"expected measurements or their files, got {type(one).__name__}")
+    if not paths:
+        raise InputError("expected measurements or their files, got none")
     return together([_measured(Path(one), robot, sigma_path) for one in paths])
 
 

@@ -35,6 +35,7 @@ from crosscheck.twin.lab import (
     sweeps,
 )
 from crosscheck.twin.measure import Truth
+from seecr.arguments import whole
 from seecr.effects import Term
 from seecr.result import Record, Result
 from seecr.robot import Robot
@@ -120,6 +121,8 @@ def make_twin(
         InputFileError: poses that cannot be read.
         InputError: a robot of no file, or with other numbers than its file has.
     """
+    seed, points = whole(seed, "seed"), whole(points, "points", least=1)
+    n_effects = None if n_effects is None else whole(n_effects, "n_effects")
     path, robot = file_of(robot), robot_of(robot)
     given = None if poses is None else commands_of(poses, robot)
     stated = sigma or (Sigma() if given is None else given.sigma)

@@ -105,5 +105,7 @@ def effect_named(name: str) -> type[Effect]:
     known = catalogue()
     if name in known:
         return known[name]
+    if not isinstance(name, str):
+        raise InputError(f"expected the name of an effect, got {name!r}")
     near = difflib.get_close_matches(name, known, n=len(known), cutoff=0.0)
     raise InputError(f"no effect {name!r}; known, nearest first: {', '.join(near)}")

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seecr.arguments import finite
 from seecr.effects.base import Effect, Layout, layout_of
 from seecr.effects.knowledge import Knowledge
 from seecr.effects.own_values import Own
@@ -62,7 +63,7 @@ class Term:
         layout = layout_of(effect_named(name), robot)
         vector = layout.null.copy()
         for key, value in values.items():
-            vector[_place_of(layout, key)] = value
+            vector[_place_of(layout, key)] = finite(value, key)
         return cls(layout, vector)
 
     def with_vector(self, values: Array) -> Term:

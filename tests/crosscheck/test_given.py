@@ -1,13 +1,20 @@
-"""What a case folder is given: a robot that stands alone in it."""
+"""What callers give: a robot that stands alone in its case, names of effects, data."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any, cast
 
+import numpy as np
 import pytest
 
+import crosscheck
 from crosscheck import given
 from crosscheck.errors import CrosscheckError
+from crosscheck.measurements.data import Measurements
+from seecr.errors import InputError
+from seecr.mjcf import load_robot
 from seecr.shipped import model_path
 
 
@@ -31,3 +38,42 @@ def test_another_failure_is_not_called_that(
     monkeypatch.setattr(given, "load_robot", fail)
     with pytest.raises(MemoryError, match="none is left"):
         given.copy_robot(model_path("planar_vertical"), tmp_path / "robot.xml")
+
+
+def test_effects_to_consider() -> None:
+    assert given.considered("stiffness") == {"stiffness"}
+    assert given.considered(["creep", "stiffness"], "creep") == {"stiffness"}
+    with pytest.raises(InputError, match="only: expected names of effects, got 3"):
+        given.considered(3)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="no effect 'foo'; known, nearest first"):
+        given.considered("foo")
+
+
+ROBOT = load_robot(model_path("demobot_parallel"))
+DATA = Measurements(Path("m.csv"), 8, np.array(["a"]), command_pose=ROBOT.reference_pose[None])
+BAD: dict[str, tuple[Callable[[], Any], str]] = {
+    "no data": (lambda: crosscheck.compare(ROBOT, []), "expected measurements or their files, got"),
+    "tolerance": (
+        lambda: crosscheck.diagnose(ROBOT, DATA, tolerance=cast(Any, "1mm")),
+        "tolerance: expected a crosscheck.Tolerance, got '1mm'",
+    ),
+    "names": (
+        lambda: crosscheck.add_effects(ROBOT, DATA, cast(Any, ["creep"])),
+        "expected a model, its path, or a list of effects with their values, .* got 'creep'",
+    ),
+    "a number": (lambda: crosscheck.add_effects(ROBOT, DATA, cast(Any, 3)), "effects .* got int"),
+    "seed": (lambda: crosscheck.make_twin(ROBOT, -1), "seed: expected a whole number from 0 on"),
+    "count": (
+        lambda: crosscheck.make_twin(ROBOT, 1, n_effects=-2), "n_effects: expected a whole number",
+    ),
+    "points": (
+        lambda: crosscheck.make_twin(ROBOT, 1, points=0), "points: expected a whole number from 1",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", BAD)
+def test_other_arguments_are_one_sentence(what: str) -> None:
+    call, words = BAD[what]
+    with pytest.raises(InputError, match=words):
+        call()

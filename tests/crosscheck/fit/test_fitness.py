@@ -63,6 +63,16 @@ def test_rows_that_are_all_alike_carry_no_verdict(data: Measurements) -> None:
     assert unfit(replace(frozen, tensions=data.tensions)) is None
 
 
+def test_effects_of_which_none_can_be_tried_carry_no_verdict(data: Measurements) -> None:
+    """Nothing was tried, so nothing is unknown either."""
+    none = np.full_like(data.tensions, np.nan)
+    untold = replace(data, tensions=none, tension_mask=~data.tension_mask)
+    found = diagnose(robot(), untold, only="tension_scale")
+    assert found.verdict is DiagnosisVerdict.NO_VERDICT and found.converged
+    assert "none of the effects to consider: tension_scale (needs measured" in found.sentence
+    assert diagnose(robot(), data, only="tension_scale").refusal is None
+
+
 def test_noise_that_hides_all_effects_carries_no_verdict(data: Measurements) -> None:
     # millimetres in the place of metres
     sigma = Sigma(position_m=30.0, orientation_rad=3.5, tension_N=1e4)

@@ -1,0 +1,56 @@
+"""What callers give: numbers and counts, or one sentence about something else."""
+
+from __future__ import annotations
+
+import operator
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from seecr.errors import InputError
+from seecr.pose import LARGEST, Array, all_finite
+
+
+def numbers(values: ArrayLike, name: str) -> Array:
+    """An array of real numbers; ``name`` is what an error calls it.
+
+    Raises:
+        InputError: it is something else.
+    """
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind == "c":  # NumPy would drop what is imaginary
+            raise TypeError
+        return np.asarray(array, dtype=float)
+    except (TypeError, ValueError):
+        got = repr(values) if isinstance(values, str) else f"a {type(values).__name__}"
+        raise InputError(f"{name}: expected numbers, got {got}") from None
+
+
+def finite(values: ArrayLike, name: str) -> Array:
+    """An array of numbers, all finite; ``name`` is what an error calls it.
+
+    Raises:
+        InputError: one of them is not, or it is something else.
+    """
+    array = numbers(values, name)
+    if not all_finite(array):
+        raise InputError(
+            f"{name} holds numbers that are not finite, or beyond {LARGEST:g}; expected finite ones"
+        )
+    return array
+
+
+def whole(value: object, name: str, least: int = 0) -> int:
+    """A whole number; ``name`` is what an error calls it.
+
+    Raises:
+        InputError: less than the least, or something else.
+    """
+    try:
+        number = operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        number = least - 1
+    if number < least:
+        raise InputError(f"{name}: expected a whole number from {least} on, got {value!r}")
+    return number
