@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 from written_pages import figures_of, text_of
 
+from crosscheck.calibration.instead import Instead
 from crosscheck.diagnosis.result import Diagnosis, NotListed
 from crosscheck.diagnosis.steps import (
     by_block,
@@ -170,6 +171,11 @@ def test_beside_something_unknown_probabilities_are_within_the_catalogue() -> No
     seen = text_of(render(replace(found, verdict=DiagnosisVerdict.UNKNOWN_EFFECT)))
     assert "Probability within the catalogue that it is missing: > 99 %" in seen
     assert WITHIN in seen and "probability within the catalogue" in seen
+    # where something imitated was weighed, they are probabilities
+    assert found.chances is not None
+    weighed = replace(found.chances, imitated=Instead(9.0, frozenset({"length_scale"})))
+    unknown = replace(found, verdict=DiagnosisVerdict.UNKNOWN_EFFECT, chances=weighed)
+    assert "within the catalogue" not in text_of(render(unknown)).lower()
 
 
 def test_text_from_users_stays_text() -> None:
