@@ -145,9 +145,14 @@ def picture(found: Change) -> str:
         _draw(right, found.x, turned, ["about x", "about y", "about z"], "orientation [deg]")
     out = io.StringIO()
     figure.savefig(out, format="svg", metadata={"Date": None, "Creator": None})
-    # a hundredth of a point is finer than any screen
-    text = re.sub(r"(\d\.\d\d)\d+", r"\1", out.getvalue())
+    # numbers of the axes stand between the tags and are kept
+    text = re.sub(r"<[^>]*>", lambda tag: _rounded(tag[0]), out.getvalue())
     return re.sub(r' transform="rotate\(-0 [^"]*"', "", text)
+
+
+def _rounded(tag: str) -> str:
+    """A tag whose places have two digits: a hundredth of a point is finer than any screen."""
+    return re.sub(r"(\d\.\d\d)\d+", r"\1", tag)
 
 
 def _draw(axes: Axes, x: Array, values: Array, names: list[str], label: str) -> None:

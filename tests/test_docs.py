@@ -12,6 +12,7 @@ import link_words
 import make_api
 import make_commands
 import make_effects
+import numpy as np
 import pytest
 
 import crosscheck
@@ -73,6 +74,42 @@ def test_the_pictures_of_effects_are_current() -> None:
     pictures = {path.stem: path.stat().st_size for path in folder.glob("*.svg")}
     assert pictures.keys() == drawn.keys() == {effect.name for effect in BUILT_IN}
     assert max(pictures.values()) < 30_000
+
+
+def numbers_beside_axes(svg: str) -> list[list[float]]:
+    """What the ticks of each axis of a drawing say, in their order."""
+    said: dict[str, list[float]] = {}
+    axes, of = 0, ""
+    for what, tick, words in re.findall(
+        r'<g id="(?:(axes)|([xy])tick)_\d+">|<text [^>]*>([^<]*)</text>', svg
+    ):
+        axes += what == "axes"
+        if what or tick:
+            of = tick and f"{axes}{tick}"
+        if words and of:
+            said.setdefault(of, []).append(float(words.replace("−", "-")))
+            of = ""
+    return list(said.values())
+
+
+def evenly_spaced(values: list[float]) -> bool:
+    steps = np.diff(values)
+    return len(values) > 1 and steps.min() > 0.0 and np.allclose(steps, steps[0], 1e-6)
+
+
+def test_axes_of_the_pictures_of_effects_have_evenly_spaced_numbers() -> None:
+    for path in draw_effects.FOLDER.glob("*.svg"):
+        every = numbers_beside_axes(path.read_text(encoding="utf-8"))
+        assert len(every) in (2, 4) and all(map(evenly_spaced, every)), f"{path.name}: {AGAIN}"
+
+
+def test_small_changes_keep_the_digits_of_their_axis() -> None:
+    x = np.linspace(0.2, 0.6, draw_effects.COUNT)
+    x = np.concatenate([x, x[-2::-1]])
+    small = 5e-6 * np.stack([x, -x, x**2], axis=1)
+    change = draw_effects.Change(BUILT_IN[0](), "demobot_cogiro", 1.0, x, small, small, small)
+    every = numbers_beside_axes(draw_effects.picture(change))
+    assert len(every) == 4 and all(map(evenly_spaced, every))
 
 
 def test_the_page_of_public_names_is_current() -> None:

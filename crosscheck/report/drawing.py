@@ -15,9 +15,11 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backend_bases import RendererBase
+from matplotlib.backends.backend_agg import FigureCanvasAgg, RendererAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
@@ -135,6 +137,40 @@ def image(figure: Figure, words: str) -> str:
     return f'<img alt="{alt}" src="data:image/svg+xml;base64,{text}">'
 
 
+class _Dots(PathPatch):
+    """Lines from a point to itself with round ends: dots in SVG, in a tenth of the text.
+
+    Agg leaves out lines without length: for it they are drawn as markers.
+    """
+
+    def __init__(self, points: Array, size: float, colour: str, order: float) -> None:
+        codes = np.tile(np.array([Path.MOVETO, Path.LINETO], dtype=np.uint8), len(points))
+        path = Path(np.repeat(points, 2, axis=0), codes)
+        path.should_simplify = False  # it would take dots for needless points of a line
+        super().__init__(
+            path, fill=False, edgecolor=colour, linewidth=size, capstyle="round", zorder=order
+        )
+        self._markers = Line2D(*points.T, **_as_markers(size, colour))
+
+    def draw(self, renderer: RendererBase) -> None:
+        """Draw them as the renderer shows them."""
+        if not isinstance(renderer, RendererAgg):
+            super().draw(renderer)
+            return
+        assert self.axes is not None
+        self._markers.set_figure(self.axes.figure)
+        self._markers.set_transform(self.axes.transData)
+        self._markers.set_clip_path(self.axes.patch)
+        self._markers.draw(renderer)
+
+
+def _as_markers(size: float, colour: str) -> dict[str, Any]:
+    return {
+        "linestyle": "none", "marker": "o", "markersize": size, "markeredgewidth": 0,
+        "color": colour,
+    }  # fmt: skip
+
+
 def dots(axes: Axes, x: Array, y: Array, size: float, colour: str, order: float) -> None:
     """Round dots of one colour, so many points wide."""
     seen = np.isfinite(x) & np.isfinite(y)
@@ -142,19 +178,10 @@ def dots(axes: Axes, x: Array, y: Array, size: float, colour: str, order: float)
     if len(points) == 0:
         return
     if len(points) > MANY:
-        axes.plot(
-            *points.T, linestyle="none", marker="o", markersize=size, markeredgewidth=0,
-            color=colour, zorder=order,
-        )  # fmt: skip
+        axes.plot(*points.T, zorder=order, **_as_markers(size, colour))
         return
-    # in SVG a line from a point to itself with round ends is a dot, in a tenth of the text
-    codes = np.tile(np.array([Path.MOVETO, Path.LINETO], dtype=np.uint8), len(points))
-    path = Path(np.repeat(points, 2, axis=0), codes)
-    path.should_simplify = False  # it would take dots for needless points of a line
-    patch = PathPatch(
-        path, fill=False, edgecolor=colour, linewidth=size, capstyle="round", zorder=order
-    )
-    axes.add_artist(patch)  # add_patch would look for the bends of each dot
+    # add_patch would look for the bends of each dot
+    axes.add_artist(_Dots(points, size, colour, order))
     axes.update_datalim(points)
     axes.autoscale_view()
 

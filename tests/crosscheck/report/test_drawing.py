@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import base64
 import re
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from PIL import Image
 
-from crosscheck.report.drawing import MANY, blank, dots, image, plain_log, styled
+from crosscheck.report.drawing import MANY, blank, dots, image, keeping, plain_log, styled
 from crosscheck.report.where import thinned
 
 
@@ -45,6 +47,28 @@ def test_dots_that_were_not_read_are_not_drawn(points: int) -> None:
         assert path.count("M") == points - 1
     else:
         assert text.count("<use") >= points - 1
+
+
+def kept_dots(folder: Path, points: int) -> tuple[float, float, float]:
+    """Of one dot among so many that are kept as PNG: its middle and width, in parts of the page."""
+    with styled(), keeping(folder):
+        figure = blank(2.0, 2.0, constrained=False)
+        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        dots(axes, np.full(points, 0.25), np.full(points, 0.75), 14.4, "#ff0000", 1.0)
+        axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
+        axes.set_axis_off()
+        image(figure, "dots")
+    with Image.open(folder / "dots.png") as taken:
+        red = np.asarray(taken.convert("RGB"))[..., 1] < 128
+    down, across = np.nonzero(red)
+    size = len(red)
+    return across.mean() / size, 1.0 - down.mean() / size, np.ptp(across) / size
+
+
+@pytest.mark.parametrize("points", [1, MANY + 2])
+def test_dots_are_on_the_png_too_where_they_are_and_as_large(tmp_path: Path, points: int) -> None:
+    """14.4 pt are a tenth of 2 in."""
+    assert kept_dots(tmp_path, points) == pytest.approx((0.25, 0.75, 0.1), abs=0.01)
 
 
 def test_logarithmic_axes_have_plain_numbers() -> None:
