@@ -101,7 +101,7 @@ def test_the_best_of_what_was_found_elsewhere_is_tried(
     seek(problem, SIGMA)
     assert tried == [HIDDEN]
     # what was found elsewhere may have a history, and a walk for each parameter takes minutes
-    assert taken_as_given == [True, True]
+    assert len(taken_as_given) >= 2 and all(taken_as_given)
 
 
 @pytest.mark.slow
