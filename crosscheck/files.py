@@ -2,6 +2,7 @@
 
 from seecr.files import (
     Toml,
+    check_replaces,
     check_writable,
     json_text,
     plain,
@@ -15,6 +16,7 @@ from seecr.files import (
 
 __all__ = [
     "Toml",
+    "check_replaces",
     "check_writable",
     "json_text",
     "plain",

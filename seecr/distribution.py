@@ -47,7 +47,8 @@ def wanted_tensions(aim: str | ArrayLike, low: Array, high: Array) -> Array:
     """The tensions (m,) or (n, m) [N] that an aim means.
 
     Raises:
-        InputError: an unknown name, a wrong shape, the middle of limits that are not there.
+        InputError: an unknown name, a wrong shape, the middle of limits that are not there, or
+            tensions that are not between them.
     """
     if isinstance(aim, str):
         if aim not in AIMS:
@@ -62,7 +63,15 @@ def wanted_tensions(aim: str | ArrayLike, low: Array, high: Array) -> Array:
         raise InputError(f"aim must be (m,) or (n, m) with m = {len(low)}, got {wanted.shape}")
     if not all_finite(wanted):
         raise InputError("aim holds tensions that are not finite; expected finite ones [N]")
-    return np.array(np.broadcast_to(wanted, np.broadcast_shapes(wanted.shape, low.shape)))
+    wanted = np.array(np.broadcast_to(wanted, np.broadcast_shapes(wanted.shape, low.shape)))
+    outside = np.argwhere((wanted < low) | (wanted > high))
+    if len(outside):
+        at, k = tuple(outside[0]), outside[0][-1]
+        raise InputError(
+            f"aim must lie between lowest and highest tension, for cable number {k + 1} "
+            f"{low[k]:g} to {high[k]:g} N, got {wanted[at]:g} N"
+        )
+    return wanted
 
 
 def distribute(

@@ -15,7 +15,7 @@ import re
 import shutil
 import tempfile
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum
@@ -28,6 +28,7 @@ from seecr.errors import InputError, InputFileError
 
 __all__ = [
     "Toml",
+    "check_replaces",
     "check_writable",
     "json_text",
     "no_text",
@@ -202,6 +203,35 @@ def check_writable(path: Path) -> None:
         what = f"{above} is no folder to write to: {reason_of(error)}"
     if what:
         raise InputFileError.at(path, f"cannot be written: {what}; expected the name of a file")
+
+
+def check_replaces(
+    out: str | Path, names: Sequence[str], mark: str, same: Mapping[str, Path] | None = None
+) -> None:
+    """That files in a folder are of an older result before new ones replace them.
+
+    What was measured cannot be made again.
+
+    Args:
+        out: the folder; it need not be there yet.
+        names: of the files that are to be written. mark: the one that only such a result has.
+        same: by name, what a file is a copy of, which it may be already.
+
+    Raises:
+        InputFileError: files of these names without the mark.
+    """
+    out = Path(out)
+    there = [name for name in names if (out / name).exists()]
+    if mark in there:
+        return
+    for name in there:
+        copied = (same or {}).get(name)
+        if copied is None or not copied.exists() or not (out / name).samefile(copied):
+            raise InputFileError.at(
+                out / name,
+                f"would be replaced, and is no older result: there is no {mark} beside it; "
+                "expected a new folder or that of an older one; name one with --out",
+            )
 
 
 @contextmanager

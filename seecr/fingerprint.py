@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +27,8 @@ _ANEW = "give the robot it was made for, or make it anew for this one"
 _NOTED = ("mass_kg", "ea_N", "rest_lengths_m", "centre_of_mass_m")
 # Digits kept: more than anybody measures, few enough to read.
 _DIGITS = 9
+# Characters of a wrong value that are shown.
+_SHOWN = 60
 
 
 def fingerprint(robot: Robot) -> tomlkit.items.Table:
@@ -56,7 +59,30 @@ def _toml(value: Any) -> Any:
     return rows.multiline(True)
 
 
-def check_robot(path: Path, table: Any, robot: Robot, changed: str = _TWICE) -> tuple[str, ...]:
+@dataclass(frozen=True)
+class _Said:
+    """What a file says of its robot, and on which lines."""
+
+    path: Path
+    table: Mapping[str, Any]
+    line_of: Callable[[str], int | None]
+
+    def error(self, key: str, words: str) -> InputFileError:
+        return InputFileError.at(self.path, f"[robot] {key}: {words}", line=self.line_of(key))
+
+
+def _nowhere(key: str) -> int | None:
+    """The line of a key in files that have none."""
+    return None
+
+
+def check_robot(
+    path: Path,
+    table: Any,
+    robot: Robot,
+    changed: str = _TWICE,
+    line_of: Callable[[str], int | None] = _nowhere,
+) -> tuple[str, ...]:
     """Check that a model or a diagnosis was made for this robot.
 
     Args:
@@ -64,27 +90,30 @@ def check_robot(path: Path, table: Any, robot: Robot, changed: str = _TWICE) -> 
         table: its ``[robot]``; None where a person left it out, which is their business.
         robot: the one it is to be used for.
         changed: what it means that mass, stiffness and the like have changed.
+        line_of: the line of a key, for errors, in a file that has lines.
 
     Returns:
         notes about mass, stiffness and the like that have changed since.
 
     Raises:
-        InputFileError: another number of cables, or points elsewhere.
+        InputFileError: another number of cables, points elsewhere, or no numbers.
     """
     if table is None:
         return (f"{path} does not say which robot it was made for",)
     if not isinstance(table, Mapping):
-        raise InputFileError.at(path, f"robot: expected a table [robot], got {table!r}")
+        text = f"robot: expected a table [robot], got {table!r}"
+        raise InputFileError.at(path, text, line=line_of("robot"))
+    said = _Said(path, table, line_of)
     _check_cables(path, table, robot)
     own = fingerprint(robot)
     tolerance = _SAME * float(np.max(robot.nominal_lengths(robot.reference_pose[None])))
     for key in _POINTS:
-        apart = _apart(path, table, key, own)
+        apart = _apart(said, key, own)
         if np.any(apart > tolerance):
             raise _elsewhere(path, table, key, apart, robot)
     notes = []
     for key in _NOTED:
-        apart = _apart(path, table, key, own)
+        apart = _apart(said, key, own)
         size = float(np.max(np.abs(np.asarray(own[key], float)))) + tolerance
         if np.any(apart > 1e-6 * size):
             notes.append(
@@ -107,21 +136,32 @@ def _check_cables(path: Path, table: Mapping[str, Any], robot: Robot) -> None:
         )
 
 
-def _apart(path: Path, table: Mapping[str, Any], key: str, own: Mapping[str, Any]) -> Any:
+def _apart(said: _Said, key: str, own: Mapping[str, Any]) -> Any:
     """How far each row of numbers is from the robot's, (k,); 0 where the file has none."""
     here = np.atleast_1d(np.asarray(own[key], float))
-    if key not in table:
+    if key not in said.table:
         return np.zeros(len(here))
-    try:
-        there = np.atleast_1d(np.asarray(table[key], float))
-    except (TypeError, ValueError):
-        there = np.zeros(0)
-    if there.shape != here.shape or not np.all(np.isfinite(there)):
-        raise InputFileError.at(
-            path, f"[robot] {key}: expected numbers of shape {here.shape}; leave it out otherwise"
-        )
+    there = _numbers(said.table[key])
+    if there is None or there.shape != here.shape:
+        expected = "a number" if here.size == 1 else f"numbers of shape {here.shape}"
+        got = repr(said.table[key]) if there is None else f"those of shape {there.shape}"
+        raise said.error(key, f"expected {expected}, got {_cut(got)}; leave it out otherwise")
     apart = np.abs(there - here)
     return apart.max(axis=1) if apart.ndim == 2 else apart
+
+
+def _numbers(value: Any) -> Any:
+    """As an array; None where they are none, or not finite."""
+    try:
+        array = np.atleast_1d(np.asarray(value, float))
+    except (TypeError, ValueError):
+        return None
+    return array if np.all(np.isfinite(array)) else None
+
+
+def _cut(text: str) -> str:
+    """The beginning of what may be long."""
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]} ..."
 
 
 def _elsewhere(

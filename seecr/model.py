@@ -44,7 +44,7 @@ from seecr.cells import Where, term_of
 from seecr.counted import counted
 from seecr.data_reach import TABLE, DataReach
 from seecr.effects import Effect, Term, Terms, catalogue
-from seecr.errors import InputError, InputFileError
+from seecr.errors import InputError
 from seecr.files import Toml, path_of, read_toml
 from seecr.fingerprint import check_robot, fingerprint
 from seecr.given import GivenRobot, robot_of
@@ -230,35 +230,44 @@ def load_model(path: str | Path, robot: GivenRobot) -> Model:
             that is unknown, missing, given twice, no number or out of bounds.
     """
     path, robot = path_of(path, "a model"), robot_of(robot)
-    toml = read_toml(path, _EXPECTED)
-    text, document = toml.text, _with_comments(toml)
-    if not document:
-        raise InputFileError.at(path, f"is empty; {_EXPECTED}")
-    where = Where(path, text)
-    _check_tables(where, document)
-    notes = check_robot(path, document.get("robot"), robot)
+    toml, document = read_document(path)
+    where = Where(path, toml.text)
+    notes = check_robot(path, document.get("robot"), robot, line_of=toml.line_of)
     terms: list[Term] = []
     errors: dict[str, Array] = {}
     notes = (*notes, *_migrate(where, document))
-    for k, table in enumerate(_effect_tables(where, document)):
+    tables = _effect_tables(where, document)
+    _check_once(where, tables)
+    for k, table in enumerate(tables):
         term, stderr = term_of(where, k, table, robot)
-        if term.name in errors:
-            raise where.error(f"effect {term.name} is listed twice; expected it once", k, "name")
         terms.append(term)
         errors[term.name] = stderr
     reach = DataReach.read(where, document)
     return Model(Terms(terms), errors, document, notes, path, reach)
 
 
-def _with_comments(toml: Toml) -> TOMLDocument:
-    """The tree that is written again as it was read."""
+def read_document(path: Path, expected: str = _EXPECTED) -> tuple[Toml, TOMLDocument]:
+    """A model's file, of whatever robot: its text, and the tree that is written as it was read.
+
+    Args:
+        path: the file.
+        expected: what it should be, for the error.
+
+    Raises:
+        InputFileError: no such file, no TOML, or no model.
+    """
+    toml = read_toml(path, expected)
     try:
-        return tomlkit.parse(toml.text)
+        document = tomlkit.parse(toml.text)
     except TOMLKitError as error:  # TOML that only this parser does not take
-        raise toml.error(f"cannot be kept with its comments: {error}; {_EXPECTED}") from None
+        raise toml.error(f"cannot be kept with its comments: {error}; {expected}") from None
+    if not document:
+        raise toml.error(f"is empty; {expected}")
+    _check_tables(Where(path, toml.text), document, expected)
+    return toml, document
 
 
-def _check_tables(where: Where, document: Mapping[str, Any]) -> None:
+def _check_tables(where: Where, document: Mapping[str, Any], expected: str) -> None:
     """Tables of other names are the user's own; a misspelt one must not be passed over."""
     for name in document:
         near = difflib.get_close_matches(name.lower(), _TABLES, cutoff=0.7)
@@ -266,7 +275,7 @@ def _check_tables(where: Where, document: Mapping[str, Any]) -> None:
             raise where.error(f"unknown {name}; expected {near[0]}", key=name)
     if document and not any(name in document for name in _TABLES):
         has = ", ".join(document)
-        raise where.error(f"is no model, it has {has}; {_EXPECTED}, with tables [[effect]]")
+        raise where.error(f"is no model, it has {has}; {expected}, with tables [[effect]]")
     version = document.get("format", FORMAT)
     if version != FORMAT:
         raise where.error(
@@ -280,6 +289,14 @@ def _effect_tables(where: Where, document: Mapping[str, Any]) -> Sequence[Mappin
     if not isinstance(tables, list) or not all(isinstance(t, Mapping) for t in tables):
         raise where.error("effect: expected tables [[effect]], one per effect", key="effect")
     return tables
+
+
+def _check_once(where: Where, tables: Sequence[Mapping[str, Any]]) -> None:
+    """Each effect once: said before what a table lacks, which the other one may have."""
+    names = [table.get("name") for table in tables]
+    for k, name in enumerate(names):
+        if isinstance(name, str) and name in names[:k]:
+            raise where.error(f"effect {name} is listed twice; expected it once", k, "name")
 
 
 def _migrate(where: Where, document: Mapping[str, Any]) -> list[str]:

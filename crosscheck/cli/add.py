@@ -75,12 +75,12 @@ def command(
     equilibrium or a fit that does not come to an end.
     """
     from crosscheck import add_effect, add_effects, load_measurements, save_model
-    from crosscheck.files import check_writable
     from crosscheck.measurements.stated import with_stated
-    from crosscheck.model import load_diagnosed
+    from crosscheck.model import check_place, load_diagnosed
     from seecr import load_model, load_robot, new_model
     from seecr.effects import effect_named
 
+    _check_not_both(words, all_from)
     effect, robot, data = _arguments(words, all_from)
     if effect is not None:
         effect_named(effect)
@@ -93,7 +93,7 @@ def command(
     for name in names:
         _check_names(old, name, refit, model)
     measured = with_stated(load_measurements(data, machine), sigmas)
-    check_writable(model)
+    check_place(model)
     with result_in(out, "add.json") as keep:
         with progress_share(f"adding {' + '.join(names)}") as progress:
             if effect is not None:
@@ -114,6 +114,17 @@ def command(
         given = Given.with_data(measured, robot, data, model, sigmas)
         click.echo(after_fit(found.whiteness.is_noise, written, given))
     return 0 if written else 1
+
+
+def _check_not_both(words: Sequence[str], all_from: Path | None) -> None:
+    """Beside --all-from the first word is the robot's file; an effect there was meant as one."""
+    from seecr.effects import catalogue
+
+    if all_from is not None and words and words[0] in catalogue() and not Path(words[0]).exists():
+        raise click.UsageError(
+            f"expected EFFECT or --all-from, not both; got {words[0]} and --all-from {all_from}; "
+            "leave one of them out"
+        )
 
 
 def _arguments(

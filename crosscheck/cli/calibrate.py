@@ -52,9 +52,10 @@ def command(
     input, 3 rows without an equilibrium, or a fit that did not settle.
     """
     from crosscheck import calibrate, load_measurements, save_model
-    from crosscheck.files import check_writable, json_text
+    from crosscheck.files import json_text
     from crosscheck.given import considered
     from crosscheck.measurements.stated import with_stated
+    from crosscheck.model import check_place
     from crosscheck.terminal import print_calibration
     from seecr import load_model, load_robot, new_model
 
@@ -62,7 +63,7 @@ def command(
     machine = load_robot(robot)
     old = load_model(model, machine) if model.exists() else new_model(machine)
     measured = with_stated(load_measurements(data, machine), sigmas)
-    check_writable(model)
+    check_place(model)
     with result_in(out, "calibration.json") as keep:
         with progress_share("calibrating") as progress:
             found = calibrate(machine, measured, old, progress, only=only, exclude=exclude)

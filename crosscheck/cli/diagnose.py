@@ -73,9 +73,10 @@ def command(
     3 rows without an equilibrium.
     """
     from crosscheck import DiagnosisVerdict, Tolerance, diagnose, load_measurements
-    from crosscheck.files import check_writable, json_text, staged, write_text
+    from crosscheck.files import json_text, staged, write_text
     from crosscheck.given import considered
     from crosscheck.measurements.stated import with_stated
+    from crosscheck.model import check_place
     from crosscheck.report import write_page
     from seecr import load_model, load_robot, new_model
     from seecr.fingerprint import fingerprint
@@ -87,7 +88,7 @@ def command(
     measured = with_stated(load_measurements(data, machine), sigmas)
     own = load_model(model, machine) if model is not None else new_model(machine)
     if model_out is not None:
-        check_writable(model_out)
+        check_place(model_out)
     with staged(out, sometimes=["diagnosis.rrd"]) as folder:
         with progress_share("diagnosing") as progress:
             found = diagnose(

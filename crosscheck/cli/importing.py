@@ -108,11 +108,12 @@ def command(
       import.json      what was done
     """
     from crosscheck.files import json_text
-    from crosscheck.importing import ImportChoices, import_case, write_case
+    from crosscheck.importing import ImportChoices, check_case, import_case, write_case
     from seecr import load_robot
 
     machine = load_robot(robot)
     choices = ImportChoices.said(machine, **options)
+    check_case(out, robot)
     found = import_case(form, files, machine, logs, choices)
     made = made_by(machine.source, *files, *logs)
     write_case(found, robot, out, made)

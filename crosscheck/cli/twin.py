@@ -95,6 +95,7 @@ def command(
       answer.sealed    what was hidden; no other command opens it
     """
     if opened is not None:
+        _check_alone(robot, seed, count, names, tensions, poses, sigmas)
         return _open(opened, as_json)
     if robot is None or seed is None:
         raise click.UsageError("expected ROBOT.xml and --hide SEED, or --open FILE")
@@ -120,6 +121,12 @@ def command(
         advance(1, "measured")
     _tell(twin, out, made_by(twin.robot.source, poses) if as_json else None)
     return 0
+
+
+def _check_alone(*others: object) -> None:
+    """That nothing is asked to be made beside what is opened."""
+    if any(other is not None and other is not False and other != () for other in others):
+        raise click.UsageError("--open shows a case that is there: leave out all but --json")
 
 
 def _tell(twin: Twin, out: Path, made: Made | None) -> None:

@@ -92,10 +92,12 @@ def load_limits(path: str | Path) -> Limits:
     """Limits of a TOML file: ``max_position = "0.5mm"``, keys as on the command line.
 
     Raises:
-        InputFileError: no TOML, an unknown key, a value without a unit.
+        InputFileError: no TOML, an empty one, an unknown key, a value without a unit.
     """
     expected = 'expected a TOML file with lines such as max_position = "0.5mm"'
     toml = read_toml(Path(path), expected)
+    if not toml.content:  # a gate that nothing can fail
+        raise toml.error(f"is empty; {expected}")
     values: dict[str, float] = {}
     for key, value in toml.content.items():
         name = key.replace("-", "_")

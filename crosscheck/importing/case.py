@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.files import json_text, staged, write_text
+from crosscheck.files import check_replaces, json_text, staged, write_text
 from crosscheck.given import GivenRobot, copy_robot, file_of, numbers_of, robot_of
 from crosscheck.importing.align import (
     Frames,
@@ -42,7 +42,8 @@ from seecr.robot import Robot
 _DIGITS = 0.5
 # Recordings follow one another after so long [s].
 _BETWEEN = 60.0
-FILES = ("robot.xml", "measured.csv", "measured.toml", "dwells.csv", "import.json")
+NAME = "import.json"
+FILES = ("robot.xml", "measured.csv", "measured.toml", "dwells.csv", NAME)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -135,7 +136,10 @@ def import_case(
     if form not in READERS:
         raise InputError(f"form must be one of {', '.join(READERS)}, got {form!r}")
     choices = choices or ImportChoices()
+    choices.check(form)
     source, robot = None if out is None else file_of(robot), robot_of(robot)
+    if out is not None and source is not None:
+        check_case(out, source)
     files = [files] if isinstance(files, str | Path) else files
     commands = [commands] if isinstance(commands, str | Path) else commands
     if len(files) != len(commands):
@@ -165,16 +169,26 @@ def import_case(
     return found
 
 
+def check_case(out: str | Path, robot_path: Path) -> None:
+    """That a case may be written into a folder, before the work that it is for.
+
+    Raises:
+        InputFileError: measurements or a robot are in it that no import made.
+    """
+    check_replaces(out, FILES, NAME, {"robot.xml": robot_path})
+
+
 def write_case(found: Imported, robot_path: Path, out: Path, made: Made | None = None) -> None:
     """Write the case folder, whole or not at all; ``made`` says how it came about."""
     said = {} if made is None else {"made": made}
+    check_case(out, robot_path)
     with staged(out) as folder:
         write_measurements(folder / "measured.csv", found.measured)
         copy_robot(robot_path, folder / "robot.xml")
         rows = found.records()
         lines = [",".join(rows[0])] + [",".join(_cell(v) for v in row.values()) for row in rows]
         write_text(folder / "dwells.csv", "\n".join(lines) + "\n")
-        write_text(folder / "import.json", json_text({**said, **found.as_json()}) + "\n")
+        write_text(folder / NAME, json_text({**said, **found.as_json()}) + "\n")
 
 
 def _cell(value: object) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,9 +12,13 @@ from crosscheck.errors import CrosscheckError
 from crosscheck.given import numbers_of
 from crosscheck.importing.dwells import REST_FOR
 from crosscheck.importing.markers import read_shape
+from crosscheck.importing.vicon import ROTATIONS
 from crosscheck.units import parse_quantity
 from seecr.pose import Array
 from seecr.robot import Robot
+
+# No axis twice in a row, which would be one turn.
+_ROTATION = re.compile(r"vector|(?:([xyz])(?!\1)){3}|(?:([XYZ])(?!\2)){3}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +70,30 @@ class ImportChoices:
             rest_speed=_speed(rest_speed) if rest_speed else None,
             **others,
         )
+
+    def check(self, form: str) -> None:
+        """That nothing is said which a recording of this form, or what else is said, leaves no use.
+
+        Raises:
+            CrosscheckError: what is, or a rotation that is none.
+        """
+        said = [
+            (self.aligned and self.points, "--aligned and --point", "one of them: the frame is "
+             "known, or points find it"),
+            (self.markers and self.body, "--body and --markers", "one of them: a body of the "
+             "file, or markers that make one"),
+            (self.shape and not self.markers, "--shape without --markers", "the names of the "
+             "markers that make the body"),
+            (self.rotation and form != "vicon", f"--rotation beside {form}", "it with vicon only: "
+             "others say themselves what their columns mean"),
+            (self.unit and form != "poses", f"--unit beside {form}", "it with poses only: others "
+             "say their unit in the file"),
+        ]  # fmt: skip
+        for wrong, got, expected in said:
+            if wrong:
+                raise CrosscheckError(f"{got}: expected {expected}")
+        if self.rotation and not _ROTATION.fullmatch(self.rotation):
+            raise CrosscheckError(f"--rotation: expected {ROTATIONS}, got {self.rotation!r}")
 
 
 def _point(text: str, robot: Robot) -> tuple[str, Array]:

@@ -46,6 +46,8 @@ def read_poses(path: Path, unit: str | None = None) -> Logged:
             f"expected columns of a pose such as x_mm y_mm z_mm, got no {', '.join(lacking)}; name "
             "them so"
         )
+    if unit is not None and all(found[axis][1] for axis in "xyz"):
+        raise InputError(f"--unit {unit}: the columns of {path.name} say their own; leave it out")
     position = np.stack([_length(table, *found[axis], unit) for axis in "xyz"], axis=1)
     bodies = {path.stem: (position, _turns(table, found))}
     return Logged(path, t_s, table.line, bodies, {}, began=first)

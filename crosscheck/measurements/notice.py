@@ -10,6 +10,7 @@ from crosscheck.measurements.data import Measurements
 from seecr.columns.known import ANGLES, POSITION, Columns
 from seecr.columns.reach import away_from, check_reach
 from seecr.counted import some
+from seecr.errors import InputFileError
 from seecr.pose import Array, quat_conjugate, quat_multiply, rotvec_from_quat, rxyz_from_quat
 
 if TYPE_CHECKING:
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 _FAR = 2.5
 # Readings that spread by this much more, or less, than what was commanded are in another unit.
 _OTHER_UNIT, _LEAST_ROWS = 100.0, 4
+# An axis along which commands spread over so much of the frame was moved along on purpose.
+_MOVED = 0.02
 # Quaternions this far [rad] from where they should be, and near it in another order.
 _TURNED, _UNTURNED = np.radians(90.0), np.radians(45.0)
 # Positions that are usually further from the commands than this part of how these spread, and of
@@ -34,7 +37,7 @@ def notice(columns: Columns, robot: Robot, data: Measurements) -> list[str]:
         InputFileError: commands or readings that must be in another unit or order.
     """
     check_reach(columns, robot, data.command_pose, data.command_lengths)
-    _check_spread(columns, data)
+    _check_spread(columns, robot, data)
     return [
         *_far(robot, data),
         *_elsewhere(robot, data),
@@ -57,26 +60,41 @@ def _far(robot: Robot, data: Measurements) -> list[str]:
 
 
 def _spread(values: Array) -> float:
-    """Usual distance [m] from the middle, (n, 3), of what is not NaN."""
+    """Usual distance [m] from the middle, (n, k), of what is not NaN."""
     known = values[np.isfinite(values).all(axis=1)]
     if len(known) < _LEAST_ROWS:
         return 0.0
     return float(np.median(np.linalg.norm(known - np.median(known, axis=0), axis=1)))
 
 
-def _check_spread(columns: Columns, data: Measurements) -> None:
-    """Positions read in another unit than their column says."""
+def _check_spread(columns: Columns, robot: Robot, data: Measurements) -> None:
+    """Positions read in another unit than their columns say, all of them or one."""
     if data.command_pose is None:
         return
     which = [k for k in range(3) if data.position_mask[k]]
-    read, told = _spread(data.position[:, which]), _spread(data.command_pose[:, :3][:, which])
-    if not (read > 0.0 and told > 0.0) or 1.0 / _OTHER_UNIT < read / told < _OTHER_UNIT:
-        return
-    column = columns.known[f"meas_{POSITION[which[0]]}"]
-    raise columns.table.error(
+    read, told = _spread(data.position[:, which]), _spread(data.command_pose[:, which])
+    if read > 0.0 and told > 0.0 and not 1.0 / _OTHER_UNIT < read / told < _OTHER_UNIT:
+        raise _other_unit(columns, which[0], read, told)
+    for k in which:
+        seen = np.isfinite(data.position[:, k])
+        read, told = _mean_spread(data.position[seen, k]), _mean_spread(data.command_pose[seen, k])
+        if told > _MOVED * robot.reach and 0.0 < read < told / _OTHER_UNIT:
+            raise _other_unit(columns, k, read, told)
+
+
+def _mean_spread(values: Array) -> float:
+    """Mean distance [m] from the middle, (n,), which one that is far off makes larger only."""
+    if len(values) < _LEAST_ROWS:
+        return 0.0
+    return float(np.mean(np.abs(values - np.median(values))))
+
+
+def _other_unit(columns: Columns, k: int, read: float, told: float) -> InputFileError:
+    column = columns.known[f"meas_{POSITION[k]}"]
+    return columns.table.error(
         f"positions were read over {read:.3g} m where {told:.3g} m were commanded; expected about "
         f"the same; are these really {column.unit.suffix}? Name the columns by their unit, such as "
-        f"meas_{POSITION[which[0]]}_{'mm' if read > told else 'm'}",
+        f"meas_{POSITION[k]}_{'mm' if read > told else 'm'}",
         column=column.name,
     )
 

@@ -21,7 +21,7 @@ def with_stated(data: Measurements, texts: Iterable[str]) -> Measurements:
         texts: each a kind of reading and a quantity, such as ``"tension=0.5N"``.
 
     Raises:
-        CrosscheckError: an unknown kind, no quantity, or one in another unit.
+        CrosscheckError: an unknown kind, no quantity, one in another unit, or two of a kind.
     """
     texts = list(texts)
     sigma, ratio = stated(data.sigma, texts), data.sigma_ratio.copy()
@@ -34,7 +34,7 @@ def with_stated(data: Measurements, texts: Iterable[str]) -> Measurements:
 
 def stated(sigma: Sigma, texts: Iterable[str]) -> Sigma:
     """The noise with some of it stated anew; see :func:`with_stated`."""
-    values = {}
+    values: dict[str, float] = {}
     for text in texts:
         kind, equals, quantity = text.partition("=")
         kind = kind.strip()
@@ -44,7 +44,8 @@ def stated(sigma: Sigma, texts: Iterable[str]) -> Sigma:
                 f"--sigma {text}: expected KIND=QUANTITY such as position=0.1mm, KIND one of "
                 f"{', '.join(near)} (nearest first)"
             )
-        values[f"{kind}_{SI[kind]}"] = parse_quantity(
-            f"--sigma {kind}", kind, quantity, LEAST_NOISE
-        )
+        key = f"{kind}_{SI[kind]}"
+        if key in values:
+            raise CrosscheckError(f"--sigma {text}: another one for the {kind} was given")
+        values[key] = parse_quantity(f"--sigma {kind}", kind, quantity, LEAST_NOISE)
     return replace(sigma, **values)

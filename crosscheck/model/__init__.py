@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from crosscheck.model.diagnosed import load_diagnosed
+from crosscheck.model.place import check_place
 from crosscheck.model.write import (
     Provenance,
     calibrated,
@@ -15,6 +16,7 @@ from crosscheck.model.write import (
 __all__ = [
     "Provenance",
     "calibrated",
+    "check_place",
     "load_diagnosed",
     "provenance_of",
     "renewed",

@@ -16,6 +16,7 @@ import tomlkit
 from crosscheck.files import written
 from crosscheck.model.fitted import Fitted
 from crosscheck.model.own import Kept, kept, without_parts
+from crosscheck.model.place import check_place
 from seecr import __version__
 from seecr.cells import UNSEEN
 from seecr.data_reach import TABLE, DataReach
@@ -313,7 +314,7 @@ def save_model(path: str | Path, model: Model) -> None:
         model: as read, or the ``model`` that a calibration or an addition has.
 
     Raises:
-        InputFileError: the file cannot be written.
+        InputFileError: the file cannot be written, or what is there is no model.
         InputError: no model.
     """
     if not isinstance(model, Model):
@@ -321,6 +322,7 @@ def save_model(path: str | Path, model: Model) -> None:
             f"expected a model, such as the .model of a calibration, got {type(model).__name__}"
         )
     path = Path(path)
+    check_place(path)
     with written(path, failure="the model cannot be written") as (partial,):
         path.parent.mkdir(parents=True, exist_ok=True)
         partial.write_text(tomlkit.dumps(model.document), encoding="utf-8", newline="\n")

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.files import staged, write_text
+from crosscheck.files import check_replaces, staged, write_text
 from crosscheck.given import GivenRobot, copy_robot, file_of, robot_of
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import GivenCommands, commands_of
@@ -118,12 +118,14 @@ def make_twin(
 
     Raises:
         CrosscheckError: an effect that no twin can hide, or a robot that MuJoCo cannot rest.
-        InputFileError: poses that cannot be read.
+        InputFileError: poses that cannot be read, or files in ``out`` that are of no older twin.
         InputError: a robot of no file, or with other numbers than its file has.
     """
     seed, points = whole(seed, "seed"), whole(points, "points", least=1)
     n_effects = None if n_effects is None else whole(n_effects, "n_effects")
     path, robot = file_of(robot), robot_of(robot)
+    if out is not None:
+        check_replaces(out, FILES, NAME, {"robot.xml": path})
     given = None if poses is None else commands_of(poses, robot)
     stated = sigma or (Sigma() if given is None else given.sigma)
     tensions = tensions or stated.tension_N is not None

@@ -140,8 +140,24 @@ def model_at(given: Path | None, robot: Robot) -> Model | None:
 
 
 def notes_of(model: Model | None, solution: Solution) -> tuple[str, ...]:
-    """What is to be told of a model, and of answers with it that are beyond its data."""
-    return () if model is None else (*model.notes, *model.beyond(solution))
+    """What is to be told of commands, of a model, and of answers that are beyond its data."""
+    said = outside(solution.robot, solution.command)
+    return said if model is None else (*said, *model.notes, *model.beyond(solution))
+
+
+def outside(robot: Robot, commands: NDArray[np.float64]) -> tuple[str, ...]:
+    """That commands (n, 7) lie outside the frame, where some do: most likely a slip."""
+    import numpy as np
+
+    away = np.linalg.norm(commands[:, :3] - robot.reference_pose[:3], axis=1)
+    out = int(np.sum(away > robot.reach))
+    if out == 0:
+        return ()
+    which = "the command is" if len(away) == 1 else f"{out} of {len(away)} commands are"
+    return (
+        f"{which} outside the frame: up to {away.max():.3g} m from the reference position, and "
+        f"the frame is {robot.reach:.3g} m across",
+    )
 
 
 def _usual(model: Model) -> list[str]:

@@ -57,13 +57,19 @@ def command(
     out = out if folder is None else folder / out
     if out.suffix.lower() not in (".xml", ".mjcf"):
         raise InputError(f"{out}: expected the name of an MJCF file to write, such as out.xml")
-    if out.exists() and machine.source is not None and out.samefile(machine.source):
-        raise InputError(f"{out}: is the robot itself; expected another file to write")
+    beside = out.with_name(f"{out.stem}-mujoco{out.suffix}")
+    for file in (out, beside):
+        if file.exists() and machine.source is not None and file.samefile(machine.source):
+            raise InputError(f"{file}: is the robot itself; expected another file to write")
     own = model_at(model, machine)
     found = export(machine, own or (), pose_of(coordinates, machine) if coordinates else None)
+    if coordinates and found.mujoco_text is None:
+        raise InputError(
+            f"X Y Z is the pose of {beside.name}, and what the model has needs no such file; leave "
+            "it out"
+        )
     check_writable(out)
     out.parent.mkdir(parents=True, exist_ok=True)
-    beside = out.with_name(f"{out.stem}-mujoco{out.suffix}")
     files = {out: found.text} | ({beside: found.mujoco_text} if found.mujoco_text else {})
     write_texts(files, "cannot write the MJCF")
     if as_json:

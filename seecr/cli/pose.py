@@ -47,7 +47,8 @@ def command(
     takes to get there.
 
     \b
-    Exit status: 0 at rest, 2 bad input, 3 no rest found.
+    Exit status: 0 at rest, 2 bad input, 3 no rest found, or a platform that
+    is free to move there.
     """
     from seecr import barriers, equilibria, predict, solve, spread_of
     from seecr.files import json_text, staged, write_text

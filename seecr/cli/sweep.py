@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 
 _WANTED = "Lengths are commanded; what is off is told from the poses wanted, columns want_*."
+# Poses of --line.
+_COUNT = 24
 _COUNTED = "Poses are counted from 0, as the rows of sweep.json are."
 
 
@@ -53,7 +55,10 @@ Examples:
     "--line", nargs=6, type=float, metavar="X Y Z X Y Z", help="From a position to another [m]."
 )
 @click.option(
-    "--count", type=click.IntRange(min=1), default=24, show_default=True, help="Poses of --line."
+    "--count",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help=f"Poses of --line.  [default: {_COUNT}]",
 )
 @click.option(
     "--grid",
@@ -101,7 +106,8 @@ def command(
     Writes sweep.json, sweep.csv, a figure and sweep.rrd.
 
     \b
-    Exit status: 0 all at rest, 2 bad input, 3 a pose without rest.
+    Exit status: 0 all at rest, 2 bad input, 3 a pose without rest, or where the platform is free
+    to move.
     """
     from seecr import spread_of
     from seecr.files import json_text, staged, write_text
@@ -214,6 +220,11 @@ def _commands(
         raise InputError(f"expected one of POSES.csv, --line, --grid; got {got or 'none'}")
     if poses is not None and given["turned"]:
         raise InputError(f"--turned is of --line and --grid; {poses} has its own orientations")
+    if given["count"] and not given["line"]:
+        raise InputError(
+            f"--count is of --line, got it beside {poses or '--grid'}, which says how many poses "
+            "it has; leave it out"
+        )
     if poses is None:
         return Commands(_along(robot, given)), {}, (_COUNTED,), False
     read = read_commands(poses, robot)
@@ -237,8 +248,9 @@ def _along(robot: Robot, given: dict[str, Any]) -> NDArray[np.float64]:
 
     if given["line"]:
         check_places(given["line"], robot)
-        check_count("--count", given["count"])
-        places = np.linspace(given["line"][:3], given["line"][3:], given["count"])
+        count = given["count"] or _COUNT
+        check_count("--count", count)
+        places = np.linspace(given["line"][:3], given["line"][3:], count)
     else:
         axes = axes_of(given["grid"], robot)
         places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)

@@ -11,6 +11,10 @@ from seecr.robot import ABSURD, Robot
 
 # So many commands say where a robot goes.
 _SEVERAL = 4
+# Numbers below this part of the frame are near its origin, and no cable is so short.
+_TINY = 0.01
+# A reference position this part of the frame from the origin is not near it.
+_OFF_ORIGIN = 0.1
 
 __all__ = ["ABSURD", "away_from", "check_reach"]
 
@@ -36,6 +40,8 @@ def check_reach(columns: Columns, robot: Robot, poses: Array | None, lengths: Ar
     for quantity, away in zip(quantities, away_from(robot, poses, lengths).T, strict=True):
         if quantity in columns.known:
             _refuse_far(columns, quantity, away, robot.reach)
+            home = 0.0 if lengths is not None else robot.reference_pose["xyz".index(quantity[-1])]
+            _refuse_small(columns, quantity, home, robot.reach)
     if lengths is None and poses is not None:
         _refuse_another(columns, robot, poses)
 
@@ -70,3 +76,22 @@ def _refuse_far(columns: Columns, quantity: str, away: Array, reach: float) -> N
             f"unit, such as {quantity}_mm"
         ),
     )
+
+
+def _refuse_small(columns: Columns, quantity: str, home: float, reach: float) -> None:
+    """Metres under the name of a smaller unit: all near nothing, and as metres inside the frame."""
+    unit, given = columns.known[quantity].unit, columns.numbers(quantity)
+    as_metres = given / unit.to_si(1.0)
+    length = quantity.startswith("length_")
+    near = np.max(np.abs(given), initial=0.0) < _TINY * reach
+    inside = np.all(np.abs(as_metres - home) <= reach) and np.any(as_metres != 0.0)
+    if unit.suffix != "m" and near and inside and (length or abs(home) > _OFF_ORIGIN * reach):
+        columns.refuse(
+            np.ones(len(given), dtype=bool),
+            quantity,
+            lambda row: (
+                f"expected numbers of the size of the robot's frame, {reach:.3g} m across, got at "
+                f"most {np.max(np.abs(as_metres)):.4g} {unit.suffix}; are these really "
+                f"{unit.suffix}? Name the column by its unit, such as {quantity}_m"
+            ),
+        )

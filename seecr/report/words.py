@@ -278,5 +278,5 @@ def _three(values: Array, form: str) -> str:
 
 
 def at_rest(solution: Solution) -> bool:
-    """Whether every pose rests, be it free to move along some direction."""
-    return all(s in (Status.CONVERGED, Status.SINGULAR) for s in solution.status)
+    """Whether every pose is one of those counted as at rest: where nothing can move freely."""
+    return bool(solution.converged.all())

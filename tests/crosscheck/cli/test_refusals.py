@@ -10,6 +10,8 @@ import pytest
 from made_data import case, refused, run
 
 import crosscheck
+import seecr
+from seecr.errors import SeecrError
 
 pytestmark = pytest.mark.slow
 
@@ -166,3 +168,84 @@ def test_an_unknown_robot_lists_the_shipped_ones_nearest_first(verb: tuple[str, 
     assert (
         "demobot_4: no such file and no shipped robot; expected an MJCF file or one of de" in said
     )
+
+
+@pytest.mark.parametrize("which", [0, 1])
+@pytest.mark.parametrize(
+    "words",
+    [("diagnose", "--model-out"), ("calibrate", "--model"), ("add", "stiffness", "--model")],
+)
+def test_what_is_no_model_is_not_replaced_by_one(
+    stiff: tuple[Path, Path], which: int, words: tuple[str, ...], tmp_path: Path
+) -> None:
+    """The only robot and the only measurements had been, with status 0."""
+    mine = stiff[which]
+    before = mine.read_bytes()
+    *verb, option = words
+    said = refused(*verb, *stiff, option, mine, "--out", tmp_path / "o")
+    assert f"{mine}" in said and "model" in said
+    if words[0] == "diagnose":
+        assert "expected the name of a new file, or a model to be replaced" in said
+    assert mine.read_bytes() == before and not (tmp_path / "o").exists()
+    with pytest.raises(SeecrError, match="a new file, or a model to be replaced"):
+        crosscheck.save_model(mine, seecr.load_model(saved(tmp_path, stiff), stiff[0]))
+    assert mine.read_bytes() == before
+
+
+def saved(folder: Path, stiff: tuple[Path, Path]) -> Path:
+    """A model of the robot with nothing in it."""
+    path = folder / "empty.toml"
+    crosscheck.save_model(path, seecr.new_model(seecr.load_robot(stiff[0])))
+    return path
+
+
+def test_an_effect_beside_all_from(stiff: tuple[Path, Path], tmp_path: Path) -> None:
+    words = ("add", "stiffness", *stiff, "--model", tmp_path / "m.toml", "--all-from", "d.json")
+    assert "expected EFFECT or --all-from, not both; got stiffness and" in refused(*words)
+
+
+def test_what_else_had_no_effect(stiff: tuple[Path, Path], tmp_path: Path) -> None:
+    robot, data = stiff
+    empty = tmp_path / "limits.toml"
+    empty.write_text("# none yet\n")
+    assert "limits.toml: is empty; expected a TOML file with lines such as" in refused(
+        "compare", *stiff, "--limits", empty
+    )
+    twice = ("--sigma", "position=0.1mm", "--sigma", "position=1mm")
+    assert "--sigma position=1mm: another one for the position was given" in refused(
+        "compare", *stiff, *twice
+    )
+    for other in ((robot,), ("--hide", 3), ("--tensions",), ("--poses", data)):
+        assert "--open shows a case that is there: leave out all but --json" in refused(
+            "twin", "--open", tmp_path, *other
+        )
+
+
+def test_measurements_are_not_replaced_by_those_of_a_twin(
+    stiff: tuple[Path, Path], tmp_path: Path
+) -> None:
+    robot, data = stiff
+    mine = tmp_path / "measured.csv"
+    mine.write_bytes(data.read_bytes())
+    said = refused("twin", robot, "--hide", 1, "--out", tmp_path)
+    assert f"{mine}: would be replaced, and is no older result: there is no answer.sealed" in said
+    log = tmp_path / "log.csv"
+    log.write_text("t_s,x_mm,y_mm,z_mm\n0,1,2,3\n")
+    words = ("import", "poses", log, "--robot", robot, "--commands", data)
+    assert "there is no import.json beside it; expected a new folder or that of an" in refused(
+        *words, "--out", tmp_path
+    )
+    assert mine.read_bytes() == data.read_bytes()
+
+
+@pytest.mark.parametrize("column", ["cmd_x", "meas_x", "meas_y"])
+def test_metres_under_millimetres_in_one_column(
+    stiff: tuple[Path, Path], tmp_path: Path, column: str
+) -> None:
+    robot, data = stiff
+    header, *rows = data.read_text().splitlines()
+    other = tmp_path / "other.csv"
+    assert f"{column}_m" in header
+    other.write_text("\n".join([header.replace(f"{column}_m", f"{column}_mm"), *rows]))
+    said = refused("compare", robot, other)
+    assert f"column {column}_mm: " in said and "are these really mm?" in said

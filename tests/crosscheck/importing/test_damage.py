@@ -255,3 +255,20 @@ def test_the_command_line_says_it_in_one_line_and_writes_nothing(files, tmp_path
         "--out", out,
     )  # fmt: skip
     assert "crosscheck import motive" in message and not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("form", "given", "said"),
+    [
+        ("motive", {"aligned": True, "points": {"a": np.zeros(3)}}, "--aligned and --point: exp"),
+        ("motive", {"body": "platform", "markers": POINTS}, "--body and --markers: expected one"),
+        ("motive", {"shape": {"a": np.zeros(3)}}, "--shape without --markers: expected the names"),
+        ("motive", {"rotation": "vector"}, "--rotation beside motive: expected it with vicon onl"),
+        ("vicon", {"unit": "mm"}, "--unit beside vicon: expected it with poses only"),
+        ("vicon", {"rotation": "foo"}, "--rotation: expected vector, or the order of Euler angles"),
+        ("vicon", {"rotation": "xxy"}, "got 'xxy'"),
+        ("poses", {"unit": "mm"}, "--unit mm: the columns of log.csv say their own; leave it out"),
+    ],
+)  # fmt: skip
+def test_what_is_said_and_has_no_use(files, form, given, said):
+    assert said in wrong(files, form, **given)

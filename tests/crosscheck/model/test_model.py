@@ -241,7 +241,7 @@ def test_a_file_that_is_not_there_or_no_text(robot, tmp_path):
 def test_an_unwritable_place_leaves_the_old_model(robot, saved, tmp_path):
     blocked = tmp_path / "file"
     blocked.write_text("")
-    with pytest.raises(InputFileError, match="the model cannot be written"):
+    with pytest.raises(InputFileError, match="cannot be written"):
         save_model(blocked / "m.toml", new_model(robot))
     assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "model.toml"]
 

@@ -70,6 +70,28 @@ ROBOT = "planar_vertical"
          "out.csv: expected the name of an MJCF file to write, such as out.xml"),
         ("export own.xml own.xml", "own.xml: is the robot itself; expected another file to write"),
         ("export own.xml out.xml nan 0 1", "X: expected metres"),
+        ("export own-mujoco.xml own.xml",
+         "own-mujoco.xml: is the robot itself; expected another file to write"),
+        ("export own.xml out.xml 0.4 0.25 0.1", "X Y Z is the pose of out-mujoco.xml, and what the "
+         "model has needs no such file; leave it out"),
+        ("sweep demobot_parallel here.csv --count 5 --out o",
+         "--count is of --line, got it beside here.csv, which says how many poses it has"),
+        ("sweep demobot_parallel --grid 0:1:3 0.2 0.1 --count 5 --out o",
+         "--count is of --line, got it beside --grid"),
+        ("sweep demobot_parallel metres.csv --out o",
+         "metres.csv: line 2, column cmd_x_mm: expected numbers of the size of the "
+         "robot's frame, 0.834 m across, got at most 0.4 mm; are these really mm? Name the "
+         "column by its unit, such as cmd_x_m"),
+        ("sweep demobot_parallel lengths.csv --out o",
+         "lengths.csv: line 2, column length_1_mm: expected numbers of the size of the robot's "
+         "frame, 0.834 m across, got at most 0.5 mm; are these really mm?"),
+        ("correct demobot_parallel here.csv --lowest 5 --aim 1 --out o", "aim must lie between "
+         "lowest and highest tension, for cable number 1 5 to inf N, got 1 N"),
+        ("correct demobot_parallel here.csv --highest 5 --aim 1,9 --out o", "aim"),
+        ("pose demobot_parallel 0.4 0.25 0.1 --model odd.toml",
+         "odd.toml: line 2: [robot] mass_kg: expected a number, got 'heavy'; leave it out"),
+        ("pose demobot_parallel 0.4 0.25 0.1 --model two.toml",
+         "two.toml: line 4: effect stiffness is listed twice; expected it once"),
     ],
 )  # fmt: skip
 def test_a_mistake_is_one_sentence(
@@ -80,12 +102,19 @@ def test_a_mistake_is_one_sentence(
     (tmp_path / "far.csv").write_text(CSV.replace("0.4", "400"))
     names = ",".join(f"length_{i}_m" for i in range(1, 9))
     (tmp_path / "told.csv").write_text(f"{names}\n{','.join(['0.5'] * 8)}\n")
+    (tmp_path / "lengths.csv").write_text((tmp_path / "told.csv").read_text().replace("_m", "_mm"))
+    (tmp_path / "metres.csv").write_text("cmd_x_mm,cmd_y_mm,cmd_z_mm\n0.4,250,100\n")
+    (tmp_path / "odd.toml").write_text('[robot]\nmass_kg = "heavy"\n')
+    (tmp_path / "two.toml").write_text(
+        '[[effect]]\nname = "stiffness"\n[[effect]]\nname = "stiffness"\n'
+    )
     (tmp_path / "huge.csv").write_text(CSV.replace("0.4", "1e300"))
     (tmp_path / "picture.xml").write_bytes(b"\x89PNG\r\n\x1a\n\0")
     (tmp_path / "empty.xml").write_text(" \n")
     (tmp_path / "noise.toml").write_text('[sigma]\nposition_m = "0.1mm"\n')
     own = model_path("demobot_parallel").read_text()
     (tmp_path / "own.xml").write_text(own)
+    (tmp_path / "own-mujoco.xml").write_text(own)
     (tmp_path / "long.xml").write_text(re.sub('springlength="[^"]*"', 'springlength="0 1e6"', own))
     (tmp_path / "stiff.xml").write_text(re.sub('stiffness="[^"]*"', 'stiffness="1e300"', own))
     before = {path: path.read_bytes() for path in tmp_path.iterdir()}
@@ -102,3 +131,32 @@ def test_a_platform_that_falls_is_told_without_vibrations() -> None:
     )
     assert result.exit_code == 3
     assert "no equilibrium found" in result.stdout and "vibrates" not in result.stdout
+
+
+@pytest.mark.parametrize("words", ["pose demobot_parallel", "sweep demobot_parallel --count 1"])
+def test_a_platform_that_is_free_to_move_is_not_at_rest(
+    words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It had said "0 of 1 pose at rest" and ended with status 0."""
+    monkeypatch.chdir(tmp_path)
+    verb, robot, *more = words.split()
+    place = ["3", "3", "3"]
+    quiet = ["--line", *place, *place, "--figure", "none", "--no-recording", "--out", "o"]
+    given = quiet if verb == "sweep" else [*place, "--alone"]
+    result = CliRunner().invoke(main, [verb, robot, *more, *given])
+    assert result.exit_code == 3, result.output
+    assert "free to move along at least one direction" in result.stdout
+    where = "the command is outside the frame: up to 4.74 m from the reference position, and the"
+    assert f"{where} frame is 0.834 m across" in result.stdout
+
+
+def test_commands_outside_the_frame_are_counted(tmp_path: Path) -> None:
+    line = ["--line", "0.4", "0.25", "0.1", "1.4", "0.25", "0.1", "--count", "3"]
+    quiet = ["--figure", "none", "--no-recording", "--out", str(tmp_path)]
+    said = CliRunner().invoke(main, ["sweep", "demobot_parallel", *line, *quiet]).stdout
+    assert "1 of 3 commands are outside the frame: up to 1" in said
+    inside = [*line[:4], "0.5", *line[5:]]
+    assert (
+        "the frame"
+        not in CliRunner().invoke(main, ["sweep", "demobot_parallel", *inside, *quiet]).stdout
+    )

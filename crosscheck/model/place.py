@@ -1,0 +1,24 @@
+"""Where a model may be written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from crosscheck.files import check_writable
+from seecr.model import read_document
+
+__all__ = ["check_place"]
+
+_EXPECTED = "expected the name of a new file, or a model to be replaced"
+
+
+def check_place(path: Path) -> None:
+    """That a model can be written there, before the work that it is for.
+
+    Raises:
+        InputFileError: nothing can be written there, or what is there is no model: a robot or
+            measurements that were named by mistake are often the only ones.
+    """
+    check_writable(path)
+    if path.exists():
+        read_document(path, _EXPECTED)
