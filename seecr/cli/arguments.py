@@ -149,14 +149,15 @@ def outside(robot: Robot, commands: NDArray[np.float64]) -> tuple[str, ...]:
     """That commands (n, 7) lie outside the frame, where some do: most likely a slip."""
     import numpy as np
 
+    from seecr.counted import counted
+
     away = np.linalg.norm(commands[:, :3] - robot.reference_pose[:3], axis=1)
     out = int(np.sum(away > robot.reach))
     if out == 0:
         return ()
-    which = "the command is" if len(away) == 1 else f"{out} of {len(away)} commands are"
     return (
-        f"{which} outside the frame: up to {away.max():.3g} m from the reference position, and "
-        f"the frame is {robot.reach:.3g} m across",
+        f"{out} of {counted(len(away), 'command')} outside the frame: up to {away.max():.3g} m "
+        f"from the reference position, and the frame is {robot.reach:.3g} m across",
     )
 
 

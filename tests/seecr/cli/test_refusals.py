@@ -146,7 +146,7 @@ def test_a_platform_that_is_free_to_move_is_not_at_rest(
     result = CliRunner().invoke(main, [verb, robot, *more, *given])
     assert result.exit_code == 3, result.output
     assert "free to move along at least one direction" in result.stdout
-    where = "the command is outside the frame: up to 4.74 m from the reference position, and the"
+    where = "1 of 1 command outside the frame: up to 4.74 m from the reference position, and the"
     assert f"{where} frame is 0.834 m across" in result.stdout
 
 
@@ -154,7 +154,7 @@ def test_commands_outside_the_frame_are_counted(tmp_path: Path) -> None:
     line = ["--line", "0.4", "0.25", "0.1", "1.4", "0.25", "0.1", "--count", "3"]
     quiet = ["--figure", "none", "--no-recording", "--out", str(tmp_path)]
     said = CliRunner().invoke(main, ["sweep", "demobot_parallel", *line, *quiet]).stdout
-    assert "1 of 3 commands are outside the frame: up to 1" in said
+    assert "1 of 3 commands outside the frame: up to 1" in said
     inside = [*line[:4], "0.5", *line[5:]]
     assert (
         "the frame"
