@@ -118,7 +118,7 @@ def barriers(solution: Solution, others: Solution, i: int = 0) -> tuple[Barrier,
 def _barrier(one: Solution, other: Solution) -> Barrier:
     tables, robot = one.tables, one.robot
     turned = np.linalg.norm(pose_difference(other.pose[0], one.pose[0])[3:])
-    twisted = bool(not robot.joints and turned > TWISTED)
+    twisted = bool(turned > TWISTED)
     if not (np.isfinite(one.energy[0]) and np.isfinite(other.energy[0])):
         return Barrier(np.nan, np.nan, np.full(7, np.nan), exact=False, twisted=twisted)
     size = np.where(np.arange(6) < 3, 1.0 / robot.length, 1.0)

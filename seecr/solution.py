@@ -238,7 +238,9 @@ class Solution(Result):
         if commanded:
             away = np.linalg.norm(self.deviation[:, :3], axis=1)
             turned = np.degrees(np.linalg.norm(self.deviation[:, 3:], axis=1))
-            k = int(known[np.argmax(away[known])])
+            # both at once, as distances are: rounding must not say which of two is further
+            apart = np.hypot(away, self.robot.length * np.radians(turned))
+            k = int(known[np.argmax(apart[known])])
             out.append(
                 f"furthest from its command: {self.place(k)}, by {1e3 * away[k]:.4g} mm "
                 f"and {turned[k]:.4g} deg"

@@ -70,6 +70,10 @@ def _of_cable(name: str, beyond: float, low: float, high: float, of_weight: bool
     if pull >= 0.0:
         least = f"the {low:.3g} N that it weighs" if of_weight else f"{low:.3g} N"
         return f"{who} would have to pull {pull:.3g} N, less than {least}"
+    if low > 0.0 and not of_weight:
+        return (
+            f"{who} would have to push with {-pull:.3g} N for others to pull at least {low:.3g} N"
+        )
     return f"{who} would have to push with {-pull:.3g} N"
 
 

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from seecr.arguments import finite, numbers
 from seecr.counted import counted
-from seecr.distribution import balanced, tension_limits
+from seecr.distribution import tension_limits
 from seecr.errors import InputError
 from seecr.given import GivenRobot, robot_of
 from seecr.joints import motion_columns, values_of_pose
@@ -34,6 +34,8 @@ __getattr__ = lazily("seecr", dict.fromkeys(("Workspace", "boundary", "workspace
 
 # Part of the load that may stay unbalanced: rounding of the tensions found.
 _BALANCED = 1e-9
+# Directions in which W is weaker than this part of its strongest are none of its own.
+_SINGULAR = 1e-9
 
 
 @dataclass(frozen=True, repr=False)
@@ -139,7 +141,8 @@ def tension_margin(
         )  # fmt: skip
     odd = np.flatnonzero(np.isnan(out))
     if len(odd):
-        out[odd] = _by_search(*_loads(robot, places[odd], _rows(wrench, odd), wrenches), low, high)
+        some_loads = _loads(robot, places[odd], _rows(wrench, odd), wrenches)
+        out[odd] = _by_rank(*some_loads, low, high, scale)
     return out
 
 
@@ -161,7 +164,7 @@ def margins_from(matrices: Array, loads: Array, low: Array, high: Array, scale: 
         )
     odd = np.flatnonzero(np.isnan(out))
     if len(odd):
-        out[odd] = _by_search(matrices[odd], loads[odd], low, high)
+        out[odd] = _by_rank(matrices[odd], loads[odd], low, high, scale)
     return out
 
 
@@ -182,21 +185,30 @@ def _loads(
     return np.array(matrix, order="C"), np.stack(every, axis=1) + (load - at_rest)[:, None]
 
 
-def _by_search(matrices: Array, loads: Array, low: Array, high: Array) -> Array:
-    """Margins (n,) where W has no inverse: zero where a search finds tensions, else none.
+def _by_rank(matrices: Array, loads: Array, low: Array, high: Array, scale: float) -> Array:
+    """Margins (n,) where W has no inverse: what it can balance at all, in its own directions.
 
-    None, too, where a cable's equations have no answer, which leaves numbers that are not finite.
+    None where the load is out of these, or a cable's equations have no answer, which leaves
+    numbers that are not finite.
     """
-    sound = np.atleast_1d(np.isfinite(matrices).all(axis=(1, 2)))
-    sound &= np.isfinite(loads).all(axis=(1, 2))
-    return np.array(
-        [
-            0.0
-            if fine and all(balanced(w, load, low, high)[1] < _BALANCED for load in some)
-            else -np.inf
-            for w, some, fine in zip(matrices, loads, sound, strict=True)
-        ]
-    )
+    from seecr.compiled.margin import margins_of  # takes a while to import
+
+    out = np.full(len(matrices), -np.inf)
+    sound = np.isfinite(matrices).all(axis=(1, 2)) & np.isfinite(loads).all(axis=(1, 2))
+    rows = np.flatnonzero(sound)
+    left, sizes, _right = np.linalg.svd(matrices[rows], full_matrices=False)
+    rank = np.sum(sizes > _SINGULAR * sizes[:, :1], axis=1)
+    for r in np.unique(rank[rank > 0]):
+        own, base = rows[rank == r], left[rank == r, :, :r]
+        inside = loads[own] @ base
+        beyond = np.linalg.norm(loads[own] - inside @ base.swapaxes(1, 2), axis=2)
+        size = np.linalg.norm(loads[own], axis=2)
+        held = np.flatnonzero((beyond <= _BALANCED * size).all(axis=1))
+        reduced = np.ascontiguousarray(base.swapaxes(1, 2) @ matrices[own])[held]
+        found = np.full(len(held), np.nan)
+        margins_of(reduced, np.ascontiguousarray(inside[held]), low, high, scale, found)
+        out[own[held]] = np.where(np.isnan(found), -np.inf, found)
+    return out
 
 
 def _wrench(value: ArrayLike, n: int) -> Array:

@@ -83,8 +83,9 @@ def command(
     correction.json says of each row how likely its tensions stay within the limits.
 
     Poses are those of the platform in the base frame. A calibration shares errors between robot and
-    tracker as it best can; what is sure is what the tracker will read. With --as-read the platform
-    is brought to where the model's tracker reads the poses of the file.
+    tracker as it best can, and may leave the platform farther off there than it was; what is sure
+    is what the tracker will read. With --as-read the platform is brought to where the model's
+    tracker reads the poses of the file, and want_* are these places.
 
     Writes corrected.csv and corrected.toml, which every command reads as commands, and
     correction.json. Poses without any answer are left out of corrected.csv; poses are told by
@@ -193,5 +194,6 @@ def _as_tracked(
         return wanted, []
     return wanted, [
         f"the model's tracker reads these poses up to {1e3 * away:.3g} mm off: the platform is "
-        "brought to them in the base frame; --as-read brings the readings to them"
+        "brought to them in the base frame, which a calibration by a tracker knows no better than "
+        "that; --as-read brings the readings to them"
     ]

@@ -155,8 +155,8 @@ def command(
     lines = [*found.lines(), *softest_line(found), *likely_lines(found, at_least)]
     if places is not None and edge is not None:
         lines.append(edge_line(places, edge))
-    tensions = ("--lowest", lowest) if lowest else ()
-    most = () if highest is None else ("--highest", highest)
+    tensions = ("--lowest", f"{lowest:g}") if lowest else ()
+    most = () if highest is None else ("--highest", f"{highest:g}")
     then = following("crosscheck", "plan", robot, "--rows", 40, *tensions, *most)
     for line in [*notes, *lines, f"Results in {out}/", then]:
         click.echo(line)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from seecr.passes import TWISTED, Barrier
 from seecr.planar import midline_point
 from seecr.pose import Array, pose_difference, rxyz_from_quat, transform_points
-from seecr.robot import Robot
+from seecr.robot import Joint, Robot
 from seecr.solution import Solution, Status
 from seecr.uncertainty import Spread
 from seecr.units import joules, short, with_error
@@ -163,11 +163,7 @@ def direction_words(robot: Robot, direction: Array) -> str:
     if not np.isfinite(direction).all():
         return "no direction"
     if robot.joints:
-        parts = zip(robot.joints, direction, robot.hinges, strict=True)
-        sizes = [
-            (joint.name, abs(v) * (robot.length if turns else 1.0)) for joint, v, turns in parts
-        ]
-        return "move along " + " and ".join(name for name, size in sizes if size > _PART)
+        return _joint_words(robot, direction)
     words = []
     for verb, part in (("move along", direction[:3]), ("turn about", robot.length * direction[3:])):
         size = float(np.linalg.norm(part))
@@ -175,6 +171,25 @@ def direction_words(robot: Robot, direction: Array) -> str:
             axes = [a for a, v in zip("xyz", part / size, strict=True) if abs(v) > 2 * _PART]
             words.append(f"{verb} {' and '.join(axes)}")
     return ", ".join(words)
+
+
+def _joint_words(robot: Robot, direction: Array) -> str:
+    """The same of a platform on joints: along slides, about hinges."""
+    words = []
+    for verb, kind, metre in (("move along", "slide", 1.0), ("turn about", "hinge", robot.length)):
+        names = [
+            _axis_name(joint)
+            for joint, part in zip(robot.joints, direction, strict=True)
+            if joint.kind == kind and metre * abs(part) > _PART
+        ]
+        words += [f"{verb} {' and '.join(names)}"] if names else []
+    return ", ".join(words)
+
+
+def _axis_name(joint: Joint) -> str:
+    """The letter of a joint's axis in the base frame, or else its name."""
+    along = np.flatnonzero(np.abs(joint.axis) > 1.0 - 1e-9)
+    return "xyz"[along[0]] if len(along) else joint.name
 
 
 def midline_lines(solution: Solution, i: int = 0) -> Iterator[str]:
@@ -227,6 +242,8 @@ def other_lines(
         line = (
             f"could also rest {1e3 * np.linalg.norm(gap[:3]):.4g} mm and "
             f"{np.degrees(np.linalg.norm(gap[3:])):.4g} deg away, "
+            f"at {_three(1e3 * others.pose[k, :3], '.4g')} mm turned "
+            f"{_three(np.degrees(rxyz_from_quat(others.pose[k, 3:])), '.4g')} deg, "
             f"{_more_energy(others.energy[k] - solution.energy[i])}"
             f"slack: {' '.join(slack) or 'none'}"
         )

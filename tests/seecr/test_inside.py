@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 
 import numpy as np
 import pytest
@@ -154,6 +155,12 @@ def test_a_set_of_wrenches_counts_with_its_least_margin() -> None:
 def test_it_is_told_what_a_cable_weighs() -> None:
     matrix, load, names = np.array([[1.0, 1.0]]), np.array([5.0]), ["a", "b"]
     low, high = np.array([4.0, 4.0]), np.array([9.0, 9.0])
+    push = why_not_held(matrix, np.array([-3.0]), low, high, names)
+    assert re.fullmatch(
+        "cable [ab] would have to push with 7 N for others to pull at least 4 N", push
+    )
+    free = why_not_held(matrix, np.array([-3.0]), 0.0 * low, high, names)
+    assert free in ("cable a would have to push with 3 N", "cable b would have to push with 3 N")
     less = why_not_held(matrix, load, low, high, names, np.array([4.0, 3.0]))
     assert less == "cable a would have to pull 1 N, less than the 4 N that it weighs"
     heavy = why_not_held(matrix, load, low, np.array([9.0, 2.0]), names, low)

@@ -31,7 +31,7 @@ from seecr.report.figures import map_figure
 from seecr.report.maps import softest_line
 from seecr.robot import Robot
 from seecr.shipped import model_path
-from seecr.workspace import balance_equations, feasible, tension_margin
+from seecr.workspace import balance_equations, feasible, margins_from, tension_margin
 
 NAMES = ["demobot_cogiro", "demobot_parallel", "demobot_off_centre", "planar_vertical"]
 
@@ -92,6 +92,29 @@ def test_robots_of_any_number_of_cables(seed: int) -> None:
     for margin, matrix, load in zip(margins, matrices, loads, strict=True):
         expected = margin_by_highs(matrix, load, 0.0, 50.0)
         assert margin == pytest.approx(expected, rel=1e-6, abs=1e-8)
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.0, np.inf), (0.5, 2.0), (1.0, 1.5)])
+@pytest.mark.parametrize("cables", [8, 5, 2])
+def test_where_balance_lacks_a_direction_margins_are_those_of_highs(
+    cables: int, low: float, high: float
+) -> None:
+    """A layout may lose a freedom by symmetry: 0 had been said of all that can be held."""
+    random = np.random.default_rng(cables)
+    matrices = random.normal(size=(12, 6, 2 if cables == 2 else 5))
+    matrices = matrices @ random.normal(size=(12, matrices.shape[2], cables))
+    tensions = random.uniform(0.3, 2.5, size=(12, cables))
+    loads = np.einsum("ndm,nm->nd", matrices, tensions)
+    limits = np.full(cables, low), np.full(cables, high)
+    margins = margins_from(matrices, loads[:, None], *limits, 1.0)
+    expected = [margin_by_highs(*each, low, high) for each in zip(matrices, loads, strict=True)]
+    np.testing.assert_allclose(margins, expected, rtol=1e-6, atol=1e-7)
+    assert np.isfinite(margins).all() or high == np.inf
+    # out of what the cables can do at all
+    out = loads + 0.1 * np.linalg.svd(matrices)[0][:, :, -1]
+    assert np.all(np.isneginf(margins_from(matrices, out[:, None], *limits, 1.0)))
+    sets = np.stack([loads, out], axis=1)
+    assert np.all(np.isneginf(margins_from(matrices, sets, *limits, 1.0)))
 
 
 def test_margins_without_a_bound_are_infinite(tmp_path: Path) -> None:

@@ -42,7 +42,7 @@ def test_from_a_pose_to_a_workspace_to_a_plan(
     assert told == ["seecr", "map", "demobot_cogiro", "--cable", "3000"]
     grid = ("--grid", "0.4", "0.25", "0.1:0.15:2", "--no-elastic", "--highest", "40")
     told = following(run(*told, *grid, *QUIET))
-    assert told == ["crosscheck", "plan", "demobot_cogiro", "--rows", "40", "--highest", "40.0"]
+    assert told == ["crosscheck", "plan", "demobot_cogiro", "--rows", "40", "--highest", "40"]
 
 
 def test_from_wanted_poses_to_what_is_told_and_back(

@@ -160,3 +160,14 @@ def test_commands_outside_the_frame_are_counted(tmp_path: Path) -> None:
         "the frame"
         not in CliRunner().invoke(main, ["sweep", "demobot_parallel", *inside, *quiet]).stdout
     )
+
+
+@pytest.mark.parametrize("verb", ["map", "sweep"])
+def test_a_grid_may_begin_below_zero(verb: str, tmp_path: Path) -> None:
+    """The origin of many halls is in the middle of the floor; it was taken for an option."""
+    grid = ("--grid", "-1:1:2", "-.5:0.5:2", "2")
+    quiet = ("--figure", "none", "--no-recording", "--out", str(tmp_path / "o"))
+    result = CliRunner().invoke(main, [verb, "cogiro_large", *grid, *quiet])
+    assert result.exit_code == 0 and "4" in result.stdout, result.output
+    wrong = CliRunner().invoke(main, [verb, "cogiro_large", "-x:1:2", *quiet])
+    assert wrong.exit_code == 2 and "No such option '-x:1:2'" in wrong.output

@@ -9,7 +9,7 @@ import numpy as np
 
 import seecr
 from seecr.passes import Barrier
-from seecr.report.words import other_lines, pose_lines
+from seecr.report.words import direction_words, other_lines, pose_lines
 from seecr.shipped import model_path
 
 
@@ -49,3 +49,37 @@ def test_what_has_no_energy_gets_no_number() -> None:
     (line,) = other_lines(free, hall, [steep])
     assert ", +428 J, slack:" in line
     assert line.endswith("; twisted, at most 428 J to get there, next to nothing back")
+
+
+def test_joints_move_along_slides_and_turn_about_hinges() -> None:
+    """Names that MuJoCo gives to joints without any say nothing, and no hinge is moved along."""
+    robot = seecr.load_robot(model_path("planar_vertical"))
+    slides, hinges = robot.joints[:2], robot.joints[2:]
+    unnamed = replace(robot, joints=tuple(
+        replace(joint, name=f"joint{k}") for k, joint in enumerate((*slides, *hinges))
+    ))  # fmt: skip
+    both = np.array([1.0, 0.0, 1.0 / robot.length])
+    assert direction_words(unnamed, both) == "move along x, turn about y"
+    assert direction_words(unnamed, np.array([1.0, 1.0, 0.0])) == "move along x and z"
+    askew = replace(slides[0], axis=np.array([0.6, 0.0, 0.8]), name="ramp")
+    ramp = replace(robot, joints=(askew, *robot.joints[1:]))
+    assert direction_words(ramp, np.array([1.0, 0.0, 0.0])) == "move along ramp"
+
+
+def test_other_equilibria_are_told_apart() -> None:
+    """Several as far away had been lines of the same words."""
+    robot = seecr.load_robot(model_path("demobot_parallel"))
+    found = seecr.solve(robot, [robot.reference_pose])
+    turned = np.tile(robot.reference_pose, (2, 1))
+    turned[:, 0] += [0.1, -0.1]
+    lines = list(other_lines(found, replace(seecr.solve(robot, turned), energy=np.zeros(2))))
+    assert len(set(lines)) == 2 and all(" mm turned " in line for line in lines)
+
+
+def test_the_furthest_is_so_by_position_and_orientation_at_once() -> None:
+    """Where positions are right but for rounding, rounding had said which turned most."""
+    robot = seecr.load_robot(model_path("demobot_parallel"))
+    found = seecr.solve(robot, np.tile(robot.reference_pose, (2, 1)))
+    off = np.array([[0.0, 0.0, 0.0, 0.0, 0.6, 0.0], [1e-15, 0.0, 0.0, 0.0, 0.1, 0.0]])
+    line = replace(found, deviation=off).lines()[1]
+    assert line.startswith("furthest from its command: pose 0, by ") and "34.38 deg" in line
