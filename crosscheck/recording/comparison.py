@@ -138,7 +138,7 @@ def _errors(found: Comparison, shown: Misfit) -> str:
 
 def _worst(found: Comparison) -> str:
     rows = [
-        (str(row.row + 1), str(row.line), plain(row.run), short(row.times_noise))
+        (str(row.row), str(row.line), plain(row.run), short(row.times_noise))
         for row in found.worst[:_MOST_WORST]
     ]
     return "## Worst poses\n" + words.table(rows, ("pose", "line", "run", "times the noise"))
@@ -146,7 +146,8 @@ def _worst(found: Comparison) -> str:
 
 def _pose(found: Comparison, k: int) -> str:
     data = found.problem.data
-    head = f"## Pose {k + 1} of {data.n_rows}\nline {int(data.line[k])}, run {plain(data.run[k])}\n"
+    where = f"line {int(data.line[k])}, run {plain(data.run[k])}"
+    head = f"{words.pose_heading(k, data.n_rows)}\n{where}\n"
     missing = [row.why for row in found.unsolved if row.row == k]
     if missing:
         return head + f"\nNo equilibrium to compare with: {plain(missing[0])}."

@@ -109,7 +109,8 @@ def _candidates(found: Diagnosis) -> str:
 def pose_words(stages: list[Stage], shown: Misfit, k: int) -> str:
     """The numbers of one row under the first and the last model."""
     data = shown.problem.data
-    head = f"## Pose {k + 1} of {data.n_rows}\nline {int(data.line[k])}, run {plain(data.run[k])}\n"
+    where = f"line {int(data.line[k])}, run {plain(data.run[k])}"
+    head = f"{words.pose_heading(k, data.n_rows)}\n{where}\n"
     if not shown.problem.use[k]:
         return head + words.unused(data, k)
     ends = stages if len(stages) < 2 else [stages[0], stages[-1]]

@@ -68,7 +68,7 @@ class Panels:
             f"{robot.weight:.3g} N of weight; "
             f"{material.count} {_KINDS.get(case.kind, 'poses')}."
         )
-        watched = material.watched + 1 if material.motion is not None else None
+        watched = material.watched if material.motion is not None else None
         return words.read_me(
             material.name,
             sentence,
@@ -85,7 +85,7 @@ class Panels:
         result = self.material.result
         lines = []
         for verdict in Verdict:
-            rows = [str(i + 1) for i in np.flatnonzero(result.verdict == verdict)]
+            rows = [str(i) for i in np.flatnonzero(result.verdict == verdict)]
             if verdict is not Verdict.AGREES and rows:
                 listed = ", ".join(rows[:_LISTED]) + (" …" if len(rows) > _LISTED else "")
                 lines.append(f"pose {listed}: {verdict.value}")
@@ -97,7 +97,7 @@ class Panels:
             (
                 _TITLES[name],
                 words.number(worst.value, name.rsplit("_", 1)[1]),
-                str(worst.pose + 1),
+                str(worst.pose),
                 words.number(worst.allowed, name.rsplit("_", 1)[1]),
             )
             for name, worst in self.material.result.worst.items()
@@ -118,7 +118,7 @@ class Panels:
         ]
         verdict = material.result.verdict[i].value
         more = "".join(f.text + "\n\n" for f in material.result.findings if f.pose == i)
-        head = f"## Pose {i + 1} of {material.count}\n{more or verdict}\n\n"
+        head = f"{words.pose_heading(i, material.count)}\n{more or verdict}\n\n"
         return head + words.table(rows)
 
     def _loose(self, which: NDArray[np.bool_]) -> str:

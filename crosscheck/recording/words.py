@@ -35,6 +35,11 @@ _LINES = "Lines are SEECR, dots MuJoCo."
 _CROSSES = "Crosses are SEECR, the dots on them MuJoCo."
 
 
+def pose_heading(k: int, count: int) -> str:
+    """The heading of what is said of one of so many poses, counted from 0."""
+    return f"## Pose {k}" + (f" (of 0 to {count - 1})" if count > 1 else "")
+
+
 def unused(data: Measurements, k: int) -> str:
     """Why nothing is shown of a row that does not count."""
     if data.read[k]:
@@ -59,7 +64,7 @@ def read_me(
         name: of the case.
         sentence: what robot, cable and poses it has.
         count: of poses.
-        watched: which pose, counted from 1, the settling shows; None for no settling.
+        watched: which pose, counted from 0, the settling shows; None for no settling.
         rows: quantity, largest difference, at which pose, what is allowed there.
         findings: sentences.
         lines: whether SEECR is drawn as lines in the plots.

@@ -51,8 +51,8 @@ class Recording:
 
 
 def pose_index(count: int) -> rr.TimeColumn:
-    """The timeline over poses, counted from 1 as in the text and the tables."""
-    return rr.TimeColumn(POSE, sequence=range(1, count + 1))
+    """The timeline over poses, counted from 0 as in a terminal and in every file of results."""
+    return rr.TimeColumn(POSE, sequence=range(count))
 
 
 def sweep_index(poses: Array) -> list[rr.TimeColumn]:

@@ -242,7 +242,7 @@ def test_comparison_names_the_worst_and_the_verdict(compared: Path, comparison: 
     assert plain(comparison.sentence) in text
     assert "# Not noise" in text
     worst = comparison.worst[0]
-    assert f"| {worst.row + 1} | {worst.line} |" in text
+    assert f"| {worst.row} | {worst.line} |" in text
     assert f"| {short(1e3 * comparison.rms['position_rms_m'])} | 0.0300 |" in text  # type: ignore[operator]
 
 

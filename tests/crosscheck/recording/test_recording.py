@@ -70,9 +70,9 @@ def test_both_timelines_and_no_other(back: Readback) -> None:
     assert back.timelines == {"pose", "x_mm", "settling_time"}
 
 
-def test_poses_are_counted_from_one(back: Readback) -> None:
+def test_poses_are_counted_from_zero_as_in_results(back: Readback) -> None:
     index = back.column("/plot/deviation/seecr/dx", "pose")
-    assert index == list(range(1, POSES + 1))
+    assert index == list(range(POSES))
 
 
 @pytest.mark.parametrize("quantity", ["position", "orientation", "tension"])
@@ -168,10 +168,10 @@ def test_the_text_has_the_guide_and_the_numbers(back: Readback, result: CaseResu
     guide = back.static(f"/{READ_ME}", "TextDocument:text")[0]
     assert "parallel-fishing-z0.10" in guide and "settling_time" in guide
     worst = result.worst["tension_N"]
-    assert f"| tension | {worst.value:.3g} N | {worst.pose + 1} | 1e-06 N |" in guide
+    assert f"| tension | {worst.value:.3g} N | {worst.pose} | 1e-06 N |" in guide
     now = [row[0] for row in back.column(f"/{NOW}", "TextDocument:text")]
     assert len(now) == POSES
-    assert "Pose 1 of 6" in now[0] and "x 170.00, y 250.00, z 100.00 mm" in now[0]
+    assert "Pose 0 (of 0 to 5)" in now[0] and "x 170.00, y 250.00, z 100.00 mm" in now[0]
     assert "26.5" in now[0] and "| slack | cable2, cable4, cable5, cable7 |" in now[0]
     assert "Settling, " in back.column(f"/{NOW}", "TextDocument:text", "settling_time")[0][0]
 
@@ -276,7 +276,7 @@ def test_a_pose_without_an_answer_is_not_drawn(failed: CaseResult, tmp_path: Pat
     assert np.isnan(back.scalars("/plot/deviation/seecr/dx")[1])
     assert "SEECR moves by | no answer" in back.column(f"/{NOW}", "TextDocument:text")[1][0]
     guide = back.static(f"/{READ_ME}", "TextDocument:text")[0]
-    assert f"- pose 2: {Verdict.SEECR_UNSOLVED.value}" in guide
+    assert f"- pose 1: {Verdict.SEECR_UNSOLVED.value}" in guide
 
 
 def test_no_settling_to_watch(failed: CaseResult, tmp_path: Path) -> None:

@@ -107,6 +107,7 @@ def test_the_recording_holds_the_numbers(sweep: Solution, tmp_path: Path) -> Non
     path = tmp_path / "sweep.rrd"
     write_sweep_recording(sweep, path)
     back = Readback(path)
+    assert back.column("/plot/tension/cable1", "pose") == list(range(len(sweep)))
     np.testing.assert_array_equal(back.scalars("/plot/tension/cable1"), sweep.tensions[:, 0])
     np.testing.assert_allclose(
         back.scalars("/plot/deviation/dx"), 1e3 * sweep.deviation[:, 0], atol=1e-9
