@@ -10,6 +10,7 @@ from markupsafe import Markup
 
 from crosscheck.planning.proposer import Suggestion
 from crosscheck.planning.result import Plan, Visible
+from crosscheck.planning.visibility import NAMED
 from crosscheck.planning.words import alike, gain_words
 from crosscheck.report.confusion import Confusion, draw_confusion
 from crosscheck.report.drawing import AFTER, BEFORE, INK, blank, grid, image, plain_log, styled
@@ -44,6 +45,7 @@ def plan_context(plan: Plan) -> dict[str, Any]:
         ],
         "sizes": "",
         "confusion": "",
+        "named": f"{NAMED:g}",
     }
     if plan.effects:
         context["sizes"] = Markup(draw_sizes(plan.effects))  # ours, escaped there

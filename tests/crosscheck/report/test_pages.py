@@ -11,6 +11,7 @@ from made_data import case, run, term
 from written_pages import figures_of, text_of
 
 import crosscheck
+from crosscheck.planning.visibility import NAMED
 from crosscheck.report.write import render
 from seecr.made import Made
 
@@ -58,6 +59,7 @@ def test_a_plan_has_its_page(plan):
     page = render(plan)
     seen = text_of(page)
     assert plan.sentence in seen and len(figures_of(page)) == 2 and needs_nothing_else(page)
+    assert f"; from {NAMED:g} times the smallest size that shows on" in seen
     for found in plan.effects:
         assert found.name in seen
     for item in plan.suggestions:
