@@ -11,6 +11,7 @@ from crosscheck.diagnosis.words import percent, probability_words
 from crosscheck.fit.words import rms_words
 from crosscheck.units import in_unit, parameter_name, short, with_error
 from seecr.counted import counted
+from seecr.effects import Terms
 
 # Correlations above this are named; parameters beyond this many plausible sizes are doubtful.
 _CORRELATED, PLAUSIBLE = 0.9, 5.0
@@ -110,7 +111,7 @@ def _correlations(found: Diagnosis, finding: MissingEffect) -> list[str]:
     """Parameters that the data hold together, the strongest first."""
     assert found.search is not None
     best = found.search.last.fit
-    every = best.terms.labels
+    every = _spoken(best.terms, finding.effect)
     own = np.flatnonzero(best.terms.own(finding.effect))
     correlation = best.correlation
     pairs = {
@@ -122,10 +123,16 @@ def _correlations(found: Diagnosis, finding: MissingEffect) -> list[str]:
     ranked = sorted(pairs.items(), key=lambda item: -abs(item[1]))
     out = []
     for (i, j), value in ranked[:_MOST_CORRELATIONS]:
-        names = [
-            every[k][1] if every[k][0] == finding.effect else ".".join(every[k]) for k in (i, j)
-        ]
-        out.append(f"{names[0]} with {names[1]} ({short(value)})")
+        out.append(f"{every[i]} with {every[j]} ({short(value)})")
     if len(ranked) > _MOST_CORRELATIONS:
         out.append(f"and {counted(len(ranked) - _MOST_CORRELATIONS, 'more pair')}")
     return out
+
+
+def _spoken(terms: Terms, effect: str) -> list[str]:
+    """Parameters as the cards' tables name them, those of other effects with whose they are."""
+    return [
+        parameter_name(name, unit) + ("" if term.name == effect else f" of {term.name}")
+        for term in terms
+        for name, unit in zip(term.layout.names, term.layout.units, strict=True)
+    ]

@@ -6,6 +6,7 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crosscheck.comparison.associations import Association
 from crosscheck.diagnosis.order import Step
@@ -18,6 +19,8 @@ from crosscheck.fit.noise import POOR_FIT, STRUCTURED
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.report.findings import PLAUSIBLE
 from crosscheck.units import chance, in_unit, parameter_name, short
+from seecr.effects.base import Layout
+from seecr.setup import Setup
 
 
 @dataclass(frozen=True)
@@ -66,9 +69,9 @@ def _of_effects(found: Diagnosis) -> list[Check]:
             else Check("effects tried", None, str(tried))
         ]  # fmt: skip
     better, blocks = _better_runs(steps)
-    worst = max(_largest_sizes(step) for step in steps[1:])
+    worst, largest = max((_largest_sizes(step), step.added) for step in steps[1:])
     p = max(_chance(steps[k - 1], steps[k]) for k in range(1, len(steps)))
-    bound = bool(np.any(steps[-1].fit.at_bound))
+    bound = _at_bounds(steps[-1])
     return [
         Check("effects tried", None, str(tried)),
         Check("chance", p < FALSE_ALARM, f"explains what was added with p {chance(p)}, over all "
@@ -76,7 +79,7 @@ def _of_effects(found: Diagnosis) -> list[Check]:
         Check("runs left out", better == blocks, f"{better} of {blocks} predicted better with "
               "each effect added"),
         Check("sizes", worst < PLAUSIBLE and not bound, f"at most {short(worst, 2)} plausible "
-              "sizes" + (", and a parameter at its bound" if bound else "")),
+              f"sizes ({largest})" + (f"; at its bound: {', '.join(bound)}" if bound else "")),
     ]  # fmt: skip
 
 
@@ -93,6 +96,12 @@ def _better_runs(steps: list[Step]) -> tuple[int, int]:
 
 def _largest_sizes(step: Step) -> float:
     return float(np.max(np.abs(step.fit.terms[step.added].sizes)))
+
+
+def _at_bounds(step: Step) -> list[str]:
+    """The effects of a model that have a parameter at its bound."""
+    labels = np.array(step.fit.terms.labels)[step.fit.at_bound]
+    return list(dict.fromkeys(effect for effect, _name in labels.tolist()))
 
 
 def _chance(before: Step, after: Step) -> float:
@@ -135,7 +144,7 @@ def candidate_rows(found: Diagnosis) -> list[CandidateRow]:
                 title=row.title,
                 score=short(row.score) if row.score else "",
                 alone=_alone(found, candidate),
-                needs="" if candidate is None else _largest_parameter(candidate),
+                needs=_needs(found, candidate),
                 why_not=str(row.why_not),
                 probability=_probability(found, row.effect),
             )
@@ -167,13 +176,16 @@ def _alone(found: Diagnosis, candidate: Candidate | None) -> float | None:
     return float(np.clip(candidate.drop / excess, 0.0, 1.0)) if excess > 0.0 else None
 
 
-def _largest_parameter(candidate: Candidate) -> str:
+def _needs(found: Diagnosis, candidate: Candidate | None) -> str:
     """What it would take: the parameter that is largest in plausible sizes."""
+    if candidate is None or found.search is None:
+        return ""
     term = candidate.alone if candidate.fit is None else candidate.fit.terms[candidate.name]
     if term is None:
         return ""
     layout = term.layout
-    size = np.where(layout.shape, 0.0, term.sizes)
+    setup = found.search.steps[0].fit.state.prediction.setup
+    size = np.where(_makes_size(layout, setup), term.sizes, 0.0)
     k = int(np.argmax(np.abs(size)))
     factor, unit = in_unit(layout.units[k])
     name = parameter_name(layout.names[k], layout.units[k])
@@ -181,6 +193,17 @@ def _largest_parameter(candidate: Candidate) -> str:
     # a factor near one is told from one by its later digits
     digits = 5 if layout.null[k] else 3
     return f"{name} = {short(factor * float(term.vector[k]), digits)} {unit}".strip() + doubt
+
+
+def _makes_size(layout: Layout, setup: Setup) -> NDArray[np.bool_]:
+    """(p,) which parameters make an effect large: not those that only say where to look for it.
+
+    A length behind the exit point is one of these where friction is looked for: by itself it is
+    another effect.
+    """
+    places = layout.effect.shapes(setup)
+    own = ~layout.shape & (layout.start(places[0] if places else {}) == layout.null)
+    return own if own.any() else ~layout.shape
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from pathlib import Path
 import made_diagnoses as made
 import numpy as np
 import pytest
+from made_data import term
 from matplotlib.figure import Figure
 from PIL import Image
 from written_pages import figures_of, text_of
@@ -27,6 +28,7 @@ from crosscheck.diagnosis.steps import (
     views_of,
 )
 from crosscheck.diagnosis.words import WITHIN
+from crosscheck.fit.candidates import Candidate
 from crosscheck.fit.imitation import imitated
 from crosscheck.fit.problem import KINDS
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
@@ -39,6 +41,7 @@ from crosscheck.report.tables import candidate_rows, checks, untried
 from crosscheck.report.waterfall import waterfall
 from crosscheck.report.write import render
 from crosscheck.units import short, with_error
+from seecr.effects import Terms
 from seecr.errors import InputFileError
 
 pytestmark = pytest.mark.slow
@@ -280,6 +283,20 @@ def test_a_bound_and_a_blind_parameter_are_flagged() -> None:
     assert "at its bound" not in text_of(page("pulleys"))
 
 
+def test_correlated_parameters_go_by_the_names_that_tables_have() -> None:
+    found = diagnosis("pulleys")
+    assert found.search is not None
+    robot, last = made.robot(), found.search.last
+    terms = Terms([*last.fit.terms, term(robot, "platform_mass", added_kg=0.1)])
+    together = np.array([[1.0, 0.95], [0.95, 1.0]])
+    alike = replace(
+        last.fit, state=replace(last.fit.state, terms=terms), spread=lambda _columns: together
+    )
+    steps = (*found.search.steps[:-1], replace(last, node=replace(last.node, fit=alike)))
+    card = finding_card(replace(found, search=replace(found.search, steps=steps)), found.missing[0])
+    assert card.correlations == ["radius with added of platform_mass (0.950)"]
+
+
 def test_checks_tell_noise_from_structure() -> None:
     good = {check.name: check.good for check in checks(diagnosis("pulleys"))}
     assert good["size of what is left"] is True
@@ -298,6 +315,33 @@ def test_candidates_say_what_they_would_need() -> None:
     assert "thermal_expansion" not in rows
     assert any("thermal_expansion" in names for _why, names in untried(diagnosis("pulleys")))
     assert "alone it explains" not in text_of(page("nothing"))
+
+
+def test_friction_would_need_a_friction_and_not_the_length_that_it_is_looked_for_with() -> None:
+    found = diagnosis("pulleys")
+    assert found.search is not None
+    friction = term(made.robot(), "exit_friction", friction=0.2, length_m=100.0)
+    first = found.search.steps[0]
+    candidates = (Candidate(friction.layout, alone=friction),)
+    first = replace(first, node=replace(first.node, candidates=candidates))
+    tried = NotListed("exit_friction", "rubs", 1.0, Reason(Why.NOT_NEEDED))
+    search = replace(found.search, steps=(first, *found.search.steps[1:]))
+    (row,) = candidate_rows(replace(found, search=search, candidates=(tried,)))
+    assert row.needs == "friction = 0.200"
+
+
+def test_sizes_that_are_not_plausible_are_named_with_their_effect() -> None:
+    found = diagnosis("pulleys")
+    (sizes,) = (check for check in checks(found) if check.name == "sizes")
+    assert sizes.words.endswith("plausible sizes (pulley_radius)")
+    assert found.search is not None
+    last = found.search.steps[-1]
+    at_bound = replace(last.fit, at_bound=np.array([True]))
+    stuck = replace(last, node=replace(last.node, fit=at_bound))
+    search = replace(found.search, steps=(*found.search.steps[:-1], stuck))
+    (sizes,) = (c for c in checks(replace(found, search=search)) if c.name == "sizes")
+    assert sizes.words.endswith("(pulley_radius); at its bound: pulley_radius")
+    assert sizes.good is False
 
 
 def test_blocks_are_the_runs_left_out() -> None:
