@@ -142,7 +142,8 @@ def command(
         })  # fmt: skip
         write_text(folder / "map.json", text + "\n")
         write_arrays(folder / "map.npz", found, places)
-        if figure != "none" and sum(len(axis) > 1 for axis in axes) > 1:
+        drawn = figure != "none" and sum(len(axis) > 1 for axis in axes) > 1
+        if drawn:
             map_figure(folder / f"map.{figure}", found, edge=places)
         if not no_recording:
             # takes a second or two to import
@@ -153,6 +154,8 @@ def command(
         click.echo(text)
         return 0
     lines = [*found.lines(), *softest_line(found), *likely_lines(found, at_least)]
+    if figure != "none" and not drawn:
+        lines.append("no figure: the grid has more than one value along fewer than two axes")
     if places is not None and edge is not None:
         lines.append(edge_line(places, edge))
     tensions = ("--lowest", f"{lowest:g}") if lowest else ()

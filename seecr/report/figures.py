@@ -33,6 +33,8 @@ _LETTERS = 13
 # Margins grow without end towards the height of the exit points: so many times what half of the
 # poses have is the end of their colours.
 _OUTSTANDING = 4.0
+# What is moved or turned by less [mm, deg] is not: colours up to there would show rounding.
+_STILL = 1e-6
 # More cables than colours are told apart by dashes.
 _DASHES = ("-", "--", ":", "-.")
 # Beyond so many cables a legend says nothing.
@@ -171,7 +173,8 @@ def map_figure(path: Path, found: Workspace, most: int = 4, edge: Array | None =
     Args:
         path: the file.
         found: the workspace, with two or three axes of more than one value.
-        most: slices drawn; they lie across the last axis, or that with one value.
+        most: slices drawn; they lie across the last axis, or that with one value. The title says
+            of how many.
         edge: (k, 7) poses at the edge of what can be held; those in a slice are dots on it.
 
     Raises:
@@ -205,11 +208,28 @@ def map_figure(path: Path, found: Workspace, most: int = 4, edge: Array | None =
             ax.set_title(f"{'xyz'[across]} = {per_metre * found.axes[across][k]:.4g} {unit}")
         for ax in axes[-1]:
             ax.set_xlabel(f"{'xyz'[wide]} [{unit}]")
-        drawn = len(panels) > 1 and any(_has_edge(inside) for inside in _inside(found, slices))
+        words = [*_left_out(found, across, len(picked)), *_white(found, slices)]
+        drawn = any(_has_edge(inside) for inside in _inside(found, slices))
         if drawn or (edge is not None and len(edge)):
-            words = "orange: the edge of what tensions within the limits can hold"
-            words = textwrap.fill(words, int(_LETTERS * size[0]))
-            axes[0, 0].figure.suptitle(words, fontsize=9)
+            words.append("orange: the edge of what tensions within the limits can hold")
+        if words:
+            title = textwrap.fill("; ".join(words), int(_LETTERS * size[0]))
+            axes[0, 0].figure.suptitle(title, fontsize=9)
+
+
+def _left_out(found: Workspace, across: int, shown: int) -> list[str]:
+    """How many slices there are, where not all of them are drawn."""
+    whole = len(found.axes[across])
+    return [f"{shown} of {whole} values of {'xyz'[across]}"] if shown < whole else []
+
+
+def _white(found: Workspace, slices: Slices) -> list[str]:
+    """What cells without a colour are, where there are any."""
+    one = np.concatenate([number.ravel() for number in slices])
+    why = [] if found.feasible.ravel()[one].all() else ["cannot be held (margin)"]
+    if found.rests.any() and not found.rests.ravel()[one].all():
+        why.append("does not come to rest (below it)")
+    return ["white: " + ", or ".join(why)] if why else []
 
 
 def _in_slices(found: Workspace, edge: Array, across: int, picked: Any) -> list[Any]:
@@ -249,7 +269,7 @@ def _held_panel(found: Workspace, row: Any, x: Array, y: Array, slices: Slices) 
     finite = flat[np.isfinite(flat)]
     half = float(np.median(finite)) if len(finite) else 0.0
     top = min(_top(finite), _OUTSTANDING * half) or 1.0
-    return _colours(row, x, y, [flat[k] for k in slices], 0.0, top)
+    return _colours(row, x, y, [flat[k] for k in slices], 0.0, top, None, found, slices)
 
 
 def _chance_panel(found: Workspace, row: Any, x: Array, y: Array, slices: Slices) -> Any:
@@ -270,12 +290,27 @@ def _slack_panel(found: Workspace, row: Any, x: Array, y: Array, slices: Slices)
 
 def _away_panel(found: Workspace, row: Any, x: Array, y: Array, slices: Slices) -> Any:
     away = 1e3 * np.linalg.norm(found.deviation, axis=-1).ravel()
-    return _colours(row, x, y, [away[k] for k in slices], 0.0, _top(away), None, found, slices)
+    top = _end(found, away)
+    return _colours(row, x, y, [away[k] for k in slices], 0.0, top, None, found, slices)
 
 
 def _turn_panel(found: Workspace, row: Any, x: Array, y: Array, slices: Slices) -> Any:
     turn = np.degrees(np.linalg.norm(found.rotation, axis=-1)).ravel()
-    return _colours(row, x, y, [turn[k] for k in slices], 0.0, _top(turn), None, found, slices)
+    top = _end(found, turn)
+    return _colours(row, x, y, [turn[k] for k in slices], 0.0, top, None, found, slices)
+
+
+def _end(found: Workspace, values: Array) -> float:
+    """Where colours of how far off it rests end: at what poses have that can be held.
+
+    Poses outside of the workspace fall by a hundred times that, and all others would be of one
+    colour.
+    """
+    for some in (values[found.feasible.ravel()], values):
+        known = some[np.isfinite(some)]
+        if len(known) and (top := float(np.quantile(known, 0.95))) > _STILL:
+            return top
+    return 1.0
 
 
 def _top(values: Array) -> float:
@@ -291,7 +326,10 @@ def _colours(
     shown = None
     inside = [] if found is None or slices is None else _inside(found, slices)
     for k, (ax, value) in enumerate(zip(row, values, strict=True)):
-        shown = ax.pcolormesh(x, y, value.T, vmin=low, vmax=high, cmap=colours, shading="nearest")
+        shown = ax.pcolormesh(
+            x, y, value.T, vmin=low, vmax=high, cmap=colours, shading="nearest",
+            rasterized=True,  # else lines show between the cells of an SVG
+        )  # fmt: skip
         if inside and _has_edge(inside[k]):
             ax.contour(x, y, inside[k].T, levels=[0.0], colors=_EDGE, linewidths=1.2)
         ax.set_aspect("equal")

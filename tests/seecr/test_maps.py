@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from PIL import Image
 from random_robots import random_poses, random_robot
 from scipy.optimize import linprog
@@ -20,7 +21,7 @@ from seecr.effects import Term
 from seecr.equilibrium import solve
 from seecr.errors import InputError
 from seecr.inverse import correct, held_in_place
-from seecr.maps import boundary, default_axes, workspace_map
+from seecr.maps import Workspace, boundary, default_axes, workspace_map
 from seecr.mjcf import load_robot
 from seecr.nearest import Reaching, in_place
 from seecr.nearest.search import Best
@@ -228,6 +229,51 @@ def test_a_map_is_what_each_pose_says(tmp_path: Path) -> None:
     assert "probability" in (tmp_path / "chance.svg").read_text()
     with pytest.raises(InputError, match="at least two axes"):
         map_figure(tmp_path / "no.png", workspace_map(robot, 0.4, 0.25, [0.1, 0.2], elastic=False))
+
+
+def drawn_panels(monkeypatch: pytest.MonkeyPatch, path: Path, found: Workspace) -> list[Any]:
+    """Axes of a map's figure: its panels row by row, and one bar of colours for each row."""
+    kept: list[Any] = []
+    write = Figure.savefig
+    monkeypatch.setattr(Figure, "savefig", lambda f, *a, **b: (kept.append(f), write(f, *a, **b)))
+    map_figure(path, found)
+    return list(kept[0].axes)
+
+
+@pytest.mark.slow
+def test_colours_of_a_map_are_those_of_poses_that_can_be_held(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    robot = robot_named("demobot_cogiro")
+    found = workspace_map(robot, np.linspace(0.04, 0.76, 9), np.linspace(0.04, 0.46, 7), [0.1])
+    panels = drawn_panels(monkeypatch, tmp_path / "map.png", found)
+    bars = {ax.get_ylabel(): ax.get_ylim()[1] for ax in panels[4:]}
+    away = 1e3 * np.linalg.norm(found.deviation, axis=-1)
+    held = away[found.feasible]
+    assert np.quantile(held, 0.9) < bars["off its command [mm]"] <= held.max() < 0.2 * away.max()
+    turned = np.degrees(np.linalg.norm(found.rotation, axis=-1))
+    assert bars["turned [°]"] <= turned[found.feasible].max() < 0.2 * turned.max()
+
+
+@pytest.mark.slow
+def test_a_map_says_which_slices_it_has_and_what_is_white(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    robot = robot_named("demobot_cogiro")
+    x, y = np.linspace(0.04, 0.76, 9), np.linspace(0.04, 0.46, 7)
+    found = workspace_map(robot, x, y, [0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4])
+    path = tmp_path / "map.svg"
+    panels = drawn_panels(monkeypatch, path, found)
+    assert "4 of 7 values of z; white: cannot be held (margin); orange" in path.read_text()
+    assert all(len(ax.collections) == 2 for ax in panels[:4]), "an edge in the margins' panels too"
+    cells = path.read_text().count("<path")
+    assert cells < found.margin.size, "no path for each cell: lines would show between them"
+    fallen = replace(found, slack=np.where(found.margin > 0.1, found.slack, -1).astype(np.int8))
+    map_figure(path, fallen)
+    assert "cannot be held (margin), or does not come to rest (below it)" in path.read_text()
+    inner = workspace_map(robot, [0.3, 0.4], [0.2, 0.3], [0.1])
+    map_figure(path, inner)
+    assert not any(word in path.read_text() for word in ("white", "values of", "orange"))
 
 
 @pytest.mark.slow

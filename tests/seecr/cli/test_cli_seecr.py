@@ -260,6 +260,9 @@ def test_map_writes_its_files_or_says_why_not(tmp_path: Path) -> None:
     assert np.load(out / "map.npz")["edge"].shape == (places, 7)
     none = run("map", "demobot_cogiro", *grid, "--edge", "0.001", "--no-elastic", "--out", out)
     assert none.exit_code == 0 and "no edge: all poses of the grid can be held" in none.output
+    assert "no figure" not in none.output
+    line = run("map", "demobot_cogiro", "--grid", "0.3:0.5:3", "0.2", "0.1", "--out", out)
+    assert "no figure: the grid has more than one value along fewer than two axes" in line.output
     soft = run("map", "demobot_cogiro", *grid, "--cable", "0.001", "--out", out)
     assert "elastic: at rest at 0 of 6 commands" in soft.output
     lost = run("map", "demobot_cogiro", *grid, "--lowest", "90", "--out", tmp_path / "lost")
