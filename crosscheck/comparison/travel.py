@@ -15,6 +15,8 @@ AXES = ("x", "y", "z", "rx", "ry", "rz")
 STILL = "still"
 # An axis along which the commands spread by less than this part of the longest is not cut.
 _FLAT = 0.05
+# Nearer to the middle of an axis, in parts of it, is on it.
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +62,7 @@ def travel(problem: Problem, prediction: Prediction) -> Travel:
 
 def regions_of(problem: Problem, pose: Array) -> Names:
     """The region of each row, (n,): halves along each axis that is used, such as
-    "x below 0.4 m, z above 0.15 m".
+    "x below 0.4 m, z at or above 0.15 m".
 
     Args:
         problem: the data.
@@ -75,6 +77,7 @@ def regions_of(problem: Problem, pose: Array) -> Names:
         if spread[k] <= _FLAT * spread.max() or spread[k] == 0:
             continue
         middle = 0.5 * (low[k] + high[k])
+        edge = middle - _ROUNDING * spread[k]
         for row, value in zip(words, place[:, k], strict=True):
-            row.append(f"{axis} {'below' if value < middle else 'above'} {middle:.3g} m")
+            row.append(f"{axis} {'below' if value < edge else 'at or above'} {middle:.3g} m")
     return np.array([", ".join(row) or "everywhere" for row in words], dtype=np.str_)
