@@ -77,6 +77,15 @@ def test_pages_are_dark_and_narrow_where_the_reader_is(which, request):
     assert style.count("{") == style.count("}")
 
 
+def test_printed_tables_have_their_heads_on_every_page(plan):
+    style = render(plan).split("<style>")[1].split("</style>")[0]
+    printed = style[style.index("@media print") :]
+    assert "thead { display: table-header-group; break-inside: avoid; }" in printed
+    # heads that hold buttons are not repeated by browsers
+    assert "th button { display: contents;" in printed
+    assert "tr { break-inside: avoid; }" in style
+
+
 def test_version_command_day_and_hashes_are_on_page_and_in_json(files, tmp_path):
     out, kept = tmp_path / "out", tmp_path / "figures"
     done = run("compare", *files, "--out", out, "--figures", kept, "--no-recording")
