@@ -20,6 +20,7 @@ from crosscheck.diagnosis.result import Diagnosis, MissingEffect, NotListed
 from crosscheck.diagnosis.rivals import Rival, loss_of_its_part
 from crosscheck.diagnosis.search import Search
 from crosscheck.diagnosis.small import share_of
+from crosscheck.diagnosis.steps import OTHER
 from crosscheck.diagnosis.unexplained import where_of
 from crosscheck.diagnosis.way import fit_of, way_of
 from crosscheck.diagnosis.words import (
@@ -38,8 +39,8 @@ from crosscheck.fit.problem import KINDS, Rms, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 from crosscheck.fit.words import rms_words
 
-# Noise of another size than stated by more than this part, or correlated by more, is told.
-_OTHER, _ALIKE = 0.25, 0.3
+# Noise that is correlated by more than this is told.
+_ALIKE = 0.3
 
 MORE = (
     "what few effects leave is smooth over the workspace and no noise: all effects together take "
@@ -131,7 +132,7 @@ def _noise_notes(sought: Sought, chances: Chances) -> list[str]:
     assert together is not None
     for name, scale in together.scale.items():
         rho = together.rho[name]
-        if abs(scale - 1.0) > _OTHER or rho > _ALIKE:
+        if abs(scale - 1.0) > OTHER or rho > _ALIKE:
             alike = f", correlated by {rho:.2f} from row to row of a run" if rho > _ALIKE else ""
             out.append(f"noise of the {name}: {scale:.2f} times the assumed one{alike}")
     rows = sought.calibration.outliers

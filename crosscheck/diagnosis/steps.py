@@ -10,6 +10,7 @@ import numpy as np
 from crosscheck.diagnosis.order import Step
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.fit.held_out import blocks_of
+from crosscheck.fit.prepare import noise_floor
 from crosscheck.fit.problem import KINDS, Kind, Problem, rms_by_kind
 from crosscheck.fit.state import State
 from seecr.pose import Array
@@ -18,6 +19,9 @@ from seecr.pose import Array
 _ARROW, _LARGEST = 0.13, 98.0
 # A side that is shorter than this part of the longest is flat.
 _FLAT = 0.02
+
+OTHER = 0.25
+"""Noise of another size than assumed by more than this part is told."""
 
 
 class Drawn(Protocol):
@@ -124,6 +128,15 @@ def drawn(magnify: float) -> str:
 def floor_of(found: Diagnosis, kind: Kind) -> float:
     """The rms error that noise alone would give, in SI; that of the commanded lengths with it."""
     return found.floor.get(kind.key) or 0.0
+
+
+def noise_is_other(found: Diagnosis) -> bool:
+    """Whether noise was found to be of another size than was assumed."""
+    if found.search is None:
+        return False
+    assumed = noise_floor(found.search.problem, found.search.last.fit.state)
+    sizes = [(found.floor.get(key), value) for key, value in assumed.items()]
+    return any(abs(one / value - 1.0) > OTHER for one, value in sizes if one and value)
 
 
 def views_of(place: Array) -> list[tuple[int, int]]:

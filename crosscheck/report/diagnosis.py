@@ -7,7 +7,7 @@ from typing import Any
 from markupsafe import Markup
 
 from crosscheck.diagnosis.result import Diagnosis
-from crosscheck.diagnosis.steps import shown_stages, stages_of
+from crosscheck.diagnosis.steps import noise_is_other, shown_stages, stages_of
 from crosscheck.diagnosis.words import WITHIN, probability_name
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.fit.words import rms_words
@@ -23,7 +23,7 @@ from crosscheck.report.where import caption, failure_map
 _NO_SEARCH: dict[str, Any] = {
     "facts": [], "figures": dict.fromkeys(("waterfall", "map", "confusion"), ""),
     "walls": [], "twins": [], "caption": "", "added": [], "tint": BEFORE, "together": False,
-    "unsure": False,
+    "unsure": False, "other_noise": False,
 }  # fmt: skip
 
 
@@ -68,12 +68,14 @@ def _of_search(found: Diagnosis) -> dict[str, Any]:
         "map": failure_map(problem, before, after),
         "confusion": draw_confusion(confusion) if confusion is not None else "",
     }
+    other = noise_is_other(found)
     calm = found.verdict is DiagnosisVerdict.NO_EFFECT_MISSING
     alone = CALM if calm else BEFORE
     walls = [draw_wall(wall, alone) for wall in walls_of(problem, before, last)]
     added = [n for n in last.state.terms.names if n not in found.search.base]
     return {
-        "facts": [*facts(problem), *_unknown_facts(found)],
+        "facts": [*facts(problem, other_noise=other), *_unknown_facts(found)],
+        "other_noise": other,
         "figures": {key: Markup(text) for key, text in figures.items()},  # ours, escaped there
         "walls": [Markup(text) for text in walls],
         "twins": confusion.twins if confusion is not None else [],
@@ -86,8 +88,10 @@ def _of_search(found: Diagnosis) -> dict[str, Any]:
 
 
 def _unknown_facts(found: Diagnosis) -> list[tuple[str, str]]:
-    """How large what is left is, and what could not have been seen."""
-    out = [] if found.left is None else [("left beyond noise", found.left.words)]
+    """How large noise is if not as assumed, what is left, and what could not have been seen."""
+    out = [("noise as found", rms_words(found.floor))] if noise_is_other(found) else []
+    if found.left is not None:
+        out.append(("left beyond noise", found.left.words))
     if found.chances is not None and found.chances.words:
         shown = found.chances.shown
         words = "at no size" if shown is None else f"from {rms_words(shown)} rms on"

@@ -38,8 +38,12 @@ def title_of(problem: Problem) -> str:
     return f"{problem.robot.name} · {problem.data.path.name}"
 
 
-def facts(problem: Problem) -> list[tuple[str, str]]:
-    """What was measured, in a few words."""
+def facts(problem: Problem, *, other_noise: bool = False) -> list[tuple[str, str]]:
+    """What was measured, in a few words.
+
+    Args:
+        problem: the data. other_noise: whether noise was found to be other than that assumed.
+    """
     data, sigma = problem.data, problem.sigma
     values = {"position": sigma.position_m, "orientation": sigma.orientation_rad,
               "tension": sigma.tension_N}  # fmt: skip
@@ -62,5 +66,5 @@ def facts(problem: Problem) -> list[tuple[str, str]]:
         ("rows", rows),
         ("runs", str(len(data.runs))),
         ("readings", str(problem.n_readings)),
-        ("noise", ", ".join(noise)),
+        ("noise as assumed" if other_noise else "noise", ", ".join(noise)),
     ]

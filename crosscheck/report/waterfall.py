@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from crosscheck.diagnosis.result import Diagnosis
-from crosscheck.diagnosis.steps import Stage, by_block, floor_of, stages_of
+from crosscheck.diagnosis.steps import Stage, by_block, floor_of, noise_is_other, stages_of
 from crosscheck.fit.problem import Kind, kinds_read, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.report.drawing import (
@@ -69,11 +69,13 @@ def _panel(axes: Axes, found: Diagnosis, stages: list[Stage], kind: Kind) -> Non
         left, right = 0.5 * min(floor, *values), top * (top / floor) ** 0.32
     else:
         left, right = 0.0, 1.45 * top
+        axes.locator_params(axis="x", nbins=5)
     axes.set_xlim(left, right)
     axes.axvspan(left, floor, color=NOISE, linewidth=0, zorder=0)
     axes.axvline(floor, color=GREY, linewidth=1.0, linestyle=(0, (3, 2)), zorder=1)
+    noise = "noise as found" if noise_is_other(found) else "noise"
     axes.annotate(
-        f"noise {short(floor)}", (floor, -0.72), xytext=(3, -2), textcoords="offset points",
+        f"{noise} {short(floor)}", (floor, -0.72), xytext=(3, -2), textcoords="offset points",
         color=GREY, fontsize=7.5, va="top",
     )  # fmt: skip
     for row, (stage, value, runs) in enumerate(zip(stages, values, blocks, strict=True)):
