@@ -6,11 +6,13 @@ a drum a sine, creep a curve in time, friction and backlash a step with the dire
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
 
 from crosscheck.comparison.cable_space import cable_errors, cable_lengths
 from crosscheck.comparison.quantities import channels
@@ -36,6 +38,13 @@ from seecr.pose import Array
 # More rows of panels than this are too many to look at: the worst are shown.
 _MOST_ROWS = 12
 _ROW_HEIGHT = 0.78
+# Room beside the panels, over the page's width: for names of so many letters, and for each more.
+_LEFT, _SHORT, _LETTER = 0.105, 8, 0.0072
+# Letters of a line of a name, and lines of one; a name that is longer ends in dots.
+_LINE, _MOST_LINES = 13, 3
+# No number stands so near to the end of a panel, in parts of all of them: it would touch the next
+# panel's.
+_END = 0.0175
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,13 +150,16 @@ def draw_wall(wall: Wall, alone: str = BEFORE) -> str:
         wall: residuals. alone: their colour where no effect accounts for a part of them.
     """
     rows = _worth_showing(wall)
+    names = [_in_lines(wall.names[k]) for k in rows]
+    widest = max(len(line) for name in names for line in name.split("\n"))
     with styled():
         height = _ROW_HEIGHT * len(rows) + 0.75
         figure = blank(height, constrained=False)
         panels = figure.subplots(
             len(rows), len(wall.abscissae), squeeze=False,
             gridspec_kw={
-                "left": 0.105, "right": 0.995, "bottom": 0.5 / height, "top": 1.0 - 0.25 / height,
+                "left": _LEFT + _LETTER * max(widest - _SHORT, 0), "right": 0.995,
+                "bottom": 0.5 / height, "top": 1.0 - 0.25 / height,
                 "wspace": 0.07 if wall.unit else 0.16, "hspace": 0.16,
             },
         )  # fmt: skip
@@ -155,13 +167,42 @@ def draw_wall(wall: Wall, alone: str = BEFORE) -> str:
         for place, k in enumerate(rows):
             for axes, (_name, values) in zip(panels[place], wall.abscissae, strict=True):
                 _panel(axes, _of_row(values, k), wall, k, alone)
-            name = wall.names[k].replace(" about ", "\nabout ")  # else it leaves the page
-            panels[place, 0].set_ylabel(name, rotation=0, ha="right", va="center", labelpad=6)
+            panels[place, 0].set_ylabel(
+                names[place], rotation=0, ha="right", va="center", labelpad=6
+            )
         for axes, (name, _values) in zip(panels[-1], wall.abscissae, strict=True):
             axes.set_xlabel(name)
         unit = f" [{wall.unit}]" if wall.unit else ""
         panels[0, 0].set_title(f"{wall.title}{unit}", loc="left", fontsize=8.5)
         return image(figure, f"{wall.title} against what they may follow")
+
+
+def _in_lines(name: str) -> str:
+    """A name beside its panel in short lines: in one it would leave the page."""
+    pieces = re.findall(rf"[^\s_/.-]{{1,{_LINE - 1}}}[\s_/.-]?|[\s_/.-]", name)
+    lines = [""]
+    for piece in pieces:
+        if len(f"{lines[-1]}{piece}".rstrip()) > _LINE:
+            lines.append("")
+        lines[-1] += piece
+    lines = [line.strip() for line in lines]
+    if len(lines) > _MOST_LINES:
+        lines[_MOST_LINES - 1 :] = [f"{lines[_MOST_LINES - 1][: _LINE - 1]}…"]
+    return "\n".join(lines)
+
+
+class _Inner(MaxNLocator):
+    """Round numbers, none so near to the end of a panel that it touches those of the next."""
+
+    def __init__(self, columns: int) -> None:
+        super().__init__(nbins="auto", steps=[1, 2, 2.5, 5, 10])
+        self.room = _END * columns
+
+    def tick_values(self, vmin: float, vmax: float) -> Any:
+        """Places of ticks between two values."""
+        room = self.room * (vmax - vmin)
+        places = np.asarray(super().tick_values(vmin, vmax))
+        return places[(places > vmin + room) & (places < vmax - room)]
 
 
 def _worth_showing(wall: Wall) -> list[int]:
@@ -220,3 +261,4 @@ def _panel(axes: Axes, x: Array, wall: Wall, k: int, alone: str) -> None:
         axes.set_rasterization_zorder(0.8)  # both kinds of dots as one image per panel
     grid(axes, "x")
     axes.locator_params(axis="y", nbins=3)
+    axes.xaxis.set_major_locator(_Inner(len(wall.abscissae)))

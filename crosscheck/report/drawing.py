@@ -19,6 +19,7 @@ from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg, RendererAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
@@ -34,6 +35,13 @@ CALM = "#6f7f8f"
 INK, GREY, FAINT, NOISE = "#1d2329", "#6b747d", "#e7eaed", "#d9dee3"
 WIDTH = 10.4
 """Width of a figure [in]; the page scales it to its own."""
+
+# Beside what is drawn [in]: letters are up to so much wider in a PNG, or in the reader's browser,
+# than where they were measured.
+_ROOM = 0.09
+
+# Of the ticks for which Matplotlib sees room: labels such as 0.003 are wider than it thinks.
+_OF_ROOM = 0.7
 
 MANY = 400
 """More marks than this are drawn as an image: the page is to stay small."""
@@ -83,7 +91,8 @@ def blank(height: float, width: float = WIDTH, *, constrained: bool = True) -> F
         height, width: [in].
         constrained: let Matplotlib find room for all labels, which takes its time.
     """
-    figure = Figure(figsize=(width, height), layout="constrained" if constrained else None)
+    layout = ConstrainedLayoutEngine(w_pad=_ROOM) if constrained else None
+    figure = Figure(figsize=(width, height), layout=layout)
     FigureCanvasSVG(figure)
     return figure
 
@@ -186,9 +195,21 @@ def dots(axes: Axes, x: Array, y: Array, size: float, colour: str, order: float)
     axes.autoscale_view()
 
 
+class _Decades(LogLocator):
+    """Ticks at 1 and 3 times powers of ten; at powers alone where their labels would touch."""
+
+    def tick_values(self, vmin: float, vmax: float) -> Any:
+        """Places of ticks between two values."""
+        assert self.axis is not None
+        room = _OF_ROOM * self.axis.get_tick_space()
+        both = 2.0 * np.log10(max(vmax / vmin, 1.0)) <= room
+        self.set_params(subs=(1.0, 3.0) if both else (1.0,))
+        return super().tick_values(vmin, vmax)
+
+
 def plain_log(axes: Axes) -> None:
     """A logarithmic axis of x whose labels are plain numbers."""
     axes.set_xscale("log")
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+    axes.xaxis.set_major_locator(_Decades())
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
     axes.xaxis.set_minor_formatter(NullFormatter())

@@ -21,8 +21,9 @@ _LARGEST = 98.0
 _MOST_HEIGHT = 3.4
 # More arrows than this hide each other.
 _MOST_ARROWS = 250
-# Viridis without its bright end, which would not be seen on white.
-_COLOURS = ListedColormap(colormaps["viridis_r"](np.linspace(0.12, 1.0, 128)))
+# Viridis without its bright half: dots of small errors stand out from white by 3 to 1, and from
+# the dark page, on which figures are inverted.
+_COLOURS = ListedColormap(colormaps["viridis_r"](np.linspace(0.42, 1.0, 128)))
 
 # A title of more letters than these does not fit above a panel: the effects are counted instead.
 _LONGEST = 48
@@ -78,7 +79,11 @@ def _draw(
         title = _title(stages, column, magnify)
         panels[0, column].set_title(title, loc="left", color=INK)
     if dots is not None and kind is not None:
-        bar = figure.colorbar(dots, ax=panels.ravel().tolist(), shrink=0.7, pad=0.01, aspect=28)
+        beyond = max(_largest(problem, stage, kind) for stage in stages) > top
+        bar = figure.colorbar(
+            dots, ax=panels.ravel().tolist(), shrink=0.7, pad=0.01, aspect=28,
+            extend="max" if beyond else "neither",
+        )  # fmt: skip
         bar.set_label(f"{kind.name} error [{kind.unit}]")
         bar.outline.set_visible(False)
 
@@ -97,6 +102,10 @@ def _coloured(problem: Problem) -> Kind | None:
     """What the dots show: the orientation, or else the tensions."""
     read = [kind for kind in kinds_read(problem) if kind.name != "position"]
     return read[0] if read else None
+
+
+def _largest(problem: Problem, stage: Drawn, kind: Kind) -> float:
+    return float(np.nanmax(kind.sizes(problem, stage.state.raw))) * kind.factor
 
 
 def _top(problem: Problem, stage: Drawn, kind: Kind) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import itertools
 import re
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from crosscheck.report import where
 from crosscheck.report.drawing import MANY, blank, dots, image, keeping, plain_log, styled
 from crosscheck.report.where import thinned
 
@@ -86,3 +88,42 @@ def test_logarithmic_axes_have_plain_numbers() -> None:
 def test_arrows_are_thinned_out(rows: int, every: int) -> None:
     problem: Any = SimpleNamespace(use=np.ones(rows, dtype=bool))
     assert thinned(problem) == every
+
+
+def light(colour: np.ndarray) -> float:
+    """Relative luminance of sRGB (3,), as WCAG 2.2 defines it."""
+    linear = np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)
+    return float(linear @ [0.2126, 0.7152, 0.0722])
+
+
+def in_the_dark(colour: np.ndarray) -> np.ndarray:
+    """What the page's filter makes of it: invert(.92) hue-rotate(180deg)."""
+    luma = np.array([0.213, 0.715, 0.072])
+    inverted = 0.92 - 0.84 * colour
+    return np.clip(2.0 * (luma @ inverted) - inverted, 0.0, 1.0)
+
+
+def test_dots_of_small_errors_stand_out_from_light_and_dark_pages() -> None:
+    style = Path(where.__file__).with_name("page.css").read_text()
+    assert "invert(.92) hue-rotate(180deg)" in style and "--paper: #14181c" in style
+    paper = light(np.array([0x14, 0x18, 0x1C]) / 255.0)
+    for part in np.linspace(0.0, 1.0, 11):
+        colour = np.array(where._COLOURS(part)[:3])
+        assert 1.05 / (light(colour) + 0.05) >= 3.0
+        assert (light(in_the_dark(colour)) + 0.05) / (paper + 0.05) >= 3.0
+
+
+def test_labels_of_a_wide_range_do_not_touch() -> None:
+    with styled():
+        figure = blank(1.2, 3.0, constrained=False)
+        axes = figure.subplots()
+        plain_log(axes)
+        for low, top, least in ((1.0, 1e2, 5), (1e-2, 1e3, 5)):
+            axes.set_xlim(low, top)
+            figure.canvas.draw()
+            labels = [label for label in axes.get_xticklabels() if label.get_text()]
+            shown = [
+                one.get_window_extent() for one in labels if low <= one.get_position()[0] <= top
+            ]
+            assert len(shown) >= least
+            assert all(a.x1 + 2.0 < b.x0 for a, b in itertools.pairwise(shown))

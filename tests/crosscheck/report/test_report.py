@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import base64
 import io
+import itertools
 import re
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import made_diagnoses as made
 import numpy as np
@@ -32,13 +34,14 @@ from crosscheck.fit.candidates import Candidate
 from crosscheck.fit.imitation import imitated
 from crosscheck.fit.problem import KINDS
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
-from crosscheck.report import write_page
+from crosscheck.report import where, write_page
 from crosscheck.report.cables import Wall, draw_wall, paid_out, walls_of
 from crosscheck.report.confusion import confusion_of
-from crosscheck.report.drawing import AFTER, BEFORE, CALM
+from crosscheck.report.drawing import AFTER, BEFORE, CALM, keeping
 from crosscheck.report.findings import finding_card
 from crosscheck.report.tables import candidate_rows, checks, untried
 from crosscheck.report.waterfall import waterfall
+from crosscheck.report.where import failure_map
 from crosscheck.report.write import render
 from crosscheck.units import short, with_error
 from seecr.effects import Terms
@@ -203,6 +206,44 @@ def test_text_from_users_stays_text() -> None:
     )
     assert text.count("<script") == 1  # ours, which sorts
     assert text_of(text).count(EVIL) >= 4 + 8  # sentence, note, next, why not; a wall has 4 names
+
+
+def test_noise_that_was_assumed_and_noise_that_was_found_are_told_apart() -> None:
+    found = diagnosis("pulleys")
+    larger = {key: value and 18.0 * value for key, value in found.floor.items()}
+    seen = text_of(render(replace(found, floor=larger)))
+    assert "noise as assumed position 0.030 mm" in seen
+    assert "noise as found 0.540 mm" in seen
+    assert "what noise as it was found alone would give" in seen
+    assert "two standard deviations of noise as it was assumed" in seen
+    assert not re.search("as found|as it was", text_of(page("pulleys")))
+
+
+def test_letters_of_a_figure_that_is_kept_are_whole(tmp_path: Path) -> None:
+    with keeping(tmp_path):
+        waterfall(diagnosis("pulleys"))
+    (picture,) = tmp_path.glob("*.png")
+    with Image.open(picture) as kept:
+        edges = np.asarray(kept.convert("L"))[:, [0, 1, 2, -3, -2, -1]]
+    assert edges.min() == 255
+
+
+def test_the_scale_of_a_map_goes_on_where_errors_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    extends: list[str] = []
+    whole = Figure.colorbar
+
+    def told(figure: Figure, *args: Any, **named: Any) -> Any:
+        extends.append(named["extend"])
+        return whole(figure, *args, **named)
+
+    monkeypatch.setattr(Figure, "colorbar", told)
+    found = diagnosis("pulleys")
+    assert found.search is not None
+    before, after = shown_stages(found)
+    failure_map(found.search.problem, before, after)
+    monkeypatch.setattr(where, "_LARGEST", 100.0)
+    failure_map(found.search.problem, before, after)
+    assert extends == ["max", "neither"]
 
 
 def test_partial_data_show_what_they_have() -> None:
@@ -448,6 +489,34 @@ def test_a_wall_of_many_cables_shows_the_worst() -> None:
     (text,) = figures_of(draw_wall(wall))
     assert text.count(">rope") == 12
     assert "rope17" in text
+
+
+def test_names_of_cables_stay_on_the_page_and_numbers_of_panels_apart(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    kept: list[Figure] = []
+
+    def placed(figure: Figure, *_args: Any, **_named: Any) -> None:
+        figure.draw_without_rendering()
+        kept.append(figure)
+
+    monkeypatch.setattr(Figure, "savefig", placed)
+    names = ["winch_left_front_upper", "rightfrontlowercable", "a " * 40]
+    values = np.outer(np.linspace(0.15, 1.42, 7), np.ones(3))
+    across = [("t", values), ("l", 20.0 * (values - 1.0)), ("u", values), ("v", values)]
+    draw_wall(Wall("long", names, values, 0.0 * values, np.ones(3), "mm", across))
+    (figure,) = kept
+    panels = figure.axes
+    assert panels[0].get_ylabel() == "winch_left_\nfront_upper" and len(panels) == 12
+    assert panels[8].get_ylabel().endswith("…")
+    assert min(a.yaxis.label.get_window_extent().x0 for a in panels[::4]) > 0.0
+    numbers = [
+        label.get_window_extent()
+        for axes in panels[8:]
+        for label in axes.get_xticklabels()
+        if label.get_text() and axes.get_xlim()[0] <= label.get_position()[0] <= axes.get_xlim()[1]
+    ]
+    assert all(one.x1 + 3.0 < other.x0 for one, other in itertools.pairwise(numbers))
 
 
 @pytest.mark.usefixtures("words_alone")
