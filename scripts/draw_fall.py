@@ -54,7 +54,7 @@ def _rms(errors: Any) -> dict[str, float]:
 
 
 def figure(ways: dict[str, crosscheck.Comparison]) -> Figure:
-    """Errors of all rows, model beside model, falling to the noise; shown 830 pixels wide."""
+    """Rms errors of each row, model beside model, falling to the noise; shown 830 pixels wide."""
     drawn = Figure(figsize=(8.3, 3.4), layout="constrained")
     left, right = drawn.subplots(1, 2)
     _draw(left, ways, "position", 1e3, "mm")
@@ -68,7 +68,8 @@ def _draw(
     said = numbers(ways)
     axes.set_yscale("log")
     for k, (one, colour) in enumerate(zip(ways.values(), COLOURS, strict=False)):
-        errors: Array = factor * one.errors_of(kind)
+        # of the three components, as the numbers and the noise are
+        errors: Array = factor * one.errors_of(kind) / np.sqrt(3.0)
         axes.plot(k + np.linspace(-0.36, 0.36, len(errors)), errors, ".", color=colour, ms=4)
     values = [said[name][f"{kind}_{unit}"] for name in ways]
     axes.set_xticks(range(len(ways)), [
@@ -76,13 +77,12 @@ def _draw(
     ], fontsize=10)  # fmt: skip
     for tick, colour in zip(axes.get_xticklabels(), COLOURS, strict=False):
         tick.set_color(colour)
-    # the length of three components, each with the noise's standard deviation
-    floor = said["noise alone"][f"{kind}_{unit}"] * np.sqrt(3.0)
+    floor = said["noise alone"][f"{kind}_{unit}"]
     axes.axhspan(1e-9, floor, color="#e5e7eb", zorder=0)
     axes.text(-0.42, floor * 0.93, "noise", color="#4b5563", va="top", fontsize=10)
     axes.set_ylim(0.08 * floor, None)
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
-    axes.set_title(f"{kind} error of each pose [{unit}]", fontsize=11, loc="left")
+    axes.set_title(f"rms {kind} error of each pose [{unit}]", fontsize=11, loc="left")
     axes.spines[["top", "right"]].set_visible(False)
 
 
