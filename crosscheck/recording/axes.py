@@ -12,14 +12,16 @@ from seecr.recording.stream import Recording
 # Ticks of an axis; slices of the bar; radii of lines in points of the screen.
 _TICKS, _SLICES, _LINE = 3, 32, 0.8
 # Room around the dots, and where axes and bar stand in it, over the larger side of the map.
-_MARGIN, _ABOVE, _BELOW, _ASIDE, _BAR = 0.08, 0.06, 0.24, 0.45, 0.18
-_TICK, _THICK = 0.02, 0.035
+_MARGIN, _ABOVE, _BELOW, _BAR = 0.08, 0.12, 0.24, 0.14
+# Left of the map are numbers, right of it the bar and its words, which keep their size in points.
+_LEFT, _RIGHT = 0.3, 0.7
+_TICK, _THICK, _WORDS = 0.02, 0.035, 0.27
 
 
 def bounds(points: Array) -> tuple[tuple[float, float], tuple[float, float]]:
     """What a view has to show of a map of points (n, 2): its ranges along both axes."""
     low, high, size = _box(points)
-    return (low[0] - _ASIDE * size, high[0] + _ASIDE * size), (
+    return (low[0] - _LEFT * size, high[0] + _RIGHT * size), (
         low[1] - _ABOVE * size,
         high[1] + _BELOW * size,
     )
@@ -49,7 +51,7 @@ def draw_axes(recording: Recording, entity: str, points: Array, words: str) -> N
     strips = rr.LineStrips2D(lines, radii=-_LINE, colors=colours.FRAME)
     recording.always(f"{entity}/axes", strips)
     _bar(recording, f"{entity}/scale", low, high, size)
-    x = high[0] + (_BAR + 0.17) * size
+    x = high[0] + (_BAR + _WORDS) * size
     ends = [(x, low[1] - 2.2 * tick), (x, high[1] - 2.2 * tick)]
     recording.always(
         f"{entity}/numbers",

@@ -16,6 +16,7 @@ from crosscheck.recording.diagnosis_words import plain
 from crosscheck.recording.misfit import MEASURED, Misfit
 from crosscheck.units import in_unit, short
 from seecr.recording import colours, layout, plots, shapes
+from seecr.recording.legends import Legend, legend_of
 from seecr.recording.scene import Scene
 from seecr.recording.stream import Index, Recording, pose_index, recording_file
 
@@ -56,13 +57,22 @@ def write_comparison_recording(found: Comparison, path: str | Path) -> None:
 def _blueprint(found: Comparison, shown: Misfit, name: str, seen: np.ndarray) -> rrb.Blueprint:
     robot = found.problem.robot
     low, high = shapes.extent(robot, seen)
+    # half of a column of a window of 1920 by 1080 points
+    size = (630.0, 445.0)
     plotted = [
-        layout.plot(f"{kind.name.capitalize()} error [{kind.unit}]", [f"plot/{kind.name}/**"])
+        layout.plot(
+            f"{kind.name.capitalize()} error [{kind.unit}]", [f"plot/{kind.name}/**"],
+            _legend(found, kind, size),
+        )
         for kind in shown.kinds
-    ]
+    ]  # fmt: skip
     root = rrb.Horizontal(
         layout.scene_view(robot, low, high, name, 0.76),
-        rrb.Vertical(*misfit.map_views(shown), *plotted),
+        rrb.Vertical(
+            *misfit.map_views(shown),
+            rrb.Tabs(*plotted),
+            row_shares=[*[1.0] * len(shown.kinds), float(len(shown.kinds))],
+        ),
         rrb.Vertical(
             layout.text("Verdict", "text/verdict"),
             layout.text("Now", "text/now"),
@@ -94,11 +104,28 @@ def _over_poses(recording: Recording, scene: Scene, found: Comparison, shown: Mi
     recording.rows("text/now", index, rr.TextDocument.columns(text=texts, media_type=kinds))
 
 
+def _errors_of(found: Comparison, kind: Kind) -> tuple[np.ndarray, np.ndarray]:
+    """(n, k) what counts of the readings of one kind, and their errors, NaN where none does."""
+    counted = found.problem.counted[:, kind.columns]
+    return counted, np.where(counted, found.state.raw[:, kind.columns], np.nan) * kind.factor
+
+
+def _short(name: str) -> str:
+    """A reading's name in a plot whose title says of what kind it is."""
+    return name.removeprefix("tension of ").removeprefix("rotation ")
+
+
+def _legend(found: Comparison, kind: Kind, size: tuple[float, float]) -> Legend:
+    counted, raw = _errors_of(found, kind)
+    read = np.flatnonzero(counted.any(axis=0))
+    names = channels(found.problem)[0][kind.columns]
+    return legend_of([raw[:, read]], [_short(names[k]) for k in read], size)
+
+
 def _plots(recording: Recording, index: Index, found: Comparison, kind: Kind) -> None:
     """The errors of one kind, reading by reading, over the poses."""
     names, _units = channels(found.problem)
-    counted = found.problem.counted[:, kind.columns]
-    raw = np.where(counted, found.state.raw[:, kind.columns], np.nan) * kind.factor
+    counted, raw = _errors_of(found, kind)
     shades = colours.cable_colours(raw.shape[1])
     for k, (name, shade) in enumerate(zip(names[kind.columns], shades, strict=True)):
         if not counted[:, k].any():
@@ -106,7 +133,7 @@ def _plots(recording: Recording, index: Index, found: Comparison, kind: Kind) ->
         entity = f"plot/{kind.name}/reading_{k + 1}"
         colour = (int(shade[0]), int(shade[1]), int(shade[2]), 255)
         starts = found.problem.experiment.commands.starts
-        plots.line_by_runs(recording, entity, index, raw[:, k], starts, name, colour, 1.5)
+        plots.line_by_runs(recording, entity, index, raw[:, k], starts, _short(name), colour, 1.5)
 
 
 def _verdict(recording: Recording, found: Comparison, shown: Misfit | None) -> None:

@@ -7,6 +7,7 @@ and as the last one does.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,11 +22,14 @@ from crosscheck.recording.diagnosis_words import model_words, pose_words, verdic
 from crosscheck.recording.misfit import MEASURED, Misfit
 from seecr.pose import Array
 from seecr.recording import colours, layout, plots, shapes
+from seecr.recording.legends import Legend, legend_of
 from seecr.recording.scene import Scene
 from seecr.recording.stream import MODEL_STEP, Recording, pose_index, recording_file
 
 _MARKDOWN = rr.MediaType.MARKDOWN
 _STEPS_A_SECOND = 1.0
+# Of the plot, in points of a window of 1920 by 1080.
+_PLOT = (820.0, 250.0)
 _BETWEEN = (colours.YELLOW, colours.PINK, colours.GREEN, colours.SILVER)
 
 
@@ -82,9 +86,12 @@ def _blueprint(found: Diagnosis, stages: list[Stage], shown: Misfit) -> rrb.Blue
     low_part = bars.share(found, stages)
     middle = [*misfit.map_views(shown), bars.view(found, stages)]
     plotted = [
-        layout.plot(f"{kind.name.capitalize()} error [{kind.unit}]", [f"plot/{kind.name}/**"])
+        layout.plot(
+            f"{kind.name.capitalize()} error [{kind.unit}]", [f"plot/{kind.name}/**"],
+            _legend(stages, shown, kind),
+        )
         for kind in shown.kinds
-    ]
+    ]  # fmt: skip
     root = rrb.Horizontal(
         rrb.Vertical(
             layout.scene_view(robot, low, high, _name(found), 1.22),
@@ -159,6 +166,13 @@ def _plots(
     rms = [kind.factor * (stage.step.held_out.rms[kind.key] or 0.0) for stage in stages]
     recording.scalars(entity, steps, rms)
     plots.as_line(recording, entity, "rms on runs left out", colours.SILVER, 2.0)
+
+
+def _legend(stages: list[Stage], shown: Misfit, kind: Kind) -> Legend:
+    """Its corner: a longer axis for it would leave little of the one curve over the steps."""
+    sizes = [kind.sizes(shown.problem, stage.state.raw) * kind.factor for stage in stages]
+    legend = legend_of([np.stack(sizes, axis=1)], [stage.label for stage in stages], _PLOT)
+    return replace(legend, values=None)
 
 
 def _texts(recording: Recording, index: rr.TimeColumn, texts: list[str]) -> None:

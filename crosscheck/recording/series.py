@@ -12,6 +12,7 @@ from crosscheck.suite.verdicts import UNSOLVED, Verdict
 from seecr.pose import Array, pose_difference
 from seecr.recording import colours, layout, plots
 from seecr.recording.colours import Rgba
+from seecr.recording.legends import Legend, alike, joined, legend_of
 from seecr.recording.stream import Index, Recording
 
 DEVIATION, TILT, TENSION = "plot/deviation", "plot/tilt", "plot/tension"
@@ -40,6 +41,10 @@ _QUANTITIES: dict[str, tuple[str, Rgba]] = {
     "orientation": ("orientation [rad]", colours.ORANGE),
     "tension": ("tension [N]", colours.GREEN),
 }
+_QUANTITY_NAMES = [name for name, _colour in _QUANTITIES.values()]
+# Of the plots, top to bottom, over the column's height, and in points of a window of 1920 by 1080.
+SHARES = (2.8, 3.0, 3.8, 3.6)
+_WIDTH, _HEIGHTS = 640.0, [1000.0 * share / sum(SHARES) - 55.0 for share in SHARES]
 
 
 class Series:
@@ -52,16 +57,22 @@ class Series:
     def views(material: Material) -> list[rrb.TimeSeriesView]:
         """The plots, top to bottom."""
         moved, turned = _components(material)
-        most, widest = _largest(material, moved), _largest(material, turned)
         return [
-            layout.plot("Deviation from the command [mm]", _both(DEVIATION, moved), _still(most)),
-            layout.plot("Rotation from the command [°]", _both(TILT, turned), _still(widest)),
-            layout.plot("Tension [N]", [f"{TENSION}/**"]),
+            layout.plot(
+                "Deviation from the command [mm]", _both(DEVIATION, moved),
+                _components_legend(material, moved, _HEIGHTS[0]),
+            ),
+            layout.plot(
+                "Rotation from the command [°]", _both(TILT, turned),
+                _components_legend(material, turned, _HEIGHTS[1]),
+            ),
+            _tension_view(material),
             layout.plot(
                 "log10 |SEECR − MuJoCo| (crosses: before the polish, lines: limits)",
                 [f"{SETTLED}/**", f"{DIFFERENCE}/**", f"{LIMIT}/**"],
+                legend_of(_logarithms(material), _QUANTITY_NAMES, (_WIDTH, _HEIGHTS[3])),
             ),
-        ]
+        ]  # fmt: skip
 
     def over_poses(self, index: Index) -> None:
         """Both physics at every pose, their difference and its limits."""
@@ -88,11 +99,8 @@ class Series:
         aim = np.tile(material.seecr.tensions[i], (k, 1))
         self._tension("seecr", index, aim)
         self._tension("mujoco", index, moving.tensions)
-        gap = pose_difference(moving.pose, target)
-        worst = np.abs(moving.tensions - aim).max(axis=1)
-        self._log(DIFFERENCE, "position", index, np.linalg.norm(gap[:, :3], axis=1))
-        self._log(DIFFERENCE, "orientation", index, np.linalg.norm(gap[:, 3:], axis=1))
-        self._log(DIFFERENCE, "tension", index, worst)
+        for quantity, values in zip(_QUANTITIES, _from_the_answer(material), strict=True):
+            self._log(DIFFERENCE, quantity, index, values)
         self._lanes(index, plots.lane_states(moving.slack, moving.slack & False, moving.known))
 
     def _deviation(self, who: str, index: Index, poses: Array, command: Array) -> None:
@@ -130,10 +138,12 @@ class Series:
         for name, colour in _COMPONENTS.items():
             root = DEVIATION if name in plots.TRANSLATIONS else TILT
             self._pair(root, _entity(name), name, colour)
+        names = self.material.robot.cable_names
         shades = colours.cable_colours(self.material.robot.n_cables)
-        for name, shade in zip(self.material.robot.cable_names, shades, strict=True):
+        said = {group[0]: joined([names[k] for k in group]) for group in _drawn(self.material)}
+        for k, (name, shade) in enumerate(zip(names, shades, strict=True)):
             colour = (int(shade[0]), int(shade[1]), int(shade[2]), 255)
-            self._pair(TENSION, _entity(name), name, colour)
+            self._pair(TENSION, _entity(name), said.get(k, name), colour)
             plots.lane_style(self.recording, f"{LANES}/{_entity(name)}", colour)
         for quantity, (name, colour) in _QUANTITIES.items():
             plots.as_dots(self.recording, f"{DIFFERENCE}/{quantity}", name, colour, 2.5)
@@ -172,6 +182,68 @@ def _largest(material: Material, names: list[str]) -> float:
     """The largest of some components of the deviation [mm or degrees]."""
     parts = plots.deviation(material.seecr.pose, material.command)
     return max(float(np.nanmax(np.abs(parts[name]), initial=0.0)) for name in names)
+
+
+def _components_legend(material: Material, names: list[str], height: float) -> Legend:
+    """Where the legend of some components of the deviation goes, over poses and the settling."""
+    still = _still(_largest(material, names))
+    if still is not None:
+        return Legend(values=still)
+    ways = [(material.seecr.pose, material.command), (material.mujoco.pose, material.command)]
+    over_poses = [plots.deviation(poses, command) for poses, command in ways]
+    curves = [np.stack([part[name] for part in over_poses for name in names], axis=1)]
+    if material.motion is not None:
+        moving = plots.deviation(material.settling.pose, material.command[material.watched])
+        curves.append(np.stack([moving[name] for name in names], axis=1))
+    return legend_of(curves, names, (_WIDTH, height))
+
+
+def _tensions(material: Material) -> list[Array]:
+    """(n, m) tensions of both physics over the poses, and those of the settling."""
+    moving = [] if material.motion is None else [material.settling.tensions]
+    return [material.seecr.tensions, material.mujoco.tensions, *moving]
+
+
+def _tension_legend(material: Material, groups: list[list[int]]) -> Legend:
+    names = material.robot.cable_names
+    said = [joined([names[k] for k in group]) for group in groups]
+    return legend_of(_tensions(material), said, (_WIDTH, _HEIGHTS[2]))
+
+
+def _drawn(material: Material) -> list[list[int]]:
+    """Cables whose tensions lie on each other, of which the first is drawn, where a legend fits."""
+    groups = alike(_tensions(material))
+    if _tension_legend(material, groups).fits:
+        return groups
+    return [[k] for k in range(material.robot.n_cables)]
+
+
+def _tension_view(material: Material) -> rrb.TimeSeriesView:
+    """Tensions with a legend where there is room for one; lanes have the same colours."""
+    groups = _drawn(material)
+    legend = _tension_legend(material, groups)
+    title = "Tension [N]" + ("" if legend.fits else ", cables in the colours of their lanes")
+    first = [material.robot.cable_names[group[0]] for group in groups]
+    return layout.plot(title, _both(TENSION, first), legend, listed=legend.fits)
+
+
+def _logarithms(material: Material) -> list[Array]:
+    """What is drawn of differences and their limits: (n, 8) over the poses, (k, 3) over time."""
+    gap, limit = material.gap, material.result.allowance
+    out = [
+        gap.position_m, gap.orientation_rad, gap.tension_N, gap.settled_position_m,
+        gap.settled_orientation_rad, limit.position_m, limit.orientation_rad, limit.tension_N,
+    ]  # fmt: skip
+    moving = [] if material.motion is None else [np.stack(_from_the_answer(material), axis=1)]
+    return [plots.log10(values) for values in (np.stack(out, axis=1), *moving)]
+
+
+def _from_the_answer(material: Material) -> tuple[Array, Array, Array]:
+    """How far MuJoCo is from SEECR's answer as it settles: (k,) [m], [rad], [N]."""
+    moving, i = material.settling, material.watched
+    gap = pose_difference(moving.pose, np.tile(material.seecr.pose[i], (len(moving.pose), 1)))
+    worst = np.abs(moving.tensions - material.seecr.tensions[i]).max(axis=1)
+    return np.linalg.norm(gap[:, :3], axis=1), np.linalg.norm(gap[:, 3:], axis=1), worst
 
 
 def _still(largest: float) -> tuple[float, float] | None:

@@ -10,6 +10,8 @@ import rerun.blueprint as rrb
 
 from seecr.pose import Array
 from seecr.recording import scene as scenes
+from seecr.recording import shapes
+from seecr.recording.legends import Legend
 from seecr.recording.stream import POSE
 from seecr.robot import Robot
 
@@ -35,9 +37,7 @@ def eye(robot: Robot, low: Array, high: Array, aspect: float) -> rrb.EyeControls
         aspect: width over height of the view.
     """
     up, span = robot.up, high - low
-    across = np.eye(3)[int(np.argmax(span - np.abs(up) * span))]
-    towards = np.cross(across, up)
-    towards = towards / max(float(np.linalg.norm(towards)), 1e-9)
+    across, towards = shapes.front(robot, low, high)
     flat = float(np.abs(towards) @ span) < 0.05 * float(np.linalg.norm(span))
     aside, above = (0.12, 0.1) if flat else (0.42, 0.34)
     gaze = towards + aside * across + above * up
@@ -76,11 +76,14 @@ def scene_view(
     robot: Robot, low: Array, high: Array, name: str, aspect: float
 ) -> rrb.Spatial3DView:
     """The 3D view of one robot, about so much wider than high."""
+    names, _words = shapes.cable_labels(robot, low, high)
     return rrb.Spatial3DView(
         origin=scenes.ROOT,
         name=name,
         background=rrb.Background(color=GROUND),
-        eye_controls=eye(robot, low, high, aspect),
+        eye_controls=eye(
+            robot, np.minimum(low, names.min(axis=0)), np.maximum(high, names.max(axis=0)), aspect
+        ),
         line_grid=_floor(robot, low, high),
         spatial_information=rrb.SpatialInformation(
             target_frame=f"tf#/{scenes.ROOT}", show_axes=False
@@ -102,14 +105,20 @@ def _floor(robot: Robot, low: Array, high: Array) -> rrb.LineGrid3D:
 
 
 def plot(
-    name: str, contents: Sequence[str], values: tuple[float, float] | None = None
+    name: str, contents: Sequence[str], legend: Legend, *, listed: bool = True
 ) -> rrb.TimeSeriesView:
-    """One plot with its legend inside; its range of values is the viewer's choice if None."""
-    axis = None if values is None else rrb.ScalarAxis(range=values)
+    """One plot with its legend inside.
+
+    Args:
+        name, contents: of the view.
+        legend: where it goes, and the range of values.
+        listed: whether there is a legend.
+    """
+    axis = None if legend.values is None else rrb.ScalarAxis(range=legend.values)
     return rrb.TimeSeriesView(
         name=name,
         contents=list(contents),
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
+        plot_legend=rrb.PlotLegend(legend.corner, visible=listed),
         axis_y=axis,
     )
 

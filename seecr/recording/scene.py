@@ -61,10 +61,13 @@ class Scene:
                 robot.exit_points,
                 radii=1.5 * _FRAME * self.size,
                 colors=colours.SILVER,
-                labels=list(robot.cable_names),
-                show_labels=True,
             ),
         )
+        places, names = shapes.cable_labels(robot, self.low, self.high)
+        words = rr.Points3D(
+            places, radii=0.0, colors=colours.SILVER, labels=names, show_labels=True
+        )
+        record.always(f"{ROOT}/cable_names", words)
 
     def axes(self) -> None:
         """Numbers in metres where the edges of the frame end that leave its lowest corner."""

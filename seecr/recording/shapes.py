@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.pose import Array, quat_rotate, transform_points
+from seecr.recording.legends import joined
 from seecr.robot import Robot
 
 # Slack cables are drawn as this many dashes of this many points.
@@ -16,6 +17,11 @@ _DASHES, _DASH_POINTS = 12, 3
 _DEEPEST = 0.35
 # Thickness of what has none, over the platform's largest side.
 _FLAT = 0.12
+# Names of exit points that are nearer than this, over the robot's size, would overlap.
+_NEAR = 0.1
+# What is nearer than the middle by more than this, over the robot's size, is in front; how far
+# names are lifted there.
+_BEFORE, _LIFT = 0.05, 0.08
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +82,41 @@ def extent(robot: Robot, poses: Array) -> tuple[Array, Array]:
     anchors = transform_points(seen, robot.anchor_points).reshape(-1, 3)
     points = np.concatenate([robot.exit_points, anchors, seen[:, :3]])
     return points.min(axis=0), points.max(axis=0)
+
+
+def front(robot: Robot, low: Array, high: Array) -> tuple[Array, Array]:
+    """Directions (3,) along the wide side of what is to be seen, and towards who looks at it.
+
+    Args:
+        robot: tells which way is down. low, high: (3,) corners of what is to be seen [m].
+    """
+    span = high - low
+    across = np.eye(3)[int(np.argmax(span - np.abs(robot.up) * span))]
+    towards = np.cross(across, robot.up)
+    return across, towards / max(float(np.linalg.norm(towards)), 1e-9)
+
+
+def cable_labels(robot: Robot, low: Array, high: Array) -> tuple[Array, list[str]]:
+    """Where names of cables stand (k, 3) [m]: one for exit points that are near to each other.
+
+    The viewer hangs them under their points; those in front stand above, clear of those behind.
+
+    Args:
+        robot: the robot. low, high: (3,) corners of what is to be seen [m].
+    """
+    points, size = robot.exit_points, float(np.linalg.norm(high - low))
+    groups: list[list[int]] = []
+    for k, point in enumerate(points):
+        apart = [float(np.linalg.norm(points[group[0]] - point)) for group in groups]
+        near = int(np.argmin(apart)) if apart else 0
+        if apart and apart[near] < _NEAR * size:
+            groups[near].append(k)
+        else:
+            groups.append([k])
+    places = np.stack([points[group].mean(axis=0) for group in groups])
+    depth = (places - points.mean(axis=0)) @ front(robot, low, high)[1]
+    places += np.where(depth > _BEFORE * size, _LIFT * size, 0.0)[:, None] * robot.up
+    return places, [joined([robot.cable_names[k] for k in group]) for group in groups]
 
 
 def frame_edges(low: Array, high: Array) -> list[Array]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import rerun.blueprint as rrb
 from seecr.pose import Array
 from seecr.recording import colours, layout, plots, shapes
 from seecr.recording.colours import COMMAND, SEECR
+from seecr.recording.legends import alike, joined, legend_of
 from seecr.recording.scene import LEGEND, Scene, write_legend
 from seecr.recording.shapes import States
 from seecr.recording.stream import (
@@ -25,6 +27,8 @@ from seecr.solution import Solution
 
 __all__ = ["write_sweep_recording"]
 
+# Of a plot, in points of a window of 1920 by 1080.
+_WIDTH = 850.0
 _LANES, _AWAY, _TURN, _PULL = "lanes", "plot/deviation", "plot/rotation", "plot/tension"
 
 
@@ -66,16 +70,43 @@ def _blueprint(
     low, high = shapes.extent(robot, seen)
     scene = layout.scene_view(robot, low, high, name, 1.2 * layout.COLUMN_ASPECT / (0.87 - share))
     lanes = layout.lanes("Which cables pull, which are slack", _LANES)
-    drawn = [layout.plot("Tension [N]", [f"{_PULL}/**"])]
+    size = (_WIDTH, 1000.0 / (3 if commanded else 1) - 55.0)
+    drawn = [_tension_view(solution, size)]
     if commanded:
+        parts = plots.deviation(solution.pose, solution.command)
+        moved = {name: parts.pop(name) for name in plots.TRANSLATIONS}
         drawn = [
-            layout.plot("Deviation from the command [mm]", [f"{_AWAY}/**"]),
-            layout.plot("Rotation from the command [°]", [f"{_TURN}/**"]),
+            _component_view("Deviation from the command [mm]", _AWAY, moved, size),
+            _component_view("Rotation from the command [°]", _TURN, parts, size),
             *drawn,
         ]
     left = rrb.Vertical(scene, layout.legend(LEGEND), lanes, row_shares=[0.9 - share, 0.1, share])
     root = rrb.Horizontal(left, rrb.Vertical(*drawn), column_shares=[6, 5])
     return layout.blueprint(root, timeline=timeline)
+
+
+def _component_view(
+    title: str, root: str, parts: dict[str, Array], size: tuple[float, float]
+) -> rrb.TimeSeriesView:
+    curves = np.stack(list(parts.values()), axis=1)
+    return layout.plot(title, [f"{root}/**"], legend_of([curves], list(parts), size))
+
+
+def _tension_view(solution: Solution, size: tuple[float, float]) -> rrb.TimeSeriesView:
+    """Tensions, one curve of those that lie on each other; lanes have the same colours."""
+    names = solution.robot.cable_names
+    said = _said(names, alike([solution.tensions]))
+    legend = legend_of([solution.tensions], list(said.values()), size)
+    title = "Tension [N]" + ("" if legend.fits else ", cables in the colours of their lanes")
+    contents = [
+        f"{_PULL}/{_entity(names[k])}" for k in (said if legend.fits else range(len(names)))
+    ]
+    return layout.plot(title, contents, legend, listed=legend.fits)
+
+
+def _said(names: Sequence[str], groups: list[list[int]]) -> dict[int, str]:
+    """By the number of the first cable of each group: the names of all of them."""
+    return {group[0]: joined([names[k] for k in group]) for group in groups}
 
 
 def _plots(recording: Recording, index: Index, solution: Solution, commanded: bool) -> None:
@@ -89,11 +120,12 @@ def _plots(recording: Recording, index: Index, solution: Solution, commanded: bo
     nowhere = np.zeros(solution.slack.shape, dtype=bool)
     states = plots.lane_states(solution.slack, nowhere, known)
     names = solution.robot.cable_names
+    said = _said(names, alike([solution.tensions]))
     for k, shade in enumerate(colours.cable_colours(solution.robot.n_cables)):
         colour = (int(shade[0]), int(shade[1]), int(shade[2]), 255)
         entity = f"{_PULL}/{_entity(names[k])}"
         recording.scalars(entity, index, solution.tensions[:, k])
-        plots.as_line(recording, entity, names[k], colour, 1.5)
+        plots.as_line(recording, entity, said.get(k, names[k]), colour, 1.5)
         lane = f"{_LANES}/{_entity(names[k])}"
         plots.lanes(recording, lane, index, list(states[:, k]))
         plots.lane_style(recording, lane, colour)

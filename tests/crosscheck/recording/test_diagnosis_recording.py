@@ -257,8 +257,9 @@ def test_written_whole_or_not_at_all(
 
 
 def test_cables_go_by_their_names(back: Readback, shown: Misfit) -> None:
-    labels = back.static("/scene/exit_points", "Points3D:labels")
-    assert labels == list(shown.problem.robot.cable_names)
+    labels = back.static("/scene/cable_names", "Points3D:labels")
+    assert shown.problem.robot.cable_names == ("cable1", "cable2", "cable3", "cable4")
+    assert labels == ["cable1, 2", "cable3, 4"], "pairs that leave side by side"
 
 
 def test_lines_do_not_join_runs(compared: Path, comparison: Comparison) -> None:

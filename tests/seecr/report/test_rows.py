@@ -109,6 +109,8 @@ def test_the_recording_holds_the_numbers(sweep: Solution, tmp_path: Path) -> Non
     back = Readback(path)
     assert back.column("/plot/tension/cable1", "pose") == list(range(len(sweep)))
     np.testing.assert_array_equal(back.scalars("/plot/tension/cable1"), sweep.tensions[:, 0])
+    names = back.static("/plot/tension/cable2", "SeriesLines:names")
+    assert names == ["cable2, 4, 5, 7"], "one curve for tensions that are the same"
     np.testing.assert_allclose(
         back.scalars("/plot/deviation/dx"), 1e3 * sweep.deviation[:, 0], atol=1e-9
     )

@@ -1,0 +1,111 @@
+"""Where the legend of a plot covers no curve: the viewer puts it into a corner of the plot."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import rerun.blueprint as rrb
+
+from seecr.pose import Array
+
+# Of the viewer's legend, in points of a window of 1920 by 1080: height of a name, of what is around
+# them, width of a letter and of what is around a name.
+_NAME, _AROUND, _LETTER, _ASIDE = 23.0, 8.0, 6.0, 42.0
+# An axis is made longer by no more than this for a legend: the curves would be flat.
+_LONGER = 2.0
+# Curves that are nearer to each other than this part of the largest lie on each other.
+_ALIKE = 1e-6
+# The viewer leaves so much of the axis free at both ends.
+_MARGIN = 0.04
+_CORNERS = (
+    rrb.Corner2D.RightTop, rrb.Corner2D.LeftTop, rrb.Corner2D.RightBottom, rrb.Corner2D.LeftBottom,
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Legend:
+    """Where it goes.
+
+    Attributes:
+        corner: of the plot. values: the axis' range, None for the viewer's choice.
+        fits: whether it covers nothing.
+    """
+
+    corner: rrb.Corner2D = rrb.Corner2D.RightTop
+    values: tuple[float, float] | None = None
+    fits: bool = True
+
+
+def legend_of(curves: Sequence[Array], names: Sequence[str], size: tuple[float, float]) -> Legend:
+    """The corner in which a legend covers nothing, with a longer axis where that takes one.
+
+    Args:
+        curves: (n, k) of each timeline, over times that are about evenly spaced.
+        names: in the legend. size: of the plot, in points of a window of 1920 by 1080.
+    """
+    known = [values for values in curves if np.isfinite(values).any()]
+    if not known or not names:
+        return Legend()
+    low = min(float(np.nanmin(values)) for values in known)
+    high = max(float(np.nanmax(values)) for values in known)
+    wide = min((_LETTER * max(map(len, names)) + _ASIDE) / size[0], 1.0)
+    tall = min((_NAME * len(names) + _AROUND) / size[1], 0.95)
+    span = max(high - low, 1e-12)
+    best, taken = _CORNERS[0], np.inf
+    for corner in _CORNERS:
+        left = corner in (rrb.Corner2D.LeftTop, rrb.Corner2D.LeftBottom)
+        top = corner in (rrb.Corner2D.RightTop, rrb.Corner2D.LeftTop)
+        reach = max(_reach(values, low, high, wide, left=left, top=top) for values in known)
+        # the legend takes the part ``tall`` of an axis so long
+        longer = max(reach / (1.0 - tall), span) / span
+        if longer < taken:
+            best, taken = corner, longer
+    if taken <= 1.0 + _MARGIN and len(known) == 1:
+        return Legend(best)
+    if taken > _LONGER:
+        return Legend(best, fits=False)
+    more, edge = (taken - 1.0) * span, _MARGIN * span
+    if best in (rrb.Corner2D.RightTop, rrb.Corner2D.LeftTop):
+        return Legend(best, (low - edge, high + more + edge))
+    return Legend(best, (low - more - edge, high + edge))
+
+
+def _reach(values: Array, low: float, high: float, wide: float, *, left: bool, top: bool) -> float:
+    """How far curves come towards a corner, from the axis' other end."""
+    count = int(np.ceil(wide * (len(values) - 1))) + 1
+    near = values[:count] if left else values[-count:]
+    near = near[np.isfinite(near)]
+    if len(near) == 0:
+        return 0.0
+    return float(near.max()) - low if top else high - float(near.min())
+
+
+def alike(curves: Sequence[Array]) -> list[list[int]]:
+    """Numbers of curves that lie on each other on all timelines: one would hide the others.
+
+    Args:
+        curves: (n, k) of each timeline.
+    """
+    whole = np.concatenate([np.asarray(values, float) for values in curves])
+    near = _ALIKE * float(np.nanmax(np.abs(whole), initial=0.0))
+    groups: list[list[int]] = []
+    for k in range(whole.shape[1]):
+        for group in groups:
+            if np.allclose(whole[:, group[0]], whole[:, k], 0.0, near, equal_nan=True):
+                group.append(k)
+                break
+        else:
+            groups.append([k])
+    return groups
+
+
+def joined(names: Sequence[str]) -> str:
+    """Several names in one: what they begin with is said once, as in "cable1, 2"."""
+    first, *others = names
+    stem = first.rstrip("0123456789")
+    same = stem and all(
+        name.startswith(stem) and name[len(stem) :].isdigit() for name in (first, *others)
+    )
+    return ", ".join([first, *(name[len(stem) :] if same else name for name in others)])
