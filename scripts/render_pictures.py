@@ -83,7 +83,7 @@ REPORT, MAP = "diagnosis-report", "map"
 _PAGE, _SCALE = (1130, 1262), 1.5
 # seecr map demobot_cogiro --grid 0.04:0.76:73 0.04:0.46:43 0.05:0.40:6
 _GRID = ((0.04, 0.76, 73), (0.04, 0.46, 43), (0.05, 0.40, 6))
-_COLOURS = 128
+_COLOURS = 256
 
 
 def main(folder: Path = FOLDER) -> None:
@@ -153,7 +153,8 @@ def keep(made: Path | Image.Image, path: Path, numbers: Numbers, *, few: bool = 
     image = made if isinstance(made, Image.Image) else Image.open(made)
     image = image.convert("RGB")
     if few:
-        image = image.quantize(_COLOURS, dither=Image.Dither.NONE)
+        # refined by nearest means: else rare colours of a scale are one
+        image = image.quantize(_COLOURS, kmeans=2, dither=Image.Dither.NONE)
     info = PngInfo()
     info.add_text("numbers", json.dumps({name: float(f"{v:.6g}") for name, v in numbers.items()}))
     image.save(path, optimize=True, pnginfo=info)
