@@ -62,7 +62,7 @@ def travel(problem: Problem, prediction: Prediction) -> Travel:
 
 def regions_of(problem: Problem, pose: Array) -> Names:
     """The region of each row, (n,): halves along each axis that is used, such as
-    "x below 0.4 m, z at or above 0.15 m".
+    "x below 0.4 m, z from 0.15 m".
 
     Args:
         problem: the data.
@@ -79,5 +79,5 @@ def regions_of(problem: Problem, pose: Array) -> Names:
         middle = 0.5 * (low[k] + high[k])
         edge = middle - _ROUNDING * spread[k]
         for row, value in zip(words, place[:, k], strict=True):
-            row.append(f"{axis} {'below' if value < edge else 'at or above'} {middle:.3g} m")
+            row.append(f"{axis} {'below' if value < edge else 'from'} {middle:.3g} m")
     return np.array([", ".join(row) or "everywhere" for row in words], dtype=np.str_)

@@ -41,9 +41,9 @@ def test_regions_are_halves_of_what_was_used(case: tuple[Problem, Prediction]) -
     assert set(regions_of(problem, pose)) == {"everywhere"}
     pose[::2, 0] = 1.0
     names = regions_of(problem, pose)
-    assert set(names[::2]) == {"x at or above 0.5 m"} and set(names[1::2]) == {"x below 0.5 m"}
+    assert set(names[::2]) == {"x from 0.5 m"} and set(names[1::2]) == {"x below 0.5 m"}
     pose[[2, 3], 0] = 0.5, np.nextafter(0.5, 0.0)
-    assert set(regions_of(problem, pose)[[2, 3]]) == {"x at or above 0.5 m"}, "on the plane"
+    assert set(regions_of(problem, pose)[[2, 3]]) == {"x from 0.5 m"}, "on the plane"
 
 
 def test_a_shift_of_the_platform_is_an_error_of_each_cable(
