@@ -16,12 +16,12 @@ from scipy import special
 
 from crosscheck.calibration.catalogue import widths_for
 from crosscheck.calibration.exact import own_readings
-from crosscheck.calibration.field import FIELD_WIDTHS, UNKNOWN, field_of
+from crosscheck.calibration.field import FIELD_WIDTHS, UNKNOWN
 from crosscheck.calibration.gram import ColumnGroup, Gram, Solved, averaging, gram_of
 from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.linearised import groups_of, linearised
 from crosscheck.calibration.sets import Names, Scores
-from crosscheck.fit.problem import KINDS
+from crosscheck.calibration.varying import varying
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,17 +145,13 @@ def _with_fields(setting: Setting, joint: JointFit) -> tuple[Gram, list[str]]:
     """Normal equations of a fit's own effects and of fields; the names of these."""
     linear, groups = linearised(setting, joint), groups_of(joint, widths_for)
     y = own_readings(linear, joint, groups)
-    columns = field_of(setting.problem, joint.state.prediction.pose[:, :3])
-    if not columns.shape[1]:
-        return gram_of(linear.x, y, groups), []
-    kind_of = setting.chain.kind[np.argmax(columns != 0.0, axis=0)]
-    first, fields = linear.x.shape[1], dict[str, ColumnGroup]()
-    for kind in np.unique(kind_of):
-        own = first + np.flatnonzero(kind_of == kind)
-        fields[f"the {KINDS[kind].name} alone"] = ColumnGroup(own, np.array(FIELD_WIDTHS))
-    if len(fields) > 1:
-        every = first + np.arange(len(kind_of))
-        fields["all readings"] = ColumnGroup(every, np.array(FIELD_WIDTHS))
+    fields, first = dict[str, ColumnGroup](), linear.x.shape[1]
+    parts = varying(setting, joint)
+    for words, part in parts.items():
+        own = first + np.arange(part.shape[1])
+        fields[words] = ColumnGroup(own, np.array(FIELD_WIDTHS))
+        first += part.shape[1]
+    columns = np.concatenate([np.zeros((len(joint.state.white), 0)), *parts.values()], axis=1)
     # what was measured independently comes last, and no field moves it
     known = np.zeros((len(linear.y) - len(columns), columns.shape[1]))
     white = np.concatenate([joint.whitened(setting.chain, columns), known])

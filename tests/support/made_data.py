@@ -17,6 +17,7 @@ from crosscheck.twin.trajectory import trajectory
 from seecr.commands import Commands
 from seecr.effects import Term, Terms, effect_named, layout_of
 from seecr.experiment import Experiment
+from seecr.loads import Loads
 from seecr.mjcf import load_robot
 from seecr.pose import quat_from_rotvec, quat_multiply
 from seecr.robot import Robot
@@ -58,11 +59,12 @@ def measured(
     sigma: Sigma = SIGMA,
     seed: int = 0,
     tensions: bool = False,
+    loads: Loads | None = None,
 ) -> Measurements:
-    """What a tracker with noise would read of a robot with these effects."""
+    """What a tracker with noise would read of a robot with these effects, and loads unknown."""
     way = trajectory(robot, points)
     run = np.unique(way.run, return_inverse=True)[1]
-    experiment = Experiment(robot, Commands(way.pose, run=run, time=way.t_s))
+    experiment = Experiment(robot, Commands(way.pose, run=run, time=way.t_s, loads=loads))
     found = experiment.predict(Terms(terms).effects)
     assert np.all(found.solved)
     rng = np.random.default_rng(seed)

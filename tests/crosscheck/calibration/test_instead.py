@@ -20,6 +20,7 @@ from crosscheck.calibration.priors import widths_of
 from crosscheck.calibration.probability import Classes
 from crosscheck.calibration.search import seek
 from crosscheck.calibration.sets import Scores, log_prior
+from crosscheck.calibration.varying import varying
 from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.fit.evidence import WIDTHS
 from crosscheck.fit.prepare import prepare
@@ -28,6 +29,7 @@ from crosscheck.fit.state import evaluate
 from crosscheck.measurements.data import Measurements
 from seecr.effects import Term, Terms
 from seecr.effects.knowledge import Knowledge
+from seecr.loads import Loads
 from seecr.mjcf import load_robot
 from seecr.pose import Array
 
@@ -56,13 +58,11 @@ def test_the_odds_are_those_of_the_covariances() -> None:
     scores = Scores(gram_of(joint.jacobian, joint.state.white, {}), 26)
     found = field_instead(setting, joint, {"tracker_scale": 0.3}, scores)
     y = joint.state.white + joint.jacobian @ joint.z
-    field = field_of(setting.problem, joint.state.prediction.pose[:, :3])
-    kind = setting.chain.kind[np.argmax(field != 0.0, axis=0)]
-    parts = [field[:, kind == 0], field[:, kind == 1], field]
-    fields = [averaged_density(y, columns, FIELD_WIDTHS) for columns in parts]
+    parts = varying(setting, joint)
+    fields = [averaged_density(y, columns, FIELD_WIDTHS) for columns in parts.values()]
     without = averaged_density(y, joint.jacobian, WIDTHS)
     prior = scores.log_prior(frozenset()) - scores.log_prior(frozenset({"tracker_scale"}))
-    expected = float(special.logsumexp(fields)) - np.log(3) - without + prior
+    expected = float(special.logsumexp(fields)) - np.log(len(parts)) - without + prior
     assert found.odds == pytest.approx(expected, abs=1e-3)
     assert found.replaced == {"tracker_scale"} and found.seen == "the position alone"
     assert found.odds < UNKNOWN and found.chance == 0.0 and not found.worth
@@ -115,6 +115,24 @@ def test_what_steps_find_is_asked_too() -> None:
     sought = seek(ready.problem, SIGMA)
     assert sought.judgement.imitated is not None and sought.judgement.sure == ()
     assert diagnose(ROBOT, widening([], 8.0)).verdict is DiagnosisVerdict.UNKNOWN_EFFECT
+
+
+@pytest.mark.slow
+def test_a_hose_is_unknown_and_what_is_hidden_beside_it_named() -> None:
+    """A tilt with other stiffnesses, drums and lengths had been found in its place."""
+    data = sprung([term(ROBOT, "pulley_radius", radius_m=0.006)], 20.0)
+    found = diagnose(ROBOT, data)
+    assert found.verdict is DiagnosisVerdict.UNKNOWN_EFFECT
+    assert [missing.effect for missing in found.missing] == ["pulley_radius"]
+    assert "smooth over the workspace, in the pull of a spring" in found.sentence
+
+
+def sprung(terms: list[Term], times: float) -> Measurements:
+    """Of a platform that a soft spring pulls, which moves it by about so many times the noise."""
+    plain = measured(ROBOT, terms, points=10)
+    force = -10.0 * times * ROBOT.weight * (plain.command_pose[:, :3] - np.array([0.5, 0.2, 0.3]))
+    loads = Loads.of(plain.n_rows, wrench=np.hstack([1e-4 * force, 0.0 * force]))
+    return measured(ROBOT, terms, points=10, loads=loads)
 
 
 def test_equals_of_what_imitates_are_doubted_as_well() -> None:
@@ -216,9 +234,9 @@ def test_no_field_moves_what_was_measured_independently() -> None:
     knowledge = replace(Knowledge.nothing(1), value=np.array([1.002]), stderr=np.array([1e-4]))
     setting, joint = fitted(replace(alone, knowledge=knowledge))
     gram, names = _with_fields(setting, joint)
-    own = gram.groups[names[-1]].columns
+    own = gram.groups["all readings"].columns
     columns = field_of(setting.problem, joint.state.prediction.pose[:, :3])
-    assert names[-1] == "all readings" and len(own) == columns.shape[1]
+    assert names == list(varying(setting, joint)) and len(own) == columns.shape[1]
     assert gram.normal[np.ix_(own, own)] == pytest.approx(columns.T @ columns, abs=1e-9)
     assert gram.normal[own, 0] == pytest.approx(columns.T @ joint.jacobian[:, 0], abs=1e-9)
     # which does count as a reading of the effect itself

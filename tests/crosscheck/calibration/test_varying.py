@@ -1,0 +1,79 @@
+"""What changes with the place: as linear algebra has it, and as robots do it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_data import COGIRO, measured, term
+
+from crosscheck.calibration.colour import WHITE, chain_of
+from crosscheck.calibration.joint import JointFit, Setting, settle
+from crosscheck.calibration.priors import widths_of
+from crosscheck.calibration.varying import varying
+from crosscheck.fit.prepare import prepare
+from crosscheck.fit.state import evaluate
+from seecr.effects import Terms
+from seecr.loads import Loads
+from seecr.mjcf import load_robot
+from seecr.pose import Array
+
+ROBOT = load_robot(COGIRO)
+# What is moved so little moves linearly.
+LITTLE = 1e-6
+
+
+@pytest.fixture(scope="module")
+def fit() -> tuple[Setting, JointFit]:
+    some = [term(ROBOT, "tracker_scale", factor=1.002)]
+    problem = prepare(ROBOT, measured(ROBOT, some, points=4), Terms()).problem
+    factor = problem.noise(problem.experiment.predict(()))
+    setting = Setting(problem, factor, chain_of(problem))
+    state = evaluate(problem, Terms(some), factor)
+    return setting, settle(setting, state, widths_of(Terms(some)), WHITE)
+
+
+def moved(setting: Setting, joint: JointFit, **changed: object) -> Array:
+    """(N,) by how much readings change, in units of their noise, where commands are others."""
+    problem, terms = setting.problem, joint.terms
+    other = replace(problem.experiment.commands, **changed)
+    there = replace(problem.experiment, commands=other).predict(terms.effects)
+    here = problem.experiment.predict(terms.effects)
+    white = [problem.whiten(setting.factor, problem.residuals(p.readings)) for p in (there, here)]
+    return np.asarray(white[1] - white[0])
+
+
+def unexplained(columns: Array, signal: Array) -> float:
+    """The part of a signal that columns cannot explain."""
+    solved = np.linalg.lstsq(columns, signal, rcond=None)[0]
+    return float(np.linalg.norm(signal - columns @ solved) / np.linalg.norm(signal))
+
+
+def test_a_spring_is_among_what_changes(fit: tuple[Setting, JointFit]) -> None:
+    setting, joint = fit
+    place = joint.state.prediction.pose[:, :3]
+    pull = -LITTLE * ROBOT.weight / ROBOT.length * (place - np.array([0.1, 0.2, 0.3]))
+    loads = Loads.of(len(place), wrench=np.hstack([pull, 0.0 * pull]))
+    signal = moved(setting, joint, loads=loads)
+    kinds = varying(setting, joint)
+    assert unexplained(kinds["the pull of a spring"], signal) < 1e-3
+    assert unexplained(kinds["a force on the platform"], signal) < 1e-3
+    assert unexplained(kinds["the position alone"], signal) > 0.1
+    # one that pulls along x only is a force, and no such spring
+    pull[:, 1:] = 0.0
+    loads = Loads.of(len(place), wrench=np.hstack([pull, 0.0 * pull]))
+    signal = moved(setting, joint, loads=loads)
+    assert unexplained(kinds["a force on the platform"], signal) < 1e-3
+    assert unexplained(kinds["the pull of a spring"], signal) > 0.05
+
+
+def test_all_are_in_units_of_the_noise(fit: tuple[Setting, JointFit]) -> None:
+    kinds = varying(*fit)
+    assert list(kinds) == [
+        "the position alone", "the orientation alone", "all readings", "a force on the platform",
+        "the pull of a spring", "the cables' lengths",
+    ]  # fmt: skip
+    for columns in kinds.values():
+        size = np.sqrt(np.mean(np.sum(columns**2, axis=1)))
+        assert 0.5 < size < 5.0
