@@ -2,8 +2,8 @@
 
 Beside the best set a field has nothing left to explain where members of the set have taken in
 what nobody knows: a tracker's picture that widens is a length scale with drums out of round. So
-the field is asked in their place, too, for each kind of readings by itself: what acts on the
-platform moves all of them, what a tracker does wrong only some.
+the field is asked in their place, too, as each of what may change with the place
+(:mod:`crosscheck.calibration.varying`).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Instead:
         odds: ln odds of it with the rest of the set over the whole set, an unknown effect thought
             as likely as none; -inf of a set without members of its own.
         replaced: the members in whose place it is.
-        seen: the readings in which it shows, in words.
+        seen: what changes with the place, in words.
         worth: ln odds that the other members are worth beside it.
     """
 
