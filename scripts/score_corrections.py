@@ -3,6 +3,7 @@
     python scripts/score_corrections.py --seeds 1 2      some
     python scripts/score_corrections.py                  those of the README, a few minutes
     python scripts/score_corrections.py --calibrated     with models of crosscheck calibrate
+    python scripts/score_corrections.py --aligned        which suppose that the tracker is right
 
 Each twin of Cogiro hides what its seed draws; the diagnosis knows its measurements alone. The
 paper's sweeps at both heights are then commanded as they are, and corrected for what was found;
@@ -13,6 +14,7 @@ between robot and tracker: corrected are the platform's poses in the base frame,
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -28,6 +30,7 @@ from seecr.sensed import placed
 from seecr.shipped import model_path
 
 ROBOT = "demobot_cogiro"
+TRACKER = ("tracker_frame", "tracker_target", "tracker_scale")
 # Seeds 3 and 11 hide nothing and 12 only a tracker's scale, which moves no robot.
 SEEDS = (1, 2, 4, 5, 6, 7, 8, 9, 10)
 # Of each sweep; seconds from pose to pose, and degrees Celsius all the time.
@@ -58,11 +61,16 @@ def score(seed: int) -> str:
     )
 
 
-def score_calibrated(seed: int) -> str:
+def score_aligned(seed: int) -> str:
+    """With a calibrated model without the tracker's effects."""
+    return score_calibrated(seed, exclude=TRACKER)
+
+
+def score_calibrated(seed: int, exclude: Sequence[str] = ()) -> str:
     """The same with a calibrated model, of what is and of what is read, both ways of aiming."""
     path = model_path(ROBOT)
     twin = make_twin(path, seed)
-    terms = calibrate(path, twin.measured).terms
+    terms = calibrate(path, twin.measured, exclude=exclude).terms
     poses = np.concatenate([demobot_sweep(z, POSES) for z in (0.1, 0.2)])
     n = len(poses)
     told = Commands(poses, time=SECONDS * np.arange(n), temperature=np.full(n, WARMTH))
@@ -91,9 +99,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, nargs="*", default=list(SEEDS))
     parser.add_argument("--calibrated", action="store_true")
+    parser.add_argument("--aligned", action="store_true")
     given = parser.parse_args()
+    way = score_aligned if given.aligned else score_calibrated if given.calibrated else score
     for seed in given.seeds:
-        print((score_calibrated if given.calibrated else score)(seed), flush=True)
+        print(way(seed), flush=True)
 
 
 if __name__ == "__main__":

@@ -85,7 +85,8 @@ def command(
     Poses are those of the platform in the base frame. A calibration shares errors between robot and
     tracker as it best can, and may leave the platform farther off there than it was; what is sure
     is what the tracker will read. With --as-read the platform is brought to where the model's
-    tracker reads the poses of the file, and want_* are these places.
+    tracker reads the poses of the file, and want_* are these places. Where the tracker is known to
+    read the platform in the base frame, calibrate with --exclude tracker_frame,tracker_target.
 
     Writes corrected.csv and corrected.toml, which every command reads as commands, and
     correction.json. Poses without any answer are left out of corrected.csv; poses are told by
