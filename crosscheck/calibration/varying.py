@@ -1,9 +1,9 @@
-"""What nobody knows, as what changes with the place: readings, the pull on the platform, lengths.
+"""What nobody knows, as what changes smoothly: readings, the pull on the platform, lengths.
 
 A hose pulls differently everywhere, and known effects imitate in all readings at once what few
 numbers of a force say. So beside cubics of the readings there are a constant force and constant
 lengths of cables that change linearly with the place, and a spring, which pulls all the same
-towards a point.
+towards a point. A tracker that moves shows over the session, wherever the platform is.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ import numpy as np
 
 from crosscheck.calibration.field import field_of
 from crosscheck.calibration.joint import JointFit, Setting
-from crosscheck.fit.problem import KINDS
-from crosscheck.fit.smooth import monomials
+from crosscheck.fit.problem import KINDS, POSITION
+from crosscheck.fit.smooth import field_columns, monomials
 from crosscheck.fit.state import derivatives
 from seecr.effects import Term, Terms, catalogue
 from seecr.effects.base import layout_of
@@ -26,7 +26,8 @@ def varying(setting: Setting, joint: JointFit) -> dict[str, Array]:
     """Columns (N, k) of each kind, in units of the noise, by what they are in words."""
     return {
         words: columns
-        for words, columns in (*_of_readings(setting, joint), *_of_robot(setting, joint))
+        for part in (_of_readings, _of_tracker, _of_robot)
+        for words, columns in part(setting, joint)
         if np.any(columns)
     }
 
@@ -39,9 +40,25 @@ def _of_readings(setting: Setting, joint: JointFit) -> Iterator[tuple[str, Array
     kind_of = setting.chain.kind[np.argmax(columns != 0.0, axis=0)]
     kinds = np.unique(kind_of)
     for kind in kinds:
-        yield f"the {KINDS[kind].name} alone", columns[:, kind_of == kind]
+        words = f"something smooth over the workspace in the {KINDS[kind].name} alone"
+        yield words, columns[:, kind_of == kind]
     if len(kinds) > 1:
-        yield "all readings", columns
+        yield "something smooth over the workspace in all readings", columns
+
+
+def _of_tracker(setting: Setting, _joint: JointFit) -> Iterator[tuple[str, Array]]:
+    """A cubic of the time for each channel of the position."""
+    columns = field_columns(setting.problem, _session(setting)[:, None], POSITION.stop)
+    yield "something smooth over the session in the position", columns
+
+
+def _session(setting: Setting) -> Array:
+    """(n,) when each row was read: by a clock that never goes back, else by its number."""
+    data = setting.problem.data
+    clock = data.t_s
+    if clock is not None and np.all(np.diff(clock) >= 0.0) and np.ptp(clock) > 0.0:
+        return clock
+    return np.arange(data.n_rows, dtype=float)
 
 
 def _of_robot(setting: Setting, joint: JointFit) -> Iterator[tuple[str, Array]]:
@@ -49,12 +66,15 @@ def _of_robot(setting: Setting, joint: JointFit) -> Iterator[tuple[str, Array]]:
     place = joint.state.prediction.pose[:, :3]
     linear = monomials(place, 1)[setting.problem.row_of]
     force = _rates(setting, joint, "external_wrench")[:, :3]
-    yield "a force on the platform", _scaled(_products(force, linear))
+    yield "a force on the platform that changes with the place", _scaled(_products(force, linear))
     off = place - place.mean(axis=0)
     towards = np.sum(force * off[setting.problem.row_of], axis=1, keepdims=True)
-    yield "the pull of a spring", _scaled(np.hstack([_scaled(force), _scaled(towards)]))
+    yield (
+        "something that pulls the platform like a spring",
+        _scaled(np.hstack([_scaled(force), _scaled(towards)])),
+    )
     lengths = _rates(setting, joint, "cable_length_offset")
-    yield "the cables' lengths", _scaled(_products(lengths, linear))
+    yield "lengths of the cables that change with the place", _scaled(_products(lengths, linear))
 
 
 def _rates(setting: Setting, joint: JointFit, name: str) -> Array:

@@ -160,7 +160,7 @@ def _sentence(
         known = " + ".join(sorted(said.imitated.replaced))
         left = (
             f"likelier than {known}, which can imitate it, is an effect that is not among them: "
-            f"smooth over the workspace, in {said.imitated.seen}"
+            f"{said.imitated.seen}"
         )
         return and_what_is_left(words_of(missing), left, tried)
     if said.verdict is DiagnosisVerdict.EFFECTS_FOUND:

@@ -20,6 +20,10 @@ from seecr.mjcf import load_robot
 from seecr.pose import Array
 
 ROBOT = load_robot(COGIRO)
+POSITION = "something smooth over the workspace in the position alone"
+SESSION = "something smooth over the session in the position"
+FORCE = "a force on the platform that changes with the place"
+SPRING = "something that pulls the platform like a spring"
 # What is moved so little moves linearly.
 LITTLE = 1e-6
 
@@ -57,22 +61,45 @@ def test_a_spring_is_among_what_changes(fit: tuple[Setting, JointFit]) -> None:
     loads = Loads.of(len(place), wrench=np.hstack([pull, 0.0 * pull]))
     signal = moved(setting, joint, loads=loads)
     kinds = varying(setting, joint)
-    assert unexplained(kinds["the pull of a spring"], signal) < 1e-3
-    assert unexplained(kinds["a force on the platform"], signal) < 1e-3
-    assert unexplained(kinds["the position alone"], signal) > 0.1
+    assert unexplained(kinds[SPRING], signal) < 1e-3
+    assert unexplained(kinds[FORCE], signal) < 1e-3
+    assert unexplained(kinds[POSITION], signal) > 0.1
     # one that pulls along x only is a force, and no such spring
     pull[:, 1:] = 0.0
     loads = Loads.of(len(place), wrench=np.hstack([pull, 0.0 * pull]))
     signal = moved(setting, joint, loads=loads)
-    assert unexplained(kinds["a force on the platform"], signal) < 1e-3
-    assert unexplained(kinds["the pull of a spring"], signal) > 0.05
+    assert unexplained(kinds[FORCE], signal) < 1e-3
+    assert unexplained(kinds[SPRING], signal) > 0.05
+
+
+def test_a_tracker_that_moves_shows_over_the_session(fit: tuple[Setting, JointFit]) -> None:
+    setting, joint = fit
+    problem = setting.problem
+    walk = np.linspace(0.0, 1.0, problem.data.n_rows)
+
+    def told(moved: Array, t_s: Array | None) -> tuple[dict[str, Array], Array]:
+        """What may change, and a tracker that moved so far along y, in units of the noise."""
+        read = np.zeros(problem.measured.shape)
+        read[:, 1] = 1e-3 * moved
+        timed = replace(problem, data=replace(problem.data, t_s=t_s))
+        signal = problem.whiten(setting.factor, read)
+        return varying(replace(setting, problem=timed), joint), signal
+
+    rows, signal = told(walk**2, None)
+    assert unexplained(rows[SESSION], signal) < 1e-9 < 0.05 < unexplained(rows[POSITION], signal)
+    # a clock counts, if it goes on through all runs
+    late, signal = told(walk**6, walk**2)
+    assert unexplained(late[SESSION], signal) < 1e-9 < 1e-3 < unexplained(rows[SESSION], signal)
+    again, _ = told(walk, walk[::-1])
+    assert np.array_equal(again[SESSION], rows[SESSION])
 
 
 def test_all_are_in_units_of_the_noise(fit: tuple[Setting, JointFit]) -> None:
     kinds = varying(*fit)
+    smooth = "something smooth over the workspace in"
     assert list(kinds) == [
-        "the position alone", "the orientation alone", "all readings", "a force on the platform",
-        "the pull of a spring", "the cables' lengths",
+        POSITION, f"{smooth} the orientation alone", f"{smooth} all readings", SESSION, FORCE,
+        SPRING, "lengths of the cables that change with the place",
     ]  # fmt: skip
     for columns in kinds.values():
         size = np.sqrt(np.mean(np.sum(columns**2, axis=1)))

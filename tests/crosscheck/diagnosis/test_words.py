@@ -53,9 +53,10 @@ def test_what_is_left_beside_what_was_found_may_hide_something() -> None:
 
 
 def test_what_imitates_something_unknown_is_told_with_where_that_shows() -> None:
-    imitated = Instead(9.0, frozenset({"length_scale", "creep"}), "the position alone")
+    seen = "something smooth over the workspace in the position alone"
+    imitated = Instead(9.0, frozenset({"length_scale", "creep"}), seen)
     said = Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, (), 0.0, imitated=imitated)
     assert _sentence(said, [], 26, Chances({}, (), None, None)) == (
         "Likelier than creep + length_scale, which can imitate it, is an effect that is not among "
-        "them: smooth over the workspace, in the position alone. 26 effects were tried."
+        "them: something smooth over the workspace in the position alone. 26 effects were tried."
     )
