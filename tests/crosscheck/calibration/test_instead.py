@@ -234,7 +234,7 @@ def test_no_field_moves_what_was_measured_independently() -> None:
     knowledge = replace(Knowledge.nothing(1), value=np.array([1.002]), stderr=np.array([1e-4]))
     setting, joint = fitted(replace(alone, knowledge=knowledge))
     gram, names = _with_fields(setting, joint)
-    own = gram.groups["all readings"].columns
+    own = gram.groups["something smooth over the workspace in all readings"].columns
     columns = field_of(setting.problem, joint.state.prediction.pose[:, :3])
     assert names == list(varying(setting, joint)) and len(own) == columns.shape[1]
     assert gram.normal[np.ix_(own, own)] == pytest.approx(columns.T @ columns, abs=1e-9)
