@@ -21,7 +21,7 @@ from crosscheck.calibration.gram import ColumnGroup, Gram, Solved, averaging, gr
 from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.linearised import groups_of, linearised
 from crosscheck.calibration.sets import Names, Scores
-from crosscheck.calibration.varying import varying
+from crosscheck.calibration.varying import Varying, varying
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,13 +32,13 @@ class Instead:
         odds: ln odds of it with the rest of the set over the whole set, an unknown effect thought
             as likely as none; -inf of a set without members of its own.
         replaced: the members in whose place it is.
-        seen: what changes with the place, in words.
+        seen: what changes; None where no field was asked.
         worth: ln odds that the other members are worth beside it.
     """
 
     odds: float
     replaced: Names
-    seen: str = ""
+    seen: Varying | None = None
     worth: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -92,7 +92,7 @@ class _Sets:
     """
 
     gram: Gram
-    fields: list[str]
+    fields: list[Varying]
     scores: Scores
     chosen: Mapping[str, float]
     averaged: Mapping[str, float]
@@ -121,7 +121,7 @@ class _Sets:
         """ln evidence and prior of a subset."""
         return self._solved(names).log_evidence + self._before(names)
 
-    def beside(self, names: Names) -> tuple[float, str]:
+    def beside(self, names: Names) -> tuple[float, Varying]:
         """The same with a field, and where that shows."""
         own, every = self._solved(names), list[float]()
         for name in self.fields:
@@ -141,15 +141,15 @@ class _Sets:
         return self.scores.log_prior(names) - price + sum(self.averaged.get(n, 0.0) for n in names)
 
 
-def _with_fields(setting: Setting, joint: JointFit) -> tuple[Gram, list[str]]:
+def _with_fields(setting: Setting, joint: JointFit) -> tuple[Gram, list[Varying]]:
     """Normal equations of a fit's own effects and of fields; the names of these."""
     linear, groups = linearised(setting, joint), groups_of(joint, widths_for)
     y = own_readings(linear, joint, groups)
-    fields, first = dict[str, ColumnGroup](), linear.x.shape[1]
+    fields, first = dict[Varying, ColumnGroup](), linear.x.shape[1]
     parts = varying(setting, joint)
-    for words, part in parts.items():
+    for what, part in parts.items():
         own = first + np.arange(part.shape[1])
-        fields[words] = ColumnGroup(own, np.array(FIELD_WIDTHS))
+        fields[what] = ColumnGroup(own, np.array(FIELD_WIDTHS))
         first += part.shape[1]
     columns = np.concatenate([np.zeros((len(joint.state.white), 0)), *parts.values()], axis=1)
     # what was measured independently comes last, and no field moves it

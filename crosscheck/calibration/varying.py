@@ -9,6 +9,7 @@ towards a point. A tracker that moves shows over the session, wherever the platf
 from __future__ import annotations
 
 from collections.abc import Iterator
+from enum import StrEnum
 
 import numpy as np
 
@@ -21,18 +22,60 @@ from seecr.effects import Term, Terms, catalogue
 from seecr.effects.base import layout_of
 from seecr.pose import Array
 
+_MOVE = "move the tracker and read some poses again; what goes with it is the tracker's"
+_FREE = (
+    "take hoses and leads off the platform, or hang them elsewhere, and read some poses again; "
+    "what goes with them is their pull"
+)
 
-def varying(setting: Setting, joint: JointFit) -> dict[str, Array]:
-    """Columns (N, k) of each kind, in units of the noise, by what they are in words."""
+
+class Varying(StrEnum):
+    """What may change smoothly and is no effect, in words, and how to find out about it."""
+
+    POSITION = "something smooth over the workspace in the position alone", _MOVE
+    ORIENTATION = "something smooth over the workspace in the orientation alone", _MOVE
+    TENSION = (
+        "something smooth over the workspace in the tension alone",
+        "hang a known weight on each load cell, as it is mounted, at several angles of its cable",
+    )
+    READINGS = "something smooth over the workspace in all readings", ""
+    SESSION = (
+        "something smooth over the session in the position",
+        "read a target that stands still before, between and after the runs, and the first poses "
+        "once more at the end",
+    )
+    FORCE = "a force on the platform that changes with the place", _FREE
+    SPRING = "something that pulls the platform like a spring", _FREE
+    LENGTHS = (
+        "lengths of the cables that change with the place",
+        "measure what each winch pays out, at several lengths and with the other winches elsewhere",
+    )
+
+    advice: str
+
+    def __new__(cls, word: str, advice: str) -> Varying:
+        """Words with what to do; none where they name nothing that can be touched."""
+        varying = str.__new__(cls, word)
+        varying._value_, varying.advice = word, advice
+        return varying
+
+
+_ALONE = {
+    "position": Varying.POSITION, "orientation": Varying.ORIENTATION, "tension": Varying.TENSION,
+}  # fmt: skip
+
+
+def varying(setting: Setting, joint: JointFit) -> dict[Varying, Array]:
+    """Columns (N, k) of each kind, in units of the noise."""
     return {
-        words: columns
+        what: columns
         for part in (_of_readings, _of_tracker, _of_robot)
-        for words, columns in part(setting, joint)
+        for what, columns in part(setting, joint)
         if np.any(columns)
     }
 
 
-def _of_readings(setting: Setting, joint: JointFit) -> Iterator[tuple[str, Array]]:
+def _of_readings(setting: Setting, joint: JointFit) -> Iterator[tuple[Varying, Array]]:
     """A cubic for each channel, of each kind of readings and of all."""
     columns = field_of(setting.problem, joint.state.prediction.pose[:, :3])
     if not columns.shape[1]:
@@ -40,16 +83,15 @@ def _of_readings(setting: Setting, joint: JointFit) -> Iterator[tuple[str, Array
     kind_of = setting.chain.kind[np.argmax(columns != 0.0, axis=0)]
     kinds = np.unique(kind_of)
     for kind in kinds:
-        words = f"something smooth over the workspace in the {KINDS[kind].name} alone"
-        yield words, columns[:, kind_of == kind]
+        yield _ALONE[KINDS[kind].name], columns[:, kind_of == kind]
     if len(kinds) > 1:
-        yield "something smooth over the workspace in all readings", columns
+        yield Varying.READINGS, columns
 
 
-def _of_tracker(setting: Setting, _joint: JointFit) -> Iterator[tuple[str, Array]]:
+def _of_tracker(setting: Setting, _joint: JointFit) -> Iterator[tuple[Varying, Array]]:
     """A cubic of the time for each channel of the position."""
     columns = field_columns(setting.problem, _session(setting)[:, None], POSITION.stop)
-    yield "something smooth over the session in the position", columns
+    yield Varying.SESSION, columns
 
 
 def _session(setting: Setting) -> Array:
@@ -61,20 +103,17 @@ def _session(setting: Setting) -> Array:
     return np.arange(data.n_rows, dtype=float)
 
 
-def _of_robot(setting: Setting, joint: JointFit) -> Iterator[tuple[str, Array]]:
+def _of_robot(setting: Setting, joint: JointFit) -> Iterator[tuple[Varying, Array]]:
     """What moves the platform itself."""
     place = joint.state.prediction.pose[:, :3]
     linear = monomials(place, 1)[setting.problem.row_of]
     force = _rates(setting, joint, "external_wrench")[:, :3]
-    yield "a force on the platform that changes with the place", _scaled(_products(force, linear))
+    yield Varying.FORCE, _scaled(_products(force, linear))
     off = place - place.mean(axis=0)
     towards = np.sum(force * off[setting.problem.row_of], axis=1, keepdims=True)
-    yield (
-        "something that pulls the platform like a spring",
-        _scaled(np.hstack([_scaled(force), _scaled(towards)])),
-    )
+    yield Varying.SPRING, _scaled(np.hstack([_scaled(force), _scaled(towards)]))
     lengths = _rates(setting, joint, "cable_length_offset")
-    yield "lengths of the cables that change with the place", _scaled(_products(lengths, linear))
+    yield Varying.LENGTHS, _scaled(_products(lengths, linear))
 
 
 def _rates(setting: Setting, joint: JointFit, name: str) -> Array:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.calibration.sets import Names
+from crosscheck.calibration.varying import Varying
 from crosscheck.comparison.associations import Association
 from crosscheck.comparison.quantities import QuantityKind
 from crosscheck.diagnosis.result import MissingEffect
@@ -123,12 +124,14 @@ def measure_next(
     verdict: DiagnosisVerdict,
     where: Sequence[Association],
     alternatives: Sequence[Names] = (),
+    seen: Varying | None = None,
 ) -> list[str]:
     """What to measure to tell apart, confirm or find, a sentence each.
 
     Args:
         found: the way to what is missing. missing, verdict, where: as they stand in the diagnosis.
         alternatives: sets of effects of which it is one.
+        seen: how what nobody knows shows, where effects imitate it.
     """
     out = []
     plan = Planned(found.problem, found.last.fit, found.factor, Reads.of(found.problem.data))
@@ -143,6 +146,8 @@ def measure_next(
     if verdict is DiagnosisVerdict.MANY_EFFECTS:
         out.append(_CALIBRATE)
     if verdict is DiagnosisVerdict.UNKNOWN_EFFECT:
+        if seen is not None and seen.advice:
+            out.append(f"to find {seen}: {seen.advice}")
         out += [_to_find(where), _ALL_AT_ONCE]
     if verdict is DiagnosisVerdict.NO_EFFECT_MISSING:
         out.append("nothing is missing; to see smaller effects, see crosscheck plan")

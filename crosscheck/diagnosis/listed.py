@@ -46,6 +46,7 @@ def diagnosis_of(
     """
     last = (way if shown is None else shown).last
     after = rms_by_kind(way.problem, last.fit.state.raw)
+    seen = None if chances.imitated is None else chances.imitated.seen
     return Diagnosis(
         verdict=verdict,
         sentence=sentence,
@@ -55,7 +56,7 @@ def diagnosis_of(
         held_out=last.held_out.rms,
         floor=floor,
         candidates=tuple(candidates),
-        measure_next=tuple(measure_next(way, missing, verdict, where, alternatives)),
+        measure_next=tuple(measure_next(way, missing, verdict, where, alternatives, seen)),
         notes=tuple(dict.fromkeys([*notes, *overestimated(way.problem, after)])),
         search=way,
         whiteness=way.last.whiteness,

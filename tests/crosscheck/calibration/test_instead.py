@@ -20,7 +20,7 @@ from crosscheck.calibration.priors import widths_of
 from crosscheck.calibration.probability import Classes
 from crosscheck.calibration.search import seek
 from crosscheck.calibration.sets import Scores, log_prior
-from crosscheck.calibration.varying import varying
+from crosscheck.calibration.varying import Varying, varying
 from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.fit.evidence import WIDTHS
 from crosscheck.fit.prepare import prepare
@@ -34,7 +34,6 @@ from seecr.mjcf import load_robot
 from seecr.pose import Array
 
 ROBOT = load_robot(COGIRO)
-SEEN = "something smooth over the workspace in the position alone"
 
 
 def fitted(*terms: Term) -> tuple[Setting, JointFit]:
@@ -65,7 +64,7 @@ def test_the_odds_are_those_of_the_covariances() -> None:
     prior = scores.log_prior(frozenset()) - scores.log_prior(frozenset({"tracker_scale"}))
     expected = float(special.logsumexp(fields)) - np.log(len(parts)) - without + prior
     assert found.odds == pytest.approx(expected, abs=1e-3)
-    assert found.replaced == {"tracker_scale"} and found.seen == SEEN
+    assert found.replaced == {"tracker_scale"} and found.seen is Varying.POSITION
     assert found.odds < UNKNOWN and found.chance == 0.0 and not found.worth
 
 
@@ -96,12 +95,12 @@ def test_a_picture_that_widens_is_unknown_and_what_is_hidden_beside_it_named() -
     assert found.verdict is DiagnosisVerdict.UNKNOWN_EFFECT
     assert [missing.effect for missing in found.missing] == ["pulley_radius"]
     assert found.missing[0].values[0] == pytest.approx(0.006, rel=0.05)
-    assert f"is an effect that is not among them: {SEEN}" in found.sentence and found.where
+    assert f"an effect that is not among them: {Varying.POSITION}" in found.sentence and found.where
     assert found.chances is not None and found.chances.field is not None
     assert found.chances.field > UNKNOWN and found.chances.shown is None
     assert found.chances.words == "" and found.chances.imitated is not None
     unknown = found.as_json()["unknown"]
-    assert unknown["seen_in"] == SEEN and "length_scale" in unknown["instead_of"]
+    assert unknown["seen_in"] == Varying.POSITION and "length_scale" in unknown["instead_of"]
     (why,) = (c.why_not for c in found.candidates if c.effect == "length_scale")
     assert why is not None and why.why is Why.MAY_IMITATE
     assert found.chances.of("pulley_radius") > 0.95 > 0.05 > found.chances.of("length_scale")
@@ -124,7 +123,8 @@ def test_a_hose_is_unknown_and_what_is_hidden_beside_it_named() -> None:
     found = diagnose(ROBOT, data)
     assert found.verdict is DiagnosisVerdict.UNKNOWN_EFFECT
     assert [missing.effect for missing in found.missing] == ["pulley_radius"]
-    assert "not among them: something that pulls the platform like a spring" in found.sentence
+    assert f"not among them: {Varying.SPRING}" in found.sentence
+    assert any("take hoses and leads off the platform" in line for line in found.measure_next)
 
 
 def sprung(terms: list[Term], times: float) -> Measurements:
@@ -234,7 +234,7 @@ def test_no_field_moves_what_was_measured_independently() -> None:
     knowledge = replace(Knowledge.nothing(1), value=np.array([1.002]), stderr=np.array([1e-4]))
     setting, joint = fitted(replace(alone, knowledge=knowledge))
     gram, names = _with_fields(setting, joint)
-    own = gram.groups["something smooth over the workspace in all readings"].columns
+    own = gram.groups[Varying.READINGS].columns
     columns = field_of(setting.problem, joint.state.prediction.pose[:, :3])
     assert names == list(varying(setting, joint)) and len(own) == columns.shape[1]
     assert gram.normal[np.ix_(own, own)] == pytest.approx(columns.T @ columns, abs=1e-9)

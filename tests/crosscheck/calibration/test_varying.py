@@ -11,7 +11,7 @@ from made_data import COGIRO, measured, term
 from crosscheck.calibration.colour import WHITE, chain_of
 from crosscheck.calibration.joint import JointFit, Setting, settle
 from crosscheck.calibration.priors import widths_of
-from crosscheck.calibration.varying import varying
+from crosscheck.calibration.varying import Varying, varying
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.state import evaluate
 from seecr.effects import Terms
@@ -20,10 +20,6 @@ from seecr.mjcf import load_robot
 from seecr.pose import Array
 
 ROBOT = load_robot(COGIRO)
-POSITION = "something smooth over the workspace in the position alone"
-SESSION = "something smooth over the session in the position"
-FORCE = "a force on the platform that changes with the place"
-SPRING = "something that pulls the platform like a spring"
 # What is moved so little moves linearly.
 LITTLE = 1e-6
 
@@ -61,15 +57,15 @@ def test_a_spring_is_among_what_changes(fit: tuple[Setting, JointFit]) -> None:
     loads = Loads.of(len(place), wrench=np.hstack([pull, 0.0 * pull]))
     signal = moved(setting, joint, loads=loads)
     kinds = varying(setting, joint)
-    assert unexplained(kinds[SPRING], signal) < 1e-3
-    assert unexplained(kinds[FORCE], signal) < 1e-3
-    assert unexplained(kinds[POSITION], signal) > 0.1
+    assert unexplained(kinds[Varying.SPRING], signal) < 1e-3
+    assert unexplained(kinds[Varying.FORCE], signal) < 1e-3
+    assert unexplained(kinds[Varying.POSITION], signal) > 0.1
     # one that pulls along x only is a force, and no such spring
     pull[:, 1:] = 0.0
     loads = Loads.of(len(place), wrench=np.hstack([pull, 0.0 * pull]))
     signal = moved(setting, joint, loads=loads)
-    assert unexplained(kinds[FORCE], signal) < 1e-3
-    assert unexplained(kinds[SPRING], signal) > 0.05
+    assert unexplained(kinds[Varying.FORCE], signal) < 1e-3
+    assert unexplained(kinds[Varying.SPRING], signal) > 0.05
 
 
 def test_a_tracker_that_moves_shows_over_the_session(fit: tuple[Setting, JointFit]) -> None:
@@ -86,21 +82,34 @@ def test_a_tracker_that_moves_shows_over_the_session(fit: tuple[Setting, JointFi
         return varying(replace(setting, problem=timed), joint), signal
 
     rows, signal = told(walk**2, None)
-    assert unexplained(rows[SESSION], signal) < 1e-9 < 0.05 < unexplained(rows[POSITION], signal)
+    assert (
+        unexplained(rows[Varying.SESSION], signal)
+        < 1e-9
+        < 0.05
+        < unexplained(rows[Varying.POSITION], signal)
+    )
     # a clock counts, if it goes on through all runs
     late, signal = told(walk**6, walk**2)
-    assert unexplained(late[SESSION], signal) < 1e-9 < 1e-3 < unexplained(rows[SESSION], signal)
+    assert (
+        unexplained(late[Varying.SESSION], signal)
+        < 1e-9
+        < 1e-3
+        < unexplained(rows[Varying.SESSION], signal)
+    )
     again, _ = told(walk, walk[::-1])
-    assert np.array_equal(again[SESSION], rows[SESSION])
+    assert np.array_equal(again[Varying.SESSION], rows[Varying.SESSION])
 
 
 def test_all_are_in_units_of_the_noise(fit: tuple[Setting, JointFit]) -> None:
     kinds = varying(*fit)
-    smooth = "something smooth over the workspace in"
-    assert list(kinds) == [
-        POSITION, f"{smooth} the orientation alone", f"{smooth} all readings", SESSION, FORCE,
-        SPRING, "lengths of the cables that change with the place",
-    ]  # fmt: skip
+    assert set(kinds) == set(Varying) - {Varying.TENSION}
     for columns in kinds.values():
         size = np.sqrt(np.mean(np.sum(columns**2, axis=1)))
         assert 0.5 < size < 5.0
+
+
+def test_all_but_what_is_everywhere_say_what_to_look_at() -> None:
+    assert [what for what in Varying if not what.advice] == [Varying.READINGS]
+    assert (
+        len({what.advice for what in Varying}) == len(Varying) - 2
+    )  # hoses; the tracker's picture

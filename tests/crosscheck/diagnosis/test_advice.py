@@ -7,6 +7,7 @@ import pytest
 from linear_toy import toy
 from made_data import soft_cogiro, term
 
+from crosscheck.calibration.varying import Varying
 from crosscheck.comparison.associations import Association
 from crosscheck.comparison.quantities import QuantityKind
 from crosscheck.diagnosis.advice import check_of, measure_next, measured_directly
@@ -48,6 +49,17 @@ def test_the_unknown_is_looked_for_where_it_goes(
     for words in ("commanded z", "the run", "time", "anything"):
         line = advice(found, goes_with(kind, words))
         assert line.startswith(f"the unexplained error goes with {words}: {expected}")
+
+
+def test_what_shows_as_a_hose_is_taken_off_first(found: Search) -> None:
+    unknown = DiagnosisVerdict.UNKNOWN_EFFECT
+    first, *others = measure_next(found, [], unknown, (), seen=Varying.SPRING)
+    assert first == (
+        "to find something that pulls the platform like a spring: take hoses and leads off the "
+        "platform, or hang them elsewhere, and read some poses again; what goes with them is their "
+        "pull"
+    )
+    assert others == measure_next(found, [], unknown, (), seen=Varying.READINGS)
 
 
 def test_without_a_lead_the_same_poses_are_repeated(found: Search) -> None:

@@ -6,6 +6,7 @@ import pytest
 
 from crosscheck.calibration.instead import Instead
 from crosscheck.calibration.judgement import Judgement
+from crosscheck.calibration.varying import Varying
 from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.explained import _sentence
 from crosscheck.diagnosis.words import hints_of, noise_left, one_of
@@ -53,8 +54,7 @@ def test_what_is_left_beside_what_was_found_may_hide_something() -> None:
 
 
 def test_what_imitates_something_unknown_is_told_with_where_that_shows() -> None:
-    seen = "something smooth over the workspace in the position alone"
-    imitated = Instead(9.0, frozenset({"length_scale", "creep"}), seen)
+    imitated = Instead(9.0, frozenset({"length_scale", "creep"}), Varying.POSITION)
     said = Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, (), 0.0, imitated=imitated)
     assert _sentence(said, [], 26, Chances({}, (), None, None)) == (
         "Likelier than creep + length_scale, which can imitate it, is an effect that is not among "
