@@ -18,7 +18,7 @@ from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.files import json_text
 
 # In a sweep: an unknown effect (L09), which takes longest, and is called unknown in IRMA's data and
-# in three of test_unknown_effects.py; two at once (L10), as four are in a laboratory (B08) of the
+# in three of test_unknown_effects.py; two at once (L10), as three are in a laboratory (B10) of the
 # same simulator.
 IN_SWEEP = ("L09", "L10")
 CASES = [
