@@ -19,7 +19,15 @@ from seecr.shipped import model_path
 from seecr.workspace import balance_equations
 
 
+@pytest.fixture
+def few_starts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Brute force from half as many starts as the script does: here it finds the same."""
+    for name, number in {"_SAMPLE": 30000, "_NEAR": 60, "_SEEDS": 8}.items():
+        monkeypatch.setattr(score_nearest, name, number)
+
+
 @pytest.mark.slow
+@pytest.mark.usefixtures("few_starts")
 @pytest.mark.parametrize(
     ("name", "kind"),
     [
@@ -47,8 +55,8 @@ def test_with_cables_that_sag_the_platform_rests_there_within_limits() -> None:
     path = model_path("cogiro_large")
     robot = load_robot(path)
     sag = load_model(path.with_name("sag.toml"), robot)
-    want = np.tile(robot.reference_pose, (3, 1))
-    want[:, :3] += np.array([[9.0, 3.0, 2.0], [-20.0, 10.0, 4.0], [5.0, -14.0, 15.0]])
+    want = np.tile(robot.reference_pose, (2, 1))
+    want[:, :3] += np.array([[9.0, 3.0, 2.0], [-20.0, 10.0, 4.0]])
     found = correct(robot, want, effects=sag, highest=5000.0)
     assert found.found.all() and not found.held.any() and found.solution.converged.all()
     assert np.abs(pose_difference(found.solution.pose, found.aimed)).max() < 1e-6
@@ -62,10 +70,11 @@ def test_with_cables_that_sag_the_platform_rests_there_within_limits() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("few_starts")
 def test_no_answer_with_cables_that_sag_is_farther_than_brute_force_finds() -> None:
     name, weight = "cogiro_large", score_nearest.WEIGHTS["cogiro_large"]
     robot, limits = load_robot(model_path(name)), score_nearest.LIMITS[name]
-    want = score_nearest.wanted_poses(robot, limits, "near", 3)
+    want = score_nearest.wanted_poses(robot, limits, "near", 2)
     found = correct(robot, want, effects=[CableWeight(weight)], **limits)
     assert found.stays.all() and found.settled.all() and not found.held.any()
     sample = score_nearest.held_sample(robot, limits)
