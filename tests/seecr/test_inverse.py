@@ -96,7 +96,7 @@ def test_tensions_stay_within_limits_and_near_their_aim() -> None:
 
 @pytest.mark.slow
 def test_the_parallel_robot_holds_what_its_workspace_says() -> None:
-    robot, poses = robot_named("demobot_parallel"), line(24, 0.17, 0.63, 0.1)
+    robot, poses = robot_named("demobot_parallel"), line(10, 0.17, 0.63, 0.1)
     found = correct(robot, poses, prefer="position")
     np.testing.assert_array_equal(found.held, feasible(robot, poses))
     np.testing.assert_array_equal(found.reached, found.held)
@@ -106,7 +106,7 @@ def test_the_parallel_robot_holds_what_its_workspace_says() -> None:
     tilt = np.degrees(np.linalg.norm(found.left[~found.held, 3:], axis=1))
     assert tilt.max() == pytest.approx(34.97, abs=0.01)
     text = str(found)
-    assert f"{int(found.held.sum())} of 24 poses reached" in text
+    assert f"{int(found.held.sum())} of 10 poses reached" in text
     assert f"{int((~found.held).sum())} cannot be held with tensions within the limits:" in text
 
 
@@ -143,10 +143,10 @@ def test_poses_far_outside_have_a_nearest_one_too(name: str) -> None:
     robot = robot_named(name)
     limits = {"lowest": 50.0, "highest": 3000.0} if name == "ipanema" else {}
     size = float(np.ptp(robot.exit_points, axis=0).max())
-    toward = np.random.default_rng(3).normal(size=(6, 3))
+    toward = np.random.default_rng(3).normal(size=(4, 3))
     toward /= np.linalg.norm(toward, axis=1)[:, None]
-    want = np.tile(robot.reference_pose, (6, 1))
-    want[:, :3] += size * np.array([0.7, 1.0, 1.5, 2.5, 4.0, 5.5])[:, None] * toward
+    want = np.tile(robot.reference_pose, (4, 1))
+    want[:, :3] += size * np.array([0.7, 1.5, 3.0, 5.5])[:, None] * toward
     found = correct(robot, want, **limits)
     assert found.found.all() and not found.held.any() and found.solution.converged.all()
     assert np.abs(pose_difference(found.solution.pose, found.aimed)).max() < 1e-9
@@ -167,13 +167,13 @@ def test_poses_far_outside_have_a_nearest_one_too(name: str) -> None:
 @pytest.mark.slow
 def test_no_other_rows_answer_is_nearer_than_the_own() -> None:
     robot = robot_named("ipanema")
-    want = np.tile(robot.reference_pose, (12, 1))
-    want[:, 0] += np.linspace(6.4, 20.0, 12)
+    want = np.tile(robot.reference_pose, (6, 1))
+    want[:, 0] += np.linspace(6.4, 20.0, 6)
     found = correct(robot, want, lowest=50.0, highest=3000.0)
     assert found.found.all() and not found.held.any()
     unit = np.repeat([1.0, robot.length], 3)
     away = np.array([
-        np.linalg.norm(unit * pose_difference(found.aimed, np.tile(one, (12, 1))), axis=1)
+        np.linalg.norm(unit * pose_difference(found.aimed, np.tile(one, (6, 1))), axis=1)
         for one in want
     ])  # fmt: skip
     assert np.all(np.diag(away) <= 1.002 * away.min(axis=1))

@@ -260,7 +260,7 @@ def test_a_map_says_which_slices_it_has_and_what_is_white(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     robot = robot_named("demobot_cogiro")
-    x, y = np.linspace(0.04, 0.76, 9), np.linspace(0.04, 0.46, 7)
+    x, y = np.linspace(0.04, 0.76, 7), np.linspace(0.04, 0.46, 5)
     found = workspace_map(robot, x, y, [0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4])
     path = tmp_path / "map.svg"
     panels = drawn_panels(monkeypatch, path, found)
@@ -340,7 +340,7 @@ def test_a_large_robots_map_is_drawn_in_metres_and_its_colours_show_most_margins
 @pytest.mark.slow
 def test_too_few_cables_are_mapped_by_position() -> None:
     robot = robot_named("planar_two_cable")
-    x, z = np.linspace(-0.15, 1.15, 11), np.linspace(0.05, 1.05, 6)
+    x, z = np.linspace(-0.15, 1.15, 7), np.linspace(0.05, 1.05, 4)
     found = workspace_map(robot, x, 0.0, z, elastic=False)
     places = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1)
     rests = np.isfinite(bar_tilt([[0, 1], [1, 1]], places, 0.1))

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from made_data import SIGMA, case, refused, run
+from made_diagnoses import SLOW
 
 from seecr.chances import held_chance
 from seecr.mjcf import load_robot
@@ -22,6 +23,8 @@ HIDDEN = {
     "centre_of_mass": {"shift_x_m": 0.002, "shift_z_m": -0.003},
     "exit_point_error": {f"error_{i}_{a}_m": 5e-4 * (-1) ** i for i in range(1, 9) for a in "xz"},
 }
+# The other effects cost most of the time.
+FEW = [word for name in SLOW for word in ("--exclude", name)]
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +39,7 @@ def test_all_at_once_the_error_falls_to_the_noise_and_the_model_can_be_used(
     many: tuple[Path, Path], tmp_path: Path
 ) -> None:
     model = tmp_path / "model.toml"
-    result = run("calibrate", *many, "--model", model, "--out", tmp_path / "out")
+    result = run("calibrate", *many, *FEW, "--model", model, "--out", tmp_path / "out")
     assert result.exit_code == 0, result.output
     assert "on runs left out" in result.stdout and f"Written to {model}" in result.stdout
     found = json.loads((tmp_path / "out" / "calibration.json").read_text())
@@ -53,7 +56,7 @@ def test_all_at_once_the_error_falls_to_the_noise_and_the_model_can_be_used(
     the_covariance_is_there(model)
     how_likely_poses_are_held(load_robot(many[0]), known)
     # from its own model on there is nothing more to gain: nothing is lost either
-    second = run("calibrate", *many, "--model", model, "--force", "--json")
+    second = run("calibrate", *many, *FEW, "--model", model, "--force", "--json")
     assert second.exit_code == 0
     assert json.loads(second.stdout)["held_out"]["position_rms_m"] < 1.5 * SIGMA.position_m
     assert model.read_text().count("[calibration]") == 1
@@ -81,9 +84,9 @@ def how_likely_poses_are_held(robot: Robot, model: Model) -> None:
 
 @pytest.mark.slow
 def test_where_nothing_is_gained_nothing_is_written(tmp_path: Path) -> None:
-    files = case(tmp_path, {})
+    files = case(tmp_path, {}, points=4)
     model = tmp_path / "model.toml"
-    result = run("calibrate", *files, "--model", model)
+    result = run("calibrate", *files, *FEW, "--model", model)
     assert result.exit_code == 1 and not model.exists()
     assert "Runs left out are not predicted any better: not written" in result.stdout
 

@@ -19,6 +19,8 @@ from seecr.shipped import model_path
 
 pytestmark = pytest.mark.slow
 
+# On each sweep, of the 18 that are usual: 80 rows.
+POINTS = 10
 CASES = [
     ("demobot_parallel", 1, ("cable_length_offset",)),  # several equilibria, slack cables
     # of the shared twins of this robot one has pulleys and one has nothing, in every run
@@ -50,7 +52,7 @@ def test_pair(robot: str, seed: int, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("robot", "seed", "hidden"), CASES)
 def test_twin(robot: str, seed: int, hidden: tuple[str, ...], tmp_path: Path) -> None:
-    make_twin(model_path(robot), seed, effects=hidden, out=tmp_path / "case")
+    make_twin(model_path(robot), seed, effects=hidden, points=POINTS, out=tmp_path / "case")
     check(hidden, tmp_path / "case")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from made_data import COGIRO, measured, term
+from made_diagnoses import SLOW
 
 from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.planning.design import make_plan
@@ -42,7 +43,7 @@ pytestmark = pytest.mark.slow
 def test_many_small_numbers_are_not_taken_for_few_of_another_effect(name, values):
     robot = load_robot(COGIRO)
     data = measured(robot, [term(robot, name, **values)], points=12, seed=2)
-    found = diagnose(robot, data)
+    found = diagnose(robot, data, exclude=SLOW)
     assert found.verdict == "effects_found"
     (one,) = found.missing
     assert name in {one.effect, *(rival.name for rival in one.rivals)}
@@ -59,5 +60,5 @@ def test_what_a_plan_says_is_named_is_named(name, parameter):
     size = seen.as_json()["nine_in_ten_named"][parameter]
     assert size == pytest.approx(NAMED * seen.factor * seen.signal.layout.scale[0])
     data = measured(robot, [term(robot, name, **{parameter: size})], points=12, seed=5)
-    (one,) = diagnose(robot, data).missing
+    (one,) = diagnose(robot, data, exclude=SLOW).missing
     assert name in {one.effect, *(rival.name for rival in one.rivals)}
