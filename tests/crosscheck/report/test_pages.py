@@ -35,13 +35,18 @@ def plan(files):
     return crosscheck.make_plan(*files)
 
 
+@pytest.fixture(scope="module")
+def pages(comparison, plan):
+    return {"comparison": render(comparison), "plan": render(plan)}
+
+
 def needs_nothing_else(page):
     text = re.sub(r'"data:[^"]*"', '"data:"', page)
     return not re.search(r"http|<script\s|<link|@import", text)
 
 
-def test_a_comparison_has_its_page(comparison):
-    page = render(comparison)
+def test_a_comparison_has_its_page(comparison, pages):
+    page = pages["comparison"]
     seen = text_of(page)
     assert comparison.sentence in seen and "The model is off" in seen
     assert "Where the errors are" in seen and "The worst rows" in seen
@@ -55,8 +60,8 @@ def test_a_comparison_has_its_page(comparison):
     assert "Model and data agree" in text_of(good) and "with SEECR + pulley_radius" in text_of(good)
 
 
-def test_a_plan_has_its_page(plan):
-    page = render(plan)
+def test_a_plan_has_its_page(plan, pages):
+    page = pages["plan"]
     seen = text_of(page)
     assert plan.sentence in seen and len(figures_of(page)) == 2 and needs_nothing_else(page)
     assert f"; from {NAMED:g} times the smallest size that shows on" in seen
@@ -67,9 +72,8 @@ def test_a_plan_has_its_page(plan):
 
 
 @pytest.mark.parametrize("which", ["comparison", "plan"])
-def test_pages_are_dark_and_narrow_where_the_reader_is(which, request):
-    made = request.getfixturevalue(which)
-    page = render(made)
+def test_pages_are_dark_and_narrow_where_the_reader_is(which, pages):
+    page = pages[which]
     assert "prefers-color-scheme: dark" in page and "max-width: 640px" in page
     style = page[page.index("<style>") : page.index("</style>")]
     # nothing is wider than a telephone, but what can be moved sideways
@@ -77,8 +81,8 @@ def test_pages_are_dark_and_narrow_where_the_reader_is(which, request):
     assert style.count("{") == style.count("}")
 
 
-def test_printed_tables_have_their_heads_on_every_page(plan):
-    style = render(plan).split("<style>")[1].split("</style>")[0]
+def test_printed_tables_have_their_heads_on_every_page(pages):
+    style = pages["plan"].split("<style>")[1].split("</style>")[0]
     printed = style[style.index("@media print") :]
     assert "thead { display: table-header-group; break-inside: avoid; }" in printed
     # heads that hold buttons are not repeated by browsers

@@ -211,6 +211,7 @@ def test_text_from_users_stays_text() -> None:
     assert seen.count(EVIL[:12]) - seen.count(EVIL) >= 8
 
 
+@pytest.mark.usefixtures("words_alone")
 def test_noise_that_was_assumed_and_noise_that_was_found_are_told_apart() -> None:
     found = diagnosis("pulleys")
     larger = {key: value and 18.0 * value for key, value in found.floor.items()}
@@ -525,8 +526,8 @@ def test_names_of_cables_stay_on_the_page_and_numbers_of_panels_apart(
 @pytest.mark.usefixtures("words_alone")
 def test_written_whole_or_not_at_all(tmp_path: Path) -> None:
     path = tmp_path / "diagnosis.html"
-    write_page(diagnosis("nothing"), path)
-    assert path.read_text(encoding="utf-8") == render(diagnosis("nothing"))
+    write_page(diagnosis("none"), path)
+    assert path.read_text(encoding="utf-8") == render(diagnosis("none"))
     assert list(tmp_path.iterdir()) == [path]
     with pytest.raises(InputFileError, match=r"gone/d.html: cannot write the page: No such"):
         write_page(diagnosis("none"), tmp_path / "gone" / "d.html")
