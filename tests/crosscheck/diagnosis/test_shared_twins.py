@@ -17,10 +17,10 @@ from made_data import run
 from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.files import json_text
 
-# In a sweep: an unknown effect (L09), which takes longest, and is called unknown in IRMA's data and
-# in three of test_unknown_effects.py; two at once (L10), as three are in a laboratory (B10) of the
-# same simulator.
-IN_SWEEP = ("L09", "L10")
+# In a sweep, since every run asks it of other data as well: an unknown effect (L09) and pulleys
+# (L04) in test_unknown_effects.py, hysteresis (L06) and several at once (L10) in the laboratories
+# B06 and B10 of the same simulator.
+IN_SWEEP = ("L04", "L06", "L09", "L10")
 CASES = [
     pytest.param(name, marks=[pytest.mark.sweep] if name in IN_SWEEP else [])
     for name in (f"L{k:02d}" for k in range(1, 13))
