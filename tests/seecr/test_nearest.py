@@ -21,7 +21,7 @@ from seecr.workspace import balance_equations
 
 @pytest.fixture
 def few_starts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Brute force from half as many starts as the script does: here it finds the same."""
+    """Brute force from a fifth of the starts that the script makes: here it finds the same."""
     for name, number in {"_SAMPLE": 30000, "_NEAR": 60, "_SEEDS": 8}.items():
         monkeypatch.setattr(score_nearest, name, number)
 
