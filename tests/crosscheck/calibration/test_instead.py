@@ -113,7 +113,7 @@ def test_a_picture_that_widens_is_unknown_and_what_is_hidden_beside_it_named() -
 
 @pytest.mark.slow
 def test_what_steps_find_is_asked_too() -> None:
-    """They end with noise, and all that they found would have been sure."""
+    """Where they end with noise, all that they found would be sure."""
     data = widening([], 8.0)
     ready = prepare(ROBOT, data, Terms(), FEW)
     assert ready.refusal is None
