@@ -105,7 +105,7 @@ def test_a_picture_that_widens_is_unknown_and_what_is_hidden_beside_it_named() -
     assert found.chances.field > UNKNOWN and found.chances.shown is None
     assert found.chances.words == "" and found.chances.imitated is not None
     unknown = found.as_json()["unknown"]
-    assert unknown["seen_in"] == Varying.POSITION and "stiffness" in unknown["instead_of"]
+    assert unknown["seen_in"] == "position" and "stiffness" in unknown["instead_of"]
     (why,) = (c.why_not for c in found.candidates if c.effect == "stiffness")
     assert why is not None and why.why is Why.MAY_IMITATE
     assert found.chances.of("pulley_radius") > 0.95 > 0.05 > found.chances.of("stiffness")
