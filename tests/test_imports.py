@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[1]
 FLOORS = {
     "seecr.errors": 0, "seecr.compiled": 0, "seecr.threads": 0, "seecr.lazy": 0, "seecr.counted": 0,
     "seecr.files": 1, "seecr.result": 1, "seecr.made": 1,
-    "seecr.shipped": 2, "seecr.pose": 1, "seecr.units": 2, "seecr.arguments": 2,
+    "seecr.shipped": 2, "seecr.pose": 1, "seecr.curves": 2, "seecr.units": 2, "seecr.arguments": 2,
     "seecr.robot": 2, "seecr.loads": 2, "seecr.commands": 3, "seecr.joints": 3, "seecr.mjcf": 3,
     "seecr.columns": 4, "seecr.given": 4, "seecr.path": 4, "seecr.setup": 4, "seecr.fingerprint": 4,
     "seecr.effects": 5, "seecr.tables": 5, "seecr.cells": 6, "seecr.edits": 6, "seecr.shifts": 6,

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from crosscheck.recording.material import Material
 from crosscheck.suite.verdicts import UNSOLVED, Verdict
+from seecr.curves import alike, joined
 from seecr.pose import Array, pose_difference
 from seecr.recording import colours, layout, plots
 from seecr.recording.colours import Rgba
-from seecr.recording.legends import Legend, alike, joined, legend_of
+from seecr.recording.legends import Legend, legend_of
 from seecr.recording.stream import Index, Recording
 
 DEVIATION, TILT, TENSION = "plot/deviation", "plot/tilt", "plot/tension"

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from seecr.curves import joined
 from seecr.pose import Array, quat_rotate, transform_points
-from seecr.recording.legends import joined
 from seecr.robot import Robot
 
 # Slack cables are drawn as this many dashes of this many points.

@@ -9,10 +9,11 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from seecr.curves import alike, joined
 from seecr.pose import Array
 from seecr.recording import colours, layout, plots, shapes
 from seecr.recording.colours import COMMAND, SEECR
-from seecr.recording.legends import alike, joined, legend_of
+from seecr.recording.legends import legend_of
 from seecr.recording.scene import LEGEND, Scene, write_legend
 from seecr.recording.shapes import States
 from seecr.recording.stream import (

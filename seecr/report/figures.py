@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from seecr.curves import alike
 from seecr.errors import InputError
 from seecr.maps import Workspace
 from seecr.pose import Array
@@ -124,28 +125,15 @@ def _rotations(ax: Any, solution: Solution, at: Array, mark: dict[str, Any]) -> 
 
 
 def _tensions(ax: Any, solution: Solution, at: Array, mark: dict[str, Any]) -> None:
-    for k, (names, values) in enumerate(_alike(solution)):
+    for k, group in enumerate(alike([solution.tensions])):
         style = _DASHES[k // len(COLOURS) % len(_DASHES)]
+        names = ", ".join(solution.robot.cable_names[cable] for cable in group)
+        values = solution.tensions[:, group[0]]
         ax.plot(at, values, style, color=COLOURS[k % len(COLOURS)], label=names, **mark)
     ax.set_ylabel("tension [N]")
     ax.set_ylim(bottom=min(0.0, ax.get_ylim()[0]))
     if solution.robot.n_cables <= _MOST_NAMED:
         _legend(ax)
-
-
-def _alike(solution: Solution) -> list[tuple[str, Array]]:
-    """Tensions (n,) with the names of the cables that all have them: one would hide another."""
-    tensions, near = solution.tensions, 1e-6 * np.nanmax(solution.tensions, initial=0.0)
-    groups: list[list[int]] = []
-    for k in range(solution.robot.n_cables):
-        for group in groups:
-            if np.allclose(tensions[:, group[0]], tensions[:, k], 0.0, near, equal_nan=True):
-                group.append(k)
-                break
-        else:
-            groups.append([k])
-    names = solution.robot.cable_names
-    return [(", ".join(names[k] for k in group), tensions[:, group[0]]) for group in groups]
 
 
 def _legend(ax: Any) -> None:

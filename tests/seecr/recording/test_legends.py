@@ -1,4 +1,4 @@
-"""Legends that cover no curve, names of curves that lie on each other, names of cables."""
+"""Legends that cover no curve, names of cables."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 import rerun.blueprint as rrb
 
 from seecr.mjcf import load_robot
-from seecr.recording.legends import Legend, alike, joined, legend_of
+from seecr.recording.legends import Legend, legend_of
 from seecr.recording.shapes import cable_labels, extent
 from seecr.shipped import model_path
 
@@ -62,15 +62,6 @@ def test_all_timelines_have_room_on_one_axis() -> None:
     found = legend_of([rising, high], ["a"], SIZE)
     assert found.values is not None and found.values[0] < 0.0 and found.values[1] > 9.0
     assert found.corner in (LEFT_BOTTOM, RIGHT_BOTTOM) or found.values[1] > 10.0
-
-
-def test_curves_that_lie_on_each_other_have_one_name() -> None:
-    one = curves((0.0, 1.0), (2.0, 3.0), (0.0, 1.0))
-    assert alike([one]) == [[0, 2], [1]]
-    assert alike([one, curves((0.0, 1.0), (2.0, 3.0), (0.0, 2.0))]) == [[0], [1], [2]]
-    assert joined(["cable1", "cable3"]) == "cable1, 3"
-    assert joined(["left", "right"]) == "left, right"
-    assert joined(["a1", "b1"]) == "a1, b1" and joined(["rope"]) == "rope"
 
 
 def test_cables_that_leave_side_by_side_have_one_label_and_those_in_front_stand_above() -> None:
