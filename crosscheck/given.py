@@ -11,14 +11,14 @@ from typing import TypeAlias
 import numpy as np
 
 from crosscheck.errors import CrosscheckError
+from seecr.description.given import GivenRobot, robot_of
+from seecr.description.mjcf import load_robot
+from seecr.description.robot import Robot
+from seecr.description.shipped import robot_file
 from seecr.effects import Term, Terms, catalogue, effect_named
 from seecr.errors import InputError, RobotError
-from seecr.given import GivenRobot, robot_of
-from seecr.mjcf import load_robot
-from seecr.model import Model, effects_given, model_given, new_model, no_effects
 from seecr.pose import Array
-from seecr.robot import Robot
-from seecr.shipped import robot_file
+from seecr.prediction.model import Model, effects_given, model_given, new_model, no_effects
 
 __all__ = [
     "GivenModel",

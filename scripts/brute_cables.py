@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from seecr.description.robot import Robot
 from seecr.pose import Array
-from seecr.robot import Robot
 
 _ROUNDS, _EXACT = 60, 1e-13
 # Cables that go this little to the side are plumb: what they hang through is next to nothing.

@@ -21,10 +21,10 @@ import make_paper
 import numpy as np
 from matplotlib.patches import Rectangle
 
-from seecr.commands import Commands
+from seecr.commands.data import Commands
 from seecr.effects import Effect, Layout, catalogue, layout_of
-from seecr.experiment import Experiment, read
 from seecr.pose import Array, pose_difference
+from seecr.prediction.experiment import Experiment, read
 
 MEASURED, ABOUT = np.array([20.0, -15.0]), np.array([2.0, 3.0])
 """Tilt at the ends [deg] and deviation along z [mm], and what "about" is taken to mean."""

@@ -17,7 +17,7 @@ import numpy as np
 
 from crosscheck.terminal.effects import EACH
 from seecr.effects import BUILT_IN, PLACES, Effect
-from seecr.setup import QUANTITIES, History
+from seecr.effects.setup import QUANTITIES, History
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "effects.md"
 NUMBERS = PAGE.parent / "pictures" / "effects" / "numbers.json"

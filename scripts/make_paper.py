@@ -19,15 +19,15 @@ import numpy as np
 from paper_search import METHODS, search
 from paper_stiffness import HEAD, stiffness_rows
 
-from seecr.equilibrium import solve
-from seecr.mjcf import load_robot
+from seecr.description.mjcf import load_robot
+from seecr.description.robot import Robot
+from seecr.description.shipped import CABLES, model_path
+from seecr.equilibrium.solving import solve
 from seecr.planar import bar_equilibria, bar_tilt, midline_point, solution_manifold
 from seecr.pose import Array, transform_points
 from seecr.report.figures import COLOURS, figure
-from seecr.robot import Robot
-from seecr.shipped import CABLES, model_path
-from seecr.solution import Solution
-from seecr.workspace import slack_zones, tension_margin
+from seecr.statics.solution import Solution
+from seecr.workspace.zones import slack_zones, tension_margin
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE, PICTURES = ROOT / "docs" / "paper.md", ROOT / "docs" / "pictures" / "paper"

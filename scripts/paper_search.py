@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import optimize
 
+from seecr.description.robot import Robot
 from seecr.pose import Array, quat_from_rotvec, quat_to_matrix
-from seecr.robot import Robot
 
 METHODS = ("fsolve", "least_squares")
 

@@ -12,7 +12,7 @@ import numpy as np
 from paper_search import search
 
 from seecr.pose import rotvec_from_quat
-from seecr.solution import Solution
+from seecr.statics.solution import Solution
 
 HEAD = (
     "| k_c of Vectran | modulus it means | fishing line, a tenth | parallel at the end: tilt, z | "

@@ -35,11 +35,11 @@ from crosscheck.suite.cases import Case, select, shipped_cases
 from crosscheck.suite.run import run_case
 from crosscheck.suite.thresholds import load_thresholds
 from crosscheck.twin.make import make_twin
-from seecr.equilibrium import solve
-from seecr.maps import Workspace, workspace_map
-from seecr.mjcf import load_robot
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
+from seecr.equilibrium.solving import solve
 from seecr.report.figures import map_figure
-from seecr.shipped import model_path
+from seecr.workspace.maps import Workspace, workspace_map
 
 FOLDER = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 # The viewer's own bar of buttons and warnings, cut off the top [pixels].

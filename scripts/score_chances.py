@@ -34,11 +34,11 @@ from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.twin.hidden import choose, times
 from crosscheck.twin.lab import random_of, sweeps
 from crosscheck.twin.measure import Truth, measure
+from seecr.description.mjcf import load_robot
+from seecr.description.robot import Robot
+from seecr.description.shipped import model_path
 from seecr.effects import Term, Terms
-from seecr.mjcf import load_robot
 from seecr.pose import quat_from_rotvec, quat_multiply
-from seecr.robot import Robot
-from seecr.shipped import model_path
 
 Array = NDArray[np.float64]
 ROBOTS = ("demobot_cogiro", "demobot_parallel")

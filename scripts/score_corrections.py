@@ -23,11 +23,11 @@ from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.suite.poses import demobot_sweep
 from crosscheck.twin.make import make_twin
 from crosscheck.twin.measure import measure
-from seecr.commands import Commands
-from seecr.inverse import correct
+from seecr.commands.data import Commands
+from seecr.description.shipped import model_path
+from seecr.inverse.correction import correct
 from seecr.pose import Array
-from seecr.sensed import placed
-from seecr.shipped import model_path
+from seecr.prediction.sensed import placed
 
 ROBOT = "demobot_cogiro"
 TRACKER = ("tracker_frame", "tracker_target", "tracker_scale")

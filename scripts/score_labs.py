@@ -24,9 +24,9 @@ from crosscheck.fit.prepare import prepare
 from crosscheck.fit.problem import Problem, kinds_read, rms_by_kind
 from crosscheck.fit.state import State, evaluate
 from crosscheck.measurements.read import load_measurements
+from seecr.description.mjcf import load_robot
+from seecr.description.robot import Robot
 from seecr.effects import Terms
-from seecr.mjcf import load_robot
-from seecr.robot import Robot
 
 
 def predicted(robot: Robot, path: Path, terms: Terms) -> tuple[Problem, State]:

@@ -35,9 +35,9 @@ from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.twin.hidden import choose
 from crosscheck.twin.lab import random_of, sweeps
 from crosscheck.twin.measure import Truth, measure
+from seecr.description.mjcf import load_robot
+from seecr.description.robot import Robot
 from seecr.effects import Term, Terms, effect_named, layout_of
-from seecr.mjcf import load_robot
-from seecr.robot import Robot
 
 CASES = ("B07", "B03", "B02", "B08", "B04", "B09")
 LARGE = ("hall", "crane")

@@ -24,14 +24,14 @@ from brute_cables import Pull, hanging, nearly_straight, straight
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from seecr.distribution import balanced
+from seecr.description.mjcf import load_robot
+from seecr.description.robot import Robot
+from seecr.description.shipped import model_path
 from seecr.effects.cable import CableWeight
-from seecr.inverse import correct
-from seecr.mjcf import load_robot
+from seecr.holding.distribution import balanced
+from seecr.inverse.correction import correct
 from seecr.pose import Array, pose_add, pose_difference, quat_to_matrix
-from seecr.robot import Robot
-from seecr.shipped import model_path
-from seecr.workspace import feasible
+from seecr.workspace.zones import feasible
 
 LIMITS: dict[str, dict[str, float]] = {
     "demobot_parallel": {},

@@ -27,10 +27,10 @@ from crosscheck.planning.design import make_plan
 from crosscheck.planning.result import Visible
 from crosscheck.twin.lab import random_of, sweeps
 from crosscheck.twin.measure import measure
+from seecr.description.mjcf import load_robot
+from seecr.description.robot import Robot
+from seecr.description.shipped import model_path
 from seecr.effects import Term
-from seecr.mjcf import load_robot
-from seecr.robot import Robot
-from seecr.shipped import model_path
 
 TIMES = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8)
 # These move only what is not read here.

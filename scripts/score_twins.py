@@ -27,9 +27,9 @@ from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.measurements.read import load_measurements
 from crosscheck.twin.answer import unseal
 from crosscheck.twin.make import make_twin
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
 from seecr.effects import BUILT_IN
-from seecr.mjcf import load_robot
-from seecr.shipped import model_path
 
 ROBOTS = ("demobot_cogiro", "demobot_parallel")
 CLOSE, FLOOR = 3.0, 1.2

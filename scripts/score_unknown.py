@@ -29,11 +29,11 @@ from crosscheck.measurements.data import Measurements
 from crosscheck.twin.hidden import choose
 from crosscheck.twin.lab import random_of, sweeps
 from crosscheck.twin.measure import measure
-from seecr.commands import Commands
+from seecr.commands.data import Commands
+from seecr.commands.loads import Loads
+from seecr.description.robot import Robot
 from seecr.effects import Terms
-from seecr.loads import Loads
 from seecr.pose import quat_from_rotvec, quat_multiply
-from seecr.robot import Robot
 
 Array = NDArray[np.float64]
 # Sizes in standard deviations of the position, drawn evenly in their logarithm.

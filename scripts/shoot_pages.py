@@ -20,8 +20,8 @@ from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.planning import make_plan
 from crosscheck.report import write_page
 from crosscheck.twin.make import Twin, make_twin
+from seecr.description.shipped import model_path
 from seecr.made import Made
-from seecr.shipped import model_path
 
 WIDTHS = (1280, 390)
 FEW = ("stiffness", "platform_mass", "pulley_radius", "exit_point_error", "tracker_frame")

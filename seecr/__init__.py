@@ -18,8 +18,11 @@ from typing import TYPE_CHECKING
 from seecr.lazy import lazily
 
 if TYPE_CHECKING:
-    from seecr.chances import held_chance, kept_chance
-    from seecr.commands import Commands
+    from seecr.commands.data import Commands
+    from seecr.commands.loads import Loads
+    from seecr.description.mjcf import load_robot
+    from seecr.description.robot import Joint, Robot
+    from seecr.description.shipped import model_names, model_path
     from seecr.effects import (
         Effect,
         Knowledge,
@@ -31,7 +34,11 @@ if TYPE_CHECKING:
         layout_of,
         parameter,
     )
-    from seecr.equilibrium import solve
+    from seecr.effects.setup import Setup
+    from seecr.equilibrium.following import Jump
+    from seecr.equilibrium.multiple import equilibria
+    from seecr.equilibrium.passes import Barrier, barriers
+    from seecr.equilibrium.solving import solve
     from seecr.errors import (
         InputError,
         InputFileError,
@@ -39,55 +46,48 @@ if TYPE_CHECKING:
         RobotError,
         SeecrError,
     )
-    from seecr.experiment import Experiment, Prediction, predict
     from seecr.exported.export import Export, export
-    from seecr.following import Jump
-    from seecr.inverse import Correction, correct
-    from seecr.loads import Loads
-    from seecr.maps import Workspace, boundary, default_axes, workspace_map
-    from seecr.mjcf import load_robot
-    from seecr.model import Model, load_model, new_model
-    from seecr.multiple import equilibria
-    from seecr.passes import Barrier, barriers
+    from seecr.inverse.correction import Correction, correct
     from seecr.planar import BarRest, bar_equilibria, bar_tilt, midline_point, solution_manifold
-    from seecr.robot import Joint, Robot
-    from seecr.sensitivity import sensitivities
-    from seecr.setup import Setup
-    from seecr.shipped import model_names, model_path
-    from seecr.solution import Solution, Status
-    from seecr.uncertainty import Spread, spread_of
-    from seecr.workspace import Zone, feasible, slack_zones, tension_margin
+    from seecr.prediction.experiment import Experiment, Prediction, predict
+    from seecr.prediction.model import Model, load_model, new_model
+    from seecr.prediction.sensitivity import sensitivities
+    from seecr.prediction.uncertainty import Spread, spread_of
+    from seecr.statics.solution import Solution, Status
+    from seecr.workspace.chances import held_chance, kept_chance
+    from seecr.workspace.maps import Workspace, boundary, default_axes, workspace_map
+    from seecr.workspace.zones import Zone, feasible, slack_zones, tension_margin
 
 __version__ = "0.1.0"
 
 # Imported when first used: the compiled loop and MuJoCo take a while to load.
 _MODULES = {
-    "passes": ("Barrier", "barriers"),
-    "chances": ("held_chance", "kept_chance"),
-    "commands": ("Commands",),
+    "equilibrium.passes": ("Barrier", "barriers"),
+    "workspace.chances": ("held_chance", "kept_chance"),
+    "commands.data": ("Commands",),
     "effects": (
         "Effect", "Knowledge", "Readings", "Term", "Terms", "catalogue", "effect_named",
         "layout_of", "parameter",
     ),
-    "equilibrium": ("solve",),
+    "equilibrium.solving": ("solve",),
     "errors": ("InputError", "InputFileError", "MissingPackageError", "RobotError", "SeecrError"),
-    "experiment": ("Experiment", "Prediction", "predict"),
+    "prediction.experiment": ("Experiment", "Prediction", "predict"),
     "exported.export": ("Export", "export"),
-    "following": ("Jump",),
-    "loads": ("Loads",),
-    "inverse": ("Correction", "correct"),
-    "maps": ("Workspace", "boundary", "default_axes", "workspace_map"),
-    "mjcf": ("load_robot",),
-    "model": ("Model", "load_model", "new_model"),
-    "multiple": ("equilibria",),
+    "equilibrium.following": ("Jump",),
+    "commands.loads": ("Loads",),
+    "inverse.correction": ("Correction", "correct"),
+    "workspace.maps": ("Workspace", "boundary", "default_axes", "workspace_map"),
+    "description.mjcf": ("load_robot",),
+    "prediction.model": ("Model", "load_model", "new_model"),
+    "equilibrium.multiple": ("equilibria",),
     "planar": ("BarRest", "bar_equilibria", "bar_tilt", "midline_point", "solution_manifold"),
-    "robot": ("Joint", "Robot"),
-    "sensitivity": ("sensitivities",),
-    "setup": ("Setup",),
-    "solution": ("Solution", "Status"),
-    "shipped": ("model_names", "model_path"),
-    "uncertainty": ("Spread", "spread_of"),
-    "workspace": ("Zone", "feasible", "slack_zones", "tension_margin"),
+    "description.robot": ("Joint", "Robot"),
+    "prediction.sensitivity": ("sensitivities",),
+    "effects.setup": ("Setup",),
+    "statics.solution": ("Solution", "Status"),
+    "description.shipped": ("model_names", "model_path"),
+    "prediction.uncertainty": ("Spread", "spread_of"),
+    "workspace.zones": ("Zone", "feasible", "slack_zones", "tension_margin"),
 }  # fmt: skip
 _WHERE = {name: module for module, names in _MODULES.items() for name in names}
 

@@ -19,7 +19,7 @@ import crosscheck
 import seecr
 from seecr import __version__
 from seecr.effects import BUILT_IN
-from seecr.setup import QUANTITIES
+from seecr.effects.setup import QUANTITIES
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), ROOT / "models" / "README.md"]

@@ -19,8 +19,8 @@ from crosscheck.given import GivenModel, GivenRobot, basis_of, model_of, robot_o
 from crosscheck.measurements.read import GivenData, measurements_of
 from seecr.effects import ApartLayout, Own, Term, Terms, effect_named, layout_of
 from seecr.effects.base import Layout
-from seecr.model import no_effects
 from seecr.pose import Array
+from seecr.prediction.model import no_effects
 
 # Steps of a fit, and how often it may go on after that many.
 _STEPS, _TIMES = 40, 2

@@ -10,7 +10,7 @@ from crosscheck.fit.problem import Rms
 from crosscheck.fit.words import fitted_lines, fitted_records, rms_words
 from crosscheck.model.fitted import Fitted
 from seecr.effects import Terms
-from seecr.model import Model
+from seecr.prediction.model import Model
 from seecr.result import Record, Result
 
 

@@ -21,10 +21,10 @@ from crosscheck.fit.systematic import moved_by_others
 from crosscheck.model.fitted import Fitted
 from crosscheck.model.write import provenance_of, renewed, with_fit
 from seecr.counted import counted, some
+from seecr.description.robot import Robot
 from seecr.effects import Terms
-from seecr.model import Model
 from seecr.pose import Array
-from seecr.robot import Robot
+from seecr.prediction.model import Model
 
 # A value this many plausible sizes from null deserves a second look.
 _IMPLAUSIBLE = 5.0

@@ -19,8 +19,8 @@ from crosscheck.model.fitted import Fitted
 from crosscheck.model.write import calibrated, provenance_of, renewed
 from seecr.counted import counted, plural
 from seecr.effects import Terms
-from seecr.model import Model
 from seecr.pose import Array
+from seecr.prediction.model import Model
 from seecr.result import Record, Result
 
 # A parameter that is not known better than this part of its plausible size is the prior's; an

@@ -31,8 +31,8 @@ from crosscheck.fit.problem import Problem, Rms, kinds_read
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.fit.state import evaluate
 from crosscheck.measurements.data import Sigma
+from seecr.description.robot import Robot
 from seecr.effects import Term, Terms
-from seecr.robot import Robot
 
 # Sets refitted about one linear model; fewer where something unknown leaves no hope of an end.
 _REFITTED, _REFITTED_UNKNOWN = 20, 4

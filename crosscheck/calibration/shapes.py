@@ -17,8 +17,8 @@ from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.linearised import Linear, linearised
 from crosscheck.fit.definite import inverse_of
 from seecr.effects import Term
+from seecr.effects.setup import Setup
 from seecr.pose import Array
-from seecr.setup import Setup
 
 
 def log_shares(joint: JointFit, linear: Linear) -> dict[str, float]:

@@ -79,7 +79,7 @@ def command(
     from crosscheck.model import check_place
     from crosscheck.report import write_page
     from seecr import load_model, load_robot, new_model
-    from seecr.fingerprint import fingerprint
+    from seecr.description.fingerprint import fingerprint
 
     gates = [DiagnosisVerdict.named(word) for word in fail_on]
     tolerance = Tolerance.parsed(tolerances)

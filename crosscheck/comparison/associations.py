@@ -28,8 +28,8 @@ from crosscheck.comparison.quantities import (
 from crosscheck.comparison.travel import Travel, travel
 from crosscheck.fit.noise import as_table
 from crosscheck.fit.problem import Problem
-from seecr.experiment import Prediction
 from seecr.pose import Array
+from seecr.prediction.experiment import Prediction
 
 SIGNIFICANT = 0.01
 """An association of a smaller p, over all that were tried, counts."""

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from crosscheck.fit.problem import ORIENTATION, POSITION, Problem
-from seecr.experiment import Prediction
 from seecr.pose import Array, quat_rotate
+from seecr.prediction.experiment import Prediction
 
 
 def cable_errors(problem: Problem, raw: Array, prediction: Prediction) -> tuple[Array, Array]:

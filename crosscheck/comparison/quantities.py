@@ -17,8 +17,8 @@ from scipy import signal
 from crosscheck.comparison.cable_space import cable_lengths
 from crosscheck.comparison.travel import AXES, Travel
 from crosscheck.fit.problem import Problem
-from seecr.experiment import Prediction
 from seecr.pose import Array, rotvec_from_quat
+from seecr.prediction.experiment import Prediction
 
 EVERYWHERE = "nothing: it is the same everywhere"
 """The quantity of what does not change from row to row."""

@@ -24,7 +24,7 @@ from seecr.counted import counted
 from seecr.effects import Terms
 from seecr.pose import Array
 from seecr.result import Record, Result
-from seecr.solution import Status
+from seecr.statics.solution import Status
 
 
 @dataclass(frozen=True)

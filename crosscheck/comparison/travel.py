@@ -8,8 +8,8 @@ import numpy as np
 
 from crosscheck.fit.problem import Problem
 from crosscheck.measurements.data import Names
-from seecr.experiment import Prediction
 from seecr.pose import Array, pose_difference
+from seecr.prediction.experiment import Prediction
 
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 STILL = "still"

@@ -20,9 +20,9 @@ from crosscheck.planning.extensions import extensions
 from crosscheck.planning.planned import Planned, Reads
 from crosscheck.planning.proposer import Suggestion, telling_apart
 from crosscheck.units import in_unit, parameter_name
+from seecr.description.robot import Robot
 from seecr.effects import Term, catalogue
 from seecr.pose import Array, rotvec_from_quat
-from seecr.robot import Robot
 from seecr.units import with_error
 
 # Ways to tell two effects apart that are named.

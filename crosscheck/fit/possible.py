@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from crosscheck.fit.registration import NAME as TRACKER
+from seecr.description.robot import Robot
 from seecr.effects import Term, Terms
-from seecr.robot import Robot
 
 # Where structure is left over, an effect of more plausible sizes than this is not believed.
 PLAUSIBLE = 20.0

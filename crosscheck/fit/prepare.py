@@ -17,9 +17,9 @@ from crosscheck.fit.reasons import Refusal, Unfit
 from crosscheck.fit.state import State
 from crosscheck.fit.unstated import estimate_sigma
 from crosscheck.measurements.data import Measurements
+from seecr.description.robot import Robot
 from seecr.effects import Terms, catalogue
-from seecr.experiment import Prediction
-from seecr.robot import Robot
+from seecr.prediction.experiment import Prediction
 
 Progress = Callable[[str, float], None]
 """Called with what is being done and the part of it that is done, 0 to 1."""

@@ -20,10 +20,9 @@ from numpy.typing import NDArray
 
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.units import in_unit
+from seecr.description.robot import Robot
 from seecr.effects import catalogue
 from seecr.effects.base import Readings
-from seecr.experiment import Experiment, Prediction
-from seecr.parted import Parted, rates_by_length
 from seecr.pose import (
     Array,
     quat_conjugate,
@@ -31,7 +30,8 @@ from seecr.pose import (
     rotvec_from_quat,
     rxyz_from_quat,
 )
-from seecr.robot import Robot
+from seecr.prediction.experiment import Experiment, Prediction
+from seecr.prediction.parted import Parted, rates_by_length
 
 # Columns of a residual row: position, orientation, then tensions.
 POSITION, ORIENTATION, TENSION = slice(0, 3), slice(3, 6), slice(6, None)

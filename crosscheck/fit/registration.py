@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from crosscheck.fit.problem import Problem
 from seecr.effects import ApartLayout, Layout, Term, effect_named, layout_of
-from seecr.experiment import Prediction
 from seecr.pose import Array, quat_conjugate, quat_multiply, quat_rotate, rotvec_from_quat
+from seecr.prediction.experiment import Prediction
 
 NAME = "tracker_frame"
 # Rows count by the median distance; a few rounds settle which.

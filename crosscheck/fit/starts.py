@@ -22,15 +22,15 @@ from crosscheck.fit.gauss_newton import PRIOR_SIZES, Fit
 from crosscheck.fit.imitation import beside
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.state import State, derivatives, evaluate
-from seecr import statics
 from seecr.compiled.outcomes import CONVERGED
 from seecr.effects import Term, Terms
 from seecr.effects.base import Effect, Layout
-from seecr.experiment import Prediction
-from seecr.parted import PartedPrediction
 from seecr.pose import Array, pose_add, pose_difference
-from seecr.sensitivity import motion_of, sensitivities, with_inverse
-from seecr.tables import assemble
+from seecr.prediction.experiment import Prediction
+from seecr.prediction.parted import PartedPrediction
+from seecr.prediction.sensitivity import motion_of, sensitivities, with_inverse
+from seecr.statics import batch
+from seecr.statics.tables import assemble
 from seecr.threads import run_parts
 
 # Most times that the forces are evaluated; a fall of their squares by less ends the search.
@@ -318,9 +318,9 @@ class _Forces:
             return None
         tables = assemble(setup)
         n, m = tables.cables.shape[:2]
-        start = statics.Evaluation.empty(n, m, tables.n_dof)
-        start.deviation[:] = statics.deviations(tables, self.poses)
-        found = statics.evaluate(tables, start)
+        start = batch.Evaluation.empty(n, m, tables.n_dof)
+        start.deviation[:] = batch.deviations(tables, self.poses)
+        found = batch.evaluate(tables, start)
         found.deviation[:] = start.deviation
         # where a law has no answer the numbers are what was left of trying
         size = np.where(np.isfinite(found.hessian), np.abs(found.hessian), np.inf)

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from crosscheck.fit.problem import Problem, in_units_of
 from seecr.effects import Terms
 from seecr.effects.base import Effect
-from seecr.experiment import Experiment, Prediction
-from seecr.parted import rates
 from seecr.pose import Array
+from seecr.prediction.experiment import Experiment, Prediction
+from seecr.prediction.parted import rates
 
 # A row is far off beyond this mean square of its whitened residuals; only where few rows are
 # (this part of all), it may be that they rest in another equilibrium.

@@ -9,8 +9,8 @@ import numpy as np
 
 from crosscheck.fit.problem import Problem, Rms, kinds_read
 from crosscheck.fit.smooth import monomials
-from seecr.experiment import Prediction
 from seecr.pose import Array, rotvec_from_quat
+from seecr.prediction.experiment import Prediction
 
 # What is left over the estimated noise, below which the estimate was wrong.
 _TOO_LARGE = 0.5

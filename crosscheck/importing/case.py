@@ -30,11 +30,11 @@ from crosscheck.measurements.together import together
 from crosscheck.measurements.write import write_measurements
 from crosscheck.units import LEAST
 from seecr.counted import counted
+from seecr.description.robot import Robot
 from seecr.errors import InputError
 from seecr.made import Made
 from seecr.pose import Array
 from seecr.result import Record, Result
-from seecr.robot import Robot
 
 # Samples that scatter by less than this part of the least change between them show the last digit
 # written and no noise. From q / 2 on, the mean of numbers rounded to q is off by 0.002 q at most:

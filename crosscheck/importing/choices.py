@@ -14,8 +14,8 @@ from crosscheck.importing.dwells import REST_FOR
 from crosscheck.importing.markers import read_shape
 from crosscheck.importing.vicon import ROTATIONS
 from crosscheck.units import parse_quantity
+from seecr.description.robot import Robot
 from seecr.pose import Array
-from seecr.robot import Robot
 
 # No axis twice in a row, which would be one turn.
 _ROTATION = re.compile(r"vector|(?:([xyz])(?!\1)){3}|(?:([XYZ])(?!\2)){3}")

@@ -11,10 +11,10 @@ from crosscheck.importing.dwells import Dwells
 from crosscheck.importing.logged import Stream
 from crosscheck.measurements.data import Measurements
 from seecr.counted import counted
+from seecr.description.robot import Robot
 from seecr.errors import InputFileError
-from seecr.experiment import Experiment
 from seecr.pose import Array
-from seecr.robot import Robot
+from seecr.prediction.experiment import Experiment
 
 _MOST_LINES = 6
 

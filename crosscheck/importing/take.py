@@ -22,7 +22,7 @@ from crosscheck.importing.poses import read_poses
 from crosscheck.importing.vicon import read_vicon
 from crosscheck.measurements.data import Measurements
 from seecr.counted import between, counted
-from seecr.robot import Robot
+from seecr.description.robot import Robot
 
 READERS: Mapping[str, Callable[[Path, ImportChoices], Logged]] = {
     "motive": lambda path, choices: read_motive(path),

@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from crosscheck.measurements.named import named_columns
-from seecr.commands import Commands
+from seecr.commands.data import Commands
+from seecr.commands.loads import Loads
 from seecr.counted import counted, plural, some
-from seecr.loads import Loads
+from seecr.description.robot import Robot
 from seecr.pose import Array
 from seecr.result import Record, Result
-from seecr.robot import Robot
 
 Mask = NDArray[np.bool_]
 Names = NDArray[np.str_]

@@ -14,7 +14,7 @@ from seecr.errors import InputFileError
 from seecr.pose import Array, quat_conjugate, quat_multiply, rotvec_from_quat, rxyz_from_quat
 
 if TYPE_CHECKING:
-    from seecr.robot import Robot
+    from seecr.description.robot import Robot
 
 # Commands beyond this many times the frame's reach are odd.
 _FAR = 2.5

@@ -29,7 +29,7 @@ from seecr.counted import counted
 from seecr.errors import InputError
 
 if TYPE_CHECKING:
-    from seecr.robot import Robot
+    from seecr.description.robot import Robot
 
 GivenData: TypeAlias = Measurements | str | Path | Sequence[str | Path]
 """Measurements, their file, or several files of one robot."""
@@ -110,7 +110,7 @@ def commands_of(given: GivenCommands, robot: Robot) -> Measurements:
         return given
     if isinstance(given, str | Path):
         return load_commands(given, robot)
-    from seecr.starts import commanded_poses  # takes a while to import
+    from seecr.statics.starts import commanded_poses  # takes a while to import
 
     pose = commanded_poses(given)
     run = np.full(len(pose), "all")

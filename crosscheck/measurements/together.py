@@ -11,8 +11,8 @@ import numpy as np
 
 from crosscheck.measurements.data import Measurements, Names, Sigma
 from crosscheck.measurements.notice import twice
+from seecr.commands.loads import Loads
 from seecr.errors import InputFileError
-from seecr.loads import Loads
 from seecr.pose import Array, rxyz_from_quat
 
 # Of files that state no noise of their lengths beside one that does: next to none.

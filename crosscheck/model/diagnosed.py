@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from crosscheck.files import read_text
-from seecr.cells import number_of
+from seecr.description.fingerprint import check_robot
+from seecr.description.robot import Robot
 from seecr.effects import Term, Terms
 from seecr.errors import InputError, InputFileError
-from seecr.fingerprint import check_robot
 from seecr.made import digits_of
-from seecr.robot import Robot
+from seecr.prediction.cells import number_of
 
 __all__ = ["load_diagnosed"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from crosscheck.files import check_writable
-from seecr.model import read_document
+from seecr.prediction.model import read_document
 
 __all__ = ["check_place"]
 

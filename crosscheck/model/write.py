@@ -18,17 +18,17 @@ from crosscheck.model.fitted import Fitted
 from crosscheck.model.own import Kept, kept, without_parts
 from crosscheck.model.place import check_place
 from seecr import __version__
-from seecr.cells import UNSEEN
-from seecr.data_reach import TABLE, DataReach
+from seecr.description.fingerprint import fingerprint
+from seecr.description.robot import Robot
 from seecr.effects import Knowledge, Terms
 from seecr.effects.base import Layout
 from seecr.errors import InputError
-from seecr.experiment import predict
-from seecr.fingerprint import fingerprint
-from seecr.model import CALIBRATION, FIT, Model
 from seecr.pose import Array
-from seecr.robot import Robot
-from seecr.uncertainty import CORRELATION, PARAMETERS, STDERR
+from seecr.prediction.cells import UNSEEN
+from seecr.prediction.data_reach import TABLE, DataReach
+from seecr.prediction.experiment import predict
+from seecr.prediction.model import CALIBRATION, FIT, Model
+from seecr.prediction.uncertainty import CORRELATION, PARAMETERS, STDERR
 
 if TYPE_CHECKING:
     from crosscheck.measurements.data import Measurements

@@ -19,9 +19,9 @@ from crosscheck.planning.planned import Planned, Reads, expected_sigma, kinds_of
 from crosscheck.planning.sight import all_visible
 from crosscheck.planning.visibility import EXACT, Signal, left_over, signals
 from seecr.counted import counted
-from seecr.joints import pose_of_values
+from seecr.description.joints import pose_of_values
+from seecr.description.robot import Robot
 from seecr.pose import Array
-from seecr.robot import Robot
 
 # Candidates along x, y, z, or so many random ones on joints, and most of them that are weighed.
 _GRID, _JOINT_POSES, _MOST = (6, 6, 4), 400, 240

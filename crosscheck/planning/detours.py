@@ -11,9 +11,9 @@ from crosscheck.measurements.data import Measurements
 from crosscheck.planning.adding import Adding, Extension, like
 from crosscheck.planning.extensions import PAYLOAD, named_again
 from crosscheck.planning.planned import Planned
-from seecr.loads import Loads
+from seecr.commands.loads import Loads
 from seecr.pose import Array
-from seecr.workspace import feasible
+from seecr.workspace.zones import feasible
 
 # A payload aside hangs so far off the centre of mass, over the widest distance of two anchor
 # points across; a way point lies so much of the way beyond a pose.

@@ -17,8 +17,8 @@ from crosscheck.planning.planned import (
     expected_sigma,
     usual_cell,
 )
-from seecr.loads import Loads
-from seecr.robot import Robot
+from seecr.commands.loads import Loads
+from seecr.description.robot import Robot
 
 # A known load, over the platform's mass.
 PAYLOAD = 0.25

@@ -8,10 +8,10 @@ from crosscheck.fit.problem import Problem
 from crosscheck.measurements.data import Measurements
 from crosscheck.planning.adding import NO_LIMITS, Adding, Extension, Limits, like
 from crosscheck.planning.planned import Planned, near_slack
-from seecr.joints import pose_of_values, values_of_pose
+from seecr.description.joints import pose_of_values, values_of_pose
+from seecr.description.robot import Robot
 from seecr.pose import Array, quat_from_rotvec, quat_multiply
-from seecr.robot import Robot
-from seecr.workspace import feasible
+from seecr.workspace.zones import feasible
 
 # Candidate poses: steps along x, y, z, and how far out of the planned region they go.
 _GRID, _BEYOND = (4, 3, 3), 0.25

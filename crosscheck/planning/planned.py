@@ -14,12 +14,12 @@ from crosscheck.fit.gauss_newton import Fit
 from crosscheck.fit.problem import Problem
 from crosscheck.measurements.data import Measurements, Sigma
 from seecr.compiled.columns import REST, STRAIN, TENSION
+from seecr.description.robot import Robot
 from seecr.effects import Terms
 from seecr.effects.base import Readings
-from seecr.experiment import Experiment
 from seecr.pose import Array, rxyz_from_quat
-from seecr.robot import Robot
-from seecr.workspace import load_scale
+from seecr.prediction.experiment import Experiment
+from seecr.workspace.zones import load_scale
 
 # Noise of a good tracker over the mean cable length (30 micrometres on a DemoBot), of its angles,
 # and of load cells over the mean tension.

@@ -14,12 +14,12 @@ from crosscheck.settle.physics import Physics
 from crosscheck.settle.settler import Settler, Settling
 from crosscheck.suite.agreement import Differences
 from crosscheck.suite.verdicts import Verdict
+from seecr.description.robot import Robot
 from seecr.pose import Array, pose_difference
 from seecr.recording import colours
 from seecr.recording.shapes import States
 from seecr.recording.stream import sweep_index
-from seecr.robot import Robot
-from seecr.solution import Status
+from seecr.statics.solution import Status
 
 if TYPE_CHECKING:
     from crosscheck.suite.results import CaseResult

@@ -32,8 +32,8 @@ from crosscheck.report.drawing import (
     image,
     styled,
 )
-from seecr.experiment import Prediction
 from seecr.pose import Array
+from seecr.prediction.experiment import Prediction
 
 # More rows of panels than this are too many to look at: the worst are shown.
 _MOST_ROWS = 12

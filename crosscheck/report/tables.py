@@ -20,7 +20,7 @@ from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.report.findings import PLAUSIBLE
 from crosscheck.units import chance, in_unit, parameter_name, short
 from seecr.effects.base import Layout
-from seecr.setup import Setup
+from seecr.effects.setup import Setup
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from threading import Lock
 import mujoco
 import numpy as np
 
+from seecr.description.mjcf import not_mjcf
 from seecr.errors import InputFileError
-from seecr.mjcf import not_mjcf
 
 _DISABLE = (
     mujoco.mjtDisableBit.mjDSBL_AUTORESET,  # else a diverging run restarts as if nothing happened

@@ -14,7 +14,7 @@ from seecr.pose import Array
 if TYPE_CHECKING:
     from crosscheck.settle.settler import SettlingBatch
     from crosscheck.suite.thresholds import Thresholds
-    from seecr.solution import Solution
+    from seecr.statics.solution import Solution
 
 QUANTITIES = (
     "settled_position_m",

@@ -23,8 +23,8 @@ from crosscheck.suite.poses import (
     robot_random,
     robot_sweep,
 )
+from seecr.description.shipped import CABLES, model_path, robot_file
 from seecr.pose import Array, quat_from_rotvec
-from seecr.shipped import CABLES, model_path, robot_file
 
 
 class Named(Protocol):
@@ -58,7 +58,8 @@ class Case:
         name: as on the terminal, in files' names and for ``--case``.
         model: MJCF file that SEECR reads.
         mujoco_model: MJCF file that MuJoCo settles; the same one, unless the two are to differ.
-        cable: name of one of ``seecr.shipped.CABLES``; None leaves the MJCF's stiffness.
+        cable: name of one of ``CABLES`` of :mod:`seecr.description.shipped`; None leaves the
+            MJCF's stiffness.
         kind: ``"sweep"``, whose poses follow each other along a line, ``"random"``, or
             ``"starts"``: one command from several.
         poses: (n, 7) commanded.
@@ -178,7 +179,7 @@ def _tilted_case(cable: str) -> Case:
     Either start leads to one of the two; either physics has to find the one that its start
     leads to. Let go from a start alike, they are compared like with like.
     """
-    from seecr.mjcf import load_robot
+    from seecr.description.mjcf import load_robot
 
     path = model_path("demobot_parallel")
     command = demobot_tilted(cable)
@@ -189,7 +190,7 @@ def _tilted_case(cable: str) -> Case:
 
 def _planar_cases(robot: str) -> list[Case]:
     """A planar robot of the paper (Figs 2 to 9): along a short sweep, at other heights, turned."""
-    from seecr.mjcf import load_robot
+    from seecr.description.mjcf import load_robot
 
     path, stem = model_path(f"planar_{robot}"), f"planar-{robot}".replace("_", "-")
     home, exits = load_robot(path).reference_pose, load_robot(path).exit_points
@@ -220,7 +221,7 @@ def _own_cable_cases(robot: str, turn: float, seed: int, n_random: int) -> list[
 
 def _other_cases(robot: str, seed: int, n_random: int) -> list[Case]:
     """A robot of another size and kind, as any robot of a user's."""
-    from seecr.mjcf import load_robot
+    from seecr.description.mjcf import load_robot
 
     path, stem = model_path(robot), robot.replace("_", "-")
     one = load_robot(path)

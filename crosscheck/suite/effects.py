@@ -24,14 +24,14 @@ from crosscheck.twin.hidden import CONTAINED, choose
 from crosscheck.twin.measure import measure
 from crosscheck.twin.robot import TRUE_EFFECTS
 from crosscheck.twin.trajectory import trajectory
-from seecr.commands import Commands
+from seecr.commands.data import Commands
+from seecr.commands.loads import Loads
+from seecr.description.mjcf import load_robot
+from seecr.description.robot import Robot
+from seecr.description.shipped import model_path
 from seecr.effects import Effect, Term
-from seecr.experiment import Experiment
-from seecr.loads import Loads
-from seecr.mjcf import load_robot
 from seecr.pose import Array
-from seecr.robot import Robot
-from seecr.shipped import model_path
+from seecr.prediction.experiment import Experiment
 
 GROUP, PREFIX = "effects", "effect-"
 LOADS = "known_loads"

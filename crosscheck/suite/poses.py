@@ -9,7 +9,7 @@ import numpy as np
 from seecr.pose import Array, pose_add, quat_from_rotvec
 
 if TYPE_CHECKING:
-    from seecr.robot import Robot
+    from seecr.description.robot import Robot
 
 N_SWEEP = 24
 # The paper's trajectories (Fig 12): x from 0.17 to 0.63 m in the middle of the frame.
@@ -108,7 +108,7 @@ def _reachable(robot: Robot, poses: Array) -> Array:
     """The poses (n, 7), or what a jointed robot can do of them: one Gauss-Newton step's joints."""
     if not robot.joints:
         return poses
-    from seecr.joints import motion_columns, pose_of_values
+    from seecr.description.joints import motion_columns, pose_of_values
     from seecr.pose import pose_difference
 
     start, screws = pose_of_values(robot, np.zeros((1, len(robot.joints))))

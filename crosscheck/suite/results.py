@@ -14,10 +14,10 @@ from crosscheck.suite.cases import Case
 from crosscheck.suite.mujoco_robot import MujocoRobot
 from crosscheck.suite.outcome import Outcome
 from crosscheck.suite.verdicts import UNSOLVED, PoseFinding, Verdict
+from seecr.description.robot import Robot
 from seecr.pose import Array
 from seecr.result import COORDINATES, Record, Result, named
-from seecr.robot import Robot
-from seecr.solution import Solution
+from seecr.statics.solution import Solution
 
 if TYPE_CHECKING:
     from crosscheck.settle.settler import SettlingBatch

@@ -26,12 +26,12 @@ from crosscheck.suite.results import CaseResult, Worst, counts, worst_of
 from crosscheck.suite.thresholds import Thresholds, load_thresholds
 from crosscheck.suite.verdicts import Answers, Verdict, held_to, judge
 from seecr.counted import counted
-from seecr.equilibrium import solve as seecr_solve
+from seecr.description.mjcf import load_robot
+from seecr.description.robot import Robot
+from seecr.equilibrium.solving import solve as seecr_solve
 from seecr.errors import InputFileError
-from seecr.mjcf import load_robot
 from seecr.result import Result
-from seecr.robot import Robot
-from seecr.solution import Solution
+from seecr.statics.solution import Solution
 
 FORMAT = 1
 """Of ``results.json``; raised when a key changes its meaning or goes."""

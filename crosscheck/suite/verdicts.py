@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 from crosscheck.settle.relax import SettleStatus
 from crosscheck.suite.agreement import Allowance, Differences, within
 from crosscheck.suite.gap import gap
-from seecr.equilibrium import solve as seecr_solve
+from seecr.equilibrium.solving import solve as seecr_solve
 from seecr.pose import Array
-from seecr.solution import Status
+from seecr.statics.solution import Status
 
 if TYPE_CHECKING:
     from crosscheck.settle.settler import SettlingBatch
     from crosscheck.suite.cases import Case
     from crosscheck.suite.mujoco_robot import MujocoRobot
     from crosscheck.suite.thresholds import FindingLimits
-    from seecr.solution import Solution
+    from seecr.statics.solution import Solution
 
 # Unbalanced force, relative to the load, below which a platform counts as free to move: what
 # an answer may leave unbalanced itself.

@@ -9,9 +9,9 @@ import numpy as np
 from crosscheck.errors import CrosscheckError
 from crosscheck.twin.robot import TRUE_EFFECTS
 from seecr.counted import counted
+from seecr.description.robot import Robot
 from seecr.effects import Layout, Term, effect_named, layout_of
 from seecr.pose import transform_points
-from seecr.robot import Robot
 
 # How often a seed hides none, one and two.
 _SHARES = (0.2, 0.6, 0.2)

@@ -17,9 +17,9 @@ from crosscheck.twin.answer import Moves
 from crosscheck.twin.hidden import times
 from crosscheck.twin.measure import Truth, measure
 from crosscheck.twin.trajectory import trajectory
+from seecr.description.robot import Robot
 from seecr.effects import Effect, Term
 from seecr.pose import quat_from_rotvec, quat_multiply
-from seecr.robot import Robot
 
 # Noise of a tracker, over the mean cable length (30 micrometres on a DemoBot), and of its angles.
 _POSITION, _ORIENTATION_RAD = 6e-5, 3.5e-4

@@ -36,9 +36,9 @@ from crosscheck.twin.lab import (
 )
 from crosscheck.twin.measure import Truth
 from seecr.arguments import whole
+from seecr.description.robot import Robot
 from seecr.effects import Term
 from seecr.result import Record, Result
-from seecr.robot import Robot
 
 FILES = ("robot.xml", "measured.csv", "measured.toml", NAME)
 """What a case's folder holds."""

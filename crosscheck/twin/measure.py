@@ -14,11 +14,11 @@ from crosscheck.twin.lengths import WAYPOINTS, Way, paid_out, way_of
 from crosscheck.twin.robot import true_robot
 from crosscheck.twin.springs import Cable, Springs
 from crosscheck.twin.world import World
-from seecr.commands import Commands
+from seecr.commands.data import Commands
+from seecr.commands.loads import Loads
+from seecr.description.robot import Robot
 from seecr.effects import Effect
-from seecr.loads import Loads
 from seecr.pose import Array, pose_add, pose_difference
-from seecr.robot import Robot
 
 SEGMENTS = (8, 16)
 """Segments N of a cable with weight. A chain errs by some 1/N^2 of what the weight does, from two

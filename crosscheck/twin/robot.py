@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from crosscheck.errors import CrosscheckError
+from seecr.description.robot import Robot
 from seecr.effects import Effect
 from seecr.pose import Array, quat_from_rotvec, quat_multiply, quat_rotate
-from seecr.robot import Robot
 
 Reading = tuple[Array, Array, Array]
 """Position (n, 3) [m], quaternion (n, 4), tensions (n, m) [N]."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from crosscheck.measurements.data import Names
+from seecr.description.robot import Robot
 from seecr.pose import Array, pose_add, pose_difference
-from seecr.robot import Robot
 
 # Of the way from the reference pose to where the exit points end, in each direction.
 _ALONG, _ACROSS, _HEIGHT, _LOOP = 0.64, 0.56, 0.15, 0.5
@@ -107,7 +107,7 @@ def _reachable(robot: Robot, change: Array) -> Array:
     start = np.tile(robot.reference_pose, (len(change), 1))
     if not robot.joints:
         return pose_add(start, change)
-    from seecr.joints import motion_columns, pose_of_values
+    from seecr.description.joints import motion_columns, pose_of_values
 
     at, screws = pose_of_values(robot, np.zeros((1, len(robot.joints))))
     columns = motion_columns(screws, at[:, :3])[0]

@@ -21,7 +21,7 @@ from seecr.cli.options import FILE, json_option, made_by, out_option, progress_s
 
 if TYPE_CHECKING:
     from seecr import Model, Robot
-    from seecr.command_file import CommandFile
+    from seecr.columns.command_file import CommandFile
 
 # A tracker that reads poses off by less [m] is not worth a line.
 _SEEN = 1e-6
@@ -97,7 +97,7 @@ def command(
     3 a pose without an answer, one at which the platform does not come to rest, or none reached.
     """  # fmt: skip
     from seecr import InputFileError, correct, kept_chance
-    from seecr.command_file import read_commands
+    from seecr.columns.command_file import read_commands
     from seecr.files import json_text, staged, write_texts
     from seecr.report.corrections import chance_lines, corrected_csv, corrected_toml
 
@@ -175,7 +175,7 @@ def _as_tracked(
     import numpy as np
 
     from seecr import InputError
-    from seecr.sensed import placed, tracked
+    from seecr.prediction.sensed import placed, tracked
 
     if model is None:
         if as_read:

@@ -212,7 +212,7 @@ def _commands(
 ) -> tuple[Commands, dict[str, Any], tuple[str, ...], bool]:
     """The commands, what else their file says, notes on it, whether lengths have poses wanted."""
     from seecr import Commands, InputError
-    from seecr.command_file import read_commands
+    from seecr.columns.command_file import read_commands
 
     ways = [name for name in ("line", "grid") if given[name]]
     if len(ways) + (poses is not None) != 1:
@@ -244,7 +244,7 @@ def _along(robot: Robot, given: dict[str, Any]) -> NDArray[np.float64]:
     """Poses (n, 7) of --line or --grid."""
     import numpy as np
 
-    from seecr.starts import commanded_poses
+    from seecr.statics.starts import commanded_poses
 
     if given["line"]:
         check_places(given["line"], robot)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from seecr.columns.known import POSITION, Columns
-from seecr.loads import Loads
+from seecr.commands.loads import Loads
+from seecr.description.robot import Robot
 from seecr.pose import Array
-from seecr.robot import Robot
 
 
 def known_loads(columns: Columns, robot: Robot) -> Loads | None:

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.columns.known import ANGLES, POSITION, QUATERNION, Columns
-from seecr.joints import pose_of_values
+from seecr.description.joints import pose_of_values
 from seecr.pose import Array, quat_from_rxyz, rxyz_from_quat
 
 if TYPE_CHECKING:
-    from seecr.robot import Robot
+    from seecr.description.robot import Robot
 
 # Files with six digits are rounded by up to 1e-6; a quaternion farther off is a mistake.
 _NORM_TOLERANCE = 1e-3

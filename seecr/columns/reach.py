@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from seecr.columns.known import POSITION, Columns
-from seecr.joints import off_joints
+from seecr.description.joints import off_joints
+from seecr.description.robot import ABSURD, Robot
 from seecr.pose import Array
-from seecr.robot import ABSURD, Robot
 
 # So many commands say where a robot goes.
 _SEVERAL = 4

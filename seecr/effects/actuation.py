@@ -7,11 +7,11 @@ from typing import ClassVar
 
 import numpy as np
 
+from seecr.description.robot import Robot
 from seecr.effects.base import Effect, mean_length, of_length, parameter
+from seecr.effects.setup import Setup
 from seecr.effects.totals import Total
 from seecr.pose import Array, pose_add
-from seecr.robot import Robot
-from seecr.setup import Setup
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,8 @@ An effect is a small frozen dataclass. Its fields are its parameters, made with
 methods, or both:
 
 - ``edit_setup`` changes numbers the statics uses: lengths, points, masses ... (see
-  :class:`seecr.setup.Setup`, whose ``laws`` also take a cable's extra tension by its strain);
+  :class:`seecr.effects.setup.Setup`, whose ``laws`` also take a cable's extra tension by its
+  strain);
 - ``edit_readings`` changes what the sensors report of the solved pose.
 
 Sensitivities need no derivatives from it: the framework differences the edit, not the solve.
@@ -21,12 +22,12 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from seecr.description.given import GivenRobot, robot_of
+from seecr.description.robot import Robot
+from seecr.effects.setup import Setup
 from seecr.effects.totals import Total
 from seecr.errors import InputError
-from seecr.given import GivenRobot, robot_of
 from seecr.pose import Array
-from seecr.robot import Robot
-from seecr.setup import Setup
 
 Scale = float | Callable[[Robot], float]
 PLACES = ("actuation", "geometry", "cable", "structure", "load", "sensing")

@@ -11,9 +11,9 @@ from dataclasses import fields
 import numpy as np
 
 from seecr.effects.base import PLACES, Effect, Readings
+from seecr.effects.setup import QUANTITIES, Setup
 from seecr.errors import InputError
 from seecr.pose import Array
-from seecr.setup import QUANTITIES, Setup
 
 
 def check_class(effect: type[Effect], where: str) -> None:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from seecr.description.robot import Robot
 from seecr.effects.base import Effect, mean_length, of_length, parameter
+from seecr.effects.setup import Setup
 from seecr.effects.totals import Total
 from seecr.pose import Array
-from seecr.robot import Robot
-from seecr.setup import Setup
 
 # No sheave's radius is this part of the cables' length: they would hardly leave it.
 _WIDEST = 0.4

@@ -7,11 +7,11 @@ from typing import ClassVar
 
 import numpy as np
 
+from seecr.description.robot import Robot
 from seecr.effects.base import Effect, parameter
+from seecr.effects.setup import Setup
 from seecr.effects.totals import Total
 from seecr.pose import Array, quat_from_rotvec, quat_rotate
-from seecr.robot import Robot
-from seecr.setup import Setup
 
 # No platform is lighter than this part of what its file says, nor has its centre of mass this
 # many of its own lengths outside of its anchor points.

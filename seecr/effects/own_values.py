@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from seecr.description.robot import Robot
 from seecr.effects.base import Effect, Layout, Readings
 from seecr.effects.knowledge import Knowledge
+from seecr.effects.setup import Setup
 from seecr.effects.totals import Total
 from seecr.errors import InputError
 from seecr.pose import Array
-from seecr.robot import Robot
-from seecr.setup import Setup
 
 KINDS = ("file", "run")
 """What an effect may have values of its own for."""

@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from seecr.effects.base import Effect, Readings, of_length, parameter
+from seecr.effects.setup import Setup
 from seecr.pose import Array, quat_from_rotvec, quat_multiply, quat_rotate
-from seecr.setup import Setup
 
 
 @dataclass(frozen=True, eq=False)

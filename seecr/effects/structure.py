@@ -7,9 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from seecr.description.robot import Robot
 from seecr.effects.base import Effect, mean_length, parameter
-from seecr.robot import Robot
-from seecr.setup import Setup
+from seecr.effects.setup import Setup
 
 
 def _plausible(robot: Robot) -> float:

@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seecr.arguments import finite
+from seecr.description.given import GivenRobot
+from seecr.description.robot import Robot
 from seecr.effects.base import Effect, Layout, layout_of
 from seecr.effects.knowledge import Knowledge
 from seecr.effects.own_values import Own
 from seecr.effects.registry import catalogue, effect_named
 from seecr.errors import InputError
-from seecr.given import GivenRobot
 from seecr.pose import Array
-from seecr.robot import Robot
 
 # Default of a field that __post_init__ makes from the others when it is not given.
 _FILLED_IN: Any = None

@@ -16,13 +16,13 @@ from dataclasses import replace
 import numpy as np
 
 from seecr.compiled.columns import UP
+from seecr.description.joints import values_of_pose
+from seecr.description.robot import Robot
+from seecr.effects.setup import Setup
 from seecr.exported.chain import HangingCable, HangingChain, hanging
 from seecr.exported.scene import cable, dot, numbers, scene, text_of
-from seecr.joints import values_of_pose
 from seecr.pose import Array, transform_points
-from seecr.robot import Robot
-from seecr.setup import Setup
-from seecr.solution import Solution
+from seecr.statics.solution import Solution
 
 SEGMENTS = 24
 """Of a cable with weight. At the pose of the file they hang as the catenary does, elsewhere

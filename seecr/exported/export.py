@@ -9,25 +9,25 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from seecr.commands import Commands
+from seecr.commands.data import Commands
 from seecr.compiled.columns import FORCE_OF_WEIGHT, UP
+from seecr.description.given import GivenRobot, robot_of
+from seecr.description.robot import Robot
 from seecr.effects import Effect
 from seecr.effects.checked import edit_setup
-from seecr.equilibrium import solve
+from seecr.effects.setup import Setup, plain_setup
+from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
-from seecr.experiment import effects_of
 from seecr.exported.bodies import SEGMENTS, bodies_text
 from seecr.exported.expressed import expressed
 from seecr.exported.scene import plain_text
-from seecr.given import GivenRobot, robot_of
+from seecr.prediction.experiment import effects_of
 from seecr.result import Record, Result
-from seecr.robot import Robot
-from seecr.setup import Setup, plain_setup
-from seecr.solution import Solution
-from seecr.starts import commanded_poses
+from seecr.statics.solution import Solution
+from seecr.statics.starts import commanded_poses
 
 if TYPE_CHECKING:
-    from seecr.model import GivenEffects
+    from seecr.prediction.model import GivenEffects
 
 # Directions whose sine is smaller are one.
 _ALONG = 1e-12

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from seecr.commands import Commands
+from seecr.commands.data import Commands
+from seecr.description.robot import Robot
 from seecr.effects import Effect
 from seecr.effects.checked import edit_setup
-from seecr.experiment import senses
-from seecr.robot import Robot
-from seecr.setup import QUANTITIES, History, plain_setup
+from seecr.effects.setup import QUANTITIES, History, plain_setup
+from seecr.prediction.experiment import senses
 
 # What a robot's description says itself, and what bodies and springs beyond it say.
 _PLAIN = frozenset(("exit_points", "anchor_points", "ea", "mass", "centre_of_mass", "gravity"))

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from seecr.description.robot import Robot
 from seecr.pose import Array, quat_conjugate, quat_rotate
-from seecr.robot import Robot
 
 _PLATFORM_COLOUR, _CABLE_COLOUR = "0.13 0.35 0.62 1", "0.10 0.12 0.14 1"
 

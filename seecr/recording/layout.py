@@ -8,12 +8,12 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from seecr.description.robot import Robot
 from seecr.pose import Array
 from seecr.recording import scene as scenes
 from seecr.recording import shapes
 from seecr.recording.legends import Legend
 from seecr.recording.stream import POSE
-from seecr.robot import Robot
 
 # Half the viewer's vertical field of view [rad], and the part of it that is filled.
 _HALF_VIEW, _FILL = np.deg2rad(27.5), 0.88

@@ -10,12 +10,12 @@ from collections.abc import Mapping
 import numpy as np
 import rerun as rr
 
+from seecr.description.robot import Robot
 from seecr.pose import Array, transform_points
 from seecr.recording import colours, shapes
 from seecr.recording.colours import Rgba
 from seecr.recording.shapes import States
 from seecr.recording.stream import Index, Recording
-from seecr.robot import Robot
 
 ROOT, LEGEND = "scene", "legend"
 # Radii of lines over the robot's size.

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.curves import joined
+from seecr.description.robot import Robot
 from seecr.pose import Array, quat_rotate, transform_points
-from seecr.robot import Robot
 
 # Slack cables are drawn as this many dashes of this many points.
 _DASHES, _DASH_POINTS = 12, 3

@@ -24,7 +24,7 @@ from seecr.recording.stream import (
     recording_file,
     sweep_index,
 )
-from seecr.solution import Solution
+from seecr.statics.solution import Solution
 
 __all__ = ["write_sweep_recording"]
 

@@ -8,11 +8,11 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from seecr.maps import Workspace
 from seecr.pose import Array
 from seecr.recording import colours, layout, shapes
 from seecr.recording.scene import LEGEND, ROOT, Scene, write_scale
 from seecr.recording.stream import recording_file
+from seecr.workspace.maps import Workspace
 
 __all__ = ["write_map_recording"]
 

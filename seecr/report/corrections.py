@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from seecr.command_file import CommandFile
-from seecr.inverse import Correction
+from seecr.columns.command_file import CommandFile
+from seecr.inverse.correction import Correction
 from seecr.pose import Array
 from seecr.result import COORDINATES
 

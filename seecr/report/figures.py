@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from seecr.curves import alike
 from seecr.errors import InputError
-from seecr.maps import Workspace
 from seecr.pose import Array
-from seecr.solution import Solution
+from seecr.statics.solution import Solution
+from seecr.workspace.maps import Workspace
 
 __all__ = ["figure", "map_figure", "sweep_figure"]
 

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from seecr.counted import counted
-from seecr.data_reach import DataReach
 from seecr.files import written
-from seecr.maps import Workspace
 from seecr.pose import Array
+from seecr.prediction.data_reach import DataReach
 from seecr.report.words import direction_words
+from seecr.workspace.maps import Workspace
 
 __all__ = ["beyond_line", "edge_line", "likely_lines", "softest_line", "write_arrays"]
 

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from seecr.pose import Array
+from seecr.prediction.uncertainty import Spread
 from seecr.result import COORDINATES, Record
-from seecr.solution import Solution
-from seecr.uncertainty import Spread
+from seecr.statics.solution import Solution
 
 __all__ = ["SweepRows"]
 

@@ -7,12 +7,12 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr.passes import TWISTED, Barrier
+from seecr.description.robot import Joint, Robot
+from seecr.equilibrium.passes import TWISTED, Barrier
 from seecr.planar import midline_point
 from seecr.pose import Array, pose_difference, rxyz_from_quat, transform_points
-from seecr.robot import Joint, Robot
-from seecr.solution import Solution, Status
-from seecr.uncertainty import Spread
+from seecr.prediction.uncertainty import Spread
+from seecr.statics.solution import Solution, Status
 from seecr.units import joules, short, with_error
 
 __all__ = [

@@ -9,8 +9,8 @@ import time
 import pytest
 
 import seecr
-from seecr.maps import default_axes, workspace_map
 from seecr.threads import processors
+from seecr.workspace.maps import default_axes, workspace_map
 
 pytestmark = [pytest.mark.benchmark, pytest.mark.slow]
 

@@ -10,9 +10,9 @@ import pytest
 
 import seecr
 from crosscheck.suite.cases import shipped_cases
-from seecr.equilibrium import METHODS
+from seecr.description.shipped import CABLES, model_path
+from seecr.equilibrium.solving import METHODS
 from seecr.pose import pose_difference
-from seecr.shipped import CABLES, model_path
 
 pytestmark = [pytest.mark.benchmark, pytest.mark.slow]
 

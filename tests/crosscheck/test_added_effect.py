@@ -17,8 +17,8 @@ from crosscheck.add import add_effect
 from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.model.write import Provenance, save_model, with_fit
 from seecr.effects import registry
-from seecr.model import new_model
 from seecr.pose import quat_from_rotvec, quat_rotate
+from seecr.prediction.model import new_model
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,9 +13,9 @@ import crosscheck
 from crosscheck import given
 from crosscheck.errors import CrosscheckError
 from crosscheck.measurements.data import Measurements
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
 from seecr.errors import InputError
-from seecr.mjcf import load_robot
-from seecr.shipped import model_path
 
 
 def test_a_robot_that_needs_files_beside_it_is_refused(tmp_path: Path) -> None:

@@ -10,10 +10,10 @@ import pytest
 
 import seecr
 from seecr.arguments import whole
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
 from seecr.effects import effect_named
 from seecr.errors import InputError
-from seecr.mjcf import load_robot
-from seecr.shipped import model_path
 
 ROBOT = load_robot(model_path("demobot_parallel"))
 POSE = ROBOT.reference_pose[None]

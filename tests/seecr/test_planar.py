@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seecr.equilibrium import solve
+from seecr.description.mjcf import load_robot
+from seecr.description.robot import Robot
+from seecr.description.shipped import model_path
+from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
-from seecr.mjcf import load_robot
 from seecr.planar import bar_equilibria, bar_tilt, midline_point, solution_manifold
 from seecr.pose import transform_points
-from seecr.robot import Robot
-from seecr.shipped import model_path
-from seecr.solution import Solution, Status
-from seecr.workspace import feasible, slack_zones
+from seecr.statics.solution import Solution, Status
+from seecr.workspace.zones import feasible, slack_zones
 
 EXITS = np.array([[0.0, 0.5], [1.0, 0.5]])
 PLACE = np.array([0.3, 0.0])

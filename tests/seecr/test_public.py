@@ -42,6 +42,14 @@ def test_workspaces_and_the_inverse_are_there_as_modules() -> None:
     assert got.stdout.split() == ["feasible", "correct"]
 
 
+@pytest.mark.parametrize("folder", ["workspace", "inverse"])
+def test_a_public_folder_gives_what_the_package_gives(folder: str) -> None:
+    module = getattr(seecr, folder)
+    assert {name: getattr(module, name) for name in module.__all__} == {
+        name: getattr(seecr, name) for name in module.__all__
+    }
+
+
 def test_a_name_that_is_not_there_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="module 'seecr' has no attribute 'Solver'"):
         _ = seecr.Solver

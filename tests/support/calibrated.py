@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from seecr.mjcf import load_robot
-from seecr.model import Model, load_model
-from seecr.shipped import model_path
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
+from seecr.prediction.model import Model, load_model
 
 ROBOT = load_robot(model_path("demobot_cogiro"))
 POSES = np.array([[0.3, 0.2, 0.1, 1, 0, 0, 0], [0.5, 0.3, 0.2, 1, 0, 0, 0]])

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from random_robots import random_poses, random_robot
 
-from seecr.commands import Commands
+from seecr.commands.data import Commands
+from seecr.description.mjcf import load_robot
+from seecr.description.robot import Robot
+from seecr.description.shipped import model_path
 from seecr.effects import Effect, Term, Terms, effect_named, layout_of
-from seecr.experiment import Experiment, Prediction
-from seecr.mjcf import load_robot
-from seecr.robot import Robot
-from seecr.sensitivity import readings_difference
-from seecr.shipped import model_path
+from seecr.prediction.experiment import Experiment, Prediction
+from seecr.prediction.sensitivity import readings_difference
 
 # The last is commanded in lengths.
 KINDS = ("demobot_cogiro", "demobot_parallel", "planar_vertical", "lengths")

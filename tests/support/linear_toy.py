@@ -22,11 +22,11 @@ from crosscheck.fit.problem import Problem
 from crosscheck.fit.starts import Starts
 from crosscheck.fit.state import State
 from crosscheck.measurements.data import Measurements, Sigma
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
 from seecr.effects import Terms, effect_named, layout_of
 from seecr.effects.base import Layout
-from seecr.mjcf import load_robot
 from seecr.pose import Array
-from seecr.shipped import model_path
 
 SIGMA = Sigma(position_m=3e-5, orientation_rad=3.5e-4)
 RUNS, ROWS = 6, 12

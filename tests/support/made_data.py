@@ -14,14 +14,14 @@ from crosscheck.cli import main
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.write import write_measurements
 from crosscheck.twin.trajectory import trajectory
-from seecr.commands import Commands
+from seecr.commands.data import Commands
+from seecr.commands.loads import Loads
+from seecr.description.mjcf import load_robot
+from seecr.description.robot import Robot
+from seecr.description.shipped import model_path
 from seecr.effects import Term, Terms, effect_named, layout_of
-from seecr.experiment import Experiment
-from seecr.loads import Loads
-from seecr.mjcf import load_robot
 from seecr.pose import quat_from_rotvec, quat_multiply
-from seecr.robot import Robot
-from seecr.shipped import model_path
+from seecr.prediction.experiment import Experiment
 
 COGIRO = model_path("demobot_cogiro")
 SIGMA = Sigma(position_m=3e-5, orientation_rad=3.5e-4)

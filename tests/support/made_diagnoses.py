@@ -11,9 +11,9 @@ from made_data import measured, term
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.verdict import diagnose as diagnose_with
 from crosscheck.measurements.data import Measurements, Sigma
-from seecr.mjcf import load_robot
-from seecr.robot import Robot
-from seecr.shipped import model_path
+from seecr.description.mjcf import load_robot
+from seecr.description.robot import Robot
+from seecr.description.shipped import model_path
 
 SIGMA = Sigma(position_m=3e-5, orientation_rad=3.5e-4, tension_N=0.03)
 POINTS = 6
@@ -93,9 +93,9 @@ def one_angle() -> Diagnosis:
     rng = np.random.default_rng(4)
     angles = np.full((data.n_rows, 3), np.nan)
     angles[:, 1] = SIGMA.orientation_rad * rng.standard_normal(data.n_rows)
-    from seecr.commands import Commands
-    from seecr.experiment import Experiment
+    from seecr.commands.data import Commands
     from seecr.pose import rxyz_from_quat
+    from seecr.prediction.experiment import Experiment
 
     exact = Experiment(robot(), Commands(data.command_pose)).predict().readings
     angles[:, 1] += rxyz_from_quat(exact.quat_wxyz)[:, 1]

@@ -15,6 +15,7 @@ import numpy as np
 from made_data import measured
 
 from crosscheck.measurements.data import Measurements, Sigma
+from seecr.description.robot import Robot
 from seecr.effects import Term
 from seecr.pose import (
     Array,
@@ -25,7 +26,6 @@ from seecr.pose import (
     rotvec_from_quat,
     rxyz_from_quat,
 )
-from seecr.robot import Robot
 
 RATE, HOLD_S, WAY_S = 50.0, 1.2, 0.8
 NOISE_M, NOISE_RAD = 1e-4, 5e-4

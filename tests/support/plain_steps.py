@@ -13,8 +13,8 @@ from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
 
 from seecr.compiled.columns import GAP
-from seecr.robot import Robot
-from seecr.solution import Solution
+from seecr.description.robot import Robot
+from seecr.statics.solution import Solution
 
 
 @dataclass
@@ -93,7 +93,7 @@ def exact_residual(answer: Solution, i: int, extra: np.ndarray | float = 0.0) ->
 def _on_joints(
     robot: Robot, pose: np.ndarray, deviation: np.ndarray, force: np.ndarray, moment: np.ndarray
 ) -> float:
-    from seecr.joints import values_of_pose
+    from seecr.description.joints import values_of_pose
     from seecr.pose import pose_add
 
     now = pose_add(pose, deviation)

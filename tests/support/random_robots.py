@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from seecr.description.robot import Joint, Robot
 from seecr.pose import quat_from_rotvec, quat_rotate
-from seecr.robot import Joint, Robot
 
 KINDS = ("free", "planar", "jointed")
 
@@ -73,7 +73,7 @@ def random_poses(rng: np.random.Generator, robot: Robot, count: int) -> np.ndarr
     """Poses (count, 7) near the reference, on the joints where there are any."""
     reach = 0.15 * float(np.ptp(robot.exit_points[:, 0]))
     if robot.joints:
-        from seecr.joints import pose_of_values
+        from seecr.description.joints import pose_of_values
 
         spans = [reach if j.kind == "slide" else 0.3 for j in robot.joints]
         values = rng.uniform(-1, 1, (count, len(spans))) * spans

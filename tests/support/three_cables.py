@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from seecr.robot import Joint, Robot
+from seecr.description.robot import Joint, Robot
 
 _HOME = np.array([0.75, 0.0, 0.5])
 _TURNS = (("slide", "x", 0), ("slide", "z", 2), ("hinge", "ry", 1))

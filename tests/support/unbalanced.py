@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from seecr.distribution import balanced, tension_limits
+from seecr.description.robot import Robot
+from seecr.holding.distribution import balanced, tension_limits
 from seecr.pose import Array
-from seecr.robot import Robot
-from seecr.workspace import balance_equations
+from seecr.workspace.zones import balance_equations
 
 
 def unbalanced(

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 import seecr
-from seecr.commands import Commands
-from seecr.distribution import distribute
-from seecr.experiment import Experiment
-from seecr.sensitivity import sensitivities
-from seecr.workspace import tension_margin
+from seecr.commands.data import Commands
+from seecr.holding.distribution import distribute
+from seecr.prediction.experiment import Experiment
+from seecr.prediction.sensitivity import sensitivities
+from seecr.workspace.zones import tension_margin
 
 # What a walk, a change of all and a change of each cable are needed for.
 EFFECTS = {

@@ -15,10 +15,10 @@ from crosscheck.errors import CrosscheckError, UnsolvedError
 from crosscheck.fit.gauss_newton import fit
 from crosscheck.fit.prepare import prepare
 from crosscheck.terminal.addition import why_not
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
 from seecr.effects import Term, Terms
-from seecr.mjcf import load_robot
-from seecr.shipped import model_path
-from seecr.uncertainty import covariance_of
+from seecr.prediction.uncertainty import covariance_of
 
 EVERY = np.ones(4, dtype=bool)
 

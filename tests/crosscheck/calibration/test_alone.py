@@ -12,8 +12,8 @@ from crosscheck.calibration.joint import JointFit, Setting, settle
 from crosscheck.calibration.later import layouts
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.state import evaluate
+from seecr.description.mjcf import load_robot
 from seecr.effects import Terms
-from seecr.mjcf import load_robot
 
 pytestmark = pytest.mark.slow
 ROBOT = load_robot(COGIRO)

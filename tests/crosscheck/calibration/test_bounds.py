@@ -12,9 +12,9 @@ from scipy import integrate
 from crosscheck.calibration.bounds import log_absent
 from crosscheck.calibration.equals import parameters_told
 from crosscheck.calibration.linearised import Linear
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
 from seecr.effects import Term, Terms, effect_named, layout_of
-from seecr.mjcf import load_robot
-from seecr.shipped import model_path
 
 LAYOUT = layout_of(effect_named("exit_friction"), load_robot(model_path("demobot_cogiro")))
 SETTING: Any = SimpleNamespace(chain=None)

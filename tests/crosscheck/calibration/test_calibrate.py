@@ -21,8 +21,8 @@ from crosscheck.fit.registration import registered
 from crosscheck.fit.state import evaluate
 from crosscheck.given import considered
 from crosscheck.measurements.data import Measurements
+from seecr.description.mjcf import load_robot
 from seecr.effects import Terms
-from seecr.mjcf import load_robot
 from seecr.pose import quat_from_rotvec, quat_multiply, quat_rotate
 
 ROBOT = load_robot(COGIRO)

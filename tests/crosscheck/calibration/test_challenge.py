@@ -18,9 +18,9 @@ from crosscheck.calibration.gram import ColumnGroup, Gram, gram_of
 from crosscheck.calibration.probability import probabilities
 from crosscheck.calibration.refits import containing, does_nothing, looked_about
 from crosscheck.calibration.sets import Names, Scores, explore
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
 from seecr.effects import Term, Terms, effect_named, layout_of
-from seecr.mjcf import load_robot
-from seecr.shipped import model_path
 
 NAMES = "abcdefgh"
 WIDTHS = np.array([0.1, 0.3, 1.0, 3.0, 10.0])

@@ -22,8 +22,8 @@ from crosscheck.fit.prepare import prepare
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.state import State, evaluate
 from crosscheck.given import considered
+from seecr.description.mjcf import load_robot
 from seecr.effects import Term, Terms
-from seecr.mjcf import load_robot
 
 ROBOT = load_robot(COGIRO)
 HIDDEN = Terms(

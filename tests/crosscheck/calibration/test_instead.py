@@ -28,10 +28,10 @@ from crosscheck.fit.reasons import DiagnosisVerdict, Why
 from crosscheck.fit.state import evaluate
 from crosscheck.given import considered
 from crosscheck.measurements.data import Measurements
+from seecr.commands.loads import Loads
+from seecr.description.mjcf import load_robot
 from seecr.effects import Term, Terms
 from seecr.effects.knowledge import Knowledge
-from seecr.loads import Loads
-from seecr.mjcf import load_robot
 from seecr.pose import Array
 
 ROBOT = load_robot(COGIRO)

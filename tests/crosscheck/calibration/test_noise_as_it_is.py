@@ -11,7 +11,7 @@ from crosscheck.calibration.restricted import estimate, log_evidence
 from crosscheck.calibration.robust import outliers, row_weights
 from crosscheck.fit.problem import Problem
 from crosscheck.measurements.data import Sigma
-from seecr.mjcf import load_robot
+from seecr.description.mjcf import load_robot
 
 
 def chain(rows: int, channels: int = 3, runs: int = 2) -> Chain:

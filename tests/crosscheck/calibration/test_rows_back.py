@@ -17,8 +17,8 @@ from crosscheck.fit.prepare import prepare
 from crosscheck.fit.state import evaluate
 from crosscheck.given import considered
 from crosscheck.measurements.data import Measurements
+from seecr.description.mjcf import load_robot
 from seecr.effects import Term, Terms, effect_named, layout_of
-from seecr.mjcf import load_robot
 
 ROBOT = load_robot(COGIRO)
 # Every tolerance a little off: which cables are slack where is another matter with each of them.

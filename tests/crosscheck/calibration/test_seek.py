@@ -15,8 +15,8 @@ from crosscheck.diagnosis.explained import MORE, explained
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.reasons import DiagnosisVerdict, Why
 from crosscheck.given import considered
+from seecr.description.mjcf import load_robot
 from seecr.effects import Term, Terms
-from seecr.mjcf import load_robot
 
 pytestmark = pytest.mark.slow
 

@@ -18,8 +18,8 @@ from crosscheck.calibration.priors import widths_of
 from crosscheck.calibration.sets import Scores
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.state import evaluate
+from seecr.description.mjcf import load_robot
 from seecr.effects import Term, Terms, effect_named, layout_of
-from seecr.mjcf import load_robot
 
 ROBOT = load_robot(COGIRO)
 DRUMS = "drum_eccentricity"

@@ -11,8 +11,8 @@ from crosscheck.calibration.joint import Setting, settle
 from crosscheck.calibration.strange import goes_together, most_together, too_large
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.state import evaluate
+from seecr.description.mjcf import load_robot
 from seecr.effects import Terms
-from seecr.mjcf import load_robot
 
 POSITION = np.array([432, 0, 0])
 

@@ -17,10 +17,10 @@ from crosscheck.calibration.refits import swapped
 from crosscheck.calibration.sets import Scores
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.state import evaluate
-from seecr.commands import Commands
+from seecr.commands.data import Commands
+from seecr.description.mjcf import load_robot
 from seecr.effects import Terms
-from seecr.experiment import Experiment
-from seecr.mjcf import load_robot
+from seecr.prediction.experiment import Experiment
 
 ROBOT = load_robot(COGIRO)
 EXPANSION = 2e-4

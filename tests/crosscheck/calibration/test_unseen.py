@@ -15,8 +15,8 @@ from crosscheck.calibration.priors import widths_of
 from crosscheck.calibration.unseen import shown_from
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.state import evaluate
+from seecr.description.mjcf import load_robot
 from seecr.effects import Term, Terms, effect_named, layout_of
-from seecr.mjcf import load_robot
 
 DRAWN = 12
 

@@ -14,9 +14,9 @@ from crosscheck.calibration.priors import widths_of
 from crosscheck.calibration.varying import Varying, varying
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.state import evaluate
+from seecr.commands.loads import Loads
+from seecr.description.mjcf import load_robot
 from seecr.effects import Terms
-from seecr.loads import Loads
-from seecr.mjcf import load_robot
 from seecr.pose import Array
 
 ROBOT = load_robot(COGIRO)

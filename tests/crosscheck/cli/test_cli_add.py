@@ -14,8 +14,8 @@ from crosscheck.add import add_effect
 from crosscheck.errors import CrosscheckError
 from crosscheck.measurements.read import load_measurements
 from crosscheck.measurements.write import write_measurements
-from seecr.mjcf import load_robot
-from seecr.model import load_model
+from seecr.description.mjcf import load_robot
+from seecr.prediction.model import load_model
 
 pytestmark = pytest.mark.slow
 

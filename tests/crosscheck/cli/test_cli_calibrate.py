@@ -11,10 +11,10 @@ import pytest
 from made_data import SIGMA, case, refused, run
 from made_diagnoses import SLOW
 
-from seecr.chances import held_chance
-from seecr.mjcf import load_robot
-from seecr.model import Model, load_model
-from seecr.robot import Robot
+from seecr.description.mjcf import load_robot
+from seecr.description.robot import Robot
+from seecr.prediction.model import Model, load_model
+from seecr.workspace.chances import held_chance
 
 HIDDEN = {
     "pulley_radius": {"radius_m": 0.006},

@@ -18,10 +18,10 @@ from crosscheck.fit.gauss_newton import FitStatus
 from crosscheck.fit.reasons import DiagnosisVerdict, Unfit
 from crosscheck.measurements.read import load_measurements
 from crosscheck.measurements.write import write_measurements
-from seecr.mjcf import load_robot
-from seecr.model import load_model
-from seecr.shipped import model_path
-from seecr.uncertainty import covariance_of
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
+from seecr.prediction.model import load_model
+from seecr.prediction.uncertainty import covariance_of
 
 pytestmark = pytest.mark.slow
 

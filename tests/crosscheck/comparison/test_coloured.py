@@ -11,7 +11,7 @@ from made_data import COGIRO, SIGMA, measured
 from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.result import Comparison
 from crosscheck.measurements.data import Measurements
-from seecr.mjcf import load_robot
+from seecr.description.mjcf import load_robot
 from seecr.pose import Array
 
 ROBOT = load_robot(COGIRO)

@@ -17,10 +17,10 @@ from crosscheck.comparison.travel import STILL
 from crosscheck.errors import CrosscheckError
 from crosscheck.files import json_text
 from crosscheck.measurements.data import Sigma
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
 from seecr.errors import InputFileError
-from seecr.mjcf import load_robot
 from seecr.pose import pose_add, pose_difference
-from seecr.shipped import model_path
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from crosscheck.comparison.quantities import QuantityKind, in_time, of_cables, o
 from crosscheck.comparison.travel import STILL, regions_of, travel
 from crosscheck.fit.problem import Problem
 from seecr.effects import Terms
-from seecr.experiment import Prediction
+from seecr.prediction.experiment import Prediction
 
 
 @pytest.fixture(scope="module")

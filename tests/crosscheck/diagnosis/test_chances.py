@@ -21,8 +21,8 @@ from crosscheck.fit.prepare import prepare
 from crosscheck.fit.problem import Rms
 from crosscheck.fit.reasons import Reason, Why
 from crosscheck.given import considered
+from seecr.description.mjcf import load_robot
 from seecr.effects import Terms
-from seecr.mjcf import load_robot
 
 RMS: Rms = {"position_rms_m": 1e-3, "orientation_rms_rad": None, "tension_rms_N": None}
 

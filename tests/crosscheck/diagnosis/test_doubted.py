@@ -17,10 +17,10 @@ from crosscheck.diagnosis.verdict import is_clear
 from crosscheck.fit.possible import hardly_happens
 from crosscheck.fit.reasons import Reason, Why
 from crosscheck.measurements.data import Measurements
-from seecr.commands import Commands
-from seecr.experiment import Experiment
-from seecr.mjcf import load_robot
+from seecr.commands.data import Commands
+from seecr.description.mjcf import load_robot
 from seecr.pose import quat_from_rxyz
+from seecr.prediction.experiment import Experiment
 
 PLANAR = """<mujoco model="tri">
   <option gravity="0 0 -9.81"/>

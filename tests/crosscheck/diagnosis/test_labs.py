@@ -19,8 +19,8 @@ from crosscheck.fit.problem import Problem, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.fit.state import evaluate
 from crosscheck.measurements.read import load_measurements
+from seecr.description.mjcf import load_robot
 from seecr.effects import Terms
-from seecr.mjcf import load_robot
 
 # Nothing missing in heavy tails; one effect beside outliers, positions alone; a memory through
 # slackness; three at once in heavy tails; a frame that yields; few rows. Four at once, in B08,

@@ -14,8 +14,8 @@ from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.measurements.read import load_measurements
 from crosscheck.twin.answer import unseal
 from crosscheck.twin.make import make_twin
-from seecr.mjcf import load_robot
-from seecr.shipped import model_path
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
 
 pytestmark = pytest.mark.slow
 

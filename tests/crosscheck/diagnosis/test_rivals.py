@@ -9,7 +9,7 @@ from made_data import COGIRO, measured, term
 
 from crosscheck.diagnosis.rivals import rivals_of
 from crosscheck.diagnosis.verdict import diagnose
-from seecr.mjcf import load_robot
+from seecr.description.mjcf import load_robot
 
 pytestmark = pytest.mark.slow
 

@@ -9,7 +9,7 @@ from made_diagnoses import SLOW
 from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.planning.design import make_plan
 from crosscheck.planning.visibility import NAMED
-from seecr.mjcf import load_robot
+from seecr.description.mjcf import load_robot
 
 pytestmark = pytest.mark.slow
 

@@ -12,10 +12,10 @@ from made_data import COGIRO, measured, term
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.verdict import diagnose
 from crosscheck.measurements.data import Measurements
-from seecr.mjcf import load_robot
+from seecr.description.mjcf import load_robot
+from seecr.description.robot import Robot
+from seecr.description.shipped import model_path
 from seecr.pose import Array, quat_from_rotvec, quat_multiply
-from seecr.robot import Robot
-from seecr.shipped import model_path
 
 Change = Callable[[Measurements], None]
 PULLEY = {"radius_m": 0.01}

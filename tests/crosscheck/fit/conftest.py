@@ -6,7 +6,7 @@ import pytest
 from made_data import measured, soft_cogiro
 
 from crosscheck.measurements.data import Measurements
-from seecr.robot import Robot
+from seecr.description.robot import Robot
 
 
 @pytest.fixture(scope="module")

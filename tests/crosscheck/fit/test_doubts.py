@@ -15,10 +15,10 @@ from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import load_commands, load_measurements
 from crosscheck.measurements.together import together
 from crosscheck.measurements.write import write_measurements
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
 from seecr.effects import Terms
 from seecr.errors import InputFileError
-from seecr.mjcf import load_robot
-from seecr.shipped import model_path
 
 COGIRO, PLANAR = soft_cogiro(), load_robot(model_path("planar_vertical"))
 

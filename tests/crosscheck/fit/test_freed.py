@@ -17,7 +17,7 @@ from crosscheck.measurements.together import together
 from crosscheck.measurements.write import write_measurements
 from seecr.effects import Terms
 from seecr.errors import InputFileError
-from seecr.experiment import Experiment
+from seecr.prediction.experiment import Experiment
 
 ROBOT = soft_cogiro()
 FAR = {"shift_x_m": 0.4, "shift_z_m": -0.2, "rotation_z_rad": 0.7, "rotation_x_rad": 0.1}

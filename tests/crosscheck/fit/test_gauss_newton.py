@@ -10,8 +10,8 @@ from crosscheck.fit import gauss_newton
 from crosscheck.fit.gauss_newton import Fit, fit
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.state import State
+from seecr.description.mjcf import load_robot
 from seecr.effects import Terms
-from seecr.mjcf import load_robot
 from seecr.pose import Array
 
 ROBOT = load_robot(COGIRO)

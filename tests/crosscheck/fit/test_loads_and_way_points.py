@@ -19,9 +19,9 @@ from crosscheck.planning.adding import Adding
 from crosscheck.planning.extensions import PAYLOAD, extensions
 from crosscheck.planning.planned import Reads, planned
 from crosscheck.twin.trajectory import trajectory
+from seecr.commands.loads import Loads
 from seecr.effects import Terms
-from seecr.experiment import Experiment
-from seecr.loads import Loads
+from seecr.prediction.experiment import Experiment
 
 ROBOT = soft_cogiro()
 SIGMA = Sigma(position_m=1e-5, orientation_rad=1e-4)

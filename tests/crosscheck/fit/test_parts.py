@@ -18,8 +18,8 @@ from crosscheck.fit.prepare import prepare
 from crosscheck.measurements.together import together
 from crosscheck.measurements.write import write_measurements
 from seecr.cli import main as seecr_main
+from seecr.description.mjcf import load_robot
 from seecr.effects import Own, Terms
-from seecr.mjcf import load_robot
 
 pytestmark = pytest.mark.slow
 

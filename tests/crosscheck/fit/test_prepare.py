@@ -16,8 +16,8 @@ from crosscheck.fit.problem import Problem
 from crosscheck.fit.reasons import Reason, Refusal, Unfit, Why
 from crosscheck.fit.state import evaluate
 from crosscheck.measurements.data import Measurements
+from seecr.description.robot import Robot
 from seecr.effects import Terms
-from seecr.robot import Robot
 
 
 def loose(robot: Robot) -> Robot:

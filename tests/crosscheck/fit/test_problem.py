@@ -13,8 +13,8 @@ from crosscheck.fit.noise import whiteness
 from crosscheck.fit.problem import Problem, angle_rates, noise_factors, rms_by_kind
 from crosscheck.fit.state import evaluate
 from crosscheck.measurements.data import Sigma
+from seecr.description.mjcf import load_robot
 from seecr.effects import Terms
-from seecr.mjcf import load_robot
 from seecr.pose import quat_from_rotvec, quat_from_rxyz, quat_multiply, rxyz_from_quat
 
 

@@ -10,8 +10,8 @@ from made_data import COGIRO, SIGMA, measured, term
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.smooth import beyond_smooth, field_columns, monomials
 from crosscheck.fit.state import State, evaluate
+from seecr.description.mjcf import load_robot
 from seecr.effects import Terms
-from seecr.mjcf import load_robot
 
 
 def problem_and_state() -> tuple[Problem, State]:

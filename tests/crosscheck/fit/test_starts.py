@@ -13,9 +13,9 @@ from crosscheck.fit.candidates import Trials, candidates_for, fit_candidate, nul
 from crosscheck.fit.gauss_newton import fit
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.starts import equation_start, starts_of
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
 from seecr.effects import Terms
-from seecr.mjcf import load_robot
-from seecr.shipped import model_path
 
 OFFSETS = (-0.0006, 0.0012, -0.0011, 0.0015, -0.0009, 0.0014, 0.0013, 0.0006)
 

@@ -15,12 +15,12 @@ from crosscheck.calibration.colour import chain_of
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.unstated import overestimated
 from crosscheck.measurements.data import Measurements, Sigma
-from seecr.commands import Commands
+from seecr.commands.data import Commands
+from seecr.description.mjcf import load_robot
+from seecr.description.robot import Robot
 from seecr.effects import Term, Terms
-from seecr.experiment import Experiment
-from seecr.mjcf import load_robot
 from seecr.pose import quat_from_rotvec, quat_multiply
-from seecr.robot import Robot
+from seecr.prediction.experiment import Experiment
 
 
 def test_noise_that_nobody_stated_is_estimated_and_said(robot: Robot) -> None:

@@ -12,9 +12,9 @@ from made_data import refused, soft_cogiro, soft_xml
 
 from crosscheck.importing import import_case
 from crosscheck.importing.choices import ImportChoices
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
 from seecr.errors import SeecrError
-from seecr.mjcf import load_robot
-from seecr.shipped import model_path
 
 ROBOT = soft_cogiro()
 POINTS = tuple(f"platform:points{i}" for i in (1, 2, 3))

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from measured_csv import ARM, FREE, HINGE, PLANAR, SLIDE, mjcf
 
-from seecr.mjcf import load_robot
-from seecr.robot import Robot
+from seecr.description.mjcf import load_robot
+from seecr.description.robot import Robot
 
 
 @pytest.fixture(scope="module")

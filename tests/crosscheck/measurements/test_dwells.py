@@ -11,10 +11,10 @@ import pytest
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.dwells import averaged_dwells
 from crosscheck.measurements.read import measurements_of
-from seecr.loads import Loads
-from seecr.mjcf import load_robot
+from seecr.commands.loads import Loads
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
 from seecr.pose import quat_from_rotvec
-from seecr.shipped import model_path
 
 DWELLS, READINGS, NOISE_M, NOISE_RAD = 60, 40, 1e-4, 3e-4
 

@@ -15,10 +15,10 @@ from crosscheck.measurements.read import load_commands, load_measurements
 from crosscheck.measurements.write import write_measurements
 from seecr.columns.known import know_columns
 from seecr.columns.table import Table
+from seecr.commands.loads import Loads
+from seecr.description.robot import Robot
 from seecr.errors import InputFileError
-from seecr.loads import Loads
 from seecr.pose import quat_from_rotvec, quat_multiply
-from seecr.robot import Robot
 
 CMD = "cmd_x_m,cmd_y_m,cmd_z_m"
 POSE = f"run,{CMD},meas_x_m"

@@ -8,7 +8,7 @@ import pytest
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import load_measurements
 from crosscheck.measurements.write import write_measurements
-from seecr.mjcf import load_robot
+from seecr.description.mjcf import load_robot
 from seecr.pose import pose_difference
 
 

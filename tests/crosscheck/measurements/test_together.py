@@ -13,10 +13,10 @@ from crosscheck.fit.state import evaluate
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import load_measurements
 from crosscheck.measurements.stated import with_stated
+from seecr.description.robot import Robot
 from seecr.effects import Terms
 from seecr.errors import InputFileError
 from seecr.pose import quat_from_rxyz
-from seecr.robot import Robot
 
 CMD = "run,t_s,cmd_x_m,cmd_y_m,cmd_z_m"
 

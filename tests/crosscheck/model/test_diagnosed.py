@@ -13,12 +13,12 @@ from made_data import COGIRO
 
 from crosscheck.files import json_text
 from crosscheck.model import load_diagnosed
+from seecr.description.fingerprint import fingerprint
+from seecr.description.mjcf import load_robot
+from seecr.description.robot import Robot
+from seecr.description.shipped import model_path
 from seecr.errors import InputFileError
-from seecr.fingerprint import fingerprint
 from seecr.made import digits_of
-from seecr.mjcf import load_robot
-from seecr.robot import Robot
-from seecr.shipped import model_path
 
 ROBOT = load_robot(COGIRO)
 # It belongs to every robot: its name and parameters tell nothing.

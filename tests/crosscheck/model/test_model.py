@@ -12,12 +12,12 @@ from made_data import COGIRO, measured, term
 
 from crosscheck.model.fitted import Fitted
 from crosscheck.model.write import Provenance, calibrated, renewed, save_model, with_fit
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
 from seecr.errors import InputFileError
-from seecr.experiment import predict
-from seecr.mjcf import load_robot
-from seecr.model import load_model, new_model
-from seecr.shipped import model_path
-from seecr.uncertainty import covariance_of
+from seecr.prediction.experiment import predict
+from seecr.prediction.model import load_model, new_model
+from seecr.prediction.uncertainty import covariance_of
 
 SOURCE = Provenance("measured.csv", "2024-05-13", "seecr 0.1.0", "crosscheck add pulley_radius")
 ERRORS = {

@@ -22,11 +22,11 @@ from crosscheck.planning.detours import detours
 from crosscheck.planning.planned import Reads, planned
 from crosscheck.planning.sight import sight_of
 from crosscheck.planning.write import remark_of
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
 from seecr.effects import Terms
-from seecr.equilibrium import solve
-from seecr.mjcf import load_robot
-from seecr.shipped import model_path
-from seecr.workspace import feasible
+from seecr.equilibrium.solving import solve
+from seecr.workspace.zones import feasible
 
 pytestmark = pytest.mark.slow
 

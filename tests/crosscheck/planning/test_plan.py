@@ -23,11 +23,11 @@ from crosscheck.planning.places import more_poses
 from crosscheck.planning.planned import Reads, near_slack, planned
 from crosscheck.planning.proposer import MORE_POSES, NEEDED, telling_apart
 from crosscheck.planning.visibility import joined, left_over, needed, signals, signals_like
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
 from seecr.effects import Terms
-from seecr.mjcf import load_robot
 from seecr.pose import rotvec_from_quat
-from seecr.shipped import model_path
-from seecr.workspace import feasible
+from seecr.workspace.zones import feasible
 
 pytestmark = pytest.mark.slow
 

@@ -14,12 +14,12 @@ from recordings import Readback
 from crosscheck.errors import CrosscheckError
 from crosscheck.recording import bars
 from seecr.errors import InputFileError
-from seecr.maps import workspace_map
 from seecr.recording import layout, plots
 from seecr.recording.scene import Scene, write_legend
 from seecr.recording.shapes import States
 from seecr.recording.stream import opening, pose_index, recording_file, settling_index, sweep_index
 from seecr.recording.workspace import write_map_recording
+from seecr.workspace.maps import workspace_map
 
 
 def blueprint() -> rrb.Blueprint:

@@ -24,13 +24,13 @@ from crosscheck.suite.results import CaseResult
 from crosscheck.suite.run import Run, results_json, run_case
 from crosscheck.suite.thresholds import load_thresholds
 from crosscheck.suite.verdicts import Verdict
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
 from seecr.errors import InputFileError
-from seecr.mjcf import load_robot
 from seecr.pose import quat_conjugate, quat_multiply
 from seecr.recording import shapes
 from seecr.recording.colours import cable_colours, round_up, scale_colours
-from seecr.shipped import model_path
-from seecr.solution import Status
+from seecr.statics.solution import Status
 
 pytestmark = pytest.mark.slow
 

@@ -18,8 +18,8 @@ from crosscheck.settle.model import (
     quiet_mujoco,
 )
 from crosscheck.settle.physics import Physics
+from seecr.description.shipped import model_names, model_path
 from seecr.errors import InputFileError
-from seecr.shipped import model_names, model_path
 
 PLANAR = model_path("planar_vertical").read_text(encoding="utf-8")
 

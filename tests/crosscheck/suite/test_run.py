@@ -28,9 +28,9 @@ from crosscheck.suite.results import CaseResult, worst_of
 from crosscheck.suite.run import run_case, run_suite
 from crosscheck.suite.thresholds import SHIPPED, FindingLimits, load_thresholds, thresholds_toml
 from crosscheck.suite.verdicts import Verdict
+from seecr.description.shipped import CABLES, model_path
 from seecr.errors import InputFileError
 from seecr.pose import pose_add, pose_difference, quat_from_rotvec
-from seecr.shipped import CABLES, model_path
 
 PARALLEL, COGIRO = model_path("demobot_parallel"), model_path("demobot_cogiro")
 # Near a corner of the frame two taut cables are left, and their line meets the centre of mass.

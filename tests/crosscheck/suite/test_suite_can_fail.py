@@ -27,10 +27,10 @@ from crosscheck.suite.mujoco_robot import MujocoRobot
 from crosscheck.suite.outcome import Outcome
 from crosscheck.suite.run import Run, run_suite
 from crosscheck.suite.thresholds import load_thresholds
-from seecr import search
 from seecr.compiled import columns
+from seecr.description.shipped import model_path
+from seecr.equilibrium import search
 from seecr.pose import quat_conjugate, quat_from_rotvec, quat_multiply
-from seecr.shipped import model_path
 
 pytestmark = pytest.mark.slow
 

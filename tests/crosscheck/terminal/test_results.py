@@ -24,7 +24,7 @@ from crosscheck.terminal.addition import print_addition, why_not
 from crosscheck.terminal.calibration import print_calibration
 from crosscheck.terminal.comparison import print_comparison
 from crosscheck.terminal.diagnosis import print_diagnosis
-from seecr.mjcf import load_robot
+from seecr.description.mjcf import load_robot
 
 
 def console() -> tuple[Console, StringIO]:

@@ -8,9 +8,9 @@ import pytest
 
 from crosscheck.twin.build import build, tail_of
 from crosscheck.twin.robot import true_robot
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
 from seecr.effects import effect_named
-from seecr.mjcf import load_robot
-from seecr.shipped import model_path
 
 
 def built(name="", robot="demobot_parallel", segments=1, **values):

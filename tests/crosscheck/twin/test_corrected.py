@@ -10,13 +10,13 @@ import pytest
 from crosscheck.settle.settler import Settler
 from crosscheck.suite.poses import demobot_sweep
 from crosscheck.twin.measure import measure
-from seecr.commands import Commands
+from seecr.commands.data import Commands
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import CABLES, model_path
 from seecr.effects import Term
-from seecr.inverse import correct
-from seecr.mjcf import load_robot
+from seecr.inverse.correction import correct
 from seecr.pose import pose_difference
-from seecr.shipped import CABLES, model_path
-from seecr.workspace import feasible
+from seecr.workspace.zones import feasible
 
 
 @pytest.mark.parametrize("cable", CABLES)

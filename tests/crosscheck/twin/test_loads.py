@@ -9,12 +9,12 @@ import pytest
 from effect_cases import experiment_of
 
 from crosscheck.twin.measure import measure
-from seecr.commands import Commands
+from seecr.commands.data import Commands
+from seecr.commands.loads import Loads
+from seecr.description.robot import Robot
 from seecr.effects import Effect, effect_named
-from seecr.experiment import Experiment
-from seecr.loads import Loads
 from seecr.pose import pose_difference
-from seecr.robot import Robot
+from seecr.prediction.experiment import Experiment
 
 
 def effect(name: str, **values: object) -> Effect:

@@ -22,13 +22,13 @@ from crosscheck.twin.hidden import choose, times
 from crosscheck.twin.make import make_twin
 from crosscheck.twin.robot import TRUE_EFFECTS
 from crosscheck.twin.trajectory import trajectory
-from seecr.commands import Commands
+from seecr.commands.data import Commands
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
 from seecr.effects import Term, effect_named, layout_of
 from seecr.errors import InputError, InputFileError
-from seecr.experiment import Experiment
-from seecr.mjcf import load_robot
 from seecr.pose import pose_difference
-from seecr.shipped import model_path
+from seecr.prediction.experiment import Experiment
 
 COGIRO = model_path("demobot_cogiro")
 # Short sweeps: 24 rows. History between far rows is a matter of the points looked at, see below.

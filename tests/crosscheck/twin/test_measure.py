@@ -21,12 +21,12 @@ from crosscheck.twin.measure import measure
 from crosscheck.twin.robot import TRUE_EFFECTS, true_robot
 from crosscheck.twin.springs import Springs
 from crosscheck.twin.world import World
-from seecr.commands import Commands
+from seecr.commands.data import Commands
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
 from seecr.effects import BUILT_IN, Effect, effect_named, parameter
-from seecr.experiment import Experiment
-from seecr.mjcf import load_robot
 from seecr.pose import pose_difference, quat_from_rotvec
-from seecr.shipped import model_path
+from seecr.prediction.experiment import Experiment
 
 ROBOTS = ("demobot_cogiro", "demobot_parallel", "planar_vertical")
 CASES = {case.name: case for case in effect_cases(ROBOTS)}

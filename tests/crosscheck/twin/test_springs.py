@@ -9,9 +9,9 @@ import pytest
 
 from crosscheck.twin.robot import TrueRobot, true_robot
 from crosscheck.twin.springs import Cable, Springs
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
 from seecr.effects import effect_named
-from seecr.mjcf import load_robot
-from seecr.shipped import model_path
 
 EA, REST = 300.0, 0.8
 

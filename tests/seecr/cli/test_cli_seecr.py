@@ -15,11 +15,11 @@ from click.testing import CliRunner, Result
 
 from seecr.cli import COMMANDS, main
 from seecr.cli.arguments import robot_at
-from seecr.equilibrium import solve
-from seecr.mjcf import load_robot
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
+from seecr.equilibrium.solving import solve
 from seecr.planar import midline_point
 from seecr.pose import transform_points
-from seecr.shipped import model_path
 
 PLACE = ["0.17", "0.25", "0.1"]
 

@@ -12,9 +12,9 @@ from random_robots import random_robot
 from seecr.columns.known import Columns, know_columns
 from seecr.columns.poses import command_lengths, command_poses, measured_orientation
 from seecr.columns.table import Table, read_table
+from seecr.description.robot import Joint, Robot
 from seecr.errors import InputFileError
 from seecr.pose import quat_from_rxyz
-from seecr.robot import Joint, Robot
 
 
 def columns_of(header: str, *rows: str, n_cables: int = 6) -> Columns:

@@ -11,16 +11,16 @@ from three_cables import THREE
 
 from crosscheck.settle.settler import Settler, settle_batch
 from seecr.compiled.catenary import catenary_span
+from seecr.description.mjcf import load_robot
+from seecr.description.robot import Robot
+from seecr.description.shipped import model_path
 from seecr.effects import Term, Terms
-from seecr.equilibrium import solve
+from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
 from seecr.exported.bodies import SEGMENTS
 from seecr.exported.chain import HangingCable, hanging
 from seecr.exported.export import Export, export
-from seecr.mjcf import load_robot
 from seecr.pose import Array, pose_difference
-from seecr.robot import Robot
-from seecr.shipped import model_path
 
 COGIRO = load_robot(model_path("demobot_cogiro"))
 POSES = np.array([[0.3, 0.2, 0.15, 1, 0, 0, 0], [0.5, 0.3, 0.1, 0.995, 0, 0.0998749, 0]])

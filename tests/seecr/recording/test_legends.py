@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import rerun.blueprint as rrb
 
-from seecr.mjcf import load_robot
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
 from seecr.recording.legends import Legend, legend_of
 from seecr.recording.shapes import cable_labels, extent
-from seecr.shipped import model_path
 
 SIZE = (600.0, 200.0)
 RIGHT_TOP, LEFT_TOP = rrb.Corner2D.RightTop, rrb.Corner2D.LeftTop

@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 from recordings import Readback
 
-from seecr.command_file import read_commands
-from seecr.equilibrium import solve
+from seecr.columns.command_file import read_commands
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
+from seecr.equilibrium.solving import solve
 from seecr.files import json_text
-from seecr.inverse import correct
-from seecr.mjcf import load_robot
+from seecr.inverse.correction import correct
 from seecr.recording.sweep import write_sweep_recording
 from seecr.report.corrections import chance_lines
 from seecr.report.figures import sweep_figure
 from seecr.report.rows import SweepRows
 from seecr.report.words import at_rest, cable_lines, pose_lines, sweep_lines
-from seecr.shipped import model_path
-from seecr.solution import Solution, Status
+from seecr.statics.solution import Solution, Status
 
 POSES = [[x, 0.25, 0.1, 1, 0, 0, 0] for x in (0.17, 0.3, 0.4)]
 

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 import seecr
-from seecr.passes import Barrier
+from seecr.description.shipped import model_path
+from seecr.equilibrium.passes import Barrier
 from seecr.report.words import direction_words, other_lines, pose_lines
-from seecr.shipped import model_path
 
 
 def test_rounding_is_no_turn() -> None:

@@ -1,0 +1,96 @@
+"""Commands from a file: poses or lengths, with runs, times, temperatures and known loads.
+
+The columns are those of a file of measurements, readings being passed over, and ``want_*``, the
+poses that lengths are for. The TOML beside it may say ``lengths = "told"`` and
+``start = "first_row"``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seecr.columns.beside import choice
+from seecr.columns.known import know_columns
+from seecr.columns.loads import known_loads
+from seecr.columns.poses import command_lengths, command_poses, poses_of
+from seecr.columns.reach import check_reach
+from seecr.columns.table import read_table
+from seecr.columns.times import runs, temperatures, times
+from seecr.commands.data import Commands
+from seecr.description.robot import Robot
+from seecr.files import read_toml
+from seecr.pose import Array
+
+__all__ = ["CommandFile", "read_commands"]
+
+
+@dataclass(frozen=True, eq=False)
+class CommandFile:
+    """Commands as read.
+
+    Attributes:
+        path: the file.
+        commands: its rows.
+        wanted: (n, 7) poses of columns ``want_*``, or None.
+        run: (n,) names of runs.
+        notes: sentences for the reader: what was assumed or filled in.
+    """
+
+    path: Path
+    commands: Commands
+    wanted: Array | None
+    run: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def read_commands(path: str | Path, robot: Robot) -> CommandFile:
+    """Read a list of commands for a robot.
+
+    Args:
+        path: the CSV or Parquet.
+        robot: its number of cables, and the reference pose for what the file does not say.
+
+    Raises:
+        InputFileError: with line and column of what is wrong.
+    """
+    path = Path(path)
+    columns = know_columns(read_table(path), robot.n_cables)
+    run = runs(columns)
+    lengths = command_lengths(columns, robot)
+    wanted = poses_of(columns, robot, "want", "wanted")
+    if lengths is None:
+        poses = command_poses(columns, robot)
+    else:
+        poses = np.tile(robot.reference_pose, (len(run), 1)) if wanted is None else wanted
+    check_reach(columns, robot, poses, lengths)
+    told, stands = _beside(path.with_suffix(".toml"))
+    commands = Commands(
+        pose=poses,
+        lengths=lengths,
+        run=_numbers(run),
+        time=times(columns, run),
+        temperature=temperatures(columns),
+        told=told and lengths is not None,
+        loads=known_loads(columns, robot),
+        stands=np.ones(len(run), dtype=bool) if stands else None,
+        line=columns.table.line,
+    )
+    return CommandFile(path, commands, wanted, tuple(run.tolist()), tuple(columns.notes))
+
+
+def _beside(path: Path) -> tuple[bool, bool]:
+    """Whether lengths were told, and whether runs start at their first row."""
+    if not path.exists():
+        return False, False
+    toml = read_toml(path, "expected a TOML beside the commands")
+    return choice(toml, "lengths") == "told", choice(toml, "start") == "first_row"
+
+
+def _numbers(run: NDArray[np.str_]) -> NDArray[np.int64]:
+    """Runs (n,) by number, in the order in which they come."""
+    order = {name: number for number, name in enumerate(dict.fromkeys(run.tolist()))}
+    return np.array([order[name] for name in run.tolist()], dtype=np.int64)

@@ -1,0 +1,247 @@
+"""The way of a robot through its commands: waypoints, and where cables turn round between them.
+
+A run starts at the robot's reference pose (or at its first row, where commands say so), goes
+straight to its first row and straight from row to row, in what the platform may do. Where the load
+changes it does so first, at the row before. What depends on the rows before (see
+:mod:`seecr.compiled.walk`, and :func:`seecr.commands.data.play`) depends on this way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seecr.commands.data import Commands
+from seecr.description.joints import motion_columns, pose_of_values, values_of_pose
+from seecr.description.robot import Robot
+from seecr.pose import Array, cross, pose_add, pose_difference, quat_rotate
+
+# Waypoints on the way to the first row of a run, and from row to row.
+_APPROACH, _BETWEEN = 6, 2
+# Turns of a cable's length are looked for in pieces of a way on which the platform turns by less
+# [rad]; two turns in one piece, which go unseen, differ by less than a millionth of an anchor
+# point's distance.
+_PIECE = 0.02
+# Rate of a squared length that is rounding, relative to the largest squared length; rounds until
+# it is that small (a few).
+_STILL, _ROUNDS = 1e-14, 20
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """Rows with the waypoints between them.
+
+    Attributes:
+        robot: as described; given: commands of the n rows.
+        commands: of all N waypoints.
+        rows: (n,) which waypoints are the rows asked for.
+        source: (N,) which row a waypoint belongs to.
+        fresh: (N,) bool, waypoints at which a run starts from the reference pose.
+        elapsed: (N,) [s] since the waypoint before.
+    """
+
+    robot: Robot
+    given: Commands
+    commands: Commands
+    rows: NDArray[np.integer]
+    source: NDArray[np.integer]
+    fresh: NDArray[np.bool_]
+    elapsed: Array
+
+    @property
+    def new_clock(self) -> NDArray[np.bool_]:
+        """(N,) bool, waypoints from which on another clock tells the time; the first is one."""
+        clock = self.commands.clock
+        changes = np.zeros(len(self.source), dtype=bool)
+        if clock is not None:
+            changes[1:] = np.diff(clock) != 0
+        changes[:1] = True
+        return changes
+
+    @cached_property
+    def turning(self) -> Commands:
+        """Of all waypoints, with where lengths turn round in between, for backlash."""
+        return turning(self.robot, self.commands)
+
+    @cached_property
+    def given_turning(self) -> Commands:
+        """Of the n rows alone, with where lengths turn round in between."""
+        return turning(self.robot, self.given)
+
+
+def path_of(robot: Robot, commands: Commands, waypoints: float | None = None) -> Path:
+    """The waypoints of commands: straight from the reference pose, straight between rows.
+
+    Args:
+        robot: as described.
+        commands: n rows.
+        waypoints: [of the robot's length] by which what is commanded moves between them at most;
+            a few for each row by default.
+    """
+    n = len(commands)
+    ways, fresh = _ways(robot, commands), commands.starts
+    # a way begins with a waypoint of its own where a run starts, or with another load
+    begins = fresh.copy() if commands.loads is None else fresh | commands.loads.changes
+    steps = np.where(fresh, _APPROACH, _BETWEEN)
+    if waypoints is not None:
+        steps = np.ceil(_moved(ways, commands) / waypoints).astype(int).clip(1)
+    steps = np.where(commands.starts_here, 0, steps)
+    source = np.repeat(np.arange(n), steps + begins)
+    rows = np.cumsum(steps + begins) - 1
+    step = np.arange(len(source)) - (rows - steps)[source]
+    first = (step == 0) & fresh[source]
+    part = step / np.maximum(steps, 1)[source]
+    pose = ways.at(source, part)[0]
+    pose[first], pose[rows] = robot.reference_pose, commands.pose
+    lengths = None
+    if commands.lengths is not None:
+        last = commands.before(commands.lengths, robot.rest_lengths)
+        lengths = last[source] + part[:, None] * (commands.lengths - last)[source]
+        lengths[rows] = commands.lengths
+    since = _since(commands)
+    # a run's clock starts at its first row: before, the robot waits at home
+    elapsed = np.where(fresh, 0.0, since / np.maximum(steps, 1))[source]
+    elapsed[step == 0] = np.where(fresh, since, 0.0)[source[step == 0]]
+    whole = Commands(
+        pose=pose,
+        lengths=lengths,
+        run=(np.zeros(n, dtype=np.int64) if commands.run is None else commands.run)[source],
+        time=None if commands.time is None else commands.time[source],
+        temperature=None if commands.temperature is None else commands.temperature[source],
+        told=commands.told,
+        loads=None if commands.loads is None else commands.loads.rows(source),
+        stands=None if commands.stands is None else commands.stands[source],
+        clock=None if commands.clock is None else commands.clock[source],
+    )
+    return Path(robot, commands, whole, rows, source, first, elapsed)
+
+
+def _moved(ways: _Ways, commands: Commands) -> Array:
+    """How far what is commanded moves on the way to each row, (n,), over the robot's length."""
+    robot = ways.robot
+    if commands.lengths is not None:
+        last = commands.before(commands.lengths, robot.rest_lengths)
+        return np.asarray(np.abs(commands.lengths - last).max(axis=1) / robot.length)
+    hinges = robot.hinges
+    return np.asarray(np.linalg.norm(ways.change / np.where(hinges, 1.0, robot.length), axis=1))
+
+
+def _since(commands: Commands) -> Array:
+    """(n,) [s] since the row before; none where another clock begins."""
+    if commands.time is None:
+        return np.zeros(len(commands))
+    since = np.maximum(np.diff(commands.time, prepend=commands.time[:1]), 0.0)
+    if commands.clock is not None:
+        since[1:][np.diff(commands.clock) != 0] = 0.0
+    return since
+
+
+@dataclass(frozen=True, eq=False)
+class _Ways:
+    """The ways to n rows, straight in what the platform may do: poses, or values of its joints.
+
+    Attributes:
+        start: (n, 7) poses or (n, d) values; change: (n, 6) or (n, d).
+        turn: (n,) [rad] no less than the platform turns on the way.
+    """
+
+    robot: Robot
+    start: Array
+    change: Array
+    turn: Array
+
+    def at(self, row: NDArray[np.integer], part: Array) -> tuple[Array, Array]:
+        """Poses (k, 7) at parts (k,) of the ways to rows (k,), and their rates (k, 6) by part."""
+        change = self.change[row]
+        moved = part[:, None] * change
+        if not self.robot.joints:
+            return pose_add(self.start[row], moved), change
+        pose, screws = pose_of_values(self.robot, self.start[row] + moved)
+        return pose, np.einsum("nkd,nd->nk", motion_columns(screws, pose[:, :3]), change)
+
+    def rates(
+        self, row: NDArray[np.integer], part: Array, exits: Array, anchors: Array
+    ) -> tuple[Array, Array]:
+        """Half the rates of squared lengths (k, c) [m^2] by part, and lengths (k, c) [m]."""
+        pose, rate = (one[:, None] for one in self.at(row, part))
+        arm = quat_rotate(pose[..., 3:], anchors)
+        span = pose[..., :3] + arm - exits
+        rates = np.sum(span * (rate[..., :3] + cross(rate[..., 3:], arm)), axis=-1)
+        rates[np.abs(rates) < _STILL * np.max(self.robot.reference_lengths) ** 2] = 0.0
+        return rates, np.linalg.norm(span, axis=-1)
+
+
+def _ways(robot: Robot, commands: Commands) -> _Ways:
+    if not robot.joints:
+        start = commands.before(commands.pose, robot.reference_pose)
+        change = pose_difference(commands.pose, start)
+        return _Ways(robot, start, change, np.linalg.norm(change[:, 3:], axis=1))
+    values = values_of_pose(robot, commands.pose)[0]
+    start = commands.before(values, np.zeros(robot.n_dof))
+    change = values - start
+    return _Ways(robot, start, change, np.abs(change[:, robot.hinges]).sum(axis=1))
+
+
+def turning(robot: Robot, commands: Commands) -> Commands:
+    """The same commands, with what the ways to their rows pass (``Commands.passed``).
+
+    Between rows a cable's commanded length turns round where its rate is zero. Lengths commanded
+    as such never do.
+    """
+    told = commands.change(robot)
+    start = commands.before(told, commands.home(robot))
+    if commands.lengths is not None:
+        return replace(commands, passed=start[None])
+    ways = _ways(robot, commands)
+    row, cable, number, length = _turns(ways)
+    passed = np.tile(told, (2 + int(np.max(number, initial=-1)), 1, 1))
+    passed[0] = start
+    passed[1 + number, row, cable] = length - robot.reference_lengths[cable]
+    return replace(commands, passed=passed)
+
+
+def _turns(
+    ways: _Ways,
+) -> tuple[NDArray[np.integer], NDArray[np.integer], NDArray[np.integer], Array]:
+    """Where cables turn round: row, cable, how many turns before on that way, and length [m]."""
+    robot = ways.robot
+    # without turning the square of a length is a parabola: its rate has one zero at most
+    pieces = 1 + np.ceil(ways.turn / _PIECE).astype(int)
+    row = np.repeat(np.arange(len(pieces)), pieces + 1)
+    first = np.cumsum(pieces + 1) - pieces - 1
+    part = (np.arange(len(row)) - first[row]) / pieces[row]
+    rates = ways.rates(row, part, robot.exit_points, robot.anchor_points)[0]
+    turned = ((rates[:-1] < 0.0) != (rates[1:] < 0.0)) & (row[:-1] == row[1:])[:, None]
+    at, cable = np.nonzero(turned)
+    before = np.cumsum(turned, axis=0) - turned
+    on = row[at]
+    number = before[at, cable] - before[first[on], cable]
+    ends = (part[at], rates[at, cable]), (part[at + 1], rates[at + 1, cable])
+    return on, cable, number, _length_at_rest(ways, on, cable, *ends)
+
+
+def _length_at_rest(
+    ways: _Ways, row: NDArray[np.integer], cable: NDArray[np.integer],
+    one: tuple[Array, Array], other: tuple[Array, Array],
+) -> Array:  # fmt: skip
+    """Lengths (k,) [m] of cables (k,) where their rates are zero between two parts of the way.
+
+    By the Illinois variant of the rule of false position (Dowell and Jarratt, BIT 11, 1971).
+    """
+    (a, at_a), (b, at_b) = one, other
+    exits = ways.robot.exit_points[cable, None]
+    anchors = ways.robot.anchor_points[cable, None]
+    length = np.zeros(len(row))
+    for _ in range(_ROUNDS):
+        c = b - at_b * (b - a) / (at_b - at_a)
+        rates, lengths = ways.rates(row, c, exits, anchors)
+        at_c, length = rates[:, 0], lengths[:, 0]
+        if not np.any(at_c):
+            break
+        across = (at_c < 0.0) != (at_b < 0.0)
+        a, at_a = np.where(across, b, a), np.where(across, at_b, 0.5 * at_a)
+        b, at_b = c, at_c
+    return length

@@ -1,0 +1,186 @@
+"""Which robot a model or a diagnosis is of, written so that a person sees what differs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import tomlkit
+
+from seecr.counted import counted
+from seecr.errors import InputFileError
+
+if TYPE_CHECKING:
+    from seecr.description.robot import Robot
+
+__all__ = ["check_robot", "fingerprint"]
+
+# Points that moved by less than this part of the longest cable are where they were.
+_SAME = 1e-6
+# What a change of the other numbers means for a model.
+_TWICE = "its effects may count twice; fit them again (crosscheck add --refit)"
+_POINTS = ("exit_points_m", "anchor_points_m", "reference_pose")
+_ANEW = "give the robot it was made for, or make it anew for this one"
+_NOTED = ("mass_kg", "ea_N", "rest_lengths_m", "centre_of_mass_m")
+# Digits kept: more than anybody measures, few enough to read.
+_DIGITS = 9
+# Characters of a wrong value that are shown.
+_SHOWN = 60
+
+
+def fingerprint(robot: Robot) -> tomlkit.items.Table:
+    """The table ``[robot]`` of a model, ``robot`` of a diagnosis."""
+    table = tomlkit.table()
+    table["name"] = robot.name
+    table["cables"] = list(robot.cable_names)
+    numbers = {
+        "exit_points_m": robot.exit_points,
+        "anchor_points_m": robot.anchor_points,
+        "reference_pose": robot.reference_pose,
+        "mass_kg": robot.mass,
+        "ea_N": robot.ea,
+        "rest_lengths_m": robot.rest_lengths,
+        "centre_of_mass_m": robot.centre_of_mass,
+    }
+    for key, value in numbers.items():
+        table[key] = _toml(np.round(np.asarray(value, float), _DIGITS).tolist())
+    return table
+
+
+def _toml(value: Any) -> Any:
+    """Points one per line, other numbers as they are."""
+    if not (isinstance(value, list) and isinstance(value[0], list)):
+        return value
+    rows = tomlkit.array()
+    rows.extend(value)
+    return rows.multiline(True)
+
+
+@dataclass(frozen=True)
+class _Said:
+    """What a file says of its robot, and on which lines."""
+
+    path: Path
+    table: Mapping[str, Any]
+    line_of: Callable[[str], int | None]
+
+    def error(self, key: str, words: str) -> InputFileError:
+        return InputFileError.at(self.path, f"[robot] {key}: {words}", line=self.line_of(key))
+
+
+def _nowhere(key: str) -> int | None:
+    """The line of a key in files that have none."""
+    return None
+
+
+def check_robot(
+    path: Path,
+    table: Any,
+    robot: Robot,
+    changed: str = _TWICE,
+    line_of: Callable[[str], int | None] = _nowhere,
+) -> tuple[str, ...]:
+    """Check that a model or a diagnosis was made for this robot.
+
+    Args:
+        path: the file.
+        table: its ``[robot]``; None where a person left it out, which is their business.
+        robot: the one it is to be used for.
+        changed: what it means that mass, stiffness and the like have changed.
+        line_of: the line of a key, for errors, in a file that has lines.
+
+    Returns:
+        notes about mass, stiffness and the like that have changed since.
+
+    Raises:
+        InputFileError: another number of cables, points elsewhere, or no numbers.
+    """
+    if table is None:
+        return (f"{path} does not say which robot it was made for",)
+    if not isinstance(table, Mapping):
+        text = f"robot: expected a table [robot], got {table!r}"
+        raise InputFileError.at(path, text, line=line_of("robot"))
+    said = _Said(path, table, line_of)
+    _check_cables(path, table, robot)
+    own = fingerprint(robot)
+    tolerance = _SAME * float(np.max(robot.nominal_lengths(robot.reference_pose[None])))
+    for key in _POINTS:
+        apart = _apart(said, key, own)
+        if np.any(apart > tolerance):
+            raise _elsewhere(path, table, key, apart, robot)
+    notes = []
+    for key in _NOTED:
+        apart = _apart(said, key, own)
+        size = float(np.max(np.abs(np.asarray(own[key], float)))) + tolerance
+        if np.any(apart > 1e-6 * size):
+            notes.append(
+                f"{path} was made when {key} of robot {robot.name} was {_short(table[key])}; now "
+                f"it is {_short(own[key])}: {changed}"
+            )
+    return tuple(notes)
+
+
+def _check_cables(path: Path, table: Mapping[str, Any], robot: Robot) -> None:
+    cables = table.get("cables")
+    if not isinstance(cables, list):
+        return
+    if len(cables) != robot.n_cables:
+        raise InputFileError.at(
+            path,
+            f"made for another robot: {table.get('name', 'one')} with "
+            f"{counted(len(cables), 'cable')}; "
+            f"{robot.name} has {robot.n_cables}; {_ANEW}",
+        )
+
+
+def _apart(said: _Said, key: str, own: Mapping[str, Any]) -> Any:
+    """How far each row of numbers is from the robot's, (k,); 0 where the file has none."""
+    here = np.atleast_1d(np.asarray(own[key], float))
+    if key not in said.table:
+        return np.zeros(len(here))
+    there = _numbers(said.table[key])
+    if there is None or there.shape != here.shape:
+        expected = "a number" if here.size == 1 else f"numbers of shape {here.shape}"
+        got = repr(said.table[key]) if there is None else f"those of shape {there.shape}"
+        raise said.error(key, f"expected {expected}, got {_cut(got)}; leave it out otherwise")
+    apart = np.abs(there - here)
+    return apart.max(axis=1) if apart.ndim == 2 else apart
+
+
+def _numbers(value: Any) -> Any:
+    """As an array; None where they are none, or not finite."""
+    try:
+        array = np.atleast_1d(np.asarray(value, float))
+    except (TypeError, ValueError):
+        return None
+    return array if np.all(np.isfinite(array)) else None
+
+
+def _cut(text: str) -> str:
+    """The beginning of what may be long."""
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]} ..."
+
+
+def _elsewhere(
+    path: Path, table: Mapping[str, Any], key: str, apart: Any, robot: Robot
+) -> InputFileError:
+    name = table.get("name", "one")
+    k = int(np.argmax(apart))
+    if key == "reference_pose":
+        what = f"its reference pose is {_short(table[key])}"
+    else:
+        word = key.removesuffix("s_m").replace("_", " ")
+        what = f"the {word} of {robot.cable_names[k]} is {1e3 * float(apart[k]):.3g} mm away"
+    return InputFileError.at(
+        path,
+        f"made for another robot: {name}, not {robot.name}: {what}; {_ANEW}",
+    )
+
+
+def _short(value: Any) -> str:
+    numbers = np.atleast_1d(np.asarray(value, float)).ravel()
+    text = " ".join(f"{v:.6g}" for v in numbers[:7])
+    return f"({text}{' ...' if len(numbers) > 7 else ''})" if len(numbers) > 1 else text

@@ -1,0 +1,32 @@
+"""What callers give for a robot: one that was loaded, or where to load it from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TypeAlias
+
+from seecr.description.mjcf import load_robot
+from seecr.description.robot import Robot
+from seecr.errors import InputError
+
+__all__ = ["GivenRobot", "robot_of"]
+
+GivenRobot: TypeAlias = Robot | str | Path
+"""A robot, the path of its MJCF, or the name of a shipped one."""
+
+
+def robot_of(given: GivenRobot) -> Robot:
+    """The robot, read if need be.
+
+    Raises:
+        RobotError: no such file, or no cable robot in it.
+        InputError: neither a robot nor where one is.
+    """
+    if isinstance(given, Robot):
+        return given
+    if isinstance(given, str | Path):
+        return load_robot(given)
+    raise InputError(
+        "expected a robot, the path of its MJCF or the name of a shipped one, got "
+        f"{type(given).__name__}"
+    )

@@ -1,0 +1,108 @@
+"""Platforms on slide and hinge joints: joint values of poses, and poses of joint values."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from seecr.description.robot import Robot
+from seecr.errors import InputError
+from seecr.pose import (
+    Array,
+    cross,
+    pose_difference,
+    quat_from_rotvec,
+    quat_multiply,
+    quat_rotate,
+)
+
+# A commanded pose may miss the joints' manifold by this, relative to the robot's length.
+_OFF_MANIFOLD = 1e-6
+
+
+def pose_of_values(robot: Robot, values: Array) -> tuple[Array, Array]:
+    """Poses (n, 7) and joints as they stand there (n, d, 7) for joint values (n, d) [m, rad].
+
+    A joint is a row of kind (0 slide, 1 hinge), axis and point in the base frame. The first
+    joint is the outermost, as in MJCF (product of exponentials from the reference pose).
+    """
+    values = np.atleast_2d(np.asarray(values, float))
+    n = len(values)
+    turn = np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
+    shift = np.zeros((n, 3))  # x -> turn(x - o) + o + shift, o the reference position
+    origin = robot.reference_pose[:3]
+    screws = np.zeros((n, len(robot.joints), 7))
+    for j, joint in enumerate(robot.joints):
+        axis = quat_rotate(turn, joint.axis)
+        point = quat_rotate(turn, joint.point - origin) + origin + shift
+        screws[:, j, 0] = 1.0 if joint.kind == "hinge" else 0.0
+        screws[:, j, 1:4], screws[:, j, 4:7] = axis, point
+        if joint.kind == "slide":
+            shift = shift + axis * values[:, j : j + 1]
+            continue
+        own = quat_from_rotvec(axis * values[:, j : j + 1])
+        shift = point + quat_rotate(own, origin + shift - point) - origin
+        turn = quat_multiply(own, turn)
+    quat = quat_multiply(turn, robot.reference_pose[3:])
+    return np.concatenate([origin + shift, quat], axis=1), screws
+
+
+def values_of_pose(robot: Robot, poses: Array) -> tuple[Array, Array]:
+    """Joint values (n, d) that bring the platform to poses (n, 7), and the joints there.
+
+    Raises:
+        InputError: a pose that the joints cannot reach.
+    """
+    poses = np.atleast_2d(np.asarray(poses, float))
+    values = _nearest(robot, poses)
+    reached, screws = pose_of_values(robot, values)
+    off = _off_joints(robot, poses, reached)
+    if off is not None:
+        raise InputError(
+            f"robot {robot.name}: commanded pose {off[0]} is off what its joints can reach, by "
+            f"{off[1]}; expected a pose on the joints"
+        )
+    return values, screws
+
+
+def _nearest(robot: Robot, poses: Array) -> Array:
+    """Joint values (n, d) that bring the platform nearest to poses (n, 7), by Newton steps."""
+    values, before = np.zeros((len(poses), len(robot.joints))), np.inf
+    for _ in range(50):
+        reached, screws = pose_of_values(robot, values)
+        miss = pose_difference(poses, reached)
+        columns = motion_columns(screws, reached[:, :3])
+        step = np.einsum("nkd,nd->nk", np.linalg.pinv(columns), miss)
+        values = values + step
+        size = float(np.max(np.abs(step) / (1.0 + np.abs(values)), initial=0.0))
+        # so near to the end steps that do not fall are rounding
+        if size < 1e-14 or 0.5 * before <= size < 1e-12:
+            break
+        before = size
+    return values
+
+
+def _off_joints(robot: Robot, poses: Array, reached: Array) -> tuple[int, str] | None:
+    """The row that is furthest off what the joints can reach, and by how much; None if none is."""
+    miss = np.abs(pose_difference(poses, reached)) / np.repeat([robot.length, 1.0], 3)
+    if not np.any(miss > _OFF_MANIFOLD):
+        return None
+    row, part = np.unravel_index(np.argmax(miss), miss.shape)
+    size = miss[row, part] * (robot.length if part < 3 else 1.0)
+    return int(row), f"{size:.3g} {'m' if part < 3 else 'rad'} in {'xyz'[part % 3]}"
+
+
+def off_joints(robot: Robot, poses: Array) -> tuple[int, str] | None:
+    """The row of poses (n, 7) that is furthest off what the joints can reach, and by how much.
+
+    None where all can be reached; a platform with a free joint reaches all.
+    """
+    if not robot.joints:
+        return None
+    return _off_joints(robot, poses, pose_of_values(robot, _nearest(robot, poses))[0])
+
+
+def motion_columns(screws: Array, position: Array) -> Array:
+    """Change of poses at positions (n, 3) by their joint values, (n, 6, d); screws (n, d, 7)."""
+    axis, point, hinge = screws[..., 1:4], screws[..., 4:7], screws[..., :1]
+    linear = np.where(hinge == 1.0, cross(axis, position[:, None] - point), axis)
+    return np.swapaxes(np.concatenate([linear, axis * hinge], axis=-1), 1, 2)

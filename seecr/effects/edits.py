@@ -1,0 +1,42 @@
+"""A setup as effects leave it, one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from threading import Lock
+
+from seecr.effects.base import Effect
+from seecr.effects.checked import edit_setup
+from seecr.effects.setup import Setup
+
+
+class Edits:
+    """What effects make of one setup.
+
+    A fit shifts one parameter after the other: what the effects before it left is kept. Threads
+    may ask at once.
+    """
+
+    def __init__(self, plain: Setup) -> None:
+        self._plain = plain
+        self._kept: list[tuple[Effect, Setup]] = []
+        self._lock = Lock()
+
+    def by(self, effects: Sequence[Effect]) -> Setup:
+        """The setup as the effects leave it, in their order."""
+        with self._lock:
+            return self._by(effects)
+
+    def _by(self, effects: Sequence[Effect]) -> Setup:
+        same = 0
+        for (one, _left), effect in zip(self._kept, effects, strict=False):
+            if one is not effect:
+                break
+            same += 1
+        del self._kept[same:]
+        setup = self._kept[-1][1] if self._kept else self._plain
+        for effect in effects[same:]:
+            setup = setup.shared()
+            edit_setup(effect, setup)
+            self._kept.append((effect, setup))
+        return setup.shared()

@@ -1,0 +1,1 @@
+"""Where the platform comes to rest: one pose, all of them, and the ways between them."""

@@ -1,0 +1,307 @@
+"""Trajectories followed: where the reference pose leads along the commanded way, and its jumps.
+
+A rest moves smoothly with what the winches pay out until it ends, in a fold or where a cable goes
+slack; there the platform jumps to another. From waypoint to waypoint the rest is continued, by
+steps that are halved until it moves as its stiffness says (Allgower and Georg, Introduction to
+Numerical Continuation Methods, 2003, chapter 2); what moves far however small the step is a jump.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seecr.commands.data import Commands
+from seecr.commands.path import Path, path_of
+from seecr.compiled.outcomes import CONVERGED, SINGULAR
+from seecr.description.joints import pose_of_values, values_of_pose
+from seecr.description.robot import Robot
+from seecr.effects.setup import Setup
+from seecr.pose import Array, pose_add, pose_difference
+from seecr.result import COORDINATES, Record, Result, named
+from seecr.statics import batch
+from seecr.statics.solution import Solution, certify
+from seecr.statics.starts import start_of
+from seecr.statics.tables import Tables, assemble, take
+from seecr.units import joules
+
+__all__ = ["Jump", "follow_commands", "moved", "step_between"]
+
+# Between waypoints the command moves by less than this [of the length].
+_WAY = 0.05
+# Smooth is where the rest moves with its command but for the first, or but for the second where the
+# stiffness foretells that within the third; the least part of a waypoint's step that is tried.
+_SMALL, _LARGE, _FORETOLD, _LEAST = 0.005, 0.05, 0.2, 2.0**-20
+# Damping of rotations against translations with which a jump's landing is tried; the first counts.
+_DAMPINGS = (1.0, 0.1, 10.0)
+# Of the flow after a fold: longest step [of the length], end [of the load], steps at most.
+_FLOW, _STILL, _STEPS = 0.05, 1e-6, 2000
+# Of a ridge: what is none [of the largest stiffness], and the touch that ends it [of the length].
+_FLAT, _TOUCH = 1e-10, 1e-3
+
+
+SetupOf = Callable[[Commands, NDArray[np.integer]], Setup]
+"""From waypoints and the row (N,) that each belongs to, to their setup."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Jump(Result):
+    """Where a rest ends on the commanded way.
+
+    Attributes:
+        command: (7,) the commanded pose at which it ends.
+        before: (7,) where the platform rests last.
+        after: (7,) where it comes to rest then; NaN where nothing holds it.
+        energy: [J] set free by it.
+        certain: whether it lands there with rotations damped a tenth, once and ten times as much
+            as translations over the robot's length; inertia is not looked at.
+    """
+
+    command: Array
+    before: Array
+    after: Array
+    energy: float
+    certain: bool
+
+    @property
+    def size(self) -> Array:
+        """(6,) [m, rad] from before to after."""
+        return pose_difference(self.after, self.before)
+
+    def as_json(self) -> Record:
+        """One of a row's ``jumps`` in ``sweep.json``."""
+        return {
+            "command": self.command,
+            "before": self.before,
+            "after": self.after,
+            "energy_J": self.energy,
+            "certain": self.certain,
+        }
+
+    @property
+    def words(self) -> str:
+        """How far it jumps and what that sets free."""
+        if not np.isfinite(self.after).all():
+            return "its rest ends, and nothing holds it then"
+        moved, turned = np.linalg.norm(self.size[:3]), np.linalg.norm(self.size[3:])
+        free = f", {joules(self.energy)} set free" if np.isfinite(self.energy) else ""
+        sure = "" if self.certain else "; where it lands depends on damping"
+        return (
+            f"its rest ends and it jumps by {1e3 * moved:.4g} mm and {np.degrees(turned):.4g} deg"
+            f"{free}{sure}"
+        )
+
+    def lines(self) -> list[str]:
+        """Where it is commanded to, and its words."""
+        place = ", ".join(f"{value:.4g}" for value in self.command[:3])
+        return [f"at command ({place}) m: {self.words}"]
+
+    def records(self) -> Sequence[Record]:
+        """One row: the command, the platform before and after, and what is set free."""
+        poses = (("command_{}", self.command), ("before_{}", self.before), ("after_{}", self.after))
+        record: Record = {}
+        for pattern, pose in poses:
+            record |= named(pattern, COORDINATES, pose)
+        return [{**record, "energy_J": float(self.energy), "certain": self.certain}]
+
+
+def follow_commands(robot: Robot, commands: Commands, setup_of: SetupOf) -> Solution:
+    """Follow each run from the reference pose along the commanded way.
+
+    Args:
+        robot: as described.
+        commands: n rows.
+        setup_of: from waypoints and the row (N,) that each belongs to, to their setup.
+
+    Returns:
+        a :class:`seecr.Solution` with ``jumps``; a row after one without any rest is solved from
+        its own command, as without following.
+    """
+    path = path_of(robot, commands, waypoints=_WAY)
+    tables = assemble(setup_of(path.commands, path.source))
+    way = _Way(robot, path, tables, setup_of)
+    found = batch.Evaluation.empty(len(tables), robot.n_cables, robot.n_dof)
+    jumps: list[list[Jump]] = [[] for _ in range(len(commands))]
+    state = None
+    for k in range(len(tables)):
+        jumped: list[Jump] = []
+        last = None if path.fresh[k] else state
+        now = way.afresh(k) if last is None else way.on(k, last, jumped)
+        batch.put_evaluation(found, np.array([k]), now)
+        state = now if _rests(now) else None
+        jumps[path.source[k]] += jumped
+    solution = certify(robot, take(tables, path.rows), batch.take_evaluation(found, path.rows))
+    return replace(solution, jumps=tuple(tuple(some) for some in jumps))
+
+
+@dataclass(frozen=True, eq=False)
+class _Way:
+    """Waypoints as tables (N), and how the rest goes from one to the next."""
+
+    robot: Robot
+    path: Path
+    tables: Tables
+    setup_of: SetupOf
+
+    def afresh(self, k: int) -> batch.Evaluation:
+        """From the command at waypoint k."""
+        return batch.descend(self._at(k), threads=1)
+
+    def on(self, k: int, state: batch.Evaluation, jumps: list[Jump]) -> batch.Evaluation:
+        """From the rest at waypoint k - 1 to that at k."""
+        pose = batch.platform_poses(self._at(k - 1), state.deviation)
+        along = self._along(k)
+        done, size = 0.0, 1.0
+        while done < 1.0:
+            size = min(size, 1.0 - done)
+            trial = self._between(k, done + size)
+            # as far from its command as it was before
+            start = moved(self.robot, pose, size * along)
+            found = self._descended(trial, start, state.guess)
+            if not self._smooth(trial, start, found):
+                if size > _LEAST:
+                    size *= 0.5
+                    continue
+                found = self._landed(trial, pose, state.guess, jumps)
+                if not _rests(found):
+                    return self.afresh(k)
+            pose = batch.platform_poses(trial, found.deviation)
+            state, done, size = found, done + size, 2.0 * size
+        return state
+
+    def _between(self, k: int, part: float) -> Tables:
+        """The tables at a part of the step to waypoint k.
+
+        On the commanded way itself: a chord of the lengths, a few micrometres off, may lead past
+        a fold on its other side.
+        """
+        row, last, now = np.array([k]), self._at(k - 1), self._at(k)
+        if part == 1.0:
+            return now
+        told, before = self.path.commands.rows(row), self.path.commands.rows(row - 1)
+        pose = moved(self.robot, before.pose, part * self._along(k))
+        lengths = None
+        if told.lengths is not None and before.lengths is not None:
+            lengths = (1.0 - part) * before.lengths + part * told.lengths
+        told = replace(told, pose=pose, lengths=lengths)
+        out = assemble(self.setup_of(told, self.path.source[row]))
+        # another load comes bit by bit
+        load, scale = ((1.0 - part) * a + part * b for a, b in (
+            (last.load, now.load), (last.scale, now.scale),
+        ))  # fmt: skip
+        return replace(out, load=load, scale=scale)
+
+    def _at(self, k: int) -> Tables:
+        return take(self.tables, np.array([k]))
+
+    def _along(self, k: int) -> Array:
+        """The commanded step (1, d) to waypoint k."""
+        poses = self.tables.poses
+        return step_between(self.robot, poses[k : k + 1], poses[k - 1 : k])
+
+    def _descended(self, trial: Tables, pose: Array, guess: Array) -> batch.Evaluation:
+        start, values = start_of(self.robot, trial, pose)
+        return batch.descend(
+            trial, start, threads=1, start_values=values, staged=False, guess=guess
+        )
+
+    def _smooth(self, trial: Tables, pose: Array, found: batch.Evaluation) -> bool:
+        if not _rests(found):
+            return False
+        step = step_between(self.robot, batch.platform_poses(trial, found.deviation), pose)[0]
+        size, length = float(np.linalg.norm(step)), self.robot.length
+        if size <= _SMALL * length:
+            return True
+        at = evaluated(self.robot, trial, pose)
+        told = -np.linalg.lstsq(at.hessian[0], at.gradient[0], rcond=None)[0]
+        off = float(np.linalg.norm(step - told))
+        return size <= _LARGE * length and off <= _FORETOLD * size
+
+    def _landed(
+        self, trial: Tables, pose: Array, guess: Array, jumps: list[Jump]
+    ) -> batch.Evaluation:
+        """Where the platform comes to from a pose that holds it no more."""
+        ends = []
+        for damping in _DAMPINGS:
+            there = _flow(self.robot, trial, pose, damping)
+            ends.append(self._descended(trial, there, guess))
+        places = [batch.platform_poses(trial, end.deviation) for end in ends]
+        first, after = ends[0], places[0][0] if _rests(ends[0]) else np.full(7, np.nan)
+        apart = [np.abs(step_between(self.robot, one, places[0])).max() for one in places]
+        same = all(_rests(end) for end in ends) and max(apart) < _SMALL * self.robot.length
+        if _rests(first) and apart_from(self.robot, places[0], pose) <= _SMALL * self.robot.length:
+            return first
+        energies = [evaluated(self.robot, trial, one).energy[0] for one in (pose, places[0])]
+        lost = energies[0] - energies[1] if _rests(first) else np.inf
+        jumps.append(Jump(trial.poses[0].copy(), pose[0], after, float(lost), same))
+        return first
+
+
+def evaluated(robot: Robot, tables: Tables, poses: Array) -> batch.Evaluation:
+    """Gradient, stiffness and energy with the platform at poses (n, 7)."""
+    at = batch.Evaluation.empty(len(poses), tables.cables.shape[1], tables.n_dof)
+    start, values = start_of(robot, tables, poses)
+    at.deviation[:] = start
+    if values is not None:
+        at.values[:] = values
+    return batch.evaluate(tables, at)
+
+
+def moved(robot: Robot, poses: Array, step: Array) -> Array:
+    """Poses (n, 7) after steps (n, d) [m], rotations times the robot's length."""
+    change = step * np.where(robot.hinges, 1.0 / robot.length, 1.0)
+    if not robot.joints:
+        return pose_add(poses, change)
+    return pose_of_values(robot, values_of_pose(robot, poses)[0] + change)[0]
+
+
+def step_between(robot: Robot, poses: Array, before: Array) -> Array:
+    """Steps (n, d) [m] that take poses (n, 7) to others, rotations times the robot's length."""
+    unit = np.where(robot.hinges, robot.length, 1.0)
+    if not robot.joints:
+        return pose_difference(poses, before) * unit
+    return (values_of_pose(robot, poses)[0] - values_of_pose(robot, before)[0]) * unit
+
+
+def _flow(robot: Robot, tables: Tables, pose: Array, damping: float) -> Array:
+    """Down the energy as an overdamped platform goes, to where it stands still, (1, 7).
+
+    Linearly implicit steps of the flow: where the energy is steep they are short, in the end they
+    are Newton's.
+    """
+    weight = np.where(robot.hinges, damping, 1.0)
+    for _ in range(_STEPS):
+        at = evaluated(robot, tables, pose)
+        if not np.isfinite(at.gradient).all():
+            break
+        # in units in which the damping is one
+        root = 1.0 / np.sqrt(weight)
+        values, vectors = np.linalg.eigh(at.hessian[0] * root[:, None] * root[None, :])
+        slope = vectors.T @ (at.gradient[0] * root)
+        if at.residual[0] < _STILL:
+            if values[0] > -_FLAT * values[-1]:
+                break
+            # balanced on a ridge: the slightest touch makes it leave
+            pose = moved(robot, pose, _TOUCH * robot.length * (root * vectors[:, 0])[None])
+            continue
+        # 1/time of the step: soft or falling directions must not outrun the steep ones
+        pace = max(2.0 * max(-float(values[0]), 0.0), 1e-9 * float(values[-1]))
+        while True:
+            step = -root * (vectors @ (slope / (values + pace)))
+            if np.linalg.norm(step) <= _FLOW * robot.length:
+                break
+            pace = 2.0 * max(pace, 1e-12)
+        pose = moved(robot, pose, step[None])
+    return pose
+
+
+def apart_from(robot: Robot, pose: Array, other: Array) -> float:
+    """How far two poses (1, 7) are apart [m], rotations times the robot's length."""
+    return float(np.linalg.norm(step_between(robot, pose, other)))
+
+
+def _rests(found: batch.Evaluation) -> bool:
+    return int(found.outcome[0]) in (CONVERGED, SINGULAR)

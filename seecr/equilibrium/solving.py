@@ -1,0 +1,167 @@
+"""Where the platform comes to rest: ``solve`` for a batch of commands."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from seecr.arguments import finite
+from seecr.commands.data import Commands
+from seecr.counted import counted
+from seecr.description.given import GivenRobot, robot_of
+from seecr.description.robot import Robot
+from seecr.effects.checked import edit_setup
+from seecr.effects.setup import Setup, plain_setup
+from seecr.equilibrium.following import follow_commands
+from seecr.equilibrium.multiple import other_rests
+from seecr.equilibrium.search import solve_setup
+from seecr.errors import InputError
+from seecr.pose import Array
+from seecr.prediction.experiment import Experiment, effects_of
+from seecr.statics.solution import Solution
+from seecr.statics.starts import commanded_poses
+
+if TYPE_CHECKING:
+    from seecr.prediction.model import GivenEffects
+
+METHODS = ("newton", "fsolve", "least_squares")
+
+
+def solve(
+    robot: GivenRobot,
+    poses: Commands | ArrayLike | None = None,
+    *,
+    rest_lengths: ArrayLike | None = None,
+    effects: GivenEffects = (),
+    method: str = "newton",
+    wrench: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+    start: ArrayLike | None = None,
+    max_iterations: int = 400,
+    threads: int | None = None,
+    others: bool = False,
+    follow: bool = False,
+) -> Solution:
+    """Find where the platform rests (paper, section III-B) for a batch of commands.
+
+    Args:
+        robot: from :func:`seecr.load_robot`, its MJCF, or made by hand.
+        poses: (n, 7) or (7,) commanded poses; the winches pay out the straight lengths there
+            (eqs 1, 2). Or :class:`seecr.Commands` with runs, times, lengths.
+        rest_lengths: (n, m) or (m,) [m] instead of, or beside, the poses: then the poses are
+            only where the search starts, the reference pose by default.
+        effects: what the robot has beyond the paper's plain one: a model, its file, or effects
+            with values. Where one has history, rows are solved in order.
+        method: ``"newton"`` follows the energy downhill, compiled; ``"fsolve"`` and
+            ``"least_squares"`` are the paper's own, on SciPy with its first guess (step 4).
+        wrench: (6,) or (n, 6) external force [N] at the platform origin and moment [N m].
+        gravity: (3,) [m/s^2] instead of the robot's.
+        start: (n, 7) poses to start from instead of the commanded ones.
+        max_iterations: most evaluations of the wrench, per pose and stage of stiffness.
+        threads: one per processor by default.
+        others: look for the other stable equilibria of each command too, a tenth of a second or
+            more for each; they are then the solution's ``others``.
+        follow: go from the reference pose along the commanded way, run by run, from rest to rest,
+            instead of searching from each command; where a rest ends on the way, and where the
+            platform jumps to, are the solution's ``jumps``.
+
+    Returns:
+        a :class:`Solution`; look at ``status`` or ``converged`` before using a pose.
+
+    Raises:
+        InputError: shapes, values that are not finite, an unknown method, arguments that do not
+            go together or are something else.
+    """
+    if method not in METHODS:
+        raise InputError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
+    if max_iterations < 1:
+        raise InputError(f"max_iterations must be at least 1, got {max_iterations}")
+    robot = robot_of(robot)
+    if gravity is not None:
+        robot = replace(robot, gravity=_array(gravity, (3,), "gravity"))
+    commands = _commands(robot, poses, rest_lengths)
+    acting = effects_of(effects, robot)
+    pushed = None if wrench is None else finite(wrench, "wrench")
+
+    def setup_of(rows: Commands, push: Array | None) -> Setup:
+        setup = plain_setup(robot, rows, push)
+        for effect in acting:
+            edit_setup(effect, setup)
+        return setup
+
+    setup = setup_of(commands, pushed)
+    if setup.has_history or setup.laws:
+        if follow:
+            raise InputError(
+                "effects with a memory or with a law of their own are solved along the way anyhow; "
+                "expected no follow beside them"
+            )
+        if method != "newton" or start is not None or wrench is not None or others:
+            raise InputError(
+                "effects with history or with a law of their own are solved along the way; "
+                "expected no other method, no start, no others, and external_wrench "
+                "among the effects instead of wrench"
+            )
+        found = Experiment(robot, commands).predict(acting).solution()
+        return replace(found, line=commands.line)
+    starts = None
+    if start is not None:
+        starts = commanded_poses(start, "start")
+        if len(starts) != len(commands):
+            raise InputError(f"start must have {counted(len(commands), 'pose')}, got {len(starts)}")
+    pushes = np.broadcast_to(np.zeros(6) if pushed is None else pushed, (len(commands), 6))
+    if follow:
+        if method != "newton" or start is not None:
+            raise InputError(
+                "follow goes from the reference pose downhill; expected no other method and no "
+                "start"
+            )
+        found = follow_commands(robot, commands, lambda way, row: setup_of(way, pushes[row]))
+    else:
+        found = solve_setup(setup, method, starts, max_iterations, threads)
+    found = replace(found, line=commands.line)
+    if not others:
+        return found
+
+    def repeated(i: int, n: int) -> Setup:
+        return setup_of(commands.rows(np.full(n, i)), pushes[i])
+
+    return replace(found, others=other_rests(found, repeated))
+
+
+def _commands(
+    robot: Robot, poses: Commands | ArrayLike | None, lengths: ArrayLike | None
+) -> Commands:
+    if isinstance(poses, Commands):
+        if lengths is not None:
+            raise InputError("commands have their own lengths; expected no rest_lengths beside")
+        return poses
+    if lengths is None:
+        if poses is None:
+            raise InputError("solve needs commanded poses (n, 7) or rest_lengths (n, m); got none")
+        return Commands(commanded_poses(poses))
+    table = np.atleast_2d(finite(lengths, "rest_lengths"))
+    if table.ndim != 2 or table.shape[1] != robot.n_cables:
+        raise InputError(
+            f"rest_lengths must be (n, {robot.n_cables}) for {robot.name}, got {np.shape(lengths)}"
+        )
+    if np.any(table <= 0):
+        raise InputError("rest_lengths must be positive [m]")
+    start = robot.reference_pose[None] if poses is None else commanded_poses(poses)
+    if len(start) not in (1, len(table)):
+        raise InputError(
+            f"poses must be one or as many as the {counted(len(table), 'row')} of rest_lengths, "
+            f"got {len(start)}"
+        )
+    rows = np.broadcast_to(start, (len(table), 7)).copy()
+    return Commands(rows, lengths=table)
+
+
+def _array(values: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
+    array = finite(values, name)
+    if array.shape != shape:
+        raise InputError(f"{name} must be {shape}, got {array.shape}")
+    return array

@@ -1,0 +1,1 @@
+"""What holds a platform at a given pose: tensions within limits, and rest lengths."""

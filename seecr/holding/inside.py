@@ -1,0 +1,341 @@
+"""The tensions farthest inside their limits that hold platforms, where pulls bend with their size.
+
+A linear program finds them where balance is linear in the tensions. Where it is not, each round
+takes balance about the tensions that the last one found, and solves again (sequential linear
+programming): at the end balance holds exactly at the tensions found.
+
+A cable with weight never has no tension. The less it is to pull, the longer it hangs, and below
+about its own weight its tension says nothing any more: there a measure takes its place that goes on
+falling with the length.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seecr.compiled.columns import REST, TENSION, WEIGHT
+from seecr.holding.balance import (
+    balance_of,
+    bends,
+    first_tensions,
+    here,
+    loose_rest,
+    next_rest,
+    rates_of,
+    tightness,
+    with_rest,
+)
+from seecr.holding.distribution import balanced, distribute
+from seecr.holding.hanging import bridged_lengths, least_of_heavy, rest_for
+from seecr.pose import Array
+from seecr.statics import batch
+from seecr.statics.tables import Tables, take
+from seecr.threads import in_parts
+
+# Rounds at most, from which on steps are halved, and what ends them [of load].
+_ROUNDS, _HALVED, _ENOUGH = 14, 7, 1e-10
+# Balance is taken where every cable pulls at least this part of its share of the load.
+_PULLS = 1e-3
+# Part of the load that may stay unbalanced where the matrix has no inverse.
+_BALANCED = 1e-9
+# How tight a cable hangs at least [of its weight]: it is half as long again as its way then.
+_LOOSEST = 12.0**-0.5
+# Hanging loosely gains less than this many weights of a cable.
+_GAINED = 2.0
+# Rounds with cables that hang loosely, balance [of load] at the end, what tensions may be off.
+_NEWTON, _EXACT, _OFF = 30, 1e-12, 1e-9
+# Attempts with fewer and fewer of them.
+_AGAIN = 4
+
+
+@dataclass(eq=False)
+class Inside:
+    """Tensions farthest inside their limits, of n poses.
+
+    Attributes:
+        margins: (n,) [N] how far; below zero where limits have to be passed; infinite where cables
+            can be tightened without end; minus infinity where nothing balances. Zero where a pose
+            is held with cables that hang loosely alone.
+        tensions: (n, m) [N], NaN where they have no end or nothing balances.
+        rest: (n, m) [m] lengths about which balance was taken: those of the tensions, where these
+            are within the limits.
+        matrices, loads: (n, d, m), (n, d) [N] balance there, torques over a length.
+        low, high: (n, m) [N] the limits: cables that do not hang loosely pull what they weigh.
+        loose: (n,) bool, held by ``rest``, with cables that pull less than they weigh.
+    """
+
+    margins: Array
+    tensions: Array
+    rest: Array
+    matrices: Array
+    loads: Array
+    low: Array
+    high: Array
+    loose: NDArray[np.bool_]
+
+
+def limits_of(tables: Tables, low: Array, high: Array) -> tuple[Array, Array]:
+    """Limits (n, m) [N] of tensions, from those asked for, (m,) or (n, m): none below its weight.
+
+    Nothing is between them where a cable may not pull as much as it weighs.
+    """
+    shape = tables.cables.shape[:2]
+    least = np.maximum(np.broadcast_to(low, shape), least_of_heavy(tables))
+    return least, np.array(np.broadcast_to(high, shape), float)
+
+
+def farthest_inside(tables: Tables, low: Array, high: Array, hopeless: float = np.inf) -> Inside:
+    """The tensions that stay farthest inside limits, exactly where pulls bend, too.
+
+    Args:
+        tables: of n poses, whose own rest lengths do not matter; as many cables as freedoms.
+        low, high: (m,) or (n, m) [N].
+        hopeless: rows that are, after a round of their own, farther outside than this part of the
+            load are left at that.
+    """
+    out = _tightened(tables, *limits_of(tables, low, high), hopeless)
+    weighs = least_of_heavy(tables)
+    could = (weighs > low) & (weighs <= high)
+    lost = (out.margins < 0.0) & (out.margins > -_GAINED * weighs.max(axis=1)) & could.any(axis=1)
+    rows = np.flatnonzero(lost)
+    if len(rows):
+        asked = [np.array(np.broadcast_to(one, weighs.shape)[rows]) for one in (low, high)]
+        _loosen(out, rows, take(tables, rows), could[rows], asked[0], asked[1])
+    return out
+
+
+def balances(
+    tables: Tables, low: Array, high: Array
+) -> Iterator[tuple[Array, Array, Array, Array]]:
+    """Of each pose the balance that its tensions come nearest to, for a reason why they do not.
+
+    Args:
+        tables: of n poses.
+        low, high: (m,) limits that are asked for [N].
+
+    Yields:
+        matrix (d, m), load (d,) [N], and limits (m,) [N] of those that do not hang loosely.
+    """
+    if tables.cables.shape[1] >= tables.n_dof and bends(tables):
+        found = farthest_inside(tables, low, high)
+        yield from zip(found.matrices, found.loads, found.low, found.high, strict=True)
+    else:
+        rows = balance_of(tables, low), limits_of(tables, low, high)
+        yield from zip(*rows[0], *rows[1], strict=True)
+
+
+def _tightened(tables: Tables, least: Array, most: Array, hopeless: float) -> Inside:
+    """See :func:`farthest_inside`; with limits (n, m) that no cable passes by hanging loosely."""
+    n, m = tables.cables.shape[:2]
+    pulls = np.maximum(least, _PULLS * tables.scale[:, None] / m)
+    first = rest_for(tables, first_tensions(tables, least))
+    out = Inside(
+        np.full(n, np.nan), np.full((n, m), np.nan), first,
+        np.zeros((n, tables.n_dof, m)), np.zeros((n, tables.n_dof)), least, most,
+        np.zeros(n, dtype=bool),
+    )  # fmt: skip
+    rows, bent, start = np.arange(n), bends(tables), here(tables)
+    for k in range(_ROUNDS if bent else 1):
+        now = with_rest(take(tables, rows), out.rest[rows])
+        at = batch.evaluate(now, batch.take_evaluation(start, rows), threads=None)
+        batch.put_evaluation(start, rows, at)
+        rates, own = rates_of(now, at), at.states[..., TENSION]
+        out.matrices[rows], out.loads[rows] = rates.by_tension, rates.load(at)
+        out.margins[rows], out.tensions[rows] = innermost(
+            rates.by_tension, out.loads[rows], least[rows], most[rows], now.scale
+        )
+        if not bent:
+            break
+        found = out.tensions[rows]
+        wanted = np.where(np.isnan(found), own, np.fmax(found, pulls[rows]))
+        wanted = wanted if k < _HALVED else 0.5 * (wanted + own)
+        rest = next_rest(now, out.rest[rows], rates.by_length, own, wanted)
+        go = np.abs(wanted - own).max(axis=1) > _ENOUGH * now.scale
+        go &= np.isfinite(rest).all(axis=1)
+        if k > 0:
+            go &= ~(out.margins[rows] < -hopeless * now.scale)
+        rows = rows[go]
+        if len(rows) == 0:
+            break
+        out.rest[rows] = rest[go]
+    return out
+
+
+@dataclass(eq=False)
+class _Line:
+    """Balance of n poses, linear in one value per cable: its tension, or how tight it hangs.
+
+    Attributes:
+        tables: with the rest lengths about which it is linear.
+        value: (n, m) [N] there. loose: (n, m) bool, it is how tight the cable hangs.
+        tension: (n, m) [N]; by_length: (n, m) [N/m] of it by the rest length.
+        matrix, load: (n, d, m), (n, d) [N] matrix value = load.
+    """
+
+    tables: Tables
+    value: Array
+    loose: NDArray[np.bool_]
+    tension: Array
+    by_length: Array
+    matrix: Array
+    load: Array
+
+    def rest_for(self, wanted: Array) -> Array:
+        """Rest lengths (n, m) [m] for other values."""
+        law = self.tables
+        rest = law.cables[..., REST]
+        tight = next_rest(
+            law, rest, self.by_length, self.tension, np.where(self.loose, self.tension, wanted)
+        )
+        return np.where(self.loose, loose_rest(law, np.where(self.loose, wanted, 1.0))[0], tight)
+
+
+def _line_about(tables: Tables, at: batch.Evaluation, size: Array) -> _Line:
+    """Balance about an evaluation.
+
+    Args:
+        tables: of n poses.
+        at: an evaluation of them.
+        size: (n, m) [N] how tight cables hang that may do so loosely, NaN of all others.
+    """
+    rates, loose, tension = rates_of(tables, at), ~np.isnan(size), at.states[..., TENSION]
+    value = np.where(loose, size, tension)
+    longer = loose_rest(tables, np.where(loose, size, 1.0))[1]
+    matrix = np.where(loose[:, None], rates.pull * longer[:, None], rates.by_tension)
+    load = np.einsum("ndm,nm->nd", matrix, value) - at.gradient
+    return _Line(tables, value, loose, tension, rates.by_length, matrix, load)
+
+
+def _loosen(
+    out: Inside, rows: NDArray[np.intp], tables: Tables, loose: NDArray[np.bool_], low: Array,
+    high: Array,
+) -> None:  # fmt: skip
+    """Hold rows with cables that hang loosely, where that holds them.
+
+    By Newton's method with the least change of all cables, from the tensions farthest inside.
+
+    Args:
+        out: filled in there.
+        rows: (k,) of it; tables: of these.
+        loose: (k, m) cables that may, low, high: (k, m) [N] the tensions that are asked for.
+    """
+    weight = tables.cables[..., WEIGHT] * bridged_lengths(tables)
+    least, first = np.where(loose, _LOOSEST * weight, out.low[rows]), out.rest[rows]
+    room, left = _OFF * tables.scale[:, None], np.arange(len(rows))
+    for _ in range(_AGAIN):
+        part = take(tables, left)
+        rest, tension, held = _hang(part, loose[left], least[left], high[left], first[left])
+        under = tension < low[left] - room[left]
+        fine = held & ~(under | (tension > high[left] + room[left])).any(axis=1)
+        to = rows[left[fine]]
+        out.margins[to], out.loose[to] = 0.0, True
+        out.rest[to], out.tensions[to] = rest[fine], tension[fine]
+        # once more, with those that pulled too little as tight as they have to be
+        under &= loose[left] & ~fine[:, None]
+        again = under.any(axis=1)
+        left, under = left[again], under[again]
+        if len(left) == 0:
+            return
+        loose[left] &= ~under
+        least[left] = np.where(under, low[left], least[left])
+
+
+def _hang(
+    tables: Tables, loose: NDArray[np.bool_], least: Array, high: Array, first: Array
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Newton's method for :func:`_loosen`, from rest lengths (n, m) [m].
+
+    Returns:
+        rest lengths, tensions (n, m) [N], and (n,) whether they are in balance.
+    """
+    size, rest = np.where(loose, tightness(tables, first), np.nan), first.copy()
+    left, start = np.arange(len(rest)), here(tables)
+    for _ in range(_NEWTON):
+        now = with_rest(take(tables, left), rest[left])
+        at = batch.evaluate(now, batch.take_evaluation(start, left), threads=None)
+        batch.put_evaluation(start, left, at)
+        line = _line_about(now, at, size[left])
+        upper = np.where(line.loose, line.value + high[left] - line.tension, high[left])
+        upper = np.maximum(upper, least[left])
+        value, possible = distribute(line.matrix, line.load, line.value, least[left], upper)
+        longer = line.rest_for(value)
+        go = possible & np.isfinite(longer).all(axis=1) & (at.residual > _EXACT)
+        left = left[go]
+        if len(left) == 0:
+            break
+        rest[left], size[left] = longer[go], np.where(line.loose, value, np.nan)[go]
+    held = (start.residual <= _EXACT) & np.all(~(size < least), axis=1)
+    return rest, start.states[..., TENSION], held
+
+
+def innermost(
+    matrices: Array, loads: Array, low: Array, high: Array, scale: Array
+) -> tuple[Array, Array]:
+    """Margins (n,) and tensions (n, m) [N] of balances A tau = load, as :class:`Inside` has them.
+
+    Args:
+        matrices: (n, d, m), loads: (n, d) [N]. low, high: (n, m) [N]. scale: (n,) [N].
+    """
+    from seecr.compiled.margin import innermost_of  # takes a while to import
+
+    n = len(matrices)
+    margins, tensions = np.full(n, np.nan), np.full(low.shape, np.nan)
+    whole, load = np.ascontiguousarray(matrices), np.ascontiguousarray(loads)
+    low, high = np.ascontiguousarray(low), np.ascontiguousarray(high)
+    if matrices.shape[2] >= matrices.shape[1]:
+        in_parts(
+            lambda part: innermost_of(
+                whole[part], load[part], low[part], high[part], scale[part], margins[part],
+                tensions[part],
+            ),
+            n,
+        )  # fmt: skip
+    for r in np.flatnonzero(np.isnan(margins)):
+        margins[r], tensions[r] = _by_search(whole[r], load[r], low[r], high[r])
+    return margins, tensions
+
+
+def _by_search(matrix: Array, load: Array, low: Array, high: Array) -> tuple[float, Array]:
+    """The same of one pose where W has no inverse: no margin if a search finds tensions."""
+    if np.all(high >= low) and np.isfinite(matrix).all() and np.isfinite(load).all():
+        tensions, left = balanced(matrix, load, low, high)
+        if left < _BALANCED:
+            return 0.0, tensions
+    return -np.inf, np.full(len(low), np.nan)
+
+
+def raised(tables: Tables, low: Array, high: Array) -> Array:
+    """(n, m) [N] lower limits: no length takes a hanging cable's tension to nothing."""
+    floor = least_of_heavy(tables)
+    return np.where(floor < high, np.maximum(low, floor), low)
+
+
+def counted_balance(
+    tables: Tables, low: Array, high: Array, about: Array | None = None
+) -> tuple[Array, Array]:
+    """:func:`balance_of` for tensions counted so that hanging cables have the limits, too.
+
+    Counted tensions go from ``low`` to ``high`` where those go from what such a cable needs, which
+    changes with the pose, to ``high``; those of others are as they are.
+
+    Args:
+        tables: of n poses.
+        low, high: (m,) limits [N].
+        about: (n, m) counted, or None for tensions that come nearest to balance.
+    """
+    least = raised(tables, low, high)
+    if not np.any(least > low):
+        return balance_of(tables, low, about)
+    room = np.ones_like(least)
+    np.divide(high - least, high - low, out=room, where=np.isfinite(high) & (least > low))
+    if about is None:
+        matrix, load = balance_of(tables, least)
+        tensions = distribute(matrix, load, least, least, high)[0]
+    else:
+        tensions = least + room * (about - low)
+    matrix, load = balance_of(tables, low, tensions)
+    return matrix * room[:, None], load - np.einsum("ndm,nm->nd", matrix, least - room * low)

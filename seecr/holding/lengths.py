@@ -1,0 +1,180 @@
+"""Rest lengths that hold platforms at given poses: the elastic statics, the other way round.
+
+At a given pose the tensions follow from balance, W tau = -w (paper, eq 3), as near to wanted ones
+as limits allow, and rest lengths from each cable's law, l0 = l/(1 + tau/(E S)) for a plain one.
+Where a pull's direction depends on its size (sag, yielding exit points), Newton's method brings
+both together, with the law's own derivatives.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seecr.compiled.columns import STRAIN, TENSION
+from seecr.holding.balance import Rates, bends, first_tensions, here, next_rest, rates_of, with_rest
+from seecr.holding.distribution import distribute
+from seecr.holding.hanging import bridged_lengths, rest_for
+from seecr.holding.inside import Inside, farthest_inside, limits_of
+from seecr.pose import Array
+from seecr.statics import batch
+from seecr.statics.tables import Tables, take
+
+# Rounds of Newton's method; balance to this part of the load ends them.
+_ROUNDS, _BALANCED = 40, 1e-12
+# Where no tensions balance, as linearised, what lacks at least is to fall by this factor.
+_NEARS = 0.5
+# Rounds for whether a pose is firm, asked of many.
+_FEW = 14
+# A slack cable is this much longer than the way it bridges: it needs a margin, not a value.
+_MARGIN = 2e-3
+# A stiffness below this part of the largest is none.
+_FIRM = 1e-12
+# Below this part of the load a tension is none.
+_NONE = 1e-9
+# Parts of the way from an aim to the tensions farthest inside, at which a pose is tried once more.
+_PARTS = (0.0, 0.5, 0.75, 0.9, 1.0)
+# Limits without an end are so many loads apart; a pose this part of the load outside is left.
+_TIGHT, _HOPELESS = 30.0, 0.1
+
+
+@dataclass(eq=False)
+class Held:
+    """Rest lengths that hold n poses.
+
+    Attributes:
+        rest: (n, m) [m].
+        tensions: (n, m) [N].
+        strains: (n, m).
+        fine: (n,) bool, the pose can be held within the limits.
+    """
+
+    rest: Array
+    tensions: Array
+    strains: Array
+    fine: NDArray[np.bool_]
+
+    def only(self, rows: NDArray[np.bool_]) -> Held:
+        """Some rows (n,)."""
+        return Held(self.rest[rows], self.tensions[rows], self.strains[rows], self.fine[rows])
+
+    def put(self, rows: NDArray[np.intp], other: Held) -> None:
+        """Put rows of another in their place."""
+        self.rest[rows], self.tensions[rows] = other.rest, other.tensions
+        self.strains[rows], self.fine[rows] = other.strains, other.fine
+
+
+def hold(tables: Tables, aim: Array, low: Array, high: Array, rounds: int = _ROUNDS) -> Held:
+    """Find rest lengths with which the poses of ``tables`` are in balance.
+
+    Args:
+        tables: of n poses, whose own rest lengths do not matter.
+        aim: (n, m) tensions wanted [N].
+        low, high: (m,) limits [N]; no cable hangs with less tension than it weighs.
+        rounds: at most, of Newton's method.
+    """
+    least, most = limits_of(tables, low, high)
+    out = _hold(tables, aim, least, most, rounds, rest_for(tables, first_tensions(tables, least)))
+    lost = np.flatnonzero(~out.fine)
+    if len(lost) and tables.cables.shape[1] >= tables.n_dof and bends(tables):
+        _from_inside(out, lost, tables, aim, rounds, low, (least, most))
+    return out
+
+
+def _from_inside(
+    out: Held, rows: NDArray[np.intp], tables: Tables, aim: Array, rounds: int,
+    low: Array, limits: tuple[Array, Array],
+) -> None:  # fmt: skip
+    """Hold rows from tensions farthest inside the limits, where these bend on the way to others.
+
+    The aim comes to those tensions, which hold, as far as it has to.
+    """
+    least, most = limits
+    # without an end, far enough for every cable to be tight
+    end = np.minimum(most, least + _TIGHT * tables.scale[:, None])
+    start = farthest_inside(take(tables, rows), low, end[rows], _HOPELESS)
+    _put_loose(out, rows[start.loose], take(tables, rows[start.loose]), start)
+    held = ~start.loose & (start.margins >= -_NONE * tables.scale[rows])
+    some, inside, rest = rows[held], start.tensions[held], start.rest[held]
+    for part in _PARTS:
+        if len(some) == 0:
+            return
+        wanted = (1.0 - part) * np.clip(aim[some], least[some], most[some]) + part * inside
+        found = _hold(take(tables, some), wanted, least[some], most[some], rounds, rest)
+        out.put(some[found.fine], found.only(found.fine))
+        some, inside, rest = some[~found.fine], inside[~found.fine], rest[~found.fine]
+
+
+def _put_loose(out: Held, rows: NDArray[np.intp], tables: Tables, start: Inside) -> None:
+    """Put rows that are held with cables that hang loosely: as tight as they can."""
+    if len(rows):
+        now = with_rest(tables, start.rest[start.loose])
+        at = batch.evaluate(now, here(now), threads=None)
+        states = at.states[..., TENSION], at.states[..., STRAIN]
+        out.put(rows, Held(start.rest[start.loose], *states, np.ones(len(rows), dtype=bool)))
+
+
+def _hold(tables: Tables, aim: Array, least: Array, most: Array, rounds: int, rest: Array) -> Held:
+    """See :func:`hold`, with limits (n, m) and rest lengths (n, m) [m] to start from."""
+    n, m = tables.cables.shape[:2]
+    out = Held(rest.copy(), np.zeros((n, m)), np.zeros((n, m)), np.zeros(n, dtype=bool))
+    rows, known, wanted = np.arange(n), None, out.tensions
+    start, short = here(tables), np.full(n, np.inf)
+    for _ in range(rounds):
+        now = with_rest(take(tables, rows), out.rest[rows])
+        at = batch.evaluate(now, batch.take_evaluation(start, rows), threads=None)
+        batch.put_evaluation(start, rows, at)
+        missed = np.abs(at.states[..., TENSION] - wanted).max(axis=1)
+        fine = (at.residual <= _BALANCED) & (missed <= _NONE * now.scale)
+        out.fine[rows] = fine
+        rows, now, at = rows[~fine], take(now, ~fine), batch.take_evaluation(at, ~fine)
+        if len(rows) == 0:
+            break
+        rates = rates_of(now, at)
+        if known is not None:
+            # a cable that is just slack has no rates: those of when it pulled are near
+            idle = rates.by_length >= 0.0
+            rates.by_tension = np.where(idle[:, None, :], known.by_tension[rows], rates.by_tension)
+            rates.by_length = np.where(idle, known.by_length[rows], rates.by_length)
+        else:
+            known = Rates(rates.by_tension.copy(), rates.by_length.copy(), rates.pull)
+        known.by_tension[rows], known.by_length[rows] = rates.by_tension, rates.by_length
+        load = rates.load(at)
+        wanted, possible = distribute(rates.by_tension, load, aim[rows], least[rows], most[rows])
+        tensions = at.states[..., TENSION]
+        longer = next_rest(now, out.rest[rows], rates.by_length, tensions, wanted)
+        # tensions that come near may balance where pulls are as those make them
+        before, lack = short[rows], np.einsum("ndm,nm->nd", rates.by_tension, wanted) - load
+        short[rows] = np.abs(lack).max(axis=1)
+        nears = possible | (short[rows] < _NEARS * before)
+        going = nears & np.isfinite(longer).all(axis=1)
+        out.rest[rows[going]] = longer[going]
+        rows, wanted = rows[going], wanted[going]
+    out.tensions, out.strains = start.states[..., TENSION], start.states[..., STRAIN]
+    # rounding may keep a row that is in balance to nine digits from the last ones
+    out.fine |= (start.residual < 1e-10) & _within(out.tensions, least, most, tables.scale)
+    slack = (out.tensions <= _NONE * tables.scale[:, None]) & (least <= 0.0)
+    longer = (1.0 + _MARGIN) * bridged_lengths(tables)
+    out.rest = np.where(slack & out.fine[:, None], longer, out.rest)
+    return out
+
+
+def holds_firmly(tables: Tables, aim: Array, low: Array, high: Array) -> NDArray[np.bool_]:
+    """(n,) whether poses can be held, as :func:`hold` does, and are stable with those lengths.
+
+    All eigenvalues of the stiffness are above rounding of the largest.
+    """
+    found = hold(tables, aim, low, high, _FEW)
+    now = with_rest(tables, found.rest)
+    at = batch.evaluate(now, here(now), threads=None)
+    stiffness = np.where(found.fine[:, None, None], at.hessian, 0.0)
+    each = np.linalg.eigvalsh(0.5 * (stiffness + np.swapaxes(stiffness, 1, 2)))
+    return np.asarray(found.fine & (each[:, 0] > _FIRM * each[:, -1]))
+
+
+def _within(tensions: Array, low: Array, high: Array, scale: Array) -> NDArray[np.bool_]:
+    room = 1e-9 * scale[:, None]
+    inside = (tensions >= low - room) & (tensions <= high + room)
+    return np.asarray(inside.all(axis=1))

@@ -1,0 +1,387 @@
+"""Commands that correct: what to tell the winches so that the platform comes to wanted poses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from seecr.commands.data import Commands
+from seecr.counted import between, counted, rows_words
+from seecr.description.given import GivenRobot, robot_of
+from seecr.description.robot import Robot
+from seecr.effects.base import Effect
+from seecr.errors import InputError
+from seecr.holding.distribution import tension_limits, wanted_tensions
+from seecr.holding.hanging import least_of_heavy
+from seecr.holding.inside import balances, counted_balance
+from seecr.holding.lengths import Held, hold, holds_firmly
+from seecr.holding.unheld import why_not_held
+from seecr.inverse.nearest import Nearest, Reaching, nearest, poses_in_place
+from seecr.inverse.told import told_lengths
+from seecr.pose import Array, pose_difference
+from seecr.prediction.experiment import Experiment, Prediction, effects_of
+from seecr.result import COORDINATES, Record, Result, named
+from seecr.statics.solution import Solution
+from seecr.statics.starts import commanded_poses
+from seecr.statics.tables import Tables, assemble, take
+
+if TYPE_CHECKING:
+    from seecr.prediction.model import GivenEffects
+
+PREFERENCES = ("pose", "position")
+"""What may give way at a pose that cannot be held: both, or the orientation alone."""
+
+# Rounds of history, or of users' laws, and by how much a pose may be missed at the end [of length].
+_ROUNDS, _MISSED = 40, 1e-10
+# A pose that is missed by less than this [m, and rad over the length] has been reached.
+_REACHED = 1e-6
+# Poses whose reason is told.
+_NAMED = 5
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Correction(Result):
+    """What to tell the winches for n wanted poses.
+
+    Attributes:
+        wanted: (n, 7).
+        aimed: (n, 7) the wanted poses where they can be held, else the nearest that can.
+        lengths: (n, m) [m] to tell the winches, counted as the plain robot counts.
+        held: (n,) bool, the wanted pose can be held by tensions within the limits.
+        found: (n,) bool, there is an answer: lengths for the wanted pose or the nearest.
+        settled: (n,) bool, what is aimed at is the wanted pose itself, or meets the first-order
+            conditions of a local minimum (Karush, Kuhn and Tucker) and the platform stays there.
+            Among those the nearest of many searches is taken.
+        why_not: (n,) sentences, why a wanted pose cannot be held; "" where it can.
+        solution: where the platform rests with these lengths, certified.
+        commands: the lengths as commands that every function takes, with the runs, times,
+            temperatures and loads they are for.
+    """
+
+    robot: Robot
+    wanted: Array
+    aimed: Array
+    lengths: Array
+    held: NDArray[np.bool_]
+    found: NDArray[np.bool_]
+    settled: NDArray[np.bool_]
+    solution: Solution
+    commands: Commands
+    why_not: tuple[str, ...]
+
+    @property
+    def left(self) -> Array:
+        """(n, 6) [m, rad] from the wanted pose to where the platform rests."""
+        return pose_difference(self.solution.pose, self.wanted)
+
+    @property
+    def stays(self) -> NDArray[np.bool_]:
+        """(n,) bool, the platform rests at what is aimed at, stably, to within a micrometre."""
+        return self.found & _rests_at(self.aimed, self.solution)
+
+    @property
+    def reached(self) -> NDArray[np.bool_]:
+        """(n,) bool, the platform rests at the wanted pose, stably, to within a micrometre."""
+        return self.held & self.stays
+
+    def lines(self) -> list[str]:
+        """How many poses are reached, what is left, and what cannot be held."""
+        n, left = len(self.wanted), self.left
+        at, lost = self.reached, ~self.held
+        out = [f"{self.robot.name}: {int(at.sum())} of {counted(n, 'pose')} reached"]
+        if np.any(at):
+            out.append(
+                f"left there: {1e3 * np.linalg.norm(left[at, :3], axis=1).max():.2g} mm and "
+                f"{np.degrees(np.linalg.norm(left[at, 3:], axis=1).max()):.2g} deg at most"
+            )
+            pulls = self.solution.tensions[at]
+            out.append(f"tensions there {between(pulls.min(), pulls.max(), lead='from ')} N")
+        near = lost & self.found
+        if np.any(lost):
+            out.append(f"{int(lost.sum())} cannot be held with tensions within the limits:")
+            out += self._reasons()
+        if np.any(near):
+            out.append(
+                f"the nearest poses that can be held are up to "
+                f"{1e3 * np.linalg.norm(left[near, :3], axis=1).max():.4g} mm and "
+                f"{np.degrees(np.linalg.norm(left[near, 3:], axis=1).max()):.4g} deg away"
+            )
+            pulls = self.solution.tensions[near]
+            out.append(f"tensions there {between(pulls.min(), pulls.max(), lead='from ')} N")
+        for rows, text in (
+            (lost & ~self.found, "of them: no pose near was found that can be held"),
+            (near & ~self.settled, "of them may have nearer ones beside them"),
+            (self.found & ~self.stays, "are balanced, but the platform does not rest there"),
+        ):
+            if np.any(rows):
+                out.append(f"{int(rows.sum())} {text}")
+        return out
+
+    def place(self, row: int) -> str:
+        """A row in words: "line 24" of its file, "pose 3", counted from 0, without one."""
+        return rows_words([row], self.commands.line)
+
+    def _reasons(self) -> list[str]:
+        """The first poses that cannot be held, each with the reason."""
+        rows = np.flatnonzero(~self.held)
+        named_rows = [f"  {self.place(i)}: {self.why_not[i]}" for i in rows[:_NAMED]]
+        more = len(rows) - _NAMED
+        return [*named_rows, f"  and {more} more, see why_not"] if more > 0 else named_rows
+
+    def records(self) -> list[Record]:
+        """One row per pose: wanted, lengths, what is left, tensions."""
+        cables, left = self.robot.cable_names, self.left
+        moved = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
+        return [
+            {
+                **named("want_{}", COORDINATES, self.wanted[i]),
+                **named("length_{}_m", [str(k + 1) for k in range(len(cables))], self.lengths[i]),
+                "held": bool(self.held[i]),
+                "reached": bool(self.reached[i]),
+                "why_not": self.why_not[i],
+                **named("left_{}", moved, left[i]),
+                **named("tension_{}_N", cables, self.solution.tensions[i]),
+            }
+            for i in range(len(self.wanted))
+        ]
+
+    def as_json(self, kept: Array | None = None) -> Record:
+        """``correction.json``.
+
+        Args:
+            kept: (n,) probability that tensions stay within their limits, :func:`kept_chance`.
+        """
+        left, line, there = self.left, self.commands.line, self.solution
+        return {
+            "robot": self.robot.name,
+            "cables": self.robot.cable_names,
+            "poses": len(self.wanted),
+            "reached": int(self.reached.sum()),
+            "not_held": int((~self.held).sum()),
+            "without_answer": int((~(self.found & there.converged)).sum()),
+            "rows": [
+                {
+                    **({} if line is None else {"line": line[i]}),
+                    "wanted": self.wanted[i],
+                    "aimed": self.aimed[i] if self.found[i] else None,
+                    "lengths_m": self.lengths[i],
+                    "held": self.held[i],
+                    "why_not": self.why_not[i] or None,
+                    "reached": reached,
+                    "left_m": left[i, :3],
+                    "left_rad": left[i, 3:],
+                    "within_limits_probability": None if kept is None else kept[i],
+                    "tensions_N": there.tensions[i],
+                    "status": there.status[i] if self.found[i] else "no_answer",
+                }
+                for i, reached in enumerate(self.reached)
+            ],
+        }
+
+
+def correct(
+    robot: GivenRobot,
+    poses: Commands | ArrayLike,
+    *,
+    effects: GivenEffects = (),
+    lowest: ArrayLike = 0.0,
+    highest: ArrayLike = np.inf,
+    aim: str | ArrayLike = "minimum",
+    prefer: str = "pose",
+) -> Correction:
+    """Lengths to tell the winches so that the platform comes to rest at wanted poses.
+
+    Elasticity and all effects are taken into account; what more cables than freedoms leave free
+    goes to tensions as near to ``aim`` as the limits allow. Where a pose cannot be held, the
+    nearest one that can is aimed at.
+
+    Args:
+        robot: as described, or its MJCF.
+        poses: (n, 7) wanted, or :class:`seecr.Commands` with runs and times, for effects that
+            depend on them.
+        effects: a model, its file, or effects with values.
+        lowest: (m,) or one [N], not negative. A cable that may have none gets a margin.
+        highest: (m,) or one [N]; infinite for none.
+        aim: "minimum", "middle" (of the limits), or tensions (m,) or (n, m) [N].
+        prefer: "pose": least position^2 + (length x rotation)^2; "position": only the
+            orientation gives way.
+
+    Raises:
+        InputError: shapes, limits that leave nothing, an unknown aim or preference.
+    """
+    if prefer not in PREFERENCES:
+        raise InputError(f"prefer must be one of {', '.join(PREFERENCES)}, got {prefer!r}")
+    search = _search_of(robot_of(robot), poses, effects, lowest, highest, aim)
+    return search.run(prefer == "position")
+
+
+def held_in_place(
+    robot: Robot, poses: Array, effects: GivenEffects, lowest: ArrayLike, highest: ArrayLike
+) -> NDArray[np.bool_]:
+    """(n,) whether positions can be held at some orientation by tensions within the limits.
+
+    As :func:`correct` with ``prefer="position"`` says it, but any orientation will do, and nothing
+    is sought at other positions: for maps.
+    """
+    return _search_of(robot, poses, effects, lowest, highest, "minimum").held_in_place()
+
+
+def _search_of(
+    robot: Robot,
+    poses: Commands | ArrayLike,
+    effects: GivenEffects,
+    lowest: ArrayLike,
+    highest: ArrayLike,
+    aim: str | ArrayLike,
+) -> _Search:
+    """One search, its arguments checked."""
+    given = poses if isinstance(poses, Commands) else Commands(commanded_poses(poses))
+    if given.lengths is not None:
+        raise InputError("correct needs wanted poses (n, 7); got lengths")
+    low, high = tension_limits(robot, lowest, highest)
+    target = wanted_tensions(aim, low, high)
+    if target.ndim == 2 and len(target) != len(given):
+        raise InputError(f"aim must have {counted(len(given), 'row')}, got {len(target)}")
+    limits = _Limits(np.broadcast_to(target, (len(given), robot.n_cables)), low, high)
+    return _Search(robot, given, effects_of(effects, robot), limits)
+
+
+@dataclass(frozen=True, eq=False)
+class _Limits:
+    aim: Array
+    low: Array
+    high: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """One call of :func:`correct`."""
+
+    robot: Robot
+    given: Commands
+    effects: Sequence[Effect]
+    limits: _Limits
+
+    def run(self, fix_position: bool) -> Correction:
+        held, tables = self._held(self.given)
+        found, aimed, settled = held.fine.copy(), self.given.pose.copy(), held.fine.copy()
+        lost = np.flatnonzero(~held.fine)
+        if len(lost):
+            best = self._nearest(lost, tables.scale, fix_position)
+            aimed[lost], found[lost], settled[lost] = best.poses, best.found, best.settled
+        commands = replace(self.given, pose=aimed)
+        there = self._held(commands)[0] if len(lost) else held
+        found &= there.fine
+        lengths, prediction = self._lengths(commands, there)
+        lengths[~found] = np.nan
+        solution = prediction.solution()
+        return Correction(
+            self.robot, self.given.pose, aimed, lengths, held.fine, found, settled & found,
+            _without(solution, ~found), replace(commands, lengths=lengths, told=True),
+            self._why_not(lost, tables),
+        )  # fmt: skip
+
+    def held_in_place(self) -> NDArray[np.bool_]:
+        """(n,) whether some orientation is held, and stays, at each position."""
+        held, tables = self._held(self.given)
+        aimed, lost = self.given.pose.copy(), np.flatnonzero(~held.fine)
+        if len(lost):
+            problem = self._reaching(lost, tables.scale, fix_position=True)
+            aimed[lost] = poses_in_place(problem)
+        commands = replace(self.given, pose=aimed)
+        there = self._held(commands)[0] if len(lost) else held
+        solution = self._lengths(commands, there)[1].solution()
+        return there.fine & _rests_at(aimed, solution)
+
+    def _why_not(self, lost: NDArray[np.intp], tables: Tables) -> tuple[str, ...]:
+        """(n,) sentences; "" of rows that can be held."""
+        out, limits = [""] * len(self.given), self.limits
+        if len(lost) == 0:
+            return tuple(out)
+        some = take(tables, lost)
+        weighs, names = least_of_heavy(some), self.robot.cable_names
+        for i, w, row in zip(lost, weighs, balances(some, limits.low, limits.high), strict=True):
+            matrix, load, low, high = row
+            out[i] = why_not_held(matrix, load, low, high, names, w)
+        return tuple(out)
+
+    def _tables(self, commands: Commands) -> Tables:
+        """Tables at the poses of commands; what is paid out does not matter."""
+        plain = self.robot.commanded_lengths(commands.pose)
+        trial = replace(commands, lengths=plain, told=True)
+        return assemble(Experiment(self.robot, trial).setup(self.effects))
+
+    def _held(self, commands: Commands, past: Prediction | None = None) -> tuple[Held, Tables]:
+        tables = self._tables(commands) if past is None else past.tables
+        limits = self.limits
+        return hold(tables, limits.aim, limits.low, limits.high), tables
+
+    def _reaching(self, rows: NDArray[np.intp], scale: Array, *, fix_position: bool) -> Reaching:
+        """The problem of the nearest poses of some rows."""
+        limits = self.limits
+
+        def balance(
+            poses: Array, some: NDArray[np.intp], about: Array | None = None
+        ) -> tuple[Array, Array]:
+            part = replace(self.given.rows(rows[some]), pose=poses)
+            return counted_balance(self._tables(part), limits.low, limits.high, about)
+
+        def stays(poses: Array, some: NDArray[np.intp]) -> NDArray[np.bool_]:
+            tables = self._tables(replace(self.given.rows(rows[some]), pose=poses))
+            return holds_firmly(tables, limits.aim[rows[some]], limits.low, limits.high)
+
+        return Reaching.within(
+            self.robot, self.given.pose[rows], balance, stays, (limits.low, limits.high),
+            scale[rows], fix_position=fix_position,
+        )  # fmt: skip
+
+    def _nearest(self, rows: NDArray[np.intp], scale: Array, fix_position: bool) -> Nearest:
+        best = nearest(self._reaching(rows, scale, fix_position=fix_position))
+        again = np.flatnonzero(~best.firm)
+        if fix_position and len(again):
+            # the position cannot be kept either
+            other = self._nearest(rows[again], scale, False)
+            better = other.firm | (other.found & ~best.found[again])
+            to = again[better]
+            best.poses[to], best.found[to] = other.poses[better], other.found[better]
+            best.firm[to], best.settled[to] = other.firm[better], other.settled[better]
+        return best
+
+    def _lengths(self, commands: Commands, held: Held) -> tuple[Array, Prediction]:
+        """Lengths to tell for rest lengths that hold, and what comes of them."""
+        for _ in range(_ROUNDS):
+            told = told_lengths(self.robot, commands, self.effects, held.rest)
+            trial = replace(commands, lengths=told, told=True)
+            prediction = Experiment(self.robot, trial).predict(self.effects)
+            if not (prediction.has_history or prediction.setup.laws):
+                break
+            missed = np.abs(pose_difference(prediction.pose, commands.pose)).max(axis=1)
+            if np.all(missed[held.fine] <= _MISSED * self.robot.length):
+                break
+            held, _ = self._held(commands, prediction)
+        return told, prediction
+
+
+def _rests_at(poses: Array, solution: Solution) -> NDArray[np.bool_]:
+    """(n,) whether the platform rests at poses (n, 7), to within a micrometre."""
+    size = np.where(np.arange(6) < 3, 1.0, solution.robot.length)
+    off = np.abs(pose_difference(solution.pose, poses) * size).max(axis=1)
+    return np.asarray(solution.converged & (off < _REACHED))
+
+
+def _without(solution: Solution, rows: NDArray[np.bool_]) -> Solution:
+    """The solution without numbers where there is nothing to solve."""
+    if not np.any(rows):
+        return solution
+    kept = ~rows[:, None]
+    return replace(
+        solution,
+        pose=np.where(kept, solution.pose, np.nan),
+        deviation=np.where(kept, solution.deviation, np.nan),
+        tensions=np.where(kept, solution.tensions, np.nan),
+        rest_lengths=np.where(kept, solution.rest_lengths, np.nan),
+    )

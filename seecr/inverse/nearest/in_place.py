@@ -1,0 +1,60 @@
+"""Positions that some orientation holds, for robots with fewer cables than freedoms.
+
+Where the platform comes to at a position changes little from one to the next. So a few positions
+are searched in earnest, and the others from their answers; any orientation will do.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from seecr.inverse.nearest.firm import part_of
+from seecr.inverse.nearest.inward import tightened
+from seecr.inverse.nearest.problem import Reaching, Rows
+from seecr.inverse.nearest.search import Best, any_that_stays
+from seecr.pose import Array
+
+# Answers of the nearest positions that are tried, and how many are searched at once in earnest.
+_NEIGHBOURS, _AT_ONCE = 3, 8
+
+
+def poses_in_place(problem: Reaching) -> Array:
+    """Poses (n, 7) at wanted positions at which the platform is held, and stays, if some are found.
+
+    Args:
+        problem: of which positions may not change.
+    """
+    best, rows = Best.none(problem), np.arange(len(problem.wanted))
+    _try_all(best, np.zeros((len(rows), len(problem.free))), rows)
+    left, fresh = ~best.firm, np.flatnonzero(best.firm)
+    while left.any():
+        if len(fresh):
+            fresh = _from_neighbours(best, np.flatnonzero(left), fresh)
+        else:
+            some = _apart(np.flatnonzero(left))
+            best.take(some, any_that_stays(part_of(problem, some)))
+            left[some], fresh = False, some[best.firm[some]]
+        left &= ~best.firm
+    return problem.placed(best.away, rows)
+
+
+def _try_all(best: Best, away: Array, rows: Rows) -> None:
+    """Keep what comes to balance from ways (k, d) of rows."""
+    best.keep(tightened(best.problem, best.problem.start(away, rows)))
+
+
+def _apart(rows: Rows) -> Rows:
+    """A few of them, far from one another in their order."""
+    return rows[np.unique(np.linspace(0, len(rows) - 1, _AT_ONCE).round().astype(np.intp))]
+
+
+def _from_neighbours(best: Best, rows: Rows, fresh: Rows) -> Rows:
+    """Try answers at the nearest positions, of fresh ones; those that came of them are fresh."""
+    problem, place = best.problem, best.problem.wanted[:, :3]
+    near = cKDTree(place[fresh]).query(place[rows], k=min(_NEIGHBOURS, len(fresh)))[1]
+    near = near.reshape(len(rows), -1)
+    each, of = np.repeat(rows, near.shape[1]), fresh[near.ravel()]
+    turned = problem.to(problem.placed(best.away[of], of), each)
+    _try_all(best, problem.allowed(turned), each)
+    return rows[best.firm[rows]]

@@ -1,0 +1,270 @@
+"""Balance about poses: what the search for the nearest pose that can be held knows of a robot."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seecr.description.joints import pose_of_values, values_of_pose
+from seecr.description.robot import Robot
+from seecr.holding.distribution import balanced, distribute
+from seecr.pose import Array, pose_add, pose_difference
+
+Rows = NDArray[np.intp]
+
+
+class Balance(Protocol):
+    """Balance at poses (k, 7) of some rows, which may come again: matrices (k, d, m), loads (k, d).
+
+    Linear in the tensions from ``about`` (k, m), where pulls of heavy cables depend on it; by
+    default from such that come near to balance.
+    """
+
+    def __call__(
+        self, poses: Array, rows: Rows, about: Array | None = None, /
+    ) -> tuple[Array, Array]: ...
+
+
+Stays = Callable[[Array, Rows], NDArray[np.bool_]]
+"""Whether the platform stays at poses (k, 7) of some rows with the rest lengths that hold them."""
+
+# A pose this near to the limit is held with something to spare: tensions, relative to the load.
+_INSIDE = 1e-6
+# Weight of a tension of one load, as a displacement over the robot's length: next to none.
+_WEIGHT = 1e-3
+# Difference for derivatives, over the length.
+_DIFFERENCE = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Reaching:
+    """Wanted poses (n, 7) and what holds there; ``away`` (k, d) is how far poses are off them [m].
+
+    Rows say whose wanted pose each of k poses belongs to; a row may come again.
+    """
+
+    robot: Robot
+    wanted: Array
+    values: Array | None  # (n, d) of the joints at the wanted poses, None of a free platform
+    balance: Balance
+    stays: Stays
+    least: Array  # (n, m) [N]
+    most: Array  # (n, m) [N]
+    scale: Array  # (n,) [N] load
+    free: Array  # (d,) how far each coordinate may go from its wanted value: none, or infinitely
+
+    @classmethod
+    def within(
+        cls,
+        robot: Robot,
+        wanted: Array,
+        balance: Balance,
+        stays: Stays,
+        limits: tuple[Array, Array],
+        scale: Array,
+        *,
+        fix_position: bool = False,
+    ) -> Reaching:
+        """The problem of wanted poses (n, 7).
+
+        Args:
+            limits: (m,) least and largest tensions [N]. scale: (n,) [N] load.
+            fix_position: the position is kept, only the orientation gives way.
+        """
+        low, high = limits
+        inside = _INSIDE * scale[:, None]
+        least = np.minimum(low + inside, 0.5 * (low + np.minimum(high, 1e300)))
+        most = np.maximum(high - inside, least)
+        values = values_of_pose(robot, wanted)[0] if robot.joints else None
+        free = np.full(robot.n_dof, np.inf)
+        if fix_position:
+            free[~robot.hinges] = 0.0
+        return cls(robot, wanted, values, balance, stays, least, most, scale, free)
+
+    @property
+    def is_in_place(self) -> bool:
+        """Whether positions are kept."""
+        return not np.all(self.robot.hinges | (self.free > 0.0))
+
+    def placed(self, away: Array, rows: Rows) -> Array:
+        """Poses (k, 7) so far from the wanted ones of rows."""
+        change = away * np.where(self.robot.hinges, 1.0 / self.robot.length, 1.0)
+        if self.values is None:
+            return pose_add(self.wanted[rows], change)
+        return pose_of_values(self.robot, self.values[rows] + change)[0]
+
+    def to(self, poses: Array, rows: Rows) -> Array:
+        """(k, d) how far poses (k, 7) are from the wanted ones of rows."""
+        if self.values is None:
+            change = pose_difference(poses, self.wanted[rows])
+        else:
+            change = values_of_pose(self.robot, poses)[0] - self.values[rows]
+            shorter = np.mod(change + np.pi, 2.0 * np.pi) - np.pi  # either way about a hinge
+            change = np.where(self.robot.hinges, shorter, change)
+        return change * np.where(self.robot.hinges, self.robot.length, 1.0)
+
+    def at(self, away: Array, rows: Rows, about: Array | None = None) -> tuple[Array, Array]:
+        """Balance (k, d, m) and (k, d) there, linear in the tensions from those about (k, m)."""
+        return self.balance(self.placed(away, rows), rows, about)
+
+    def held(self, away: Array, rows: Rows) -> NDArray[np.bool_]:
+        """Whether the poses so far from those of rows can be held."""
+        return self.holds(self.placed(away, rows), rows)
+
+    def firm(self, away: Array, rows: Rows) -> NDArray[np.bool_]:
+        """Whether the platform stays at the poses so far from those of rows, checked exactly."""
+        out = self.held(away, rows)
+        some = np.flatnonzero(out)
+        if len(some):
+            out[some] = self.rests(away[some], rows[some])
+        return out
+
+    def rests(self, away: Array, rows: Rows) -> NDArray[np.bool_]:
+        """The same of poses that are in balance, or nearly."""
+        return self.stays(self.placed(away, rows), rows)
+
+    def holds(self, poses: Array, rows: Rows) -> NDArray[np.bool_]:
+        """Whether poses (k, 7) can be held with the loads of rows."""
+        if len(rows) == 0:
+            return np.zeros(0, dtype=bool)
+        least = self.least[rows]
+        return distribute(*self.balance(poses, rows), least, least, self.most[rows])[1]
+
+    def lack(self, away: Array, rows: Rows) -> tuple[Array, NDArray[np.bool_]]:
+        """(k,) what lacks of balance about there [of load], roughly; and whether nothing does."""
+        least, (matrix, load) = self.least[rows], self.at(away, rows)
+        tensions, held = distribute(matrix, load, least, least, self.most[rows])
+        left = np.abs(np.einsum("ndm,nm->nd", matrix, tensions) - load).max(axis=1)
+        return left / self.scale[rows], held
+
+    def allowed(self, away: Array) -> Array:
+        """The same without what may not change."""
+        return np.where(self.free > 0.0, away, 0.0)
+
+    def start(self, away: Array, rows: Rows) -> Spots:
+        """Where searches begin, held or not, with the tensions that come nearest to balance."""
+        if len(rows) == 0:
+            return Spots(away, rows, np.empty((0, self.least.shape[1])), np.empty(0))
+        each = zip(rows, *self.at(away, rows), strict=True)
+        found = [balanced(a, load, self.least[i], self.most[i]) for i, a, load in each]
+        tensions = np.array([one for one, _ in found]).reshape(len(rows), self.least.shape[1])
+        # with pulls as these tensions make them
+        matrix, load = self.at(away, rows, tensions)
+        left = np.abs(np.einsum("ndm,nm->nd", matrix, tensions) - load).max(axis=1)
+        return Spots(away, rows, tensions, left / self.scale[rows])
+
+    def unit(self, rows: Rows) -> Array:
+        """(k, 1) [m/N] that tensions weigh beside ways."""
+        return np.asarray((_WEIGHT * self.robot.length / self.scale[rows])[:, None])
+
+    def project(
+        self,
+        matrix: Array,
+        load: Array,
+        turn: Array,
+        away: Array,
+        near: tuple[Array, Array],
+        rows: Rows,
+    ) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Tensions and ways nearest to ``near`` that balance as linearised about ``away``.
+
+        Args:
+            matrix: (k, d, m), load: (k, d) there. turn: (k, d, d) [N/m] rates of what is out of
+                balance by the way.
+
+        Returns:
+            Ways (k, d), tensions (k, m), (k,) whether there are any.
+        """  # fmt: skip
+        unit, m = self.unit(rows), matrix.shape[2]
+        whole = np.concatenate([matrix / unit[:, None], turn], axis=2)
+        ends = np.broadcast_to(self.free, away.shape)
+        low = np.concatenate([self.least[rows] * unit, -ends], axis=1)
+        high = np.concatenate([self.most[rows] * unit, ends], axis=1)
+        goal = np.concatenate([near[1] * unit, near[0] - away], axis=1)
+        answer, possible = distribute(whole, load, goal, low, high)
+        return away + answer[:, m:], answer[:, :m] / unit, possible
+
+
+@dataclass(frozen=True, eq=False)
+class Spots:
+    """Where k searches are.
+
+    Attributes:
+        away: (k, d) [m]. rows: (k,). tensions: (k, m) [N]. left: (k,) out of balance [of load].
+    """
+
+    away: Array
+    rows: Rows
+    tensions: Array
+    left: Array
+
+    def size(self) -> Array:
+        """(k,) [m] from the wanted poses."""
+        return np.asarray(np.linalg.norm(self.away, axis=1))
+
+    def only(self, some: NDArray[np.intp] | NDArray[np.bool_]) -> Spots:
+        return Spots(self.away[some], self.rows[some], self.tensions[some], self.left[some])
+
+    def only_tight(self, most: float) -> Spots:
+        return self.only(self.left <= most)
+
+    def put(self, some: NDArray[np.intp], other: Spots) -> None:
+        """Others in the places of some, in place."""
+        self.away[some], self.tensions[some] = other.away, other.tensions
+        self.left[some] = other.left
+
+    def copy(self) -> Spots:
+        return Spots(self.away.copy(), self.rows, self.tensions.copy(), self.left.copy())
+
+
+@dataclass(frozen=True, eq=False)
+class Curved:
+    """Balance about k poses to second order, with the tensions of a search.
+
+    Attributes:
+        matrix: (k, d, m). load, left: (k, d) [N], what is out of balance.
+        turn: (k, d, d) [N/m] rates of that by the way.
+    """
+
+    matrix: Array
+    load: Array
+    left: Array
+    turn: Array
+    _all: Array
+    _matrices: Array
+    _step: float
+
+    @classmethod
+    def about(cls, problem: Reaching, away: Array, tensions: Array, rows: Rows) -> Curved:
+        """By differences: to both sides along each coordinate, and along each two of them."""
+        (k, d), step = away.shape, _DIFFERENCE * problem.robot.length
+        eye, (i, j) = np.eye(d), np.triu_indices(d, 1)
+        sides = step * np.concatenate([np.zeros((1, d)), eye, -eye, eye[i] + eye[j]])
+        moved = (away[:, None] + sides).reshape(-1, d)
+        count = len(sides)
+        pulls = np.repeat(tensions, count, axis=0)
+        matrix, load = problem.at(moved, np.repeat(rows, count), pulls)
+        matrix = matrix.reshape(k, len(sides), d, -1)
+        load = load.reshape(k, len(sides), d)
+        left = np.einsum("nsdm,nm->nsd", matrix, tensions) - load
+        plus, minus = left[:, 1 : 1 + d], left[:, 1 + d : 1 + 2 * d]
+        turn = np.swapaxes(plus - minus, 1, 2) / (2.0 * step)
+        return cls(matrix[:, 0], load[:, 0], left[:, 0], turn, left, matrix, step)
+
+    def bends(self, dual: Array) -> tuple[Array, Array]:
+        """Second derivatives of dual . left: (k, d, d) by the way, (k, d, m) by it and tensions."""
+        d = self.load.shape[1]
+        value = np.einsum("nsd,nd->ns", self._all, dual)
+        first, plus, minus = value[:, :1], value[:, 1 : 1 + d], value[:, 1 + d : 1 + 2 * d]
+        i, j = np.triu_indices(d, 1)
+        own = np.zeros((len(dual), d, d))
+        own[:, i, j] = value[:, 1 + 2 * d :] - plus[:, i] - plus[:, j] + first
+        own += np.swapaxes(own, 1, 2)
+        own[:, np.arange(d), np.arange(d)] = plus + minus - 2.0 * first
+        sides = self._matrices[:, 1 : 1 + d] - self._matrices[:, 1 + d : 1 + 2 * d]
+        by_tension = np.einsum("nsdm,nd->nsm", sides, dual) / (2.0 * self._step)
+        return own / self._step**2, by_tension

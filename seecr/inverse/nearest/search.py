@@ -1,0 +1,170 @@
+"""The nearest poses that can be held: many searches, of which the nearest answer is kept.
+
+Least position^2 + (length x rotation)^2 subject to balance, W(q) tau = -w(q), and limits. What can
+be held is not convex, and turned platforms reach where level ones do not: there are many local
+minima, a few per cent apart. So searches begin at the wanted pose itself; where the ways from a
+sample of poses that are held end to be; and at other rows' answers, those turned by all angles.
+Where the nearest end is one at which the platform would not stay, see
+:mod:`seecr.inverse.nearest.firm`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seecr.inverse.nearest.firm import at_random, firm_ends, nearest_of, part_of
+from seecr.inverse.nearest.inward import ENOUGH, TIGHT, inward, tightened, to_rounding
+from seecr.inverse.nearest.problem import Curved, Reaching, Rows, Spots
+from seecr.inverse.nearest.screen import screened
+from seecr.inverse.nearest.seeds import Candidates, about_answers, about_wanted, from_sample, sample
+from seecr.pose import Array
+
+# Searches of each row from the sample, and from other rows' answers.
+_FIRST, _SHARED = 14, 4
+# Where a search ended nearer by this part, but the platform would not stay, firm poses are sought.
+_NEARER = 0.01
+# A step of this part of the way, and how much of it may come nearer at a local minimum.
+_PART, _FLAT = 1e-3, 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Nearest:
+    """What was found for n wanted poses.
+
+    Attributes:
+        poses: (n, 7). found: (n,) bool, there is one that can be held.
+        firm: (n,) bool, the platform stays there.
+        settled: (n,) bool, it meets the first-order conditions of a local minimum (Karush, Kuhn
+            and Tucker): to first order no small change that can be held comes nearer.
+    """
+
+    poses: Array
+    found: NDArray[np.bool_]
+    firm: NDArray[np.bool_]
+    settled: NDArray[np.bool_]
+
+
+def nearest(problem: Reaching) -> Nearest:
+    """The nearest poses that can be held, and whether any were found.
+
+    Args:
+        problem: the wanted poses, what holds there, and what may give way. Balance is linear in
+            the tensions here, from where cables just pull: of heavy ones it is not quite right.
+            Answers that stay go before all that do not; where none was found that stays, the
+            nearest of the others is kept.
+    """
+    best, rows = Best.none(problem), np.arange(len(problem.wanted))
+    start = problem.start(np.zeros((len(rows), len(problem.free))), rows)
+    best.keep(inward(problem, tightened(problem, start)))
+    poses = sample(problem)
+    first = from_sample(problem, poses).and_more(about_wanted(problem))
+    best.search(first, _FIRST)
+    if not best.found.any():
+        return Nearest(problem.wanted.copy(), best.found, best.firm, best.found.copy())
+    best.search(about_answers(problem, best.away, np.flatnonzero(best.found)), _SHARED)
+    best.firm_ones(poses)
+    settled = best.settled() & best.firm
+    return Nearest(problem.placed(best.away, rows), best.found, best.firm, settled)
+
+
+def any_that_stays(problem: Reaching) -> Best:
+    """Any poses at which the platform is held and stays, near or far, if some are found."""
+    best, poses = Best.none(problem), sample(problem)
+    first = from_sample(problem, poses).and_more(about_wanted(problem))
+    spots = screened(problem, first, _FIRST)
+    best.keep(spots)
+    spots = spots.only(~best.firm[spots.rows])
+    if len(spots.rows):
+        best.keep(inward(problem, spots))
+        best.firm_ones(poses)
+    return best
+
+
+@dataclass(frozen=True, eq=False)
+class Best:
+    """The nearest answers so far, changed in place.
+
+    Attributes:
+        away: (n, d) [m] from the wanted poses. tensions: (n, m) [N].
+        found: (n,) bool. firm: (n,) bool, the platform stays there.
+        loose: (n, d) [m] the nearest at which it would not, infinitely far where there is none.
+    """
+
+    problem: Reaching
+    away: Array
+    tensions: Array
+    found: NDArray[np.bool_]
+    firm: NDArray[np.bool_]
+    loose: Array
+
+    @classmethod
+    def none(cls, problem: Reaching) -> Best:
+        n = len(problem.wanted)
+        away, tensions = np.zeros((n, len(problem.free))), np.zeros(problem.least.shape)
+        loose = np.full(away.shape, np.inf)
+        return cls(problem, away, tensions, np.zeros(n, dtype=bool), np.zeros(n, dtype=bool), loose)
+
+    def search(self, candidates: Candidates, most: int) -> None:
+        """Searches from the best of candidates, ``most`` of each row."""
+        self.keep(inward(self.problem, screened(self.problem, candidates, most)))
+
+    def keep(self, other: Spots) -> None:
+        """Take what is held and nearer, and what stays rather than what does not."""
+        other = to_rounding(self.problem, other.only_tight(TIGHT))
+        if len(other.rows) == 0:
+            return
+        firm = self.problem.rests(other.away, other.rows)
+        size = other.size()
+        for i in np.argsort(size):
+            row = other.rows[i]
+            nearer = not self.found[row] or size[i] < np.linalg.norm(self.away[row])
+            if firm[i] > self.firm[row] or (firm[i] == self.firm[row] and nearer):
+                self.away[row], self.tensions[row] = other.away[i], other.tensions[i]
+                self.found[row], self.firm[row] = True, firm[i]
+            if not firm[i] and size[i] < np.linalg.norm(self.loose[row]):
+                self.loose[row] = other.away[i]
+
+    def take(self, rows: Rows, other: Best) -> None:
+        """The answers of another, which is of these rows alone."""
+        self.away[rows], self.tensions[rows] = other.away, other.tensions
+        self.found[rows], self.firm[rows], self.loose[rows] = other.found, other.firm, other.loose
+
+    def firm_ones(self, poses: Array) -> None:
+        """Where a search ended nearer, but the platform would not stay: the nearest that does.
+
+        Args:
+            poses: (k, 7) a sample of what can be held.
+        """
+        size = np.where(self.firm, np.linalg.norm(self.away, axis=1), np.inf)
+        end = np.linalg.norm(self.loose, axis=1)
+        rows = np.flatnonzero(self.found & (end < (1.0 - _NEARER) * size))
+        if len(rows) == 0:
+            return
+        part = part_of(self.problem, rows)
+        away, some = nearest_of(firm_ends(part, poses, self.loose[rows]))
+        if len(some) == 0:
+            return
+        away = at_random(part, away, some)
+        start = part.start(away, some)
+        better = np.linalg.norm(away, axis=1) < size[rows[some]]
+        to = rows[some[better]]
+        self.away[to], self.tensions[to] = away[better], start.tensions[better]
+        self.firm[to] = True
+
+    def settled(self) -> NDArray[np.bool_]:
+        """(n,) whether a small step towards the wanted poses is lost on the way back to balance.
+
+        The projected gradient: nothing but the conditions of Karush, Kuhn and Tucker.
+        """
+        rows: Rows = np.flatnonzero(self.found)
+        away, pulls, out = self.away[rows], self.tensions[rows], self.found.copy()
+        at = Curved.about(self.problem, away, pulls, rows)
+        near = ((1.0 - _PART) * away, pulls)
+        to, _, possible = self.problem.project(at.matrix, at.load, at.turn, away, near, rows)
+        size = np.linalg.norm(away, axis=1)
+        gain = np.linalg.norm(to - away, axis=1) <= _FLAT * _PART * size
+        out[rows] = (possible & gain) | (size <= ENOUGH * self.problem.robot.length)
+        return out

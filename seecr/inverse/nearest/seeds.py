@@ -1,0 +1,163 @@
+"""Where searches for the nearest pose may begin: poses over the frame, and about others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from seecr.description.joints import pose_of_values
+from seecr.description.robot import Robot
+from seecr.inverse.nearest.problem import Reaching, Rows
+from seecr.pose import Array, quat_from_rotvec
+
+# Poses tried over the frame; of those that are held, as many nearest and as many others per row.
+_SAMPLE, _NEAR = 24000, 128
+# Turns tried where only the orientation gives way, and those looked at that are nearly held.
+_IN_PLACE, _NEARLY = 8000, 128
+# Turned poses about each wanted one, and about each answer, where as many others are tried.
+_TURNED, _ABOUT = 256, 64
+# Half of the sample is turned by less than this [rad], and poses move inward by up to this part.
+_LEVEL, _INWARD = 1.0, 0.4
+# Answers are turned by up to so many times their distance over the length [rad].
+_WIDEST = 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Poses (k, d) away from the wanted ones of rows (k,), held or not."""
+
+    away: Array
+    rows: Rows
+
+    def and_more(self, other: Candidates) -> Candidates:
+        return Candidates(
+            np.concatenate([self.away, other.away]), np.concatenate([self.rows, other.rows])
+        )
+
+
+def sample(problem: Reaching) -> Array:
+    """Poses (k, 7) that can be held with the first row's load, and home, which may not be.
+
+    Home alone where positions are kept: none of the others is at a wanted one.
+    """
+    if problem.is_in_place:
+        return problem.robot.reference_pose[None]
+    random = np.random.default_rng(0)
+    draw = _turned if problem.values is None else _on_joints
+    poses = draw(problem.robot, random)
+    held = problem.holds(poses, np.zeros(len(poses), dtype=np.intp))
+    return np.concatenate([problem.robot.reference_pose[None], poses[held]])
+
+
+def _box(robot: Robot) -> Array:
+    """(k, 3) points that the frame goes about."""
+    return np.concatenate([robot.exit_points, robot.reference_pose[None, :3]])
+
+
+def _turned(robot: Robot, random: np.random.Generator) -> Array:
+    """Poses of a free platform over the frame, half of them turned by all angles."""
+    box, half = _box(robot), _SAMPLE // 2
+    turn = random.normal(size=(_SAMPLE, 4))
+    turn /= np.linalg.norm(turn, axis=1, keepdims=True)
+    axis = turn[:half, 1:] / np.linalg.norm(turn[:half, 1:], axis=1, keepdims=True)
+    turn[:half] = quat_from_rotvec(axis * random.uniform(0.0, _LEVEL, (half, 1)))
+    places = random.uniform(box.min(axis=0), box.max(axis=0), (_SAMPLE, 3))
+    return np.concatenate([places, turn], axis=1)
+
+
+def _on_joints(robot: Robot, random: np.random.Generator) -> Array:
+    """Poses of a platform on joints: slides over the frame, hinges by all angles."""
+    values, box = np.zeros((_SAMPLE, robot.n_dof)), _box(robot) - robot.reference_pose[:3]
+    for i, joint in enumerate(robot.joints):
+        along = box @ joint.axis
+        slides = joint.kind == "slide"
+        low, high = (along.min(), along.max()) if slides else (-np.pi, np.pi)
+        values[:, i] = random.uniform(low, high, _SAMPLE)
+    return pose_of_values(robot, values)[0]
+
+
+def from_sample(problem: Reaching, poses: Array) -> Candidates:
+    """Home, the poses nearest to each wanted one, and as many of the others."""
+    random, out, rows = np.random.default_rng(1), [], []
+    in_place = problem.is_in_place
+    for row in range(len(problem.wanted)):
+        every = _in_place(problem, row) if in_place else problem.to(poses, np.full(len(poses), row))
+        some = min(_NEAR, len(every))
+        near = np.argsort(np.linalg.norm(every, axis=1))[:some]
+        pick = np.concatenate([[0], near, random.choice(len(every), some, replace=False)])
+        out.append(every[pick])
+        rows.append(np.full(len(pick), row))
+    return Candidates(problem.allowed(np.concatenate(out)), np.concatenate(rows))
+
+
+def _in_place(problem: Reaching, row: int) -> Array:
+    """Home's turn, and of all turns of a wanted pose those that are held, or nearly (k, d).
+
+    What is held may be less than a thousandth of all turns, and in parts.
+    """
+    robot, random = problem.robot, np.random.default_rng(6)
+    rows = np.full(_IN_PLACE, row)
+    if problem.values is None:
+        poses = np.repeat(problem.wanted[row][None], _IN_PLACE, axis=0)
+        poses[:, 3:] = random.normal(size=(_IN_PLACE, 4))
+        poses[:, 3:] /= np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
+        every = problem.to(poses, rows)
+    else:
+        every = robot.length * random.uniform(-np.pi, np.pi, (_IN_PLACE, robot.n_dof))
+    home = problem.to(robot.reference_pose[None], rows[:1])
+    every = problem.allowed(np.concatenate([home, every]))
+    lack, held = problem.lack(every[1:], rows)
+    best = np.argsort(np.where(held, 0.0, lack))[: held.sum() + _NEARLY]
+    return np.asarray(np.concatenate([every[:1], every[1:][best]]))
+
+
+def about_wanted(problem: Reaching) -> Candidates:
+    """The wanted poses, or what of the frame is nearest to them, turned."""
+    n, box = len(problem.wanted), _box(problem.robot)
+    middle = np.zeros((n, problem.robot.n_dof))
+    if problem.values is None:
+        place = problem.wanted[:, :3]
+        middle[:, :3] = np.clip(place, box.min(axis=0), box.max(axis=0)) - place
+    rows, widest = np.arange(n), np.full(n, np.pi)
+    return _about(problem, middle, rows, widest, _TURNED, np.random.default_rng(2))
+
+
+def about_answers(problem: Reaching, away: Array, rows: Rows) -> Candidates:
+    """Answers (n, d) of some rows: each one's own, turned, and the nearest of the others'."""
+    poses, count = problem.placed(away[rows], rows), min(_ABOUT, len(rows))
+    far = np.linalg.norm(away[rows], axis=1) / problem.robot.length
+    widest = np.minimum(_WIDEST * far, np.pi)
+    own = _about(problem, away[rows], rows, widest, _ABOUT, np.random.default_rng(3))
+    others = np.empty((len(rows), count, away.shape[1]))
+    for k, row in enumerate(rows):
+        there = problem.to(poses, np.full(len(poses), row))
+        others[k] = there[np.argsort(np.linalg.norm(there, axis=1))[:count]]
+    shared = Candidates(problem.allowed(others.reshape(-1, away.shape[1])), np.repeat(rows, count))
+    return own.and_more(shared)
+
+
+def _about(
+    problem: Reaching,
+    middle: Array,
+    rows: Rows,
+    widest: Array,
+    count: int,
+    random: np.random.Generator,
+) -> Candidates:
+    """Poses (k, d) of rows, turned by up to ``widest`` (k,) and half of them moved inward.
+
+    More of them by little than by much; and two as they are and as home is.
+    """  # fmt: skip
+    robot, hinges = problem.robot, problem.robot.hinges
+    home = problem.to(np.tile(robot.reference_pose, (len(rows), 1)), rows)
+    out = np.repeat(middle[:, None], count, axis=1)
+    turn = random.normal(size=(*out.shape[:2], int(hinges.sum())))
+    angle = widest[:, None, None] * robot.length * random.random((*out.shape[:2], 1)) ** 2
+    out[..., hinges] += angle * turn / np.maximum(np.linalg.norm(turn, axis=2, keepdims=True), 1e-9)
+    part = np.maximum(_INWARD * (2.0 * random.random((*out.shape[:2], 1)) - 1.0), 0.0)
+    out = np.where(hinges, out, out + part * (home[:, None] - out))
+    level = np.where(hinges, home, middle)
+    every = np.concatenate([out, level[:, None], middle[:, None]], axis=1)
+    away = problem.allowed(every.reshape(-1, every.shape[2]))
+    return Candidates(away, np.repeat(rows, every.shape[1]))

@@ -1,0 +1,71 @@
+"""What to tell winches so that they pay out what is wanted: their laws, the other way round."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seecr.commands.data import Commands
+from seecr.description.robot import Robot
+from seecr.effects.base import Effect
+from seecr.pose import Array
+from seecr.prediction.experiment import Experiment
+
+# A drum out of true lets a round come this much nearer or better; gains and offsets need one.
+_ROUNDS = 60
+
+
+def told_lengths(robot: Robot, commands: Commands, effects: Sequence[Effect], paid: Array) -> Array:
+    """Lengths to tell the winches for rest lengths that they are to pay out.
+
+    Args:
+        robot: as described.
+        commands: of n rows; its lengths are where the search starts.
+        effects: of the winches, among others.
+        paid: (n, m) [m] rest lengths wanted.
+
+    Returns:
+        (n, m) [m], counted as the plain robot counts (``Commands.told``).
+    """
+    told, last = paid.copy(), np.inf
+    for _ in range(_ROUNDS):
+        trial = replace(commands, lengths=told, told=True, passed=None)
+        setup = Experiment(robot, trial).setup(effects)
+        # what is paid out at no turn of the winch, then what each turn adds
+        pretension = robot.rest_lengths - robot.reference_lengths
+        zero = setup.geometric_lengths(setup.zero_pose[None]) + pretension
+        turned = paid / setup.length_factor - zero - setup.extra_length
+        turned = turned / (1.0 + setup.length_gain)
+        if np.any(setup.backlash):
+            turned = unplay(turned, commands.starts, 0.5 * setup.backlash)
+        new = robot.rest_lengths + turned
+        change = float(np.max(np.abs(new - told)))
+        told = new
+        if change <= 1e-15 * float(np.max(np.abs(told))) or change >= last:
+            break
+        last = change if change < 1e-9 else np.inf
+    return told
+
+
+def unplay(wanted: Array, starts: NDArray[np.bool_], half_width: Array) -> Array:
+    """Inputs (n, m) of the play operator whose outputs are those wanted (n, m).
+
+    The inverse of play is a jump at each reversal (Krejci and Kuhnen, IEE Proceedings 148, 2001).
+    Where an output stays, the input stays in the middle of its play.
+
+    Args:
+        starts: (n,) rows before which input and output were zero.
+        half_width: (m,).
+    """
+    out, side = np.empty_like(wanted), np.zeros(wanted.shape[1])
+    before = np.zeros(wanted.shape[1])
+    for k in range(len(wanted)):
+        if starts[k]:
+            side[:], before = 0.0, np.zeros_like(before)
+        moved = np.sign(wanted[k] - before)
+        side = np.where(moved == 0.0, side, moved)
+        out[k], before = wanted[k] + side * half_width, wanted[k]
+    return out

@@ -1,0 +1,386 @@
+"""A robot, its commands and its effects: what would be read, row by row."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from seecr.commands.data import Commands
+from seecr.commands.path import Path, path_of
+from seecr.compiled.columns import STRAIN, TENSION
+from seecr.compiled.outcomes import CONVERGED, ITERATIONS, SINGULAR, STALLED
+from seecr.description.given import GivenRobot, robot_of
+from seecr.description.robot import Robot
+from seecr.effects.base import Effect, Readings
+from seecr.effects.checked import edit_readings
+from seecr.effects.edits import Edits
+from seecr.effects.setup import Setup, plain_setup
+from seecr.effects.terms import Term
+from seecr.pose import Array
+from seecr.result import COORDINATES, Record, Result, named
+from seecr.statics import batch
+from seecr.statics.solution import Solution, certify
+from seecr.statics.starts import commanded_poses, start_of
+from seecr.statics.tables import Tables, assemble, relengthened, take
+
+if TYPE_CHECKING:
+    from seecr.prediction.model import GivenEffects
+
+# Rounds of linearising users' laws about the strains found with them.
+_LAW_ROUNDS = 30
+_LIMIT = 400
+# Of more rows than this, and than a quarter of all, so many are tried first.
+_MANY, _SAMPLE = 16, 4
+
+
+@dataclass(eq=False, repr=False)
+class Prediction(Result):
+    """Solved rows and what the sensors would report of them.
+
+    It prints as a few lines, and ``to_frame`` gives one row per command: what would be read.
+
+    Attributes:
+        setup: as the effects left it, of the rows asked for.
+        tables, found: of the rows asked for.
+        readings: what would be read.
+        has_history: whether rows depend on the rows before.
+        sensors: effects that edit the readings.
+        walk: where all N waypoints of the way came to rest, once it was walked.
+        solved: (n,) bool, a stable equilibrium was found.
+    """
+
+    setup: Setup
+    tables: Tables
+    found: batch.Evaluation
+    readings: Readings
+    has_history: bool
+    sensors: tuple[Effect, ...] = ()
+    walk: batch.Evaluation | None = field(default=None, repr=False)
+    kept: dict[str, Array] = field(default_factory=dict, repr=False)
+
+    @property
+    def solved(self) -> NDArray[np.bool_]:
+        return self.found.solved
+
+    @property
+    def singular(self) -> NDArray[np.bool_]:
+        """(n,) rows at rest that are free to move along some direction."""
+        return np.asarray(self.found.outcome == SINGULAR)
+
+    @property
+    def pose(self) -> Array:
+        """(n, 7) where the platform rests."""
+        if "pose" not in self.kept:
+            self.kept["pose"] = batch.platform_poses(self.tables, self.found.deviation)
+        return self.kept["pose"]
+
+    @property
+    def slack(self) -> NDArray[np.bool_]:
+        """(n, m) cables that are slack, as :func:`seecr.statics.batch.is_slack` has it."""
+        return batch.is_slack(self.tables, self.found)
+
+    @property
+    def tensions(self) -> Array:
+        """(n, m) [N]."""
+        return self.found.states[..., TENSION]
+
+    def with_rows(self, other: Prediction, rows: NDArray[np.bool_]) -> Prediction:
+        """The same with some rows (n,) of another that differs in length errors alone.
+
+        Rows that depend on the rows before cannot be exchanged one by one: both have none.
+        """
+
+        def mixed(one: Array, two: Array) -> Array:
+            return np.where(rows.reshape(-1, *[1] * (one.ndim - 1)), two, one)
+
+        def put(one: Any, two: Any, *names: str) -> Any:
+            some = {name: mixed(getattr(one, name), getattr(two, name)) for name in names}
+            return replace(one, **some)
+
+        return replace(
+            self,
+            setup=put(self.setup, other.setup, "extra_length"),
+            tables=put(self.tables, other.tables, "cables", "load", "scale", "reach"),
+            found=put(self.found, other.found, *(f.name for f in fields(batch.Evaluation))),
+            readings=put(self.readings, other.readings, *(f.name for f in fields(Readings))),
+            walk=None,
+            kept={k: mixed(v, other.kept[k]) for k, v in self.kept.items() if k in other.kept},
+        )
+
+    def lines(self) -> list[str]:
+        """As a solution's: how many rows came to rest, and where."""
+        return self.solution().lines()
+
+    def records(self) -> list[Record]:
+        """What would be read, one row per command."""
+        cables, read = self.setup.robot.cable_names, self.readings
+        poses = np.concatenate([read.position, read.quat_wxyz], axis=1)
+        return [
+            {
+                "solved": bool(self.solved[i]),
+                **named("{}", COORDINATES, poses[i]),
+                **named("tension_{}_N", cables, read.tensions[i]),
+            }
+            for i in range(len(read.position))
+        ]
+
+    def solution(self) -> Solution:
+        """The rows as a certified :class:`seecr.Solution`."""
+        return certify(self.setup.robot, self.tables, self.found)
+
+
+@dataclass(eq=False)
+class Experiment:
+    """A robot and what it was told; predicts its readings under any effects.
+
+    Attributes:
+        robot: as described.
+        commands: n rows.
+        length_errors: (n, m) [m] by which each row's rest lengths differ from what was commanded:
+            noise of the winches, not an effect.
+    """
+
+    robot: Robot
+    commands: Commands
+    length_errors: Array | None = None
+    _path: list[Path] = field(default_factory=list, repr=False)
+    # by identity of the commands: a setup holds them, so that no other takes their place
+    _plain: dict[int, Setup] = field(default_factory=dict, repr=False)
+    _edits: dict[int, Edits] = field(default_factory=dict, repr=False)
+
+    @property
+    def path(self) -> Path:
+        """The rows with their waypoints, for effects with history."""
+        if not self._path:
+            self._path.append(path_of(self.robot, self.commands))
+        return self._path[0]
+
+    def with_length_errors(self, errors: Array | None) -> Experiment:
+        """The same experiment with other errors of the paid-out lengths."""
+        return Experiment(self.robot, self.commands, errors, self._path, self._plain)
+
+    def setup(self, effects: Sequence[Effect], commands: Commands | None = None) -> Setup:
+        """The setup as the effects leave it."""
+        setup = self._edits_of(self.commands if commands is None else commands).by(effects)
+        if np.any(setup.backlash):
+            # what the winches did on the way to the rows counts too
+            path = self.path
+            setup.commands = path.given_turning if commands is None else path.turning
+        return setup
+
+    def _edits_of(self, commands: Commands) -> Edits:
+        """What effects make of the setup of commands: fits ask for that thousands of times."""
+        if id(commands) not in self._edits:
+            if id(commands) not in self._plain:
+                self._plain[id(commands)] = plain_setup(self.robot, commands)
+            setup = self._plain[id(commands)].shared()
+            if self.length_errors is not None:
+                rows = slice(None) if commands is self.commands else self.path.source
+                setup.extra_length = setup.extra_length + self.length_errors[rows]
+            self._edits[id(commands)] = Edits(setup)
+        return self._edits[id(commands)]
+
+    def predict(self, effects: Sequence[Effect] = (), near: Prediction | None = None) -> Prediction:
+        """Solve all rows and read the sensors.
+
+        Args:
+            effects: in the order in which they act.
+            near: a prediction to start from, of effects a little different; the search starts
+                at the commanded poses without one.
+        """
+        setup = self.setup(effects)
+        if setup.has_history:
+            return self._predict_path(effects)
+        if near is not None and near.has_history:
+            near = None
+        tables, found = self._solve(setup, near)
+        pose = batch.platform_poses(tables, found.deviation)
+        readings = read(effects, setup, pose, found.states[..., TENSION])
+        sensors = sensors_among(effects)
+        kept = {"pose": pose}
+        return Prediction(setup, tables, found, readings, False, sensors, kept=kept)
+
+    def from_other_starts(
+        self, effects: Sequence[Effect], at: Prediction, rows: NDArray[np.intp], poses: Array
+    ) -> Prediction:
+        """The same prediction with some rows solved again from given poses (k, 7).
+
+        Where a robot has several stable equilibria, the start decides which one is found.
+        """
+        tables = take(at.tables, rows)
+        start, values = start_of(self.robot, tables, poses)
+        again = batch.descend(tables, start, _LIMIT, start_values=values, staged=False)
+        found = batch.take_evaluation(at.found, np.arange(len(at.found.outcome)))
+        batch.put_evaluation(found, rows, again)
+        readings = self._read(effects, at.setup, at.tables, found)
+        return Prediction(at.setup, at.tables, found, readings, at.has_history, at.sensors)
+
+    def _solve(self, setup: Setup, near: Prediction | None) -> tuple[Tables, batch.Evaluation]:
+        def run(tables: Tables, start: batch.Evaluation | None) -> batch.Evaluation:
+            if start is None:
+                return batch.descend(tables, limit=_LIMIT)
+
+            def warm(rows: NDArray[np.intp]) -> batch.Evaluation:
+                return batch.descend(
+                    take(tables, rows), start.deviation[rows], _LIMIT,
+                    start_values=start.values[rows], staged=False, guess=start.guess[rows],
+                )  # fmt: skip
+
+            def afresh(rows: NDArray[np.intp]) -> batch.Evaluation:
+                return batch.descend(take(tables, rows), limit=_LIMIT)
+
+            found = batch.take_evaluation(start, np.arange(len(start.outcome)))
+            found.outcome[:] = ITERATIONS
+            return _among(_among(found, warm), afresh)
+
+        start = None if near is None else near.found
+        if near is not None and _differ_in_length(setup, near.setup):
+            # what fits of noisy lengths ask for three times of four
+            tables = relengthened(near.tables, setup)
+            return tables, run(tables, start)
+        return _with_laws(setup, run, start)
+
+    def walk(self, effects: Sequence[Effect]) -> tuple[Tables, batch.Evaluation]:
+        """Solve all waypoints of the way in order, each from the one before."""
+        path = self.path
+        setup = self.setup(effects, path.commands)
+        return _with_laws(setup, lambda tables, _start: batch.walk(tables, path, _LIMIT), None)
+
+    def _predict_path(self, effects: Sequence[Effect]) -> Prediction:
+        path = self.path
+        tables, whole = self.walk(effects)
+        rows = take(tables, path.rows)
+        found = batch.take_evaluation(whole, path.rows)
+        # a waypoint that was not solved spoils the rows of its run from there on
+        for k in path.source[~whole.at_rest]:
+            run = path.commands.run
+            assert run is not None
+            later = (np.arange(len(found.outcome)) >= k) & (run[path.rows] == run[path.rows[k]])
+            found.outcome[later & (found.outcome == CONVERGED)] = STALLED
+        own = self.setup(effects)
+        readings = self._read(effects, own, rows, found)
+        return Prediction(own, rows, found, readings, True, sensors_among(effects), whole)
+
+    @staticmethod
+    def _read(
+        effects: Sequence[Effect],
+        setup: Setup,
+        tables: Tables,
+        found: batch.Evaluation,
+    ) -> Readings:
+        pose = batch.platform_poses(tables, found.deviation)
+        return read(effects, setup, pose, found.states[..., TENSION])
+
+
+def predict(
+    robot: GivenRobot,
+    commands: Commands | ArrayLike,
+    model: GivenEffects = (),
+) -> Prediction:
+    """Where a robot with effects comes to rest, and what its sensors would report.
+
+    Args:
+        robot: as described, or its MJCF.
+        commands: commanded poses (n, 7), or :class:`seecr.Commands` with runs, times, lengths.
+        model: from :func:`seecr.load_model`, its file, or effects with values; none by default.
+
+    Returns:
+        a :class:`Prediction`; look at ``solved`` before using a row.
+
+    Raises:
+        InputError: poses, a robot or effects that are none.
+
+    Example:
+        ``seecr.predict(robot, poses, [seecr.Term.of(robot, "pulley_radius", radius_m=0.01)])``
+    """
+    robot = robot_of(robot)
+    if not isinstance(commands, Commands):
+        commands = Commands(commanded_poses(commands))
+    return Experiment(robot, commands).predict(effects_of(model, robot))
+
+
+def effects_of(given: GivenEffects, robot: Robot) -> list[Effect]:
+    """The effects of a model or of its file, of terms with values, or as they are.
+
+    Raises:
+        InputFileError: no such file, or no model of this robot in it.
+        InputError: something else than effects with values.
+    """
+    from seecr.prediction.model import effects_given  # takes a while to import
+
+    terms, _notes = effects_given(given, robot)
+    return [one.effect() if isinstance(one, Term) else one for one in terms]
+
+
+def read(effects: Sequence[Effect], setup: Setup, poses: Array, tensions: Array) -> Readings:
+    """What the sensors report of poses (n, 7) and tensions (n, m)."""
+    readings = Readings(poses[:, :3].copy(), poses[:, 3:].copy(), tensions.copy())
+    for effect in sensors_among(effects):
+        edit_readings(effect, readings, setup)
+    return readings
+
+
+def sensors_among(effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    """The effects that edit readings."""
+    return tuple(effect for effect in effects if senses(type(effect)))
+
+
+def senses(effect: type[Effect]) -> bool:
+    """Whether an effect edits readings."""
+    return effect.edit_readings is not Effect.edit_readings
+
+
+def _differ_in_length(one: Setup, other: Setup) -> bool:
+    """Whether two setups differ in lengths beyond the same commands at most."""
+    alike = one.robot is other.robot and one.commands is other.commands
+    return alike and not (one.laws or other.laws) and one.differs(other) <= {"extra_length"}
+
+
+def _among(
+    found: batch.Evaluation, solve: Callable[[NDArray[np.intp]], batch.Evaluation]
+) -> batch.Evaluation:
+    """Solve what is not solved yet.
+
+    Where that is most rows, a few are tried first: with values under which no pose holds (a step
+    of a fit that went too far) the solver would try every row to its limit.
+    """
+    lost = found.outcome != CONVERGED
+    rows = np.flatnonzero(lost)
+    first, rest = rows, rows[:0]
+    if len(rows) > max(_MANY, len(lost) // 4):
+        some = np.zeros(len(rows), dtype=bool)
+        some[np.linspace(0, len(rows) - 1, _SAMPLE).astype(int)] = True
+        first, rest = rows[some], rows[~some]
+    if len(first):
+        batch.put_evaluation(found, first, solve(first))
+    if len(rest) and np.any(found.outcome[first] == CONVERGED):
+        batch.put_evaluation(found, rest, solve(rest))
+    return found
+
+
+def _with_laws(
+    setup: Setup,
+    run: Callable[[Tables, batch.Evaluation | None], batch.Evaluation],
+    start: batch.Evaluation | None,
+) -> tuple[Tables, batch.Evaluation]:
+    """Solve, and where users' laws are in play linearise them at the strains found, again."""
+    strains = None
+    if setup.laws and start is not None:
+        strains = start.states[..., STRAIN]
+    tables = assemble(setup, strains)
+    found = run(tables, start)
+    if not setup.laws:
+        return tables, found
+    for _ in range(_LAW_ROUNDS):
+        before = strains
+        strains = np.maximum(found.states[..., STRAIN], 0.0)
+        tables = assemble(setup, strains)
+        found = run(tables, found)
+        if before is not None and np.allclose(strains, before, rtol=1e-12, atol=1e-15):
+            return tables, found
+    found.outcome[found.outcome == CONVERGED] = STALLED
+    return tables, found

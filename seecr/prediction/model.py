@@ -1,0 +1,315 @@
+"""A model: a robot plus the effects added to it, in a TOML file that people keep in git.
+
+    format = 1
+    [robot]                      # whose model it is, to notice when it is used for another
+    [[effect]]                   # in the order of adding
+    name = "pulley_radius"
+    fixed = true                 # optional: none of its values is ever fitted
+    [effect.parameters]
+    radius_m = { value = 0.0099, stderr = 0.0001, unit = "m", at_bound = false }
+    [effect.provenance]          # data file, date, version, who or what put it there
+    [effect.before]              # rms errors without it, with it, and on runs left out
+    [effect.after]
+    [effect.held_out]
+    [fit]                        # how the errors of these values go together
+    [fitted_to]                  # how far those data reach: places and tensions
+
+An effect that is another for each file or run, such as a tracker that is set up anew, says
+``per_file = true`` or ``per_run = true``. Its own values stand in tables named after those,
+``[effect.of."monday/measured.csv"]``; those under ``parameters`` are what a further file or run is
+expected to have, as far as these differ, and may be left out.
+
+``stderr = "unseen"`` stands for a parameter that the data do not see. A person may write a model
+by hand: name, parameters and values are all that is needed. What a person knows beside the data
+stands with the parameter (:mod:`seecr.prediction.cells`): ``fixed = true`` holds its value in every
+fit, ``known = { value = 0.03, stderr = 0.0005 }`` is a reading in every fit. A key without the
+component's number or axis (``shift_m``, ``gain``) says the same of all components.
+"""
+
+from __future__ import annotations
+
+import copy
+import difflib
+import math
+from collections.abc import Iterable, Mapping, MutableMapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import tomlkit
+from tomlkit import TOMLDocument
+from tomlkit.exceptions import TOMLKitError
+
+from seecr.counted import counted
+from seecr.description.fingerprint import check_robot, fingerprint
+from seecr.description.given import GivenRobot, robot_of
+from seecr.description.robot import Robot
+from seecr.effects import Effect, Term, Terms, catalogue
+from seecr.errors import InputError
+from seecr.files import Toml, path_of, read_toml
+from seecr.pose import Array
+from seecr.prediction.cells import Where, term_of
+from seecr.prediction.data_reach import TABLE, DataReach
+from seecr.result import Record, Result
+
+if TYPE_CHECKING:
+    from seecr.statics.solution import Solution
+
+FORMAT = 1
+"""Of the file; raised when a key changes its meaning or goes."""
+
+_EXPECTED = "expected a model as crosscheck add writes it"
+CALIBRATION, FIT = "calibration", "fit"
+"""Tables about all values at once: what a calibration was worth, and how the errors of the last
+fit go together (:mod:`seecr.prediction.uncertainty`)."""
+
+_TABLES = ("format", "robot", "effect", CALIBRATION, FIT, TABLE)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Model(Result):
+    """A robot's effects, as read from a file.
+
+    It prints as one line per effect, and ``to_frame`` gives one row per parameter.
+
+    Attributes:
+        terms: the effects with their values.
+        stderr: standard errors (p,) of each effect's parameters by its name; inf where unseen,
+            NaN where the file gives none.
+        document: the file's text as a tree, comments included.
+        notes: sentences about what has changed since the model was made.
+        path: the file.
+        reach: how far the data reach that the values were fitted to, if the file says so.
+    """
+
+    terms: Terms
+    stderr: Mapping[str, Array]
+    document: TOMLDocument
+    notes: tuple[str, ...] = ()
+    path: Path | None = None
+    reach: DataReach | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the effects, in the order of adding."""
+        return tuple(self.stderr)
+
+    def beyond(self, solution: Solution) -> tuple[str, ...]:
+        """A sentence about the rows at rest that are beyond the data, if there are any.
+
+        Args:
+            solution: as :func:`seecr.solve` gives it with this model.
+        """
+        if self.reach is None:
+            return ()
+        rests = solution.converged
+        places, tensions = solution.pose[rests, :3], solution.tensions[rests]
+        return self.reach.beyond(places, tensions, solution.robot.length)
+
+    def lines(self) -> list[str]:
+        """Whose model it is, and the effects with their first few values."""
+        table = self.document.get("robot")
+        robot = table.get("name", "a robot") if isinstance(table, Mapping) else "a robot"
+        count = counted(len(self.names), "effect")
+        return [
+            f"model of {robot}: plain SEECR and {count}" if self.names else
+            f"model of {robot}: plain SEECR, no effects",
+            *(f"{name}: {_shown(self.terms[name], self.stderr[name])}" for name in self.names),
+            *self.notes,
+        ]  # fmt: skip
+
+    def records(self) -> list[Record]:
+        """One row per parameter: its value and standard error, None where there is none.
+
+        ``of`` names the file or run where it has values of its own for each.
+        """
+        return [
+            {
+                "effect": name,
+                "of": of,
+                "parameter": key,
+                "value": float(vector[i]),
+                "stderr": float(stderr[i]) if math.isfinite(stderr[i]) else None,
+                "unit": self.terms[name].layout.units[i],
+            }
+            for name in self.names
+            for of, vector, stderr in self._tables(name)
+            for i, key in enumerate(self.terms[name].layout.names)
+        ]
+
+    def _tables(self, name: str) -> list[tuple[str, Array, Array]]:
+        """Values and errors of an effect, and those for files or runs by their names."""
+        term = self.terms[name]
+        own = {} if term.own is None else term.own.values
+        tables = [(of, one.vector, one.stderr) for of, one in own.items()]
+        return [("", term.vector, self.stderr[name]), *tables]
+
+
+def _shown(term: Term, stderr: Array, most: int = 3) -> str:
+    """Values of an effect for people, the first few."""
+    parts = [
+        f"{key} = {value:.6g}"
+        + (" (fixed)" if fixed else f" +- {error:.2g}" if math.isfinite(error) else "")
+        for key, value, error, fixed in zip(
+            term.layout.names, term.vector, stderr, term.knowledge.fixed, strict=True
+        )
+    ]
+    more = [f"{len(parts) - most} more"] if len(parts) > most else []
+    words = ", ".join([*parts[:most], *more])
+    if term.own is None:
+        return words
+    return f"of its own for each {term.own.kind}, {len(term.own.values)} known; elsewhere {words}"
+
+
+GivenEffects: TypeAlias = Model | Iterable[Term | Effect] | str | Path
+"""A model, the path of its TOML, or effects with their values."""
+
+
+def effects_given(
+    given: GivenEffects, robot: Robot
+) -> tuple[tuple[Term | Effect, ...], tuple[str, ...]]:
+    """Effects of a model, of its file, or as they are; and what is to be told of the model.
+
+    Raises:
+        InputFileError: no such file, or no model of this robot in it.
+        InputError: something else than effects with values.
+    """
+    if isinstance(given, Model | str | Path):
+        model = model_given(given, robot)
+        return tuple(model.terms), model.notes
+    every = tuple(given) if isinstance(given, Iterable) else (None,)
+    wrong = [one for one in every if not isinstance(one, Term | Effect)]
+    if wrong:
+        raise no_effects(wrong[0] if isinstance(given, Iterable) else given)
+    return every, ()
+
+
+def no_effects(got: object) -> InputError:
+    """The error about something given in the place of effects with values."""
+    what = repr(got) if isinstance(got, str) else type(got).__name__
+    return InputError(
+        "expected a model, its path, or a list of effects with their values, as "
+        f"seecr.Term.of(robot, name, ...) gives each, got {what}"
+    )
+
+
+def model_given(given: Model | str | Path, robot: Robot) -> Model:
+    """The model, read if need be.
+
+    Raises:
+        InputFileError: no such file, or no model of this robot in it.
+        InputError: no model.
+    """
+    if isinstance(given, Model):
+        return given
+    if isinstance(given, str | Path):
+        return load_model(given, robot)
+    raise InputError(f"expected a model or its path, got {type(given).__name__}")
+
+
+def new_model(robot: GivenRobot) -> Model:
+    """A model without effects of a robot, or of that in an MJCF: the seed's plain SEECR."""
+    robot = robot_of(robot)
+    document = tomlkit.document()
+    document.add(tomlkit.comment("Effects that this robot has beyond plain SEECR, in the order"))
+    document.add(tomlkit.comment("of adding. SI units. Written by crosscheck add; edit freely."))
+    document["format"] = FORMAT
+    document["robot"] = fingerprint(robot)
+    return Model(Terms(), {}, document)
+
+
+def load_model(path: str | Path, robot: GivenRobot) -> Model:
+    """Read a model for a robot.
+
+    Args:
+        path: the TOML file.
+        robot: that it must have been made for, or its MJCF.
+
+    Raises:
+        InputFileError: no such file, no TOML, made for another robot, an effect or parameter
+            that is unknown, missing, given twice, no number or out of bounds.
+    """
+    path, robot = path_of(path, "a model"), robot_of(robot)
+    toml, document = read_document(path)
+    where = Where(path, toml.text)
+    notes = check_robot(path, document.get("robot"), robot, line_of=toml.line_of)
+    terms: list[Term] = []
+    errors: dict[str, Array] = {}
+    notes = (*notes, *_migrate(where, document))
+    tables = _effect_tables(where, document)
+    _check_once(where, tables)
+    for k, table in enumerate(tables):
+        term, stderr = term_of(where, k, table, robot)
+        terms.append(term)
+        errors[term.name] = stderr
+    reach = DataReach.read(where, document)
+    return Model(Terms(terms), errors, document, notes, path, reach)
+
+
+def read_document(path: Path, expected: str = _EXPECTED) -> tuple[Toml, TOMLDocument]:
+    """A model's file, of whatever robot: its text, and the tree that is written as it was read.
+
+    Args:
+        path: the file.
+        expected: what it should be, for the error.
+
+    Raises:
+        InputFileError: no such file, no TOML, or no model.
+    """
+    toml = read_toml(path, expected)
+    try:
+        document = tomlkit.parse(toml.text)
+    except TOMLKitError as error:  # TOML that only this parser does not take
+        raise toml.error(f"cannot be kept with its comments: {error}; {expected}") from None
+    if not document:
+        raise toml.error(f"is empty; {expected}")
+    _check_tables(Where(path, toml.text), document, expected)
+    return toml, document
+
+
+def _check_tables(where: Where, document: Mapping[str, Any], expected: str) -> None:
+    """Tables of other names are the user's own; a misspelt one must not be passed over."""
+    for name in document:
+        near = difflib.get_close_matches(name.lower(), _TABLES, cutoff=0.7)
+        if name not in _TABLES and near:
+            raise where.error(f"unknown {name}; expected {near[0]}", key=name)
+    if document and not any(name in document for name in _TABLES):
+        has = ", ".join(document)
+        raise where.error(f"is no model, it has {has}; {expected}, with tables [[effect]]")
+    version = document.get("format", FORMAT)
+    if version != FORMAT:
+        raise where.error(
+            f"format {version!r} is not known to this version, which reads {FORMAT}; upgrade it",
+            key="format",
+        )
+
+
+def _effect_tables(where: Where, document: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
+    tables = document.get("effect", [])
+    if not isinstance(tables, list) or not all(isinstance(t, Mapping) for t in tables):
+        raise where.error("effect: expected tables [[effect]], one per effect", key="effect")
+    return tables
+
+
+def _check_once(where: Where, tables: Sequence[Mapping[str, Any]]) -> None:
+    """Each effect once: said before what a table lacks, which the other one may have."""
+    names = [table.get("name") for table in tables]
+    for k, name in enumerate(names):
+        if isinstance(name, str) and name in names[:k]:
+            raise where.error(f"effect {name} is listed twice; expected it once", k, "name")
+
+
+def _migrate(where: Where, document: Mapping[str, Any]) -> list[str]:
+    """Put parameters that had another name when the model was written under those of today."""
+    notes = []
+    for table in _effect_tables(where, document):
+        given, name = table.get("parameters"), table.get("name")
+        if not isinstance(given, MutableMapping) or name not in catalogue():
+            continue
+        for old, now in catalogue()[str(name)].renamed.items():
+            if old in given:
+                cell = given.pop(old)
+                for key in now:
+                    given.setdefault(key, copy.deepcopy(cell))
+                notes.append(f"effect {name}: {old} is read as {' and '.join(now)}, as it is now")
+    return notes

@@ -1,0 +1,57 @@
+"""Between where a platform is and what its tracker reads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from seecr.commands.data import Commands
+from seecr.description.given import GivenRobot, robot_of
+from seecr.description.robot import Robot
+from seecr.effects import Effect
+from seecr.errors import InputError
+from seecr.pose import Array, pose_add, pose_difference
+from seecr.prediction.experiment import Experiment, effects_of, read
+
+if TYPE_CHECKING:
+    from seecr.prediction.model import GivenEffects
+
+__all__ = ["placed", "tracked"]
+
+# Rounds until a pose is read as wanted, and how nearly [m, rad].
+_ROUNDS, _READ = 50, 1e-12
+
+
+def tracked(robot: GivenRobot, commands: Commands, effects: GivenEffects) -> Array:
+    """Poses (n, 7) that the tracker of a model reads of platforms at the commanded poses."""
+    robot = robot_of(robot)
+    return _tracked(robot, commands, effects_of(effects, robot))
+
+
+def placed(robot: GivenRobot, commands: Commands, effects: GivenEffects) -> Commands:
+    """Commands at whose poses the tracker of a model reads those of ``commands``.
+
+    How a calibration shares an error between the tracker and the robot hardly matters to what is
+    read, and much to where the platform is taken to be.
+
+    Raises:
+        InputError: no pose is read so.
+    """
+    robot = robot_of(robot)
+    acting, at = effects_of(effects, robot), commands
+    for _ in range(_ROUNDS):
+        missed = pose_difference(commands.pose, _tracked(robot, at, acting))
+        if np.abs(missed).max(initial=0.0) < _READ:
+            return at
+        at = replace(at, pose=pose_add(at.pose, missed))
+    raise InputError("the model's tracker reads no pose as wanted; expected one near the robot's")
+
+
+def _tracked(robot: Robot, commands: Commands, effects: Sequence[Effect]) -> Array:
+    setup = Experiment(robot, commands).setup(effects)
+    none = np.zeros((len(commands), robot.n_cables))
+    readings = read(effects, setup, commands.pose, none)
+    return np.concatenate([readings.position, readings.quat_wxyz], axis=1)

@@ -1,0 +1,350 @@
+"""How readings change with the effects' parameters, by the implicit function theorem.
+
+At a solved pose the wrench w(q, theta) is zero; so dq/d theta = -K^-1 dg/d theta with g = -w the
+gradient of the energy and K its stiffness. One factorisation of K serves all parameters. dg/d
+theta comes from differencing the effects' edits at the fixed pose: nothing is solved again.
+Where rows depend on the rows before, so does g: what the cables keep is differentiated forward
+along the way, and nothing is solved there either.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from seecr.compiled.columns import STRAIN
+from seecr.description.joints import motion_columns
+from seecr.effects.base import Effect, Readings
+from seecr.effects.checked import is_built_in
+from seecr.effects.terms import Terms
+from seecr.pose import Array, pose_add, quat_conjugate, quat_multiply, rotvec_from_quat
+from seecr.prediction.experiment import Experiment, Prediction, read, senses
+from seecr.prediction.shifts import OF_SHAPE, Shift, Sides, blocks_of_cables, positions, shifted
+from seecr.statics import batch
+from seecr.statics.tables import Tables, assemble
+from seecr.threads import run_parts
+
+# Differencing step of a way, in plausible sizes of a parameter: a cable that is barely taut where
+# the platform rests is slack a little beside it.
+_WAY = 1e-5
+# Differencing step of what the sensors make of a pose: rad, or part of a length or tension.
+_READ = 1e-5
+
+
+def sensitivities(
+    experiment: Experiment,
+    terms: Terms,
+    at: Prediction,
+    columns: Sequence[int] = (),
+    frozen: bool = False,
+) -> Array:
+    """Derivative of the readings by the terms' parameters.
+
+    Args:
+        experiment: robot and commands.
+        terms: effects with values.
+        at: the prediction with those values.
+        columns: which parameters (counted through all terms); all by default.
+        frozen: take the history of each row as given, where the model has history: quick, and
+            good enough to see which effects could matter, but not to fit them.
+
+    Returns:
+        (n, 6 + m, p): position [m], rotation vector [rad], tensions [N], by each parameter.
+    """
+    wanted = list(columns) if len(columns) else list(range(len(terms)))
+    out = np.zeros((*_shape(at), len(wanted)))
+    by_wrench = _ByWrench(experiment, at, terms)
+    if at.has_history and not frozen:
+        shifts = [shifted(terms, term, k, _WAY) for term, k in positions(terms, wanted)]
+        _ = by_wrench.way  # made once, for all threads
+
+        def run(part: slice) -> None:
+            out[..., part.start] = by_wrench.column(shifts[part.start], along=True)
+
+        # a way cannot be parted where creep goes by one clock: the parameters can
+        run_parts(run, [slice(c, c + 1) for c in range(len(wanted))])
+        return out
+    todo = {position: c for c, position in enumerate(positions(terms, wanted))}
+    for term, group in blocks_of_cables(terms, todo):
+        block = by_wrench.block(shifted(terms, term, group))
+        if block is not None:
+            out[..., [todo.pop((term, k)) for k in group.tolist()]] = block
+    for (term, k), c in todo.items():
+        out[..., c] = by_wrench.column(shifted(terms, term, k))
+    return out
+
+
+def length_sensitivities(at: Prediction) -> Array:
+    """Derivative of pose and tensions by each cable's rest length, (n, 6 + m, m)."""
+    return _kept(at, "by_length", _by_length)
+
+
+def _by_length(at: Prediction) -> Array:
+    step = 1e-6 * at.tables.length
+    return _response_by_cable(
+        at, at.tables.lengthened(step), at.tables.lengthened(-step), 2.0 * step
+    )
+
+
+def read_by_length(at: Prediction) -> Array:
+    """Derivative of what the sensors read by each cable's rest length, (n, 6 + m, m)."""
+    change = length_sensitivities(at)
+    return rates_of_reading(at, at.sensors) @ change if _alters(at) else change
+
+
+def _alters(at: Prediction) -> bool:
+    """Whether the sensors report anything else than what is there."""
+    read, pose = at.readings, at.pose
+    there = (pose[:, :3], pose[:, 3:], at.tensions)
+    seen = (read.position, read.quat_wxyz, read.tensions)
+    return bool(at.sensors) and not all(map(np.array_equal, seen, there))
+
+
+def rates_of_reading(at: Prediction, sensors: Sequence[Effect]) -> Array:
+    """Derivative of the readings by pose and tensions, (n, 6 + m, 6 + m)."""
+    step = np.full(_shape(at)[1], _READ)
+    step[:3] *= at.tables.length
+    step[6:] *= max(1.0, float(np.max(np.abs(at.tensions))))
+    each = np.diag(step)
+    # our own sensors look at a row's readings alone: all steps are rows of one batch
+    together = all(is_built_in(type(effect)) for effect in sensors)
+    parts = [each] if together else [one[None] for one in each]
+    rates = np.concatenate([_read_apart(at, sensors, part) for part in parts], axis=2)
+    return np.asarray(rates / step)
+
+
+def _read_apart(at: Prediction, sensors: Sequence[Effect], steps: Array) -> Array:
+    """Half of what steps (k, 6 + m) ahead and back change of the readings, (n, 6 + m, k)."""
+    n, width = _shape(at)
+    k = len(steps)
+    change = np.repeat(steps, n, axis=0)
+    pose, tensions = np.tile(at.pose, (k, 1)), np.tile(at.tensions, (k, 1))
+    ahead, behind = (
+        read(sensors, at.setup, pose_add(pose, s * change[:, :6]), tensions + s * change[:, 6:])
+        for s in (1.0, -1.0)
+    )
+    return np.moveaxis(0.5 * readings_difference(ahead, behind).reshape(k, n, width), 0, 2)
+
+
+def _shape(at: Prediction) -> tuple[int, int]:
+    n, m = at.tables.cables.shape[:2]
+    return n, 6 + m
+
+
+@dataclass(eq=False)
+class _ByWrench:
+    """Columns of the sensitivity at one prediction without history."""
+
+    experiment: Experiment
+    at: Prediction
+    terms: Terms
+
+    @cached_property
+    def sensing(self) -> list[Effect]:
+        """The effects that edit the readings."""
+        return [t.effect() for t in self.terms if senses(t.layout.effect)]
+
+    @cached_property
+    def read_rates(self) -> Array:
+        """Derivative of the readings by pose and tensions, (n, 6 + m, 6 + m)."""
+        own = [(t.name, *t.vector.tolist()) for t in self.terms if senses(t.layout.effect)]
+        return _kept(self.at, f"read_rates {own}", lambda at: rates_of_reading(at, self.sensing))
+
+    @property
+    def inverse(self) -> Array:
+        return _kept(self.at, "inverse", _inverse_stiffness)
+
+    @property
+    def by_length(self) -> Array:
+        return length_sensitivities(self.at)
+
+    @cached_property
+    def way(self) -> _Way:
+        """The way through the rows, for what depends on the rows before."""
+        return _Way.of(self.experiment, self.at, self.terms)
+
+    def column(self, shift: Shift, along: bool = False) -> Array:
+        """Derivative of the readings (n, 6 + m) by the shifted parameter.
+
+        ``along`` the way; where that is not asked, of effects with history alone.
+        """
+        n, width = _shape(self.at)
+        change = np.zeros((n, width))
+        if shift.physical:
+            sides = None if along else self._sides(shift)
+            if sides is None or sides.of_history:
+                change = self.way.change(shift)
+            else:
+                change = self._physical(sides, shift.apart)
+        if shift.sensing:
+            return self._read(shift, change, shift.apart)
+        return (self.read_rates @ change[..., None])[..., 0] if self.sensing else change
+
+    def block(self, shift: Shift) -> Array | None:
+        """Derivatives (n, 6 + m, m) by what each cable has of its own, shifted together."""
+        if shift.sensing:
+            return None
+        sides = self._sides(shift)
+        if sides.of_history:
+            return None
+        if sides.of_lengths:
+            change = self.by_length * sides.longer(shift.apart)[:, None, :]
+        else:
+            change = _response_by_cable(self.at, *self._tables(sides), shift.apart)
+        return np.asarray(self.read_rates @ change if self.sensing else change)
+
+    def _sides(self, shift: Shift) -> Sides:
+        plus = self.experiment.setup(shift.plus.effects)
+        minus = self.experiment.setup(shift.minus.effects)
+        return Sides(plus, minus, plus.differs(minus))
+
+    def _tables(self, sides: Sides) -> tuple[Tables, Tables]:
+        return sides.tables(self.at.tables, self.at.found.states[..., STRAIN])
+
+    def _physical(self, sides: Sides, apart: float) -> Array:
+        if sides.of_lengths:
+            return (self.by_length @ sides.longer(apart)[..., None])[..., 0]
+        return _response(self.at, *self._tables(sides), apart, self.inverse)
+
+    def _read(self, shift: Shift, change: Array, apart: float) -> Array:
+        at = self.at
+
+        def seen(side: Terms, sign: float) -> Readings:
+            if not shift.physical:
+                return read(side.effects, at.setup, at.pose, at.tensions)
+            step = (0.5 * sign * apart) * change
+            moved = pose_add(at.pose, step[:, :6])
+            return read(side.effects, at.setup, moved, at.tensions + step[:, 6:])
+
+        return readings_difference(seen(shift.plus, 1.0), seen(shift.minus, -1.0)) / apart
+
+
+def _kept(at: Prediction, name: str, make: Callable[[Prediction], Array]) -> Array:
+    """What many effects ask of one prediction, computed once."""
+    if name not in at.kept:
+        at.kept[name] = make(at)
+    return at.kept[name]
+
+
+def _response(at: Prediction, plus: Tables, minus: Tables, apart: float, inverse: Array) -> Array:
+    """Change of pose and tensions (n, 6 + m) between two tables, per unit of ``apart``."""
+    force, tension = batch.change(plus, minus, at.found)
+    step = -inverse @ (force / apart)[..., None]
+    move = (motion_of(at) @ step)[..., 0]
+    return np.concatenate([move, tension / apart + (at.found.slopes @ step)[..., 0]], axis=1)
+
+
+def _response_by_cable(at: Prediction, plus: Tables, minus: Tables, apart: Any) -> Array:
+    """The same (n, 6 + m, m) where each cable was changed, by the change of each."""
+    force, own = batch.change_by_cable(plus, minus, at.found)
+    step = -_kept(at, "inverse", _inverse_stiffness) @ (force / apart)
+    out = np.concatenate([motion_of(at) @ step, at.found.slopes @ step], axis=1)
+    cable = np.arange(own.shape[1])
+    out[:, 6 + cable, cable] += own / apart
+    return out
+
+
+def motion_of(at: Prediction) -> Array:
+    """Displacement and rotation vector (n, 6, d) by steps in the loop's coordinates."""
+    return _kept(at, "motion", _motion_columns)
+
+
+def _motion_columns(at: Prediction) -> Array:
+    return _motion_at(at.tables, at.found)
+
+
+def _motion_at(tables: Tables, found: batch.Evaluation) -> Array:
+    if tables.screws.shape[1] == 0:
+        return np.diag(1.0 / np.repeat([1.0, tables.length], 3))[None]
+    screws = batch.joints_at_rest(tables, found)
+    per = np.where(screws[..., 0] == 1.0, 1.0 / tables.length, 1.0)
+    origin = batch.platform_poses(tables, found.deviation)[:, :3]
+    return motion_columns(screws, origin) * per[:, None, :]
+
+
+def with_inverse(at: Prediction, inverse: Array) -> Prediction:
+    """The prediction, whose rows answer forces by another inverse of their stiffness (n, d, d).
+
+    Such as a damped one, where the rows are at poses that are no equilibria.
+    """
+    return replace(at, kept={"inverse": inverse})
+
+
+def _inverse_stiffness(at: Prediction) -> Array:
+    return _inverse_of(at.tables, at.found)
+
+
+def _inverse_of(tables: Tables, found: batch.Evaluation) -> Array:
+    """Inverse of the stiffness of each row; of what is stiff, where a row is singular."""
+    stiffness = batch.stiffness(tables, found)
+    whole = np.where(np.isfinite(stiffness), stiffness, 0.0)
+    solved = found.solved
+    # a stable row's stiffness is far from singular, and inverting takes a fifth of the time
+    if solved.all():
+        return np.asarray(np.linalg.inv(whole))
+    out = np.empty_like(whole)
+    out[solved] = np.linalg.inv(whole[solved])
+    out[~solved] = np.linalg.pinv(whole[~solved], rcond=1e-12)
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class _Way:
+    """The way through the rows of a prediction: N waypoints, walked and not walked again.
+
+    Attributes:
+        experiment: robot and commands.
+        tables, found: of the waypoints; the columns of the past are not filled.
+        inverse: (N, d, d) of the stiffness there. motion: (N, 6, d), see motion_of; (1, 6, d) where
+            it is the same everywhere.
+    """
+
+    experiment: Experiment
+    tables: Tables
+    found: batch.Evaluation
+    inverse: Array
+    motion: Array
+
+    @classmethod
+    def of(cls, experiment: Experiment, at: Prediction, terms: Terms) -> _Way:
+        found = _walk_of(experiment, at, terms)
+        setup = experiment.setup(terms.effects, experiment.path.commands)
+        tables = assemble(setup, found.states[..., STRAIN])
+        return cls(experiment, tables, found, _inverse_of(tables, found), _motion_at(tables, found))
+
+    def change(self, shift: Shift) -> Array:
+        """Derivative of pose and tensions (n, 6 + m) by the shifted parameter."""
+        path = self.experiment.path
+        ahead = self.experiment.setup(shift.plus.effects, path.commands)
+        behind = self.experiment.setup(shift.minus.effects, path.commands)
+        sides = Sides(ahead, behind, ahead.differs(behind))
+        plus, minus = sides.tables(self.tables, self.found.states[..., STRAIN])
+        step, tension = batch.change_of_walk(plus, minus, path, self.found, self.inverse)
+        change = np.concatenate([(self.motion @ step[..., None])[..., 0], tension], axis=1)
+        return np.asarray(change[path.rows] / shift.apart)
+
+
+def _walk_of(experiment: Experiment, at: Prediction, terms: Terms) -> batch.Evaluation:
+    """Where the waypoints come to rest with the terms, kept where the rows do as at the prediction.
+
+    An effect at its null may have a shape that matters: cable behind the exit point.
+    """
+    setup = experiment.setup(terms.effects)
+    other = at.setup.differs(setup)
+    if other and (setup.has_history or not other <= OF_SHAPE):
+        return experiment.walk(terms.effects)[1]
+    if at.walk is None:
+        at.walk = experiment.walk(terms.effects)[1]
+    return at.walk
+
+
+def readings_difference(a: Readings, b: Readings) -> Array:
+    """Readings a less b, (n, 6 + m): position, rotation vector from b to a, tensions."""
+    turn = quat_multiply(a.quat_wxyz, quat_conjugate(b.quat_wxyz))
+    return np.concatenate(
+        [a.position - b.position, rotvec_from_quat(turn), a.tensions - b.tensions], axis=1
+    )

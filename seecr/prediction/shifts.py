@@ -1,0 +1,127 @@
+"""Terms with a parameter shifted up and down: what derivatives are differenced from."""
+
+from __future__ import annotations
+
+from collections.abc import Container
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seecr.effects.base import Effect, Layout
+from seecr.effects.checked import is_built_in
+from seecr.effects.setup import QUANTITIES, History, Setup
+from seecr.effects.terms import Term, Terms
+from seecr.pose import Array
+from seecr.statics.tables import Tables, assemble, reassembled
+
+# Steps, in plausible sizes of a parameter.
+_CENTRAL, _ONE_SIDED = 1e-4, 1e-5
+
+# Quantities that reach the statics through the rest lengths alone.
+_PAID_OUT = {name for name, item in QUANTITIES.items() if item.paid_out}
+# Quantities whose change reaches a row through the rows before it as well.
+_OF_HISTORY = {name for name, item in QUANTITIES.items() if item.history is not History.NONE}
+# Quantities that mean nothing where nothing has history.
+OF_SHAPE = {name for name, item in QUANTITIES.items() if item.history is History.SHAPES}
+
+
+@dataclass(frozen=True, eq=False)
+class Shift:
+    """Terms with a parameter shifted up and down, or several of one effect together.
+
+    ``apart`` is by how much plus and minus differ, a number or one for each of several.
+    """
+
+    plus: Terms
+    minus: Terms
+    apart: Any
+    layout: Layout
+
+    @property
+    def physical(self) -> bool:
+        """Whether the shifted effect edits the setup."""
+        return self.layout.effect.edit_setup is not Effect.edit_setup
+
+    @property
+    def sensing(self) -> bool:
+        """Whether the shifted effect edits the readings."""
+        return self.layout.effect.edit_readings is not Effect.edit_readings
+
+
+@dataclass(frozen=True, eq=False)
+class Sides:
+    """Setups with a parameter shifted up and down, and the names of what differs between them."""
+
+    plus: Setup
+    minus: Setup
+    differing: frozenset[str]
+
+    @property
+    def of_history(self) -> bool:
+        """Whether what differs reaches a row through the rows before it as well."""
+        return not self.differing.isdisjoint(_OF_HISTORY)
+
+    @property
+    def of_lengths(self) -> bool:
+        """Whether the cables are longer or shorter, and nothing else."""
+        return self.differing <= _PAID_OUT and not (self.plus.laws or self.minus.laws)
+
+    def longer(self, apart: Any) -> Array:
+        """Rest lengths (n, m) of plus less those of minus, per unit of ``apart``."""
+        return np.asarray((self.plus.rest_lengths() - self.minus.rest_lengths()) / apart)
+
+    def tables(self, base: Tables, strains: Array) -> tuple[Tables, Tables]:
+        """Of both, as those of neither shift with what differs; strains are for users' laws."""
+        both = (self.plus, self.minus)
+        if self.plus.laws or self.minus.laws:
+            ahead, behind = (assemble(one, strains).with_past(base) for one in both)
+        else:
+            ahead, behind = (reassembled(base, one, self.differing) for one in both)
+        return ahead, behind
+
+
+def shifted(terms: Terms, term: Term, k: Any, part: float | None = None) -> Shift:
+    """Shift parameter ``k`` (or those of an index array, together) of one of the terms."""
+    layout, value = term.layout, term.vector[k]
+    lower, upper = layout.lower[k], layout.upper[k]
+    # a time constant, a radius: what counts is by which part of itself it changes; finely, since
+    # a drum of this radius may have turned many times, but above what a walk leaves unsolved
+    relative = layout.shape[k] & (lower > 0.0)
+    size = np.where(relative, value * (0.1 if part is None else 1.0), layout.scale[k])
+    step = (_CENTRAL if part is None else part) * size
+    low, high = value - step < lower, value + step > upper
+    small = (_ONE_SIDED if part is None else part) * size
+    up = np.where(low, value + small, np.where(high, value, value + step))
+    down = np.where(low, value, np.where(high, value - small, value - step))
+
+    def with_value(numbers: Array) -> Terms:
+        vector = term.vector.copy()
+        vector[k] = numbers
+        return terms.with_term(term.with_vector(vector))
+
+    return Shift(with_value(up), with_value(down), up - down, layout)
+
+
+def positions(terms: Terms, wanted: list[int]) -> list[tuple[Term, int]]:
+    """Whose parameters are wanted, and which of the term's own each is."""
+    every = [(term, k) for term in terms for k in range(len(term.layout))]
+    return [every[c] for c in wanted]
+
+
+def blocks_of_cables(
+    terms: Terms, todo: Container[tuple[Term, int]]
+) -> list[tuple[Term, NDArray[np.intp]]]:
+    """Parameters that every cable has one of: they are shifted together.
+
+    What each does is told apart by the cable it does it to. Of built-in effects alone: nothing
+    says that a user's effect leaves the other cables as they are.
+    """
+    return [
+        (term, group)
+        for term in terms
+        if is_built_in(term.layout.effect)
+        for group in term.layout.cable_by_cable
+        if all((term, k) in todo for k in group.tolist())
+    ]

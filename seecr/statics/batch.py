@@ -1,0 +1,334 @@
+"""What the compiled loop says of tables: where platforms rest, and what holds at given poses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seecr.commands.path import Path
+from seecr.compiled.change import change_at_rest, change_of_each_cable
+from seecr.compiled.columns import (
+    CREEP_PART,
+    EA,
+    EXTERNAL_MOMENT,
+    GAP,
+    N_STATE,
+    RADIUS,
+    REST,
+    SLACK,
+    TENSION,
+)
+from seecr.compiled.descent import STIFF, solve_batch
+from seecr.compiled.joints import place_batch
+from seecr.compiled.outcomes import (
+    CABLE_LAW,
+    CONVERGED,
+    IDLE,
+    ITERATIONS,
+    SINGULAR,
+    STALLED,
+    TOLERANCE,
+)
+from seecr.compiled.platform import add_skew, evaluate_batch
+from seecr.compiled.walk import change_on_the_way, walk_in_order
+from seecr.pose import Array, quat_conjugate, quat_multiply
+from seecr.statics.tables import Tables, take
+from seecr.threads import in_parts, run_parts
+
+
+@dataclass(eq=False)
+class Evaluation:
+    """What the loop fills: one row per pose."""
+
+    outcome: NDArray[np.int64]
+    count: NDArray[np.int64]
+    residual: Array
+    gradient: Array  # (n, d) [N], torques over the robot's length
+    hessian: Array  # (n, d, d) [N/m] in scaled coordinates
+    states: Array  # (n, m, N_STATE)
+    slopes: Array  # (n, m, d)
+    deviation: Array  # (n, 7)
+    values: Array  # (n, d) joint values less the commanded ones, hinges times length
+    guess: Array  # (n, m, 3) catenaries
+    energy: Array
+
+    @property
+    def solved(self) -> NDArray[np.bool_]:
+        """(n,) rows in a stable equilibrium."""
+        return np.asarray((self.outcome == CONVERGED) & (self.residual < TOLERANCE))
+
+    @property
+    def at_rest(self) -> NDArray[np.bool_]:
+        """(n,) rows at rest, those among them that are free to move along some direction."""
+        return np.asarray((self.outcome == CONVERGED) | (self.outcome == SINGULAR))
+
+    @classmethod
+    def empty(cls, n: int, m: int, d: int) -> Evaluation:
+        deviation = np.zeros((n, 7))
+        deviation[:, 3] = 1.0
+        return cls(
+            outcome=np.zeros(n, dtype=np.int64),
+            count=np.zeros(n, dtype=np.int64),
+            residual=np.zeros(n),
+            gradient=np.zeros((n, d)),
+            hessian=np.zeros((n, d, d)),
+            states=np.zeros((n, m, N_STATE)),
+            slopes=np.zeros((n, m, d)),
+            deviation=deviation,
+            values=np.zeros((n, d)),
+            guess=np.zeros((n, m, 3)),
+            energy=np.zeros(n),
+        )
+
+
+def descend(
+    tables: Tables,
+    start: Array | None = None,
+    limit: int = 400,
+    threads: int | None = None,
+    start_values: Array | None = None,
+    staged: bool | None = None,
+    guess: Array | None = None,
+) -> Evaluation:
+    """Bring every pose to rest; ``start`` (n, 7) are deviations, none by default.
+
+    ``guess`` (n, m, 3) are the catenaries of the start, where there are any.
+
+    Stiff robots that do not get there are made stiff in stages, from soft (``staged=True``
+    starts with that, ``False`` never does it). A soft robot can leave for another equilibrium,
+    so the stages are for those alone that need them.
+    """
+    if staged is None:
+        out = descend(tables, start, limit, threads, start_values, False, guess)
+        unsettled = (out.outcome == ITERATIONS) | (out.outcome == STALLED)
+        stiff = tables.cables[..., EA].max(axis=1) > STIFF * tables.scale
+        again = np.flatnonzero(unsettled & stiff)
+        if len(again):
+            first, values = (None if s is None else s[again] for s in (start, start_values))
+            better = descend(take(tables, again), first, limit, threads, values, staged=True)
+            better.count += out.count[again]
+            put_evaluation(out, again, better)
+        return out
+    n, m = tables.cables.shape[:2]
+    out = Evaluation.empty(n, m, tables.n_dof)
+    starts = np.array(out.deviation if start is None else start, order="C")
+    first = np.zeros((n, tables.n_dof)) if start_values is None else start_values
+    if guess is not None:
+        out.guess[:] = guess
+    out.energy = np.full(n, np.nan)
+
+    def run(part: slice) -> None:
+        solve_batch(
+            tables.cables[part], tables.load[part], tables.poses[part], tables.screws[part],
+            starts[part], first[part], tables.length, tables.scale[part], 0.5 * tables.length,
+            tables.reach[part], limit, out.outcome[part], out.count[part], out.residual[part],
+            out.gradient[part], out.hessian[part], out.states[part], out.slopes[part],
+            out.deviation[part], out.values[part], out.guess[part], staged,
+        )  # fmt: skip
+
+    in_parts(run, n, threads)
+    return out
+
+
+def evaluate(tables: Tables, at: Evaluation, threads: int | None = 1) -> Evaluation:
+    """Wrench, stiffness and energy at the deviations of ``at``; nothing is solved."""
+    n, m = tables.cables.shape[:2]
+    out = Evaluation.empty(n, m, tables.n_dof)
+    out.deviation[:] = at.deviation
+    out.values[:] = at.values
+    out.guess[:] = at.guess
+
+    def run(part: slice) -> None:
+        evaluate_batch(
+            tables.cables[part], tables.load[part], tables.poses[part], tables.screws[part],
+            out.deviation[part], out.values[part], tables.length, out.gradient[part],
+            out.hessian[part], out.states[part], out.slopes[part], out.energy[part],
+            out.guess[part],
+        )  # fmt: skip
+
+    in_parts(run, n, threads)
+    out.outcome = np.where(np.isinf(out.energy), CABLE_LAW, CONVERGED)
+    out.residual = residual_size(out.gradient) / tables.scale
+    return out
+
+
+def walk(tables: Tables, path: Path, limit: int) -> Evaluation:
+    """Solve the waypoints of a path in order, each from the one before.
+
+    Fills the columns of the past in ``tables``. Runs are independent, but for creep, which goes
+    by the clock through all that were timed by the same.
+    """
+    n, m = tables.cables.shape[:2]
+    out = Evaluation.empty(n, m, tables.n_dof)
+    out.energy = np.full(n, np.nan)
+
+    def run(part: slice) -> None:
+        walk_in_order(
+            tables.cables[part], tables.load[part], tables.poses[part], tables.screws[part],
+            tables.length, tables.scale[part], 0.5 * tables.length, tables.reach[part], limit,
+            path.fresh[part], path.elapsed[part], out.outcome[part], out.count[part],
+            out.residual[part], out.gradient[part], out.hessian[part], out.states[part],
+            out.slopes[part], out.deviation[part], out.values[part], out.guess[part],
+        )  # fmt: skip
+
+    run_parts(run, _apart(path, tables))
+    return out
+
+
+def _apart(path: Path, *tables: Tables) -> list[slice]:
+    """Waypoints that nothing of those before goes with."""
+    creeps = any(np.any(one.cables[..., CREEP_PART]) for one in tables)
+    starts = np.flatnonzero(path.new_clock if creeps else path.fresh).tolist()
+    return [slice(a, b) for a, b in pairwise([*starts, len(path.source)])]
+
+
+def change_of_walk(
+    plus: Tables, minus: Tables, path: Path, at: Evaluation, inverse: Array
+) -> tuple[Array, Array]:
+    """Steps (N, d) [m] and tensions (N, m) of a walk under ``plus`` less those under ``minus``.
+
+    Args:
+        plus, minus: tables of the N waypoints.
+        path: their way.
+        at: where a walk between the two came to rest; nothing is solved.
+        inverse: (N, d, d) [m/N] of the stiffness there.
+    """
+    n, m = plus.cables.shape[:2]
+    step, tension = np.empty((n, plus.n_dof)), np.empty((n, m))
+    solved = at.at_rest
+    for part in _apart(path, plus, minus):
+        change_on_the_way(
+            plus.cables[part], minus.cables[part], plus.load[part], minus.load[part],
+            plus.poses[part], plus.screws[part], at.deviation[part], at.values[part],
+            at.slopes[part], plus.length, at.guess[part], inverse[part], path.fresh[part],
+            path.elapsed[part], solved[part], step[part], tension[part],
+        )  # fmt: skip
+    return step, tension
+
+
+def change(plus: Tables, minus: Tables, at: Evaluation) -> tuple[Array, Array]:
+    """Gradient (n, d) [N] and tensions (n, m) [N] of ``plus`` less those of ``minus``.
+
+    Args:
+        plus, minus: tables of the same poses.
+        at: where the platform is; nothing is solved.
+    """
+    n, m = plus.cables.shape[:2]
+    gradient, tension = np.empty((n, plus.n_dof)), np.empty((n, m))
+
+    def run(part: slice) -> None:
+        change_at_rest(
+            plus.cables[part], minus.cables[part], plus.load[part], minus.load[part],
+            plus.poses[part], plus.screws[part], at.deviation[part], at.values[part],
+            plus.length, at.guess[part], gradient[part], tension[part],
+        )  # fmt: skip
+
+    in_parts(run, n)
+    return _solved(gradient, tension, gradient)
+
+
+def change_by_cable(plus: Tables, minus: Tables, at: Evaluation) -> tuple[Array, Array]:
+    """The same cable by cable: gradient (n, d, m) [N] and each cable's own tension (n, m).
+
+    For tables in which every cable was changed, to have the derivatives by what each cable has
+    of its own at once. The load is taken to be the same in both.
+    """
+    n, m = plus.cables.shape[:2]
+    gradient, tension = np.empty((n, m, plus.n_dof)), np.empty((n, m))
+
+    def run(part: slice) -> None:
+        change_of_each_cable(
+            plus.cables[part], minus.cables[part], plus.load[part], plus.poses[part],
+            plus.screws[part], at.deviation[part], at.values[part], plus.length, at.guess[part],
+            gradient[part], tension[part],
+        )  # fmt: skip
+
+    in_parts(run, n)
+    return _solved(np.swapaxes(gradient, 1, 2), tension, gradient.reshape(n, m * plus.n_dof))
+
+
+def _solved(gradient: Array, tension: Array, failed: Array) -> tuple[Array, Array]:
+    """Nothing changes where a cable's own equations could not be solved beside the pose."""
+    lost = np.isnan(failed).any(axis=1)
+    gradient[lost], tension[lost] = 0.0, 0.0
+    return gradient, tension
+
+
+def without_idle(tables: Tables, at: Evaluation) -> Evaluation:
+    """Evaluate again, without the taut cables whose tension is mere rounding."""
+    tension = at.states[..., TENSION]
+    idle = (at.states[..., SLACK] == 0.0) & (tension < IDLE * tables.scale[:, None])
+    rest = take(tables, np.arange(len(tables)))
+    rest.cables[idle, GAP] = -rest.cables[idle, REST]
+    rest.cables[idle, RADIUS] = 0.0
+    return evaluate(rest, at)
+
+
+def is_slack(tables: Tables, at: Evaluation) -> NDArray[np.bool_]:
+    """Slack cables, (n, m): those longer than the way they bridge, and those that pull nothing.
+
+    A heavy cable that is longer than its way hangs through and pulls by its weight alone. A
+    tension below what rounding leaves of the load is none.
+    """
+    nothing = at.states[..., TENSION] < IDLE * tables.scale[:, None]
+    return np.asarray((at.states[..., SLACK] > 0.5) | nothing)
+
+
+def joints_at_rest(tables: Tables, at: Evaluation) -> Array:
+    """The joints (n, d, 7) as they stand at the joint values of ``at``."""
+    out = np.empty_like(tables.screws)
+    if tables.screws.shape[1]:
+        place = np.empty(7)
+        place_batch(tables.screws, at.values, tables.length, tables.poses, place, out)
+    return out
+
+
+def stiffness(tables: Tables, at: Evaluation) -> Array:
+    """Minus the derivative of the wrench, (n, d, d) [N/m] in scaled coordinates.
+
+    A constant moment, which has no potential, skews it; ``at.hessian`` is its symmetric part.
+    """
+    first = EXTERNAL_MOMENT
+    rows = np.flatnonzero(np.any(tables.load[:, first : first + 3], axis=1))
+    if len(rows) == 0:
+        return at.hessian
+    joints, out = joints_at_rest(tables, at), at.hessian.copy()
+    for i in rows:
+        add_skew(tables.load[i], joints[i], tables.length, out[i])
+    return out
+
+
+def residual_size(gradient: Array) -> Array:
+    """Largest of force and torque over length, (n,) [N], of gradients (n, d)."""
+    if gradient.shape[1] == 6:
+        halves = np.linalg.norm(gradient.reshape(-1, 2, 3), axis=2)
+        return np.asarray(halves.max(axis=1))
+    return np.asarray(np.linalg.norm(gradient, axis=1))
+
+
+def take_evaluation(whole: Evaluation, rows: NDArray[np.integer]) -> Evaluation:
+    """Some rows of an evaluation."""
+    return Evaluation(**{f.name: getattr(whole, f.name)[rows] for f in fields(Evaluation)})
+
+
+def put_evaluation(whole: Evaluation, rows: NDArray[np.integer], part: Evaluation) -> None:
+    """Put rows into an evaluation."""
+    for f in fields(Evaluation):
+        getattr(whole, f.name)[rows] = getattr(part, f.name)
+
+
+def platform_poses(tables: Tables, deviation: Array) -> Array:
+    """Poses (n, 7) of deviations (n, 7) from the commanded ones."""
+    quat = quat_multiply(deviation[:, 3:], tables.poses[:, 3:])
+    quat = quat / np.linalg.norm(quat, axis=1, keepdims=True)
+    return np.concatenate([tables.poses[:, :3] + deviation[:, :3], quat], axis=1)
+
+
+def deviations(tables: Tables, poses: Array) -> Array:
+    """Deviations (n, 7) of poses (n, 7) from the commanded ones."""
+    quat = quat_multiply(poses[:, 3:], quat_conjugate(tables.poses[:, 3:]))
+    quat = np.where(quat[:, :1] < 0.0, -quat, quat)
+    return np.concatenate([poses[:, :3] - tables.poses[:, :3], quat], axis=1)

@@ -1,0 +1,42 @@
+"""The platform's inertia in the coordinates of its stiffness."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from seecr.compiled.columns import CENTRE_OF_MASS, FORCE_OF_WEIGHT
+from seecr.description.joints import motion_columns, values_of_pose
+from seecr.description.robot import Robot
+from seecr.errors import InputError
+from seecr.pose import Array, quat_rotate, quat_to_matrix
+from seecr.statics.tables import Tables
+
+
+def mass_matrices(robot: Robot, tables: Tables, poses: Array) -> Array:
+    """Mass matrices (n, d, d) of the platform at poses (n, 7).
+
+    Of a free platform by translation of its origin and rotation, base frame [kg, kg m; kg m,
+    kg m^2]; else by its joints. Mass and centre are those of the rows, with what effects and known
+    payloads make of them; a payload turns as a point would, and cables have no mass.
+
+    Raises:
+        InputError: nobody said what the platform's inertia is.
+    """
+    if not np.any(robot.inertia):
+        raise InputError(f"robot {robot.name}: its inertia is not known; expected Robot.inertia")
+    g = float(np.linalg.norm(robot.gravity))
+    weight = np.linalg.norm(tables.load[:, FORCE_OF_WEIGHT : FORCE_OF_WEIGHT + 3], axis=1)
+    mass = weight / g if g > 0.0 else np.full(len(poses), robot.mass)
+    turn = quat_to_matrix(poses[:, 3:])
+    lever = quat_rotate(poses[:, 3:], tables.load[:, CENTRE_OF_MASS : CENTRE_OF_MASS + 3])
+    cross = np.cross(lever[:, None, :], np.eye(3)).swapaxes(1, 2)
+    out = np.zeros((len(poses), 6, 6))
+    out[:, :3, :3] = mass[:, None, None] * np.eye(3)
+    out[:, 3:, :3] = mass[:, None, None] * cross
+    out[:, :3, 3:] = out[:, 3:, :3].swapaxes(1, 2)
+    about = turn @ robot.inertia @ turn.swapaxes(1, 2)
+    out[:, 3:, 3:] = about - mass[:, None, None] * cross @ cross
+    if not robot.joints:
+        return out
+    columns = motion_columns(values_of_pose(robot, poses)[1], poses[:, :3])
+    return np.asarray(columns.swapaxes(1, 2) @ out @ columns)

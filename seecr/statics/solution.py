@@ -1,0 +1,339 @@
+"""The answers to a batch of poses: where the platform rests, and whether that is certain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import Enum
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from seecr.compiled.columns import REST, TENSION
+from seecr.compiled.outcomes import (
+    CABLE_LAW,
+    CONVERGED,
+    FALLING,
+    ITERATIONS,
+    SINGULAR,
+    SPINNING,
+    STALLED,
+    TOLERANCE,
+    UNSTABLE,
+)
+from seecr.counted import between, counted, rows_words
+from seecr.description.robot import Robot
+from seecr.pose import Array, rotvec_from_quat
+from seecr.result import COORDINATES, Record, Result, named
+from seecr.statics import batch
+from seecr.statics.inertia import mass_matrices
+from seecr.statics.tables import Tables, take
+from seecr.threads import in_parts
+
+if TYPE_CHECKING:
+    from seecr.equilibrium.following import Jump
+
+
+class Status(Enum):
+    """What became of a pose; the value is the sentence a user reads."""
+
+    CONVERGED = "at rest: forces balance to 1e-9 of the load and the equilibrium is stable"
+    UNSTABLE = "balanced but unstable: the platform would leave this pose at the slightest touch"
+    SINGULAR = "balanced, but free to move along at least one direction without resistance"
+    STALLED = "not at rest: steps no longer reduce the forces, though they do not balance"
+    FALLING = "no equilibrium found: the platform fell beyond the reach of its cables"
+    SPINNING = "no equilibrium found: the external moment turned the platform round and round"
+    CABLE_LAW = "no answer: a cable's own equations have no solution at this pose"
+    ITERATIONS = "not at rest: the limit of iterations was reached before the forces balanced"
+    GAVE_UP = "not at rest: SciPy's solver gave up before the forces balanced"
+
+
+_OF_OUTCOME = {
+    CONVERGED: Status.CONVERGED,
+    UNSTABLE: Status.UNSTABLE,
+    SINGULAR: Status.SINGULAR,
+    STALLED: Status.STALLED,
+    FALLING: Status.FALLING,
+    CABLE_LAW: Status.CABLE_LAW,
+    ITERATIONS: Status.ITERATIONS,
+    SPINNING: Status.SPINNING,
+}
+
+
+_PER_ROW = (
+    "command", "pose", "deviation", "tensions", "slack", "rest_lengths", "iterations", "residual",
+    "energy", "status",
+)  # fmt: skip
+# A squared frequency below this part of the largest is rounding.
+_NO_FREQUENCY = 1e-12
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Solution(Result):
+    """Answers of n poses, each with the certificate recomputed from the answer itself.
+
+    It prints as a few lines, and ``to_frame`` gives one row per pose.
+
+    Attributes:
+        robot: that was solved.
+        tables: the problem, from which everything can be recomputed.
+        command: (n, 7) commanded poses.
+        pose: (n, 7) where the platform rests.
+        deviation: (n, 6) [m, rad] pose less command: displacement and rotation vector, base
+            frame. It carries more digits than the difference of the two poses.
+        tensions: (n, m) [N] at the exit point.
+        slack: (n, m) bool, as :func:`seecr.statics.batch.is_slack` has it.
+        rest_lengths: (n, m) [m].
+        iterations: (n,) evaluations of the wrench.
+        residual: (n,) unbalanced force, and torque over the robot's length, relative to the
+            load; recomputed at the returned deviation.
+        energy: (n,) [J] elastic energy less the work of the load since the commanded pose, and of
+            the cables' weight since it hung straight there; nan under a moment from outside,
+            for laws that are not linear, and for cables with weight over pulleys, which have none
+            (the effect ``cable_weight`` says why).
+        status: (n,) of :class:`Status`.
+        others: the other stable equilibria of each command, where they were asked for.
+        jumps: on the way to each command, where it was followed.
+        line: (n,) of the file that commands were read from; None where there is none.
+    """
+
+    robot: Robot
+    tables: Tables
+    evaluation: batch.Evaluation
+    command: Array
+    pose: Array
+    deviation: Array
+    tensions: Array
+    slack: NDArray[np.bool_]
+    rest_lengths: Array
+    iterations: NDArray[np.int64]
+    residual: Array
+    energy: Array
+    status: NDArray[np.object_]
+    others: tuple[Solution, ...] | None = None
+    jumps: tuple[tuple[Jump, ...], ...] | None = None
+    line: NDArray[np.int64] | None = None
+
+    def __len__(self) -> int:
+        return len(self.pose)
+
+    @property
+    def converged(self) -> NDArray[np.bool_]:
+        """Where the answer is a stable equilibrium, (n,)."""
+        return np.array([s is Status.CONVERGED for s in self.status], dtype=bool)
+
+    @cached_property
+    def stiffness(self) -> Array:
+        """Minus the derivative of the wrench by the pose, (n, d, d).
+
+        For a free platform [N/m, N/rad; N m/m, N m/rad], by translation and rotation vector
+        in the base frame; else by the joints. An external moment, which has no potential,
+        takes its symmetry.
+        """
+        unit = self._units()
+        return batch.stiffness(self.tables, self.evaluation) * unit[:, None] * unit[None, :]
+
+    @cached_property
+    def modes(self) -> tuple[Array, Array]:
+        """Frequencies (n, d) [Hz] of small vibrations, rising, and their shapes (n, d, d).
+
+        Of the platform's inertia on the stiffness of massless cables without damping; zero along
+        directions that nothing resists, NaN where the platform would leave, or has no rest.
+        ``shapes[i, :, k]`` [m, rad] is the motion of ``frequencies[i, k]``, in the coordinates of
+        :attr:`stiffness`.
+
+        Raises:
+            InputError: nobody said what the platform's inertia is.
+        """
+        frequencies = np.full(self.stiffness.shape[:2], np.nan)
+        shapes = np.full(self.stiffness.shape, np.nan)
+        known = np.isfinite(self.stiffness).all(axis=(1, 2)) & np.isfinite(self.pose).all(axis=1)
+        rows = np.flatnonzero(known)
+        if len(rows) == 0:
+            return frequencies, shapes
+        mass = mass_matrices(self.robot, take(self.tables, rows), self.pose[rows])
+        # K v = w^2 M v, made symmetric by the mass matrix's own factor
+        half = np.linalg.inv(np.linalg.cholesky(mass))
+        stiffness = self.stiffness[rows]
+        stiffness = 0.5 * (stiffness + stiffness.swapaxes(1, 2))
+        squares, vectors = np.linalg.eigh(half @ stiffness @ half.swapaxes(1, 2))
+        nothing = _NO_FREQUENCY * np.abs(squares).max(axis=1, keepdims=True)
+        squares = np.where(np.abs(squares) <= nothing, 0.0, squares)
+        with np.errstate(invalid="ignore"):
+            frequencies[rows] = np.sqrt(squares) / (2.0 * np.pi)
+        shapes[rows] = half.swapaxes(1, 2) @ vectors
+        return frequencies, shapes
+
+    @property
+    def frequencies(self) -> Array:
+        """Of small vibrations, (n, d) [Hz], rising; see :attr:`modes`."""
+        return self.modes[0]
+
+    def rows(self, index: ArrayLike) -> Solution:
+        """Some rows: numbers or a mask (n,)."""
+        at = np.arange(len(self))[np.asarray(index)]
+        values: dict[str, Any] = {name: getattr(self, name)[at] for name in _PER_ROW}
+        values["tables"] = take(self.tables, at)
+        values["evaluation"] = batch.take_evaluation(self.evaluation, at)
+        for name in ("others", "jumps"):
+            whole = getattr(self, name)
+            values[name] = None if whole is None else tuple(whole[k] for k in at)
+        values["line"] = None if self.line is None else self.line[at]
+        return replace(self, **values)
+
+    @cached_property
+    def _softest(self) -> tuple[Array, Array]:
+        """Smallest eigenvalue of the scaled stiffness (n,), and a direction of it (n, d)."""
+        from seecr.compiled.softest import softest_batch  # takes a while to import
+
+        hessian = self.evaluation.hessian
+        rows = np.flatnonzero(self.status == Status.SINGULAR)
+        if len(rows):
+            # a cable that is just as long as its rest length resists on one side only
+            there = batch.take_evaluation(self.evaluation, rows)
+            hessian = hessian.copy()
+            hessian[rows] = batch.without_idle(take(self.tables, rows), there).hessian
+        values, directions = np.empty(len(hessian)), np.empty(hessian.shape[:2])
+
+        def run(part: slice) -> None:
+            softest_batch(hessian[part], values[part], directions[part])
+
+        in_parts(run, len(hessian))
+        return values, directions
+
+    @property
+    def smallest_eigenvalue(self) -> Array:
+        """Of the stiffness, (n,) [N/m], rotations scaled by the robot's length."""
+        return self._softest[0]
+
+    @property
+    def softest_direction(self) -> Array:
+        """Eigenvector of the smallest eigenvalue, (n, d) [m, rad], a unit step of it.
+
+        Its largest component (rotations by the robot's length) is positive. Where the stiffness is
+        not known, NaN.
+        """
+        return self._softest[1] / self._units()
+
+    def _units(self) -> Array:
+        """Robot's length for rotations, 1 for translations, (d,)."""
+        return np.where(self.robot.hinges, self.robot.length, 1.0)
+
+    def lines(self, commanded: bool = True) -> list[str]:
+        """How many poses came to rest, how far from their commands, and the cables' tensions.
+
+        Args:
+            commanded: whether poses were commanded, and not lengths.
+        """
+        there = f"{int(self.converged.sum())} of {counted(len(self), 'pose')}"
+        out = [f"{self.robot.name}: {there} at rest"]
+        for status in dict.fromkeys(self.status):
+            if status is not Status.CONVERGED:
+                rows = np.flatnonzero(self.status == status)
+                out.append(f"{self.place(*rows)}: {self.sentence(int(rows[0]))}")
+        known = np.flatnonzero(np.isfinite(self.pose).all(axis=1))
+        if len(known) == 0:
+            return out
+        if commanded:
+            away = np.linalg.norm(self.deviation[:, :3], axis=1)
+            turned = np.degrees(np.linalg.norm(self.deviation[:, 3:], axis=1))
+            # both at once, as distances are: rounding must not say which of two is further
+            apart = np.hypot(away, self.robot.length * np.radians(turned))
+            k = int(known[np.argmax(apart[known])])
+            out.append(
+                f"furthest from its command: {self.place(k)}, by {1e3 * away[k]:.4g} mm "
+                f"and {turned[k]:.4g} deg"
+            )
+        pulls, slack = self.tensions[known], self.slack[known].sum(axis=1)
+        out.append(
+            f"tensions {between(pulls.min(), pulls.max(), lead='from ')} N; slack cables: "
+            f"{between(slack.min(), slack.max(), 'd')} of {self.robot.n_cables}"
+        )
+        worst = float(np.max(self.residual[known]))
+        return [*out, f"forces balance to {worst:.1g} of the load or better"]
+
+    def records(self) -> list[Record]:
+        """One row per pose: command, pose, status, tensions and slack cables by name."""
+        cables, stiffness = self.robot.cable_names, self.smallest_eigenvalue
+        return [
+            {
+                "status": self.status[i].name,
+                **named("command_{}", COORDINATES, self.command[i]),
+                **named("{}", COORDINATES, self.pose[i]),
+                "residual": float(self.residual[i]),
+                "energy_J": float(self.energy[i]),
+                "smallest_eigenvalue_N_per_m": float(stiffness[i]),
+                **named("tension_{}_N", cables, self.tensions[i]),
+                **named("slack_{}", cables, self.slack[i]),
+            }
+            for i in range(len(self))
+        ]
+
+    def as_json(self) -> Record:
+        """``seecr`` of a case in ``results.json``: the answers of all poses, by quantity."""
+        return {
+            "pose": self.pose,
+            "deviation": self.deviation,
+            "tensions_N": self.tensions,
+            "slack": self.slack,
+            "residual": self.residual,
+            "smallest_eigenvalue_N_per_m": self.smallest_eigenvalue,
+            "iterations": self.iterations,
+            "status": self.status,
+        }
+
+    def place(self, *rows: int) -> str:
+        """Rows in words: "line 24" of their file, "pose 3", counted from 0, without one."""
+        return rows_words(rows, self.line)
+
+    def sentence(self, i: int) -> str:
+        """What became of pose i, with the direction where it is singular or unstable."""
+        status = self.status[i]
+        if status not in (Status.SINGULAR, Status.UNSTABLE):
+            return str(status.value)
+        names = [joint.name for joint in self.robot.joints] or ["x", "y", "z", "rx", "ry", "rz"]
+        vector = self._softest[1][i]
+        parts = [
+            f"{value:+.2f} {name}"
+            for value, name in zip(vector, names, strict=True)
+            if abs(value) > 0.05
+        ]
+        return f"{status.value} (direction {' '.join(parts)})"
+
+
+def certify(robot: Robot, tables: Tables, found: batch.Evaluation) -> Solution:
+    """Recompute wrench, stiffness and energy at the answer, and say what it is worth."""
+    check = batch.evaluate(tables, found, threads=None)
+    check.count = found.count
+    status = np.full(len(found.outcome), Status.GAVE_UP, dtype=object)
+    for outcome, words in _OF_OUTCOME.items():
+        status[found.outcome == outcome] = words
+    balanced = check.residual < TOLERANCE
+    status[(status == Status.CONVERGED) & ~balanced] = Status.STALLED
+    # not found's own: a search in joint values alone leaves its deviations unplaced
+    moved = check.deviation
+    turn = np.where(moved[:, 3:4] < 0, -1.0, 1.0) * moved[:, 3:]
+    lost = np.isin(found.outcome, (FALLING, CABLE_LAW, SPINNING))
+    return Solution(
+        robot=robot,
+        tables=tables,
+        evaluation=check,
+        command=tables.poses,
+        pose=_blank(batch.platform_poses(tables, moved), lost),
+        deviation=_blank(np.concatenate([moved[:, :3], rotvec_from_quat(turn)], axis=1), lost),
+        tensions=_blank(check.states[..., TENSION], lost),
+        slack=batch.is_slack(tables, check),
+        rest_lengths=tables.cables[..., REST],
+        iterations=found.count,
+        residual=np.where(lost, np.inf, check.residual),
+        energy=check.energy,
+        status=status,
+    )
+
+
+def _blank(values: Array, rows: NDArray[np.bool_]) -> Array:
+    """No number where there is no answer."""
+    values = values.copy()
+    values[rows] = np.nan
+    return values

@@ -1,0 +1,46 @@
+"""Poses as callers give them: those that are commanded, and those where a search starts."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from seecr.arguments import finite
+from seecr.description.joints import values_of_pose
+from seecr.description.robot import Robot
+from seecr.errors import InputError
+from seecr.pose import Array
+from seecr.statics import batch
+from seecr.statics.tables import Tables
+
+__all__ = ["commanded_poses", "start_of"]
+
+
+def start_of(
+    robot: Robot, tables: Tables, start: Array | None
+) -> tuple[Array | None, Array | None]:
+    """Deviations and joint values of start poses (n, 7)."""
+    if start is None:
+        return None, None
+    if not robot.joints:
+        return batch.deviations(tables, start), None
+    change = values_of_pose(robot, start)[0] - values_of_pose(robot, tables.poses)[0]
+    return batch.deviations(tables, start), change * np.where(robot.hinges, robot.length, 1.0)
+
+
+def commanded_poses(values: ArrayLike, name: str = "poses") -> Array:
+    """Poses (n, 7) with unit quaternions, checked; ``name`` is what an error calls them."""
+    array = np.atleast_2d(finite(values, name))
+    if array.ndim != 2 or array.shape[1] != 7:
+        raise InputError(f"{name} must be (n, 7), x y z qw qx qy qz, got {np.shape(values)}")
+    norm = np.linalg.norm(array[:, 3:], axis=1)
+    if np.any(np.abs(norm - 1.0) > 1e-3):
+        row = int(np.argmax(np.abs(norm - 1.0)))
+        raise InputError(
+            f"{name} row {row} has a quaternion of norm {norm[row]:.4g}; expected a unit "
+            "quaternion, scalar first"
+        )
+    out = array.copy()
+    exact = np.abs(norm - 1.0) > 1e-15
+    out[exact, 3:] /= norm[exact, None]
+    return out

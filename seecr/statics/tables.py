@@ -1,0 +1,184 @@
+"""From a setup to the tables of the compiled loop."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seecr.compiled.columns import (
+    CENTRE_OF_MASS,
+    EXTRA,
+    EXTRA_SLOPE,
+    FORCE_OF_WEIGHT,
+    GAP,
+    N_COLUMNS,
+    N_LOAD,
+    OF_THE_PAST,
+    REST,
+    UP,
+)
+from seecr.description.joints import values_of_pose
+from seecr.description.robot import Robot
+from seecr.effects.setup import QUANTITIES, Setup
+from seecr.pose import Array
+
+
+@dataclass(eq=False)
+class Tables:
+    """The problem of n poses as the compiled loop reads it."""
+
+    cables: Array  # (n, m, N_COLUMNS)
+    load: Array  # (n, N_LOAD)
+    poses: Array  # (n, 7) commanded
+    screws: Array  # (n, d, 7) joints at the commanded pose; (n, 0, 7) for a free platform
+    length: float
+    scale: Array  # (n,) [N] that residuals are measured against
+    reach: Array  # (n,) [m] deviations beyond this are a fall
+    n_dof: int
+
+    def __len__(self) -> int:
+        return len(self.poses)
+
+    def lengthened(self, by: float) -> Tables:
+        """The same with every cable longer by a length [m]."""
+        cables = self.cables.copy()
+        cables[..., REST] += by
+        cables[..., GAP] -= by
+        return replace(self, cables=cables)
+
+    def with_past(self, other: Tables) -> Tables:
+        """The same with what is left of the rows before as other tables have it."""
+        cables, past = self.cables.copy(), list(OF_THE_PAST)
+        cables[..., past] = other.cables[..., past]
+        return replace(self, cables=cables)
+
+
+@lru_cache(maxsize=8)
+def _screws_of(robot: Robot, poses_bytes: bytes, n: int) -> Array:
+    if not robot.joints:
+        return np.zeros((n, 0, 7))
+    poses = np.frombuffer(poses_bytes).reshape(n, 7)
+    return values_of_pose(robot, poses)[1]
+
+
+def assemble(setup: Setup, strains: Array | None = None) -> Tables:
+    """The tables of a setup. Columns of the past are left at their null.
+
+    Args:
+        setup: n rows.
+        strains: (n, m) about which users' laws are linearised; zero by default.
+    """
+    robot = setup.robot
+    poses = np.array(setup.commands.pose, order="C")  # of our own: see seecr.compiled.jit
+    n, m = len(poses), robot.n_cables
+    cables, load = np.zeros((n, m, N_COLUMNS)), np.zeros((n, N_LOAD))
+    _write(setup, QUANTITIES, cables, load, blank=True)
+    if setup.laws:
+        _linearise(setup, np.zeros((n, m)) if strains is None else strains, cables)
+    return Tables(
+        cables=cables,
+        load=load,
+        poses=poses,
+        screws=_screws_of(robot, poses.tobytes(), n),
+        length=robot.length,
+        scale=_load_scale(setup),
+        reach=_reach(cables),
+        n_dof=robot.n_dof,
+    )
+
+
+def relengthened(tables: Tables, setup: Setup) -> Tables:
+    """The tables of a setup, from those of another that differs in lengths beyond the command."""
+    cables = tables.cables.copy()
+    _write(setup, {"extra_length"}, cables, tables.load)
+    return replace(tables, cables=cables, reach=_reach(cables))
+
+
+def reassembled(tables: Tables, setup: Setup, names: Collection[str]) -> Tables:
+    """Tables with some of their quantities as in a setup of the same rows, without users' laws.
+
+    What is left of the rows before stays, and so does what a search measures against
+    (``scale``, ``reach``): they are for differences at rest.
+    """
+    cables, load = tables.cables.copy(), tables.load.copy()
+    _write(setup, names, cables, load)
+    return replace(tables, cables=cables, load=load)
+
+
+# Quantities that go into more than their own column: into lengths, into weight and vertical.
+_OF_LENGTHS = {"exit_points", "anchor_points", "pulley_radius"} | {
+    name for name, item in QUANTITIES.items() if item.paid_out
+}
+_OF_LOAD = {"mass", "centre_of_mass", "gravity", "pulley_radius", "lift"}
+
+
+def _write(
+    setup: Setup, names: Collection[str], cables: Array, load: Array, *, blank: bool = False
+) -> None:
+    """Write some quantities, and what is made of them, where the compiled loop reads it.
+
+    In tables that are ``blank`` the zeros are there already, most of them for nothing.
+    """
+    for name in names:
+        item = QUANTITIES[name]
+        value = np.asarray(getattr(setup, name))
+        if blank and not value.any():
+            continue
+        if item.column is not None:
+            per_cable = value if item.shape[-1] == 3 else value[..., None]
+            cables[..., item.column : item.column + per_cable.shape[-1]] = per_cable
+        if item.entry is not None:
+            load[:, item.entry : item.entry + value.shape[-1]] = value
+    if not _OF_LENGTHS.isdisjoint(names):
+        rest = setup.rest_lengths()
+        cables[..., REST] = rest
+        cables[..., GAP] = setup.geometric_lengths(setup.commands.pose) - rest
+    if not _OF_LOAD.isdisjoint(names):
+        mass, centre = setup.carried()
+        load[:, FORCE_OF_WEIGHT : FORCE_OF_WEIGHT + 3] = mass[:, None] * setup.gravity
+        load[:, CENTRE_OF_MASS : CENTRE_OF_MASS + 3] = centre
+        load[:, UP : UP + 3] = _hanging(setup)
+
+
+def _linearise(setup: Setup, strains: Array, cables: Array) -> None:
+    """Tangents of the users' laws at the given strains (Newton's method does the rest)."""
+    step = 1e-6 * (1e-3 + np.abs(strains))
+    for law in setup.laws:
+        slope = (law(strains + step) - law(strains - step)) / (2.0 * step)
+        cables[..., EXTRA] += law(strains) - slope * strains
+        cables[..., EXTRA_SLOPE] += slope
+
+
+def _hanging(setup: Setup) -> Array:
+    """Vertical of the planes in which cables hang: gravity's, or that of pulleys and frame."""
+    g = np.linalg.norm(setup.gravity)
+    if g == 0.0 or np.any(setup.pulley_radius) or np.any(setup.lift):
+        return setup.robot.up
+    return -setup.gravity / g
+
+
+def _reach(cables: Array) -> Array:
+    """(n,) [m] deviations beyond this are a fall."""
+    rest, gap = cables[..., REST], cables[..., GAP]
+    return np.asarray(3.0 * (rest.max(axis=1) + np.abs(gap).max(axis=1)))
+
+
+def _load_scale(setup: Setup) -> Array:
+    """Load [N] of each pose: weight, external force and moment over the robot's length."""
+    force = np.linalg.norm(setup.wrench[:, :3], axis=1)
+    moment = np.linalg.norm(setup.wrench[:, 3:], axis=1) / setup.robot.length
+    scale = setup.weight() + force + moment
+    # nothing loads the platform: measure against what a strain of 1e-3 would pull
+    return np.where(scale > 0.0, scale, 1e-3 * float(np.max(setup.ea)))
+
+
+def take(tables: Tables, rows: NDArray[np.integer]) -> Tables:
+    """Some rows of the tables."""
+    return Tables(
+        tables.cables[rows], tables.load[rows], tables.poses[rows], tables.screws[rows],
+        tables.length, tables.scale[rows], tables.reach[rows], tables.n_dof,
+    )  # fmt: skip

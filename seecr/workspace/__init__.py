@@ -1,0 +1,33 @@
+"""Where a robot can hold its platform: single poses, whole grids of them, edges and chances."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from seecr.lazy import lazily
+
+if TYPE_CHECKING:
+    from seecr.workspace.chances import held_chance, kept_chance
+    from seecr.workspace.maps import Workspace, boundary, default_axes, workspace_map
+    from seecr.workspace.zones import Zone, feasible, slack_zones, tension_margin
+
+__all__ = [
+    "Workspace",
+    "Zone",
+    "boundary",
+    "default_axes",
+    "feasible",
+    "held_chance",
+    "kept_chance",
+    "slack_zones",
+    "tension_margin",
+    "workspace_map",
+]
+
+_MODULES = {
+    "chances": ("held_chance", "kept_chance"),
+    "maps": ("Workspace", "boundary", "default_axes", "workspace_map"),
+    "zones": ("Zone", "feasible", "slack_zones", "tension_margin"),
+}
+
+__getattr__ = lazily(__name__, {name: m for m, names in _MODULES.items() for name in names})

@@ -1,0 +1,238 @@
+"""Probabilities by what a calibrated model does not know: that poses hold, and tensions keep."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import ndtri
+
+from seecr.commands.data import Commands
+from seecr.compiled.columns import EXTERNAL_FORCE, EXTERNAL_MOMENT
+from seecr.description.given import GivenRobot, robot_of
+from seecr.description.robot import Robot
+from seecr.effects.terms import Terms
+from seecr.errors import InputError
+from seecr.holding.balance import balance_of, bends
+from seecr.holding.distribution import tension_limits
+from seecr.holding.inside import farthest_inside
+from seecr.pose import Array
+from seecr.prediction.experiment import Experiment, effects_of
+from seecr.prediction.model import GivenEffects, Model, model_given
+from seecr.prediction.sensitivity import sensitivities
+from seecr.prediction.uncertainty import moving_covariance
+from seecr.statics.starts import commanded_poses
+from seecr.statics.tables import Tables, assemble
+from seecr.workspace.zones import load_scale, margins_from
+
+__all__ = ["asked_chance", "held_chance", "kept_chance", "margins_with"]
+
+# Draws of the parameters: for tensions, which follow linearly; for poses, first and at most. Where
+# the first all agree, and are this many standard deviations from the limit, the rest is left out.
+_LINEAR, _FIRST, _DRAWS, _SURE = 4096, 16, 256, 6.0
+# Rows at a time.
+_PART = 64
+_HOLDS_NONE = (
+    "{} has fewer cables than freedoms: it holds no poses; expected a map without probabilities"
+)
+_NO_COVARIANCE = (
+    "how likely poses can be held is said by a model that keeps its covariance; expected a table "
+    "[calibration] or [fit], as crosscheck calibrate writes it, and add and diagnose where they "
+    "know it"
+)
+
+
+def kept_chance(
+    robot: GivenRobot,
+    commands: Commands,
+    model: Model | str | Path,
+    *,
+    lowest: ArrayLike = 0.0,
+    highest: ArrayLike = np.inf,
+) -> Array | None:
+    """The probability that all tensions stay within limits, with what the model does not know.
+
+    Tensions to first order in the parameters. A cable that pulls and would go slack leaves a limit
+    of zero; one that is slack stays so.
+
+    Args:
+        robot: as described, or its MJCF.
+        commands: n rows, such as those of a correction; NaN in lengths where there are none.
+        model: as ``crosscheck calibrate`` writes it, or its file.
+        lowest, highest: (m,) or one [N].
+
+    Returns:
+        (n,), NaN where a row has no rest; None where the model keeps no covariance.
+    """
+    robot = robot_of(robot)
+    known = moving_covariance(model_given(model, robot))
+    if known is None:
+        return None
+    terms, covariance = known
+    low, high = tension_limits(robot, lowest, highest)
+    lost: NDArray[np.bool_] = np.zeros(len(commands), dtype=bool)
+    if commands.lengths is not None:
+        lost |= np.isnan(commands.lengths).any(axis=1)
+        plain = robot.commanded_lengths(commands.pose)
+        lengths = np.where(lost[:, None], plain, commands.lengths)
+        commands = replace(commands, lengths=lengths)
+    experiment = Experiment(robot, commands)
+    at = experiment.predict(terms.effects)
+    drawn = _drawn(terms, covariance, _LINEAR) - terms.vector
+    out = np.ones(len(commands))
+    room = 1e-9 * load_scale(robot)
+    slopes = np.zeros((len(out), robot.n_cables, 0))
+    if len(terms):
+        slopes = sensitivities(experiment, terms, at)[:, 6:]
+    for first in range(0, len(out), _PART):
+        rows = slice(first, first + _PART)
+        tensions = at.tensions[rows, None] + np.einsum("nmp,kp->nkm", slopes[rows], drawn)
+        kept = (tensions >= low - room) & (tensions <= high + room)
+        out[rows] = kept.all(axis=2).mean(axis=1)
+    out[lost | ~at.solved] = np.nan
+    return out
+
+
+def held_chance(
+    robot: GivenRobot,
+    poses: ArrayLike,
+    model: Model | str | Path,
+    *,
+    lowest: ArrayLike = 0.0,
+    highest: ArrayLike = np.inf,
+    wrenches: ArrayLike | None = None,
+) -> Array | None:
+    """The probability that poses can be held within limits, with what the model does not know.
+
+    The part of 256 models drawn from its covariance that hold them; of 16, where these are all far
+    on one side. No value is drawn beyond its bounds; a model with which a cable's equations have no
+    answer holds nothing.
+
+    Args:
+        robot: as described, or its MJCF.
+        poses: (n, 7).
+        model: as ``crosscheck calibrate`` writes it, or its file.
+        lowest, highest, wrenches: as in :func:`seecr.tension_margin`.
+
+    Returns:
+        (n,); None where the model keeps no covariance.
+
+    Raises:
+        InputError: fewer cables than freedoms.
+    """
+    robot = robot_of(robot)
+    known = moving_covariance(model_given(model, robot))
+    if known is None:
+        return None
+    if robot.n_cables < robot.n_dof:
+        raise InputError(_HOLDS_NONE.format(robot.name))
+    terms, covariance = known
+    places, limits = commanded_poses(poses), (lowest, highest, wrenches)
+    vectors = _drawn(terms, covariance, _DRAWS)
+    edge = -1e-9 * load_scale(robot)
+
+    def held(rows: Array, some: Array) -> Array:
+        drawn = [terms.with_vector(one).effects for one in some]
+        return np.stack([margins_with(robot, rows, one, *limits) for one in drawn])
+
+    first = held(places, vectors[:_FIRST])
+    out = np.asarray((first >= edge).mean(axis=0))
+    # limits of no end, or poses out of all reach, are far from any
+    finite = np.where(np.isfinite(first), first, np.nan)
+    far: NDArray[np.bool_] = np.asarray(~np.isfinite(first).all(axis=0))
+    mean, spread = finite[:, ~far].mean(axis=0), finite[:, ~far].std(axis=0)
+    far[~far] = np.abs(mean) > _SURE * spread
+    near = np.flatnonzero(~(far & np.isin(out, (0.0, 1.0))))
+    if len(near):
+        rest = held(places[near], vectors[_FIRST:])
+        count = (first[:, near] >= edge).sum(axis=0) + (rest >= edge).sum(axis=0)
+        out[near] = count / _DRAWS
+    return out
+
+
+def check_chance(robot: Robot, model: GivenEffects) -> None:
+    """That a robot's poses can have probabilities, before hours are spent on them.
+
+    Raises:
+        InputError: fewer cables than freedoms, or something else than a model with a covariance.
+    """
+    if robot.n_cables < robot.n_dof:
+        raise InputError(_HOLDS_NONE.format(robot.name))
+    if not isinstance(model, Model) or moving_covariance(model) is None:
+        raise InputError(_NO_COVARIANCE)
+
+
+def asked_chance(
+    robot: Robot, poses: Array, model: GivenEffects, lowest: ArrayLike, highest: ArrayLike,
+    wrenches: ArrayLike | None,
+) -> Array:  # fmt: skip
+    """As :func:`held_chance`, of what has to be a model with a covariance.
+
+    Raises:
+        InputError: it is none.
+    """
+    found = None
+    if isinstance(model, Model):
+        found = held_chance(robot, poses, model, lowest=lowest, highest=highest, wrenches=wrenches)
+    if found is None:
+        raise InputError(_NO_COVARIANCE)
+    return found
+
+
+def margins_with(
+    robot: Robot,
+    poses: Array,
+    effects: GivenEffects,
+    lowest: ArrayLike = 0.0,
+    highest: ArrayLike = np.inf,
+    wrenches: ArrayLike | None = None,
+) -> Array:
+    """Margins (n,) [N] as :func:`seecr.tension_margin`, of a robot with effects at poses (n, 7).
+
+    Raises:
+        InputError: a set of wrenches for a robot on joints.
+    """
+    low, high = tension_limits(robot, lowest, highest)
+    told = Commands(poses, lengths=robot.commanded_lengths(poses), told=True)
+    tables = assemble(Experiment(robot, told).setup(effects_of(effects, robot)))
+    some = np.zeros((1, 6)) if wrenches is None else np.atleast_2d(np.asarray(wrenches, float))
+    if robot.joints and wrenches is not None:
+        raise InputError(f"{robot.name} stands on joints: expected no set of wrenches")
+    if bends(tables):
+        every = [farthest_inside(_pushed(tables, one), low, high).margins for one in some]
+        return np.asarray(np.min(every, axis=0))
+    matrices, load = balance_of(tables, low)
+    # of -W tau = w: the signs are those of the gradient
+    loads = load[:, None]
+    if wrenches is not None:
+        loads = loads + some * np.where(robot.hinges, 1.0 / robot.length, 1.0)
+    return margins_from(matrices, np.ascontiguousarray(loads), low, high, load_scale(robot))
+
+
+def _pushed(tables: Tables, wrench: Array) -> Tables:
+    """The same with one more external wrench (6,) [N, N m] at the platform's origin."""
+    load = tables.load.copy()
+    load[:, EXTERNAL_FORCE : EXTERNAL_FORCE + 3] += wrench[:3]
+    load[:, EXTERNAL_MOMENT : EXTERNAL_MOMENT + 3] += wrench[3:]
+    return replace(tables, load=load)
+
+
+def _drawn(terms: Terms, covariance: Array, count: int) -> Array:
+    """Evenly spread draws (count, p) of a normal distribution about the terms' values, in bounds.
+
+    A value beyond its bound is put on it, as a fit to such data would have: many effects begin at
+    a bound, where they are absent, and draws that all are inside by chance are as good as never.
+    """
+    own = terms.vector
+    if len(own) == 0:
+        return np.zeros((count, 0))
+    values, vectors = np.linalg.eigh(covariance)
+    from scipy.stats import qmc  # takes a second to import
+
+    unit = qmc.Sobol(len(covariance), seed=0).random(count)
+    drawn = ndtri(np.clip(unit, 1e-9, 1.0 - 1e-9))
+    drawn = own + drawn * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
+    lower, upper = np.minimum(terms.lower, own), np.maximum(terms.upper, own)
+    return np.asarray(np.clip(drawn, lower, upper))

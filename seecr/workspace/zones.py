@@ -1,0 +1,274 @@
+"""Where a robot can hold its platform, and where its cables go slack.
+
+The static-feasible workspace (SFW) are the poses at which tensions that only pull balance the
+load (paper, eq 3, Figs 10 and 11). Elastic cables do not change it: it asks what tensions could
+do at a pose, not whether the platform comes to rest there when the winches are told to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from seecr.arguments import finite, numbers
+from seecr.counted import counted
+from seecr.description.given import GivenRobot, robot_of
+from seecr.description.joints import motion_columns, values_of_pose
+from seecr.description.robot import Robot
+from seecr.errors import InputError
+from seecr.holding.distribution import tension_limits
+from seecr.pose import Array, all_finite, quat_rotate, transform_points
+from seecr.result import Record, Result
+from seecr.statics.solution import Solution
+from seecr.threads import in_parts
+
+# Part of the load that may stay unbalanced: rounding of the tensions found.
+_BALANCED = 1e-9
+# Directions in which W is weaker than this part of its strongest are none of its own.
+_SINGULAR = 1e-9
+
+
+@dataclass(frozen=True, repr=False)
+class Zone(Result):
+    """Consecutive poses of a trajectory with the same number of slack cables.
+
+    Attributes:
+        first: index of its first pose.
+        last: index of its last pose.
+        slack: number of slack cables; None where there is no answer to count in.
+    """
+
+    first: int
+    last: int
+    slack: int | None
+
+    def lines(self) -> list[str]:
+        """Which poses, and how many cables are slack there."""
+        one, last = self.first == self.last, self.last
+        poses = f"pose {last}" if one else f"poses {self.first} to {last}"
+        count = "no answer" if self.slack is None else counted(self.slack, "slack cable")
+        return [f"{poses}: {count}"]
+
+    def records(self) -> Sequence[Record]:
+        """One row."""
+        return [{"first_pose": self.first, "last_pose": self.last, "slack_cables": self.slack}]
+
+
+def feasible(
+    robot: GivenRobot,
+    poses: ArrayLike,
+    *,
+    wrench: ArrayLike | None = None,
+    lowest: ArrayLike = 0.0,
+    highest: ArrayLike = np.inf,
+) -> NDArray[np.bool_]:
+    """Whether tensions within bounds can balance the load: W tau + w_e = 0 (paper, eq 3).
+
+    Args:
+        robot: as described, or its MJCF; its mass, centre of mass and gravity are the load.
+        poses: (n, 7) or (7,), where the platform really is.
+        wrench: (6,) or (n, 6) external force [N] at the platform origin and moment [N m].
+        lowest: (m,) or one [N], not negative.
+        highest: (m,) or one [N]; infinite for none.
+
+    Returns:
+        (n,) bool.
+    """
+    robot = robot_of(robot)
+    margin = tension_margin(robot, poses, wrench=wrench, lowest=lowest, highest=highest)
+    return np.asarray(margin >= -_BALANCED * load_scale(robot))
+
+
+def tension_margin(
+    robot: GivenRobot,
+    poses: ArrayLike,
+    *,
+    wrench: ArrayLike | None = None,
+    wrenches: ArrayLike | None = None,
+    lowest: ArrayLike = 0.0,
+    highest: ArrayLike = np.inf,
+) -> Array:
+    """How far inside their bounds all tensions can stay that balance the load [N].
+
+    Exact: the largest t with lowest + t <= tau <= highest - t and W tau + w_e = 0; below zero
+    where the load cannot be balanced. Infinite where cables can be tightened without end.
+
+    Args:
+        robot: as described, or its MJCF; its mass, centre of mass and gravity are the load.
+        poses: (n, 7) or (7,), where the platform really is.
+        wrench: (6,) or (n, 6) external force [N] at the platform origin and moment [N m].
+        wrenches: (k, 6) instead: a set of which each must be balanced, and so can all between
+            them; the least margin counts.
+        lowest: (m,) or one [N], not negative.
+        highest: (m,) or one [N]; infinite for none.
+
+    Returns:
+        (n,) [N]; minus infinity where W has no inverse, or too few cables, and the load is out
+        of what the cables can pull.
+    """
+    from seecr.compiled.margin import margins_at  # takes a while to import
+
+    robot = robot_of(robot)
+    places = np.array(_poses(poses), order="C")
+    low, high = tension_limits(robot, lowest, highest)
+    if wrench is not None:
+        wrench = _wrench(wrench, len(places))
+    out = np.full(len(places), np.nan)
+    scale = load_scale(robot)
+    if robot.n_cables < robot.n_dof:
+        pass
+    elif robot.joints or (wrench is not None and np.ndim(wrench) == 2):
+        return margins_from(*_loads(robot, places, wrench, wrenches), low, high, scale)
+    else:
+        some = np.zeros((1, 6)) if wrenches is None else _wrenches(wrenches)
+        some = some if wrench is None else some + _wrenches(wrench)
+        in_parts(
+            lambda part: margins_at(
+                places[part], robot.exit_points, robot.anchor_points, robot.centre_of_mass,
+                robot.mass * robot.gravity, some, low, high, robot.length, scale, out[part],
+            ),
+            len(places),
+        )  # fmt: skip
+    odd = np.flatnonzero(np.isnan(out))
+    if len(odd):
+        some_loads = _loads(robot, places[odd], _rows(wrench, odd), wrenches)
+        out[odd] = _by_rank(*some_loads, low, high, scale)
+    return out
+
+
+def margins_from(matrices: Array, loads: Array, low: Array, high: Array, scale: float) -> Array:
+    """Margins (n,) [N] of balances A tau = load, (n, d, m) and for each of a set (n, k, d).
+
+    Args:
+        matrices, loads: [N], torques over the robot's length.
+        low, high: (m,) [N].
+        scale: [N] load that rounding is measured against.
+    """
+    from seecr.compiled.margin import margins_of  # takes a while to import
+
+    matrices, out = np.ascontiguousarray(matrices), np.full(len(matrices), np.nan)
+    if matrices.shape[2] >= matrices.shape[1]:
+        in_parts(
+            lambda part: margins_of(matrices[part], loads[part], low, high, scale, out[part]),
+            len(out),
+        )
+    odd = np.flatnonzero(np.isnan(out))
+    if len(odd):
+        out[odd] = _by_rank(matrices[odd], loads[odd], low, high, scale)
+    return out
+
+
+def load_scale(robot: Robot) -> float:
+    """Load [N] that rounding is measured against: the weight, or a thousandth of E S."""
+    return robot.weight or 1e-3 * float(np.max(robot.ea))
+
+
+def _loads(
+    robot: Robot, poses: Array, wrench: ArrayLike | None, wrenches: ArrayLike | None
+) -> tuple[Array, Array]:
+    """Equations of balance for every wrench of a set: (n, d, m) and (n, k, d)."""
+    matrix, load = balance_equations(robot, poses, wrench)
+    if wrenches is None:
+        return np.array(matrix, order="C"), load[:, None]
+    every = [balance_equations(robot, poses, one)[1] for one in _wrenches(wrenches)]
+    at_rest = balance_equations(robot, poses)[1]
+    return np.array(matrix, order="C"), np.stack(every, axis=1) + (load - at_rest)[:, None]
+
+
+def _by_rank(matrices: Array, loads: Array, low: Array, high: Array, scale: float) -> Array:
+    """Margins (n,) where W has no inverse: what it can balance at all, in its own directions.
+
+    None where the load is out of these, or a cable's equations have no answer, which leaves
+    numbers that are not finite.
+    """
+    from seecr.compiled.margin import margins_of  # takes a while to import
+
+    out = np.full(len(matrices), -np.inf)
+    sound = np.isfinite(matrices).all(axis=(1, 2)) & np.isfinite(loads).all(axis=(1, 2))
+    rows = np.flatnonzero(sound)
+    left, sizes, _right = np.linalg.svd(matrices[rows], full_matrices=False)
+    rank = np.sum(sizes > _SINGULAR * sizes[:, :1], axis=1)
+    for r in np.unique(rank[rank > 0]):
+        own, base = rows[rank == r], left[rank == r, :, :r]
+        inside = loads[own] @ base
+        beyond = np.linalg.norm(loads[own] - inside @ base.swapaxes(1, 2), axis=2)
+        size = np.linalg.norm(loads[own], axis=2)
+        held = np.flatnonzero((beyond <= _BALANCED * size).all(axis=1))
+        reduced = np.ascontiguousarray(base.swapaxes(1, 2) @ matrices[own])[held]
+        found = np.full(len(held), np.nan)
+        margins_of(reduced, np.ascontiguousarray(inside[held]), low, high, scale, found)
+        out[own[held]] = np.where(np.isnan(found), -np.inf, found)
+    return out
+
+
+def _wrench(value: ArrayLike, n: int) -> Array:
+    wrench = np.asarray(value, float)
+    if wrench.shape not in ((6,), (n, 6)) or not all_finite(wrench):
+        raise InputError(f"wrench must be (6,) or ({n}, 6) finite numbers, got {wrench.shape}")
+    return wrench
+
+
+def _wrenches(values: ArrayLike) -> Array:
+    some = np.atleast_2d(np.asarray(values, float))
+    if some.ndim != 2 or some.shape[1] != 6:
+        raise InputError(f"wrenches must be (k, 6) [N, N m], got {np.shape(values)}")
+    return finite(some, "wrenches [N, N m]")
+
+
+def _rows(wrench: ArrayLike | None, rows: NDArray[np.intp]) -> ArrayLike | None:
+    return wrench if wrench is None or np.ndim(wrench) < 2 else np.asarray(wrench)[rows]
+
+
+def slack_zones(solution: Solution) -> list[Zone]:
+    """The zones of a trajectory by number of slack cables, in order (paper, Figs 7 and 11)."""
+    counts = [
+        int(row.sum()) if ok else None
+        for row, ok in zip(solution.slack, solution.converged, strict=True)
+    ]
+    edges = [0, *(i for i in range(1, len(counts)) if counts[i] != counts[i - 1]), len(counts)]
+    return [
+        Zone(first, after - 1, counts[first]) for first, after in pairwise(edges) if after > first
+    ]
+
+
+def wrench_matrix(robot: Robot, poses: ArrayLike) -> Array:
+    """W of eq 4 at poses (n, 7): unit vectors over moments at the platform origin, (n, 6, m)."""
+    places = _poses(poses)
+    anchors = transform_points(places, robot.anchor_points)
+    cables = robot.exit_points - anchors
+    size = np.linalg.norm(cables, axis=-1, keepdims=True)
+    # a cable without a length has no direction to pull in
+    unit = cables / np.where(size > 0.0, size, np.inf)
+    moment = np.cross(anchors - places[:, None, :3], unit)
+    return np.swapaxes(np.concatenate([unit, moment], axis=-1), 1, 2)
+
+
+def balance_equations(
+    robot: Robot, poses: Array, wrench: ArrayLike | None = None
+) -> tuple[Array, Array]:
+    """Equations of balance W tau = load, (n, d, m) and (n, d), torques over the length."""
+    n = len(poses)
+    outer = np.zeros(6) if wrench is None else _wrench(wrench, n)
+    weight = robot.mass * robot.gravity
+    arm = quat_rotate(poses[:, 3:], robot.centre_of_mass)
+    load = outer + np.concatenate([np.tile(weight, (n, 1)), np.cross(arm, weight)], axis=1)
+    matrix = wrench_matrix(robot, poses)
+    if not robot.joints:
+        unit = np.where(robot.hinges, 1.0 / robot.length, 1.0)
+        return matrix * unit[:, None], -load * unit
+    # the joints take up what they do not move along: only work on their motions must vanish
+    columns = motion_columns(values_of_pose(robot, poses)[1], poses[:, :3])
+    columns = columns * np.where(robot.hinges, 1.0 / robot.length, 1.0)
+    along = np.swapaxes(columns, 1, 2)
+    return along @ matrix, -np.einsum("ndk,nk->nd", along, load)
+
+
+def _poses(values: ArrayLike) -> Array:
+    poses = np.atleast_2d(numbers(values, "poses"))
+    if poses.ndim != 2 or poses.shape[1] != 7 or not all_finite(poses):
+        raise InputError(f"poses must be (n, 7) finite numbers, got {np.shape(values)}")
+    return poses

@@ -1,0 +1,114 @@
+"""The ordered collection of effects with values."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
+from seecr.effects import Effect, Term, Terms, catalogue, effect_named, layout_of
+from seecr.errors import InputError
+
+ROBOT = load_robot(model_path("demobot_cogiro"))
+NAMES = ("drum_gain", "pulley_radius", "tracker_target")  # 8, 1 and 6 parameters
+
+
+def term(name: str, part: float = 0.5) -> Term:
+    layout = layout_of(effect_named(name), ROBOT)
+    return Term(layout, layout.null + part * layout.scale)
+
+
+def some(*names: str) -> Terms:
+    return Terms(term(name) for name in names or NAMES)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_order_is_the_catalogues_whatever_it_is_made_from(seed: int) -> None:
+    every = list(catalogue())
+    mixed = np.random.default_rng(seed).permutation(every).tolist()
+    assert some(*mixed).names == tuple(every)
+    assert Terms(some(*mixed)).names == tuple(every)
+
+
+def test_effects_of_ones_own_that_are_not_in_the_catalogue_come_last() -> None:
+    own = Term(layout_of(Own, ROBOT), np.zeros(0))
+    assert Terms([own, term("tension_scale")]).names == ("tension_scale", "own")
+
+
+class Own(Effect):
+    name = "own"
+
+
+def test_an_effect_is_there_once() -> None:
+    with pytest.raises(InputError, match="pulley_radius is among the terms twice"):
+        some("pulley_radius", "drum_gain", "pulley_radius")
+
+
+def test_parameters_count_through_all_terms() -> None:
+    terms = some()
+    assert len(terms) == 15 and [t.name for t in terms] == list(NAMES)
+    assert [terms.part(name) for name in NAMES] == [slice(0, 8), slice(8, 9), slice(9, 15)]
+    for one in terms:
+        part = terms.part(one.name)
+        for name in ("null", "scale", "lower", "upper"):
+            assert np.array_equal(getattr(terms, name)[part], getattr(one.layout, name))
+        assert np.array_equal(terms.vector[part], one.vector)
+        assert np.flatnonzero(terms.own(one.name)).tolist() == list(range(15))[part]
+        assert {effect for effect, _key in terms.labels[part]} == {one.name}
+    assert terms.labels[3] == ("drum_gain", "gain_4")
+    assert not terms.own("creep").any() and "creep" not in terms and "drum_gain" in terms
+
+
+def test_sizes_count_from_null_in_plausible_sizes() -> None:
+    assert some().sizes == pytest.approx(np.full(15, 0.5))
+    assert term("stiffness", -0.25).sizes == pytest.approx([-0.25])  # whose null is 1
+
+
+def test_other_values_are_another_collection() -> None:
+    terms = some()
+    values = np.arange(15.0)
+    other = terms.with_vector(values)
+    assert np.array_equal(other.vector, values) and other.names == terms.names
+    assert np.array_equal(other["tracker_target"].vector, values[9:])
+    values[:] = 0.0
+    assert other.vector[3] == 3.0 and terms.sizes == pytest.approx(np.full(15, 0.5))
+    with pytest.raises(InputError, match=r"values must be \(15,\), got \(14,\)"):
+        terms.with_vector(np.zeros(14))
+    with pytest.raises(ValueError, match="read-only"):
+        terms.vector[0] = 1.0
+
+
+def test_terms_come_and_go_by_name() -> None:
+    terms = some()
+    assert terms.without("pulley_radius").names == ("drum_gain", "tracker_target")
+    assert terms.without("creep").names == terms.names
+    assert terms.only(["tracker_target", "drum_gain"]).names == ("drum_gain", "tracker_target")
+    wider = terms.with_term(term("pulley_radius", 2.0))
+    assert wider.names == NAMES and wider["pulley_radius"].sizes == pytest.approx([2.0])
+    assert terms.with_term(term("stiffness")).names == (*NAMES[:2], "stiffness", NAMES[2])
+    with pytest.raises(KeyError, match=r"creep is not among drum_gain, pulley_radius, tracker"):
+        terms.part("creep")
+
+
+def test_no_terms_are_nothing() -> None:
+    none = Terms()
+    assert not none and len(none) == 0 and list(none) == [] and none.effects == []
+    for name in ("vector", "null", "scale", "lower", "upper", "sizes", "with_vector"):
+        value = getattr(none, name)
+        assert len(value(np.zeros(0)) if name == "with_vector" else value) == 0
+
+
+def test_an_effect_without_parameters_is_there_all_the_same() -> None:
+    assert Terms([Term(layout_of(Own, ROBOT), np.zeros(0))])
+
+
+def test_the_effects_have_the_values() -> None:
+    gain, pulley, _target = some().effects
+    assert gain.gain == pytest.approx(np.full(8, 2.5e-3))  # type: ignore[attr-defined]
+    assert type(pulley) is effect_named("pulley_radius")
+
+
+def test_a_term_without_a_layout_is_refused() -> None:
+    with pytest.raises(InputError, match="expected an effect's layout and its values, got 'creep'"):
+        Term("creep", np.zeros(2))  # type: ignore[arg-type]

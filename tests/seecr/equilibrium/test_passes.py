@@ -1,0 +1,113 @@
+"""What is between two equilibria: a saddle from which either side leads to one of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
+from seecr.effects import Term, effect_named, layout_of
+from seecr.equilibrium import passes
+from seecr.equilibrium.following import evaluated, moved
+from seecr.equilibrium.multiple import equilibria
+from seecr.equilibrium.passes import barriers
+from seecr.equilibrium.solving import solve
+from seecr.errors import InputError
+from seecr.pose import pose_difference, quat_from_rotvec
+from seecr.report.words import elsewhere, other_lines
+from seecr.statics.tables import take
+
+
+@pytest.mark.slow
+def test_the_pass_between_the_two_rests_of_the_tilted_command() -> None:
+    robot = load_robot(model_path("demobot_parallel"))
+    pose = np.array([0.351, 0.216, 0.109, 0.943, 0.163, -0.288, -0.038])
+    pose[3:] /= np.linalg.norm(pose[3:])
+    own, every = solve(robot, pose), equilibria(robot, pose)
+    other = every.rows(elsewhere(own, every))
+    (way,) = barriers(own, other)
+    assert way.exact and not way.twisted
+    assert way.energy == pytest.approx(6.80e-5, rel=1e-3)
+    # of all equilibria one is the rest itself
+    assert sorted(w.energy for w in barriers(own, every)) == [0.0, way.energy]
+    assert way.back - way.energy == pytest.approx(own.energy[0] - other.energy[0], rel=1e-9)
+    # a saddle: balanced, one direction falls, and leads to one rest on either side
+    there = evaluated(robot, own.tables, way.pose[None])
+    values, vectors = np.linalg.eigh(there.hessian[0])
+    assert there.residual[0] < 1e-9 and values[0] < 0.0 < values[1]
+    sides = [
+        moved(robot, way.pose[None], s * 1e-3 * robot.length * vectors[:, :1].T) for s in (1, -1)
+    ]
+    ends = [solve(robot, pose, start=side).pose[0] for side in sides]
+    for rest in (own.pose[0], other.pose[0]):
+        assert min(np.abs(pose_difference(end, rest)).max() for end in ends) < 1e-7
+    # no way found by chance is lower: straight ones by way of poses near the pass
+    parts = np.linspace(0.0, 1.0, 41)[:, None]
+    random = np.random.default_rng(0)
+    many = take(own.tables, np.zeros(len(parts), int))
+    for _ in range(20):
+        by = moved(robot, way.pose[None], 0.2 * robot.length * random.normal(size=(1, 6)))[0]
+        highest = -np.inf
+        for end in (own.pose[0], other.pose[0]):
+            step = parts * pose_difference(by, end)
+            on = np.tile(end, (len(parts), 1))
+            on = moved(robot, on, step * np.where(robot.hinges, robot.length, 1.0))
+            highest = max(highest, float(evaluated(robot, many, on).energy.max()))
+        assert highest - own.energy[0] >= way.energy
+    (line,) = other_lines(own, every, [way])
+    assert line.endswith("; reachable, 0.068 mJ to get there, 1.68 mJ back")
+
+
+@pytest.mark.slow
+def test_cables_that_stiffen_have_energies_and_a_pass_between_rests() -> None:
+    robot = load_robot(model_path("demobot_parallel"))
+    pose = np.array([0.351, 0.216, 0.109, 0.943, 0.163, -0.288, -0.038])
+    pose[3:] /= np.linalg.norm(pose[3:])
+    for part, apart in ((1e-3, 2e-3), (1.0, 1.0)):
+        stiffer = layout_of(effect_named("nonlinear_elasticity"), robot)
+        model = [Term(stiffer, part * stiffer.scale)]
+        own, every = solve(robot, pose, effects=model), equilibria(robot, pose, effects=model)
+        assert len(every) == 2 and np.all(np.diff(every.energy) > 0)
+        other = every.rows(elsewhere(own, every))
+        (way,) = barriers(own, other)
+        assert way.exact and way.energy == pytest.approx(6.80e-5, rel=apart)
+        assert way.back - way.energy == pytest.approx(own.energy[0] - other.energy[0], rel=1e-9)
+
+
+@pytest.mark.slow
+def test_mirrored_rests_are_twisted_and_as_far_up() -> None:
+    robot = load_robot(model_path("demobot_cogiro"))
+    pose = robot.reference_pose
+    turned = np.array(
+        [[0.4, 0.25, 0.15, *quat_from_rotvec(np.array([s, 0.0, 0.0]))] for s in (2, -2)]
+    )
+    own, others = solve(robot, pose), solve(robot, np.tile(pose, (2, 1)), start=turned)
+    assert others.converged.all()
+    one, two = barriers(own, others)
+    assert one.twisted and two.twisted and one.energy == pytest.approx(two.energy, rel=1e-6)
+    assert one.energy > others.energy[0] - own.energy[0] > 0.01
+
+
+@pytest.mark.slow
+def test_where_there_is_no_energy_no_way_is_looked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Hundreds of rounds ended with the highest of numbers that were none."""
+    robot = load_robot(model_path("demobot_parallel"))
+    pose = np.array([0.351, 0.216, 0.109, 0.943, 0.163, -0.288, -0.038])
+    pose[3:] /= np.linalg.norm(pose[3:])
+    own, every = solve(robot, pose), equilibria(robot, pose)
+    other = every.rows(elsewhere(own, every))
+    monkeypatch.setattr(passes, "_string", pytest.fail)
+    for energy in (own, other):
+        energy.energy[:] = np.nan
+        (way,) = barriers(own, other)
+        assert np.isnan([way.energy, way.back, *way.pose]).all()
+        assert not way.exact and not way.twisted
+        energy.energy[:] = 0.0
+
+
+def test_equilibria_of_something_else_are_refused() -> None:
+    robot = load_robot(model_path("demobot_cogiro"))
+    own, other = solve(robot, robot.reference_pose), solve(robot, [0.5, 0.25, 0.1, 1, 0, 0, 0])
+    with pytest.raises(InputError, match="expected equilibria of one command, got other rest"):
+        barriers(own, other)

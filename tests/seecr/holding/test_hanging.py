@@ -1,0 +1,73 @@
+"""Cables that hang: lengths for tensions, and the least that they are asked for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from seecr.commands.data import Commands
+from seecr.compiled.columns import TENSION
+from seecr.description.mjcf import load_robot
+from seecr.description.robot import Robot
+from seecr.description.shipped import model_path
+from seecr.effects.cable import CableWeight
+from seecr.holding.balance import balance_of, with_rest
+from seecr.holding.hanging import bridged_lengths, least_of_heavy, rest_for
+from seecr.holding.lengths import hold
+from seecr.prediction.experiment import Experiment
+from seecr.statics import batch
+from seecr.statics.tables import Tables, assemble
+
+WEIGHT = 0.62784
+
+
+def tables_at(robot: Robot, poses: np.ndarray, weight: float = WEIGHT) -> Tables:
+    commands = Commands(poses, lengths=robot.commanded_lengths(poses), told=True)
+    return assemble(Experiment(robot, commands).setup([CableWeight(weight)] if weight else []))
+
+
+def all_over(robot: Robot) -> np.ndarray:
+    """Poses (3, 7): at home, aside and high, right below some exit points."""
+    poses = np.tile(robot.reference_pose, (3, 1))
+    poses[1, :3] += [4.0, 3.0, 2.0]
+    poses[2, :3] = robot.exit_points[0] - robot.anchor_points[0] - [0.0, 0.0, 3.0]
+    return poses
+
+
+def tensions_of(tables: Tables, rest: np.ndarray) -> np.ndarray:
+    n, m = rest.shape
+    at = batch.evaluate(with_rest(tables, rest), batch.Evaluation.empty(n, m, tables.n_dof))
+    return np.asarray(at.states[..., TENSION])
+
+
+@pytest.mark.parametrize("times", [1.0, 1.5, 4.0, 50.0])
+def test_a_cable_has_the_tension_its_length_is_for(times: float) -> None:
+    robot = load_robot(model_path("cogiro_large"))
+    tables = tables_at(robot, all_over(robot))
+    wanted = times * least_of_heavy(tables)
+    # what is left: the stretch of a cable is not the mean of its ends
+    assert tensions_of(tables, rest_for(tables, wanted)) == pytest.approx(wanted, rel=3e-3)
+
+
+def test_cables_without_weight_are_as_long_as_their_stretch_says() -> None:
+    robot = load_robot(model_path("cogiro_large"))
+    tables, pulls = tables_at(robot, all_over(robot), 0.0), np.full((3, 8), 300.0)
+    assert not least_of_heavy(tables).any()
+    np.testing.assert_array_equal(
+        rest_for(tables, pulls), bridged_lengths(tables) / (1.0 + pulls / robot.ea)
+    )
+
+
+def test_balance_about_tensions_is_exact_there() -> None:
+    """A pose that tensions at their limits hold, far from where cables just pull, is held."""
+    robot = load_robot(model_path("cogiro_large"))
+    tables, low, high = tables_at(robot, all_over(robot)[:2]), np.zeros(8), np.full(8, 5000.0)
+    first = hold(tables, np.zeros((2, 8)), low, high)
+    assert first.fine.all()
+    matrix, load = balance_of(tables, low, first.tensions)
+    left = np.einsum("ndm,nm->nd", matrix, first.tensions) - load
+    assert np.abs(left).max() < 1e-8 * robot.weight
+    least = first.tensions.min(axis=0)
+    most = first.tensions.max(axis=0) * (1.0 + 1e-9)
+    again = hold(tables, np.zeros((2, 8)), least, most)
+    assert again.fine.all()

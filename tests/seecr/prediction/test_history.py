@@ -1,0 +1,444 @@
+"""Rows that remember: the path between rows, hysteresis, friction, backlash and creep."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from effect_cases import experiment_of, robot_of
+
+from seecr.commands.data import Commands, play
+from seecr.commands.path import path_of
+from seecr.compiled.columns import (
+    EA,
+    FRICTION,
+    HYSTERESIS,
+    HYSTERESIS_BEFORE,
+    HYSTERESIS_STRETCH,
+    N_COLUMNS,
+    REST,
+    STRETCH_BEFORE,
+    STUCK,
+    TENSION,
+    WINCH_TENSION,
+)
+from seecr.compiled.law import dahl, winch_tension
+from seecr.description.joints import pose_of_values, values_of_pose
+from seecr.description.robot import Joint, Robot
+from seecr.description.shipped import CABLES
+from seecr.effects import Effect, effect_named
+from seecr.pose import pose_add, pose_difference
+from seecr.prediction.experiment import Experiment, Prediction
+
+WEIGHT = 2 * 9.81
+
+
+def effect(name: str, **values: object) -> Effect:
+    return effect_named(name)(**values)
+
+
+def lift() -> Robot:
+    """2 kg on a slide, pulled up by one cable of 1 m and down by another, both E S = 1000 N."""
+    return Robot(
+        "lift", np.array([[0.0, 0, 1], [0, 0, -1]]), np.zeros((2, 3)), np.full(2, 1000.0),
+        np.array([1.0, 0.95]), 2.0,
+        joints=(Joint("slide", "z", np.array([0.0, 0, 1]), np.zeros(3)),),
+    )  # fmt: skip
+
+
+def lifted(heights: np.ndarray, *effects: Effect, **more: object) -> Prediction:
+    poses = np.zeros((len(heights), 7))
+    poses[:, 2], poses[:, 3] = heights, 1.0
+    found = Experiment(lift(), Commands(poses, **more)).predict(effects)
+    assert np.all(found.solved)
+    return found
+
+
+# --- the path ------------------------------------------------------------------------------------
+
+
+def test_each_run_starts_at_the_reference_pose_and_goes_straight_from_row_to_row() -> None:
+    experiment = experiment_of("demobot_cogiro")
+    robot, commands = experiment.robot, experiment.commands
+    path = path_of(robot, commands)
+    assert np.array_equal(path.commands.pose[path.rows], commands.pose)
+    assert path.fresh.sum() == 2
+    assert np.array_equal(path.commands.pose[path.fresh], np.tile(robot.reference_pose, (2, 1)))
+    first, second = path.rows[0], path.rows[1]
+    whole = pose_difference(commands.pose[1], commands.pose[0])
+    for k in range(first, second + 1):
+        part = pose_difference(path.commands.pose[k], commands.pose[0])
+        share = (k - first) / (second - first)
+        assert part == pytest.approx(share * whole, abs=1e-12)
+
+
+def test_the_clock_runs_once_through_the_path() -> None:
+    experiment = experiment_of("demobot_cogiro")
+    time = experiment.commands.time
+    path = path_of(experiment.robot, experiment.commands)
+    assert time is not None
+    assert np.cumsum(path.elapsed)[path.rows] == pytest.approx(time - time[0], abs=1e-12)
+    assert path.elapsed[path.fresh][1] == pytest.approx(time[3] - time[2])  # waits at home
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_platform_on_joints_never_leaves_them_on_its_way(seed: int) -> None:
+    experiment = experiment_of("jointed", seed=seed)
+    path = path_of(experiment.robot, experiment.commands)
+    values_of_pose(experiment.robot, path.commands.pose)  # raises where it does
+    found = experiment.predict([effect("backlash", gap=1e-4)])
+    assert np.all(found.solved)
+
+
+def test_lengths_move_evenly_too() -> None:
+    experiment = experiment_of("lengths")
+    path = path_of(experiment.robot, experiment.commands)
+    lengths, told = path.commands.lengths, experiment.commands.lengths
+    assert lengths is not None and told is not None
+    assert lengths[path.fresh][0] == pytest.approx(experiment.robot.rest_lengths)
+    middle = (path.rows[0] + path.rows[1]) // 2
+    assert lengths[middle] == pytest.approx(0.5 * (told[0] + told[1]), abs=1e-12)
+
+
+# --- backlash ------------------------------------------------------------------------------------
+
+
+def test_the_play_operator_lags_by_half_its_width_and_starts_centred() -> None:
+    told = np.array([0.0, 1, 2, 3, 2.5, 2, 1, 0, 0.5, 5])[:, None]
+    starts = np.array([True] + [False] * 8 + [True])
+    found = play(told, starts, np.array([0.5]))[:, 0]
+    assert found.tolist() == [0.0, 0.5, 1.5, 2.5, 2.5, 2.5, 1.5, 0.5, 0.5, 5.0]
+    assert np.array_equal(play(told, starts, np.zeros(1)), told)
+
+
+def test_the_play_operator_is_the_one_that_goes_row_by_row() -> None:
+    rng = np.random.default_rng(0)
+    told, starts = np.cumsum(rng.normal(size=(300, 3)), axis=0), np.arange(300) % 100 == 0
+    half = np.array([0.0, 0.7, 20.0])
+    expected = told.copy()
+    for k in range(1, 300):
+        if not starts[k]:
+            near = np.maximum(expected[k - 1], told[k] - half)
+            expected[k] = np.minimum(near, told[k] + half)
+    assert np.array_equal(play(told, starts, half), expected)
+    # every other row as what is passed between the others
+    passed = np.stack([np.roll(told[1::2], 1, axis=0), told[::2]])
+    passed[0, ::50] = told[::100]
+    assert np.array_equal(play(told[1::2], starts[::2], half, passed), expected[1::2])
+
+
+def paid_out(robot: Robot, commands: Commands, gap: float) -> np.ndarray:
+    """Rest lengths (n, m) [m] of the rows, the same with waypoints as without."""
+    experiment = Experiment(robot, commands)
+    loose = [effect("backlash", gap=gap)]
+    rows = experiment.setup(loose).rest_lengths()
+    walked = experiment.setup(loose, experiment.path.commands).rest_lengths()
+    assert rows == pytest.approx(walked[experiment.path.rows], abs=1e-12)
+    return rows
+
+
+@pytest.mark.parametrize("start", [[0.0], []])
+def test_a_cable_that_turns_round_between_two_rows_takes_up_its_play_there(
+    start: list[float],
+) -> None:
+    """Past an exit point 1 m above the way: 1.25 m, 1 m at x = 0.75 m, and longer again."""
+    robot = Robot(
+        "rail", np.array([[0.75, 0.0, 1.0]]), np.zeros((1, 3)), np.array([1000.0]),
+        np.array([1.25]), 2.0, joints=(Joint("slide", "x", np.array([1.0, 0, 0]), np.zeros(3)),),
+    )  # fmt: skip
+    x = np.array([*start, 1.0, 1.5])
+    poses = np.zeros((len(x), 7))
+    poses[:, 0], poses[:, 3] = x, 1.0
+    # shortest, it is half a gap behind: 1.02 m; at x = 1 m, where it should have
+    # sqrt(17)/4 = 1.031 m, it still is; at x = 1.5 m it is behind the other way
+    found = paid_out(robot, Commands(poses), 0.04)[len(start) :, 0]
+    assert found == pytest.approx([1.02, 1.25 - 0.02], abs=1e-14)
+
+
+@pytest.mark.parametrize("joints", [(Joint("hinge", "c", np.array([0.0, 0, 1]), np.zeros(3)),), ()])
+def test_a_cable_on_a_crank_turns_round_at_both_dead_centres(joints: tuple[Joint, ...]) -> None:
+    """2 m from the axis of a crank of 1 m: 1 m of cable at 0 rad, 3 m at pi."""
+    crank = np.array([[np.cos(1.0), np.sin(1.0), 0.0]])
+    robot = Robot(
+        "crank", np.array([[2.0, 0.0, 0.0]]), crank, np.array([1000.0]),
+        np.sqrt([5 - 4 * np.cos(1.0)]), 2.0, joints=joints,
+    )  # fmt: skip
+    # a free platform takes the shorter way round: one row more
+    angles = np.array([-1.5, 3.5] if joints else [-1.5, 1.3, 3.5])
+    half = 0.5 * (angles - 1.0)
+    poses = np.zeros((len(angles), 7))
+    poses[:, 3], poses[:, 6] = np.cos(half), np.sin(half)
+    found = paid_out(robot, Commands(poses), 1.0)[:, 0]
+    told = np.sqrt(5 - 4 * np.cos(angles))
+    assert found[0] == pytest.approx(told[0] - 0.5, abs=1e-13)
+    assert found[-1] == pytest.approx(3.0 - 0.5, abs=1e-13) and told[-1] < 2.96
+
+
+def finer(robot: Robot, commands: Commands, by: int) -> tuple[Commands, np.ndarray]:
+    """More rows on the same straight ways, and where the first ones are among them."""
+    n, run = len(commands), commands.run
+    assert run is not None
+    whole: list[np.ndarray] = []
+    for k in range(n):
+        starts = k == 0 or run[k] != run[k - 1]
+        before = robot.reference_pose if starts else commands.pose[k - 1]
+        ends = np.stack([before, commands.pose[k]])
+        parts = np.arange(1, by)[:, None] / by
+        if robot.joints:
+            values = values_of_pose(robot, ends)[0]
+            way = pose_of_values(robot, values[0] + parts * (values[1] - values[0]))[0]
+        else:
+            way = pose_add(np.tile(before, (by - 1, 1)), parts * pose_difference(ends[1], ends[0]))
+        whole += [*way, commands.pose[k]]
+    rows = by * np.arange(1, n + 1) - 1
+    return Commands(np.array(whole), run=np.repeat(run, by)), rows
+
+
+@pytest.mark.parametrize("gap", [2e-4, 2e-3, 2e-2])
+@pytest.mark.parametrize("kind, seed", [
+    ("demobot_parallel", 0), ("demobot_cogiro", 0), ("jointed", 1), ("jointed", 2),
+])  # fmt: skip
+def test_more_rows_on_the_same_way_leave_backlash_as_it_is(
+    kind: str, seed: int, gap: float
+) -> None:
+    experiment = experiment_of(kind, seed=seed, rows=10)
+    robot, commands = experiment.robot, experiment.commands
+    fine, rows = finer(robot, commands, 9)
+    coarse = paid_out(robot, commands, gap)
+    assert coarse == pytest.approx(paid_out(robot, fine, gap)[rows], abs=1e-12)
+    told = experiment.setup([]).rest_lengths()
+    assert np.abs(coarse - told).max() > 0.49 * gap  # it is there
+
+
+def test_backlash_moves_no_platform_elsewhere_for_more_rows_on_its_way() -> None:
+    experiment = experiment_of("demobot_parallel", rows=10)
+    loose = [effect("backlash", gap=1e-3)]
+    fine, rows = finer(experiment.robot, experiment.commands, 7)
+    coarse = experiment.predict(loose)
+    refined = Experiment(experiment.robot, fine).predict(loose)
+    assert np.all(coarse.solved) and np.all(refined.solved)
+    expected = refined.readings.position[rows]
+    assert coarse.readings.position == pytest.approx(expected, abs=1e-10)
+
+
+def test_backlash_parts_the_way_up_from_the_way_down_by_its_gap() -> None:
+    heights = np.array([0.05, 0.1, 0.15, 0.2, 0.15, 0.1, 0.05])
+    z = lifted(heights, effect("backlash", gap=2e-3)).readings.position[:, 2]
+    plain = lifted(heights).readings.position[:, 2]
+    # rising, the upper cable lags long and the lower one short: both hold the platform down
+    assert z[2] < plain[2] - 9e-4 and z[4] > plain[4] + 9e-4
+    assert z[4] - z[2] == pytest.approx(2e-3, rel=0.05)
+
+
+# --- hysteresis ----------------------------------------------------------------------------------
+
+
+def test_hysteresis_parts_the_sweeps_by_twice_its_amplitude_at_most() -> None:
+    steps = np.linspace(0, 0.1, 6)[1:]
+    # lowering and raising the platform a lot: the stretch changes through the cables' own lengths
+    heights = np.concatenate([steps, steps[::-1][1:], [0.0], -steps, -steps[::-1][1:]])
+    turned = lifted(heights, effect("hysteresis", amplitude=0.5, stretch=1e-4))
+    plain = lifted(heights)
+    parted = (turned.readings.position - plain.readings.position)[:, 2]
+    assert np.ptp(parted) > 1e-5  # it does something
+    # z of either cable within the amplitude: the platform feels at most both against 2 k
+    soft = float(plain.found.hessian.min())
+    assert np.abs(parted).max() <= 2 * 0.5 / soft * 1.05
+
+
+def test_dahls_law_is_followed_in_closed_form() -> None:
+    """One hanging cable, told to pay out: z follows from the stretch alone."""
+
+    row = np.zeros(N_COLUMNS)
+    row[REST], row[EA] = 1.0, 1000.0
+    row[HYSTERESIS], row[HYSTERESIS_STRETCH] = 2.0, 1e-3
+    up = dahl(row, 5e-3)[0]
+    assert up == pytest.approx(2.0 * (1 - np.exp(-5.0)), rel=1e-12)
+    row[STRETCH_BEFORE], row[HYSTERESIS_BEFORE] = 5e-3, up
+    down, slope = dahl(row, 4e-3)
+    assert down == pytest.approx(-2.0 + (up + 2.0) * np.exp(-1.0), rel=1e-12)
+    assert slope == pytest.approx((2.0 + down) / 1e-3, rel=1e-12)  # dz/de = (A - s z)/stretch
+    far = dahl(row, -1.0)[0]
+    assert far == pytest.approx(-2.0, abs=1e-12)  # it saturates
+    # in two steps as in one, while the stretch goes one way
+    row[STRETCH_BEFORE], row[HYSTERESIS_BEFORE] = 4e-3, down
+    twice = dahl(row, 2e-3)[0]
+    row[STRETCH_BEFORE], row[HYSTERESIS_BEFORE] = 5e-3, up
+    assert dahl(row, 2e-3)[0] == pytest.approx(twice, rel=1e-12)
+
+
+def lift_by_small_steps(lengths: np.ndarray, amplitude: float, turning: float) -> list[float]:
+    """Heights of the lift: Dahl's law along the lengths in small steps, frozen while slack.
+
+    Where a cable would push, it pulls no more, and keeps stretch and friction until it would pull
+    again.
+    """
+    ea, weight, substeps = 1000.0, WEIGHT, 200
+    stretch, friction, heights = np.zeros(2), np.zeros(2), []
+
+    def tried(height: float, rest: np.ndarray, start: bool) -> tuple[np.ndarray, ...]:
+        e = np.array([1.0 - height, 1.0 + height]) - rest
+        limit = amplitude * np.sign(e - stretch)
+        z = limit + (friction - limit) * np.exp(-np.abs(e - stretch) / turning)
+        z = np.zeros(2) if start else z
+        return np.maximum(ea * e / rest + z, 0.0), e, z
+
+    def rests(rest: np.ndarray, start: bool) -> float:
+        low, high = -0.5, 0.5
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            tension = tried(middle, rest, start)[0]
+            low, high = (middle, high) if tension[0] - tension[1] > weight else (low, middle)
+        return low
+
+    before = lengths[0]
+    for row, target in enumerate(lengths):
+        for part in np.linspace(0.0, 1.0, substeps + 1)[1:] if row else [1.0]:
+            rest = before + part * (target - before)
+            height = rests(rest, row == 0)
+            tension, e, z = tried(height, rest, row == 0)
+            taut = tension > 0.0
+            stretch[taut], friction[taut] = e[taut], z[taut]
+        before = target
+        heights.append(height)
+    return heights
+
+
+@pytest.mark.slow
+def test_a_slack_cable_keeps_its_stretch_and_its_friction_and_pulls_again_from_there() -> None:
+    robot = lift()
+    lower = robot.rest_lengths[1] + np.array([0.0, 0.02, 0.08, 0.05, 0.09, 0.02, -0.01, 0.06, 0.0])
+    lengths = np.column_stack([np.full(len(lower), robot.rest_lengths[0]), lower])
+    pose = np.tile(robot.reference_pose, (len(lower), 1))
+    turned = effect("hysteresis", amplitude=2.0, stretch=5e-3)
+    found = Experiment(robot, Commands(pose, lengths)).predict([turned])
+    assert found.solved.all() and 0 < found.slack[:, 1].sum() < len(lower)
+    heights = lift_by_small_steps(lengths, 2.0, 5e-3)
+    plain = Experiment(robot, Commands(pose, lengths)).predict()
+    assert np.ptp(found.pose[:, 2] - plain.pose[:, 2]) > 5e-4  # or there is nothing to see
+    assert found.pose[:, 2] == pytest.approx(heights, abs=3e-6)
+
+
+@pytest.mark.parametrize("name, values", [
+    ("hysteresis", {"amplitude": 0.2, "stretch": 2e-4}),
+    ("exit_friction", {"friction": 0.2, "length": 0.4}),
+    ("backlash", {"gap": 1e-3}),
+])  # fmt: skip
+@pytest.mark.parametrize("kind", ["demobot_cogiro", "demobot_parallel"])
+def test_forward_and_back_part_and_each_run_starts_anew(
+    kind: str, name: str, values: dict[str, float]
+) -> None:
+    robot = replace(robot_of(kind), ea=np.full(8, CABLES["fishing"]))
+    x = np.concatenate([np.linspace(0.3, 0.5, 9), np.linspace(0.5, 0.3, 9)[1:]])
+    one = np.tile([0.0, 0.25, 0.15, 1, 0, 0, 0], (17, 1))
+    one[:, 0] = x
+    there = [effect(name, **values)]
+    both = Commands(np.tile(one, (2, 1)), run=np.repeat([0, 1], 17))
+    found = Experiment(robot, both).predict(there)
+    assert np.all(found.solved) and found.has_history
+    apart = np.abs(found.readings.position[:8] - found.readings.position[9:17][::-1]).max()
+    plain = Experiment(robot, both).predict().readings.position
+    assert apart > 1e-6 and np.abs(plain[:8] - plain[9:17][::-1]).max() < 1e-11
+    assert np.array_equal(found.readings.position[:17], found.readings.position[17:])
+    alone = Experiment(robot, Commands(one)).predict(there)
+    assert found.readings.position[17:] == pytest.approx(alone.readings.position, abs=1e-12)
+
+
+# --- friction ------------------------------------------------------------------------------------
+
+
+def test_the_tensions_about_an_exit_point_differ_by_the_capstans_factor_at_most() -> None:
+
+    robot = robot_of("demobot_parallel")
+    # far away, then to and fro by less and less: first all cables slip, in the end none
+    x = np.array([0.1, 0.1 + 1e-4, 0.1, 0.1 + 3e-5, 0.1, 0.1 + 1e-6, 0.1])
+    poses = np.tile(robot.reference_pose, (len(x), 1))
+    poses[:, 0] += x
+    found = Experiment(robot, Commands(poses)).predict(
+        [effect("exit_friction", friction=0.15, length=0.4)]
+    )
+    assert np.all(found.solved)
+    front = found.found.states[..., TENSION]
+    behind = found.found.states[..., WINCH_TENSION]
+    taut = (front > 1e-3).all(axis=0)
+    assert taut.sum() >= 4
+    every = np.abs(np.log(behind[:, taut] / front[:, taut]))
+    ratio = every.ravel()
+    assert ratio.max() <= 0.15 + 1e-12
+    slips = ratio > 0.15 - 1e-12
+    assert slips.any() and not slips.all()
+    assert np.all(every[0] > 0.15 - 1e-12) and np.any(every[-1] < 0.15 - 1e-6)
+
+
+def test_a_cable_sticks_inside_the_capstans_band() -> None:
+
+    row = np.zeros(N_COLUMNS)
+    row[FRICTION], row[STUCK] = 0.2, 10.0
+    grip = np.exp(0.2)
+    assert winch_tension(row, 9.0) == (10.0, 0.0)
+    assert winch_tension(row, 8.0) == pytest.approx((8 * grip, grip))
+    assert winch_tension(row, 13.0) == pytest.approx((13 / grip, 1 / grip))
+
+
+def test_endless_friction_shuts_the_cable_behind_the_exit_point_off() -> None:
+    """What lies behind keeps the tension it had at home: only its change is missing."""
+    experiment = experiment_of("demobot_cogiro")
+    plain = experiment.predict()
+    rough = experiment.predict([effect("exit_friction", friction=5.0, length=0.4)])
+    smooth = experiment.predict([effect("winch_side_length", length=0.4)])
+    assert np.all(rough.solved)
+    far = np.abs(smooth.readings.tensions - plain.readings.tensions).max()
+    assert far > 1e-4
+    assert np.abs(rough.readings.tensions - smooth.readings.tensions).max() > 0.1 * far
+
+
+# --- creep ---------------------------------------------------------------------------------------
+
+
+def hold(
+    times: np.ndarray, amount: float, constant: float, run: np.ndarray | None = None
+) -> np.ndarray:
+    """Fall [m] below the command of 2 kg hung on one cable of 1 m and E S = 1000 N at times [s]."""
+    robot = replace(
+        lift(), exit_points=np.array([[0.0, 0, 1]]), anchor_points=np.zeros((1, 3)),
+        ea=np.array([1000.0]), rest_lengths=np.ones(1), cable_names=(),
+    )  # fmt: skip
+    poses = np.tile(robot.reference_pose, (len(times), 1))
+    found = Experiment(robot, Commands(poses, time=times, run=run)).predict(
+        [effect("creep", amount=amount, time=constant)]
+    )
+    assert np.all(found.solved)
+    return -found.readings.position[:, 2]
+
+
+@pytest.mark.parametrize("step", [0.5, 7.0, 300.0])
+def test_creep_under_constant_load_ends_at_its_amount_of_the_elastic_strain(step: float) -> None:
+    times = np.arange(20) * step
+    elastic = WEIGHT / 1000
+    expected = elastic * (1 + 0.3 * (1 - np.exp(-times / 50)))
+    assert hold(times, 0.3, 50.0) == pytest.approx(expected, rel=1e-9)
+
+
+def test_creep_goes_by_the_clock_through_runs() -> None:
+    times = np.array([0.0, 10, 20, 100, 110, 400])
+    one = hold(times, 0.3, 50.0)
+    assert hold(times, 0.3, 50.0, run=np.array([0, 0, 0, 1, 1, 2])) == pytest.approx(one, rel=1e-9)
+
+
+def test_creep_does_not_depend_on_where_the_clock_started() -> None:
+    times = np.array([0.0, 10, 20, 100])
+    assert hold(times + 1e5, 0.3, 50.0) == pytest.approx(hold(times, 0.3, 50.0), rel=1e-9)
+
+
+def test_creep_long_after_a_change_of_load_has_forgotten_what_was_before() -> None:
+    """The strain follows the load of now: after many time constants that of the row itself."""
+    robot = robot_of("demobot_parallel")
+    poses = np.tile(robot.reference_pose, (3, 1))
+    poses[:, 0] += [0.0, 0.15, 0.15]
+    times = np.array([0.0, 1e3, 2e3])
+    found = Experiment(robot, Commands(poses, time=times)).predict(
+        [effect("creep", amount=0.5, time=1.0)]
+    )
+    assert np.all(found.solved)
+    assert found.readings.position[1] == pytest.approx(found.readings.position[2], abs=1e-6)

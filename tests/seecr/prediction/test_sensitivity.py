@@ -1,0 +1,170 @@
+"""Derivatives of readings beyond those of single effects (test_effects.py)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from effect_cases import KINDS, experiment_of, random_term, robot_of, worst_mismatch
+from random_robots import random_poses
+
+from seecr.commands.data import Commands
+from seecr.effects import Term, Terms, effect_named, layout_of
+from seecr.equilibrium.solving import solve
+from seecr.pose import pose_difference
+from seecr.prediction.experiment import Experiment
+from seecr.prediction.sensitivity import (
+    length_sensitivities,
+    readings_difference,
+    sensitivities,
+)
+
+
+@pytest.mark.parametrize("kind", [*KINDS, "free", "planar", "jointed"])
+def test_by_rest_lengths_as_solving_again_gives(kind: str) -> None:
+    experiment = experiment_of(kind, seed=2)
+    robot, poses = experiment.robot, experiment.commands.pose
+    found = length_sensitivities(experiment.predict())
+    rest = experiment.setup([]).rest_lengths()
+    assert found.shape == (6, 6 + robot.n_cables, robot.n_cables)
+    for i in range(robot.n_cables):
+        step = np.zeros(robot.n_cables)
+        step[i] = 1e-6 * robot.length
+        ahead, behind = (solve(robot, poses, rest_lengths=rest + s * step) for s in (1, -1))
+        move = pose_difference(ahead.pose, behind.pose) / (2 * step[i])
+        pull = (ahead.tensions - behind.tensions) / (2 * step[i])
+        assert found[:, :6, i] == pytest.approx(move, rel=1e-4, abs=1e-5 * np.abs(move).max())
+        assert found[:, 6:, i] == pytest.approx(pull, rel=1e-4, abs=1e-5 * np.abs(pull).max())
+
+
+@pytest.mark.parametrize("kind", ["free", "planar", "jointed"])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_constant_moment_has_no_potential_and_is_accounted_for(kind: str, seed: int) -> None:
+    """It skews the stiffness, which an energy's second derivative cannot show."""
+    experiment = experiment_of(kind, seed=seed)
+    rng = np.random.default_rng(seed)
+    terms = Terms([random_term(rng, experiment, "external_wrench", part=3.0)])
+    at = experiment.predict(terms.effects)
+    if not np.all(at.solved):
+        pytest.skip("this robot does not hold against such a moment")
+    worst, whose = worst_mismatch(experiment, terms, sensitivities(experiment, terms, at))
+    assert worst < 1e-4, whose
+
+
+def test_columns_picks_parameters_through_all_terms() -> None:
+    experiment = experiment_of("demobot_cogiro")
+    rng = np.random.default_rng(0)
+    names = ("pulley_radius", "drum_gain", "tracker_target")
+    terms = Terms(random_term(rng, experiment, name) for name in names)
+    at = experiment.predict(terms.effects)
+    whole = sensitivities(experiment, terms, at)
+    assert whole.shape == (6, 14, 1 + 8 + 6)
+    some = sensitivities(experiment, terms, at, columns=(9, 0, 3))
+    assert some == pytest.approx(whole[..., [9, 0, 3]], rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", ["hysteresis", "creep", "backlash", "exit_friction"])
+def test_history_that_is_not_there_yet_is_seen_from_its_null(name: str) -> None:
+    """One-sided: its amplitude cannot be negative."""
+    experiment = experiment_of("demobot_parallel", seed=3)
+    layout = layout_of(effect_named(name), experiment.robot)
+    shapes = layout.effect.shapes(experiment.setup([]))
+    term = Term(layout, layout.start(shapes[len(shapes) // 2]))
+    plain = experiment.predict([term.effect()])
+    found = sensitivities(experiment, Terms([term]), plain)[..., 0]
+    step = 1e-4 * layout.scale[0]
+    vector = term.vector.copy()
+    vector[0] = step
+    ahead = experiment.predict([layout.build(vector)])
+    assert np.all(ahead.solved)
+    full = readings_difference(ahead.readings, plain.readings) / step
+    largest = np.abs(full).max(axis=0)
+    assert np.all(np.abs(full[:, :3]).max() * layout.scale[0] > 1e-6)
+    for part in (slice(0, 3), slice(3, 6), slice(6, None)):
+        assert found[:, part] == pytest.approx(full[:, part], abs=1e-2 * largest[part].max())
+
+
+def test_at_a_bound_the_difference_stays_inside() -> None:
+    experiment = experiment_of("demobot_cogiro")
+    layout = layout_of(effect_named("pulley_radius"), experiment.robot)
+    seen: list[float] = []
+
+    class Watched(layout.effect):  # type: ignore[name-defined,misc]
+        def edit_setup(self, setup: object) -> None:
+            seen.append(self.radius)
+            super().edit_setup(setup)
+
+    term = Term(replace(layout, effect=Watched), layout.null)
+    at = experiment.predict([term.effect()])
+    found = sensitivities(experiment, Terms([term]), at)
+    assert min(seen) >= 0.0 and max(seen) > 0.0
+    assert np.abs(found).max() > 1e-2
+
+
+def test_sensitivities_do_not_care_where_the_rows_stand() -> None:
+    robot = robot_of("demobot_cogiro")
+    poses = random_poses(np.random.default_rng(0), robot, 5)
+    order = np.array([3, 0, 4, 1, 2])
+    both = []
+    for rows in (poses, poses[order]):
+        experiment = Experiment(robot, Commands(rows))
+        terms = Terms([random_term(np.random.default_rng(1), experiment, "anchor_point_error")])
+        at = experiment.predict(terms.effects)
+        both.append(sensitivities(experiment, terms, at))
+    assert both[1] == pytest.approx(both[0][order], rel=1e-6, abs=1e-9)
+
+
+def test_a_row_that_is_free_to_move_gives_finite_numbers() -> None:
+    """Three cables through one line leave a swing: its direction is no one's to say."""
+    robot = replace(robot_of("demobot_cogiro"), anchor_points=np.zeros((8, 3)))
+    experiment = Experiment(robot, Commands(robot.reference_pose[None]))
+    at = experiment.predict()
+    assert at.singular.tolist() == [True] and not at.solved.any()
+    layout = layout_of(effect_named("stiffness"), robot)
+    found = sensitivities(experiment, Terms([Term(layout, layout.null)]), at)
+    assert np.all(np.isfinite(found))
+    assert np.abs(found[:, 3:6]).max() < 1e-6 and found[0, 2, 0] > 0  # stiffer: higher
+
+
+def test_the_planes_of_hanging_cables_tilt_with_gravity() -> None:
+    """No cable's own numbers change then, and still every cable pulls another way."""
+    experiment = experiment_of("demobot_cogiro")
+    rng = np.random.default_rng(3)
+    names = ("gravity_tilt", "cable_weight")
+    terms = Terms(random_term(rng, experiment, name) for name in names)
+    at = experiment.predict(terms.effects)
+    worst, whose = worst_mismatch(experiment, terms, sensitivities(experiment, terms, at))
+    assert worst < 1e-4, whose
+
+
+def test_a_platform_that_stands_still_turns_no_cable_round() -> None:
+    """Where nothing moves a cable is stiff either way, by different amounts."""
+    robot = robot_of("demobot_cogiro")
+    poses = random_poses(np.random.default_rng(3), robot, 3)[[0, 1, 1, 1, 2]]
+    experiment = Experiment(robot, Commands(poses, run=np.zeros(5, dtype=np.int64)))
+    rng = np.random.default_rng(2)
+    names = ("hysteresis", "exit_friction", "pulley_radius", "centre_of_mass", "drum_gain")
+    terms = Terms(random_term(rng, experiment, name) for name in names)
+    at = experiment.predict(terms.effects)
+    assert np.abs(at.pose[1] - at.pose[3]).max() < 1e-12
+    worst, whose = worst_mismatch(experiment, terms, sensitivities(experiment, terms, at))
+    assert worst < 1e-4, whose
+
+
+def test_friction_that_is_not_there_yet_has_its_cable_behind_the_exit_point() -> None:
+    """Beside another effect with history, whose way was walked without that cable."""
+    experiment = experiment_of("demobot_parallel", seed=3)
+    layout = layout_of(effect_named("exit_friction"), experiment.robot)
+    term = Term(layout, layout.start(layout.effect.shapes(experiment.setup([]))[-1]))
+    creep = random_term(np.random.default_rng(1), experiment, "creep")
+    terms = Terms([creep, term])
+    at = experiment.predict([creep.effect()])
+    column = terms.part("exit_friction").start
+    found = sensitivities(experiment, terms, at, columns=[column], frozen=True)[..., 0]
+    step = 1e-4 * layout.scale[0]
+    vector = term.vector.copy()
+    vector[0] = step
+    both = [experiment.predict([creep.effect(), layout.build(v)]) for v in (vector, term.vector)]
+    full = readings_difference(both[0].readings, both[1].readings) / step
+    assert found[:, :3] == pytest.approx(full[:, :3], abs=1e-3 * np.abs(full[:, :3]).max())

@@ -1,0 +1,221 @@
+"""The compiled loop: small rotations, joints, gradient and stiffness against differences."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from random_robots import KINDS, random_poses, random_robot
+
+from seecr.commands.data import Commands
+from seecr.compiled.algebra import cholesky
+from seecr.compiled.columns import GAP, REST, STRAIN, TENSION
+from seecr.compiled.joints import place_joints
+from seecr.compiled.rotation import rotated_less, turned
+from seecr.compiled.steps import residual_size
+from seecr.description.joints import pose_of_values
+from seecr.description.robot import Robot
+from seecr.effects.setup import plain_setup
+from seecr.pose import pose_add, pose_difference, quat_from_rotvec, quat_multiply
+from seecr.statics import batch
+from seecr.statics.batch import Evaluation, Tables
+from seecr.statics.tables import assemble
+
+
+def tables_of(robot: Robot, poses: np.ndarray, **changes: object) -> Tables:
+    setup = plain_setup(robot, Commands(poses))
+    for name, value in changes.items():
+        setattr(setup, name, value)
+    return assemble(setup)
+
+
+def at(tables: Tables, steps: np.ndarray) -> Evaluation:
+    """The loop's numbers a step (n, d) [m] away from the commanded poses."""
+    point = Evaluation.empty(len(tables), tables.cables.shape[1], tables.n_dof)
+    if tables.screws.shape[1]:
+        point.values[:] = steps
+    else:
+        point.deviation[:, :3] = steps[:, :3]
+        point.deviation[:, 3:] = quat_from_rotvec(steps[:, 3:] / tables.length)
+    return batch.evaluate(tables, point)
+
+
+def after(tables: Tables, first: np.ndarray, then: np.ndarray) -> np.ndarray:
+    """The step that equals ``first`` and then ``then``, rotations from the left."""
+    if tables.screws.shape[1]:
+        return np.asarray(first + then)
+    turn = quat_multiply(
+        quat_from_rotvec(then[:, 3:] / tables.length),
+        quat_from_rotvec(first[:, 3:] / tables.length),
+    )
+    pose = np.column_stack([first[:, :3] + then[:, :3], turn])
+    rest = np.tile([0.0, 0, 0, 1, 0, 0, 0], (len(pose), 1))
+    change = pose_difference(pose, rest)
+    change[:, 3:] *= tables.length
+    return change
+
+
+# --- rotations ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("angle", [1e-300, 1e-17, 1e-9, 1e-3, 1.0, 3.0])
+def test_a_small_rotation_keeps_all_its_digits(angle: float) -> None:
+    out = rotated_less(*quat_from_rotvec(np.array([0, 0, angle])), 3.0, -2.0, 5.0)
+    less, sine = -2.0 * np.sin(angle / 2) ** 2, np.sin(angle)
+    expected = [3 * less + 2 * sine, 3 * sine - 2 * less, 0.0]
+    assert out == pytest.approx(expected, rel=1e-14, abs=0)
+
+
+def test_turning_multiplies_from_the_left() -> None:
+    q = quat_from_rotvec(np.array([0.3, -0.5, 0.2]))
+    for rotvec in (np.array([1e-10, 2e-10, 0]), np.array([0.4, 1.0, -2.0]), np.zeros(3)):
+        expected = quat_multiply(quat_from_rotvec(rotvec), q)
+        assert turned(*rotvec, *q) == pytest.approx(expected, abs=1e-15)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_joints_move_the_platform_as_the_product_of_exponentials(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    robot = random_robot(rng, "jointed")
+    first, step = rng.uniform(-0.4, 0.4, (2, robot.n_dof))
+    pose, screws = pose_of_values(robot, first)
+    expected, now = pose_of_values(robot, first + step)
+    unit = np.array([robot.length if j.kind == "hinge" else 1.0 for j in robot.joints])
+    deviation, current = np.empty(7), np.empty_like(screws[0])
+    place_joints(screws[0], step * unit, robot.length, pose[0, :3], deviation, current)
+    moved = np.concatenate([pose[0, :3] + deviation[:3],
+                            quat_multiply(deviation[3:], pose[0, 3:])])  # fmt: skip
+    assert pose_difference(moved, expected[0]) == pytest.approx(np.zeros(6), abs=1e-13)
+    assert current[:, :4] == pytest.approx(now[0, :, :4], abs=1e-13)
+
+
+# --- linear algebra ----------------------------------------------------------------------------
+
+
+def test_cholesky_notices_what_is_not_positive_definite() -> None:
+    rng = np.random.default_rng(0)
+    root = rng.normal(size=(6, 6))
+    definite = root @ root.T
+    factor = np.zeros((6, 6))
+    assert cholesky(definite, 0.0, factor)
+    assert factor == pytest.approx(np.linalg.cholesky(definite), rel=1e-10)
+    smallest = np.linalg.eigvalsh(definite)[0]
+    assert not cholesky(definite, -1.001 * smallest, factor)
+    assert cholesky(definite, -0.999 * smallest, factor)
+    assert not cholesky(np.full((2, 2), np.nan), 0.0, np.zeros((2, 2)))
+
+
+def test_residual_is_the_larger_of_force_and_torque() -> None:
+    gradient = np.array([3.0, 4, 0, 0, 0, 12])
+    assert residual_size(gradient) == 12.0
+    assert residual_size(gradient[::-1].copy()) == 12.0
+    assert residual_size(gradient[:3].copy()) == 5.0
+    assert batch.residual_size(gradient[None])[0] == 12.0
+    assert batch.residual_size(gradient[None, :3])[0] == 5.0
+
+
+# --- gradient and stiffness --------------------------------------------------------------------
+
+
+def near_slack(rng: np.random.Generator, tables: Tables, steps: np.ndarray) -> Tables:
+    """The same, with the cables' stretch at ``steps`` a few hundred thousandths of nothing."""
+    stretch = at(tables, steps).states[..., STRAIN] * tables.cables[..., REST]
+    aim = 1e-5 * tables.length * rng.uniform(0.5, 1, stretch.shape)
+    aim *= rng.choice([-1, 1], stretch.shape)
+    cables = tables.cables.copy()
+    cables[..., GAP] += aim - stretch
+    return replace(tables, cables=cables)
+
+
+@pytest.mark.parametrize("slack", [False, True], ids=["anywhere", "near-slack"])
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("seed", range(6))
+def test_gradient_and_stiffness_against_differences(kind: str, seed: int, slack: bool) -> None:
+    rng = np.random.default_rng(seed)
+    robot = random_robot(rng, kind)
+    tables = tables_of(
+        robot, random_poses(rng, robot, 6), wrench=robot.weight * 0.3 * rng.normal(size=(6, 6))
+        * np.array([1, 1, 1, 0, 0, 0])
+    )  # fmt: skip
+    steps = 0.3 * tables.length * rng.uniform(-1, 1, (6, tables.n_dof))
+    if slack:
+        tables = near_slack(rng, tables, steps)
+    here = at(tables, steps)
+    if slack:
+        taut = here.states[..., TENSION] > 0
+        assert np.any(taut) and np.any(~taut)
+    gradient, hessian = np.empty_like(here.gradient), np.empty_like(here.hessian)
+    slopes = np.empty_like(here.slopes)
+    size = 1e-6 * tables.length
+    for k in range(tables.n_dof):
+        step = np.zeros_like(steps)
+        step[:, k] = size
+        ahead, behind = (at(tables, after(tables, steps, s)) for s in (step, -step))
+        gradient[:, k] = (ahead.energy - behind.energy) / (2 * size)
+        hessian[:, :, k] = (ahead.gradient - behind.gradient) / (2 * size)
+        slopes[..., k] = (ahead.states - behind.states)[..., TENSION] / (2 * size)
+    if not robot.joints:
+        # a step from the left turns the frame in which torques are counted: half of it is not
+        # the symmetric stiffness but the torque that is there
+        hessian = 0.5 * (hessian + np.swapaxes(hessian, 1, 2))
+    force = np.abs(robot.ea).max() * 1e-6 + np.abs(here.gradient).max()
+    assert gradient == pytest.approx(here.gradient, rel=1e-6, abs=1e-7 * force)
+    top = np.abs(here.hessian).max()
+    assert hessian == pytest.approx(here.hessian, rel=1e-6, abs=1e-7 * top)
+    assert slopes == pytest.approx(here.slopes, rel=1e-6, abs=1e-7 * np.abs(here.slopes).max())
+
+
+def test_stiffness_is_symmetric_and_of_second_order_in_the_energy() -> None:
+    """Energy - gradient.step - step.H.step/2 shrinks with the cube of a step in any direction."""
+    rng = np.random.default_rng(3)
+    for kind in KINDS:
+        robot = random_robot(rng, kind)
+        tables = tables_of(robot, random_poses(rng, robot, 4))
+        down = np.zeros((4, tables.n_dof))
+        down[:, :] = 0.02 * tables.length * rng.uniform(-1, 1, (4, tables.n_dof))
+        here = at(tables, down)
+        assert np.array_equal(here.hessian, np.swapaxes(here.hessian, 1, 2))
+        direction = rng.normal(size=(4, tables.n_dof))
+        direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+        errors = []
+        for size in 1e-3 * tables.length * np.array([1.0, 0.5]):
+            step = size * direction
+            energy = at(tables, after(tables, down, step)).energy
+            linear = np.einsum("nk,nk->n", here.gradient, step)
+            square = 0.5 * np.einsum("nj,njk,nk->n", step, here.hessian, step)
+            errors.append(np.abs(energy - here.energy - linear - square))
+        # cables that go slack within the step shrink with its square only; leave those out
+        ratio = errors[0] / errors[1]
+        assert np.sum(np.abs(ratio - 8) < 1.5) >= 3, (kind, ratio)
+
+
+def test_a_constant_moment_has_no_energy_but_a_gradient() -> None:
+    rng = np.random.default_rng(4)
+    robot = random_robot(rng)
+    poses = random_poses(rng, robot, 3)
+    plain = at(tables_of(robot, poses), np.zeros((3, 6)))
+    moment = np.tile([0, 0, 0, 1.0, -2.0, 3.0], (3, 1))
+    turned = at(tables_of(robot, poses, wrench=moment), np.zeros((3, 6)))
+    assert np.all(np.isnan(turned.energy)) and np.all(np.isfinite(plain.energy))
+    change = turned.gradient - plain.gradient
+    assert change == pytest.approx(-moment / np.array([1, 1, 1] + 3 * [robot.length]), rel=1e-9)
+
+
+def test_threads_change_nothing() -> None:
+    rng = np.random.default_rng(5)
+    robot = random_robot(rng)
+    tables = tables_of(robot, random_poses(rng, robot, 200))
+    one, two = batch.descend(tables, threads=1), batch.descend(tables, threads=2)
+    assert np.array_equal(one.deviation, two.deviation)
+    assert np.array_equal(one.count, two.count)
+
+
+def test_pose_from_deviation_and_back() -> None:
+    rng = np.random.default_rng(6)
+    robot = random_robot(rng)
+    poses = random_poses(rng, robot, 8)
+    tables = tables_of(robot, poses)
+    moved = pose_add(poses, 0.3 * rng.normal(size=(8, 6)))
+    back = batch.platform_poses(tables, batch.deviations(tables, moved))
+    assert pose_difference(back, moved) == pytest.approx(np.zeros((8, 6)), abs=1e-14)

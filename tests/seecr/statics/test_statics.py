@@ -1,0 +1,146 @@
+"""The batch calls on tables: what changes between tables, walks, slack, some rows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from effect_cases import experiment_of
+
+from seecr.commands.data import Commands
+from seecr.compiled.change import change_at_rest, change_of_each_cable
+from seecr.compiled.columns import COMPLIANCE, EA, N_COLUMNS, OF_THE_PAST, REST, SLACK, TENSION
+from seecr.compiled.descent import solve_batch
+from seecr.compiled.outcomes import CONVERGED
+from seecr.compiled.pulley import lengths_at
+from seecr.prediction.experiment import Experiment
+from seecr.statics import batch
+from seecr.statics.tables import Tables, assemble, take
+
+KINDS = ("demobot_cogiro", "demobot_parallel", "planar_vertical")
+
+
+def solved(kind: str) -> tuple[Tables, batch.Evaluation]:
+    tables = assemble(experiment_of(kind).setup([]))
+    return tables, batch.descend(tables)
+
+
+def edited(tables: Tables, by: float) -> Tables:
+    """The same with another stiffness of one cable and more load."""
+    other = take(tables, np.arange(len(tables)))
+    other.cables[:, 1, EA] *= 1.0 + by
+    other.load[:, :3] *= 1.0 + by
+    return other
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_change_is_the_difference_of_what_both_tables_say(kind: str) -> None:
+    tables, at = solved(kind)
+    plus, minus = edited(tables, 0.01), edited(tables, -0.01)
+    force, tension = batch.change(plus, minus, at)
+    ahead, behind = batch.evaluate(plus, at), batch.evaluate(minus, at)
+    scale = tables.scale.max()
+    assert force == pytest.approx(ahead.gradient - behind.gradient, abs=1e-12 * scale)
+    both = (ahead.states - behind.states)[..., TENSION]
+    assert tension == pytest.approx(both, abs=1e-12 * scale)
+    assert np.abs(force).max() > 1e-3 * scale
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_each_cables_own_change_adds_up_to_that_of_all(kind: str) -> None:
+    tables, at = solved(kind)
+    plus, minus = tables.lengthened(1e-4), tables.lengthened(-1e-4)
+    force, tension = batch.change(plus, minus, at)
+    each, own = batch.change_by_cable(plus, minus, at)
+    assert each.shape == (*force.shape, tables.cables.shape[1])
+    assert each.sum(axis=-1) == pytest.approx(force, abs=1e-12 * tables.scale.max())
+    assert own == pytest.approx(tension, abs=1e-12 * tables.scale.max())
+
+
+def test_a_row_that_cannot_be_evaluated_changes_nothing() -> None:
+    tables, at = solved("demobot_cogiro")
+    tables.cables[0, 3, REST] = np.nan
+    plus = take(tables, np.arange(len(tables)))
+    plus.cables[1:, 0, COMPLIANCE] = 1e-6
+    # nan differs from itself: of the row that holds it, and of that alone, nothing is said
+    force, tension = batch.change(plus, tables, at)
+    assert np.all(force[0] == 0.0) and np.all(tension[0] == 0.0)
+    assert np.all(np.isfinite(force)) and np.all(np.abs(force[1:]).max(axis=1) > 0.0)
+
+
+def test_of_no_rows_nothing_changes() -> None:
+    tables, at = solved("demobot_cogiro")
+    none = np.zeros(0, dtype=np.intp)
+    some, there = take(tables, none), batch.take_evaluation(at, none)
+    force, tension = batch.change_by_cable(some, some, there)
+    assert force.shape == (0, 6, 8) and tension.shape == (0, 8)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_walk_of_cables_without_a_past_comes_to_rest_where_each_pose_does(kind: str) -> None:
+    experiment = experiment_of(kind)
+    path = experiment.path
+    tables = assemble(experiment.setup([], path.commands))
+    walked, alone = batch.walk(tables, path, 400), batch.descend(tables)
+    assert np.all(walked.outcome == CONVERGED)
+    assert walked.deviation == pytest.approx(alone.deviation, abs=1e-10)
+    assert np.all(tables.cables[path.fresh][..., list(OF_THE_PAST[:2])] == 0.0)
+
+
+def test_a_walk_does_not_search_beyond_a_waypoint_that_it_lost() -> None:
+    experiment = experiment_of("demobot_cogiro")
+    path = experiment.path
+    tables = assemble(experiment.setup([], path.commands))
+    lost = int(np.flatnonzero(path.fresh)[1]) - 3
+    tables.cables[lost, 3, REST] = np.nan
+    walked = batch.walk(tables, path, 400)
+    spoilt = np.isin(np.arange(len(tables)), range(lost, lost + 3))
+    assert np.array_equal(walked.outcome != CONVERGED, spoilt)
+    assert np.all(walked.count[~spoilt] > 0) and np.all(walked.count[lost + 1 : lost + 3] == 0)
+
+
+def test_a_past_is_taken_over_and_nothing_else_is() -> None:
+    tables, _at = solved("demobot_cogiro")
+    other = take(tables, np.arange(len(tables)))
+    other.cables[:] = 7.0
+    mixed = tables.with_past(other)
+    past = np.isin(np.arange(N_COLUMNS), OF_THE_PAST)
+    assert np.all(mixed.cables[..., past] == 7.0)
+    assert np.array_equal(mixed.cables[..., ~past], tables.cables[..., ~past])
+
+
+def test_poses_that_may_not_be_written_to_have_nothing_compiled_again() -> None:
+    """It would take half a minute; commands are often such."""
+    experiment = experiment_of("demobot_cogiro")
+    poses = experiment.commands.pose.copy()
+    poses.flags.writeable = False
+    setup = Experiment(experiment.robot, Commands(poses)).setup([])
+    solved("demobot_cogiro")
+    known = len(lengths_at.signatures), len(solve_batch.signatures)
+    batch.descend(assemble(setup))
+    assert (len(lengths_at.signatures), len(solve_batch.signatures)) == known
+
+
+def test_slack_is_longer_than_its_way_or_pulls_no_more_than_rounding() -> None:
+    tables, at = solved("demobot_cogiro")
+    at.states[:, :, SLACK], at.states[:, :, TENSION] = 0.0, tables.scale[:, None]
+    at.states[0, 2, SLACK] = 1.0  # hangs through and pulls by its weight
+    at.states[1, 4, TENSION] = 1e-12 * tables.scale[1]
+    assert np.argwhere(batch.is_slack(tables, at)).tolist() == [[0, 2], [1, 4]]
+
+
+def test_compiled_functions_fill_what_they_are_given() -> None:
+    """Whatever was in the arrays that the batch calls lend them."""
+    tables, at = solved("demobot_cogiro")
+    n, m = tables.cables.shape[:2]
+    gradient, tension = np.full((n, 6), 3.0), np.full((n, m), 4.0)
+    change_at_rest(
+        tables.cables, tables.cables, tables.load, tables.load, tables.poses, tables.screws,
+        at.deviation, at.values, tables.length, at.guess, gradient, tension,
+    )  # fmt: skip
+    assert np.all(gradient == 0.0) and np.all(tension == 0.0)
+    each, own = np.full((n, m, 6), 3.0), np.full((n, m), 4.0)
+    change_of_each_cable(
+        tables.cables, tables.cables, tables.load, tables.poses, tables.screws, at.deviation,
+        at.values, tables.length, at.guess, each, own,
+    )  # fmt: skip
+    assert np.all(each == 0.0) and np.all(own == 0.0)

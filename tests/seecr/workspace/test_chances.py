@@ -1,0 +1,198 @@
+"""Probabilities by a model's covariance, against models drawn from it and solved one by one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from calibrated import POSES, ROBOT, model_of
+
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
+from seecr.effects import Terms
+from seecr.equilibrium.solving import solve
+from seecr.errors import InputError
+from seecr.inverse.correction import correct
+from seecr.prediction.model import Model
+from seecr.report.corrections import chance_lines
+from seecr.report.maps import likely_lines, write_arrays
+from seecr.statics.solution import Solution
+from seecr.workspace.chances import held_chance, kept_chance, margins_with
+from seecr.workspace.maps import boundary, workspace_map
+from seecr.workspace.zones import tension_margin
+
+MODEL = """format = 1
+[[effect]]
+name = "platform_mass"
+[effect.parameters]
+added_kg = { value = 0.05, stderr = 0.02 }
+[[effect]]
+name = "stiffness"
+[effect.parameters]
+factor = { value = 0.9, stderr = 0.01 }
+[[effect]]
+name = "centre_of_mass"
+[effect.parameters]
+shift_x_m = { value = 0.0, stderr = 0.002 }
+shift_y_m = { value = 0.0, stderr = 0.002 }
+shift_z_m = { value = 0.0, stderr = 0.002 }
+"""
+KEPT = """[calibration]
+parameters = ["platform_mass.added_kg", "stiffness.factor"]
+correlation = [[1.0], [0.5, 1.0]]
+"""
+
+
+def drawn(model: Model, n: int) -> list[Terms]:
+    sizes = np.array([np.concatenate([model.stderr[name] for name in model.terms.names])])
+    labels = [effect for effect, _key in model.terms.labels]
+    correlation = np.eye(len(labels))
+    a, b = labels.index("platform_mass"), labels.index("stiffness")
+    correlation[a, b] = correlation[b, a] = 0.5
+    covariance = correlation * sizes.T * sizes
+    vectors = np.random.default_rng(1).multivariate_normal(model.terms.vector, covariance, n)
+    return [model.terms.with_vector(one) for one in vectors]
+
+
+def test_tensions_keep_their_limits_as_often_as_drawn_models_say(tmp_path: Path) -> None:
+    model = model_of(tmp_path, MODEL + KEPT)
+    found = correct(ROBOT, POSES, effects=model, lowest=0.2)
+    # as narrow as half of the models allow
+    highest = 1.01 * found.solution.tensions.max()
+    said = kept_chance(ROBOT, found.commands, model, lowest=0.2, highest=highest)
+    assert said is not None
+    seen = []
+    for terms in drawn(model, 200):
+        rests: Solution = solve(ROBOT, found.commands, effects=terms)
+        inside = (rests.tensions >= 0.2 - 1e-9) & (rests.tensions <= highest + 1e-9)
+        seen.append(inside.all(axis=1))
+    np.testing.assert_allclose(said, np.mean(seen, axis=0), atol=0.08)
+    assert 0.02 < said.min() < 0.9
+    (line,) = chance_lines(found, said)
+    assert line.startswith(f"tensions stay within the limits with probability {said.min():.2f}")
+    assert found.as_json(said)["rows"][1]["within_limits_probability"] == said[1]
+    assert list(chance_lines(found, None)) == []
+
+
+@pytest.mark.slow
+def test_poses_are_held_as_often_as_drawn_models_say(tmp_path: Path) -> None:
+    model = model_of(tmp_path, MODEL + KEPT)
+    # towards the edge of what can be held
+    poses = np.tile(POSES[0], (9, 1))
+    poses[:, 0] = np.linspace(0.02, 0.12, 9)
+    said = held_chance(ROBOT, poses, model, lowest=0.02)
+    assert said is not None
+    seen = [margins_with(ROBOT, poses, terms, 0.02) >= 0.0 for terms in drawn(model, 200)]
+    np.testing.assert_allclose(said, np.mean(seen, axis=0), atol=0.08)
+    assert said.min() < 0.05 and said.max() == 1.0 and np.any((said > 0.1) & (said < 0.9))
+
+
+def test_without_effects_margins_are_those_of_the_plain_robot() -> None:
+    pushes = [[0.3, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0.01, 0]]
+    for more in (None, pushes):
+        own = margins_with(ROBOT, POSES, [], 0.1, 6.0, more)
+        expected = tension_margin(ROBOT, POSES, lowest=0.1, highest=6.0, wrenches=more)
+        np.testing.assert_allclose(own, expected, rtol=1e-6)
+
+
+def test_a_model_without_covariance_says_nothing(tmp_path: Path) -> None:
+    model = model_of(tmp_path, MODEL)
+    found = correct(ROBOT, POSES, effects=model)
+    assert kept_chance(ROBOT, found.commands, model) is None
+    assert held_chance(ROBOT, POSES, model) is None
+
+
+@pytest.mark.slow
+def test_a_map_has_the_probabilities_of_its_poses(tmp_path: Path) -> None:
+    model, x = model_of(tmp_path, MODEL + KEPT), np.linspace(0.02, 0.12, 6)
+    found = workspace_map(
+        ROBOT, x, 0.2, 0.1, effects=model, lowest=0.02, elastic=False, chance=True
+    )
+    poses = np.tile(POSES[0], (6, 1))
+    poses[:, 0] = x
+    assert found.chance is not None
+    expected = held_chance(ROBOT, poses, model, lowest=0.02)
+    np.testing.assert_allclose(found.chance.ravel(), expected, atol=1e-6)
+    # margins are those of the robot that the model describes
+    np.testing.assert_allclose(found.margin.ravel(), margins_with(ROBOT, poses, model, 0.02))
+    sure = int(found.likely(0.95).sum())
+    assert 0 < sure < int(found.likely(0.05).sum())
+    (line,) = likely_lines(found, 0.95)
+    expected_line = f"with a probability of 0.95 or more {sure} poses can be held, "
+    assert line == f"{expected_line}{0.02 * (sure - 0.5):.4g} m"
+    assert found.as_json(0.95)["likely"]["size"] == pytest.approx(0.02 * (sure - 0.5))
+    write_arrays(tmp_path / "map.npz", found)
+    with np.load(tmp_path / "map.npz") as kept:
+        np.testing.assert_array_equal(kept["probability"], found.chance)
+
+
+@pytest.mark.slow
+def test_the_boundary_is_that_of_the_model_and_of_the_probability_asked_for(tmp_path: Path) -> None:
+    model = model_of(tmp_path, MODEL + KEPT)
+    inside, outside = POSES[:1].copy(), POSES[:1].copy()
+    inside[:, :3], outside[:, :3] = [0.3, 0.2, 0.1], [0.0, 0.2, 0.1]
+    ends = {"lowest": 0.02, "tolerance": 1e-5, "effects": model}
+    own = boundary(ROBOT, inside, outside, **ends)
+    np.testing.assert_allclose(margins_with(ROBOT, own, model, 0.02), 0.0, atol=1e-3)
+    plain = boundary(ROBOT, inside, outside, lowest=0.02, tolerance=1e-5)
+    assert abs(own - plain).max() > 5e-4
+    ends["tolerance"] = 2e-3
+    sure = boundary(ROBOT, inside, outside, at_least=0.95, **ends)
+    maybe = boundary(ROBOT, inside, outside, at_least=0.05, **ends)
+    assert sure[0, 0] > own[0, 0] > maybe[0, 0]
+    further = sure + np.array([-2e-3, 0, 0, 0, 0, 0, 0])
+    said = held_chance(ROBOT, np.concatenate([sure, further]), model, lowest=0.02)
+    assert said is not None and said[0] >= 0.95 > said[1]
+    with pytest.raises(InputError, match="by a model that keeps its covariance"):
+        boundary(ROBOT, inside, outside, at_least=0.95)
+
+
+def test_maps_that_can_have_no_probabilities_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="by a model that keeps its covariance; expected a table"):
+        workspace_map(ROBOT, 0.3, 0.2, 0.1, elastic=False, chance=True)
+    plain = workspace_map(ROBOT, 0.3, 0.2, 0.1, elastic=False)
+    with pytest.raises(InputError, match="this map has no probabilities"):
+        plain.likely(0.9)
+    with pytest.raises(InputError, match=r"above 0 and at most 1, got 1\.5"):
+        plain.likely(1.5)
+    two = load_robot(model_path("planar_two_cable"))
+    with pytest.raises(InputError, match="fewer cables than freedoms: it holds no poses"):
+        held_chance(two, two.reference_pose, model_of(tmp_path, MODEL + KEPT))
+
+
+def test_no_value_is_drawn_beyond_its_bounds(tmp_path: Path) -> None:
+    """Half of the draws of a wheel at zero would have a negative radius, which no cable runs on."""
+    beside = """[[effect]]
+name = "pulley_radius"
+[effect.parameters]
+radius_m = { value = 0.0, stderr = 0.01 }
+[[effect]]
+name = "frame_compliance"
+[effect.parameters]
+sideways_m_per_N = { value = 0.0, stderr = 1e-3 }
+upwards_m_per_N = { value = 0.0, stderr = 1e-3 }
+"""
+    keys = [f"{e}.{k}" for e, k in model_of(tmp_path, MODEL + beside).terms.labels]
+    rows = [[0.0] * k + [1.0] for k in range(len(keys))]
+    kept = f"[calibration]\nparameters = {keys}\ncorrelation = {rows}\n".replace("'", '"')
+    model = model_of(tmp_path, MODEL + beside + kept)
+    said = held_chance(ROBOT, POSES, model, lowest=0.02)
+    assert said is not None and np.all((said >= 0.0) & (said <= 1.0))
+    found = correct(ROBOT, POSES, effects=model)
+    assert np.isfinite(kept_chance(ROBOT, found.commands, model)).all()
+    # out of all reach no pose is held by any of them
+    far = POSES + np.array([9.0, 0, 0, 0, 0, 0, 0])
+    np.testing.assert_array_equal(held_chance(ROBOT, far, model, lowest=0.02), 0.0)
+
+
+def test_what_can_have_no_probabilities_is_refused_before_the_map(tmp_path: Path) -> None:
+    def told(_done: int) -> None:
+        raise AssertionError("a part was mapped")
+
+    two = load_robot(model_path("planar_two_cable"))
+    with pytest.raises(InputError, match="fewer cables than freedoms"):
+        workspace_map(two, *[np.linspace(0.0, 0.1, 9)] * 3, chance=True, progress=told)
+    with pytest.raises(InputError, match="keeps its covariance"):
+        workspace_map(ROBOT, 0.3, 0.2, 0.1, effects=model_of(tmp_path, MODEL), chance=True,
+                      progress=told)  # fmt: skip

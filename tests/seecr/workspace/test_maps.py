@@ -1,0 +1,451 @@
+"""Margins against HiGHS, boundaries, maps on grids, robots with too few cables."""
+
+from __future__ import annotations
+
+import re
+import threading
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from PIL import Image
+from random_robots import random_poses, random_robot
+from scipy.optimize import linprog
+from unbalanced import unbalanced
+
+from seecr import threads
+from seecr.description.mjcf import load_robot
+from seecr.description.robot import Robot
+from seecr.description.shipped import model_path
+from seecr.effects import Term
+from seecr.equilibrium.solving import solve
+from seecr.errors import InputError
+from seecr.inverse.correction import correct, held_in_place
+from seecr.inverse.nearest import Reaching, in_place
+from seecr.inverse.nearest.search import Best
+from seecr.planar import bar_tilt
+from seecr.pose import quat_from_rotvec
+from seecr.recording.workspace import write_map_recording
+from seecr.report.figures import map_figure
+from seecr.report.maps import softest_line
+from seecr.workspace import maps
+from seecr.workspace.maps import Workspace, boundary, default_axes, workspace_map
+from seecr.workspace.zones import balance_equations, feasible, margins_from, tension_margin
+
+NAMES = ["demobot_cogiro", "demobot_parallel", "demobot_off_centre", "planar_vertical"]
+
+
+def robot_named(name: str) -> Robot:
+    return load_robot(model_path(name))
+
+
+def some_poses(robot: Robot, n: int = 60) -> np.ndarray:
+    random = np.random.default_rng(1)
+    poses = np.tile(robot.reference_pose, (n, 1))
+    if robot.joints:
+        poses[:, [0, 2]] += random.uniform(-0.25, 0.25, (n, 2))
+        return poses
+    poses[:, :3] = random.uniform((0.05, 0.05, 0.05), (0.75, 0.45, 0.4), (n, 3))
+    poses[:, 3:] = quat_from_rotvec(0.1 * random.normal(size=(n, 3)))
+    return poses
+
+
+def margin_by_highs(matrix: np.ndarray, load: np.ndarray, low: float, high: float) -> float:
+    """max t with low + t <= tau <= high - t."""
+    d, m = matrix.shape
+    rows, right = [np.c_[-np.eye(m), np.ones(m)]], [np.full(m, -low)]
+    if np.isfinite(high):
+        rows.append(np.c_[np.eye(m), np.ones(m)])
+        right.append(np.full(m, high))
+    answer = linprog(
+        np.r_[np.zeros(m), -1.0], A_ub=np.concatenate(rows), b_ub=np.concatenate(right),
+        A_eq=np.c_[matrix, np.zeros(d)], b_eq=load, bounds=[(None, None)] * (m + 1),
+        method="highs",
+    )  # fmt: skip
+    return np.inf if answer.status == 3 else float(answer.x[-1])
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(("low", "high"), [(0.0, np.inf), (0.5, 6.0)])
+def test_margins_are_those_of_highs(name: str, low: float, high: float) -> None:
+    robot = robot_named(name)
+    poses = some_poses(robot)
+    margins = tension_margin(robot, poses, lowest=low, highest=high)
+    expected = [margin_by_highs(*each, low, high)
+                for each in zip(*balance_equations(robot, poses), strict=True)]  # fmt: skip
+    np.testing.assert_allclose(margins, expected, rtol=1e-7, atol=1e-9)
+    assert (margins > 0).any() and (margins < 0).any()
+    by_search = unbalanced(robot, poses, lowest=low, highest=high) < 1e-9
+    np.testing.assert_array_equal(feasible(robot, poses, lowest=low, highest=high), by_search)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_robots_of_any_number_of_cables(seed: int) -> None:
+    robot = random_robot(np.random.default_rng(seed), "free")
+    poses = random_poses(np.random.default_rng(seed), robot, 20)
+    margins = tension_margin(robot, poses, highest=50.0)
+    if robot.n_cables < robot.n_dof:
+        assert np.all(np.isneginf(margins))
+        return
+    matrices, loads = balance_equations(robot, poses)
+    for margin, matrix, load in zip(margins, matrices, loads, strict=True):
+        expected = margin_by_highs(matrix, load, 0.0, 50.0)
+        assert margin == pytest.approx(expected, rel=1e-6, abs=1e-8)
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.0, np.inf), (0.5, 2.0), (1.0, 1.5)])
+@pytest.mark.parametrize("cables", [8, 5, 2])
+def test_where_balance_lacks_a_direction_margins_are_those_of_highs(
+    cables: int, low: float, high: float
+) -> None:
+    """A layout may lose a freedom by symmetry: 0 had been said of all that can be held."""
+    random = np.random.default_rng(cables)
+    matrices = random.normal(size=(12, 6, 2 if cables == 2 else 5))
+    matrices = matrices @ random.normal(size=(12, matrices.shape[2], cables))
+    tensions = random.uniform(0.3, 2.5, size=(12, cables))
+    loads = np.einsum("ndm,nm->nd", matrices, tensions)
+    limits = np.full(cables, low), np.full(cables, high)
+    margins = margins_from(matrices, loads[:, None], *limits, 1.0)
+    expected = [margin_by_highs(*each, low, high) for each in zip(matrices, loads, strict=True)]
+    np.testing.assert_allclose(margins, expected, rtol=1e-6, atol=1e-7)
+    assert np.isfinite(margins).all() or high == np.inf
+    # out of what the cables can do at all
+    out = loads + 0.1 * np.linalg.svd(matrices)[0][:, :, -1]
+    assert np.all(np.isneginf(margins_from(matrices, out[:, None], *limits, 1.0)))
+    sets = np.stack([loads, out], axis=1)
+    assert np.all(np.isneginf(margins_from(matrices, sets, *limits, 1.0)))
+
+
+def test_margins_without_a_bound_are_infinite(tmp_path: Path) -> None:
+    """Cables from the corners of a square pull against one another, wherever the platform is."""
+    sites = [(x, z) for x in (0, 1) for z in (0, 1)]
+    world = "".join(f'<site name="A{i}" pos="{x} 0 {z}"/>' for i, (x, z) in enumerate(sites))
+    body = "".join(
+        f'<site name="B{i}" pos="{0.1 * x - 0.05} 0 {0.03 - 0.06 * z}"/>'
+        for i, (x, z) in enumerate(sites)
+    )
+    cables = "".join(
+        f'<spatial springlength="0 0.69" stiffness="4000"><site site="A{i}"/><site site="B{i}"/>'
+        "</spatial>"
+        for i in range(4)
+    )
+    path = tmp_path / "square.xml"
+    path.write_text(
+        f'<mujoco model="square"><worldbody>{world}<body name="platform" pos="0.5 0 0.5">'
+        '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>'
+        '<joint type="hinge" axis="0 1 0"/><inertial pos="0 0 0" mass="0.5" '
+        f'diaginertia="1 1 1"/>{body}</body></worldbody><tendon>{cables}</tendon></mujoco>'
+    )
+    robot = load_robot(path)
+    axis = np.linspace(0.1, 0.9, 9)
+    poses = np.array([[x, 0, z, 1, 0, 0, 0] for x in axis for z in axis])
+    assert np.all(np.isposinf(tension_margin(robot, poses)))
+    bounded = tension_margin(robot, poses, highest=1e3)
+    expected = [margin_by_highs(*each, 0.0, 1e3)
+                for each in zip(*balance_equations(robot, poses), strict=True)]  # fmt: skip
+    np.testing.assert_allclose(bounded, expected, rtol=1e-7)
+    found = workspace_map(robot, axis, [0.0], axis, elastic=False)
+    assert "all cables can be tightened without end" in str(found)
+
+
+def test_a_set_of_wrenches_has_the_least_margin() -> None:
+    robot = robot_named("demobot_cogiro")
+    poses = some_poses(robot, 20)
+    pushes = np.array([[0.3, 0, 0, 0, 0, 0], [-0.3, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0.01, 0]])
+    each = [tension_margin(robot, poses, wrench=one) for one in pushes]
+    np.testing.assert_allclose(
+        tension_margin(robot, poses, wrenches=pushes), np.min(each, axis=0), atol=1e-12
+    )
+    by_row = tension_margin(robot, poses, wrench=np.tile(pushes[0], (20, 1)))
+    np.testing.assert_allclose(by_row, each[0], atol=1e-12)
+
+
+def test_the_boundary_is_where_the_margin_vanishes() -> None:
+    robot = robot_named("demobot_parallel")
+    inside = np.array([[0.4, 0.25, 0.1, 1, 0, 0, 0]] * 2)
+    outside = inside.copy()
+    outside[:, 0] = [0.1, 0.7]
+    found = boundary(robot, inside, outside, tolerance=1e-9)
+    np.testing.assert_allclose(tension_margin(robot, found), 0.0, atol=1e-6)
+    assert found[0, 0] + found[1, 0] == pytest.approx(0.8, abs=1e-8)
+    with pytest.raises(InputError, match="boundary needs poses inside that can be held"):
+        boundary(robot, outside, inside)
+    for wrong in (0.0, np.nan, np.inf):
+        with pytest.raises(InputError, match="must be above 0 and finite, got"):
+            boundary(robot, inside, outside, tolerance=wrong)
+
+
+def test_the_edge_is_looked_for_between_neighbours_of_the_grid() -> None:
+    robot = robot_named("demobot_parallel")
+    x, y = np.linspace(0.05, 0.75, 8), np.linspace(0.1, 0.4, 5)
+    found = workspace_map(robot, x, y, [0.1, 0.2], elastic=False)
+    inside, outside = found.crossings(found.feasible)
+    assert len(inside) == sum(int(np.abs(np.diff(found.feasible, axis=k)).sum()) for k in range(3))
+    step = np.abs(outside[:, :3] - inside[:, :3])
+    assert np.count_nonzero(step > 1e-12, axis=1).tolist() == [1] * len(step)
+    assert tension_margin(robot, inside).min() > -1e-9 > tension_margin(robot, outside).max()
+    edge = boundary(robot, inside, outside, tolerance=1e-6)
+    assert np.all(np.abs(edge[:, :3] - inside[:, :3]) <= step + 1e-12)
+    out = 1e-6 * (outside - inside)[:, :3] / step.max(axis=1, keepdims=True)
+    beyond = np.concatenate([edge[:, :3] + out, edge[:, 3:]], axis=1)
+    assert tension_margin(robot, beyond).max() < 0.0 <= tension_margin(robot, edge).min() + 1e-9
+
+
+@pytest.mark.slow
+def test_a_map_is_what_each_pose_says(tmp_path: Path) -> None:
+    robot = robot_named("demobot_parallel")
+    axes = np.linspace(0.2, 0.6, 5), np.linspace(0.2, 0.3, 2), np.array([0.1, 0.2])
+    done: list[int] = []
+    found = workspace_map(robot, *axes, progress=done.append)
+    assert sum(done) == 20 and found.margin.shape == (5, 2, 2)
+    pose = np.array([[axes[0][1], axes[1][0], axes[2][1], 1, 0, 0, 0]])
+    alone = solve(robot, pose)
+    assert found.margin[1, 0, 1] == tension_margin(robot, pose)[0]
+    assert found.slack[1, 0, 1] == alone.slack.sum()
+    np.testing.assert_allclose(
+        found.deviation[1, 0, 1], alone.deviation[0, :3], rtol=1e-6, atol=1e-9
+    )
+    np.testing.assert_allclose(
+        np.abs(found.softest[1, 0, 1]), np.abs(alone.softest_direction[0]), rtol=1e-3, atol=1e-4
+    )
+    at = np.unravel_index(np.argmin(np.where(found.feasible, found.stiffness, np.inf)), (5, 2, 2))
+    said, told = next(softest_line(found)), found.as_json()["softest_where_feasible"]
+    assert f"{found.stiffness[at]:.4g} N/m" in said
+    assert f"x y z {1e3 * axes[0][at[0]]:.4g} " in said
+    assert told["direction"].tolist() == found.softest[at].tolist()
+    assert len(found.records()) == 20
+    assert found.records()[0]["softest_rz_rad"] == found.softest[0, 0, 0, 5]
+    assert f"{int(found.feasible.sum())} of 20 poses can be held" in str(found)
+    map_figure(tmp_path / "map.svg", found)
+    text = (tmp_path / "map.svg").read_text()
+    assert all(words in text for words in ("tension margin [N]", "slack cables", "x [mm]"))
+    write_map_recording(found, tmp_path / "map.rrd")
+    assert (tmp_path / "map.rrd").stat().st_size > 1000
+    assert "probability" not in text
+    unsure = replace(found, chance=np.where(found.feasible, 0.5, 0.0).astype(np.float32))
+    map_figure(tmp_path / "chance.svg", unsure)
+    assert "probability" in (tmp_path / "chance.svg").read_text()
+    with pytest.raises(InputError, match="at least two axes"):
+        map_figure(tmp_path / "no.png", workspace_map(robot, 0.4, 0.25, [0.1, 0.2], elastic=False))
+
+
+def drawn_panels(monkeypatch: pytest.MonkeyPatch, path: Path, found: Workspace) -> list[Any]:
+    """Axes of a map's figure: its panels row by row, and one bar of colours for each row."""
+    kept: list[Any] = []
+    write = Figure.savefig
+    monkeypatch.setattr(Figure, "savefig", lambda f, *a, **b: (kept.append(f), write(f, *a, **b)))
+    map_figure(path, found)
+    return list(kept[0].axes)
+
+
+@pytest.mark.slow
+def test_colours_of_a_map_are_those_of_poses_that_can_be_held(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    robot = robot_named("demobot_cogiro")
+    found = workspace_map(robot, np.linspace(0.04, 0.76, 9), np.linspace(0.04, 0.46, 7), [0.1])
+    panels = drawn_panels(monkeypatch, tmp_path / "map.png", found)
+    bars = {ax.get_ylabel(): ax.get_ylim()[1] for ax in panels[4:]}
+    away = 1e3 * np.linalg.norm(found.deviation, axis=-1)
+    held = away[found.feasible]
+    assert np.quantile(held, 0.9) < bars["off its command [mm]"] <= held.max() < 0.2 * away.max()
+    turned = np.degrees(np.linalg.norm(found.rotation, axis=-1))
+    assert bars["turned [°]"] <= turned[found.feasible].max() < 0.2 * turned.max()
+
+
+@pytest.mark.slow
+def test_a_map_says_which_slices_it_has_and_what_is_white(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    robot = robot_named("demobot_cogiro")
+    x, y = np.linspace(0.04, 0.76, 7), np.linspace(0.04, 0.46, 5)
+    found = workspace_map(robot, x, y, [0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4])
+    path = tmp_path / "map.svg"
+    panels = drawn_panels(monkeypatch, path, found)
+    assert "4 of 7 values of z; white: cannot be held (margin); orange" in path.read_text()
+    assert all(len(ax.collections) == 2 for ax in panels[:4]), "an edge in the margins' panels too"
+    cells = path.read_text().count("<path")
+    assert cells < found.margin.size, "no path for each cell: lines would show between them"
+    fallen = replace(found, slack=np.where(found.margin > 0.1, found.slack, -1).astype(np.int8))
+    map_figure(path, fallen)
+    assert "cannot be held (margin), or does not come to rest (below it)" in path.read_text()
+    inner = workspace_map(robot, [0.3, 0.4], [0.2, 0.3], [0.1])
+    map_figure(path, inner)
+    assert not any(word in path.read_text() for word in ("white", "values of", "orange"))
+
+
+@pytest.mark.slow
+def test_the_title_of_a_narrow_figure_is_whole(tmp_path: Path) -> None:
+    found = workspace_map(robot_named("demobot_cogiro"), [0.3, 0.4], 0.25, [0.1, 0.2])
+    map_figure(tmp_path / "narrow.png", found)
+    picture = np.asarray(Image.open(tmp_path / "narrow.png").convert("L"))
+    assert picture[:, [0, -1]].min() == 255
+
+
+def test_a_map_is_the_same_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = robot_named("demobot_parallel")
+    axes = np.linspace(0.2, 0.6, 5), np.linspace(0.2, 0.3, 2), np.array([0.1, 0.2])
+    whole, done = workspace_map(robot, *axes), list[int]()
+
+    def tell(poses: int) -> None:
+        assert threading.current_thread() is threading.main_thread()
+        done.append(poses)
+
+    monkeypatch.setattr(maps, "_PART", 3)
+    for processors in (1, 2):
+        done.clear()
+        monkeypatch.setattr(threads, "processors", lambda n=processors: n)
+        parts = workspace_map(robot, *axes, progress=tell)
+        assert sum(done) == 20 and min(done) > 0
+        assert processors > 1 or done == [3, 3, 3, 3, 3, 3, 2]
+        for name in ("margin", "deviation", "rotation", "slack", "stiffness", "softest"):
+            np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))
+
+
+def test_a_part_that_takes_long_holds_up_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot, others = robot_named("demobot_parallel"), threading.Semaphore(0)
+    own = maps._margins
+
+    def slow_at_first(robot: Robot, poses: np.ndarray, *rest: Any) -> np.ndarray:
+        if poses[0, 0] > 0.2:
+            others.release()
+        elif not all(others.acquire(timeout=60.0) for _ in range(4)):
+            raise TimeoutError("the other parts waited for this one")
+        return own(robot, poses, *rest)
+
+    monkeypatch.setattr(maps, "_PART", 1)
+    monkeypatch.setattr(maps, "_margins", slow_at_first)
+    monkeypatch.setattr(threads, "processors", lambda: 2)
+    found = workspace_map(robot, np.linspace(0.2, 0.6, 5), 0.25, 0.1, elastic=False)
+    assert found.feasible.any()
+
+
+def test_a_large_robots_map_is_drawn_in_metres_and_its_colours_show_most_margins(
+    tmp_path: Path,
+) -> None:
+    robot = robot_named("camera")
+    found = workspace_map(
+        robot, [0, 30, 52.5, 75, 105], [0, 20, 34, 48, 68], [8, 24.99], elastic=False
+    )
+    map_figure(tmp_path / "map.svg", found, most=1)
+    text = (tmp_path / "map.svg").read_text()
+    assert "x [m]" in text and "y [m]" in text and "z = 8 m" in text
+    margins = found.margin[found.feasible]
+    ticks = [float(tick) for tick in re.findall(r">(\d+(?:\.\d+)?)</text>", text)]
+    assert margins.max() > 1e4 > 1e3 > max(ticks) > np.median(margins)
+
+
+@pytest.mark.slow
+def test_too_few_cables_are_mapped_by_position() -> None:
+    robot = robot_named("planar_two_cable")
+    x, z = np.linspace(-0.15, 1.15, 7), np.linspace(0.05, 1.05, 4)
+    found = workspace_map(robot, x, 0.0, z, elastic=False)
+    places = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1)
+    rests = np.isfinite(bar_tilt([[0, 1], [1, 1]], places, 0.1))
+    assert 0.4 < rests.mean() < 0.9
+    np.testing.assert_array_equal(found.feasible[:, 0], rests)
+    with pytest.raises(InputError, match="holds no set of wrenches"):
+        workspace_map(robot, x, 0.0, z, wrenches=[[1, 0, 0, 0, 0, 0]])
+
+
+@pytest.mark.slow
+def test_positions_of_four_cables_are_held_where_a_correction_keeps_them() -> None:
+    robot = only_cables(robot_named("demobot_parallel"), [0, 2, 4, 6])
+    places = np.array([[0.4, 0.25, 0.1], [0.3, 0.2, 0.3], [0.03, 0.25, 0.1], [0.2, 0.4, 0.05]])
+    poses = np.column_stack([places, np.tile([1.0, 0.0, 0.0, 0.0], (len(places), 1))])
+    kept = correct(robot, poses, prefer="position", highest=6.0)
+    kept_there = kept.stays & (np.abs(kept.aimed[:, :3] - places).max(axis=1) < 1e-9)
+    assert 0 < kept_there.sum() < len(places)
+    held = held_in_place(robot, poses, (), 0.0, 6.0)
+    np.testing.assert_array_equal(held, kept_there)
+    assert not kept.held[1:].any()  # only the middle is held level
+
+
+def test_an_orientation_from_which_the_platform_goes_elsewhere_does_not_hold(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    robot = only_cables(robot_named("demobot_parallel"), [0, 2, 4, 6])
+    poses = np.tile([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], (3, 1))
+    # balanced at the first two, at the first stably
+    poses[:, :3] = [[0.4, 0.25, 0.1], [0.1, 0.31, 0.42], [0.03, 0.25, 0.1]]
+    every = lambda _self, _away, rows: np.ones(len(rows), dtype=bool)  # noqa: E731
+    monkeypatch.setattr(Reaching, "rests", every)
+    assert held_in_place(robot, poses, (), 0.0, 6.0).tolist() == [True, False, False]
+
+
+def test_few_positions_are_searched_in_earnest(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The others from their neighbours' orientations."""
+    searched, own = [], in_place.any_that_stays
+
+    def counted(problem: Reaching) -> Best:
+        searched.append(len(problem.wanted))
+        return own(problem)
+
+    monkeypatch.setattr(in_place, "any_that_stays", counted)
+    robot = only_cables(robot_named("demobot_parallel"), [0, 2, 4, 6])
+    x, y = np.meshgrid(np.linspace(0.2, 0.6, 8), np.linspace(0.15, 0.35, 8))
+    poses = np.tile([0.0, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0], (x.size, 1))
+    poses[:, :2] = np.column_stack([x.ravel(), y.ravel()])
+    assert held_in_place(robot, poses, (), 0.0, 6.0).all()
+    assert sum(searched) < 0.3 * len(poses)
+
+
+def only_cables(robot: Robot, some: list[int]) -> Robot:
+    """The robot with some of its cables."""
+    return replace(
+        robot, exit_points=robot.exit_points[some], anchor_points=robot.anchor_points[some],
+        ea=robot.ea[some], rest_lengths=robot.rest_lengths[some],
+        cable_names=tuple(robot.cable_names[k] for k in some),
+    )  # fmt: skip
+
+
+def test_the_default_grid_lies_between_the_exit_points() -> None:
+    x, y, z = default_axes(robot_named("demobot_cogiro"), 3)
+    np.testing.assert_allclose([x[0], x[-1], y[0], y[-1], z[-1]], [0.04, 0.76, 0.04, 0.46, 0.485])
+    assert [len(axis) for axis in default_axes(robot_named("planar_vertical"), 3)] == [3, 1, 3]
+
+
+def test_all_of_a_grid_is_as_large_as_its_box() -> None:
+    robot = robot_named("demobot_cogiro")
+    axes = np.linspace(0.1, 0.7, 7), np.array([0.1, 0.2, 0.4]), np.linspace(0.05, 0.25, 2)
+    found = workspace_map(robot, *axes, elastic=False)
+    everywhere = np.ones(found.margin.shape, dtype=bool)
+    assert found.size(everywhere) == pytest.approx(0.6 * 0.3 * 0.2)
+    line = workspace_map(robot, np.linspace(0.3, 0.55, 5), 0.25, 0.1, elastic=False)
+    assert line.feasible.all()
+    assert "5 of 5 poses can be held, 0.25 m" in str(line)
+    assert line.as_json()["size_feasible"] == pytest.approx(0.25)
+
+
+def test_the_size_of_a_ball_is_that_of_a_ball() -> None:
+    """Cut by the grid's end through its middle, too: half of it is left."""
+    robot = robot_named("demobot_cogiro")
+    for first, part in ((-1.2, 1.0), (0.0, 0.5)):
+        axes = np.linspace(first, 1.2, 61), np.linspace(-1.2, 1.2, 61), np.linspace(-1.2, 1.2, 61)
+        x, y, z = np.meshgrid(*axes, indexing="ij")
+        found = workspace_map(robot, 0.4, 0.25, 0.1, elastic=False)
+        ball = replace(found, axes=axes, margin=1.0 - np.sqrt(x**2 + y**2 + z**2))
+        assert ball.size(ball.feasible) == pytest.approx(part * 4.0 / 3.0 * np.pi, rel=0.01)
+
+
+def test_effects_with_a_memory_have_no_elastic_map() -> None:
+    robot = robot_named("demobot_cogiro")
+    slow = [Term.of(robot, "hysteresis", amplitude_N=0.05)]
+    with pytest.raises(InputError, match="poses are in no order, and hysteresis would go by"):
+        workspace_map(robot, [0.3, 0.4], 0.25, 0.1, effects=slow)
+    held = workspace_map(robot, [0.3, 0.4], 0.25, 0.1, effects=slow, elastic=False)
+    assert held.feasible.all()
+
+
+@pytest.mark.slow
+def test_a_figure_promises_an_edge_only_where_it_draws_one(tmp_path: Path) -> None:
+    robot = robot_named("demobot_cogiro")
+    found = workspace_map(robot, np.linspace(0.3, 0.5, 3), np.linspace(0.2, 0.3, 3), 0.1)
+    margin = np.linspace(-1.0, 1.0, 9).reshape(3, 3, 1)
+    for name, margins in (("edge", margin), ("few", np.where(margin < 0.0, -np.inf, 0.0))):
+        path = tmp_path / f"{name}.svg"
+        map_figure(path, replace(found, margin=margins))
+        assert ("orange" in path.read_text()) == (name == "edge")
