@@ -39,7 +39,8 @@ from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.equilibrium.solving import solve
 from seecr.report.figures import map_figure
-from seecr.workspace.maps import Workspace, workspace_map
+from seecr.workspace.grid import Workspace
+from seecr.workspace.maps import workspace_map
 
 FOLDER = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 # The viewer's own bar of buttons and warnings, cut off the top [pixels].

@@ -55,7 +55,9 @@ if TYPE_CHECKING:
     from seecr.prediction.uncertainty import Spread, spread_of
     from seecr.statics.solution import Solution, Status
     from seecr.workspace.chances import held_chance, kept_chance
-    from seecr.workspace.maps import Workspace, boundary, default_axes, workspace_map
+    from seecr.workspace.edges import boundary
+    from seecr.workspace.grid import Workspace
+    from seecr.workspace.maps import default_axes, workspace_map
     from seecr.workspace.zones import Zone, feasible, slack_zones, tension_margin
 
 __version__ = "0.1.0"
@@ -76,7 +78,9 @@ _MODULES = {
     "equilibrium.following": ("Jump",),
     "commands.loads": ("Loads",),
     "inverse.correction": ("Correction", "correct"),
-    "workspace.maps": ("Workspace", "boundary", "default_axes", "workspace_map"),
+    "workspace.edges": ("boundary",),
+    "workspace.grid": ("Workspace",),
+    "workspace.maps": ("default_axes", "workspace_map"),
     "description.mjcf": ("load_robot",),
     "prediction.model": ("Model", "load_model", "new_model"),
     "equilibrium.multiple": ("equilibria",),

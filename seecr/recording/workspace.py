@@ -12,7 +12,7 @@ from seecr.pose import Array
 from seecr.recording import colours, layout, shapes
 from seecr.recording.scene import LEGEND, ROOT, Scene, write_scale
 from seecr.recording.stream import recording_file
-from seecr.workspace.maps import Workspace
+from seecr.workspace.grid import Workspace
 
 __all__ = ["write_map_recording"]
 

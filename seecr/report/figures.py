@@ -15,7 +15,7 @@ from seecr.curves import alike
 from seecr.errors import InputError
 from seecr.pose import Array
 from seecr.statics.solution import Solution
-from seecr.workspace.maps import Workspace
+from seecr.workspace.grid import Workspace
 
 __all__ = ["figure", "map_figure", "sweep_figure"]
 

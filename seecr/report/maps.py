@@ -13,7 +13,7 @@ from seecr.files import written
 from seecr.pose import Array
 from seecr.prediction.data_reach import DataReach
 from seecr.report.words import direction_words
-from seecr.workspace.maps import Workspace
+from seecr.workspace.grid import Workspace
 
 __all__ = ["beyond_line", "edge_line", "likely_lines", "softest_line", "write_arrays"]
 

@@ -8,7 +8,9 @@ from seecr.lazy import lazily
 
 if TYPE_CHECKING:
     from seecr.workspace.chances import held_chance, kept_chance
-    from seecr.workspace.maps import Workspace, boundary, default_axes, workspace_map
+    from seecr.workspace.edges import boundary
+    from seecr.workspace.grid import Workspace
+    from seecr.workspace.maps import default_axes, workspace_map
     from seecr.workspace.zones import Zone, feasible, slack_zones, tension_margin
 
 __all__ = [
@@ -26,7 +28,9 @@ __all__ = [
 
 _MODULES = {
     "chances": ("held_chance", "kept_chance"),
-    "maps": ("Workspace", "boundary", "default_axes", "workspace_map"),
+    "edges": ("boundary",),
+    "grid": ("Workspace",),
+    "maps": ("default_axes", "workspace_map"),
     "zones": ("Zone", "feasible", "slack_zones", "tension_margin"),
 }
 

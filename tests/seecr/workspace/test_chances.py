@@ -19,7 +19,8 @@ from seecr.report.corrections import chance_lines
 from seecr.report.maps import likely_lines, write_arrays
 from seecr.statics.solution import Solution
 from seecr.workspace.chances import held_chance, kept_chance, margins_with
-from seecr.workspace.maps import boundary, workspace_map
+from seecr.workspace.edges import boundary
+from seecr.workspace.maps import workspace_map
 from seecr.workspace.zones import tension_margin
 
 MODEL = """format = 1

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from margin_by_highs import margin_by_highs
 from matplotlib.figure import Figure
 from PIL import Image
 from random_robots import random_poses, random_robot
-from scipy.optimize import linprog
 from unbalanced import unbalanced
 
 from seecr import threads
@@ -32,7 +32,9 @@ from seecr.recording.workspace import write_map_recording
 from seecr.report.figures import map_figure
 from seecr.report.maps import softest_line
 from seecr.workspace import maps
-from seecr.workspace.maps import Workspace, boundary, default_axes, workspace_map
+from seecr.workspace.edges import boundary
+from seecr.workspace.grid import Workspace
+from seecr.workspace.maps import default_axes, workspace_map
 from seecr.workspace.zones import balance_equations, feasible, margins_from, tension_margin
 
 NAMES = ["demobot_cogiro", "demobot_parallel", "demobot_off_centre", "planar_vertical"]
@@ -51,21 +53,6 @@ def some_poses(robot: Robot, n: int = 60) -> np.ndarray:
     poses[:, :3] = random.uniform((0.05, 0.05, 0.05), (0.75, 0.45, 0.4), (n, 3))
     poses[:, 3:] = quat_from_rotvec(0.1 * random.normal(size=(n, 3)))
     return poses
-
-
-def margin_by_highs(matrix: np.ndarray, load: np.ndarray, low: float, high: float) -> float:
-    """max t with low + t <= tau <= high - t."""
-    d, m = matrix.shape
-    rows, right = [np.c_[-np.eye(m), np.ones(m)]], [np.full(m, -low)]
-    if np.isfinite(high):
-        rows.append(np.c_[np.eye(m), np.ones(m)])
-        right.append(np.full(m, high))
-    answer = linprog(
-        np.r_[np.zeros(m), -1.0], A_ub=np.concatenate(rows), b_ub=np.concatenate(right),
-        A_eq=np.c_[matrix, np.zeros(d)], b_eq=load, bounds=[(None, None)] * (m + 1),
-        method="highs",
-    )  # fmt: skip
-    return np.inf if answer.status == 3 else float(answer.x[-1])
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -307,7 +294,7 @@ def test_a_map_is_the_same_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_part_that_takes_long_holds_up_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
     robot, others = robot_named("demobot_parallel"), threading.Semaphore(0)
-    own = maps._margins
+    own = maps.margins_at
 
     def slow_at_first(robot: Robot, poses: np.ndarray, *rest: Any) -> np.ndarray:
         if poses[0, 0] > 0.2:
@@ -317,7 +304,7 @@ def test_a_part_that_takes_long_holds_up_no_other(monkeypatch: pytest.MonkeyPatc
         return own(robot, poses, *rest)
 
     monkeypatch.setattr(maps, "_PART", 1)
-    monkeypatch.setattr(maps, "_margins", slow_at_first)
+    monkeypatch.setattr(maps, "margins_at", slow_at_first)
     monkeypatch.setattr(threads, "processors", lambda: 2)
     found = workspace_map(robot, np.linspace(0.2, 0.6, 5), 0.25, 0.1, elastic=False)
     assert found.feasible.any()

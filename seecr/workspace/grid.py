@@ -1,0 +1,219 @@
+"""What holds at the poses of a grid, as arrays: shares, sizes, the edges between cells."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seecr.counted import counted
+from seecr.description.robot import Robot
+from seecr.errors import InputError
+from seecr.pose import Array
+from seecr.result import Record, Result
+from seecr.workspace.margins import is_held
+
+__all__ = ["NEVER", "Workspace"]
+
+# Slack cables of a pose at which the elastic robot does not come to rest.
+NEVER = -1
+_FREEDOMS = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Workspace(Result):
+    """What holds at the poses of a grid, (nx, ny, nz) each, of one orientation.
+
+    Attributes:
+        robot: as described.
+        axes: the grid's x, y and z [m].
+        orientation: (4,) quaternion of all poses.
+        margin: [N] how far inside their limits all tensions can stay; below zero where the pose
+            cannot be held. For robots with fewer cables than freedoms zero where the position
+            can be held in some orientation, and minus infinity where not.
+        deviation: (..., 3) [m] from the command to where the elastic robot rests; NaN where it
+            does not; float32.
+        rotation: (..., 3) [rad] likewise.
+        slack: number of slack cables; -1 where it does not rest.
+        stiffness: [N/m] smallest eigenvalue, rotations by the robot's length.
+        softest: (..., d) [m, rad] the direction of it, :attr:`Solution.softest_direction`; float32.
+        chance: the probability that the pose can be held, by what the model does not know; float32;
+            None where the model keeps no covariance, or there is none.
+        elastic: whether it was asked where the elastic robot comes to rest.
+    """
+
+    robot: Robot
+    axes: tuple[Array, Array, Array]
+    orientation: Array
+    margin: Array
+    deviation: NDArray[np.float32]
+    rotation: NDArray[np.float32]
+    slack: NDArray[np.int8]
+    stiffness: NDArray[np.float32]
+    softest: NDArray[np.float32]
+    chance: NDArray[np.float32] | None = None
+    elastic: bool = True
+
+    def likely(self, at_least: float) -> NDArray[np.bool_]:
+        """Where the pose can be held with a probability of at least that.
+
+        Raises:
+            InputError: a map without probabilities, or a number that is none.
+        """
+        if not 0.0 < at_least <= 1.0:
+            raise InputError(f"a probability must be above 0 and at most 1, got {at_least:g}")
+        if self.chance is None:
+            raise InputError("this map has no probabilities; expected one made with chance=True")
+        return np.asarray(self.chance >= at_least)
+
+    @property
+    def feasible(self) -> NDArray[np.bool_]:
+        """Where the pose can be held by tensions within the limits."""
+        return is_held(self.robot, self.margin)
+
+    def crossings(self, poses: NDArray[np.bool_]) -> tuple[Array, Array]:
+        """Neighbours along the grid of which one is among some poses and the other is not.
+
+        Args:
+            poses: (nx, ny, nz) bool, such as ``feasible`` or ``likely(0.95)``.
+
+        Returns:
+            (k, 7) those that are, and (k, 7) those that are not: what :func:`boundary` takes.
+        """
+        number, inside = np.arange(poses.size).reshape(poses.shape), poses.ravel()
+        pairs = np.concatenate([
+            np.stack([np.delete(number, -1, k).ravel(), np.delete(number, 0, k).ravel()], axis=1)
+            for k in range(3)
+        ])  # fmt: skip
+        pairs = pairs[inside[pairs[:, 0]] != inside[pairs[:, 1]]]
+        pairs = np.where(inside[pairs[:, :1]], pairs, pairs[:, ::-1])
+        index = np.unravel_index(pairs, poses.shape)
+        places = np.stack([axis[k] for axis, k in zip(self.axes, index, strict=True)], axis=-1)
+        turned = np.broadcast_to(self.orientation, (*pairs.shape, 4))
+        both = np.concatenate([places, turned], axis=-1)
+        return both[:, 0], both[:, 1]
+
+    @property
+    def rests(self) -> NDArray[np.bool_]:
+        """Where the elastic robot comes to rest, if the elastic map was asked for."""
+        return np.asarray(self.slack != NEVER)
+
+    @property
+    def cell(self) -> float:
+        """Size of a cell of the grid: [m^3], or [m^2] or [m] where an axis has one value."""
+        steps = [np.ptp(axis) / (len(axis) - 1) for axis in self.axes if len(axis) > 1]
+        return float(np.prod(steps))
+
+    @property
+    def shares(self) -> Array:
+        """(nx, ny, nz) size of the grid's box that each pose stands for, [m^3], [m^2] or [m].
+
+        Half a cell at the ends of an axis: all of them together are the box between the ends.
+        """
+        along = []
+        for axis in self.axes:
+            step = np.abs(np.diff(axis))
+            along.append(0.5 * (np.r_[step, 0.0] + np.r_[0.0, step]) if len(step) else np.ones(1))
+        return np.asarray(np.einsum("i,j,k->ijk", *along))
+
+    def size(self, poses: NDArray[np.bool_]) -> float:
+        """Size of the part of the grid's box that some poses (nx, ny, nz) stand for."""
+        return float(self.shares[poses].sum())
+
+    @property
+    def softest_at(self) -> tuple[int, ...] | None:
+        """Where of the grid the elastic robot is softest of all poses that can be held."""
+        stiffness = np.where(self.feasible & self.rests, self.stiffness, np.nan)
+        if not np.isfinite(stiffness).any():
+            return None
+        return tuple(map(int, np.unravel_index(np.nanargmin(stiffness), stiffness.shape)))
+
+    def size_words(self, poses: NDArray[np.bool_]) -> str:
+        """The size of some poses (nx, ny, nz) of the grid, for people."""
+        along = sum(len(axis) > 1 for axis in self.axes)
+        unit = {1: " m", 2: " m^2", 3: " m^3"}.get(along)
+        return "" if unit is None else f", {self.size(poses):.4g}{unit}"
+
+    def lines(self) -> list[str]:
+        """How much of the grid can be held, and how far off the elastic robot is there."""
+        n, held = self.margin.size, int(self.feasible.sum())
+        size = self.size_words(self.feasible)
+        out = [f"{self.robot.name}: {held} of {counted(n, 'pose')} can be held{size}"]
+        half = float(np.median(self.margin[self.feasible])) if held else 0.0
+        if half == np.inf:
+            out.append("at half of them or more all cables can be tightened without end")
+        elif half > 0.0:
+            out.append(
+                f"at half of them tensions can stay {half:.3g} N or more inside their limits"
+            )
+        rests = self.rests
+        if self.elastic:
+            counts = self.slack[rests]
+            parts = [f"{k} at {int(np.sum(counts == k))}" for k in np.unique(counts)]
+            slack = f"; slack cables: {', '.join(parts)}" if parts else ""
+            out.append(f"elastic: at rest at {int(rests.sum())} of {counted(n, 'command')}{slack}")
+            where = rests & self.feasible
+            if np.any(where):
+                away = 1e3 * np.linalg.norm(self.deviation[where], axis=-1).max()
+                turn = np.degrees(np.linalg.norm(self.rotation[where], axis=-1).max())
+                out.append(f"where poses can be held, up to {away:.4g} mm and {turn:.4g} deg off")
+        return out
+
+    def records(self) -> list[Record]:
+        """One row per pose of the grid."""
+        places = np.stack(np.meshgrid(*self.axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        columns = {
+            **{f"{axis}_m": places[:, k] for k, axis in enumerate("xyz")},
+            "margin_N": self.margin.ravel(),
+            "feasible": self.feasible.ravel(),
+            **({} if self.chance is None else {"probability": self.chance.ravel()}),
+            "slack": self.slack.ravel(),
+            **{f"d{a}_m": self.deviation[..., k].ravel() for k, a in enumerate("xyz")},
+            **{f"r{a}_rad": self.rotation[..., k].ravel() for k, a in enumerate("xyz")},
+            "smallest_eigenvalue_N_per_m": self.stiffness.ravel(),
+            **{
+                f"softest_{name}": self.softest[..., k].ravel()
+                for k, name in enumerate([j.name for j in self.robot.joints] or _FREEDOMS)
+            },
+        }
+        listed = {name: values.tolist() for name, values in columns.items()}
+        return [dict(zip(listed, row, strict=True)) for row in zip(*listed.values(), strict=True)]
+
+    def as_json(self, at_least: float | None = None) -> Record:
+        """``map.json``: how much of the grid can be held, and the worst of the elastic robot there.
+
+        Args:
+            at_least: a probability with which poses are to be held, of a map that has them.
+        """
+        likely = None
+        if at_least is not None:
+            some = self.likely(at_least)
+            likely = {"at_least": at_least, "poses": int(some.sum()), "size": self.size(some)}
+        where = self.rests & self.feasible
+        worst = {
+            "deviation_m": np.linalg.norm(self.deviation[where], axis=-1),
+            "rotation_rad": np.linalg.norm(self.rotation[where], axis=-1),
+        }
+        counts, at = self.slack[self.rests], self.softest_at
+        return {
+            "robot": self.robot.name,
+            "shape": self.margin.shape,
+            "orientation": self.orientation,
+            "poses": self.margin.size,
+            "feasible": int(self.feasible.sum()),
+            "cell": self.cell,
+            "size_feasible": self.size(self.feasible),
+            "likely": likely,
+            "rests": int(self.rests.sum()),
+            "slack": {k: int(np.sum(counts == k)) for k in np.unique(counts)},
+            "worst_where_feasible": {
+                name: float(values.max()) if len(values) else None for name, values in worst.items()
+            },
+            "softest_where_feasible": at
+            and {
+                "pose_m": [axis[k] for axis, k in zip(self.axes, at, strict=True)],
+                "smallest_eigenvalue_N_per_m": self.stiffness[at],
+                "direction": self.softest[at],
+            },
+        }

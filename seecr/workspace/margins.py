@@ -1,0 +1,45 @@
+"""Margins of a robot with effects at given poses, and which of them mean that a pose is held."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from seecr.description.robot import Robot
+from seecr.errors import InputError
+from seecr.inverse.correction import held_in_place
+from seecr.pose import Array
+from seecr.prediction.experiment import effects_of
+from seecr.prediction.model import GivenEffects, model_given
+from seecr.workspace.chances import margins_with
+from seecr.workspace.zones import load_scale, tension_margin
+
+
+def margins_at(
+    robot: Robot, poses: Array, lowest: ArrayLike, highest: ArrayLike,
+    wrenches: ArrayLike | None, effects: GivenEffects,
+) -> Array:  # fmt: skip
+    """Margins (n,) [N]; of robots with too few cables by position, the orientation solved."""
+    acting = effects_of(effects, robot)
+    if robot.n_cables >= robot.n_dof:
+        if acting:
+            return margins_with(robot, poses, acting, lowest, highest, wrenches)
+        return tension_margin(robot, poses, lowest=lowest, highest=highest, wrenches=wrenches)
+    if wrenches is not None:
+        raise InputError(
+            f"{robot.name} has fewer cables than freedoms: it holds no set of wrenches; "
+            "expected none"
+        )
+    return np.where(held_in_place(robot, poses, acting, lowest, highest), 0.0, -np.inf)
+
+
+def is_held(robot: Robot, margin: Array) -> NDArray[np.bool_]:
+    """Whether margins [N] are those of poses that can be held, but for rounding."""
+    return np.asarray(margin >= -1e-9 * load_scale(robot))
+
+
+def read_once(effects: GivenEffects, robot: Robot) -> GivenEffects:
+    """The same, a model read from its file: every part of a map asks for it."""
+    return model_given(effects, robot) if isinstance(effects, str | Path) else effects
