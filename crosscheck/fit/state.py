@@ -79,7 +79,8 @@ def evaluate(problem: Problem, terms: Terms, factor: Array, near: State | None =
         return _on_measured_branch(problem, state)
     at = with_length_errors(problem, effects, experiment.length_errors, start)
     experiment = experiment.with_length_errors(at.length_errors)
-    return _compared(problem, terms, at.prediction, at.linear_raw(), at.factor, experiment)
+    state = _compared(problem, terms, at.prediction, at.linear_raw(), at.factor, experiment)
+    return _as_likely(problem, state, at.cost(problem, problem.length_sigma))
 
 
 def _on_measured_branch(problem: Problem, state: State) -> State:
@@ -134,6 +135,20 @@ def _compared(
         terms, prediction, raw, np.where(problem.measured, table, np.nan), white, factor,
         chi2, log_det, experiment,
     )  # fmt: skip
+
+
+def _as_likely(problem: Problem, state: State, cost: Array) -> State:
+    """The state with each row's residuals as large as its likeliest errors really leave them.
+
+    Beyond the length at which a cable goes slack straight lines promise less than any errors give,
+    and a fit would go where they promise most.
+    """
+    promised = np.nansum(state.table**2, axis=1)
+    more = np.where(np.isfinite(cost) & (promised > 0.0), cost / np.maximum(promised, 1e-300), 1.0)
+    table = state.table * np.sqrt(np.maximum(more, 1.0))[:, None]
+    white = table[problem.counted]
+    chi2 = float(white @ white) if state.valid else np.inf
+    return replace(state, table=table, white=white, chi2=chi2)
 
 
 def derivatives(

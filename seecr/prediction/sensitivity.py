@@ -91,9 +91,20 @@ def _by_length(at: Prediction) -> Array:
 
 
 def read_by_length(at: Prediction) -> Array:
-    """Derivative of what the sensors read by each cable's rest length, (n, 6 + m, m)."""
-    change = length_sensitivities(at)
+    """Derivative of what the sensors read by errors of each cable's rest length, (n, 6 + m, m).
+
+    Errors that reach beyond what hysteresis and friction hold: at a row's very end, where its
+    cables are stuck, a micrometre more moves nothing, and a millimetre all.
+    """
+    change = length_sensitivities(_sliding(at) if at.has_history else at)
     return rates_of_reading(at, at.sensors) @ change if _alters(at) else change
+
+
+def _sliding(at: Prediction) -> Prediction:
+    """The same poses without what holds the cables there; nothing is solved."""
+    tables = at.tables.sliding()
+    found = batch.evaluate(tables, at.found)
+    return replace(at, tables=tables, found=found, kept={"pose": at.pose})
 
 
 def _alters(at: Prediction) -> bool:

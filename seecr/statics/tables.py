@@ -14,7 +14,9 @@ from seecr.compiled.columns import (
     EXTRA,
     EXTRA_SLOPE,
     FORCE_OF_WEIGHT,
+    FRICTION,
     GAP,
+    HYSTERESIS,
     N_COLUMNS,
     N_LOAD,
     OF_THE_PAST,
@@ -48,6 +50,12 @@ class Tables:
         cables = self.cables.copy()
         cables[..., REST] += by
         cables[..., GAP] -= by
+        return replace(self, cables=cables)
+
+    def sliding(self) -> Tables:
+        """The same without what holds cables on small ways: hysteresis, friction at exit points."""
+        cables = self.cables.copy()
+        cables[..., [HYSTERESIS, FRICTION]] = 0.0
         return replace(self, cables=cables)
 
     def with_past(self, other: Tables) -> Tables:

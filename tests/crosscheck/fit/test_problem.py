@@ -14,6 +14,7 @@ from crosscheck.fit.problem import Problem, angle_rates, noise_factors, rms_by_k
 from crosscheck.fit.state import evaluate
 from crosscheck.measurements.data import Sigma
 from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
 from seecr.effects import Terms
 from seecr.pose import quat_from_rotvec, quat_from_rxyz, quat_multiply, rxyz_from_quat
 
@@ -57,6 +58,27 @@ def test_noise_of_lengths_reaches_the_readings_and_their_likeliest_errors_are_fo
     before = np.linalg.norm(plain.readings.position[3] - there.readings.position[3])
     assert off < 0.05 * before
     assert np.abs(np.delete(found, 3, axis=0)).max() < 1e-3 * spread
+
+
+@pytest.mark.parametrize("off", [0.0, 3e-3])
+def test_what_is_left_is_what_the_likeliest_errors_of_lengths_leave(off: float) -> None:
+    """Where cables go slack straight lines promised less than any errors give; fits went there."""
+    robot = load_robot(model_path("demobot_parallel"))
+    data = measured(robot, points=6, sigma=SIGMA)
+    data.position[:] += off
+    noisy = Sigma(SIGMA.position_m, SIGMA.orientation_rad, None, 5e-4)
+    problem = Problem(robot, data, noisy, np.ones(data.n_rows, dtype=bool))
+    plain = problem.experiment.predict()
+    state = evaluate(problem, Terms(), problem.noise(plain))
+    errors = state.experiment.length_errors
+    assert errors is not None
+    there = problem.experiment.with_length_errors(errors).predict((), plain)
+    left = np.where(problem.measured, problem.residuals(there.readings), 0.0)
+    cost = ((left / problem.reading_sigma) ** 2).sum(axis=1)
+    cost = cost + ((errors / problem.length_sigma) ** 2).sum(axis=1)
+    own = np.nansum(state.table**2, axis=1)
+    assert np.all(own > cost * (1 - 1e-6) - 1e-6)
+    assert state.chi2 == pytest.approx(own.sum()) == pytest.approx(float(state.white @ state.white))
 
 
 def test_noise_has_factors_where_a_platform_is_all_but_free_to_move() -> None:

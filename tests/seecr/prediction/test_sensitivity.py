@@ -16,6 +16,7 @@ from seecr.pose import pose_difference
 from seecr.prediction.experiment import Experiment
 from seecr.prediction.sensitivity import (
     length_sensitivities,
+    read_by_length,
     readings_difference,
     sensitivities,
 )
@@ -168,3 +169,17 @@ def test_friction_that_is_not_there_yet_has_its_cable_behind_the_exit_point() ->
     both = [experiment.predict([creep.effect(), layout.build(v)]) for v in (vector, term.vector)]
     full = readings_difference(both[0].readings, both[1].readings) / step
     assert found[:, :3] == pytest.approx(full[:, :3], abs=1e-3 * np.abs(full[:, :3]).max())
+
+
+def test_errors_of_lengths_reach_beyond_what_hysteresis_holds() -> None:
+    """Stuck, a row seemed to feel half of its lengths' noise, which fits took hysteresis for."""
+    robot = robot_of("free")
+    poses = random_poses(np.random.default_rng(4), robot, 6)
+    experiment = Experiment(robot, Commands(poses))
+    third = 0.3 * float(layout_of(effect_named("hysteresis"), robot).scale[0])
+    term = Term.of(robot, "hysteresis", amplitude_N=third, stretch_m=1e-9)
+    plain, stuck = experiment.predict(), experiment.predict([term.effect()])
+    assert stuck.has_history
+    free, noisy = read_by_length(plain), read_by_length(stuck)
+    near = np.linalg.norm(noisy - free, axis=(1, 2)) / np.linalg.norm(free, axis=(1, 2))
+    assert np.max(near) < 1e-2
