@@ -77,10 +77,12 @@ def nothing(value: float, unit: str) -> str:
     return f"below 10⁻⁹{unit}" if abs(value) < 1e-9 else f"{value:.2g}{unit}"
 
 
-def width(solution: Solution, x: Array, count: int) -> float:
+def width(name: str, z: float, count: int) -> float:
     """Width [mm] of the zone left of the middle with so many slack cables."""
-    left = (solution.slack.sum(axis=1) == count) & (x < 0.4)
-    return 1e3 * float(np.ptp(x[left])) if left.any() else 0.0
+    found = sweep(name, z, n=4601)
+    x = found.command[:, 0]
+    left = (found.slack.sum(axis=1) == count) & (x < 0.4)
+    return 1e3 * float(np.sum(left)) * float(x[1] - x[0])
 
 
 def figure_3(path: Path) -> None:
@@ -273,7 +275,7 @@ def _four_cables() -> Iterator[tuple[str, str, str, str]]:
         "7",
         "zones from the end: two slack, one slack",
         "both occur",
-        (f"{width(vertical, x, 2):.0f} mm, {width(vertical, x, 1):.0f} mm wide"),
+        " mm, ".join(f"{width('planar_vertical', 0.2, k):.0f}" for k in (2, 1)) + " mm wide",
     )
     off = [_midlines_off(found) for found in (vertical, level)]
     yield (
@@ -315,12 +317,12 @@ def _eight_cables() -> Iterator[tuple[str, str, str, str]]:
             (f"{np.abs(tilt(found)).max():.2f}°"),
         )
         if name == "parallel":
-            x = found.command[:, 0]
             yield (
                 number,
                 "zones from the end: four slack, two slack",
                 "both occur",
-                (f"{width(found, x, 4):.0f} mm, {width(found, x, 2):.0f} mm wide"),
+                " mm, ".join(f"{width(f'demobot_{name}', 0.1, k):.0f}" for k in (4, 2))
+                + " mm wide",
             )
     for z in (0.1, 0.2):
         ends = [sweep("demobot_parallel", z, ea) for ea in CABLES.values()]

@@ -18,6 +18,22 @@ def test_the_numbers_of_the_page_are_current() -> None:
     assert make_paper.with_table(page) == page, "run: python scripts/make_paper.py"
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "z", "outer", "inner"),
+    [("planar_vertical", 0.2, 2, 1), ("demobot_parallel", 0.1, 4, 2)],
+)
+def test_zones_are_as_wide_as_the_page_says(name: str, z: float, outer: int, inner: int) -> None:
+    """A fifth of a millimetre inside of either edge of a zone, and as far outside."""
+    first, second = (1e-3 * make_paper.width(name, z, count) for count in (outer, inner))
+    robot = make_paper.robot(name)
+    poses = np.tile(robot.reference_pose, (4, 1))
+    edges = 0.17 + np.array([first, first + second])
+    poses[:, 0], poses[:, 2] = (edges[:, None] + [-2e-4, 2e-4]).ravel(), z
+    slack = make_paper.solve(robot, poses).slack.sum(axis=1)
+    assert slack.tolist() == [outer, inner, inner, slack[3]] and slack[3] < inner
+
+
 def test_every_figure_is_on_the_page() -> None:
     page = make_paper.PAGE.read_text(encoding="utf-8")
     for name in make_paper.FIGURES:

@@ -176,7 +176,7 @@ class Effort:
         """For people."""
         return (
             f"{self.method}: {self.fewest} to {self.most} evaluations of the equations per pose, "
-            f"{self.median:g} in the middle; {1e3 * self.seconds_per_pose:.2g} ms per pose"
+            f"{self.median:g} the median; {1e3 * self.seconds_per_pose:.2g} ms per pose"
         )
 
 

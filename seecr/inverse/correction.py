@@ -115,7 +115,7 @@ class Correction(Result):
         for rows, text in (
             (lost & ~self.found, "of them: no pose near was found that can be held"),
             (near & ~self.settled, "of them may have nearer ones beside them"),
-            (self.found & ~self.stays, "are balanced, but the platform does not rest there"),
+            (self.found & ~self.stays, "balanced, but the platform does not rest there"),
         ):
             if np.any(rows):
                 out.append(f"{int(rows.sum())} {text}")

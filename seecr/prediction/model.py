@@ -212,7 +212,7 @@ def new_model(robot: GivenRobot) -> Model:
     robot = robot_of(robot)
     document = tomlkit.document()
     document.add(tomlkit.comment("Effects that this robot has beyond plain SEECR, in the order"))
-    document.add(tomlkit.comment("of adding. SI units. Written by crosscheck add; edit freely."))
+    document.add(tomlkit.comment("of adding. SI units. Written by crosscheck; edit freely."))
     document["format"] = FORMAT
     document["robot"] = fingerprint(robot)
     return Model(Terms(), {}, document)

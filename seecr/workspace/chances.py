@@ -228,11 +228,15 @@ def _drawn(terms: Terms, covariance: Array, count: int) -> Array:
     own = terms.vector
     if len(own) == 0:
         return np.zeros((count, 0))
-    values, vectors = np.linalg.eigh(covariance)
+    # a coefficient of the cubic stretch is off by 10^5 and a point by 10^-4 m: of their covariance
+    # as it stands rounding leaves nothing of the point's
+    error = np.sqrt(np.diag(covariance))
+    unit = np.where(error > 0.0, error, 1.0)
+    values, vectors = np.linalg.eigh(covariance / unit / unit[:, None])
     from scipy.stats import qmc  # takes a second to import
 
-    unit = qmc.Sobol(len(covariance), seed=0).random(count)
-    drawn = ndtri(np.clip(unit, 1e-9, 1.0 - 1e-9))
-    drawn = own + drawn * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
+    evenly = qmc.Sobol(len(covariance), seed=0).random(count)
+    drawn = ndtri(np.clip(evenly, 1e-9, 1.0 - 1e-9))
+    drawn = own + unit * (drawn * np.sqrt(np.maximum(values, 0.0)) @ vectors.T)
     lower, upper = np.minimum(terms.lower, own), np.maximum(terms.upper, own)
     return np.asarray(np.clip(drawn, lower, upper))

@@ -135,7 +135,7 @@ def test_a_pose_from_which_the_platform_goes_elsewhere_is_told(
     monkeypatch.setattr(Reaching, "rests", every)
     found = correct(robot, want, **limits)
     assert found.found.all() and found.solution.converged.all() and not found.stays.any()
-    assert "1 are balanced, but the platform does not rest there" in str(found)
+    assert "1 balanced, but the platform does not rest there" in str(found)
 
 
 @pytest.mark.slow

@@ -18,6 +18,7 @@ from seecr.prediction.model import Model
 from seecr.report.corrections import chance_lines
 from seecr.report.maps import likely_lines, write_arrays
 from seecr.statics.solution import Solution
+from seecr.workspace import chances
 from seecr.workspace.chances import held_chance, kept_chance, margins_with
 from seecr.workspace.edges import boundary
 from seecr.workspace.maps import workspace_map
@@ -160,6 +161,32 @@ def test_maps_that_can_have_no_probabilities_are_refused(tmp_path: Path) -> None
     two = load_robot(model_path("planar_two_cable"))
     with pytest.raises(InputError, match="fewer cables than freedoms: it holds no poses"):
         held_chance(two, two.reference_pose, model_of(tmp_path, MODEL + KEPT))
+
+
+def test_draws_spread_as_the_covariance_says_whatever_the_units(tmp_path: Path) -> None:
+    """Points were drawn eleven times too far apart beside a coefficient that is off by 10^5."""
+    beside = """[[effect]]
+name = "nonlinear_elasticity"
+[effect.parameters]
+quadratic = { value = 0.0, stderr = 3e3 }
+cubic = { value = 0.0, stderr = 6e5 }
+[[effect]]
+name = "cable_length_offset"
+[effect.parameters]
+offset_m = { value = 0.0, stderr = 1e-4 }
+"""
+    terms = model_of(tmp_path, MODEL + beside).terms
+    p = len(terms)
+    error = np.where(terms.scale > 1.0, 6e5, 1e-2 * terms.scale)
+    mixed = np.random.default_rng(2).normal(size=(p, 2 * p))
+    covariance = mixed @ mixed.T * error / np.linalg.norm(mixed, axis=1)
+    covariance = covariance * (error / np.linalg.norm(mixed, axis=1))[:, None]
+    draws = chances._drawn(terms, covariance, 4096)
+    free = np.isneginf(terms.lower)  # others are put on their bounds
+    assert free.sum() > 3 and np.ptp(np.log10(error[free])) > 7.0
+    expected = covariance[np.ix_(free, free)] / error[free] / error[free][:, None]
+    found = np.cov(draws[:, free].T) / error[free] / error[free][:, None]
+    np.testing.assert_allclose(found, expected, atol=0.05)
 
 
 def test_no_value_is_drawn_beyond_its_bounds(tmp_path: Path) -> None:
