@@ -43,6 +43,7 @@ if TYPE_CHECKING:
         InputError,
         InputFileError,
         MissingPackageError,
+        NoRestError,
         RobotError,
         SeecrError,
     )
@@ -72,7 +73,10 @@ _MODULES = {
         "layout_of", "parameter",
     ),
     "equilibrium.solving": ("solve",),
-    "errors": ("InputError", "InputFileError", "MissingPackageError", "RobotError", "SeecrError"),
+    "errors": (
+        "InputError", "InputFileError", "MissingPackageError", "NoRestError", "RobotError",
+        "SeecrError",
+    ),
     "prediction.experiment": ("Experiment", "Prediction", "predict"),
     "exported.export": ("Export", "export"),
     "equilibrium.following": ("Jump",),
@@ -111,6 +115,7 @@ __all__ = [
     "Loads",
     "MissingPackageError",
     "Model",
+    "NoRestError",
     "Prediction",
     "Readings",
     "Robot",

@@ -23,6 +23,12 @@ class InputError(SeecrError):
     """Arguments of a wrong shape, unit or value."""
 
 
+class NoRestError(SeecrError):
+    """A command at which the platform does not come to rest, where something needs that it does."""
+
+    exit_status = 3
+
+
 class MissingPackageError(SeecrError):
     """Something asked for that needs a package which is not installed."""
 

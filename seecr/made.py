@@ -41,10 +41,12 @@ class Made:
         """Today, of files and of the TOML beside each; those that are not there are left out."""
         given = [file for file in files if file is not None]
         beside = [file.with_suffix(".toml") for file in given]
+        read = [file for file in dict.fromkeys([*given, *beside]) if file.is_file()]
+        names = [file.name for file in read]
         hashes = {
-            file.name: digits_of(file)
-            for file in dict.fromkeys([*given, *beside])
-            if file.is_file()
+            # files of one name are told apart by their folders
+            str(file) if names.count(file.name) > 1 else file.name: digits_of(file)
+            for file in read
         }
         return cls(__version__, command, date.today().isoformat(), hashes)
 

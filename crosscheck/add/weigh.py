@@ -89,7 +89,7 @@ def _model(
     errors: Mapping[str, Rms], covariance: Array,
 ) -> Model:  # fmt: skip
     """The model with the effects; those given without one are as new to it as the named ones."""
-    source = provenance_of(problem.data.path, f"crosscheck add {' + '.join(names)}")
+    source = provenance_of(problem.data.name, f"crosscheck add {' + '.join(names)}")
     fresh = [f.term.name for f in fitted if f.term.name not in (*basis.names, *names)]
     new = with_fit(basis, fitted, [*names, *fresh], source, errors, covariance)
     return renewed(new, problem.robot, problem.data)

@@ -157,7 +157,7 @@ def _result(found: Calibration, before: Terms, notes: tuple[str, ...], basis: Mo
     own = np.flatnonzero([name in kept for name, _key in found.terms.labels])
     covariance = found.covariance[np.ix_(own, own)]
     data, robot = found.setting.problem.data, found.setting.problem.robot
-    source = provenance_of(data.path, "crosscheck calibrate")
+    source = provenance_of(data.name, "crosscheck calibrate")
     rms = found.together
     errors = {"before": rms.before, "after": rms.after, "held_out": rms.held_out}
     return Calibrated(

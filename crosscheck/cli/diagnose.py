@@ -133,7 +133,7 @@ def _keep(found: Diagnosis, own: Model, robot: Robot, measured: Measurements, pa
         return f"Written to {path}: the model as it stands, nothing is added"
     names = [effect.effect for effect in found.missing]
     errors = {"before": found.before, "after": found.after, "held_out": found.held_out}
-    source = provenance_of(measured.path, "crosscheck diagnose")
+    source = provenance_of(measured.name, "crosscheck diagnose")
     fitted, covariance = found_effects(found), found_covariance(found)
     new = with_fit(own, fitted, names, source, errors, covariance)
     save_model(path, renewed(new, robot, measured))

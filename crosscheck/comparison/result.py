@@ -224,7 +224,7 @@ class Comparison(Result):
             if (value := self.rms[kind.key]) is not None
         ]
         rows = f"{int(self.problem.use.sum())} of {counted(data.n_rows, 'row')}"
-        head = f"{data.path.name}: {rows} compared"
+        head = f"{data.name}: {rows} compared"
         return [head, *sizes, self.sentence]
 
     def records(self) -> list[Record]:

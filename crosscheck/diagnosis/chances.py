@@ -17,6 +17,10 @@ PROBABLE = 0.5
 """From this probability on an effect that is not listed is called probable."""
 
 
+# What diagnosis.json says where nothing was weighed.
+NOT_WEIGHED: dict[str, Any] = {"catalogue": [], "classes": []}
+
+
 @dataclass(frozen=True)
 class Chances:
     """Probabilities of the effects and of classes of equals.

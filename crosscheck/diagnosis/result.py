@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.comparison.associations import Association
-from crosscheck.diagnosis.chances import Chances
+from crosscheck.diagnosis.chances import NOT_WEIGHED, Chances
 from crosscheck.diagnosis.rivals import Rival
 from crosscheck.diagnosis.search import Search
 from crosscheck.files import plain
@@ -220,7 +220,7 @@ class Diagnosis(Result):
                 "residual": None if self.whiteness is None else asdict(self.whiteness),
                 "where": [found.as_json() for found in self.where],
                 "notes": self.notes,
-                **(self.chances.as_json() if self.chances is not None else {}),
+                **(NOT_WEIGHED if self.chances is None else self.chances.as_json()),
             }
         )
         return document

@@ -27,6 +27,8 @@ from seecr.result import Record, Result
 Mask = NDArray[np.bool_]
 Names = NDArray[np.str_]
 
+# Between the names of files that were joined.
+JOINED = " + "
 # Default of fields that __post_init__ makes from the others when they are not given.
 _FILLED_IN: Any = None
 _PER_ROW = (
@@ -177,6 +179,12 @@ class Measurements(Result):
                 raise ValueError(f"measurements: {name} must be {shape}, got {np.shape(value)}")
 
     @property
+    def name(self) -> str:
+        """The file's name; of several joined in one, the name of each as it tells them apart."""
+        joined = str(self.path)
+        return joined if JOINED in joined else self.path.name
+
+    @property
     def n_rows(self) -> int:
         """Number of rows n."""
         return len(self.run)
@@ -283,7 +291,7 @@ class Measurements(Result):
         ]
         what = ", ".join(read) or "commands alone"
         rows, runs = counted(self.n_rows, "row"), counted(len(self.runs), "run")
-        return [f"{self.path.name}: {rows} in {runs}, {what}", *self.notes]
+        return [f"{self.name}: {rows} in {runs}, {what}", *self.notes]
 
     def records(self) -> list[Record]:
         """Commands and readings row by row, named as in the file; None where not read."""

@@ -54,9 +54,9 @@ class Provenance:
     by: str
 
 
-def provenance_of(data: Path, by: str) -> Provenance:
+def provenance_of(data: str, by: str) -> Provenance:
     """Of values fitted today to a file by a command."""
-    return Provenance(data.name, date.today().isoformat(), f"seecr {__version__}", by)
+    return Provenance(data, date.today().isoformat(), f"seecr {__version__}", by)
 
 
 def with_fit(

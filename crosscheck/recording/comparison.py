@@ -38,7 +38,7 @@ def write_comparison_recording(found: Comparison, path: str | Path) -> None:
         CrosscheckError: the file cannot be written.
     """
     problem = found.problem
-    name = f"comparison of {problem.robot.name}, {problem.data.path.name}"
+    name = f"comparison of {problem.robot.name}, {problem.data.name}"
     if found.whiteness is None:
         root = rrb.Vertical(layout.text("Verdict", "text/verdict"))
         with recording_file(path, name, layout.blueprint(root)) as recording:

@@ -61,7 +61,7 @@ def write_diagnosis_recording(found: Diagnosis, path: str | Path) -> None:
 def _name(found: Diagnosis) -> str:
     assert found.search is not None
     problem = found.search.problem
-    return f"diagnosis of {problem.robot.name}, {problem.data.path.name}"
+    return f"diagnosis of {problem.robot.name}, {problem.data.name}"
 
 
 def _write_words(found: Diagnosis, path: str | Path) -> None:

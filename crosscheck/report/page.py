@@ -35,7 +35,7 @@ def page_of(template: str, made: Made | None, **context: Any) -> str:
 
 def title_of(problem: Problem) -> str:
     """The robot and its data."""
-    return f"{problem.robot.name} · {problem.data.path.name}"
+    return f"{problem.robot.name} · {problem.data.name}"
 
 
 def facts(problem: Problem, *, other_noise: bool = False) -> list[tuple[str, str]]:
@@ -62,7 +62,7 @@ def facts(problem: Problem, *, other_noise: bool = False) -> list[tuple[str, str
         rows += f", {ways} way point" + "s" * (ways > 1)
     return [
         ("robot", f"{problem.robot.name}, {counted(problem.robot.n_cables, 'cable')}"),
-        ("data", data.path.name),
+        ("data", data.name),
         ("rows", rows),
         ("runs", str(len(data.runs))),
         ("readings", str(problem.n_readings)),

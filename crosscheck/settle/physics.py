@@ -106,7 +106,7 @@ class Physics:
         self.metre = np.where(self.rotations, self.length, 1.0)
         every = np.arange(self.n_dof)
         self.coupling: list[Together] = [(every[k : k + 1], every, 0 * every + k) for k in every]
-        self.force_scale = 1.0
+        self.force_scale = self._load = 1.0
         self.set_load()
 
     @classmethod
@@ -189,7 +189,8 @@ class Physics:
         self.model.opt.gravity[:] = _finite("gravity", gravity, (3,))
         weight = self.mass * float(np.linalg.norm(self.model.opt.gravity))
         force, torque = np.linalg.norm(self.wrench[:3]), np.linalg.norm(self.wrench[3:])
-        self.force_scale = weight + float(force) + float(torque) / self.length
+        self._load = weight + float(force) + float(torque) / self.length
+        self.force_scale = self._load or self._own_forces()
 
     def place(self, pose: Array) -> None:
         """Put the platform at rest at a pose (7,), or as near to it as its joints allow."""
@@ -206,9 +207,12 @@ class Physics:
             self.data.qpos[:] = self.reference_qpos
             self._joints_towards(pose)
         self.update()
-        if self.force_scale == 0.0:  # no load: the cables' own forces are the measure
-            pull = self.stiffness * self.rest_lengths
-            self.force_scale = float(max(np.sum(self.tensions()), 1e-6 * np.max(pull)))
+        self.force_scale = self._load or self._own_forces()
+
+    def _own_forces(self) -> float:
+        """What cables pull among themselves [N]: without a load that is the measure."""
+        pull = self.stiffness * self.rest_lengths
+        return float(max(np.sum(self.tensions()), 1e-6 * np.max(pull)))
 
     def pose(self) -> Array:
         """Pose (7,) of the platform's body as of the last update."""

@@ -44,8 +44,8 @@ def print_calibration(
     if not found.settled:
         say(console, "The fit did not settle: its values are not to be used.", "bold yellow")
     elif not found.pays:
-        why = "Runs left out are not predicted any better: not written; --force writes it"
-        say(console, why, "bold yellow")
+        then = "" if written else ": not written; --force writes it"
+        say(console, f"Runs left out are not predicted any better{then}", "bold yellow")
     if written:
         parts = (
             f"{counted(len(found.fitted), 'effect')}, {counted(len(found.covariance), 'parameter')}"

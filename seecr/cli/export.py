@@ -48,7 +48,7 @@ def command(
     reference pose without one), with the rest as its keyframe. What is in no file is said.
 
     \b
-    Exit status: 0 all well, 2 bad input, or a pose without rest.
+    Exit status: 0 all well, 2 bad input, 3 no rest at the pose to export at.
     """
     from seecr import InputError, export
     from seecr.files import check_writable, json_text, write_texts

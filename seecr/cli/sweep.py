@@ -103,7 +103,8 @@ def command(
 
     Poses are told by their line in POSES.csv; those of --line and --grid count from 0.
 
-    Writes sweep.json, sweep.csv, a figure and sweep.rrd.
+    Writes sweep.json, sweep.csv, a figure and sweep.rrd; and sweep.toml, where lengths are told
+    or runs begin at their first row, so that every command reads sweep.csv as these commands.
 
     \b
     Exit status: 0 all at rest, 2 bad input, 3 a pose without rest, or where the platform is free
@@ -111,6 +112,7 @@ def command(
     """
     from seecr import spread_of
     from seecr.files import json_text, staged, write_text
+    from seecr.report.commanded import toml_beside
     from seecr.report.figures import sweep_figure
     from seecr.report.rows import SweepRows
     from seecr.report.words import at_rest, jump_lines, sweep_lines
@@ -118,7 +120,7 @@ def command(
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
     commands, more, said, wanted = _commands(machine, poses, given)
-    with staged(out, sometimes=files_of_pictures("sweep")) as folder:
+    with staged(out, sometimes=("sweep.toml", *files_of_pictures("sweep"))) as folder:
         with progress_bar("solving", len(commands)) as tell:
             solution, search = _solved(machine, commands, own, follow, method)
             if own is not None:
@@ -126,7 +128,7 @@ def command(
             spread = None if own is None else spread_of(machine, commands, own)
             tell(len(commands), "solved")
         commanded = commands.lengths is None or wanted
-        rows = SweepRows(solution, commands.lengths, more, spread, wanted)
+        rows = SweepRows(solution, commands.lengths, more, spread, wanted, commands.loads)
         status = 0 if at_rest(solution) else 3
         notes = [*notes_of(own, solution), *said]
         document = {
@@ -142,6 +144,8 @@ def command(
         text = json_text(document)
         write_text(folder / "sweep.json", text + "\n")
         write_text(folder / "sweep.csv", rows.csv_text())
+        if beside := toml_beside(commands.told, commands):
+            write_text(folder / "sweep.toml", beside)
         if figure != "none":
             sweep_figure(folder / f"sweep.{figure}", solution, commanded, wanted)
         if not no_recording:

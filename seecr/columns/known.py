@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.columns.names import meant_by, other_rotations, question, unused_note
+from seecr.columns.quantity import QUANTITY
 from seecr.columns.table import Table, show
 from seecr.counted import counted
 from seecr.errors import InputFileError
@@ -24,10 +25,6 @@ POSITION = ("x", "y", "z")
 QUATERNION = ("qw", "qx", "qy", "qz")
 ANGLES = ("rx", "ry", "rz")
 
-_QUANTITY = re.compile(
-    r"(t|temperature|run|(?:cmd|meas|want)_(?:q[wxyz]|r?[xyz])|(?:length|tension)_\d+"
-    r"|payload(?:_[xyz])?|(?:force|moment)_[xyz])(?:_([^_]*))?"
-)
 # These begin many other names; only these endings are surely meant as a unit.
 _SURE_UNITS = {
     "t": {"", "s", "ms", "us", "ns", "sec", "min", "h", "S"},
@@ -156,7 +153,7 @@ def _check_names(table: Table) -> None:
 
 
 def _parse_name(table: Table, name: str, n_cables: int) -> tuple[str, Unit] | None:
-    match = _QUANTITY.fullmatch(name)
+    match = QUANTITY.fullmatch(name)
     if match is None:
         return None
     quantity, suffix = match[1], match[2] or ""

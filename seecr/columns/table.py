@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from seecr.columns.quantity import is_number
 from seecr.counted import counted
 from seecr.errors import InputFileError, MissingPackageError
 from seecr.files import no_text, read_bytes
@@ -161,13 +162,17 @@ def _read_csv(path: Path, data: bytes) -> Table:
         names=tuple(name.strip() for name in header),
         line=np.array([line for line, _ in body]),
         header_line=header_line,
-        cells=cells if separator == "," else _with_points(cells),
+        cells=cells if separator == "," else _with_points(header, cells),
     )
 
 
-def _with_points(cells: list[list[str]]) -> list[list[str]]:
-    """Decimal commas become points, if no number has a point: one file has one kind."""
-    every = [cell for column in cells for cell in column]
+def _with_points(names: list[str], cells: list[list[str]]) -> list[list[str]]:
+    """Decimal commas become points, if no number has a point: one file has one kind.
+
+    A run's name may be 1.5, and so may be what nobody reads.
+    """
+    pairs = zip(names, cells, strict=True)
+    every = [cell for name, column in pairs if is_number(name) for cell in column]
     if any(_POINT_NUMBER.fullmatch(cell) for cell in every):
         return cells
     return [

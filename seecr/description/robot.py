@@ -156,6 +156,11 @@ class Robot:
         """Weight of the platform [N]."""
         return float(self.mass * np.linalg.norm(self.gravity))
 
+    @property
+    def usual_load(self) -> float:
+        """What cables pull about [N]: the weight; without one what stretches them by 0.1 %."""
+        return self.weight if self.weight > 0.0 else 1e-3 * float(np.mean(self.ea))
+
     @cached_property
     def length(self) -> float:
         """The robot's own length [m]: it weighs newton-metres against newtons.

@@ -16,7 +16,7 @@ from seecr.pose import Array
 
 def usual_strain(robot: Robot) -> float:
     """Strain of a cable that carries half the weight."""
-    return max(0.5 * robot.weight / float(np.mean(robot.ea)), 1e-9)
+    return max(0.5 * robot.usual_load / float(np.mean(robot.ea)), 1e-9)
 
 
 def usual_stretch(robot: Robot) -> float:
@@ -150,7 +150,7 @@ class CableWeight(Effect):
     advice: ClassVar[str] = "weigh ten metres of cable: expect {weight_10m:.2f} N"
 
     weight: float = parameter(
-        "N_per_m", lambda r: 0.02 * r.weight / mean_length(r), bounds=(0.0, _heaviest)
+        "N_per_m", lambda r: 0.02 * r.usual_load / mean_length(r), bounds=(0.0, _heaviest)
     )
 
     def edit_setup(self, setup: Setup) -> None:
@@ -180,7 +180,7 @@ class Hysteresis(Effect):
         "load and unload one cable: expect the curves to part by twice {amplitude:.3f} N"
     )
 
-    amplitude: float = parameter("N", lambda r: 0.1 * r.weight / r.n_cables, bounds=(0.0, 1e6))
+    amplitude: float = parameter("N", lambda r: 0.1 * r.usual_load / r.n_cables, bounds=(0.0, 1e6))
     stretch: float = parameter(
         "m", lambda r: 0.3 * usual_stretch(r), null=1e-3, bounds=(1e-9, 10.0), shape=True
     )

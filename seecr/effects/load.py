@@ -82,15 +82,11 @@ class ExternalWrench(Effect):
     title: ClassVar[str] = "a constant force and moment on the platform"
     advice: ClassVar[str] = "look for a hose or cable that pulls on the platform, and take it off"
 
-    force: Array = parameter("N", lambda r: 0.03 * _load(r), size="vector")
-    moment: Array = parameter("Nm", lambda r: 0.03 * _load(r) * r.length, size="vector")
+    force: Array = parameter("N", lambda r: 0.03 * r.usual_load, size="vector")
+    moment: Array = parameter("Nm", lambda r: 0.03 * r.usual_load * r.length, size="vector")
 
     def edit_setup(self, setup: Setup) -> None:
         setup.wrench = setup.wrench + np.concatenate([self.force, self.moment])
-
-
-def _load(robot: Robot) -> float:
-    return robot.weight if robot.weight > 0 else 1e-3 * float(np.mean(robot.ea))
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,7 @@ from seecr.effects import Effect
 from seecr.effects.checked import edit_setup
 from seecr.effects.setup import Setup, plain_setup
 from seecr.equilibrium.solving import solve
-from seecr.errors import InputError
+from seecr.errors import InputError, NoRestError
 from seecr.exported.bodies import SEGMENTS, bodies_text
 from seecr.exported.expressed import expressed
 from seecr.exported.scene import plain_text
@@ -163,7 +163,7 @@ def _for_mujoco(
     if len(solution) != 1:
         raise InputError(f"expected one pose to export at, got {len(solution)}")
     if not solution.converged[0]:
-        raise InputError(
+        raise NoRestError(
             f"robot {robot.name}: no rest at the pose to export at: {solution.sentence(0)}; "
             "expected another pose"
         )

@@ -10,15 +10,12 @@ import numpy as np
 from seecr.columns.command_file import CommandFile
 from seecr.inverse.correction import Correction
 from seecr.pose import Array
+from seecr.report.commanded import load_columns, toml_beside
 from seecr.result import COORDINATES
 
 __all__ = ["chance_lines", "corrected_csv", "corrected_toml"]
 
 _WANT = [f"want_{name}" for name in COORDINATES]
-_WRENCH = [
-    f"{kind}_{axis}_{unit}" for kind, unit in (("force", "N"), ("moment", "Nm")) for axis in "xyz"
-]
-
 # Below this a reader should look.
 _LIKELY = 0.95
 
@@ -42,26 +39,14 @@ def corrected_csv(found: Correction, wanted: CommandFile) -> str:
         columns["temperature_C"] = given.temperature
     columns |= dict(zip(_WANT, found.wanted.T, strict=True))
     columns |= {f"length_{k + 1}_m": one for k, one in enumerate(found.lengths.T)}
-    if given.loads is not None:
-        columns["payload_kg"] = given.loads.mass
-        columns |= dict(zip(_WRENCH, given.loads.wrench.T, strict=True))
-        if np.isfinite(given.loads.centre).all():
-            centres = zip("xyz", given.loads.centre.T, strict=True)
-            columns |= {f"payload_{axis}_m": one for axis, one in centres}
+    columns |= load_columns(given.loads)
     rows = [",".join(_cell(one[i]) for one in columns.values()) for i in range(n) if found.found[i]]
     return "\n".join([",".join(columns), *rows]) + "\n"
 
 
 def corrected_toml(wanted: CommandFile) -> str:
     """What says how the lengths are meant."""
-    lines = [
-        "# length_i is what winch i is told, counted as the plain model counts",
-        'lengths = "told"',
-    ]
-    stands = wanted.commands.stands
-    if stands is not None and stands.any():
-        lines.append('start = "first_row"')
-    return "\n".join(lines) + "\n"
+    return toml_beside(True, wanted.commands)
 
 
 def chance_lines(found: Correction, kept: Array | None) -> Iterator[str]:

@@ -10,8 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from seecr.commands.loads import Loads
 from seecr.pose import Array
 from seecr.prediction.uncertainty import Spread
+from seecr.report.commanded import load_columns
 from seecr.result import COORDINATES, Record
 from seecr.statics.solution import Solution
 
@@ -28,6 +30,7 @@ class SweepRows:
         wanted: whether poses were wanted with these lengths; deviations are from them.
         more: further values of each row, by name.
         spread: one standard deviation of poses and tensions, where the model says so.
+        loads: that were carried, if they are known.
     """
 
     solution: Solution
@@ -35,6 +38,7 @@ class SweepRows:
     more: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     spread: Spread | None = None
     wanted: bool = False
+    loads: Loads | None = None
 
     def as_json(self) -> list[Record]:
         """``rows`` in ``sweep.json``."""
@@ -69,7 +73,7 @@ class SweepRows:
         return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
     def csv_text(self) -> str:
-        """``sweep.csv``; its commands are read again as a list of commands.
+        """``sweep.csv``; with ``sweep.toml`` its commands are read again as they were given.
 
         Numbers have all their digits; cells without a number are empty.
         """
@@ -82,6 +86,7 @@ class SweepRows:
             columns |= _named("length_{}_m", cables, self.lengths)
         if self.wanted:
             columns |= _named("want_{}", COORDINATES, found.command)
+        columns |= load_columns(self.loads)
         columns |= _named("pose_{}", COORDINATES, found.pose)
         if self.lengths is None or self.wanted:
             columns |= _named("deviation_{}_m", "xyz", found.deviation[:, :3])
@@ -90,7 +95,7 @@ class SweepRows:
         if spread is not None:
             columns |= _named("pose_{}_stderr_m", "xyz", spread.position)
             columns |= _named("rotation_{}_stderr_rad", "xyz", spread.rotation)
-            columns |= _named("cable_{}_stderr_N", cables, spread.tensions)
+            columns |= _named("tension_{}_stderr_N", cables, spread.tensions)
         columns |= {
             "status": [status.name.lower() for status in found.status],
             "residual": found.residual.tolist(),

@@ -39,6 +39,7 @@ def test_two_to_five_rows_carry_no_verdict(data: Measurements, count: int) -> No
     few = data.rows(slice(0, count))
     found = diagnose(robot(), few)
     assert found.verdict is DiagnosisVerdict.NO_VERDICT and found.converged
+    assert found.as_json()["catalogue"] == found.as_json()["classes"] == []
     assert f"only {count} poses measured" in found.sentence
     assert "add poses spread over the workspace" in found.measure_next[0]
     with pytest.raises(CrosscheckError, match=f"only {count} poses .* add poses spread") as error:

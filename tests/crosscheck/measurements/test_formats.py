@@ -58,6 +58,16 @@ def test_semicolons_with_decimal_commas_and_tabs_read_as_commas_do(write: Write,
     assert np.array_equal(load_measurements(write(*commas), robot).command_pose, plain.command_pose)
 
 
+def test_what_is_no_number_of_ours_says_nothing_of_decimal_commas(write: Write, robot: Robot):
+    """A run called 1.5, or a version in a column that nobody reads."""
+    rows = [f"{POSE};version".replace(",", ";"), "1.5;0,5;-,25;0,1;1,125;2.7"]
+    found = load_measurements(write(*rows), robot)
+    np.testing.assert_allclose(found.command_pose[0, :3], [0.5, -0.25, 0.1])
+    assert found.run.tolist() == ["1.5"] and found.position[0, 0] == 1.125
+    with pytest.raises(InputFileError, match="decimal comma"):
+        load_measurements(write(rows[0], "1.5;0,5;-.25;0,1;1,125;2.7"), robot)
+
+
 def test_units_of_every_kind(write: Write, robot: Robot):
     header = "run,t_ms,cmd_x_cm,cmd_y_um,cmd_z_m,meas_x_cm,tension_1_kN,payload_g,payload_x_mm"
     header += ",payload_y_m,payload_z_m,force_x_kN,moment_z_Nm"

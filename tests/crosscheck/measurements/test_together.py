@@ -13,9 +13,11 @@ from crosscheck.fit.state import evaluate
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import load_measurements
 from crosscheck.measurements.stated import with_stated
+from crosscheck.model.write import provenance_of
 from seecr.description.robot import Robot
 from seecr.effects import Terms
 from seecr.errors import InputFileError
+from seecr.made import Made
 from seecr.pose import quat_from_rxyz
 
 CMD = "run,t_s,cmd_x_m,cmd_y_m,cmd_z_m"
@@ -121,3 +123,17 @@ def test_files_that_do_not_go_together(tmp_path: Path, robot: Robot):
     still = case(tmp_path, "e.csv", "run,cmd_x_m,cmd_y_m,cmd_z_m,meas_x_m", "a,0,0,0,0.7")
     data = load_measurements([poses, still], robot)
     assert data.t_s is None and "e.csv without t_s: that of the others is not used." in data.notes
+
+
+def test_files_of_one_name_are_all_named(tmp_path: Path, robot: Robot) -> None:
+    """Of mon/m.csv and tue/m.csv a model said that its values were of m.csv."""
+    for day in ("mon", "tue"):
+        case(tmp_path / day, "m.csv", f"{CMD},meas_x_m", "a,5,0,0,0,0.1", "a,9,0,0,.1,.1")
+    both = [tmp_path / day / "m.csv" for day in ("mon", "tue")]
+    whole = load_measurements(both, robot)
+    assert whole.name == "mon/m.csv + tue/m.csv"
+    assert load_measurements(both[0], robot).name == "m.csv"
+    assert provenance_of(whole.name, "crosscheck add").data == "mon/m.csv + tue/m.csv"
+    hashes = Made.now("crosscheck add", both).files
+    assert set(hashes) == {str(day.with_suffix(end)) for day in both for end in (".csv", ".toml")}
+    assert set(Made.now("crosscheck add", both[:1]).files) == {"m.csv", "m.toml"}

@@ -96,3 +96,15 @@ def test_mujoco_is_quiet_inside_and_speaks_again_after():
     with quiet_mujoco(), quiet_mujoco():
         assert mujoco.get_mju_user_warning() is not None
     assert mujoco.get_mju_user_warning() is None
+
+
+def test_without_a_load_residuals_are_relative_to_what_cables_pull() -> None:
+    physics = Physics.of(model_path("planar_vertical"))
+    physics.set_load(gravity=np.zeros(3))
+    assert 0.0 < physics.force_scale < np.inf and 0.0 < physics.rounding() < 1e-6
+    before = physics.force_scale
+    physics.set_cables(0.9 * physics.rest_lengths, physics.stiffness * physics.rest_lengths)
+    physics.place(physics.pose())
+    assert physics.force_scale == pytest.approx(np.sum(physics.tensions())) != before
+    physics.set_load()
+    assert physics.force_scale == pytest.approx(physics.mass * 9.81)

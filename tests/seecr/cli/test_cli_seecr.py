@@ -15,6 +15,7 @@ from click.testing import CliRunner, Result
 
 from seecr.cli import COMMANDS, main
 from seecr.cli.arguments import robot_at
+from seecr.columns.command_file import read_commands
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.equilibrium.solving import solve
@@ -357,3 +358,31 @@ def test_a_search_tells_its_evaluations_when_it_is_asked_for(tmp_path: Path) -> 
     model.write_text('[[effect]]\nname = "backlash"\n[effect.parameters]\ngap_m = 0.001\n')
     remembered = run(*args, *bare, "--method", "newton", "--model", model)
     assert remembered.exit_code == 2 and "got it beside a model with a memory" in remembered.output
+
+
+def test_told_lengths_and_loads_are_read_again_as_they_were_given(tmp_path: Path) -> None:
+    """They were read as absolute: 17 mm off, without a word."""
+    robot, names = load_robot(model_path("planar_vertical")), "length_1_m,length_2_m,length_3_m"
+    given = tmp_path / "given.csv"
+    row = ",".join(
+        repr(float(one)) for one in robot.commanded_lengths(robot.reference_pose[None])[0]
+    )
+    given.write_text(f"{names},length_4_m,payload_kg,force_x_N\n{row},0.05,0.1\n")
+    given.with_suffix(".toml").write_text('lengths = "told"\nstart = "first_row"\n')
+    model = tmp_path / "model.toml"
+    model.write_text(
+        'format = 1\n[[effect]]\nname = "drum_gain"\n[effect.parameters]\ngain = 0.01\n'
+    )
+    out = tmp_path / "out"
+    sweep = ["sweep", "planar_vertical", "--model", model, "--figure", "none", "--no-recording"]
+    assert run(*sweep, given, "--out", out).exit_code == 0
+    first, again = (read_commands(path, robot).commands for path in (given, out / "sweep.csv"))
+    assert again.told and first.told and again.stands is not None and again.stands.all()
+    assert first.loads is not None and again.loads is not None
+    np.testing.assert_array_equal(again.lengths, first.lengths)
+    np.testing.assert_array_equal(again.loads.mass, first.loads.mass)
+    np.testing.assert_array_equal(again.loads.wrench, first.loads.wrench)
+    # of an older list that was told nothing is left beside one that is not
+    line = ["--line", "0.4", "0", "0.2", "0.5", "0", "0.2"]
+    assert run("sweep", "planar_vertical", *line, "--no-recording", "--out", out).exit_code == 0
+    assert not (out / "sweep.toml").exists()

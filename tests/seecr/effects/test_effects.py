@@ -19,7 +19,9 @@ from effect_cases import (
 )
 from random_robots import random_robot
 
+from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
+from seecr.description.shipped import model_path
 from seecr.effects import (
     BUILT_IN,
     PLACES,
@@ -240,3 +242,11 @@ def test_an_unknown_effect_is_answered_with_the_known_ones_nearest_first() -> No
     assert "'pully_radius'" in text and "\n" not in text
     listed = text.split("nearest first: ")[1].split(", ")
     assert listed[0] == "pulley_radius" and sorted(listed) == sorted(catalogue())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_plausible_sizes_are_some_without_gravity_too(name: str) -> None:
+    """A robot under pretension alone: sizes of 0 had been divided by."""
+    robot = load_robot(model_path("ipanema"))
+    floating = layout_of(catalogue()[name], replace(robot, gravity=np.zeros(3)))
+    assert np.all(np.isfinite(floating.scale)) and np.all(floating.scale > 0.0)

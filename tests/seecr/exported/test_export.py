@@ -16,7 +16,7 @@ from seecr.description.robot import Robot
 from seecr.description.shipped import model_path
 from seecr.effects import Term, Terms
 from seecr.equilibrium.solving import solve
-from seecr.errors import InputError
+from seecr.errors import NoRestError
 from seecr.exported.bodies import SEGMENTS
 from seecr.exported.chain import HangingCable, hanging
 from seecr.exported.export import Export, export
@@ -257,5 +257,6 @@ def test_another_vertical_than_gravity_is_said() -> None:
 def test_a_pose_without_rest_is_one_sentence() -> None:
     pulley = [term(COGIRO, "pulley_radius", radius_m=0.01),
               term(COGIRO, "external_wrench", moment_z_Nm=1e3)]  # fmt: skip
-    with pytest.raises(InputError, match=r"no rest at the pose to export at: .*another pose"):
+    with pytest.raises(NoRestError, match=r"no rest at the pose to export at: .*another pose"):
         export(COGIRO, pulley)
+    assert NoRestError.exit_status == 3  # what `seecr pose` ends with there
