@@ -8,7 +8,7 @@ import click
 
 from crosscheck.cli.choices import figures_in, figures_option, sigma_option
 from crosscheck.cli.following import Given, after_comparison
-from seecr.cli.options import FILE, json_option, made_by, out_option
+from seecr.cli.options import FILE, json_option, made_by, out_option, progress_share
 
 
 @click.command(
@@ -75,7 +75,10 @@ def command(
     machine = load_robot(robot)
     measured = with_stated(load_measurements(data, machine), sigmas)
     own = load_model(model, machine) if model is not None else None
-    with staged(out, sometimes=["comparison.rrd"]) as folder:
+    with (
+        staged(out, sometimes=["comparison.rrd"]) as folder,
+        progress_share("comparing") as progress,
+    ):
         found = compare(machine, measured, own.terms if own else ())
         exceeded = check(limits, found)
         status = 1 if exceeded else (0 if found.converged else 3)
@@ -90,13 +93,16 @@ def command(
         }
         text = json_text(document)
         write_text(folder / "comparison.json", text + "\n")
+        progress("drawing the page", 0.5)
         with figures_in(figures):
             write_page(found, folder / "comparison.html", made)
+        progress("recording", 0.8)
         if not no_recording:
             # takes a second or two to import
             from crosscheck.recording import write_comparison_recording
 
             write_comparison_recording(found, folder / "comparison.rrd")
+        progress("recording", 1.0)
     if as_json:
         click.echo(text)
         return status

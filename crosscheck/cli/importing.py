@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from seecr.cli.following import following
-from seecr.cli.options import FILE, finite, json_option, made_by, out_option
+from seecr.cli.options import FILE, finite, json_option, made_by, out_option, progress_share
 
 
 @click.command(
@@ -114,9 +114,12 @@ def command(
     machine = load_robot(robot)
     choices = ImportChoices.said(machine, **options)
     check_case(out, robot)
-    found = import_case(form, files, machine, logs, choices)
-    made = made_by(machine.source, *files, *logs)
-    write_case(found, robot, out, made)
+    with progress_share("reading the recordings") as progress:
+        found = import_case(form, files, machine, logs, choices)
+        made = made_by(machine.source, *files, *logs)
+        progress("writing the case", 0.9)
+        write_case(found, robot, out, made)
+        progress("writing the case", 1.0)
     if as_json:
         click.echo(json_text({"made": made, **found.as_json(), "folder": str(out)}))
         return 0

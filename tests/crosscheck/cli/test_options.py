@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import inspect
+import re
+from pathlib import Path
+
 import click
 import pytest
 from click.testing import CliRunner
 
+import crosscheck.cli
+import seecr.cli
 from crosscheck.cli.compare import command as compare_command
 from crosscheck.comparison.limits import RULES, option
 from seecr.cli import options
@@ -42,6 +48,17 @@ def test_without_a_terminal_long_work_tells_where_it_is_and_never_goes_back(
         advance(1, "")
     lines = capsys.readouterr().err.splitlines()
     assert lines == [f"working: {p} %, on it" for p in (25, 75, 75, 100)] + ["working: 25 %"]
+
+
+def test_every_command_that_may_take_a_second_has_a_bar() -> None:
+    without = {
+        module
+        for group in (crosscheck.cli, seecr.cli)
+        for module, _said in group.COMMANDS.values()
+        for source in [Path(inspect.getfile(group)).with_name(f"{module}.py").read_text()]
+        if not re.search(r"progress_(share|bar)\(", source)
+    }
+    assert without == {"effects", "export"}
 
 
 def test_short_work_says_nothing_without_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
