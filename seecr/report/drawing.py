@@ -1,0 +1,44 @@
+"""Axes for figures: labels with units, colours that everybody tells apart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+__all__ = ["COLOURS", "figure"]
+
+# Okabe and Ito (2008), "Color Universal Design".
+COLOURS = (
+    "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#000000", "#B8A800",
+)  # fmt: skip
+_STYLE: Any = {
+    "font.size": 9, "axes.grid": True, "grid.alpha": 0.3, "axes.spines.top": False,
+    "axes.spines.right": False, "legend.frameon": False, "figure.dpi": 150,
+    "svg.hashsalt": "seecr", "svg.fonttype": "none", "axes.titlesize": 9.5,
+}  # fmt: skip
+
+
+@contextmanager
+def figure(path: Path, rows: int = 1, columns: int = 1, **options: Any) -> Iterator[Any]:
+    """Axes (rows, columns) of a figure that is written to a file when the block ends.
+
+    Args:
+        path: the file; its ending says of what kind: png, svg, pdf.
+        rows, columns: of axes.
+        options: of ``matplotlib.pyplot.subplots``.
+    """
+    import matplotlib
+
+    with matplotlib.rc_context(_STYLE):
+        # without pyplot: no window system, and nothing that stays in memory
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        size = options.pop("figsize", (6.4 * columns, 2.2 * rows))
+        drawn = Figure(figsize=size, layout="constrained")
+        FigureCanvasAgg(drawn)
+        yield drawn.subplots(rows, columns, squeeze=False, **options)
+        metadata = {"Date": None} if path.suffix == ".svg" else None
+        drawn.savefig(path, metadata=metadata)
