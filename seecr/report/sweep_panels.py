@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -61,30 +62,36 @@ def _along(solution: Solution, commanded: bool, word: str) -> tuple[Array, str]:
 
 
 def _deviations(ax: Any, solution: Solution, at: Array, mark: dict[str, Any]) -> None:
-    for k, name in enumerate("xyz"):
-        ax.plot(at, 1e3 * solution.deviation[:, k], color=COLOURS[k], label=f"d{name}", **mark)
+    moved = 1e3 * solution.deviation[:, :3]
+    _curves(ax, at, moved, [f"d{name}" for name in "xyz"], mark)
     ax.set_ylabel("deviation [mm]")
     _legend(ax)
 
 
 def _rotations(ax: Any, solution: Solution, at: Array, mark: dict[str, Any]) -> None:
-    for k, name in enumerate("xyz"):
-        turn = np.degrees(solution.deviation[:, 3 + k])
-        ax.plot(at, turn, color=COLOURS[k], label=f"about {name}", **mark)
+    turned = np.degrees(solution.deviation[:, 3:])
+    _curves(ax, at, turned, [f"about {name}" for name in "xyz"], mark)
     ax.set_ylabel("rotation [°]")
     _legend(ax)
 
 
 def _tensions(ax: Any, solution: Solution, at: Array, mark: dict[str, Any]) -> None:
-    for k, group in enumerate(alike([solution.tensions])):
-        style = _DASHES[k // len(COLOURS) % len(_DASHES)]
-        names = ", ".join(solution.robot.cable_names[cable] for cable in group)
-        values = solution.tensions[:, group[0]]
-        ax.plot(at, values, style, color=COLOURS[k % len(COLOURS)], label=names, **mark)
+    _curves(ax, at, solution.tensions, solution.robot.cable_names, mark)
     ax.set_ylabel("tension [N]")
     ax.set_ylim(bottom=min(0.0, ax.get_ylim()[0]))
     if solution.robot.n_cables <= _MOST_NAMED:
         _legend(ax)
+
+
+def _curves(
+    ax: Any, at: Array, values: Array, names: Sequence[str], mark: dict[str, Any]
+) -> None:  # fmt: skip
+    """Each column of values (n, k) by its name; those that lie on each other once, with all."""
+    for first, *others in alike([values]):
+        # the same axis or cable has the same colour in every figure
+        colour, style = COLOURS[first % len(COLOURS)], _DASHES[first // len(COLOURS) % len(_DASHES)]
+        said = ", ".join(names[k] for k in (first, *others))
+        ax.plot(at, values[:, first], style, color=colour, label=said, **mark)
 
 
 def _legend(ax: Any) -> None:

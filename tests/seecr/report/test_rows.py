@@ -99,6 +99,7 @@ def test_the_figure_is_written(sweep: Solution, tmp_path: Path, kind: str) -> No
     if kind == "svg":
         for words in (b"commanded x [mm]", b"tension [N]", b"cable2, cable4"):
             assert words in data
+        assert b">about x, about z<" in data, "one curve for what would hide the other"
         sweep_figure(path, sweep, wanted=True)
         assert b"wanted x [mm]" in path.read_bytes()
 
