@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -147,7 +149,8 @@ def command(
         if beside := toml_beside(commands.told, commands):
             write_text(folder / "sweep.toml", beside)
         if figure != "none":
-            sweep_figure(folder / f"sweep.{figure}", solution, commanded, wanted)
+            runs = _runs(machine, given, more)
+            sweep_figure(folder / f"sweep.{figure}", solution, commanded, wanted, runs, spread)
         if not no_recording:
             # takes a second or two to import
             from seecr.recording.sweep import write_sweep_recording
@@ -260,3 +263,12 @@ def _along(robot: Robot, given: dict[str, Any]) -> NDArray[np.float64]:
         places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     turned = given["turned"] or robot.reference_pose[3:]
     return commanded_poses(np.column_stack([places, np.tile(turned, (len(places), 1))]))
+
+
+def _runs(robot: Robot, given: dict[str, Any], more: dict[str, Any]) -> Sequence[int] | None:
+    """Which poses follow on each other: a column of --grid, a run of a file; None: all do."""
+    if not given["grid"]:
+        return more.get("run")
+    counts = [len(axis) for axis in axes_of(given["grid"], robot)]
+    column = next((n for n in reversed(counts) if n > 1), 1)
+    return [k // column for k in range(math.prod(counts))]

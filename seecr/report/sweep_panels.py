@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from seecr.curves import alike
 from seecr.pose import Array
+from seecr.prediction.uncertainty import Spread
 from seecr.report.drawing import COLOURS, figure
 from seecr.statics.solution import Solution
 
@@ -17,14 +20,20 @@ __all__ = ["sweep_figure"]
 
 # What says which pose it is, where no coordinate does.
 _NUMBERS = ("line of the file", "pose, counted from 0")
-# More cables than colours are told apart by dashes.
+# More cables than colours are told apart by dashes, and so are curves that lie on each other.
 _DASHES = ("-", "--", ":", "-.")
 # Beyond so many cables a legend says nothing.
 _MOST_NAMED = 24
+_BAND: dict[str, Any] = {"alpha": 0.2, "linewidth": 0.8}
 
 
 def sweep_figure(
-    path: Path, solution: Solution, commanded: bool = True, wanted: bool = False
+    path: Path,
+    solution: Solution,
+    commanded: bool = True,
+    wanted: bool = False,
+    runs: ArrayLike | None = None,
+    spread: Spread | None = None,
 ) -> None:
     """Deviation, rotation, tensions and slack cables along a sweep.
 
@@ -33,19 +42,26 @@ def sweep_figure(
         solution: of the sweep.
         commanded: whether poses were commanded, and not lengths.
         wanted: whether they are what lengths were told for.
+        runs: (n,) what poses that follow on each other have in common; lines break where another
+            begins. Default: all do.
+        spread: one standard deviation of poses and tensions: bands about them.
     """
     at, label = _along(solution, commanded, "wanted" if wanted else "commanded")
     mark: dict[str, Any] = {"marker": "o", "markersize": 2.5, "linewidth": 1.1}
     if label in _NUMBERS:
         mark["linewidth"] = 0.5
+    number = np.zeros(len(solution)) if runs is None else np.asarray(runs)
+    whole = _Sweep(solution, spread, at, np.flatnonzero(number[1:] != number[:-1]) + 1, mark)
     panels = [_tensions, _slack]
     if commanded:
         panels = [_deviations, _rotations, *panels]
     with figure(path, len(panels), 1, sharex=True, figsize=(7.4, 2.1 * len(panels))) as axes:
         for panel, ax in zip(panels, axes[:, 0], strict=True):
-            panel(ax, solution, at, mark)
+            panel(ax, whole)
         axes[0, 0].set_title(solution.robot.name)
         axes[-1, 0].set_xlabel(label)
+        if spread is not None:
+            _name_band(axes[0, 0])
 
 
 def _along(solution: Solution, commanded: bool, word: str) -> tuple[Array, str]:
@@ -61,50 +77,110 @@ def _along(solution: Solution, commanded: bool, word: str) -> tuple[Array, str]:
     return np.arange(float(len(solution))), _NUMBERS[1]
 
 
-def _deviations(ax: Any, solution: Solution, at: Array, mark: dict[str, Any]) -> None:
-    moved = 1e3 * solution.deviation[:, :3]
-    _curves(ax, at, moved, [f"d{name}" for name in "xyz"], mark)
+@dataclass(frozen=True, eq=False)
+class _Sweep:
+    """What is drawn, along what, and how.
+
+    Attributes:
+        solution: of n commands.
+        spread: of the same, where the model says so.
+        at: (n,) where each is drawn.
+        starts: (k,) rows at which another run begins.
+        mark: how lines and points look.
+    """
+
+    solution: Solution
+    spread: Spread | None
+    at: Array
+    starts: NDArray[np.intp]
+    mark: dict[str, Any]
+
+    def line(self, ax: Any, values: Array, *how: str, **more: Any) -> None:
+        """Points (n,) with lines between those of one run."""
+        ax.plot(self._between(), self._broken(values), *how, **self.mark, **more)
+
+    def band(self, ax: Any, values: Array, stderr: Array, least: float, colour: str) -> None:
+        """One standard deviation to either side of values (n,), as far as they can be so small."""
+        edges = np.maximum(values - stderr, np.minimum(values, least)), values + stderr
+        ax.fill_between(self._between(), *map(self._broken, edges), color=colour, zorder=1, **_BAND)
+
+    def _between(self) -> Array:
+        """Where to draw, with a place for each break: half way."""
+        half = 0.5 * (self.at[self.starts - 1] + self.at[self.starts])
+        return np.insert(self.at, self.starts, half)
+
+    def _broken(self, values: Array) -> Array:
+        """Nothing at each break: lines end there."""
+        return np.insert(np.asarray(values, float), self.starts, np.nan)
+
+
+def _deviations(ax: Any, whole: _Sweep) -> None:
+    stderr = None if whole.spread is None else 1e3 * whole.spread.position
+    _curves(ax, whole, 1e3 * whole.solution.deviation[:, :3], stderr, [f"d{k}" for k in "xyz"])
     ax.set_ylabel("deviation [mm]")
     _legend(ax)
 
 
-def _rotations(ax: Any, solution: Solution, at: Array, mark: dict[str, Any]) -> None:
-    turned = np.degrees(solution.deviation[:, 3:])
-    _curves(ax, at, turned, [f"about {name}" for name in "xyz"], mark)
+def _rotations(ax: Any, whole: _Sweep) -> None:
+    stderr = None if whole.spread is None else np.degrees(whole.spread.rotation)
+    turned = np.degrees(whole.solution.deviation[:, 3:])
+    _curves(ax, whole, turned, stderr, [f"about {k}" for k in "xyz"])
     ax.set_ylabel("rotation [°]")
     _legend(ax)
 
 
-def _tensions(ax: Any, solution: Solution, at: Array, mark: dict[str, Any]) -> None:
-    _curves(ax, at, solution.tensions, solution.robot.cable_names, mark)
+def _tensions(ax: Any, whole: _Sweep) -> None:
+    robot = whole.solution.robot
+    stderr = None if whole.spread is None else whole.spread.tensions
+    # cables do not push
+    _curves(ax, whole, whole.solution.tensions, stderr, robot.cable_names, least=0.0)
     ax.set_ylabel("tension [N]")
     ax.set_ylim(bottom=min(0.0, ax.get_ylim()[0]))
-    if solution.robot.n_cables <= _MOST_NAMED:
+    if robot.n_cables <= _MOST_NAMED:
         _legend(ax)
 
 
 def _curves(
-    ax: Any, at: Array, values: Array, names: Sequence[str], mark: dict[str, Any]
+    ax: Any, whole: _Sweep, values: Array, stderr: Array | None, names: Sequence[str],
+    least: float = -np.inf,
 ) -> None:  # fmt: skip
-    """Each column of values (n, k) by its name; those that lie on each other once, with all."""
-    for first, *others in alike([values]):
+    """Each column of values (n, k) by its name, with its band if there are errors (n, k).
+
+    Those that lie on each other are drawn once, with all names, where their bands do so too;
+    where these differ, all are there, and dashes let those below be seen.
+    """
+    below = [group.index(k) for k in range(len(names)) for group in alike([values]) if k in group]
+    for first, *others in alike([values] if stderr is None else [values, stderr]):
         # the same axis or cable has the same colour in every figure
-        colour, style = COLOURS[first % len(COLOURS)], _DASHES[first // len(COLOURS) % len(_DASHES)]
+        colour = COLOURS[first % len(COLOURS)]
+        style = _DASHES[(first // len(COLOURS) + below[first]) % len(_DASHES)]
         said = ", ".join(names[k] for k in (first, *others))
-        ax.plot(at, values[:, first], style, color=colour, label=said, **mark)
+        whole.line(ax, values[:, first], style, color=colour, label=said)
+        if stderr is not None:
+            whole.band(ax, values[:, first], stderr[:, first], least, colour)
 
 
-def _legend(ax: Any) -> None:
+def _legend(ax: Any, **more: Any) -> None:
     """Beside the axes, where it covers nothing."""
-    ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
+    ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8, **more)
 
 
-def _slack(ax: Any, solution: Solution, at: Array, mark: dict[str, Any]) -> None:
+def _name_band(ax: Any) -> None:
+    """What bands are, in the legend of the first axes: they are of all colours."""
+    from matplotlib.patches import Patch
+
+    handles, _names = ax.get_legend_handles_labels()
+    _legend(ax, handles=[*handles, Patch(color="0.3", label="± one standard\ndeviation", **_BAND)])
+
+
+def _slack(ax: Any, whole: _Sweep) -> None:
+    solution = whole.solution
     count = np.where(solution.converged, solution.slack.sum(axis=1), np.nan)
-    ax.plot(at, count, color="black", drawstyle="steps-mid", **mark)
+    whole.line(ax, count, color="black", drawstyle="steps-mid")
     lost = ~solution.converged
     if np.any(lost):
-        ax.plot(at[lost], np.zeros(int(lost.sum())), "x", color=COLOURS[4], label="no rest")
+        at = whole.at[lost]
+        ax.plot(at, np.zeros(int(lost.sum())), "x", color=COLOURS[4], label="no rest")
         _legend(ax)
     ax.set_ylabel("slack cables")
     ax.set_ylim(-0.3, solution.robot.n_cables + 0.3)
