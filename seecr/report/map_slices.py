@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,13 @@ __all__ = ["map_figure"]
 
 # Of the edge of what can be held.
 _EDGE = COLOURS[4]
+# Of that with a probability: white with a rim, which is seen on all colours and by everybody.
+_LIKELY: dict[str, Any] = {
+    "markersize": 4.0, "markerfacecolor": "white", "markeredgecolor": "black",
+    "markeredgewidth": 0.6,
+}  # fmt: skip
+# Whether poses can be held, where margins have no numbers.
+_NO, _YES = "#D9D9D9", COLOURS[0]
 # A grid of more than this [m] is told in metres.
 _LARGE = 5.0
 # Letters of a title that fit into an inch.
@@ -29,7 +38,13 @@ _OUTSTANDING = 4.0
 _STILL = 1e-6
 
 
-def map_figure(path: Path, found: Workspace, most: int = 4, edge: Array | None = None) -> None:
+def map_figure(
+    path: Path,
+    found: Workspace,
+    most: int = 4,
+    edge: Array | None = None,
+    at_least: float | None = None,
+) -> None:
     """Slices of a workspace: what can be held, slack cables, deviation and tilt at rest.
 
     Where the map has probabilities, they come second.
@@ -40,128 +55,220 @@ def map_figure(path: Path, found: Workspace, most: int = 4, edge: Array | None =
         most: slices drawn; they lie across the last axis, or that with one value. The title says
             of how many.
         edge: (k, 7) poses at the edge of what can be held; those in a slice are dots on it.
+        at_least: the probability with which these can be held, if it is the edge of that.
 
     Raises:
         InputError: a grid that goes along fewer than two axes.
     """
+    cut = _cut(found, most)
+    panels = [_held_panel]
+    if found.chance is not None:
+        panels.append(_chance_panel)
+    if np.any(found.rests):
+        panels += [_slack_panel, _away_panel, _turn_panel]
+    n = len(cut.picked)
+    size = (0.9 + 2.9 * n, 0.7 + 2.3 * len(panels))
+    with figure(path, len(panels), n, sharex=True, sharey=True, figsize=size) as axes:
+        for row, panel in zip(axes, panels, strict=True):
+            shown = panel(cut, row)
+            row[0].figure.colorbar(shown, ax=list(row), **_bar_of(panel, found))
+            row[0].set_ylabel(f"{'xyz'[cut.high]} [{cut.unit}]")
+        if edge is not None:
+            _dots(axes, cut, edge, at_least)
+        for k, ax in zip(cut.picked, axes[0], strict=True):
+            at = cut.per_metre * found.axes[cut.across][k]
+            ax.set_title(f"{'xyz'[cut.across]} = {at:.4g} {cut.unit}")
+        for ax in axes[-1]:
+            ax.set_xlabel(f"{'xyz'[cut.wide]} [{cut.unit}]")
+        words = "; ".join(_words(cut, edge, at_least))
+        title = [found.robot.name, *textwrap.wrap(words, int(_LETTERS * size[0]))]
+        axes[0, 0].figure.suptitle("\n".join(title), fontsize=9)
+
+
+@dataclass(frozen=True, eq=False)
+class _Cut:
+    """Slices of a map.
+
+    Attributes:
+        found: the map.
+        across, wide, high: the axis that slices lie across, and those of their panels.
+        picked: (k,) where on the first of these they are.
+        slices: numbers of the poses of each.
+        unit, per_metre: in which they are drawn.
+    """
+
+    found: Workspace
+    across: int
+    wide: int
+    high: int
+    picked: NDArray[np.intp]
+    slices: list[NDArray[np.intp]]
+    unit: str
+    per_metre: float
+
+    @property
+    def poses(self) -> NDArray[np.intp]:
+        """Numbers of all poses that are drawn."""
+        return np.concatenate([number.ravel() for number in self.slices])
+
+    def inside(self) -> list[Array]:
+        """Margins of each slice, as far as a line at zero between them takes them.
+
+        An infinite one says nothing of where between two poses the line goes: it stands for one
+        like others.
+        """
+        found = self.found
+        inside = np.where(found.feasible, np.maximum(found.margin, 0.0), found.margin).ravel()
+        known = np.abs(inside[np.isfinite(inside) & (inside != 0.0)])
+        far = float(np.median(known)) if len(known) else 1.0
+        inside = np.nan_to_num(inside, posinf=far, neginf=-far)
+        return [inside[one] for one in self.slices]
+
+    def with_dots(self, edge: Array) -> list[NDArray[np.bool_]]:
+        """Which of the edge's poses lie in each slice: those between two poses of it."""
+        axis = self.found.axes[self.across]
+        near = 1e-9 * max(float(np.ptp(axis)), 1e-9)
+        return [np.abs(edge[:, self.across] - axis[k]) <= near for k in self.picked]
+
+
+def _cut(found: Workspace, most: int) -> _Cut:
+    """At most so many slices of a map."""
     lengths = [len(axis) for axis in found.axes]
     if sum(n > 1 for n in lengths) < 2:
         raise InputError("a figure of a map needs at least two axes with more than one value")
     across = 2 if min(lengths) > 1 else int(np.argmin(lengths))
     wide, high = (k for k in range(3) if k != across)
     picked = np.unique(np.linspace(0, lengths[across] - 1, most + 2).round().astype(int)[1:-1])
-    panels = [_held_panel]
-    if found.chance is not None:
-        panels.append(_chance_panel)
-    if np.any(found.rests):
-        panels += [_slack_panel, _away_panel, _turn_panel]
-    size = (0.9 + 2.9 * len(picked), 0.5 + 2.3 * len(panels))
+    number = np.arange(found.margin.size).reshape(lengths)
+    slices = [np.take(number, k, across) for k in picked]
     metres = max(float(np.ptp(axis)) for axis in found.axes) > _LARGE
-    unit, per_metre = ("m", 1.0) if metres else ("mm", 1e3)
-    extents = per_metre * found.axes[wide], per_metre * found.axes[high]
-    with figure(path, len(panels), len(picked), sharex=True, sharey=True, figsize=size) as axes:
-        number = np.arange(found.margin.size).reshape(lengths)
-        slices = [np.take(number, k, across) for k in picked]
-        for row, panel in zip(axes, panels, strict=True):
-            shown = panel(found, row, *extents, slices)
-            row[0].figure.colorbar(shown, ax=list(row), **_bar_of(panel, found))
-            row[0].set_ylabel(f"{'xyz'[high]} [{unit}]")
-        if edge is not None:
-            _dots(axes, per_metre * edge[:, [wide, high]], _in_slices(found, edge, across, picked))
-        for k, ax in zip(picked, axes[0], strict=True):
-            ax.set_title(f"{'xyz'[across]} = {per_metre * found.axes[across][k]:.4g} {unit}")
-        for ax in axes[-1]:
-            ax.set_xlabel(f"{'xyz'[wide]} [{unit}]")
-        words = [*_left_out(found, across, len(picked)), *_white(found, slices)]
-        drawn = any(_has_edge(inside) for inside in _inside(found, slices))
-        if drawn or (edge is not None and len(edge)):
-            words.append("orange: the edge of what tensions within the limits can hold")
-        if words:
-            title = textwrap.fill("; ".join(words), int(_LETTERS * size[0]))
-            axes[0, 0].figure.suptitle(title, fontsize=9)
+    return _Cut(found, across, wide, high, picked, slices, *(("m", 1.0) if metres else ("mm", 1e3)))
 
 
-def _left_out(found: Workspace, across: int, shown: int) -> list[str]:
-    """How many slices there are, where not all of them are drawn."""
-    whole = len(found.axes[across])
-    return [f"{shown} of {whole} values of {'xyz'[across]}"] if shown < whole else []
+def _words(cut: _Cut, edge: Array | None, at_least: float | None) -> Iterator[str]:
+    """What is not drawn, and what colours and dots mean that no bar explains."""
+    shown, whole = len(cut.picked), len(cut.found.axes[cut.across])
+    if shown < whole:
+        yield f"{shown} of {whole} values of {'xyz'[cut.across]}"
+    yield from _white(cut)
+    yield from _without_end(cut)
+    dots = edge is not None and bool(np.any(cut.with_dots(edge)))
+    if any(map(_has_edge, cut.inside())) or (dots and at_least is None):
+        yield "orange: the edge of what tensions within the limits can hold"
+    if dots and at_least is not None:
+        yield f"white dots: the edge of what they hold with a probability of {at_least:g}"
 
 
-def _white(found: Workspace, slices: Slices) -> list[str]:
+def _white(cut: _Cut) -> Iterator[str]:
     """What cells without a colour are, where there are any."""
-    one = np.concatenate([number.ravel() for number in slices])
-    why = [] if found.feasible.ravel()[one].all() else ["cannot be held (margin)"]
-    if found.rests.any() and not found.rests.ravel()[one].all():
+    found, shown, why = cut.found, cut.poses, []
+    if not _yes_or_no(found) and not found.feasible.ravel()[shown].all():
+        why.append("cannot be held (margin)")
+    if found.rests.any() and not found.rests.ravel()[shown].all():
         why.append("does not come to rest (below it)")
-    return ["white: " + ", or ".join(why)] if why else []
+    if why:
+        yield "white: " + ", or ".join(why)
 
 
-def _in_slices(found: Workspace, edge: Array, across: int, picked: Any) -> list[Any]:
-    """Which of the edge's poses lie in each of some slices: those between two poses of it."""
-    axis = found.axes[across]
-    near = 1e-9 * max(float(np.ptp(axis)), 1e-9)
-    return [np.abs(edge[:, across] - axis[k]) <= near for k in picked]
+def _without_end(cut: _Cut) -> Iterator[str]:
+    """What margins are that no bar of numbers can have, where there are any."""
+    margin = cut.found.margin.ravel()[cut.poses]
+    if not np.isposinf(margin).any():
+        return
+    if _yes_or_no(cut.found):
+        yield "where it can be held, cables can be tightened without end"
+        return
+    larger = np.isfinite(margin) & (margin > _top_margin(cut.found))
+    also = "a larger margin, or " if larger.any() else ""
+    yield f"yellow, beyond the bar: {also}cables can be tightened without end"
 
 
-def _dots(axes: Any, places: Array, slices: list[Any]) -> None:
-    """The edge's places (k, 2) on every panel of their slice."""
+def _yes_or_no(found: Workspace) -> bool:
+    """Whether margins say no more than that poses can be held.
+
+    Those of robots with fewer cables than freedoms are 0; all are infinite where cables can be
+    tightened without end everywhere.
+    """
+    held = found.margin[found.feasible]
+    few = found.robot.n_cables < found.robot.n_dof
+    return few or (len(held) > 0 and bool(np.isposinf(held).all()))
+
+
+def _dots(axes: Any, cut: _Cut, edge: Array, at_least: float | None) -> None:
+    """The edge's places (k, 7) on every panel of their slice."""
+    look = {"color": _EDGE, "markersize": 2.5} if at_least is None else _LIKELY
+    places = cut.per_metre * edge[:, [cut.wide, cut.high]]
     for row in axes:
-        for ax, own in zip(row, slices, strict=True):
-            ax.plot(*places[own].T, ".", color=_EDGE, markersize=2.5)
-
-
-Slices = list[NDArray[np.intp]]
+        for ax, own in zip(row, cut.with_dots(edge), strict=True):
+            ax.plot(*places[own].T, ".", **look)
 
 
 def _bar_of(panel: Any, found: Workspace) -> dict[str, Any]:
+    from matplotlib.ticker import FuncFormatter
+
     words = {
         _held_panel: "tension margin [N]", _chance_panel: "probability",
         _slack_panel: "slack cables",
         _away_panel: "off its command [mm]", _turn_panel: "turned [°]",
     }  # fmt: skip
+    label = words[panel]
     more: dict[str, Any] = {"extend": "max"}
-    if panel is _chance_panel:
+    if panel is _held_panel and _yes_or_no(found):
+        said = FuncFormatter(lambda value, _: "yes" if value > 0.5 else "no")
+        label, more = "can be held", {"ticks": [0, 1], "format": said}
+    elif panel is _chance_panel:
         more = {}
     elif panel is _slack_panel:
         more = {"ticks": np.arange(found.robot.n_cables + 1)}
-    return {"label": words[panel], "shrink": 0.9, **more}
+    return {"label": label, "shrink": 0.9, **more}
 
 
-def _held_panel(found: Workspace, row: Any, x: Array, y: Array, slices: Slices) -> Any:
+def _held_panel(cut: _Cut, row: Any) -> Any:
     """The margin where poses can be held, with the workspace's boundary."""
-    flat = np.where(found.feasible, found.margin, np.nan).ravel()
-    finite = flat[np.isfinite(flat)]
+    found = cut.found
+    if _yes_or_no(found):
+        from matplotlib.colors import ListedColormap
+
+        held = found.feasible.astype(float)
+        return _colours(cut, row, held, -0.5, 1.5, ListedColormap([_NO, _YES]))
+    top = _top_margin(found)
+    # cells of no number have no colour
+    margin = np.where(np.isposinf(found.margin), 2.0 * top, found.margin)
+    return _colours(cut, row, np.where(found.feasible, margin, np.nan), 0.0, top)
+
+
+def _top_margin(found: Workspace) -> float:
+    """Where the bar of margins ends."""
+    held = found.margin[found.feasible]
+    finite = held[np.isfinite(held)]
     half = float(np.median(finite)) if len(finite) else 0.0
-    top = min(_top(finite), _OUTSTANDING * half) or 1.0
-    return _colours(row, x, y, [flat[k] for k in slices], 0.0, top, None, found, slices)
+    return min(_top(finite), _OUTSTANDING * half) or 1.0
 
 
-def _chance_panel(found: Workspace, row: Any, x: Array, y: Array, slices: Slices) -> Any:
+def _chance_panel(cut: _Cut, row: Any) -> Any:
     """The probability that a pose can be held, with the boundary of the model's own values."""
-    assert found.chance is not None
-    chance = found.chance.ravel().astype(float)
-    return _colours(row, x, y, [chance[k] for k in slices], 0.0, 1.0, "cividis", found, slices)
+    assert cut.found.chance is not None
+    return _colours(cut, row, cut.found.chance.astype(float), 0.0, 1.0, "cividis")
 
 
-def _slack_panel(found: Workspace, row: Any, x: Array, y: Array, slices: Slices) -> Any:
+def _slack_panel(cut: _Cut, row: Any) -> Any:
     import matplotlib
 
-    count = np.where(found.rests, found.slack, np.nan).ravel()
-    m = found.robot.n_cables
-    steps = matplotlib.colormaps["viridis"].resampled(m + 1)
-    return _colours(row, x, y, [count[k] for k in slices], -0.5, m + 0.5, steps, found, slices)
+    found, m = cut.found, cut.found.robot.n_cables
+    count = np.where(found.rests, found.slack, np.nan)
+    return _colours(
+        cut, row, count, -0.5, m + 0.5, matplotlib.colormaps["viridis"].resampled(m + 1)
+    )
 
 
-def _away_panel(found: Workspace, row: Any, x: Array, y: Array, slices: Slices) -> Any:
-    away = 1e3 * np.linalg.norm(found.deviation, axis=-1).ravel()
-    top = _end(found, away)
-    return _colours(row, x, y, [away[k] for k in slices], 0.0, top, None, found, slices)
+def _away_panel(cut: _Cut, row: Any) -> Any:
+    away = 1e3 * np.linalg.norm(cut.found.deviation, axis=-1)
+    return _colours(cut, row, away, 0.0, _end(cut.found, away))
 
 
-def _turn_panel(found: Workspace, row: Any, x: Array, y: Array, slices: Slices) -> Any:
-    turn = np.degrees(np.linalg.norm(found.rotation, axis=-1)).ravel()
-    top = _end(found, turn)
-    return _colours(row, x, y, [turn[k] for k in slices], 0.0, top, None, found, slices)
+def _turn_panel(cut: _Cut, row: Any) -> Any:
+    turn = np.degrees(np.linalg.norm(cut.found.rotation, axis=-1))
+    return _colours(cut, row, turn, 0.0, _end(cut.found, turn))
 
 
 def _end(found: Workspace, values: Array) -> float:
@@ -170,7 +277,7 @@ def _end(found: Workspace, values: Array) -> float:
     Poses outside of the workspace fall by a hundred times that, and all others would be of one
     colour.
     """
-    for some in (values[found.feasible.ravel()], values):
+    for some in (values[found.feasible], values):
         known = some[np.isfinite(some)]
         if len(known) and (top := float(np.quantile(known, 0.95))) > _STILL:
             return top
@@ -183,28 +290,21 @@ def _top(values: Array) -> float:
 
 
 def _colours(
-    row: Any, x: Array, y: Array, values: list[Array], low: float, high: float,
-    colours: Any = None, found: Workspace | None = None, slices: Slices | None = None,
+    cut: _Cut, row: Any, values: Array, low: float, high: float, colours: Any = None
 ) -> Any:  # fmt: skip
-    """Coloured cells of each slice; with the workspace's boundary over them where it is given."""
+    """Coloured cells of each slice, with the workspace's boundary over them."""
+    x, y = (cut.per_metre * cut.found.axes[k] for k in (cut.wide, cut.high))
     shown = None
-    inside = [] if found is None or slices is None else _inside(found, slices)
-    for k, (ax, value) in enumerate(zip(row, values, strict=True)):
+    for ax, one, inside in zip(row, cut.slices, cut.inside(), strict=True):
         shown = ax.pcolormesh(
-            x, y, value.T, vmin=low, vmax=high, cmap=colours, shading="nearest",
+            x, y, values.ravel()[one].T, vmin=low, vmax=high, cmap=colours, shading="nearest",
             rasterized=True,  # else lines show between the cells of an SVG
         )  # fmt: skip
-        if inside and _has_edge(inside[k]):
-            ax.contour(x, y, inside[k].T, levels=[0.0], colors=_EDGE, linewidths=1.2)
+        if _has_edge(inside):
+            ax.contour(x, y, inside.T, levels=[0.0], colors=_EDGE, linewidths=1.2)
         ax.set_aspect("equal")
         ax.grid(False)
     return shown
-
-
-def _inside(found: Workspace, slices: Slices) -> list[Array]:
-    """Margins of each slice, as far as a line at zero between them takes them."""
-    inside = np.where(found.feasible, np.maximum(found.margin, 0.0), found.margin)
-    return [np.clip(inside.ravel()[one], -1e3, 1e3) for one in slices]
 
 
 def _has_edge(inside: Array) -> bool:

@@ -1,0 +1,117 @@
+"""What the figure of a map draws where margins have no numbers, and which edge it shows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
+from seecr.report.figures import map_figure
+from seecr.workspace.grid import Workspace
+from seecr.workspace.maps import workspace_map
+
+pytestmark = pytest.mark.slow
+Drawn = Callable[..., Any]
+AXIS = np.linspace(0.3, 0.5, 3)
+
+
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Drawn:
+    """The figure of a map."""
+    kept: list[Any] = []
+    write = Figure.savefig
+    monkeypatch.setattr(Figure, "savefig", lambda f, *a, **b: (kept.append(f), write(f, *a, **b)))
+
+    def of(found: Workspace, **more: Any) -> Any:
+        map_figure(tmp_path / "map.png", found, **more)
+        return kept[-1]
+
+    return of
+
+
+def a_map(*margins: float) -> Workspace:
+    """Nine poses with these margins, y goes faster than x."""
+    robot = load_robot(model_path("demobot_cogiro"))
+    found = workspace_map(robot, AXIS, AXIS, 0.1, elastic=False)
+    return replace(found, margin=np.array(margins).reshape(3, 3, 1))
+
+
+def cells(drawing: Any) -> list[str]:
+    """Colours of the first panel's cells, y goes faster than x."""
+    mesh = drawing.axes[0].collections[0]
+    mesh.update_scalarmappable()
+    colours = mesh.get_facecolors().reshape(3, 3, 4).transpose(1, 0, 2).reshape(9, 4)
+    return [to_hex(one, keep_alpha=True) for one in colours]
+
+
+def title(drawing: Any) -> str:
+    return " ".join(drawing.get_suptitle().split())
+
+
+def test_a_margin_without_end_has_the_colour_beyond_the_bar(drawn: Drawn) -> None:
+    """It had been white, and white was said to be what cannot be held."""
+    one = drawn(a_map(-1.0, 1.0, 2.0, -1.0, 3.0, np.inf, -1.0, 3.0, np.inf))
+    own, yellow = cells(one), to_hex(one.axes[0].collections[0].cmap(1.0), keep_alpha=True)
+    assert own[5] == own[8] == yellow != own[1] and own[0][-2:] == "00"
+    assert "white: cannot be held (margin); yellow, beyond the bar: cables can be" in title(one)
+    most = drawn(a_map(*[1.0] * 7, 99.0, np.inf))
+    assert "beyond the bar: a larger margin, or cables can be tightened" in title(most)
+    finite = drawn(a_map(*[1.0] * 8, 99.0))
+    assert "beyond" not in title(finite)
+
+
+def test_the_edge_beside_a_margin_without_end_is_half_way(drawn: Drawn) -> None:
+    """It had been at the next pose: infinity is far."""
+    one = drawn(a_map(*[-1.0] * 3, *[np.inf] * 6))
+    (line,) = one.axes[0].collections[1].get_paths()
+    np.testing.assert_allclose(line.vertices[:, 0], 350.0)
+
+
+@pytest.mark.parametrize("name", ["demobot_cogiro", "planar_two_cable"])
+def test_margins_without_numbers_are_drawn_as_yes_or_no(drawn: Drawn, name: str) -> None:
+    """A bar of newtons from 0 to 1 had stood beside them."""
+    yes = np.inf if name == "demobot_cogiro" else 0.0
+    one = drawn(a_map(*[-1.0] * 3, *[yes] * 6) if yes else few(-np.inf, yes))
+    bar = one.axes[-1]
+    assert bar.get_ylabel() == "can be held"
+    assert [text.get_text() for text in bar.get_yticklabels()] == ["no", "yes"]
+    assert len(set(cells(one))) == 2 and "white" not in title(one)
+    assert ("cables can be tightened without end" in title(one)) == (yes > 0.0)
+
+
+def few(no: float, yes: float) -> Workspace:
+    """A map of a robot with fewer cables than freedoms."""
+    robot = load_robot(model_path("planar_two_cable"))
+    found = workspace_map(robot, AXIS, 0.0, AXIS, elastic=False)
+    return replace(found, margin=np.array([no] * 3 + [yes] * 6).reshape(3, 1, 3))
+
+
+def test_the_edge_with_a_probability_is_told_from_that_without(drawn: Drawn) -> None:
+    """Both had been orange, and the title explained one."""
+    found = a_map(*[-1.0] * 3, *[1.0] * 6)
+    edge = np.array([[0.37, 0.4, 0.1, 1.0, 0.0, 0.0, 0.0]])
+    plain, likely = drawn(found, edge=edge), drawn(found, edge=edge, at_least=0.95)
+    own, other = (one.axes[0].lines[0].get_markerfacecolor() for one in (plain, likely))
+    orange = to_hex(plain.axes[0].collections[1].get_edgecolor()[0])
+    assert to_hex(own) == orange and other == "white"
+    assert "orange: the edge of what tensions" in title(plain) and "dots" not in title(plain)
+    assert "orange: the edge of what tensions" in title(likely)
+    assert title(likely).endswith(
+        "white dots: the edge of what they hold with a probability of 0.95"
+    )
+    # an edge in none of the slices is not explained
+    elsewhere = edge.copy()
+    elsewhere[:, 2] += 0.05
+    assert "dots" not in title(drawn(found, edge=elsewhere, at_least=0.95))
+
+
+def test_a_map_says_whose_it_is(drawn: Drawn) -> None:
+    assert drawn(a_map(*[1.0] * 9)).get_suptitle() == "demobot_cogiro"
