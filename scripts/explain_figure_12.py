@@ -42,6 +42,8 @@ _SIZES = {
 _UNSEEN = ("tension_scale", "thermal_expansion")
 _ROUNDS, _STEP = 12, 1e-3
 _PLAUSIBLE = 2.0
+# Points of a curve up to half of that: a few are drawn as kinks that no curve has.
+_SAMPLES = 60
 # The paper's equations miss by this; what is no nearer is not worth a line.
 _FAR = 1.9
 # The four ends: left and right at z = 0.1 m, then at 0.2 m.
@@ -239,10 +241,10 @@ def picture(path: Path, singles: Sequence[Explanation]) -> None:
         ax.annotate(words, (low[0] + 0.1, low[1] + 0.2), fontsize=8)
         for colour, one in zip(make_paper.COLOURS, moved, strict=False):
             place = placing(one.names)
-            sizes = np.linspace(0.0, _PLAUSIBLE, 9)
+            sizes = np.linspace(0.0, _PLAUSIBLE, 2 * _SAMPLES + 1)
             way = np.array([place(size * one.at / one.size) for size in sizes])
             ax.plot(*way.T, color=colour, label=one.names[0].replace("_", " "))
-            ax.plot(*way[4::4].T, "o", color=colour, markersize=4.5)
+            ax.plot(*way[_SAMPLES::_SAMPLES].T, "o", color=colour, markersize=4.5)
         ax.plot(*numbers([]), "*", color="black", markersize=11, label="the paper's equations")
         ax.set(xlabel="tilt at the ends [°]", ylabel="deviation along z at the ends [mm]")
         ax.set(xlim=(17.5, 27.5), ylim=(-20.0, -5.0))

@@ -37,6 +37,9 @@ _COUNTS_HEAD = "| robot | method | fewest | median | most | left unbalanced |"
 _BALANCED = 1e-6
 # One and two pairs of slack cables, as the paper colours them.
 _ZONES = {1: "#F0E442", 2: "#E69F00", 4: "#D55E00"}
+# The ends of its sweep [m], and what its text says was measured there: along z [mm], tilt [deg].
+ENDS, SUNK, TILTED = (0.17, 0.63), -15.0, 20.0
+_SAID, _PIECE = "parallel, measured at the ends", np.array([-0.015, 0.015])
 EXITS, HALF = np.array([[0.0, 1.0], [1.0, 1.0]]), 0.1
 
 
@@ -94,14 +97,31 @@ def figure_3(path: Path) -> None:
             ax.set_title(f"tilt of a bar of half length {1e3 * h:.0f} mm")
             ax.set_xlabel("x [m]")
             for place in ((0.2, 0.3), (0.3, 0.6), (0.5, 0.45)):
-                ax.plot(*place, "o", color="black", markersize=4)
+                ax.plot(*place, "o", color="black", markersize=3.5, label="commanded", zorder=4)
                 if h:
-                    _, rests = drift(*place)
-                    ax.plot(rests[:, 0], rests[:, 1], color="black", linewidth=1.4)
-                    start = np.array([place, rests[0, :2]])
-                    ax.plot(start[:, 0], start[:, 1], ":", color="black", linewidth=1.0)
+                    _drift(ax, place)
+        _legend(axes[0, 1], loc="lower right", frameon=True, framealpha=0.9)
         axes[0, 0].set_ylabel("y [m]")
         axes[0, 0].figure.colorbar(shown, ax=list(axes[0]), label="tilt θ [°]")
+
+
+def _legend(ax: Any, **more: Any) -> None:
+    """Each name once."""
+    handles, labels = ax.get_legend_handles_labels()
+    named = dict(zip(labels, handles, strict=True))
+    ax.legend(named.values(), named, fontsize=8, **more)
+
+
+def _drift(ax: Any, place: tuple[float, float]) -> None:
+    """Where cables bring the level bar from there, from stiff to soft, with k_c at both ends."""
+    stiffness, rests = drift(*place)
+    start = np.array([place, rests[0, :2]])
+    ax.plot(start[:, 0], start[:, 1], ":", color="black", linewidth=1.0)
+    ax.plot(rests[:, 0], rests[:, 1], color="black", linewidth=1.4)
+    look: dict[str, Any] = {"color": "white", "markeredgecolor": "black", "linestyle": ""}
+    for k, word, mark in ((0, "stiff", "s"), (-1, "soft", "v")):
+        said = f"at rest, {word}: k_c = {stiffness[k]:,.0f} N"
+        ax.plot(*rests[k, :2], mark, markersize=6, label=said, **look)
 
 
 def figure_4(path: Path) -> None:
@@ -197,14 +217,14 @@ def figure_12(path: Path) -> None:
                         found = sweep(f"demobot_{name}", z, ea)
                         ax.plot(found.command[:, 0], values(found), style, color=COLOURS[k],
                                 label=f"{name}, {cable}")  # fmt: skip
-            axes[0, column].axhline(-15, color="black", lw=0.8, ls=":")
-            axes[0, column].set_title(f"z = {z:g} m; dotted: what the text says was measured")
-            for sign in (1, -1):
-                axes[1, column].axhline(20 * sign, color="black", lw=0.8, ls=":")
+            axes[0, column].set_title(f"z = {z:g} m")
+            for end, sign in zip(ENDS, (1, -1), strict=True):
+                for ax, value in zip(axes[:, column], (SUNK, sign * TILTED), strict=True):
+                    ax.plot(end + _PIECE, [value] * 2, color="black", lw=2.0, label=_SAID)
             axes[1, column].set_xlabel("commanded x [m]")
         axes[0, 0].set_ylabel("deviation along z [mm]")
         axes[1, 0].set_ylabel("rotation about y [°]")
-        axes[1, 1].legend(fontsize=8)
+        _legend(axes[1, 1])
 
 
 FIGURES = {

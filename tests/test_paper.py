@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
+from typing import Any
 
 import explain_figure_12
 import make_paper
@@ -10,6 +12,7 @@ import numpy as np
 import paper_search
 import paper_stiffness
 import pytest
+from matplotlib.figure import Figure
 
 
 @pytest.mark.slow
@@ -46,6 +49,55 @@ def test_every_figure_is_on_the_page() -> None:
         (make_paper.ROOT / "Makefile").read_text().partition("\npaper:")[2].partition("\n\n")[0]
     )
     assert all(f"scripts/{one.__name__}.py" in recipe for one in (make_paper, explain_figure_12))
+
+
+@pytest.fixture
+def kept(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """Axes of each figure that is written."""
+    out: list[Any] = []
+    write = Figure.savefig
+    monkeypatch.setattr(
+        Figure, "savefig", lambda f, *a, **b: (out.append(f.axes), write(f, *a, **b))
+    )
+    return out
+
+
+@pytest.mark.slow
+def test_figure_3_says_which_end_of_a_drift_is_soft(kept: list[Any], tmp_path: Path) -> None:
+    make_paper.figure_3(tmp_path / "3.png")
+    (_limit, ax, *_bar) = kept[0]
+    said = [text.get_text() for text in ax.get_legend().texts]
+    assert said == ["commanded", "at rest, stiff: k_c = 100,000 N", "at rest, soft: k_c = 12 N"]
+    at = {name: [line.get_xydata()[0] for line in ax.lines if line.get_label() == name]
+          for name in said}  # fmt: skip
+    assert [len(places) for places in at.values()] == [3, 3, 3]
+    stiff, soft = (np.array(at[name]) for name in said[1:])
+    assert np.all(soft[:, 1] < stiff[:, 1] - 0.1), "soft cables let it down"
+
+
+@pytest.mark.slow
+def test_figure_12_shows_what_was_measured_where_it_was(kept: list[Any], tmp_path: Path) -> None:
+    """Lines across all x had said that it was so everywhere."""
+    make_paper.figure_12(tmp_path / "12.png")
+    for ax in kept[0]:
+        pieces = [line.get_xydata() for line in ax.lines if "measured" in line.get_label()]
+        assert len(pieces) == 2 and len(ax.lines) == 4 + 2
+        for piece, end in zip(pieces, make_paper.ENDS, strict=True):
+            assert piece[:, 0].mean() == pytest.approx(end) and np.ptp(piece[:, 0]) < 0.05
+    assert sum(len(ax.get_legend().texts) for ax in kept[0] if ax.get_legend()) == 5
+
+
+def test_curves_of_what_explains_figure_12_have_no_kinks_of_few_points(
+    kept: list[Any], tmp_path: Path
+) -> None:
+    far = explain_figure_12.explain(("nonlinear_elasticity",))
+    explain_figure_12.picture(tmp_path / "explained.png", [far])
+    (ax,) = kept[0]
+    curve, dots = (line.get_xydata() for line in ax.lines[:2])
+    over = np.array([np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim())])
+    assert np.linalg.norm(np.diff(curve, axis=0) / over, axis=1).max() < 0.05
+    place, one = explain_figure_12.placing(far.names), far.at / far.size
+    np.testing.assert_allclose(dots, [place(one), place(2.0 * one)], atol=1e-6)
 
 
 @pytest.mark.slow
