@@ -147,7 +147,7 @@ def command(
         write_arrays(folder / "map.npz", found, places)
         drawn = figure != "none" and sum(len(axis) > 1 for axis in axes) > 1
         if drawn:
-            map_figure(folder / f"map.{figure}", found, edge=places)
+            map_figure(folder / f"map.{figure}", found, edge=places, at_least=at_least)
         if not no_recording:
             # takes a second or two to import
             from seecr.recording.workspace import write_map_recording
