@@ -25,7 +25,7 @@ from seecr.description.shipped import CABLES, model_path
 from seecr.equilibrium.solving import solve
 from seecr.planar import bar_equilibria, bar_tilt, midline_point, solution_manifold
 from seecr.pose import Array, transform_points
-from seecr.report.figures import COLOURS, figure
+from seecr.report.drawing import COLOURS, figure
 from seecr.statics.solution import Solution
 from seecr.workspace.zones import slack_zones, tension_margin
 

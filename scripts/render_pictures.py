@@ -38,7 +38,7 @@ from crosscheck.twin.make import make_twin
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.equilibrium.solving import solve
-from seecr.report.figures import map_figure
+from seecr.report.map_slices import map_figure
 from seecr.workspace.grid import Workspace
 from seecr.workspace.maps import workspace_map
 

@@ -27,8 +27,6 @@ from seecr.result import Record, Result
 Mask = NDArray[np.bool_]
 Names = NDArray[np.str_]
 
-# Between the names of files that were joined.
-JOINED = " + "
 # Default of fields that __post_init__ makes from the others when they are not given.
 _FILLED_IN: Any = None
 _PER_ROW = (
@@ -180,9 +178,8 @@ class Measurements(Result):
 
     @property
     def name(self) -> str:
-        """The file's name; of several joined in one, the name of each as it tells them apart."""
-        joined = str(self.path)
-        return joined if JOINED in joined else self.path.name
+        """The file's name; of several, each by what tells it from the others."""
+        return " + ".join(self.files) or self.path.name
 
     @property
     def n_rows(self) -> int:

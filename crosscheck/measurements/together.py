@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.measurements.data import JOINED, Measurements, Names, Sigma
+from crosscheck.measurements.data import Measurements, Names, Sigma
 from crosscheck.measurements.notice import twice
 from seecr.commands.loads import Loads
 from seecr.errors import InputFileError
@@ -41,7 +41,7 @@ def together(parts: Sequence[Measurements]) -> Measurements:
     warmth, lost_warmth = _of_all("temperature_C", [part.temperature_C for part in parts], names)
     quat, angles = _orientations(parts)
     whole = Measurements(
-        path=Path(JOINED.join(names)),
+        path=Path(" + ".join(names)),
         n_cables=first.n_cables,
         run=_runs(parts, names),
         t_s=t_s,

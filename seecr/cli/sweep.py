@@ -115,8 +115,8 @@ def command(
     from seecr import spread_of
     from seecr.files import json_text, staged, write_text
     from seecr.report.commanded import toml_beside
-    from seecr.report.figures import sweep_figure
     from seecr.report.rows import SweepRows
+    from seecr.report.sweep_panels import sweep_figure
     from seecr.report.words import at_rest, jump_lines, sweep_lines
 
     machine = robot_at(robot, cable)

@@ -105,7 +105,7 @@ def command(
     from seecr import InputError, boundary, default_axes, workspace_map
     from seecr.counted import counted
     from seecr.files import json_text, staged, write_text
-    from seecr.report.figures import map_figure
+    from seecr.report.map_slices import map_figure
     from seecr.report.maps import beyond_line, edge_line, likely_lines, softest_line, write_arrays
 
     machine = robot_at(robot, cable)

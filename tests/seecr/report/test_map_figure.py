@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
-from seecr.report.figures import map_figure
+from seecr.report.map_slices import map_figure
 from seecr.workspace.grid import Workspace
 from seecr.workspace.maps import workspace_map
 

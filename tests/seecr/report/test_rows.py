@@ -18,8 +18,8 @@ from seecr.files import json_text
 from seecr.inverse.correction import correct
 from seecr.recording.sweep import write_sweep_recording
 from seecr.report.corrections import chance_lines
-from seecr.report.figures import sweep_figure
 from seecr.report.rows import SweepRows
+from seecr.report.sweep_panels import sweep_figure
 from seecr.report.words import at_rest, cable_lines, pose_lines, sweep_lines
 from seecr.statics.solution import Solution, Status
 

@@ -9,30 +9,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from calibrated import ROBOT, model_of
+from calibrated import KEPT, MODEL, ROBOT, model_of
 from click.testing import CliRunner
 from matplotlib.figure import Figure
 
 from seecr.cli import main
 from seecr.equilibrium.solving import solve
 from seecr.prediction.uncertainty import Spread, spread_of
-from seecr.report.figures import sweep_figure
+from seecr.report.sweep_panels import sweep_figure
 from seecr.statics.solution import Solution
 
 pytestmark = pytest.mark.slow
-MODEL = """format = 1
-[[effect]]
-name = "stiffness"
-[effect.parameters]
-factor = { value = 0.9, stderr = 0.05 }
-[[effect]]
-name = "platform_mass"
-[effect.parameters]
-added_kg = { value = 0.05, stderr = 0.02 }
-[calibration]
-parameters = ["platform_mass.added_kg", "stiffness.factor"]
-correlation = [[1.0], [0.8, 1.0]]
-"""
 Drawn = Callable[..., list[Any]]
 
 
@@ -100,7 +87,7 @@ def test_lines_break_between_the_runs_of_a_file(tmp_path: Path, command: Drawn) 
 def test_bands_are_one_standard_deviation_wide(
     sweep: Solution, tmp_path: Path, drawn: Drawn, command: Drawn
 ) -> None:
-    spread = spread_of(ROBOT, sweep.command, model_of(tmp_path, MODEL))
+    spread = spread_of(ROBOT, sweep.command, model_of(tmp_path, MODEL + KEPT))
     assert spread is not None
     panels = drawn(sweep, spread=spread)
     drop, along = panels[0].collections[2], sweep.command[:, 0] * 1e3

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from calibrated import POSES, ROBOT, model_of
+from calibrated import KEPT, MODEL, POSES, ROBOT, model_of
 
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
@@ -23,27 +23,6 @@ from seecr.workspace.chances import held_chance, kept_chance, margins_with
 from seecr.workspace.edges import boundary
 from seecr.workspace.maps import workspace_map
 from seecr.workspace.zones import tension_margin
-
-MODEL = """format = 1
-[[effect]]
-name = "platform_mass"
-[effect.parameters]
-added_kg = { value = 0.05, stderr = 0.02 }
-[[effect]]
-name = "stiffness"
-[effect.parameters]
-factor = { value = 0.9, stderr = 0.01 }
-[[effect]]
-name = "centre_of_mass"
-[effect.parameters]
-shift_x_m = { value = 0.0, stderr = 0.002 }
-shift_y_m = { value = 0.0, stderr = 0.002 }
-shift_z_m = { value = 0.0, stderr = 0.002 }
-"""
-KEPT = """[calibration]
-parameters = ["platform_mass.added_kg", "stiffness.factor"]
-correlation = [[1.0], [0.5, 1.0]]
-"""
 
 
 def drawn(model: Model, n: int) -> list[Terms]:

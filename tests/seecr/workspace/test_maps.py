@@ -29,7 +29,7 @@ from seecr.inverse.nearest.search import Best
 from seecr.planar import bar_tilt
 from seecr.pose import quat_from_rotvec
 from seecr.recording.workspace import write_map_recording
-from seecr.report.figures import map_figure
+from seecr.report.map_slices import map_figure
 from seecr.report.maps import softest_line
 from seecr.workspace import maps
 from seecr.workspace.edges import boundary
