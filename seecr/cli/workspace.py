@@ -122,11 +122,11 @@ def command(
             )  # fmt: skip
         if not np.any(found.feasible):
             by_place = machine.n_cables < machine.n_dof
-            what = "in no orientation " if by_place else "no "
+            what = "in no orientation do " if by_place else "no "
             raise InputError(
                 f"no pose of the grid can be held: {what}tensions from {lowest:g} to "
                 f"{np.inf if highest is None else highest:g} N balance the load"
-                f"{' such that the platform stays' if by_place else ''} at any of "
+                f"{' so that the platform stays' if by_place else ''} at any of "
                 f"{counted(total, 'pose')}; expected another grid, orientation or wider limits"
             )
         places = None

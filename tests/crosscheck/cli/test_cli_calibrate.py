@@ -89,6 +89,9 @@ def test_where_nothing_is_gained_nothing_is_written(tmp_path: Path) -> None:
     result = run("calibrate", *files, *FEW, "--model", model)
     assert result.exit_code == 1 and not model.exists()
     assert "Runs left out are not predicted any better: not written" in result.stdout
+    forced = run("calibrate", *files, "--only", "platform_mass", "--model", model, "--force")
+    assert forced.exit_code == 0 and model.exists()
+    assert "not predicted any better\n" in forced.stdout and "not written" not in forced.stdout
 
 
 def test_data_that_cannot_carry_it_are_refused(many: tuple[Path, Path], tmp_path: Path) -> None:

@@ -183,3 +183,15 @@ def test_errors_of_lengths_reach_beyond_what_hysteresis_holds() -> None:
     free, noisy = read_by_length(plain), read_by_length(stuck)
     near = np.linalg.norm(noisy - free, axis=(1, 2)) / np.linalg.norm(free, axis=(1, 2))
     assert np.max(near) < 1e-2
+
+
+def test_errors_of_lengths_reach_beyond_what_friction_holds() -> None:
+    """A cable that sticks where it turned back a hundredth of a millimetre is none the stiffer."""
+    robot = robot_of("free")
+    poses = np.repeat(random_poses(np.random.default_rng(4), robot, 2), 2, axis=0)
+    poses[1::2, 0] -= 1e-5 * robot.length
+    term = Term.of(robot, "exit_friction", friction=0.03, length_m=0.25)
+    at = Experiment(robot, Commands(poses)).predict([term.effect()])
+    slips, sticks = read_by_length(at)[::2], read_by_length(at)[1::2]
+    assert np.linalg.norm(sticks - slips) < 0.01 * np.linalg.norm(slips)
+    assert np.linalg.norm(length_sensitivities(at)[1::2] - slips) > 0.05 * np.linalg.norm(slips)
