@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal
 
 from crosscheck.comparison.cable_space import cable_lengths
+from crosscheck.comparison.periodogram import periodogram
 from crosscheck.comparison.travel import AXES, Travel
 from crosscheck.fit.problem import Problem
 from seecr.pose import Array, rotvec_from_quat
@@ -132,14 +132,15 @@ def _period(problem: Problem, table: Array) -> tuple[float | None, int]:
     span, steps = float(np.ptp(t[some])), np.diff(np.unique(t[some]))
     if span <= 0.0:
         return None, 0
-    most = min(0.5 / float(np.median(steps)), _FREQUENCIES * 0.25 / span)
-    frequencies = np.arange(_CYCLES / span, most, 0.25 / span)
-    if len(frequencies) == 0:
+    # a quarter of a cycle over the whole span apart, from what was seen a few times on
+    step, first = 0.25 / span, round(4 * _CYCLES)
+    count = min(int(0.5 / float(np.median(steps)) / step), _FREQUENCIES)
+    if count <= first:
         return None, 0
-    power = np.zeros(len(frequencies))
+    power = np.zeros(count)
     for column in table.T:
         read = np.isfinite(column)
         if read.sum() >= _FEWEST:
-            part = column[read] - column[read].mean()
-            power += signal.lombscargle(t[read], part, 2.0 * np.pi * frequencies)
-    return 1.0 / float(frequencies[np.argmax(power)]), len(frequencies)
+            power += periodogram(t[read], column[read] - column[read].mean(), step, count)
+    best = first + int(np.argmax(power[first - 1 :]))
+    return 1.0 / (best * step), count - first + 1
