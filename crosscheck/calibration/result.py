@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 from crosscheck.calibration.all_effects import Calibration, JointErrors, fit_all_effects
 from crosscheck.errors import CrosscheckError, UnsolvedError
 from crosscheck.fit.prepare import Progress, prepare
+from crosscheck.fit.thinned import thinned
 from crosscheck.fit.words import fitted_lines, fitted_records, rms_words
 from crosscheck.given import GivenModel, GivenRobot, basis_of, considered, model_of, robot_of
 from crosscheck.measurements.read import GivenData, measurements_of
@@ -138,17 +139,19 @@ def calibrate(
         CrosscheckError: the data cannot carry it.
     """
     robot = robot_of(robot)
-    data = measurements_of(data, robot)
+    thin = thinned(robot, measurements_of(data, robot))
     terms, said = model_of(model, robot)
-    ready = prepare(robot, data, terms, considered(only, exclude))
+    ready = prepare(robot, thin.data, terms, considered(only, exclude))
     if ready.refusal is not None:
         kind = UnsolvedError if ready.refusal.unsolved else CrosscheckError
         why = f"{ready.refusal}; nothing was fitted: {ready.refusal.remedy}"
-        raise kind(f"{data.path}: {why}")
+        raise kind(f"{thin.data.path}: {why}")
     # BLAS on several threads takes longer for matrices as narrow as these
     with threadpool_limits(limits=1, user_api="blas"):
         found = fit_all_effects(ready.problem, ready.terms, progress)
-    return _result(found, terms, (*said, *ready.all_notes), basis_of(model, robot))
+        others = thin.note_on_others(found.terms, ready.problem.sigma)
+    notes = (*said, *ready.all_notes, *others)
+    return _result(found, terms, notes, basis_of(model, robot))
 
 
 def _result(found: Calibration, before: Terms, notes: tuple[str, ...], basis: Model) -> Calibrated:

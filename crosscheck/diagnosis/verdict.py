@@ -24,6 +24,7 @@ from crosscheck.fit.possible import hardly_happens
 from crosscheck.fit.prepare import Prepared, Progress, noise_floor, prepare
 from crosscheck.fit.problem import Problem, kinds_read, kinds_stated, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Refusal, Unfit, Why
+from crosscheck.fit.thinned import thinned
 from crosscheck.fit.tolerance import HALF_THE_NOISE, Tolerance
 from crosscheck.fit.words import rms_words
 from crosscheck.given import GivenModel, GivenRobot, considered, model_of, robot_of
@@ -64,14 +65,17 @@ def diagnose(
     if not isinstance(tolerance, Tolerance):
         raise InputError(f"tolerance: expected a crosscheck.Tolerance, got {tolerance!r}")
     robot = robot_of(robot)
-    data = measurements_of(data, robot)
+    thin = thinned(robot, measurements_of(data, robot))
     terms, said = model_of(model, robot)
     # BLAS on several threads takes longer for matrices as narrow as these, and takes the
     # processors from the compiled loop
     with threadpool_limits(limits=1, user_api="blas"):
-        ready = prepare(robot, data, terms, considered(only, exclude))
-        found = _diagnosed(ready, said, progress)
-    return weighed(found, ready.problem, tolerance)
+        ready = prepare(robot, thin.data, terms, considered(only, exclude))
+        found = weighed(_diagnosed(ready, said, progress), ready.problem, tolerance)
+        if found.search is None:
+            return found
+        others = thin.note_on_others(found.search.last.fit.terms, found.search.problem.sigma)
+    return replace(found, notes=(*found.notes, *others))
 
 
 Notes = tuple[str, ...]

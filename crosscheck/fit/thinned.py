@@ -1,0 +1,126 @@
+"""Long logs of a robot that moves slowly: a search takes some of the rows, and tells of the others.
+
+Rows read every few millimetres say little that every tenth of them does not, and a search through
+the catalogue takes minutes and gigabytes for each ten thousand. So rows are taken at even steps
+along each run, and those at which a cable turns round: what depends on the way (friction,
+backlash) depends on where lengths turn. Where they turn at nearly every row, the poses are in no
+order, and the first rows of each run are taken: the way to these is as it was.
+
+The rows that were not taken are rows that no fit has seen.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import signal
+
+from crosscheck.fit.problem import Problem, rms_by_kind
+from crosscheck.fit.words import rms_words
+from crosscheck.measurements.data import Measurements, Sigma
+from seecr.counted import counted
+from seecr.description.robot import Robot
+from seecr.effects import Terms
+
+MOST = 2000
+"""Of more rows than this, about so many are searched."""
+
+# A cable turns round where its length goes back by this part of its range.
+_TURN = 1e-3
+# Rows whose error is so many times that in the middle are no part of what is told.
+_FAR = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class Thinned:
+    """Measurements for a search.
+
+    Attributes:
+        robot: measured. whole: all that was measured.
+        data: the rows that are searched. others: (n,) bool, rows of ``whole`` that were read and
+            are not among them.
+    """
+
+    robot: Robot
+    whole: Measurements
+    data: Measurements
+    others: NDArray[np.bool_]
+
+    def note_on_others(self, terms: Terms, sigma: Sigma) -> tuple[str, ...]:
+        """How well a model predicts the rows that it was not fitted to; nothing where none are.
+
+        Args:
+            terms: the model. sigma: the noise that was assumed.
+        """
+        if not self.others.any():
+            return ()
+        problem = Problem(self.robot, self.whole, sigma, self.others)
+        at = problem.experiment.predict(terms.effects)
+        problem = problem.only(at.solved)
+        raw = problem.residuals(at.readings)
+        squares = np.where(problem.counted, (raw / problem.reading_sigma) ** 2, 0.0).sum(axis=1)
+        size = np.sqrt(squares / np.maximum(problem.counted.sum(axis=1), 1))
+        used = problem.use
+        if not used.any():
+            return ()
+        far = used & (size > _FAR * np.median(size[used]))
+        rms = rms_words(rms_by_kind(problem.with_far_off(far), raw))
+        aside = f", {counted(int(far.sum()), 'row')} far off aside" if far.any() else ""
+        count = counted(int(used.sum()), "other row")
+        return (f"{count}, which no fit has seen, predicted to {rms} rms{aside}",)
+
+
+def thinned(robot: Robot, data: Measurements, most: int = MOST) -> Thinned:
+    """The rows that a search takes.
+
+    Args:
+        robot: measured.
+        data: of which all rows are taken where no more than ``most`` were read.
+        most: about how many are taken of others.
+    """
+    read = data.read
+    every = -(-int(read.sum()) // most)
+    if every <= 1:
+        return Thinned(robot, data, data, np.zeros(data.n_rows, dtype=bool))
+    turns = _turns(robot, data)
+    place = _place_in_run(data)
+    if turns.sum() <= most:
+        last = np.append(place[1:] == 0, True)
+        kept = (place % every == 0) | last | turns
+        what = f"one in {every} along each run, and those at which a cable turns round"
+    else:
+        size = np.bincount(data.run_index)[data.run_index]
+        kept = place < -(-size // every)
+        what = "the first of each run, as the poses are in no order"
+    note = (
+        f"{counted(int((kept & read).sum()), 'row')} of {int(read.sum())} are searched: {what}; "
+        "`add` fits all of them"
+    )
+    return Thinned(robot, data, data.rows(kept).with_notes([note]), read & ~kept)
+
+
+def _place_in_run(data: Measurements) -> NDArray[np.int64]:
+    """(n,) number of each row in its run."""
+    index = np.arange(data.n_rows)
+    begins = np.append(True, data.run[1:] != data.run[:-1])
+    return index - np.maximum.accumulate(np.where(begins, index, 0))
+
+
+def _turns(robot: Robot, data: Measurements) -> NDArray[np.bool_]:
+    """(n,) rows at which the length of a cable turns round, or loads change, and the row before."""
+    commands = data.as_commands(robot)
+    told = commands.change(robot)
+    turns = np.zeros(data.n_rows, dtype=bool)
+    if commands.loads is not None:
+        changes = commands.loads.changes
+        turns |= changes
+        turns[:-1] |= changes[1:]
+    least = np.maximum(_TURN * np.ptp(told, axis=0), 1e-12)
+    begins = np.flatnonzero(commands.starts)
+    for rows in np.split(np.arange(data.n_rows), begins[1:]):
+        for cable, prominence in enumerate(least):
+            for way in (told[rows, cable], -told[rows, cable]):
+                turns[rows[signal.find_peaks(way, prominence=prominence)[0]]] = True
+    return turns
