@@ -55,8 +55,8 @@ RUNS = {
     "left end, z 0.1 m": (0,),
     "left end, z 0.2 m": (2,),
 }
-HEAD_PLACED = "| one run | effects | tilt | along z | plausible sizes | furthest off |"
-HEAD = "| effects | tilt | along z | [plausible sizes](glossary.md) | furthest off |"
+HEAD_PLACED = "| one run | effects | tilt | along z | plausible sizes | largest parameter |"
+HEAD = "| effects | tilt | along z | [plausible sizes](glossary.md) | largest parameter |"
 
 
 @dataclass(frozen=True, eq=False)

@@ -255,18 +255,18 @@ def _two_cables() -> Iterator[tuple[str, str, str, str]]:
         (f"{limit:.2f}° / {bar:.2f}°"),
     )
     stable = [one.theta for one in bar_equilibria(EXITS, here, HALF)]
-    yield "3", "tilts in balance there, stable or not", "unique", f"{len(stable)}"
+    yield "3", "equilibrium tilts there, stable or unstable", "unique", f"{len(stable)}"
     _, rests = drift(0.2, 0.3)
     yield (
         "3",
-        "commanded (0.2, 0.3) m: at rest with k_c from 10⁵ N to 12 N",
+        "commanded (0.2, 0.3) m: equilibria for k_c from 10⁵ N to 12 N",
         ("lower and towards the middle"),
         f"({rests[0, 0]:.3f}, {rests[0, 1]:.3f}) to ({rests[-1, 0]:.3f}, {rests[-1, 1]:.3f}) m",
     )
     off = np.degrees(bar_tilt(EXITS, rests[:, :2], HALF)) - np.degrees(rests[:, 2])
     yield (
         "3",
-        "all of that way lies on the manifold, to within",
+        "that path lies on the manifold, to within",
         "yes",
         (nothing(np.abs(off).max(), "°")),
     )
@@ -300,13 +300,13 @@ def _four_cables() -> Iterator[tuple[str, str, str, str]]:
     off = [_midlines_off(found) for found in (vertical, level)]
     yield (
         "9",
-        "point V at x = 0.17 m / in the middle, off the centre of mass",
+        "point V off the line of the centre of mass, at x = 0.17 m / in the middle",
         ("off, and on its line"),
         " / ".join(f"{1e3 * off[0][i]:+.1f} mm" for i in (0, len(x) // 2)),
     )
     yield (
         "9",
-        "point H off the line of the centre of mass by at most",
+        "point H off the line of the centre of mass, at most",
         "on it",
         nothing(np.abs(off[1]).max(), " m"),
     )
@@ -317,7 +317,7 @@ def _four_cables() -> Iterator[tuple[str, str, str, str]]:
         (nothing(np.abs(tilt(level)).max(), "°")),
     )
     apart = np.abs(np.diff(level.tensions.reshape(-1, 2, 2), axis=2)).max()
-    yield "8", "tensions on a side differ by at most", "equal", nothing(apart, " N")
+    yield "8", "largest difference between the tensions on one side", "equal", nothing(apart, " N")
 
 
 def _eight_cables() -> Iterator[tuple[str, str, str, str]]:

@@ -15,8 +15,8 @@ from seecr.pose import rotvec_from_quat
 from seecr.statics.solution import Solution
 
 HEAD = (
-    "| k_c of Vectran | modulus it means | fishing line, a tenth | parallel at the end: tilt, z | "
-    "Cogiro in the middle: z, fishing line lower by | `fsolve`: most, not found |"
+    "| k_c of Vectran | implied modulus | fishing line, a tenth | parallel at the end: tilt, z | "
+    "Cogiro in the middle: z, fishing line lower by | `fsolve`: most evaluations, poses not found |"
 )
 # From below what a nylon line can have, times ten, to a solid rod of the fibre.
 _STIFFNESSES = (1000.0, 2000.0, 3000.0, 4000.0, 10000.0, 25000.0)

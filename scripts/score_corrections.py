@@ -1,7 +1,7 @@
 """Measure, diagnose, correct, measure again: by how much MuJoCo twins come nearer their commands.
 
     python scripts/score_corrections.py --seeds 1 2      some
-    python scripts/score_corrections.py                  those of the README, a few minutes
+    python scripts/score_corrections.py                  those of docs/diagnosis.md, minutes
     python scripts/score_corrections.py --calibrated     with models of crosscheck calibrate
     python scripts/score_corrections.py --aligned        which suppose that the tracker is right
 
