@@ -24,8 +24,8 @@ from seecr.counted import counted
 from seecr.description.robot import Robot
 from seecr.effects import Terms
 
-MOST = 2000
-"""Of more rows than this, about so many are searched."""
+MOST = 1500
+"""Of more rows than this, between half as many and so many are searched."""
 
 # A cable turns round where its length goes back by this part of its range.
 _TURN = 1e-3
