@@ -21,6 +21,7 @@ from seecr.equilibrium.search import solve_setup
 from seecr.errors import InputError
 from seecr.pose import Array
 from seecr.prediction.experiment import Experiment, effects_of
+from seecr.statics.led import led
 from seecr.statics.solution import Solution
 from seecr.statics.starts import commanded_poses
 
@@ -52,7 +53,8 @@ def solve(
         poses: (n, 7) or (7,) commanded poses; the winches pay out the straight lengths there
             (eqs 1, 2). Or :class:`seecr.Commands` with runs, times, lengths.
         rest_lengths: (n, m) or (m,) [m] instead of, or beside, the poses: then the poses are
-            only where the search starts, the reference pose by default.
+            only where the search starts; by default it starts where these lengths lead the plain
+            robot from its reference pose.
         effects: what the robot has beyond the paper's plain one: a model, its file, or effects
             with values. Where one has history, rows are solved in order.
         method: ``"newton"`` follows the energy downhill, compiled; ``"fsolve"`` and
@@ -112,6 +114,14 @@ def solve(
         starts = commanded_poses(start, "start")
         if len(starts) != len(commands):
             raise InputError(f"start must have {counted(len(commands), 'pose')}, got {len(starts)}")
+    elif method == "newton" and not follow:
+        # rows of a batch have nothing to do with each other: each is a way of its own
+        apart = (
+            commands
+            if isinstance(poses, Commands)
+            else replace(commands, run=np.arange(len(commands)))
+        )
+        starts = led(robot, apart)
     pushes = np.broadcast_to(np.zeros(6) if pushed is None else pushed, (len(commands), 6))
     if follow:
         if method != "newton" or start is not None:
