@@ -104,7 +104,8 @@ def with_fit(
 def _with_values(model: Model, fitted: Sequence[Fitted]) -> Model:
     return replace(
         model,
-        terms=Terms(one.term for one in fitted),
+        terms=(terms := Terms(one.term for one in fitted)),
+        written=terms,
         stderr={one.term.name: np.asarray(one.stderr, float) for one in fitted},
     )
 
@@ -232,8 +233,9 @@ def _fill_cells(parameters: Any, fitted: Fitted) -> None:
             continue  # stands as somebody wrote it
         cell = _cell(layout, i, fitted)
         if isinstance(parameters.get(key), Mapping):
-            for word, value in cell.items():
-                parameters[key][word] = value
+            parameters[key].update(cell)
+            if "stderr" not in cell:
+                parameters[key].pop("stderr", None)
         else:
             parameters[key] = _inline(cell | _known(fitted.term.knowledge, i))
 
@@ -259,6 +261,8 @@ def _cell(layout: Layout, i: int, fitted: Fitted) -> dict[str, Any]:
     value = float(f"{float(fitted.term.vector[i]):.{_VALUE}g}")
     # rounding must not carry a value over its bound
     value = min(max(value, float(layout.lower[i])), float(layout.upper[i]))
+    if math.isnan(error):  # somebody's number, not a fit's
+        return {"value": value, "unit": layout.units[i]}
     return {
         "value": value,
         "stderr": float(f"{error:.{_ERROR}g}") if math.isfinite(error) else UNSEEN,
@@ -325,4 +329,25 @@ def save_model(path: str | Path, model: Model) -> None:
     check_place(path)
     with written(path, failure="the model cannot be written") as (partial,):
         path.parent.mkdir(parents=True, exist_ok=True)
-        partial.write_text(tomlkit.dumps(model.document), encoding="utf-8", newline="\n")
+        partial.write_text(tomlkit.dumps(_in_step(model)), encoding="utf-8", newline="\n")
+
+
+def _in_step(model: Model) -> Any:
+    """The document with the effects and values that the model has, where these were changed."""
+    before = Terms() if model.written is None else model.written
+    if before is model.terms:
+        return model.document
+    document = copy.deepcopy(model.document)
+    tables = {str(table["name"]): table for table in document.get("effect", [])}
+    for name in before.names:
+        if name not in model.terms:
+            document["effect"].remove(tables[name])
+    for term in model.terms:
+        free = np.zeros(len(term.layout), dtype=bool)
+        if term.name not in before:
+            _appended(document, Kept(Fitted(term, model.errors_of(term.name), free), {}))
+        elif not np.array_equal(term.vector, before[term.name].vector):
+            changed = Fitted(term, np.full(len(free), np.nan), free)
+            _fill_cells(_table_in(tables[term.name], "parameters"), changed)
+    _forget_covariance(document)
+    return document

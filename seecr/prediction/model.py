@@ -32,10 +32,11 @@ import copy
 import difflib
 import math
 from collections.abc import Iterable, Mapping, MutableMapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+import numpy as np
 import tomlkit
 from tomlkit import TOMLDocument
 from tomlkit.exceptions import TOMLKitError
@@ -80,6 +81,7 @@ class Model(Result):
         notes: sentences about what has changed since the model was made.
         path: the file.
         reach: how far the data reach that the values were fitted to, if the file says so.
+        written: the effects with the values that the document has: ``terms`` may be replaced.
     """
 
     terms: Terms
@@ -88,11 +90,20 @@ class Model(Result):
     notes: tuple[str, ...] = ()
     path: Path | None = None
     reach: DataReach | None = None
+    written: Terms | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        if self.written is None:
+            object.__setattr__(self, "written", self.terms)
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the effects, in the order of adding."""
-        return tuple(self.stderr)
+        return self.terms.names
+
+    def errors_of(self, name: str) -> Array:
+        """Standard errors (p,) of an effect's parameters; NaN where nobody knows them."""
+        return np.asarray(self.stderr.get(name, np.full(len(self.terms[name].layout), np.nan)))
 
     def beyond(self, solution: Solution) -> tuple[str, ...]:
         """A sentence about the rows at rest that are beyond the data, if there are any.
@@ -114,7 +125,7 @@ class Model(Result):
         return [
             f"model of {robot}: plain SEECR and {count}" if self.names else
             f"model of {robot}: plain SEECR, no effects",
-            *(f"{name}: {_shown(self.terms[name], self.stderr[name])}" for name in self.names),
+            *(f"{name}: {_shown(self.terms[name], self.errors_of(name))}" for name in self.names),
             *self.notes,
         ]  # fmt: skip
 

@@ -141,6 +141,26 @@ def test_a_parameter_that_had_another_name_is_read_and_written_under_that_of_tod
     assert not any("is read as" in note for note in load_model(path, robot).notes)
 
 
+def test_effects_put_in_from_python_are_written(robot, tmp_path):
+    path, weight = tmp_path / "model.toml", term(robot, "cable_weight", weight_N_per_m=6.0)
+    save_model(path, replace(new_model(robot), terms=new_model(robot).terms.with_term(weight)))
+    model = load_model(path, robot)
+    assert model.terms["cable_weight"].vector == pytest.approx([6.0])
+    assert np.isnan(model.stderr["cable_weight"]).all()
+    assert "stderr" not in path.read_text() and "weight" in str(model)
+
+
+def test_effects_changed_or_taken_out_in_python_are_written_so(robot, saved):
+    model = load_model(saved, robot)
+    more = replace(model, terms=model.terms.with_term(term(robot, "pulley_radius", radius_m=0.02)))
+    save_model(saved, more)
+    again = load_model(saved, robot)
+    assert again.terms["pulley_radius"].vector == pytest.approx([0.02])
+    assert np.isnan(again.stderr["pulley_radius"]).all()  # those were of another value
+    save_model(saved, replace(again, terms=type(again.terms)()))
+    assert load_model(saved, robot).names == ()
+
+
 def test_no_model_is_no_effect(robot, tmp_path):
     save_model(tmp_path / "new" / "m.toml", new_model(robot))
     assert not load_model(tmp_path / "new" / "m.toml", robot).terms
