@@ -33,9 +33,7 @@ def between(low: float, high: float, form: str = ".4g", lead: str = "") -> str:
 
 
 def some(words: Sequence[str], most: int = 4, mark: str = ", ") -> str:
-    """The first few words, and how many more: a, b and 3 more; or with a mark "; ": a; b; and 3
-    more.
-    """
+    """The first few words, and how many more: a, b and 3 more, or a; b; and 3 more."""
     more = len(words) - most
     if more <= 0:
         return mark.join(words)

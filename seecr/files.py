@@ -58,9 +58,7 @@ _BEGINNINGS = (
 
 
 def no_text(data: bytes) -> str:
-    """The kind of bytes that are not UTF-8 text, such as ``"a PNG picture"``; empty if perhaps
-    text.
-    """
+    """What bytes are if not UTF-8 text, such as ``"a PNG picture"``; empty if perhaps text."""
     known = next((kind for beginning, kind in _BEGINNINGS if data.startswith(beginning)), "")
     return known or ("a binary file" if b"\0" in data else "")
 

@@ -1,4 +1,4 @@
-"""How this package compiles: kept on disk, without Python's lock."""
+"""How this package is compiled: cached on disk, and without Python's global lock."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from numba.core import event
 from seecr.compiled import telling
 
 _COMMON = {"cache": True, "nogil": True, "error_model": "numpy"}
-# Numba counts who uses an array at every call and slice, atomically. A call here takes as long as
-# the physics in it, so that counting took three quarters of the time; what makes no array, and
-# gets its own from a caller that holds them, need not count.
+# Numba counts references to arrays, atomically, at every call and slice. That took three quarters
+# of the time, as calls here are short. Functions that create no arrays, and whose callers hold the
+# arrays, need not count.
 _UNCOUNTED = {**_COMMON, "_nrt": False}
 
 
 class _Listener(event.Listener):
-    """Hears of what Numba compiles; what its cache holds it does not compile."""
+    """Is notified when Numba compiles; functions from its cache are not compiled."""
 
     def on_start(self, _: event.Event) -> None:
         telling.begins()
