@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 LARGEST = 1e30
-"""Squares of larger numbers get lost, and nothing that is measured is so large."""
+"""Largest number accepted: squares of larger ones overflow, and no measured value is so large."""
 
 # Below this angle the series of sin(x)/x is exact to double precision.
 _SMALL_ANGLE = 1e-4

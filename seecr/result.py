@@ -17,11 +17,11 @@ from seecr.errors import MissingPackageError
 _MOST_ROWS = 20
 
 Record = dict[str, Any]
-"""One row of a data frame: numbers in SI, names that end in their unit."""
+"""One row of a data frame: numbers in SI units, with names that end in their unit."""
 
 
 COORDINATES = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
-"""Of a pose, as columns of a data frame."""
+"""Columns of a pose in a data frame."""
 
 
 def named(pattern: str, names: Sequence[str], values: NDArray[Any]) -> Record:

@@ -28,14 +28,18 @@ event.register("numba:compile", _Listener())  # type: ignore[no-untyped-call]
 
 jit = njit(**_UNCOUNTED)  # type: ignore[call-overload]
 """Decorator of compiled functions. A division by zero gives inf or nan, as NumPy's does. They
-cannot make arrays: compiling such a one fails. Callers hand over arrays that may be written to:
-Numba compiles everything once more for those that may not."""
+cannot create arrays: compiling one that does fails. Callers must pass writable arrays, since Numba
+compiles everything once more for read-only ones.
+"""
 
 jit_inner = njit(  # type: ignore[call-overload]
     **_UNCOUNTED, no_cpython_wrapper=True, no_cfunc_wrapper=True
 )
-"""The same for those that only compiled functions call: a fifth of the time of compiling went
-into ways for Python to call them."""
+"""The same for functions that only compiled functions call: wrappers for calls from Python took a
+fifth of the compile time.
+"""
 
 jit_allocating = njit(**_COMMON, _nrt=True)  # type: ignore[call-overload]
-"""The same for those that make arrays: said, since what is not is taken from the caller."""
+"""The same for functions that create arrays. It has to be explicit: otherwise the caller's setting
+would apply.
+"""

@@ -47,7 +47,7 @@ _FLAT, _TOUCH = 1e-10, 1e-3
 
 
 SetupOf = Callable[[Commands, NDArray[np.integer]], Setup]
-"""From waypoints and the row (N,) that each belongs to, to their setup."""
+"""Function of N waypoints and the row (N,) that each belongs to; returns their setup."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -24,8 +24,9 @@ from seecr.pose import Array, transform_points
 from seecr.statics.solution import Solution
 
 SEGMENTS = 24
-"""Of a cable with weight. At the pose of the file they hang as the catenary does, elsewhere
-nearly."""
+"""Springs of a cable with weight. At the pose of the file they hang exactly as the catenary does,
+elsewhere nearly so.
+"""
 
 # Mass of carriers of exit points and winches [platform's mass]; gravcomp removes its weight.
 _SMALL = 0.01

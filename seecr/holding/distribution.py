@@ -15,7 +15,7 @@ from seecr.threads import in_parts
 # Part of the load that may stay unbalanced, by rounding of the tensions.
 _BALANCED = 1e-9
 AIMS = ("minimum", "middle")
-"""Names of wanted tensions: as little as possible, the middle of the limits."""
+"""Names of wanted tensions: as small as possible, or the middle of the limits."""
 
 
 def tension_limits(robot: Robot, lowest: ArrayLike, highest: ArrayLike) -> tuple[Array, Array]:

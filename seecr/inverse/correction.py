@@ -33,7 +33,9 @@ if TYPE_CHECKING:
     from seecr.prediction.model import GivenEffects
 
 PREFERENCES = ("pose", "position")
-"""What may give way at a pose that cannot be held: both, or the orientation alone."""
+"""What may change at a pose that cannot be held: position and orientation, or the orientation
+alone.
+"""
 
 # Rounds for history or users' laws, and the error of the pose at which they end [robot's length].
 _ROUNDS, _MISSED = 40, 1e-10

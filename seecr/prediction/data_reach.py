@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from seecr.prediction.cells import Where
 
 TABLE = "fitted_to"
-"""The table of a model that holds it."""
+"""The table of a model that holds the range."""
 
 _POSITION, _TENSION = "position_m", "tension_N"
 # Beyond the data is a tension of so many times the largest one, and a position outside the box of

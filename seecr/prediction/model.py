@@ -56,12 +56,13 @@ if TYPE_CHECKING:
     from seecr.statics.solution import Solution
 
 FORMAT = 1
-"""Of the file; raised when a key changes its meaning or goes."""
+"""Version of the file format; raised when a key changes its meaning or is removed."""
 
 _EXPECTED = "expected a model as crosscheck add writes it"
 CALIBRATION, FIT = "calibration", "fit"
-"""Tables about all values at once: what a calibration was worth, and how the errors of the last
-fit go together (:mod:`seecr.prediction.uncertainty`)."""
+"""Tables about all values at once: the quality of a calibration, and the correlations of the last
+fit (:mod:`seecr.prediction.uncertainty`).
+"""
 
 _TABLES = ("format", "robot", "effect", CALIBRATION, FIT, TABLE)
 

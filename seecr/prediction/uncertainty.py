@@ -25,8 +25,7 @@ from seecr.statics.starts import commanded_poses
 from seecr.units import short
 
 PARAMETERS, STDERR, CORRELATION = "parameters", "stderr", "correlation"
-"""Of the table that keeps them: labels, their standard errors in full, and rows up to the diagonal.
-"""
+"""Keys of the table: labels, their standard errors with all digits, and rows up to the diagonal."""
 
 # An eigenvalue of a correlation matrix this far below zero is not due to rounding of its digits;
 # files of earlier versions have six digits.

@@ -30,7 +30,8 @@ class Balance(Protocol):
 
 
 Stays = Callable[[Array, Rows], NDArray[np.bool_]]
-"""Whether the platform stays at poses (k, 7) of some rows with the rest lengths that hold them."""
+"""Whether the platform is stable at poses (k, 7) of some rows, with the lengths that hold it there.
+"""
 
 # Tensions of a pose this close to the limit still have some margin [load].
 _INSIDE = 1e-6

@@ -19,7 +19,7 @@ from seecr.effects.base import Layout
 from seecr.errors import InputFileError
 
 UNSEEN = "unseen"
-"""What stands in place of an infinite standard error."""
+"""Stands for an infinite standard error."""
 
 _WORDS = ("value", "stderr", "unit", "at_bound", "fixed", "known")
 _KNOWN = ("value", "stderr")
