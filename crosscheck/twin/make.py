@@ -117,7 +117,7 @@ def make_twin(
         progress: called with the number of rows done since the last call, and what is going on.
 
     Returns:
-        a :class:`Twin`.
+        the measurements, and what was hidden in them.
 
     Raises:
         CrosscheckError: an effect that no twin can hide, or a robot that MuJoCo cannot bring to

@@ -131,7 +131,7 @@ def export(robot: GivenRobot, effects: GivenEffects = (), at: ArrayLike | None =
         at: (7,) command for which the file for MuJoCo alone is made; the reference pose by default.
 
     Returns:
-        an :class:`Export`.
+        the texts, and which effects are in which of them.
 
     Raises:
         InputError: not one pose.

@@ -216,7 +216,7 @@ def correct(
             suffices.
 
     Returns:
-        a :class:`Correction`; check ``reached`` before using a row.
+        the lengths and what they lead to; check ``reached`` before using a row.
 
     Raises:
         InputError: wrong shapes, limits that contradict each other, an unknown aim or preference.

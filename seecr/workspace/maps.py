@@ -88,7 +88,7 @@ def workspace_map(
         progress: called as poses are done.
 
     Returns:
-        a :class:`Workspace`.
+        margins and equilibria at all poses of the grid.
 
     Raises:
         InputError: an axis without values, an orientation that the joints do not allow, effects
