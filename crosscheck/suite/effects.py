@@ -123,7 +123,7 @@ class EffectCase:
 
     @property
     def loads(self) -> Loads | None:
-        """Known loads, for the case of loads; every other payload is at its own centre."""
+        """Known loads, for the case of loads; half of them at the platform's own centre."""
         if self.effect != LOADS:
             return None
         robot, n = self.robot, len(self)

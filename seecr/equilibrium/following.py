@@ -58,7 +58,8 @@ class Jump(Result):
         command: (7,) commanded pose at that point.
         before: (7,) last pose of the equilibrium that was followed.
         after: (7,) pose where the platform comes to rest afterwards; NaN if nothing holds it.
-        energy: [J] released by the jump; infinite if nothing holds the platform.
+        energy: [J] released by the jump; infinite if nothing holds the platform, NaN if there is no
+            potential energy.
         certain: whether the platform lands there with rotations damped a tenth, once and ten times
             as much as translations, over the robot's length. Inertia is not considered.
     """
@@ -121,7 +122,7 @@ def follow_commands(robot: Robot, commands: Commands, setup_of: SetupOf) -> Solu
 
     Returns:
         a :class:`seecr.Solution` with ``jumps``. If the platform finds no equilibrium after a jump,
-        the next waypoint is solved from its own command, as without following.
+        the waypoint is solved from its own command, as without following.
     """
     path = path_of(robot, commands, waypoints=_WAY)
     tables = assemble(setup_of(path.commands, path.source))

@@ -51,8 +51,8 @@ def solve(
         robot: from :func:`seecr.load_robot`, its MJCF, or made by hand.
         poses: (n, 7) or (7,) commanded poses; the winches pay out the straight lengths from A_i to
             B_i at these poses (eqs 1, 2). Or :class:`seecr.Commands` with runs, times or lengths.
-        rest_lengths: (n, m) or (m,) [m] instead of poses. Poses given as well are only where the
-            search starts; by default that is the reference pose.
+        rest_lengths: (n, m) or (m,) [m] absolute lengths instead of poses. Poses given as well are
+            only where the search starts; by default that is the reference pose.
         effects: how the robot differs from the paper's model: a model, its file, or effects with
             values. If one has a history, rows are solved in order.
         method: ``"newton"`` is the compiled Newton descent on the potential energy; ``"fsolve"``

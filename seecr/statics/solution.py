@@ -91,8 +91,8 @@ class Solution(Result):
             the load; recomputed at the returned deviation.
         energy: (n,) [J] elastic energy minus the work of the load since the commanded pose, and of
             the cables' weight since they hung straight there. NaN if there is no potential: under
-            an external moment, with cable laws that are not linear, and with cable weight over
-            pulleys (the effect ``cable_weight`` says why).
+            an external moment, with hysteresis, exit friction or a user's cable law, and with cable
+            weight over pulleys (the effect ``cable_weight`` says why).
         status: (n,) of :class:`Status`.
         others: the other stable equilibria of each command, if they were asked for.
         jumps: the jumps on the path to each command, if it was followed.
