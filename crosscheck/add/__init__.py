@@ -1,4 +1,4 @@
-"""Fit effects to measurements and say what they are worth in a model."""
+"""Fits effects to measurements, and judges whether they are worth adding to a model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Fit effects to measurements, together with those a model has."""
+"""Fits effects to measurements, together with those that a model has."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from seecr.effects.base import Layout
 from seecr.pose import Array
 from seecr.prediction.model import no_effects
 
-# Steps of a fit, and how often it may go on after that many.
+# Steps of a fit, and how often it may be continued after that many.
 _STEPS, _TIMES = 40, 2
 
 Fitter: TypeAlias = Callable[[Problem, Terms, Array], Fit]
-"""Fits effects to a problem, given those of the model and the noise."""
+"""Fits effects to a problem, given the effects of the model and the noise."""
 
 
 def add_effect(
@@ -38,22 +38,22 @@ def add_effect(
     *,
     per: str | None = None,
 ) -> Addition:
-    """Fit an effect to data, jointly with those the model has.
+    """Fit an effect to data, jointly with those that the model has.
 
     Args:
-        robot: as described, or its MJCF.
+        robot: a robot, or its MJCF file.
         data: measurements, or their file.
-        name: of the effect.
-        model: effects of the model, or their file; where the named one is among them it is
-            fitted again. The plain model without.
-        progress: called with what is being done and the part of it that is done.
-        per: "file" or "run" gives the effect values of its own for each; so it has where the model
-            says so of it.
+        name: name of the effect.
+        model: effects of the model, or their file; by default the plain model. If the named effect
+            is among them, it is fitted again.
+        progress: called with what is being done and the fraction that is done.
+        per: "file" or "run" gives the effect separate values for each; by default it has them if
+            the model says so.
 
     Raises:
-        InputError: no effect of that name, or ``per`` is neither.
-        CrosscheckError: the data cannot carry it.
-        UnsolvedError: rows have no equilibrium, or the fit does not come to an end.
+        InputError: there is no effect of that name, or ``per`` is neither.
+        CrosscheckError: the data do not allow the fit.
+        UnsolvedError: rows have no equilibrium, or the fit does not converge.
     """
     robot = robot_of(robot)
     layout = layout_of(effect_named(name), robot)
@@ -71,18 +71,18 @@ def add_effects(
     model: GivenModel = (),
     progress: Progress = lambda _text, _part: None,
 ) -> Addition:
-    """Fit several effects to data at once, from the values that they have.
+    """Fit several effects to data at once, starting from the values that they have.
 
     Args:
-        robot: as described, or its MJCF.
+        robot: a robot, or its MJCF file.
         data: measurements, or their file.
         effects: such as ``diagnose(...).terms``.
-        model: effects of the model, or their file; the plain model without.
-        progress: called with what is being done and the part of it that is done.
+        model: effects of the model, or their file; by default the plain model.
+        progress: called with what is being done and the fraction that is done.
 
     Raises:
-        CrosscheckError: there are none, or the data cannot carry them.
-        UnsolvedError: rows have no equilibrium, or the fit does not come to an end.
+        CrosscheckError: no effects were given, or the data do not allow the fit.
+        UnsolvedError: rows have no equilibrium, or the fit does not converge.
     """
     some = list(effects) if isinstance(effects, Iterable) else [effects]
     wrong = [one for one in some if not isinstance(one, Term)]
@@ -130,13 +130,13 @@ def _added(
         problem = problem.without(outliers, words)
         best = fitter(problem, terms, factor)
     progress("predicting runs left out", 0.6)
-    # what belongs to files or runs was fitted to them already: before that it was not there
+    # effects that are free in the data were fitted in advance: they are not in the model before
     before = terms.only(name for name in terms.names if name in had or name not in names)
     return weigh(problem, before, names, factor, best, notes, basis_of(model, robot))
 
 
 def _apart(terms: Terms, layout: Layout, kind: str) -> Term:
-    """An effect that is to have values of its own for each file or run."""
+    """An effect with separate values for each file or run."""
     term = terms[layout.name] if layout.name in terms else Term(layout, layout.null)
     known = term.own is not None and term.own.kind == kind
     return term if known else replace(term, own=Own(kind, {}))
@@ -149,7 +149,7 @@ def _refuse(problem: Problem, layout: Layout) -> None:
 
 
 def _fitted(problem: Problem, terms: Terms, layout: Layout, factor: Array) -> Fit:
-    """The best joint fit, from where the effect stands and from its most promising starts."""
+    """The best joint fit, from the effect's present values and its most promising starts."""
     fits = [_to_the_end(problem, terms, factor)] if layout.name in terms else []
     if fits and fits[0].valid and _is_placed(terms[layout.name]):
         return fits[0]
@@ -168,12 +168,12 @@ def _fitted(problem: Problem, terms: Terms, layout: Layout, factor: Array) -> Fi
 
 
 def _is_placed(term: Term) -> bool:
-    """Whether what is known of an effect, or of its files or runs, says where to look for it."""
+    """Whether an independent measurement, or separate values, tell where to start the fit."""
     return term.knowledge.any or isinstance(term.layout, ApartLayout)
 
 
 def _to_the_end(problem: Problem, terms: Terms, factor: Array, near: State | None = None) -> Fit:
-    """A fit that came to an end, however many steps that takes within reason."""
+    """A fit that is continued until it converges, a few times at most."""
     found = fit(problem, terms, factor, near, iterations=_STEPS)
     for _ in range(_TIMES):
         if found.settled:

@@ -1,4 +1,4 @@
-"""What adding effects to a model comes to: values, errors, and whether it is worth it."""
+"""The result of adding effects to a model: values, errors, and whether they are worth it."""
 
 from __future__ import annotations
 
@@ -19,19 +19,18 @@ class Addition(Result):
     """Effects fitted to data, with the rest of the model.
 
     Attributes:
-        names: of the effects that are new, or fitted again.
+        names: names of the effects that are new, or fitted again.
         fitted: all effects of the new model with their errors.
-        before: rms errors of the model as it stood. after: of the new one.
-        held_out_before, held_out: the same on runs left out of the fit.
-        fall: mean fall of chi2 on a block left out, and its standard error.
-        p: chance of the fall of chi2 on all data where the effect is absent.
-        predicts: whether the effects improve what was left out, and not by chance.
-        from_nothing: how far their values together are from nothing, in standard errors
-            (Mahalanobis).
-        is_nothing: whether that is no further than one standard error of one value.
-        whiteness: of what is left.
+        before: rms errors of the model as it stood. after: those of the new model.
+        held_out_before, held_out: the same on held-out runs.
+        fall: mean fall of chi2 on a held-out block, and its standard error.
+        p: p-value of the fall of chi2 on all data.
+        predicts: whether the effects improve the prediction of held-out runs, and not by chance.
+        from_nothing: distance of their values from null, in standard errors (Mahalanobis).
+        is_nothing: whether that is no further than one standard error of a single value.
+        whiteness: test of the residuals.
         warnings: about the values. notes: about the data.
-        model: the robot's, with all of this; :func:`crosscheck.save_model` keeps it.
+        model: the robot's model with all of this; :func:`crosscheck.save_model` keeps it.
     """
 
     names: tuple[str, ...]
@@ -52,7 +51,7 @@ class Addition(Result):
 
     @property
     def name(self) -> str:
-        """The effects in a line."""
+        """The names of the effects in one line."""
         return " + ".join(self.names)
 
     @property
@@ -66,7 +65,7 @@ class Addition(Result):
         return Terms(one.term for one in self.fitted)
 
     def lines(self) -> list[str]:
-        """Errors without and with the effect, the values, and what speaks against them."""
+        """Errors without and with the effects, the values, and what speaks against them."""
         worth = "pays" if self.pays else "does not pay"
         left = rms_words(self.held_out_before), rms_words(self.held_out)
         out = [
@@ -105,5 +104,5 @@ class Addition(Result):
 
     @property
     def own(self) -> Fitted:
-        """The effect itself; the first of several."""
+        """The added effect; the first one of several."""
         return next(f for f in self.fitted if f.term.name == self.names[0])

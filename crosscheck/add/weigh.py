@@ -1,4 +1,4 @@
-"""What effects fitted to data are worth, and how well their values are known."""
+"""Judges what effects fitted to data are worth, and how well their values are known."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from seecr.effects import Terms
 from seecr.pose import Array
 from seecr.prediction.model import Model
 
-# A value this many plausible sizes from null deserves a second look.
+# A value of more plausible sizes than this needs a check.
 _IMPLAUSIBLE = 5.0
-# Parameters whose errors go together like this are hardly determined apart.
+# Parameters with a larger correlation than this can hardly be determined separately.
 _CORRELATED = 0.95
 _MOST_NAMED = 4
-# Runs left out are never predicted better than fitted, but for this part of chance: where they
-# are, the fit has ended in a hollow.
+# Held-out runs are not predicted better than they are fitted, except by chance. If their chi2 is
+# below this part of the fit's, the fit has ended in a local minimum.
 _HOLLOW = 0.9
 
 
@@ -40,10 +40,10 @@ def weigh(
     problem: Problem, terms: Terms, names: Sequence[str], factor: Array, best: Fit,
     notes: Sequence[str], basis: Model,
 ) -> Addition:  # fmt: skip
-    """What the named effects are worth in the best fit, against the model without them.
+    """Judge what the named effects are worth in the best fit, against the model without them.
 
     Raises:
-        UnsolvedError: the fit is none: it did not come to an end, or ended in a hollow.
+        UnsolvedError: the fit did not converge, or ended in a local minimum.
     """
     base = base_of(problem, terms, names, factor)
     some_left = any(name not in names for name in terms.names)
@@ -52,8 +52,8 @@ def weigh(
     _refuse_unsettled(problem, names, best, held)
     own = np.isin([effect for effect, _key in best.terms.labels], list(names))
     white = whiteness(problem, best.state.white, int(np.sum(np.isfinite(best.stderr))))
-    # stated noise that is too small, or noise that goes together, makes standard errors too
-    # small, and so does another effect that is still missing
+    # standard errors are too small if the noise is larger than stated or autocorrelated, and also
+    # if another effect is still missing
     moved = np.zeros(len(own)) if white.is_noise else moved_by_others(problem, best)
     covariance = white.inflation**2 * best.covariance + np.diag(moved**2)
     fitted = _split(best, np.sqrt(np.diag(covariance)))
@@ -88,7 +88,7 @@ def _model(
     problem: Problem, basis: Model, fitted: Sequence[Fitted], names: Sequence[str],
     errors: Mapping[str, Rms], covariance: Array,
 ) -> Model:  # fmt: skip
-    """The model with the effects; those given without one are as new to it as the named ones."""
+    """The new model; effects that neither it had nor ``names`` has are new as well."""
     source = provenance_of(problem.data.name, f"crosscheck add {' + '.join(names)}")
     fresh = [f.term.name for f in fitted if f.term.name not in (*basis.names, *names)]
     new = with_fit(basis, fitted, [*names, *fresh], source, errors, covariance)
@@ -96,7 +96,7 @@ def _model(
 
 
 def base_of(problem: Problem, terms: Terms, names: Sequence[str], factor: Array) -> Fit:
-    """The model without the effects, at its own best."""
+    """The model without the named effects, refitted."""
     rest = Terms(term for term in terms if term.name not in names)
     base = null_fit(problem, rest, factor, refit=bool(rest))
     if not base.valid:
@@ -106,7 +106,7 @@ def base_of(problem: Problem, terms: Terms, names: Sequence[str], factor: Array)
 
 
 def _out_of_hollows(problem: Problem, factor: Array, best: Fit) -> tuple[Fit, HeldOut]:
-    """The fit and its errors on runs left out; fitted again from where those did better."""
+    """The fit and its held-out errors; if these hint at a local minimum, refitted from a fold."""
     held = hold_out(problem, best, factor)
     if not _hollow(best, held):
         return best, held
@@ -136,16 +136,16 @@ def _refuse_unsettled(problem: Problem, names: Sequence[str], best: Fit, held: H
 def distance_from_nothing(
     terms: Terms, covariance: Array, own: NDArray[np.bool_]
 ) -> tuple[float, int]:
-    """How far some parameters together are from null, in standard errors (Mahalanobis).
+    """Distance of some parameters together from null, in standard errors (Mahalanobis).
 
     Args:
-        terms: with their values. covariance: (p, p) of those; inf on the diagonal where unseen.
+        terms: effects with their values.
+        covariance: (p, p) covariance of these; inf on the diagonal if unidentifiable.
         own: (p,) bool, which parameters.
 
     Returns:
-        the distance and how many parameters it is of: shapes mean nothing by themselves, fixed
-        values are no finding, and what the data do not see is not away from anything. A distance
-        of infinity where nothing is left that was fitted.
+        The distance and the number of parameters in it. Shapes, fixed values and unidentifiable
+        parameters do not count. The distance is infinite if no parameter was free.
     """
     shape = np.concatenate([term.layout.shape for term in terms])
     free = own & ~shape & ~terms.knowledge.fixed
@@ -162,10 +162,10 @@ def distance_from_nothing(
 
 
 def is_nothing(distance: float, count: int) -> bool:
-    """Whether values together are within one standard error of nothing.
+    """Whether values together are within one standard error of null.
 
-    Of one value that is a distance of 1, which chance stays below in 68 %; of several the
-    distance that chance stays below as often.
+    For one value that is a distance of 1, below which chance stays in 68 %; for several values it
+    is the distance below which chance stays as often.
     """
     if not np.isfinite(distance):
         return False
@@ -203,7 +203,7 @@ def _warnings(
 
 
 def _widened(best: Fit, moved: Array, own: NDArray[np.bool_]) -> list[str]:
-    """That errors hold more than noise, where what is still missing makes most of them."""
+    """A warning if standard errors are mostly due to effects that may still be missing."""
     if not np.any(own & (moved > best.stderr)):
         return []
     return [
@@ -213,7 +213,7 @@ def _widened(best: Fit, moved: Array, own: NDArray[np.bool_]) -> list[str]:
 
 
 def _together(best: Fit, own: NDArray[np.bool_]) -> list[str]:
-    """Parameters of the effects that are hardly determined apart from those of another."""
+    """Warnings about parameters that can hardly be told from those of another effect."""
     labels = [".".join(label) for label in best.terms.labels]
     table = np.abs(best.correlation)
     pairs = [

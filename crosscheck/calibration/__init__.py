@@ -1,1 +1,1 @@
-"""Every effect that the data can see, fitted at once, and which of them are needed."""
+"""Fits all effects that the data can see at once, and finds out which of them are needed."""

@@ -1,8 +1,8 @@
-"""All effects that the data can see, fitted at once: a model that is worth what it predicts.
+"""Fits all effects that the data can see at once, for a model that predicts well.
 
-The tracker's frame is registered first; all effects without history follow together, with
-plausible sizes as priors; those with history, with shapes and with weight join where what is left
-asks for them. Size and correlation of the noise come from the fit's own marginal evidence.
+The tracker's frame is registered first. All effects without history are then fitted together, with
+their plausible sizes as priors. Effects with history, shapes or weight join if the remainder calls
+for them. Size and autocorrelation of the noise maximise the marginal likelihood of the fit.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ PLAIN = Terms()
 
 @dataclass(frozen=True, eq=False)
 class JointErrors:
-    """What fitting all effects at once gives.
+    """Errors and noise of the joint fit of all effects.
 
     Attributes:
-        before, after, held_out: rms errors by kind: of the model as it stood, of the joint fit,
-            of fits without a run on that run.
-        scale, rho: of each kind of reading, the noise in units of the stated one, and its
-            correlation from one row of a run to the next.
+        before, after, held_out: rms errors by kind: of the model as it stood, of the joint fit, and
+            of held-out runs, each predicted by a fit without it.
+        scale, rho: by kind of reading, the estimated noise over the stated one, and its correlation
+            between successive rows of a run.
     """
 
     before: Rms
@@ -58,14 +58,15 @@ class JointErrors:
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """All effects fitted to data together.
+    """All effects, fitted to the data together.
 
     Attributes:
         setting: the data. joint: the fit.
         later: all effects that join later, at their most promising shapes, amplitudes at null.
-        prices: of those that did not, what they gain more there than on average over shapes.
-        before: rms errors of the model as it stood. after: of this one.
-        held_out: on runs left out.
+        prices: for those of them that did not join, how much more ln evidence they gain at that
+            shape than on average over shapes.
+        before: rms errors of the model as it stood. after: those of this model.
+        held_out: errors on held-out runs.
         outliers: (n,) bool rows that hardly count.
     """
 
@@ -85,18 +86,18 @@ class Calibration:
 
     @property
     def colour(self) -> Colour:
-        """The noise: its size beside the stated one, its correlation along runs."""
+        """The noise: its size relative to the stated one, and its autocorrelation along runs."""
         return self.joint.colour
 
     @property
     def together(self) -> JointErrors:
-        """Its errors and noise."""
+        """The errors and the noise of the fit."""
         noise = self.colour.by_kind(self.setting.problem)
         return JointErrors(self.before, self.after, self.held_out.rms, *noise)
 
     @property
     def covariance(self) -> Array:
-        """(p, p) of the values in their units, the prior's part in it."""
+        """(p, p) posterior covariance of the values in their units."""
         return covariance(self.setting, self.joint)
 
 
@@ -110,9 +111,9 @@ def fit_all_effects(
 
     Args:
         problem: readings, from :func:`crosscheck.fit.prepare.prepare`.
-        terms: effects of the model as it stands; their values are the start.
-        progress: called with what is being done and the part of it that is done.
-        given: a few effects that were found elsewhere, with the values that they have there.
+        terms: effects of the model as it stands; their values are the starting point.
+        progress: called with what is being done and the fraction that is done.
+        given: a few effects that were found elsewhere, with their values there.
     """
     factor = problem.noise(problem.experiment.predict(terms.effects))
     setting = Setting(problem, factor, chain_of(problem))
@@ -136,9 +137,9 @@ def fit_all_effects(
 
 
 def covariance(setting: Setting, joint: JointFit) -> Array:
-    """(p, p) of the values in their units: the data's and the prior's knowledge together.
+    """(p, p) posterior covariance of the values in their units, from data and prior together.
 
-    0 for parameters that stayed where they were, held or on a bound.
+    It is 0 for parameters that are fixed or on a bound.
     """
     linear = linearised(setting, joint)
     free = np.flatnonzero(linear.width > 0.0)

@@ -1,9 +1,9 @@
-"""Effects fitted by themselves, where everything together leaves more than noise.
+"""Fits of single effects by themselves, as other starting points of the joint fit.
 
-A joint fit can end in a hollow: without a late effect that is really there many others imitate it
-badly, and what is left no longer looks like it; or the platform rests otherwise at a few poses,
-which then hardly count. By itself, from the plain model, one effect may explain most; from there
-the joint fit finds the rest.
+The joint fit can end in a local minimum. If an effect that joins late is really present, many
+others may imitate it badly before, and the remainder no longer looks like it. Or the platform rests
+in the wrong equilibrium at a few poses, which then count as outliers. By itself, beside the plain
+model, one effect may explain most, and from there the joint fit finds the rest.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from crosscheck.fit.state import evaluate
 from seecr.effects import Term, Terms
 from seecr.effects.base import Layout
 
-# Steps of each fit, and what part of chi2 they may leave at most.
+# Steps of each fit, and the largest part of chi2 that it may leave.
 _STEPS, _LEFT = 8, 0.5
-# Of late effects the best so many are taken up; of the others so many are tried, and taken up.
+# How many fits of late effects are returned; how many other effects are tried, and returned.
 _LATE, _TRIED, _TAKEN = 2, 3, 1
 
 
@@ -32,7 +32,7 @@ def fitted_alone(
         setting: the data.
         plain: the model without them, with few effects or none (the tracker's frame).
         later: effects with history or a shape that may be added.
-        others: all other effects that may be.
+        others: all other effects that may be added.
     """
     late = [inside(one.term) for one in promising_beside(setting, plain, later)]
     promising = sorted(promising_beside(setting, plain, others), key=lambda one: -one.gain)
@@ -41,7 +41,7 @@ def fitted_alone(
 
 
 def _best(setting: Setting, plain: JointFit, terms: Sequence[Term]) -> list[JointFit]:
-    """Fits that explain much, the best first."""
+    """The fits that explain much, the best first."""
     fits = [_with(setting, plain, term) for term in terms]
     most = _LEFT * plain.state.chi2
     good = [found for found in fits if found is not None and found.state.chi2 < most]

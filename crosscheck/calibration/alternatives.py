@@ -1,4 +1,4 @@
-"""Few effects that explain the data, where others explain them as well: which it is stays open."""
+"""Finds alternatives: different sets of few effects that explain the data equally well."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from crosscheck.calibration.probability import Classes
 from crosscheck.calibration.refits import Found
 from crosscheck.calibration.sets import Names
 
-# As many as one can read.
+# More alternatives than these are too many to read.
 _MOST = 3
 
 
 def alternatives(found: Found, classes: Classes) -> list[Names]:
-    """Sets of few effects that explain as well as the best one, but are not parts of each other.
+    """Sets of few effects that explain as well as the best one, none a subset of another.
 
     Args:
-        found: sets that were compared.
-        classes: effects of one class count as one.
+        found: the sets that were compared.
+        classes: equivalent effects; those of one class count as the same.
 
     Returns:
-        the best set first, each without what the model has; one where nothing else does as well,
-        none where the best is not of few effects.
+        The sets, the best first, without the effects that the model has already: one if no other
+        explains as well, none if the best set has many effects or none.
     """
     first = {e: members[0] for members in classes.members for e in members}
     out: list[Names] = []

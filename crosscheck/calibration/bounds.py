@@ -1,7 +1,7 @@
-"""What it costs that a parameter which cannot be negative is nothing, where it could be there.
+"""The evidence that a parameter costs which cannot be negative and is stopped at zero.
 
-Friction on a cable behind the exit point, with no friction, is that cable alone: if its evidence
-were too, data that show friction and show none could not tell the two apart.
+Friction on a cable behind the exit point, with zero friction, is that cable alone. If both also had
+the same evidence, then data that would show friction, and show none, could not tell them apart.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from seecr.pose import Array
 def log_absent(
     setting: Setting, joint: JointFit, linear: Linear, widths: Mapping[str, float]
 ) -> float:
-    """ln evidence that parameters at nothing take off that of the others, at most about 0.
+    """ln evidence that parameters stopped at zero cost beside the others; hardly above 0.
 
     Args:
         setting: the data.
-        joint: a fit. linear: the model about it.
+        joint: a fit. linear: the model linearised about it.
         widths: prior widths of the effects that have free parameters.
     """
     held = held_at_nothing(joint.terms) & (joint.width > 0.0)
@@ -49,13 +49,13 @@ def log_absent(
 
 
 def _gain(power: Array, along: Array, width: float | None) -> float:
-    """Of one parameter; an effect that is nothing altogether may have any width."""
+    """Gain of one parameter; averaged over all widths if its effect has no free parameter."""
     every = np.array(WIDTHS if width is None else [width])
     return float(special.logsumexp(half_gaussian(power, along, every)) - np.log(len(every)))
 
 
 def _each(joint: JointFit, widths: Mapping[str, float]) -> Array:
-    """(p,) prior widths of the parameters; those of shapes are their own."""
+    """(p,) prior widths of the parameters; shapes keep those of the fit."""
     parts = [
         np.where(t.layout.shape, joint.width[joint.terms.part(t.name)], widths.get(t.name, 1.0))
         for t in joint.terms

@@ -1,4 +1,4 @@
-"""The whole catalogue as a linear model about one fitted set: what each effect would be worth."""
+"""The whole catalogue, linearised about a fitted set: what each effect would be worth beside it."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from seecr.effects import Term, Terms
 from seecr.effects.base import Layout
 from seecr.pose import Array
 
-# Where the tracker stands has no plausible size.
+# The position of the tracker has no plausible size, so its prior may be wider.
 TRACKER_WIDTHS = (*WIDTHS, 30.0, 100.0, 300.0)
-# Effects that move no reading by this part of its noise, for plausible sizes, are not seen.
+# An effect is not seen if its plausible size moves no reading by more than this part of its noise.
 _UNSEEN = 0.02
 
 
 @dataclass(frozen=True, eq=False)
 class Catalogue:
-    """All effects that might be missing, each with the values to start it from.
+    """All effects that might be missing, each with its starting values.
 
     Attributes:
-        at_once: without history or shapes, at null.
+        at_once: effects without history or shapes, at null.
         later: the others, at their most promising shapes.
-        prices: of some of them, the ln evidence that they gain more there than on average.
+        prices: for some of these, how much more ln evidence they gain there than on average.
     """
 
     at_once: Terms
@@ -39,7 +39,7 @@ class Catalogue:
     prices: Mapping[str, float] = field(default_factory=dict)
 
     def start(self, name: str) -> Term:
-        """An effect as it starts."""
+        """An effect with its starting values."""
         return self.at_once[name] if name in self.at_once else self.later[name]
 
     def size(self, name: str) -> int:
@@ -48,17 +48,17 @@ class Catalogue:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All effects."""
+        """Names of all effects."""
         return (*self.at_once.names, *self.later.names)
 
 
 def widths_for(layout: Layout) -> Array:
-    """Prior widths that an effect may have."""
+    """Prior widths of an effect over which its evidence is averaged."""
     return np.array(TRACKER_WIDTHS if layout.name == TRACKER else WIDTHS)
 
 
 def gram_about(setting: Setting, joint: JointFit, catalogue: Catalogue) -> Gram:
-    """Normal equations of the whole catalogue about a fit of some of it."""
+    """Normal equations of the whole catalogue, linearised about a fit of some of it."""
     return gram_with(setting, joint, catalogue, *catalogue_columns(setting, joint, catalogue))
 
 
@@ -69,7 +69,7 @@ def gram_with(
     columns: Mapping[str, Array],
     z: Mapping[str, Array],
 ) -> Gram:
-    """The same with columns that are known; see :func:`catalogue_columns`."""
+    """The same, given the columns and values of :func:`catalogue_columns`."""
     groups, first = {}, 0
     for name, x in columns.items():
         count = x.shape[1]
@@ -88,7 +88,7 @@ def gram_with(
 
 
 def known_of(joint: JointFit, catalogue: Catalogue, names: Sequence[str]) -> tuple[Array, Array]:
-    """What was measured independently: columns (k, p) of the effects' amplitudes, readings (k,)."""
+    """Independent measurements: columns (k, p) by the effects' amplitudes, and readings (k,)."""
     terms = Terms(joint.terms[n] if n in joint.terms else catalogue.start(n) for n in names)
     columns, readings = known_readings(terms)
     order = []
@@ -103,7 +103,7 @@ def known_of(joint: JointFit, catalogue: Catalogue, names: Sequence[str]) -> tup
 def catalogue_columns(
     setting: Setting, joint: JointFit, catalogue: Catalogue
 ) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
-    """Of each effect that is seen: columns (N, k) of its amplitudes, and their z (k,) there."""
+    """For each effect that is seen: columns (N, k) of its amplitudes, and their values z (k,)."""
     inside = joint.terms
     every = Terms([*inside, *(t for t in catalogue.at_once if t.name not in inside)])
     state = joint.state.of(every)

@@ -1,9 +1,10 @@
-"""What would explain the data if a member of the best set were not there.
+"""Challenges to the best set: how well can the data be explained without each of its members?
 
-Sets one move away from the best one do not say how sure its members are: two effects together may
-do what two others do, and no exchange of one for one leads from here to there. So each member is
-barred, with those that can stand in its place, and the best sets without them are fitted in
-earnest, the catalogue made linear about the best of those again. They count in the probabilities.
+Sets that differ from the best one by one move do not tell how sure its members are. Two effects
+together may do what two others do, and no exchange of a single effect leads from one pair to the
+other. So each member is excluded in turn, with everything that can replace it. The best sets
+without it are fitted exactly, and the catalogue is linearised about the best of them, several times
+over. All these sets count in the probabilities.
 """
 
 from __future__ import annotations
@@ -14,28 +15,28 @@ from crosscheck.calibration.equals import are_equals
 from crosscheck.calibration.exact import Exact, Refit
 from crosscheck.calibration.sets import Names, Scores, explore
 
-# Rounds of making the catalogue linear about the best set without a member, at most.
+# Most rounds of linearising the catalogue about the best set without a member.
 _ROUNDS = 5
-# Members of a set that is challenged: more of them can do what any of them does, a little worse
-# each, and looking at that takes minutes.
+# Largest set that is challenged. In a larger one, each member can be replaced by several others
+# together that are a little worse, and searching for these takes minutes.
 _FEW = 3
-# Moves in the linear model: a member that is barred is stood in for by ever more others.
+# Moves of the search in the linear model: more and more other effects replace the excluded one.
 _MOVES = 6
-# A member without which the best fit is this much worse is needed, whatever bends.
+# If the best fit without a member is worse by this much ln evidence, the member is needed.
 _NEEDED = 40.0
-# Sets fitted in a round; how much worse than the best of all a linear model may say they are.
+# Sets fitted in a round, and how much worse than the best set the linear model may expect them.
 _EACH, _HOPELESS = 2, 15.0
-# What is no worse than the best set by this much has its neighbours fitted too.
+# If a fit comes this near to the best set, so many of its neighbours are fitted too.
 _NEAR, _NEIGHBOURS = 5.0, 6
 
 
 def challenge(exact: Exact, scores: Scores, best: Refit) -> None:
-    """Fit the best sets without each member of the best one, where that is of few effects.
+    """Fit the best sets without each member of the best one, if that has few members.
 
     Args:
         exact: sets fitted so far; those that are fitted here are added.
         scores: the linear model about the best set.
-        best: that.
+        best: the best set.
     """
     own = best.names - scores.always
     if len(own) > _FEW:
@@ -45,7 +46,7 @@ def challenge(exact: Exact, scores: Scores, best: Refit) -> None:
 
 
 def _without(exact: Exact, about: Scores, best: Refit, name: str) -> None:
-    """The best sets without a member and without its equals."""
+    """Fit the best sets without a member and without its equivalents."""
     barred: Names = frozenset()
     top = -float("inf")
     for k in range(_ROUNDS):
@@ -72,13 +73,13 @@ def _without(exact: Exact, about: Scores, best: Refit, name: str) -> None:
 
 
 def without(scores: Scores, barred: Names) -> Scores:
-    """Scores of sets in which these effects are not."""
+    """The scores of a search from which these effects are excluded."""
     groups = {n: g for n, g in scores.gram.groups.items() if n not in barred}
     return replace(scores, gram=replace(scores.gram, groups=groups), solved={}, near={})
 
 
 def equals_of(exact: Exact, best: Refit, name: str) -> Names:
-    """A member, and those that fitted about as well in its place."""
+    """A member, and the effects that fitted about as well in its place."""
     rest = best.names - {name}
     equals = {name}
     for names, other in exact.possible.items():

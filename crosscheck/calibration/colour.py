@@ -1,8 +1,8 @@
-"""Noise as it is: its size beside the stated one, and how it goes together along a run.
+"""A noise model: its size relative to the stated one, and its autocorrelation along runs.
 
-Each channel of readings is AR(1) along each run. Between two readings ``gap`` steps apart the
-correlation is rho^gap, where a step is the usual time between rows (or one row, where there is no
-time). Whitening divides by the size and takes off what the reading before foretells:
+Each channel of readings is an AR(1) process along each run. Two readings that are ``gap`` steps
+apart have the correlation rho^gap, where a step is the usual time between rows (or one row if times
+are not known). Whitening divides by the size and subtracts what the reading before predicts:
 
     v_k = (u_k - phi u_before)/sqrt(1 - phi^2),  u = sqrt(weight) r/scale,  phi = rho^gap
 """
@@ -17,19 +17,19 @@ from numpy.typing import NDArray
 from crosscheck.fit.problem import KINDS, Problem, kinds_read
 from seecr.pose import Array
 
-# Readings far apart in time: nothing of the one before is left.
+# Gap of readings that are so far apart that they are not correlated.
 _LONG = 1e3
 
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """How the counted readings (N,) follow one another.
+    """The order in which the counted readings (N,) follow one another.
 
     Attributes:
         kind: (N,) number of each reading's kind in :data:`KINDS`.
         row: (N,) its row.
-        before: (N,) the reading before it in its run and channel; -1 for the first.
-        gap: (N,) steps since then.
+        before: (N,) number of the reading before it in its run and channel; -1 for the first.
+        gap: (N,) steps since that reading.
     """
 
     kind: NDArray[np.int64]
@@ -40,18 +40,18 @@ class Chain:
 
 @dataclass(frozen=True, eq=False)
 class Colour:
-    """What noise is, beside what was stated.
+    """Size and autocorrelation of the noise.
 
     Attributes:
-        scale: (3,) standard deviation of each kind in units of the stated one.
-        rho: (3,) correlation of a reading with the next of its run.
+        scale: (3,) standard deviation of each kind over the stated one.
+        rho: (3,) correlation of successive readings of a run.
     """
 
     scale: Array
     rho: Array
 
     def by_kind(self, problem: Problem) -> tuple[dict[str, float], dict[str, float]]:
-        """Scale and rho by the name of each kind of reading that the data hold."""
+        """Scale and rho, by the name of each kind of reading in the data."""
         kinds = {KINDS.index(kind): kind.name for kind in kinds_read(problem)}
         return (
             {name: float(self.scale[k]) for k, name in kinds.items()},
@@ -59,7 +59,7 @@ class Colour:
         )
 
     def hotter(self, factor: float) -> Colour:
-        """The same with larger deviations."""
+        """The same noise with standard deviations larger by a factor."""
         return replace(self, scale=self.scale * factor)
 
 
@@ -67,7 +67,7 @@ WHITE = Colour(np.ones(len(KINDS)), np.zeros(len(KINDS)))
 
 
 def chain_of(problem: Problem) -> Chain:
-    """The chains of a problem's counted readings."""
+    """The order of a problem's counted readings."""
     row, column = problem.row_of, problem.column_of
     kind = np.array([_kind_of(c) for c in range(problem.measured.shape[1])])[column]
     run = problem.data.run_index[row]
@@ -85,31 +85,31 @@ def _kind_of(column: int) -> int:
 
 
 def _gaps(problem: Problem, row: NDArray[np.int64], before: NDArray[np.int64]) -> Array:
-    """Steps between readings: by time where there is one, else by rows."""
+    """(N,) steps between readings, by time if it is known, else by rows."""
     clock = problem.data.t_s
     if clock is None:
         clock = np.arange(problem.data.n_rows, dtype=float)
     # rows that did not come from a file need not follow in time
     since = np.where(before < 0, np.nan, np.abs(clock[row] - clock[row[before]]))
-    # a clock that stood still tells nothing: rows of one moment follow as any others do
+    # rows with the same time are taken to be one usual step apart
     usual = float(np.median(since[since > 0.0])) if (since > 0.0).any() else 1.0
     return np.nan_to_num(np.where(since == 0.0, usual, since) / usual, nan=_LONG)
 
 
 def foretold(chain: Chain, colour: Colour) -> Array:
-    """(N,) phi: what part of the reading before is in each reading's noise."""
+    """(N,) phi: correlation of each reading's noise with that of the reading before."""
     rho = colour.rho[chain.kind]
     return np.where(chain.before < 0, 0.0, rho ** np.minimum(chain.gap, _LONG))
 
 
 def whitened(chain: Chain, colour: Colour, weight: Array, values: Array) -> Array:
-    """Residuals (N,) or derivatives (N, p) in units of stated noise, made white.
+    """Whiten residuals (N,) or derivatives (N, p).
 
     Args:
-        chain: how readings follow.
+        chain: the order of the readings.
         colour: the noise.
-        weight: (N,) 1, or less where a reading is taken to be noisier than the others.
-        values: in units of the stated noise.
+        weight: (N,) 1, or less for a reading that counts as noisier than the others.
+        values: residuals or derivatives, in units of the stated noise.
     """
     wide = (slice(None),) + (None,) * (values.ndim - 1)
     unit = values * (np.sqrt(weight) / colour.scale[chain.kind])[wide]
@@ -121,7 +121,7 @@ def whitened(chain: Chain, colour: Colour, weight: Array, values: Array) -> Arra
 
 
 def log_det(chain: Chain, colour: Colour, weight: Array) -> float:
-    """Log determinant of the noise's covariance, that of the stated noise left out."""
+    """Log determinant of the noise's covariance relative to that of the stated noise."""
     phi = foretold(chain, colour)
     sizes = 2.0 * np.log(colour.scale[chain.kind]) - np.log(weight)
     return float(np.sum(sizes) + np.sum(np.log1p(-(phi**2))))

@@ -1,22 +1,22 @@
-"""When two effects are equals: the data cannot tell which of them is missing."""
+"""Equivalent effects: the data cannot tell which of them is missing."""
 
 from __future__ import annotations
 
 from seecr.effects.base import Layout
 
-# Effects whose exchange costs less evidence than this are equals.
+# Two effects are equivalent if exchanging them costs less ln evidence than this.
 EQUAL = 3.0
-# A small effect (of up to so many parameters) with one more costs about so much evidence though it
-# explains the same: a frame that yields alike in all directions is a cable behind the exit point,
-# and has two numbers.
+# An effect of up to SMALL parameters may cost so much more ln evidence for each additional
+# parameter: a frame that yields equally in all directions acts like cable behind the exit point,
+# but has two parameters.
 SMALL, _ONE_MORE = 3, 3.0
 
 
 def are_equals(loss: float, own: int, other: int) -> bool:
-    """Whether an effect of ``other`` parameters in place of one of ``own`` explains as well.
+    """Whether an effect of ``other`` parameters explains as well in place of one of ``own``.
 
     Args:
-        loss: evidence lost by the exchange.
+        loss: ln evidence that the exchange costs.
         own, other: numbers of parameters.
     """
     more = max(0, other - own) if other <= SMALL else 0
@@ -24,10 +24,10 @@ def are_equals(loss: float, own: int, other: int) -> bool:
 
 
 def parameters_told(layout: Layout) -> int:
-    """Parameters of an effect that say what others do not: of a small one that contains another.
+    """The number of parameters for :func:`are_equals`: 1 for a small effect that contains another.
 
-    Friction comes with cable behind the exit point; that it has two numbers is no excuse for it
-    to explain less than the cable alone.
+    Friction at the exit point includes cable behind that point. Its second parameter is no excuse
+    for explaining less than that cable alone.
     """
     inner = layout.effect.parent
     return 1 if inner and len(layout) <= SMALL else len(layout)

@@ -1,4 +1,4 @@
-"""Sets of effects fitted in earnest, each once, with their evidence."""
+"""Sets of effects that are fitted exactly, with their evidence; each set is fitted once."""
 
 from __future__ import annotations
 
@@ -22,24 +22,25 @@ from seecr.effects import Term, Terms
 from seecr.pose import Array
 
 _STEPS = 12
-# A refit this much worse than its linear evidence may have ended in a hollow: it starts again.
+# If a refit is worse than its linear evidence by this much, it may have ended in a local minimum,
+# and is repeated from other starting points.
 HOLLOW = 8.0
-# Sets up to this size are tried from more starts, and without each of their members.
+# Sets up to this size are tried from more starting points, and without each of their members.
 FEW = 5
 
 
-# The members of a set, with the terms that have the shape from which it was fitted.
+# The members of a set, each with the term whose shape the fit started from.
 Shapes = tuple[tuple[str, Term | None], ...]
 
 
 @dataclass(frozen=True, eq=False)
 class Refit:
-    """A set of effects, fitted exactly.
+    """A set of effects that was fitted exactly.
 
     Attributes:
         names: the set. joint: its fit.
         widths: prior width of each member.
-        score: ln evidence and ln prior.
+        score: ln evidence plus ln prior.
     """
 
     names: Names
@@ -50,13 +51,13 @@ class Refit:
 
 @dataclass(eq=False)
 class Exact:
-    """Sets of effects over one noise and one set of weights.
+    """Sets of effects fitted exactly, all with the same noise and weights.
 
     Attributes:
-        setting, joint, catalogue, plain, told: of the data, of everything, as in
+        setting, joint, catalogue, plain, told: as in
             :func:`crosscheck.calibration.refits.compare_sets`.
-        given: values that sets have elsewhere.
-        fitted: by set; None where it could not be solved.
+        given: further starting values of some sets.
+        fitted: the fit of each set; None if it could not be solved.
     """
 
     setting: Setting
@@ -70,7 +71,7 @@ class Exact:
 
     @property
     def possible(self) -> dict[Names, Refit]:
-        """Those with values that a robot can have (no negative mass); the model as it stands."""
+        """Fits with values that a robot can have (no negative mass), and the model as it stands."""
         always = frozenset(self.plain.terms.names)
         return {
             names: found
@@ -83,7 +84,7 @@ class Exact:
         return self.catalogue.size(name)
 
     def can_be(self, found: Refit) -> bool:
-        """Whether a robot can have all these values."""
+        """Whether a robot can have all values of a fit."""
         return can_be(self.setting.problem.robot, found.joint.terms, self.plain.terms)
 
     def scores_about(self, joint: JointFit, own_shapes: bool = False) -> Scores:
@@ -91,8 +92,8 @@ class Exact:
 
         Args:
             joint: the fit.
-            own_shapes: sets are fitted from the shapes that effects have there, also those that
-                were fitted from others.
+            own_shapes: start fits of sets from the shapes that effects have in this fit, also of
+                sets that were fitted from other shapes before.
         """
         always = frozenset(self.plain.terms.names)
         gram = gram_about(self.setting, joint, self.catalogue)
@@ -104,18 +105,19 @@ class Exact:
         )  # fmt: skip
 
     def best_of(self, scores: Scores, some: Iterable[Names]) -> Refit:
-        """The best of all that are fitted, these among them."""
+        """Fit these sets, and return the best of all that were ever fitted."""
         for names in some:
             self.fit(scores, names)
         return max(self.possible.values(), key=lambda r: r.score)
 
     def take(self, scores: Scores, start: Terms) -> None:
-        """Fit a set from these values, and keep that if it is better than what there is.
+        """Fit a set from these values, and keep the result if it is better than the present one.
 
-        What no robot can have is not, whatever it explains: the set would not be compared.
+        Values that no robot can have are worse than any others, however much they explain: a set
+        with such values is not compared.
         """
         names = frozenset(start.names)
-        # the linear model may hold at nothing what means something from here on only
+        # the linear model may hold an effect near null that only acts away from there
         wide = {name: max(width, 1.0) for name, width in scores.widths(names).items()}
         found = [self.fitted.get(names), self._from(scores, names, start, wide)]
         fitted = [refit for refit in found if refit is not None]
@@ -124,9 +126,9 @@ class Exact:
         )
 
     def fit(self, scores: Scores, names: Names) -> Refit | None:
-        """A set fitted exactly; None where that has no solution.
+        """The exact fit of a set, or None if it has no solution.
 
-        One that was is fitted anew from other shapes where those promise more.
+        A set is fitted again if other shapes of its members promise far more.
         """
         shapes = tuple((name, scores.shapes.get(name)) for name in sorted(names))
         if names not in self.fitted:
@@ -139,13 +141,13 @@ class Exact:
         return self.fitted[names]
 
     def _promises_more(self, scores: Scores, names: Names) -> bool:
-        """Whether another shape of its members may explain far more than the fit there is."""
+        """Whether other shapes of its members may explain far more than the present fit."""
         own = self.fitted[names]
         other = names & scores.shapes.keys()
         return bool(other) and (own is None or own.score < scores.score(names) - HOLLOW)
 
     def _fit(self, scores: Scores, names: Names) -> None:
-        """From its linear values, those given, and from null where that ends badly."""
+        """Fit a set from its linear values, from given ones, and from null if that ends badly."""
         linear, widths = scores.score(names), scores.widths(names)
         best = self._from(scores, names, _linear_terms(self.catalogue, scores, names), widths)
         self.fitted[names] = best
@@ -166,7 +168,7 @@ class Exact:
 
 
 def _linear_terms(catalogue: Catalogue, scores: Scores, names: Names) -> Terms:
-    """The set at the values of the linear model."""
+    """The set with the values of the linear model."""
     solved = scores.gram.solved(scores.widths(names))
     out, first = [], 0
     for name in solved.chosen:
@@ -174,7 +176,7 @@ def _linear_terms(catalogue: Catalogue, scores: Scores, names: Names) -> Terms:
         layout, start = term.layout, term.vector
         count = len(scores.gram.groups[name].columns)
         own = np.flatnonzero(~layout.shape & ~term.knowledge.fixed)
-        if count < len(own):  # the others start where they are
+        if count < len(own):  # only amplitudes at null are in the linear model
             own = own[start[own] == layout.null[own]]
         vector = start.copy()
         vector[own] = layout.null[own] + solved.values[first : first + count] * layout.scale[own]
@@ -184,7 +186,7 @@ def _linear_terms(catalogue: Catalogue, scores: Scores, names: Names) -> Terms:
 
 
 def _off_bound(term: Term) -> Term:
-    """Off a bound at null, where a law with history has a derivative on both sides."""
+    """Move amplitudes off a bound at null, where laws with history have two-sided derivatives."""
     layout = term.layout
     pressed = (term.vector <= layout.lower) & ~layout.shape & ~term.knowledge.fixed
     return term.with_vector(np.where(pressed, term.vector + 0.03 * layout.scale, term.vector))
@@ -198,10 +200,10 @@ def _width(terms: Terms, widths: dict[str, float]) -> Array:
 def _scored(
     setting: Setting, joint: JointFit, names: Names, widths: dict[str, float], scores: Scores
 ) -> Refit:
-    """A fit with its evidence about its own optimum, averaged over widths."""
+    """A fit with its evidence, linearised about its own optimum and averaged over prior widths."""
     linear = linearised(setting, joint)
     gram = own_gram(linear, joint)
-    # the linear model may not see at all what moves readings where it was fitted
+    # what moves readings at this fit need not have been in the linear model of the search
     inside = {n: widths.get(n, 1.0) for n in gram.names}
     better = best_widths(gram, inside)
     share = sum(log_shares(joint, linear).values()) + log_absent(setting, joint, linear, better)
@@ -210,13 +212,13 @@ def _scored(
 
 
 def own_gram(linear: Linear, joint: JointFit) -> Gram:
-    """Normal equations of a fit's own effects about its optimum; those on a bound are absent."""
+    """Normal equations of a fit's own effects about its optimum, without parameters on a bound."""
     groups = groups_of(joint, widths_for)
     return gram_of(linear.x, own_readings(linear, joint, groups), groups)
 
 
 def own_readings(linear: Linear, joint: JointFit, groups: Mapping[str, ColumnGroup]) -> Array:
-    """(N,) what the amplitudes of a fit's effects explain, and noise; shapes stay as they are."""
+    """(N,) signal of the amplitudes of a fit's effects plus noise; shapes stay fixed."""
     z = np.zeros(len(joint.z))
     for group in groups.values():
         z[group.columns] = joint.z[group.columns]

@@ -1,9 +1,9 @@
-"""An effect that no catalogue holds: a smooth field over the workspace, as a test.
+"""A test for effects that are not in the catalogue, by a smooth field over the workspace.
 
-Each channel of readings gets a cubic of the position of its own, one width for all
-coefficients. How much more evidence the data give with it, all effects integrated out and the
-noise at its best on both sides, says whether something smooth is left that none of them explains.
-It is never fitted: it would explain what effects explain.
+Each channel of readings gets its own cubic in the position, with one prior width for all
+coefficients. The field is compared with no field by evidence, with all effects integrated out and
+the noise re-estimated. A higher evidence means that something smooth remains that no effect of the
+catalogue explains. The field is never part of a fit, because it would explain what effects explain.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from crosscheck.fit.smooth import field_columns
 from seecr.pose import Array
 
 FIELD_WIDTHS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
-# Spread of ln(true sigma/stated sigma) where it was stated.
+# Prior standard deviation of ln(true sigma/stated sigma) if the noise was stated.
 _STATED = 0.35
-# ln odds above which something unknown is there.
+# From these ln odds on, something unknown is taken to be there.
 UNKNOWN = 5.0
 
 
 def field_of(problem: Problem, place: Array) -> Array:
-    """(N, k) columns of the field in units of the noise, a cubic for each channel."""
+    """(N, k) columns of the field in units of the noise: a cubic for each channel."""
     return field_columns(problem, place, problem.measured.shape[1])
 
 
 def log_odds(setting: Setting, joint: JointFit, stated: bool = True) -> float:
-    """ln evidence with a field less that without, effects integrated out.
+    """ln evidence with a field minus that without, all effects integrated out.
 
     Args:
         setting, joint: the joint fit.

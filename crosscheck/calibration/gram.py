@@ -1,9 +1,9 @@
-"""Sets of effects in the linear model about an optimum, by their normal equations alone.
+"""Evaluates sets of effects in the model linearised about an optimum, by normal equations alone.
 
-With y = r + X z in white noise and z ~ N(0, width^2) for each effect (group of columns), the
-evidence of a set of effects needs X^T X and X^T y only, computed once. For one set, the inverse
-of its normal matrix says what each member is worth beside the others, and each other effect
-beside the set, for every width at once (:mod:`crosscheck.calibration.worth`).
+With y = r + X z in white noise and the prior z ~ N(0, width^2), one width for each effect (a group
+of columns), the evidence of a set needs only X^T X and X^T y, which are computed once. The inverse
+of the normal matrix of one set tells what each member is worth beside the others, and each other
+effect beside the set, for every width at once (:mod:`crosscheck.calibration.worth`).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from crosscheck.fit.definite import inverse_of
 from seecr.effects.base import Layout
 from seecr.pose import Array
 
-# A set: the width of each effect in it.
+# A set: the prior width of each effect in it.
 Widths = Mapping[str, float]
 
 
@@ -30,8 +30,8 @@ class ColumnGroup:
     """The columns of one effect.
 
     Attributes:
-        columns: their numbers. widths: prior widths it may have.
-        one_sided: it is a single parameter that cannot be negative.
+        columns: their indices. widths: prior widths over which its evidence is averaged.
+        one_sided: whether the effect is a single parameter that cannot be negative.
     """
 
     columns: NDArray[np.intp]
@@ -40,7 +40,7 @@ class ColumnGroup:
 
     @classmethod
     def of(cls, columns: NDArray[np.intp], layout: Layout, widths: Array) -> ColumnGroup:
-        """The columns of an effect that has this layout."""
+        """The columns of an effect with this layout."""
         return cls(columns, widths, len(columns) == 1 and bool(layout.lower[0] == layout.null[0]))
 
 
@@ -50,7 +50,7 @@ class Gram:
 
     Attributes:
         normal: (p, p) X^T X. gradient: (p,) X^T y. power: y^T y.
-        groups: by effect.
+        groups: the columns of each effect.
     """
 
     normal: Array
@@ -60,11 +60,11 @@ class Gram:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """All effects."""
+        """Names of all effects."""
         return tuple(self.groups)
 
     def solved(self, chosen: Widths) -> Solved:
-        """The set solved."""
+        """Solve the normal equations of one set."""
         empty = np.zeros(0, dtype=np.intp)
         columns = np.concatenate([empty, *(self.groups[n].columns for n in chosen)])
         width = np.concatenate([np.zeros(0), *(
@@ -75,18 +75,18 @@ class Gram:
 
 
 def gram_of(x: Array, y: Array, groups: dict[str, ColumnGroup]) -> Gram:
-    """The normal equations of white columns (N, p) and readings (N,)."""
+    """The normal equations of whitened columns (N, p) and readings (N,)."""
     return Gram(x.T @ x, x.T @ y, float(y @ y), groups)
 
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """One set of effects, with one width for each.
+    """One set of effects, with one prior width for each.
 
     Attributes:
-        gram: of all effects. chosen: the set.
-        columns: (k,) its columns. width: (k,) their widths.
-        inverse: (k, k) covariance of its values z.
+        gram: normal equations of all effects. chosen: the set.
+        columns: (k,) indices of its columns. width: (k,) their prior widths.
+        inverse: (k, k) posterior covariance of its values z.
     """
 
     gram: Gram
@@ -97,12 +97,12 @@ class Solved:
 
     @cached_property
     def values(self) -> Array:
-        """(k,) most likely z."""
+        """(k,) most probable values z."""
         return np.asarray(self.inverse @ self.gram.gradient[self.columns])
 
     @cached_property
     def log_evidence(self) -> float:
-        """ln Z with these widths; that of noise alone is -power/2, constants left out."""
+        """ln Z with these widths, up to a constant: noise alone has -power/2."""
         gained = float(self.gram.gradient[self.columns] @ self.values)
         _sign, volume = np.linalg.slogdet(self.inverse)
         spread = float(volume) - 2.0 * float(np.sum(np.log(self.width)))
@@ -110,7 +110,7 @@ class Solved:
 
     @property
     def _one_sided(self) -> float:
-        """What half a Gaussian as the prior of some members changes, each by itself."""
+        """ln of the change of Z for members that cannot be negative, each treated by itself."""
         total = 0.0
         for name in self.chosen:
             if self.gram.groups[name].one_sided:
@@ -120,7 +120,7 @@ class Solved:
         return total
 
     def beside(self, name: str) -> tuple[Array, Array]:
-        """What the (other) members leave of an effect's normal matrix and gradient."""
+        """An effect's normal matrix and gradient after the (other) members are eliminated."""
         gram, own = self.gram, self.gram.groups[name].columns
         if name in self.chosen:
             at = self._place(name)
@@ -132,13 +132,13 @@ class Solved:
         return left, gram.gradient[own] - cross.T @ self.values
 
     def gains(self, name: str) -> Array:
-        """ln gain of an effect beside the (other) members, for each of its widths."""
+        """ln evidence that an effect gains beside the (other) members, for each of its widths."""
         group = self.gram.groups[name]
         normal, gradient = self.beside(name)
         return log_gains(normal, gradient, group.widths, group.one_sided)
 
     def gain(self, name: str) -> float:
-        """The same averaged over its widths."""
+        """The ln evidence that an effect gains beside the (other) members, averaged over widths."""
         gains = self.gains(name)
         return float(special.logsumexp(gains) - np.log(len(gains)))
 
@@ -150,13 +150,13 @@ class Solved:
 
 
 def best_widths(gram: Gram, start: Widths, sweeps: int = 3, price: float = 0.0) -> dict[str, float]:
-    """The widths of a set's members that raise its evidence most, one member after another.
+    """Widths of a set's members that maximise its evidence, by coordinate ascent.
 
     Args:
-        gram: all effects.
-        start: the set; a width is changed where that gains more than ``price``.
+        gram: normal equations of all effects.
+        start: the set with its initial widths.
         sweeps: most rounds through the members.
-        price: in ln evidence.
+        price: a width is only changed if that gains more than this ln evidence.
     """
     chosen = dict(start)
     for _ in range(sweeps):
@@ -171,13 +171,13 @@ def best_widths(gram: Gram, start: Widths, sweeps: int = 3, price: float = 0.0) 
 
 
 def averaged(gram: Gram, chosen: Widths) -> float:
-    """ln Z of a set, averaged over the width of each member about the best ones."""
+    """ln Z of a set, averaged over the width of each member about the best widths."""
     solved = gram.solved(chosen)
     return solved.log_evidence + sum(averaging(solved, name) for name in chosen)
 
 
 def averaging(solved: Solved, name: str) -> float:
-    """What averaging over the widths of a member, beside the others, changes in ln Z."""
+    """How much averaging over the widths of one member changes ln Z, beside the others."""
     gains = solved.gains(name)
     at = int(np.argmin(np.abs(solved.gram.groups[name].widths - solved.chosen[name])))
     return float(special.logsumexp(gains) - np.log(len(gains)) - gains[at])

@@ -1,9 +1,9 @@
-"""A smooth field in the place of effects: something unknown that known ones imitate.
+"""Tests whether known effects imitate something unknown: a field in place of some of them.
 
-Beside the best set a field has nothing left to explain where members of the set have taken in
-what nobody knows: a tracker's picture that widens is a length scale with drums out of round. So
-the field is asked in their place, too, as each of what may change with the place
-(:mod:`crosscheck.calibration.varying`).
+Members of the best set may have absorbed an unknown effect, and a field beside them then has
+nothing left to explain: a tracker image that widens can look like a length scale with eccentric
+drums. So a field is also tried in place of members, one for each thing that may change over the
+workspace (:mod:`crosscheck.calibration.varying`).
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from crosscheck.calibration.varying import Varying, varying
 
 @dataclass(frozen=True, eq=False)
 class Instead:
-    """A field in the place of some members of a set.
+    """A field in place of some members of a set.
 
     Attributes:
-        odds: ln odds of it with the rest of the set over the whole set, an unknown effect thought
-            as likely as none; -inf of a set without members of its own.
-        replaced: the members in whose place it is.
-        seen: what changes; None where no field was asked.
-        worth: ln odds that the other members are worth beside it.
+        odds: ln odds of the field with the rest of the set over the whole set, with equal priors
+            for an unknown effect and none; -inf if the set has no members of its own.
+        replaced: the members that the field replaces.
+        seen: what the field changes; None if no field was tried.
+        worth: ln evidence that each other member is worth beside the field.
     """
 
     odds: float
@@ -43,7 +43,7 @@ class Instead:
 
     @property
     def chance(self) -> float:
-        """That it is there, and they are not; none where it is not likelier than they are."""
+        """Posterior probability of the field with prior odds of e^-5; 0 unless it is likelier."""
         return float(special.expit(self.odds - UNKNOWN)) if self.odds > UNKNOWN else 0.0
 
 
@@ -53,15 +53,15 @@ NOT_ASKED = Instead(-np.inf, frozenset())
 def field_instead(
     setting: Setting, joint: JointFit, widths: Mapping[str, float], scores: Scores
 ) -> Instead:
-    """The members of a set in whose place a field explains most.
+    """The members of a set that a field replaces best.
 
-    What is worth nothing in the set itself is left out first. The others are dropped one after
-    the other, each time the one whose loss costs least beside a field.
+    Members that cost more evidence than they gain are dropped first. The others are dropped one
+    after the other, each time the one whose loss costs least beside a field.
 
     Args:
-        setting, joint: the data, and the set as fitted.
+        setting, joint: the data, and the fit of the set.
         widths: prior width of each member.
-        scores: says what sets were thought of before, and which effects the model has.
+        scores: priors of sets, and the effects that the model has already.
     """
     sets, best = _Sets.of(setting, joint, widths, scores), NOT_ASKED
     whole = rest = sets.needed(frozenset(joint.terms.names))
@@ -81,14 +81,15 @@ def field_instead(
 
 @dataclass(frozen=True, eq=False)
 class _Sets:
-    """Subsets of a set in the linear model about it, with and without a field.
+    """Subsets of a set in the model linearised about it, with and without a field.
 
     Attributes:
-        gram, fields: of its members and the fields; names of these.
-        scores: what sets were thought of before.
-        chosen: width of each member.
-        averaged: what averaging over these changes. It stays in subsets, as the widths do: wider
-            ones would take in, each by itself, what only those left out explain.
+        gram: normal equations of its members and of all fields. fields: which fields these are.
+        scores: priors of sets.
+        chosen: prior width of each member.
+        averaged: how much averaging over widths changes ln Z, by member. Both stay the same in
+            subsets: with a wider prior, each member by itself would absorb what only the members
+            left out explain.
     """
 
     gram: Gram
@@ -101,7 +102,7 @@ class _Sets:
     def of(
         cls, setting: Setting, joint: JointFit, widths: Mapping[str, float], scores: Scores
     ) -> _Sets:
-        """Of a set as fitted."""
+        """The subsets of a set that was fitted."""
         gram, fields = _with_fields(setting, joint)
         chosen = {n: widths.get(n, 1.0) for n in gram.names if n in joint.terms.names}
         solved = gram.solved(chosen)
@@ -109,7 +110,7 @@ class _Sets:
         return cls(gram, fields, scores, chosen, averaged)
 
     def needed(self, names: Names) -> Names:
-        """A subset without the members that cost more than they explain."""
+        """The subset that is left when members are dropped that cost more than they explain."""
         while some := sorted(names - self.scores.always):
             fewer = max((names - {name} for name in some), key=self.whole)
             if self.whole(fewer) < self.whole(names):
@@ -118,15 +119,15 @@ class _Sets:
         return names
 
     def whole(self, names: Names) -> float:
-        """ln evidence and prior of a subset."""
+        """ln evidence plus ln prior of a subset."""
         return self._solved(names).log_evidence + self._before(names)
 
     def beside(self, names: Names) -> tuple[float, Varying]:
-        """The same with a field, and where that shows."""
+        """The same with a field, averaged over all fields, and the field that explains most."""
         own, every = self._solved(names), list[float]()
         for name in self.fields:
             width = self.gram.groups[name].widths[int(np.argmax(own.gains(name)))]
-            # solved with it: a member that cannot be negative may be so without
+            # solve with the field: a member that cannot be negative may be so without it
             there = self.gram.solved({**own.chosen, name: float(width)})
             every.append(there.log_evidence + averaging(there, name))
         total = float(special.logsumexp(every) - np.log(len(every))) + self._before(names)
@@ -136,13 +137,13 @@ class _Sets:
         return self.gram.solved({n: w for n, w in self.chosen.items() if n in names})
 
     def _before(self, names: Names) -> float:
-        """ln prior, and what averaging and shapes change."""
+        """ln prior of a subset, with the corrections for averaging over widths and shapes."""
         price = sum(self.scores.price(name) for name in names)
         return self.scores.log_prior(names) - price + sum(self.averaged.get(n, 0.0) for n in names)
 
 
 def _with_fields(setting: Setting, joint: JointFit) -> tuple[Gram, list[Varying]]:
-    """Normal equations of a fit's own effects and of fields; the names of these."""
+    """Normal equations of a fit's own effects and of all fields, and which fields these are."""
     linear, groups = linearised(setting, joint), groups_of(joint, widths_for)
     y = own_readings(linear, joint, groups)
     fields, first = dict[Varying, ColumnGroup](), linear.x.shape[1]
@@ -152,7 +153,7 @@ def _with_fields(setting: Setting, joint: JointFit) -> tuple[Gram, list[Varying]
         fields[what] = ColumnGroup(own, np.array(FIELD_WIDTHS))
         first += part.shape[1]
     columns = np.concatenate([np.zeros((len(joint.state.white), 0)), *parts.values()], axis=1)
-    # what was measured independently comes last, and no field moves it
+    # independent measurements come last, and no field moves them
     known = np.zeros((len(linear.y) - len(columns), columns.shape[1]))
     white = np.concatenate([joint.whitened(setting.chain, columns), known])
     return gram_of(np.concatenate([linear.x, white], axis=1), y, groups | fields), list(fields)

@@ -1,8 +1,9 @@
-"""Fit many effects at once: damped Gauss-Newton with plausible sizes as priors.
+"""Fits many effects at once: damped Gauss-Newton with plausible sizes as priors.
 
-The unknowns are z = (value - null)/scale with z ~ N(0, width^2): what the data see poorly stays
-near null. The noise is tempered: at first a hundred times its size, so that the prior holds the
-fit together while it is far off, then less and less. Rows count by how far off they are.
+The unknowns are z = (value - null)/scale with the prior z ~ N(0, width^2), which keeps poorly
+identifiable parameters near null. The noise is tempered: it starts at up to a hundred times its
+size, so that the prior holds the fit together while it is far off, and then decreases. Rows that
+are far off get less weight.
 """
 
 from __future__ import annotations
@@ -22,11 +23,11 @@ from seecr.effects import Terms
 from seecr.pose import Array
 
 TEMPERS = (100.0, 30.0, 10.0, 3.0, 1.0)
-# Gauss-Newton steps at each temperature, and at the last.
+# Gauss-Newton steps at each temperature, and at the last one.
 _STEPS, _LAST = 4, 20
-# A step that gains less than this part of the objective, and less than this, is the last.
+# A step is the last if it gains less than both this part of the objective and this much.
 _PART, _GAIN = 1e-3, 1e-2
-# Most plausible sizes that a parameter of plausible size moves at once.
+# Largest step in plausible sizes, or in prior widths if these are larger.
 _MOST = 5.0
 
 
@@ -36,11 +37,11 @@ class JointFit:
 
     Attributes:
         state: the model at its best values.
-        jacobian: (N, p) derivatives by z, in units of the stated noise.
+        jacobian: (N, p) derivatives of the prediction by z, in units of the stated noise.
         width: (p,) prior standard deviations of z.
-        colour: the noise it was fitted with.
-        weight: (N,) how much each reading counts.
-        settled: the last step gained nothing.
+        colour: the noise of the fit.
+        weight: (N,) weight of each reading.
+        settled: whether the fit converged.
     """
 
     state: State
@@ -57,24 +58,24 @@ class JointFit:
 
     @property
     def z(self) -> Array:
-        """(p,) values less null in plausible sizes."""
+        """(p,) values in plausible sizes from null."""
         return self.state.terms.sizes
 
     def whitened(self, chain: Chain, values: Array) -> Array:
-        """Residuals (N,) or derivatives (N, p), in units of the stated noise, made white."""
+        """Whiten residuals (N,) or derivatives (N, p) that are in units of the stated noise."""
         return whitened(chain, self.colour, self.weight, values)
 
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """What stays the same through a fit.
+    """What stays the same during a fit.
 
     Attributes:
         problem, factor: the data and their noise factors, :meth:`Problem.noise`.
-        chain: how the readings follow one another.
-        frozen: take rows' history as given when deriving.
+        chain: the order of the readings.
+        frozen: treat the history of the rows as constant in derivatives.
         watch: called after each step with chi2 per reading.
-        weight: (N,) how much each reading counts; None to find that from what is left.
+        weight: (N,) weight of each reading; None to compute it from the residuals.
     """
 
     problem: Problem
@@ -85,13 +86,13 @@ class Setting:
     weight: Array | None = None
 
     def weight_at(self, colour: Colour, state: State) -> Array:
-        """(N,) how much each reading counts."""
+        """(N,) weight of each reading."""
         return row_weights(self.chain, colour, state.white) if self.weight is None else self.weight
 
 
 @dataclass(frozen=True, eq=False)
 class _Step:
-    """A step that pays: its gain, the objective before, and where it leads."""
+    """A step that lowers the objective: by how much, the objective before, and the new state."""
 
     gain: float
     before: float
@@ -100,7 +101,7 @@ class _Step:
 
 
 def tempered(setting: Setting, start: State, width: Array, colour: Colour) -> JointFit:
-    """Fit with the noise a hundred times its size, then less and less."""
+    """Fit with the noise scaled up, by a hundred at most, and then less and less."""
     far = np.sqrt(start.chi2 / max(len(start.white), 1)) / float(np.min(colour.scale))
     joint = None
     for temper in TEMPERS:
@@ -121,15 +122,15 @@ def settle(
     steps: int = _LAST,
     jacobian: Array | None = None,
 ) -> JointFit:
-    """Gauss-Newton steps until nothing is gained, or so many of them.
+    """Make Gauss-Newton steps until nothing is gained.
 
     Args:
         setting: data and derivatives.
         state: where to start; must be valid.
         width: (p,) prior standard deviations of z; 0 holds a parameter.
         colour: the noise.
-        steps: most of them.
-        jacobian: derivatives at the start, or so near that they are the same, where known.
+        steps: most steps.
+        jacobian: derivatives at the start or very near to it, if they are known.
     """
     damping, settled = 1e-4, False
     weight = setting.weight_at(colour, state)
@@ -144,14 +145,14 @@ def settle(
         setting.watch(state.chi2 / max(len(state.white), 1))
         weight = setting.weight_at(colour, state)
         if step.gain < max(_PART * step.before, _GAIN):
-            settled = True  # so near that the derivatives are the same
+            settled = True  # so near that the derivatives are still accurate
             break
         jacobian = scaled_derivatives(setting, state)
     return JointFit(state, jacobian, width, colour, weight, settled)
 
 
 def moved_on(setting: Setting, joint: JointFit, weight: Array, steps: int) -> State:
-    """A fit with other weights (N,) of readings: steps with the derivatives that it has."""
+    """Continue a fit with other weights (N,) of readings, with its present derivatives."""
     state, damping = joint.state, 1e-9
     for _ in range(steps):
         step = _step(setting, state, joint.jacobian, joint.width, joint.colour, weight, damping)
@@ -172,7 +173,7 @@ def _step(
     setting: Setting, state: State, jacobian: Array, width: Array, colour: Colour,
     weight: Array, damping: float,
 ) -> _Step | None:  # fmt: skip
-    """A step that pays; None where there is none."""
+    """A step that lowers the objective; None if there is none."""
     terms = state.terms
     scale, lower, upper = terms.scale, terms.lower, terms.upper
     values, z = terms.vector, terms.sizes
@@ -212,7 +213,7 @@ def _step(
 def _movable(
     slope: Array, z: Array, width: Array, values: Array, limits: tuple[Array, Array]
 ) -> NDArray[np.intp]:
-    """Numbers of the parameters that may move: not held, not pressed against a bound."""
+    """Indices of parameters that may move: neither held nor pushed against a bound."""
     lower, upper = limits
     slope = slope + z / np.where(width > 0.0, width, 1.0) ** 2
     held = (width == 0.0) | ((values <= lower) & (slope > 0)) | ((values >= upper) & (slope < 0))
@@ -220,7 +221,10 @@ def _movable(
 
 
 def cost(setting: Setting, colour: Colour, weight: Array, at: State, width: Array) -> float:
-    """What a joint fit makes least: -2 ln of likelihood and prior, for this noise and weight."""
+    """The objective of a joint fit: -2 ln of likelihood and prior, up to a constant.
+
+    Noise and weights are taken as given.
+    """
     white = whitened(setting.chain, colour, weight, at.white)
     off = known_left(at.terms)
     power = float(white @ white) + float(off @ off)
@@ -228,6 +232,6 @@ def cost(setting: Setting, colour: Colour, weight: Array, at: State, width: Arra
 
 
 def penalty(z: Array, width: Array) -> float:
-    """What the prior charges for values."""
+    """Contribution of the prior to the objective."""
     free = width > 0.0
     return float(np.sum((z[free] / width[free]) ** 2))

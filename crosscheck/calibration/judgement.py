@@ -1,10 +1,10 @@
-"""What the compared sets say: the verdict, the effects that are sure, and what to do.
+"""Turns the compared sets into a verdict and a list of effects that are sure.
 
-Something unknown is there where a smooth field over the workspace earns more evidence than chance
-gives it, beside all effects or in the place of some, or where runs left out are predicted worse
-than the fit itself expects. Where the data leave open which effects it is, or it takes many, that
-is a calibration and no diagnosis; so it is where the whole catalogue leaves a field nothing, but
-the best few do.
+Something unknown is there if a smooth field over the workspace earns evidence beside all effects,
+or in place of some, or if held-out runs are predicted worse than the fit itself expects. If the
+data leave open which effects are missing, or if it takes many, the verdict is ``many_effects``: a
+calibration and no diagnosis. The same holds if a field explains something beside the best set, but
+nothing beside the whole catalogue.
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ from crosscheck.calibration.refits import Found
 from crosscheck.calibration.sets import Names
 from crosscheck.fit.reasons import DiagnosisVerdict
 
-# An effect is sure from this probability of it or its equals.
+# An effect is sure from this probability on that it or an equivalent is missing.
 SURE = 0.95
-# Sets up to this size are a diagnosis; at most this many classes may be open, or so many where
-# every member of the set is sure.
+# Largest set that counts as few effects. The number of open classes must be below _OPEN, or below
+# _OPEN_BESIDE if every member of the set is sure.
 _FEW, _OPEN, _OPEN_BESIDE = 5, 1.0, 2.0
-# Effects of more numbers than a pose has, one or more for each cable: more than so many of them are
-# a calibration, since together they imitate anything.
+# Effects with more parameters than a pose has can together imitate anything: more than _LARGE of
+# them are a calibration.
 _NUMBERS, _LARGE = 6, 2
-# A name is owed from this much ln evidence; what explains less may be chance.
+# A set that explains less ln evidence than this may be chance and needs no name.
 _OWED = 12.5
-# Runs left out may be this many times as far off as the fit expected.
+# Held-out runs may be so many times as far off as the fit expects.
 SURPRISE = 2.0
-# In a large set each effect must carry more than this part of what all explain: others may
-# imitate what is missing.
+# In a large set, an effect is only sure if it carries more than this part of what all explain, and
+# more ln evidence than _WORTH: others may imitate what is missing.
 _PART, _WORTH = 0.1, 25.0
-# Where a field explains what is left, more than this part, and by few parameters; in the place of
-# some, of what the others do nearly all.
+# If a field explains something beside the best set, or in place of members, an effect must have few
+# parameters and carry more than this part of what all members, or those that stay, explain.
 _MOST, _ALL = 0.5, 0.95
 
 NONE: Names = frozenset()
@@ -46,15 +46,15 @@ NONE: Names = frozenset()
 
 @dataclass(frozen=True, eq=False)
 class Judgement:
-    """The verdict and what is sure.
+    """The verdict, and what is sure.
 
     Attributes:
-        verdict: of the data.
-        sure: effects that are missing beyond doubt, each the first of its class.
-        undecided: how many classes are open.
-        doubted: members of the best set of a size that hardly happens.
-        more: whether a smooth field explains what the best set leaves.
-        imitated: something unknown that members of the best set imitate; None where nothing is.
+        verdict: the verdict.
+        sure: effects that are missing beyond doubt, each one representing its class.
+        undecided: the expected number of open classes, see :class:`Classes`.
+        doubted: members of the best set that are implausibly large.
+        more: whether a smooth field explains something beside the best set.
+        imitated: something unknown that members of the best set imitate; None if there is nothing.
     """
 
     verdict: DiagnosisVerdict
@@ -75,17 +75,17 @@ def judge(
     beside: float = -np.inf,
     instead: Instead = NOT_ASKED,
 ) -> Judgement:
-    """The verdict.
+    """Decide on the verdict.
 
     Args:
         found: the compared sets.
-        classes: probabilities.
+        classes: probabilities of the classes of equivalent effects.
         field_odds: ln odds of a smooth field beside the whole catalogue.
-        surprise: of the worst run left out of the joint fit, a reading.
-        strange: what was taken for noise is none.
-        doubted: members of the best set of a size that hardly happens.
+        surprise: chi2 per reading of the worst held-out run over what the joint fit expects.
+        strange: whether what was taken for noise is not noise.
+        doubted: members of the best set that are implausibly large.
         beside: ln odds of a smooth field beside the best set.
-        instead: of one in the place of some of its members.
+        instead: a field in place of some members of the best set.
     """
     best, undecided = found.best.names - found.always - found.idle, classes.undecided
     unknown = strange or field_odds > UNKNOWN or surprise > SURPRISE
@@ -100,7 +100,7 @@ def judge(
         worth = worths(found)
         sure = tuple(name for name in carrying_most(found, worth, _MOST) if name in sure)
     if instead.chance:
-        # of several that stay some may take in what others of them do
+        # of several members that stay, some may absorb what others explain
         kept = carrying_most(found, instead.worth, _ALL)
         kept = tuple(name for name in kept if name not in doubted)
         if kept or not unknown:
@@ -114,7 +114,7 @@ def judge(
 
 
 def too_large(sizes: Iterable[int]) -> bool:
-    """Whether effects of so many parameters are a calibration together, and no diagnosis."""
+    """Whether effects with these numbers of parameters are together a calibration, no diagnosis."""
     return sum(size > _NUMBERS for size in sizes) > _LARGE
 
 
@@ -124,7 +124,8 @@ def sure_effects(found: Found, classes: Classes, few: bool) -> tuple[str, ...]:
     Args:
         found: the compared sets.
         classes: probabilities.
-        few: these few effects explain everything; else those count that carry much of it.
+        few: whether these few effects explain everything; if not, members only count that carry
+            much of it.
     """
     worth = worths(found)
     least = 0.0 if few else max(_WORTH, _PART * sum(worth.values()))
@@ -133,9 +134,9 @@ def sure_effects(found: Found, classes: Classes, few: bool) -> tuple[str, ...]:
 
 
 def adequate(found: Found, sure: tuple[str, ...]) -> tuple[str, ...]:
-    """These effects, and further ones of the best set while it explains much that they do not.
+    """These effects, plus further ones of the best set as long as it explains much more.
 
-    Which effect it is may be open where that something is missing is not.
+    That something is missing may be certain even if it is open which effect it is.
     """
     worth, listed = worths(found), list(sure)
     for name in sorted(set(worth) - set(sure), key=lambda e: -worth[e]):
@@ -147,10 +148,10 @@ def adequate(found: Found, sure: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def carrying_most(found: Found, worth: Mapping[str, float], part: float) -> tuple[str, ...]:
-    """The one of few parameters that carries more than a part of what its set does, if any.
+    """The small effect that carries more than a part of what its set explains, if there is one.
 
     Args:
-        found: the compared sets. worth: ln evidence that members of one are worth.
+        found: the compared sets. worth: ln evidence that each member of a set is worth.
         part: at least a half.
     """
     least = max(_WORTH, part * sum(worth.values()))
@@ -158,15 +159,15 @@ def carrying_most(found: Found, worth: Mapping[str, float], part: float) -> tupl
 
 
 def _size(found: Found, name: str) -> int:
-    """How many numbers an effect has, shapes aside; none where the linear model does not see it."""
+    """An effect's number of amplitudes; 0 if it is not in the linear model."""
     group = found.scores.gram.groups.get(name)
     return 0 if group is None else len(group.columns)
 
 
 def worths(found: Found) -> dict[str, float]:
-    """ln evidence that each member of the best set is worth: refitted without it, or linear.
+    """ln evidence that each member of the best set is worth, by a refit without it or linearly.
 
-    What moves nothing where the others are is worth none, and left out.
+    Members that move nothing beside the others are left out.
     """
     best = found.best
     linear = found.scores.neighbours(best.names)
@@ -184,5 +185,5 @@ def _worth(found: Found, linear: dict[Names, float], base: float, rest: Names) -
 
 
 def explained(found: Found) -> float:
-    """ln evidence of the best set over none at all."""
+    """ln evidence of the best set over that of the model as it stands."""
     return found.best.score - found.none.score

@@ -1,8 +1,7 @@
-"""Effects that join once the others are in: with history, with shapes, cables with weight.
+"""Effects that join the joint fit later: those with history, with shapes, and cables with weight.
 
-Their derivatives cost a walk through all rows, or mean something only for the right shape (a
-period, a time constant). What the joint fit leaves says which of them are worth it, and where
-their shapes start.
+Their derivatives need a walk through all rows, or only make sense at the right shape (a period, a
+time constant). The residuals of the joint fit tell which of them are worth it, and at which shape.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from seecr.effects import Term, catalogue, layout_of
 from seecr.effects.base import Layout
 from seecr.pose import Array
 
-# An effect joins where it gains this much evidence.
+# An effect joins if it gains this much ln evidence.
 PAYS = 2.0
 
 
@@ -32,9 +31,9 @@ class Promising:
     """What an effect promises beside a joint fit.
 
     Attributes:
-        term: it, at the shape that promises most, amplitudes at null.
+        term: the effect at its most promising shape, amplitudes at null.
         gain: ln evidence that it gains, averaged over its shapes.
-        price: ln evidence by which it gains more at that shape than on average.
+        price: how much more ln evidence it gains at that shape than on average.
     """
 
     term: Term
@@ -43,7 +42,7 @@ class Promising:
 
 
 def has_inputs(problem: Problem, layout: Layout) -> bool:
-    """Whether the data have what the effect needs."""
+    """Whether the data contain what the effect needs."""
     data, needs = problem.data, layout.effect.needs
     clock, warmth = data.t_s, data.temperature_C
     return not (
@@ -55,7 +54,7 @@ def has_inputs(problem: Problem, layout: Layout) -> bool:
 
 
 def layouts(problem: Problem) -> tuple[list[Layout], list[Layout]]:
-    """Effects for the joint fit, and those that join later."""
+    """The effects that are fitted from the start, and those that join later."""
     at_once: list[Layout] = []
     later: list[Layout] = []
     for effect in catalogue().values():
@@ -74,7 +73,7 @@ def _waits(problem: Problem, layout: Layout) -> bool:
 
 
 def promising_beside(setting: Setting, joint: JointFit, later: Sequence[Layout]) -> list[Promising]:
-    """Effects that could join, each at its most promising shape."""
+    """What each of these effects promises beside a joint fit, at its most promising shape."""
     beside = _Beside(setting, joint)
     out = []
     for layout in later:
@@ -89,21 +88,21 @@ def promising_beside(setting: Setting, joint: JointFit, later: Sequence[Layout])
 
 
 def at_null(term: Term) -> Term:
-    """An effect with its shape, its amplitudes null."""
+    """An effect with its shape and its fixed values, all other parameters at null."""
     layout = term.layout
     held = layout.shape | term.knowledge.fixed
     return term.with_vector(np.where(held, term.vector, layout.null))
 
 
 def inside(term: Term) -> Term:
-    """A start off the bound, where history has a derivative on both sides."""
+    """Move a start off its bound, where laws with history have two-sided derivatives."""
     layout = term.layout
     at_bound = (term.vector <= layout.lower) & ~layout.shape
     return term.with_vector(np.where(at_bound, term.vector + 0.1 * layout.scale, term.vector))
 
 
 class _Beside:
-    """What is left of more columns beside those of a joint fit."""
+    """What is left of additional columns beside those of a joint fit."""
 
     def __init__(self, setting: Setting, joint: JointFit) -> None:
         self.setting, self.joint = setting, joint
@@ -112,7 +111,7 @@ class _Beside:
         self.root = root_beside_one(self.columns)
 
     def gain(self, term: Term) -> float:
-        """ln gain of an effect's amplitudes that start at null, the others as they are."""
+        """ln evidence that an effect's amplitudes at null gain, with all others integrated out."""
         setting, joint = self.setting, self.joint
         x = joint.whitened(setting.chain, added_columns(setting, joint, term))
         cross = linalg.solve_triangular(
@@ -125,17 +124,17 @@ class _Beside:
 
 
 def amplitudes(term: Term) -> NDArray[np.bool_]:
-    """(p,) parameters that linear algebra is about: neither shapes nor fixed."""
+    """(p,) parameters that the linear model treats: neither shapes nor fixed ones."""
     return np.asarray(~term.layout.shape & ~term.knowledge.fixed)
 
 
 def amplitudes_at_null(term: Term) -> NDArray[np.bool_]:
-    """(p,) those of them that an effect that starts elsewhere has not started yet."""
+    """(p,) those of them that are at null."""
     return np.asarray(amplitudes(term) & (term.vector == term.layout.null))
 
 
 def added_columns(setting: Setting, joint: JointFit, term: Term) -> Array:
-    """(N, k) derivatives by z of an added effect's amplitudes that are at null."""
+    """(N, k) derivatives by z of those amplitudes of an added effect that are at null."""
     layout = term.layout
     own = np.flatnonzero(amplitudes_at_null(term))
     terms = joint.terms.with_term(term)

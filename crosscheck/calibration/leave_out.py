@@ -1,9 +1,9 @@
-"""Errors on runs left out of a joint fit, each by a fit that had not seen it.
+"""Errors of the joint fit on held-out runs, each predicted by a fit that has not seen it.
 
-Without a block the values move on from those with it, by steps with the derivatives of the joint
-fit; where it held values that now go so far that the prediction bends, by some with derivatives of
-their own. What is told is what the model predicts there and not what a straight line does. Whether
-that is worse than the fit expects is asked of the straight lines, of which it knows the errors.
+Without a block, the values move on from the joint fit by steps with its derivatives. If the block
+had held back values that now go so far that the prediction is no longer linear, steps with new
+derivatives follow. The reported errors are those of the model, not of its linearisation. Whether
+they are worse than the fit expects is judged by the linearised model, whose errors are known.
 """
 
 from __future__ import annotations
@@ -20,24 +20,24 @@ from crosscheck.fit.problem import Rms, rms_by_kind
 from crosscheck.fit.state import State
 from seecr.pose import Array
 
-# Steps without a block, from the fit to all of them; with derivatives of their own.
+# Steps of a refit without a block: with the derivatives of the joint fit, and with its own.
 _STEPS, _EARNEST = 6, 4
-# Where a prediction differs from a straight line by more than this part of the noise, it bends.
+# A prediction is nonlinear if it differs from its linearisation by this part of the noise.
 _BENT = 0.1
 
 
 @dataclass(frozen=True, eq=False)
 class LeftOut:
-    """Blocks of rows predicted by fits that had not seen them.
+    """Held-out blocks of rows, predicted by fits that had not seen them.
 
     Attributes:
         raw: (n, 6 + m) residuals, NaN in rows that do not count.
-        rms: by kind of reading.
-        chi2: (blocks,) whitened, of the readings in each block; readings: (blocks,) their number.
+        rms: rms errors by kind of reading.
+        chi2: (blocks,) of the whitened residuals in each block. readings: (blocks,) their number.
         values: (blocks, p) parameters fitted without each block.
-        surprise: (blocks,) chi2 of straight lines to it in units of noise and of what the fit
-            without the block did not know of it, per reading: about 1 where the model is right,
-            however far it had to reach.
+        surprise: (blocks,) chi2 per reading of linearised predictions, in units of noise plus the
+            uncertainty of the fit without the block: about 1 if the model is right, however far
+            it extrapolates.
     """
 
     raw: Array
@@ -49,7 +49,7 @@ class LeftOut:
 
 
 def leave_out(setting: Setting, joint: JointFit) -> LeftOut:
-    """Refit without each block (runs, where there are some) and predict it."""
+    """Refit without each block (runs, if there are enough of them) and predict it."""
     problem = setting.problem
     blocks = blocks_of(problem)
     linear = linearised(setting, joint)
@@ -59,7 +59,7 @@ def leave_out(setting: Setting, joint: JointFit) -> LeftOut:
     values = np.zeros((len(blocks), len(joint.z)))
     for b, rows in enumerate(blocks):
         mine = rows[problem.row_of]
-        # what was measured independently belongs to no block
+        # independent measurements belong to no block
         absent = np.concatenate([mine, np.zeros(len(linear.y) - len(mine), dtype=bool)])
         state = _without(setting, joint, mine)
         values[b], raw[rows] = state.terms.vector, state.raw[rows]
@@ -72,9 +72,9 @@ def leave_out(setting: Setting, joint: JointFit) -> LeftOut:
 
 
 def _without(setting: Setting, joint: JointFit, absent: NDArray[np.bool_]) -> State:
-    """The model fitted without some readings."""
+    """The model fitted without some readings (N,)."""
     chain, weight = setting.chain, np.where(absent, 0.0, joint.weight)
-    # what comes after them follows nothing
+    # the readings after them have no predecessor any more
     first = (chain.before >= 0) & absent[chain.before]
     chain = replace(chain, before=np.where(first, -1, chain.before))
     cut = replace(setting, chain=chain, weight=weight)
@@ -87,7 +87,7 @@ def _without(setting: Setting, joint: JointFit, absent: NDArray[np.bool_]) -> St
 
 
 def without(linear: Linear, rows: NDArray[np.bool_]) -> Array:
-    """(p,) values z fitted without some readings: ridge regression by the prior."""
+    """(p,) values z of the linear model without some readings: ridge regression with the prior."""
     free = linear.width > 0.0
     kept = linear.x[~rows][:, free]
     normal = kept.T @ kept + np.diag(1.0 / linear.width[free] ** 2)
@@ -97,9 +97,9 @@ def without(linear: Linear, rows: NDArray[np.bool_]) -> Array:
 
 
 def surprise_of(linear: Linear, rows: NDArray[np.bool_], left: Array) -> float:
-    """What is left (k,) of some readings, in units of what was to be expected: its chi2.
+    """chi2 of residuals (k,) of held-out readings, in units of what the fit expects of them.
 
-    The fit without them predicts them with the covariance 1 + x V x^T, V that of its values.
+    The fit without them predicts them with the covariance 1 + x V x^T, with V that of its values.
     """
     free = linear.width > 0.0
     kept, own = linear.x[~rows][:, free], linear.x[rows][:, free]

@@ -1,7 +1,7 @@
-"""A joint fit as a linear model about its optimum: white columns, readings, effects as groups.
+"""Linearises a joint fit about its optimum: whitened columns, readings, effects as groups.
 
-A parameter on its bound is not at the optimum that linear algebra is about, and one that is held
-is not fitted: both stay where they are. What was measured independently is a reading like others.
+Parameters on a bound are not at the optimum that the linear model assumes, and held ones are not
+fitted: both stay where they are. Independent measurements count as readings.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ class Linear:
     """y = X z + white noise, about an optimum.
 
     Attributes:
-        x: (N, p) derivatives by z; columns of parameters that stay are 0.
-        y: (N,) residuals plus what the parameters that are free explain.
+        x: (N, p) derivatives by z; 0 for parameters that stay.
+        y: (N,) residuals plus the signal of the free parameters.
         width: (p,) prior standard deviations of z; 0 for parameters that stay.
     """
 
@@ -42,9 +42,9 @@ def free_of(joint: JointFit) -> NDArray[np.bool_]:
 
 
 def unwhitened(joint: JointFit) -> Linear:
-    """The linear model in units of the stated noise, its correlation left in.
+    """The linear model in units of the stated noise, with the autocorrelation left in.
 
-    What was measured independently narrows the prior and moves its middle, and ``y`` with it.
+    Independent measurements enter the prior: they narrow it and move its mean, and ``y`` with it.
     """
     free = free_of(joint)
     x, width = joint.jacobian * free, joint.width * free
@@ -57,7 +57,7 @@ def unwhitened(joint: JointFit) -> Linear:
 
 
 def linearised(setting: Setting, joint: JointFit) -> Linear:
-    """The linear model with the noise made white; what was measured independently comes last."""
+    """The linear model with whitened noise; independent measurements are its last readings."""
     free = free_of(joint)
     chain = setting.chain
     columns = known_readings(joint.terms)[0] * free
@@ -67,7 +67,7 @@ def linearised(setting: Setting, joint: JointFit) -> Linear:
 
 
 def groups_of(joint: JointFit, widths: Callable[[Layout], Array]) -> dict[str, ColumnGroup]:
-    """The columns of each effect that are free and no shapes, with the widths they may have."""
+    """The free columns of each effect without shapes, with the prior widths it may have."""
     free = free_of(joint)
     out = {}
     for term in joint.terms:

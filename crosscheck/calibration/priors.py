@@ -1,4 +1,4 @@
-"""How wide priors are, in plausible sizes."""
+"""Prior widths of effects, in plausible sizes."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from seecr.effects import Terms
 from seecr.effects.base import Layout
 from seecr.pose import Array
 
-# Of what has no plausible size: where the tracker stands, and shapes.
+# For what has no plausible size: the position of the tracker, and shapes.
 FLAT, SHAPES = 300.0, 30.0
-# Of effects: more than 1 only where that is surely better.
+# For effects: more than 1 only if that raises the evidence clearly.
 WIDER = (1.0, 3.0, 10.0)
 
 
@@ -24,5 +24,5 @@ def widths_of(terms: Terms) -> Array:
 
 
 def wider(layout: Layout) -> Array:
-    """The prior widths that an effect may come to have."""
+    """The prior widths that an effect may be given."""
     return np.array([FLAT] if layout.name == TRACKER else WIDER)

@@ -1,4 +1,4 @@
-"""How probable each effect is, and which of them the data cannot tell apart."""
+"""Posterior probabilities of effects, and classes of effects that the data cannot tell apart."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from crosscheck.calibration.exact import HOLLOW, Refit
 from crosscheck.calibration.refits import Found
 from crosscheck.calibration.sets import Names, Scores
 
-# Sets worse than the best by more than this in ln evidence count for nothing.
+# Only the neighbours of sets that are worse than the best by less than this ln evidence count.
 _COUNTED = 8.0
-# Beside an effect that does the same another gains less than this part of what it does alone.
+# Two effects do the same if one gains less beside the other than this part of what it gains alone.
 _SAME = 0.5
-# As many effects beyond what is listed are looked at for being alike.
+# So many effects that are not listed are tested for doing the same.
 _HINTS = 10
 
 
 @dataclass(frozen=True, eq=False)
 class Classes:
-    """Probabilities from sets and their scores.
+    """Posterior probabilities, as sums over sets.
 
     Attributes:
-        effect: of each effect, that it is missing.
-        members: classes of equals, the most probable first; every effect in one.
-        probability: of each class, that some member is missing.
-        further: of members of the best set that share a class with one that is needed more, that
-            as many of the class are missing as it takes: of three equals, two may be.
+        effect: for each effect, the probability that it is missing.
+        members: classes of equivalent effects, the most probable first; each effect is in one.
+        probability: for each class, the probability that some member is missing.
+        further: for the second member of the best set within a class (third, ...), the
+            probability that at least two members of the class are missing (three, ...).
     """
 
     effect: dict[str, float]
@@ -40,13 +40,13 @@ class Classes:
 
     @property
     def undecided(self) -> float:
-        """Sum of min(P, 1 - P) over classes, and further members: how many of them are open."""
+        """Expected number of open classes and further members: the sum of min(P, 1 - P)."""
         return float(sum(min(p, 1.0 - p) for p in (*self.probability, *self.further.values())))
 
     def without(self, imitating: Names, chance: float) -> Classes:
-        """The same where, with some chance, what these explain is something unknown.
+        """The probabilities if, with some chance, something unknown explains what these explain.
 
-        Their equals explain the same.
+        Their equivalents explain the same, and become less probable too.
         """
         touched = [not imitating.isdisjoint(members) for members in self.members]
         less = {m for some, yes in zip(self.members, touched, strict=True) if yes for m in some}
@@ -59,17 +59,17 @@ class Classes:
         return Classes(of(self.effect), self.members, probability, of(self.further))
 
     def of(self, name: str) -> float:
-        """Probability that an effect or one of its class is missing, beside those needed more."""
+        """Probability that an effect or an equivalent is missing; see ``further`` for some."""
         pairs = zip(self.members, self.probability, strict=True)
         return self.further.get(name, next(p for members, p in pairs if name in members))
 
 
 def all_scores(found: Found) -> dict[Names, float]:
-    """Exact scores, and about those of sets with one effect more than a fitted one.
+    """Scores of all fitted sets, and approximate ones of sets with one effect more than these.
 
-    Each set that counts has as many larger ones about it: were only those of the best set
-    counted, its members would be surer than they are. Others that gain a member of the best set,
-    or contain it, are near it: those of them that matter are fitted.
+    Each fitted set that counts has its own larger sets. If only those of the best set counted, its
+    members would seem surer than they are. Larger sets that gain a member of the best set, or
+    contain it, are left out for other sets: those of them that matter are fitted.
     """
     best, out = found.best, dict[Names, float]()
     for names, refit in found.refits.items():
@@ -83,11 +83,12 @@ def all_scores(found: Found) -> dict[Names, float]:
 
 
 def _larger(found: Found, refit: Refit) -> dict[Names, float]:
-    """Sets with one effect more than a fitted one, with about their scores.
+    """Sets with one effect more than a fitted one, with approximate scores.
 
-    None is better than that set: it would have been fitted, or no robot can have it. Where the
-    linear model does not know what the set explains, others explain it there: they are taken to
-    gain beside it what they gain beside the best set.
+    None may score higher than that set: if it were better, it would have been fitted, unless no
+    robot can have its values. If the linear model does not know what the set explains, other
+    effects explain it there; then they are taken to gain as much beside the set as beside the best
+    one.
     """
     scores, best = found.scores, found.best
     off = (refit.score - scores.score(refit.names)) - (best.score - scores.score(best.names))
@@ -110,15 +111,15 @@ def probabilities(
     fitted: Collection[Names] | None = None,
     hints: Iterable[tuple[str, ...]] = (),
 ) -> Classes:
-    """Probabilities of effects and classes: sums over sets.
+    """Posterior probabilities of effects and classes: sums over sets.
 
     Args:
-        scores: ln evidence and prior of each set.
+        scores: ln evidence plus ln prior of each set.
         best: the best of them.
-        effects: all that may be missing.
-        sizes: how many parameters each has; one where not given.
-        fitted: sets whose scores are exact, all by default: only they say what stands in the
-            place of what.
+        effects: all effects that may be missing.
+        sizes: number of parameters of each; 1 if not given.
+        fitted: sets whose scores are exact, by default all: only these decide which effects are
+            equivalent.
         hints: effects beyond the best set that do the same, from :func:`alike_beyond`.
     """
     effects = list(effects)
@@ -130,7 +131,7 @@ def probabilities(
 def with_hints(
     members: Iterable[tuple[str, ...]], hints: Iterable[tuple[str, ...]]
 ) -> list[tuple[str, ...]]:
-    """Classes, with those put together that are of one effect each and hint at the same."""
+    """Join classes of one effect each if these effects do the same, by ``hints``."""
     members = list(members)
     alone = {names[0] for names in members if len(names) == 1}
     groups = [tuple(name for name in names if name in alone) for names in hints]
@@ -139,10 +140,10 @@ def with_hints(
 
 
 def alike_beyond(scores: Scores, listed: Names, sizes: Mapping[str, int]) -> list[tuple[str, ...]]:
-    """Effects that are not listed and hint at the same, in the linear model about what is.
+    """Groups of effects that are not listed and do the same, by the linear model about the listed.
 
-    Each explains something beside what is listed (prior odds left out), about as well as the best
-    of them does, and beside that one not half as much.
+    Each of them explains something beside the listed ones (without prior odds), about as well as
+    the best of its group, and beside that one less than half as much.
     """
 
     def gains(names: Names, some: Iterable[str]) -> dict[str, float]:
@@ -177,7 +178,7 @@ def of_classes(
     effects: Iterable[str],
     members: Iterable[tuple[str, ...]],
 ) -> Classes:
-    """Probabilities of effects and of given classes of them; ``best`` is the best set."""
+    """Posterior probabilities of effects and of given classes; ``best`` is the best set."""
     names = list(scores)
     logs = np.array([scores[n] for n in names])
     share = np.exp(logs - special.logsumexp(logs))
@@ -185,13 +186,13 @@ def of_classes(
     def chance(some: Iterable[str], least: int = 1) -> float:
         wanted = set(some)
         total = sum(p for n, p in zip(names, share, strict=True) if len(wanted & n) >= least)
-        return min(float(total), 1.0)  # a sum of shares is 1 but for rounding
+        return min(float(total), 1.0)  # rounding may take the sum above 1
 
     order = sorted(members, key=lambda c: -chance(c))
     effect = {e: chance([e]) for e in effects}
     further: dict[str, float] = {}
     for members_of in order:
-        # the most needed first: without it the set explains least
+        # the most needed member first: the set without it explains least
         needed = sorted(
             best.intersection(members_of), key=lambda e: scores.get(best - {e}, -np.inf)
         )
@@ -202,7 +203,7 @@ def of_classes(
 def _classes(
     scores: Mapping[Names, float], best: Names, effects: list[str], sizes: Mapping[str, int]
 ) -> list[tuple[str, ...]]:
-    """Members of the best set with what could stand in their place; the others by themselves."""
+    """Classes of equivalent effects, by exchanges that cost the best set little; others alone."""
     together = {e: {e} for e in effects}
 
     def join(a: str, b: str) -> None:
@@ -220,7 +221,7 @@ def _classes(
         elif len(gone) == len(come) and loss < EQUAL:
             beside.append((loss, gone, come))
     for _loss, gone, come in sorted(beside, key=lambda one: one[0]):
-        # sets that differ in equals and one effect more say that these are equals too
+        # two sets differ in known equivalents and one more pair: that pair is equivalent too
         left = _left(gone, come, together)
         if left is not None:
             join(*left)
@@ -233,7 +234,7 @@ def _classes(
 
 
 def _left(gone: Names, come: Names, together: Mapping[str, set[str]]) -> tuple[str, str] | None:
-    """The two that are exchanged beside equals; None where there are more."""
+    """The one pair that is exchanged beside known equivalents; None if there are several pairs."""
     for one in sorted(gone):
         equal = sorted(come & together[one])
         if equal and len(gone) > 1:

@@ -1,8 +1,8 @@
-"""Which sets of effects explain best, fitted in earnest: the search between linear and exact.
+"""Searches the sets of effects that explain best, by linear evidence and exact fits in turn.
 
-Linear evidence alone can be confidently wrong: cables go slack, products of parameters bend. So
-the best sets by linear evidence are refitted exactly, the empty one always among them, and the
-catalogue is made linear about the best of them again, until that stays.
+Linear evidence alone can be confidently wrong: cables go slack, and products of parameters are
+nonlinear. So the best sets by linear evidence are refitted exactly, always together with the empty
+set, and the catalogue is linearised about the best of them, until the best set stays the same.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from crosscheck.calibration.sets import Names, Scores, explore
 from crosscheck.fit.state import State
 from seecr.effects import Terms
 
-# Sets refitted about one linear model, and how much worse than the best they may be.
+# Most sets refitted about one linear model, and how much worse their ln evidence may be.
 _REFITTED, _WITHIN = 20, 12.0
-# Rounds of making the catalogue linear about the best set.
+# Most rounds of linearising the catalogue about the best set.
 ROUNDS = 4
-# Sets beside the best one that are fitted because they may be as good.
+# Most neighbours of the best set that are fitted because they may be as good.
 _BESIDE = 6
-# How often the best set is challenged, at most: a challenger that wins is challenged in turn.
+# Most rounds of challenges: a challenger that wins is challenged in turn.
 _CHALLENGES = 3
 
 
@@ -35,12 +35,12 @@ class Found:
     """Sets that were compared.
 
     Attributes:
-        refits: exact ones, by set. best: the best of them.
-        scores: linear ones about the best.
-        refit: fits any set exactly, also one that was not compared; None where that has no
-            solution.
-        always: effects that the model has, in every set: the smallest set there is.
-        idle: members of the best set that move nothing where the others are, as an equal of one.
+        refits: exact fits, by set. best: the best of them.
+        scores: linear scores about the best.
+        refit: fits any set exactly, also one that was not compared; None if it has no solution.
+        always: effects that the model has already: they are in every set.
+        idle: members of the best set that move nothing beside the others, such as a second
+            equivalent.
     """
 
     refits: dict[Names, Refit]
@@ -52,7 +52,7 @@ class Found:
 
     @property
     def none(self) -> Refit:
-        """Nothing added."""
+        """The fit of the model with nothing added."""
         return self.refits[self.always]
 
 
@@ -66,17 +66,17 @@ def compare_sets(
     rounds: int = ROUNDS,
     given: Iterable[Terms] = (),
 ) -> Found:
-    """Search the sets of effects, linear and exact in turn.
+    """Search the sets of effects, by linear evidence and exact fits in turn.
 
     Args:
-        setting: the data; noise and weights of the joint fit stay for all sets.
-        joint: everything fitted together, about which the first linear model is.
+        setting: the data; noise and weights of the joint fit are kept for all sets.
+        joint: the joint fit of all effects, about which the first linear model is.
         catalogue: effects that may be in a set.
         plain: the model as it stands; its effects are in every set.
-        told: called with what is going on.
-        most: sets to refit about one linear model.
-        rounds: of making the catalogue linear about the best set, at most.
-        given: sets that were found elsewhere, with the values that they have there.
+        told: called with each set that is fitted.
+        most: how many sets to refit about one linear model.
+        rounds: most rounds of linearising the catalogue about the best set.
+        given: sets that were found elsewhere, with their values there.
     """
     always = frozenset(plain.terms.names)
     fixed = replace(setting, frozen=True, weight=joint.weight)
@@ -108,18 +108,18 @@ def compare_sets(
 
 
 def _searched(exact: Exact, scores: Scores, begin: Names, most: int) -> Refit:
-    """The best that linear evidence leads to, from no effect and from these."""
+    """The best set that a search by linear evidence leads to, from the empty set and from this."""
     explore(scores, [scores.always, begin])
     best = exact.best_of(scores, [scores.always, *scores.best(most, _WITHIN)])
     return _thinned(exact, scores, best)
 
 
 def _thinned(exact: Exact, scores: Scores, best: Refit) -> Refit:
-    """The best set, each of its members dropped in earnest, until none is one too many."""
+    """The best set after dropping members, by exact fits, as long as that improves it."""
     while len(own := best.names - scores.always) <= FEW:
         for name in sorted(own):
             if does_nothing(exact.setting, best, name):
-                # without it the same values are there; a fit from elsewhere may miss them
+                # without it its values still serve; a fit from another start may miss them
                 exact.take(scores, Terms(t for t in best.joint.terms if t.name != name))
         better = exact.best_of(scores, [best.names - {name} for name in sorted(own)])
         if better.names == best.names:
@@ -129,7 +129,7 @@ def _thinned(exact: Exact, scores: Scores, best: Refit) -> Refit:
 
 
 def does_nothing(setting: Setting, best: Refit, name: str) -> bool:
-    """Whether a member's values move all readings together by less than noise."""
+    """Whether a member moves all readings together by less than one unit of chi2."""
     joint = best.joint
     own = joint.terms.own(name)
     moved = joint.whitened(setting.chain, joint.jacobian[:, own] @ joint.z[own])
@@ -139,10 +139,10 @@ def does_nothing(setting: Setting, best: Refit, name: str) -> bool:
 def about_given(
     exact: Exact, scores: Scores, best: Refit, known: Iterable[Names]
 ) -> tuple[Scores, Refit]:
-    """The best set, also of those about a given one that the linear model knows nothing of.
+    """The best set after a search about a given one, if the linear model misses what that explains.
 
-    An effect with a shape (drums out of round, creep) does nothing at another one: beside it the
-    linear model about everything looks for what imitates it.
+    An effect with a shape (eccentric drums, creep) does nothing at the wrong shape. There, the
+    linear model of all effects only finds what imitates it.
     """
     later = set(exact.catalogue.later.names)
     few = [names for names in known if names & later and len(names - scores.always) <= FEW]
@@ -162,12 +162,12 @@ def about_given(
 
 
 def looked_about(exact: Exact, scores: Scores, best: Refit) -> tuple[Scores, Refit]:
-    """The best set of one and those beside it, and scores about it.
+    """The best set after its neighbours were fitted, and the scores about it.
 
-    What the search ends with was chosen about other sets, where a member may have mattered that
-    does not here; and among the best by linear evidence larger ones crowd out those in which
-    another effect stands in a member's place. Of a set beside which none is fitted every member
-    would be sure.
+    The search ends with a set that was chosen by linear models about other sets, in which a member
+    may have mattered that does not matter here. Among the best by linear evidence, larger sets also
+    crowd out those in which another effect replaces a member. If no neighbour were fitted, every
+    member would seem sure.
     """
     while True:
         better = exact.best_of(scores, _beside(exact, scores, best.names))
@@ -179,7 +179,7 @@ def looked_about(exact: Exact, scores: Scores, best: Refit) -> tuple[Scores, Ref
 
 
 def _beside(exact: Exact, scores: Scores, names: Names) -> list[Names]:
-    """Sets with one member less or exchanged that linear evidence holds for as good."""
+    """Sets with one member dropped or exchanged that are as good by linear evidence."""
     near, own = scores.neighbours(names), scores.score(names)
 
     def as_good(other: Names) -> bool:
@@ -191,11 +191,12 @@ def _beside(exact: Exact, scores: Scores, names: Names) -> list[Names]:
 
 
 def containing(exact: Exact, best: Refit) -> list[Names]:
-    """Sets about as good as the best, with an effect that joins late for the one it contains.
+    """Sets about as good as the best one, with an effect in place of one that it contains.
 
-    The linear model has it where it starts, with much of what it contains: friction beside half a
-    metre of cable behind the exit points. As it is there it explains as much as what it contains.
-    Of few effects: in large sets it fits what others leave.
+    The linear model has such an effect at its starting point, together with much of what it
+    contains: friction beside half a metre of cable behind the exit points. Once fitted, it explains
+    at least as much as what it contains. Only sets of few effects are tried: in large ones it fits
+    what others leave.
     """
     always, out = frozenset(exact.plain.terms.names), list[Names]()
     for names, refit in exact.possible.items():
@@ -210,10 +211,10 @@ def containing(exact: Exact, best: Refit) -> list[Names]:
 
 
 def swapped(exact: Exact, scores: Scores, best: Refit) -> Refit:
-    """The best set, members exchanged for effects with a shape that promise about as much.
+    """The best set after exchanging members for effects with a shape that promise about as much.
 
-    The linear model has them at one shape (a reference temperature, a time), which need not
-    be the one that explains what such a member does.
+    The linear model has these at one shape (a reference temperature, a time), which need not be the
+    one that explains what the member does.
     """
     own = best.names - scores.always
     shaped = [t.layout for t in exact.catalogue.later if t.layout.shape.any()]

@@ -1,9 +1,9 @@
-"""Size and correlation of the noise from the joint fit's marginal evidence (REML).
+"""Estimates size and autocorrelation of the noise by the marginal likelihood of the fit (REML).
 
 At the optimum the prediction is linear, y = r + X z with z ~ N(0, width^2), so the readings are
-y ~ N(0, X W X^T + Sigma(scale, rho)): their likelihood, what effects can imitate integrated out,
-is largest at the noise there is (Patterson and Thompson, Biometrika 58, 1971). Residuals of a
-fit alone are too small and too white.
+distributed as y ~ N(0, X W X^T + Sigma(scale, rho)). This likelihood, in which everything that
+effects can imitate is integrated out, is maximised over the noise (Patterson and Thompson,
+Biometrika 58, 1971). The residuals of a fit alone would be too small and too little correlated.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _SMALLEST, _LARGEST = 1e-2, 1e3
 def log_evidence(
     chain: Chain, colour: Colour, weight: Array, x: Array, y: Array, width: Array
 ) -> float:
-    """ln N(y; 0, X W X^T + Sigma), constants left out; x (N, p), y (N,) in stated noise."""
+    """ln N(y; 0, X W X^T + Sigma), up to a constant; x (N, p), y (N,) in units of stated noise."""
     columns = whitened(chain, colour, weight, x * width)
     left = whitened(chain, colour, weight, y)
     factor = root_beside_one(columns)
@@ -36,12 +36,12 @@ def log_evidence(
 def estimate(
     chain: Chain, start: Colour, weight: Array, x: Array, y: Array, width: Array
 ) -> Colour:
-    """The noise of largest marginal likelihood.
+    """The noise of maximum marginal likelihood.
 
     Args:
-        chain: how readings follow.
-        start: where to start.
-        weight: (N,) how much each reading counts.
+        chain: the order of the readings.
+        start: where the search starts.
+        weight: (N,) weight of each reading.
         x: (N, p) derivatives by z, y: (N,) r + X z, both in units of the stated noise.
         width: (p,) prior standard deviations of z.
     """

@@ -1,4 +1,4 @@
-"""A model calibrated from files: every effect that the data see, with errors and how they go."""
+"""The command ``calibrate``: a model with every effect that the data see, with errors and noise."""
 
 from __future__ import annotations
 
@@ -24,26 +24,26 @@ from seecr.pose import Array
 from seecr.prediction.model import Model
 from seecr.result import Record, Result
 
-# A parameter that is not known better than this part of its plausible size is the prior's; an
-# effect of such parameters is left out if what it does to all readings is less than this of chi2.
+# A parameter that is not known better than this part of its plausible size is known by its prior
+# only. An effect of such parameters is left out if it changes all readings by less than this chi2.
 _UNSEEN, _NOTHING = 0.98, 1e-2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibrated(Result, JointErrors):
-    """Every effect that data see, fitted at once.
+    """The result of fitting every effect that the data see at once.
 
     Attributes:
-        fitted: the effects with standard errors; those that the data do not see are left out.
+        fitted: the effects with standard errors, without those that the data do not see.
         covariance: (p, p) of all their parameters, in their order; SI.
-        before, after, held_out: rms errors by kind: of the model as it stood, of this one, of
-            fits without a run on that run.
-        scale, rho: of each kind of reading, the noise in units of the stated one, and its
-            correlation from one row of a run to the next.
-        outliers: lines that hardly count.
-        settled: the fit came to an end; what did not is not to be used.
-        notes: about the data.
-        model: the robot's, with all of this; :func:`crosscheck.save_model` keeps it.
+        before, after, held_out: rms errors by kind: of the model as it stood, of this one, and of
+            held-out runs, each predicted by a fit without it.
+        scale, rho: by kind of reading, the estimated noise over the stated one, and its correlation
+            between successive rows of a run.
+        outliers: lines of the file that hardly count.
+        settled: whether the fit converged; if not, its values are not to be used.
+        notes: notes about the data.
+        model: the robot's model with all of this; :func:`crosscheck.save_model` keeps it.
     """
 
     fitted: tuple[Fitted, ...]
@@ -65,13 +65,13 @@ class Calibrated(Result, JointErrors):
 
     @property
     def pays(self) -> bool:
-        """Whether runs left out are predicted better than by the model as it stood."""
+        """Whether the fit converged and predicts held-out runs better than the model before."""
         pairs = [(was, self.held_out[key]) for key, was in self.before.items()]
         gains = [np.log(was / held) for was, held in pairs if was and held]
         return self.settled and float(np.sum(gains)) > 0.0
 
     def noise_lines(self) -> list[str]:
-        """The noise of each kind of reading as the fit found it, and lines that hardly count."""
+        """Lines about the estimated noise of each kind of reading, and about outliers."""
         out = [
             f"noise of the {name}: {self.scale[name]:.2f} times the assumed one, correlation "
             f"{self.rho[name]:.2f} along a run"
@@ -94,7 +94,7 @@ class Calibrated(Result, JointErrors):
         return [*out, *(f"note: {note}" for note in self.notes)]
 
     def value_lines(self) -> list[str]:
-        """A line for each parameter, its standard error beside it."""
+        """A line for each parameter, with its standard error."""
         return fitted_lines(self.fitted)
 
     def records(self) -> Sequence[Record]:
@@ -124,19 +124,19 @@ def calibrate(
     only: Iterable[str] = (),
     exclude: Iterable[str] = (),
 ) -> Calibrated:
-    """Fit every effect that the data can see, plausible sizes as priors.
+    """Fit every effect that the data can see, with plausible sizes as priors.
 
     Args:
-        robot: as described, or its MJCF.
+        robot: a robot, or its MJCF file.
         data: measurements, or their file.
-        model: effects to start from, or their file; the plain model without.
-        progress: called with what is being done and the part of it that is done.
-        only: names of the effects to fit beside the model's own; all without.
+        model: effects to start from, or their file; by default the plain model.
+        progress: called with what is being done and the fraction that is done.
+        only: names of the effects to fit beside the model's own; by default all.
         exclude: names of effects that are not fitted, unless the model has them.
 
     Raises:
-        InputError: no effect of a name.
-        CrosscheckError: the data cannot carry it.
+        InputError: there is no effect of a name.
+        CrosscheckError: the data allow no calibration.
     """
     robot = robot_of(robot)
     thin = thinned(robot, measurements_of(data, robot))
@@ -175,9 +175,9 @@ def _result(found: Calibration, before: Terms, notes: tuple[str, ...], basis: Mo
 
 
 def _fitted(found: Calibration, covariance: Array, before: Terms) -> tuple[Fitted, ...]:
-    """The effects of which the data see something, and those that were there.
+    """The effects of which the data see something, and those that the model had before.
 
-    One that others can stand in for may be known no better than before, and still do much.
+    An effect that others can replace may be known no better than its prior, and still do much.
     """
     error, joint = np.sqrt(np.diag(covariance)), found.joint
     fixed = found.terms.knowledge.fixed

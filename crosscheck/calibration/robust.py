@@ -1,9 +1,10 @@
-"""Rows far off the others: how much each counts in a fit.
+"""Weights of rows, which make a joint fit robust against outliers.
 
-The residuals of one kind in one row are noise of the usual size, or, with a chance of one in
-twenty, of ten times that (a reflection of the laser, a cell that was knocked). A row counts by
-the chance that it is of the usual kind; what is far off counts as if it were noise of that size.
-Where more than one row in ten sticks out, the bulk is the measure: most rows are never outliers.
+The residuals of one kind in one row are taken to be noise of the usual size or, with a prior
+probability of one in twenty, ten times that (a reflection of the laser, a load cell that was
+knocked). The weight of a row mixes those of both cases by their posterior probabilities. If the
+median residual exceeds the noise, the median sets the usual size, so that most rows are never
+outliers.
 """
 
 from __future__ import annotations
@@ -18,13 +19,13 @@ from seecr.pose import Array
 
 _CHANCE = 0.05
 LARGER = 10.0
-"""How many times as large as the noise outliers are."""
-# A row of which less than this counts is called an outlier.
+"""Size of outliers relative to the noise."""
+# A row with less weight than this is called an outlier.
 OUTLIER = 0.05
 
 
 def row_weights(chain: Chain, colour: Colour, residual: Array) -> Array:
-    """(N,) how much each reading counts.
+    """(N,) weight of each reading.
 
     Args:
         chain: which readings belong to one row and kind.
@@ -42,7 +43,7 @@ def row_weights(chain: Chain, colour: Colour, residual: Array) -> Array:
 def _weights(row: NDArray[np.int64], residual: Array, scale: float) -> Array:
     rows, group, count = np.unique(row, return_inverse=True, return_counts=True)
     power: Array = np.bincount(group, residual**2, minlength=len(rows)).astype(float)
-    # a fit may not be done yet: the size of the bulk, where that is larger than the noise
+    # the fit may not have converged yet: take the size of the bulk if it is larger than the noise
     bulk = np.sqrt(np.median(power / stats.chi2.median(count)))
     power = power / max(scale, float(bulk)) ** 2
     odds = np.log(_CHANCE / (1.0 - _CHANCE)) - count * np.log(LARGER)
@@ -53,7 +54,7 @@ def _weights(row: NDArray[np.int64], residual: Array, scale: float) -> Array:
 
 
 def outliers(chain: Chain, weight: Array, n_rows: int) -> NDArray[np.bool_]:
-    """(n,) bool rows of which some kind of reading hardly counts."""
+    """(n,) bool rows in which some kind of reading hardly counts."""
     least = np.ones(n_rows)
     np.minimum.at(least, chain.row, weight)
     return np.asarray(least < OUTLIER)

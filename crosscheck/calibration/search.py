@@ -1,4 +1,4 @@
-"""From data to sets of effects: everything at once, then which of it is needed."""
+"""From data to sets of effects: all effects are fitted at once, then sets of them are compared."""
 
 from __future__ import annotations
 
@@ -34,23 +34,23 @@ from crosscheck.measurements.data import Sigma
 from seecr.description.robot import Robot
 from seecr.effects import Term, Terms
 
-# Sets refitted about one linear model; fewer where something unknown leaves no hope of an end.
+# Sets refitted about one linear model; fewer if something unknown is there, which none explains.
 _REFITTED, _REFITTED_UNKNOWN = 20, 4
 NO_MORE: Mapping[Names, float] = {}
-# Equals that are fitted in a listed member's place, the likeliest.
+# Most equivalents that are fitted in place of a listed member.
 _SWAPPED = 6
 
 
 @dataclass(frozen=True, eq=False)
 class Sought:
-    """The effects that data need.
+    """The effects that the data need.
 
     Attributes:
-        calibration: everything at once. found: the sets compared.
-        catalogue: effects with the values they start from.
-        classes: probabilities. field_odds: ln odds of something smooth and unknown, beside all
-            effects or in the place of some.
-        shown: the size by kind of reading from which on that would show.
+        calibration: the fit of all effects at once. found: the sets that were compared.
+        catalogue: all effects with their starting values.
+        classes: posterior probabilities.
+        field_odds: ln odds of something smooth and unknown, beside all effects or in place of some.
+        shown: by kind of reading, the size from which on that would have shown; None if unsaid.
         judgement: the verdict.
     """
 
@@ -70,13 +70,13 @@ def seek(
     progress: Progress = lambda _text, _part: None,
     given: Sequence[Terms] = (),
 ) -> Sought:
-    """Fit everything at once, then compare sets of effects.
+    """Fit all effects at once, then compare sets of effects.
 
     Args:
         problem: readings, from :func:`crosscheck.fit.prepare.prepare`.
-        stated: the noise that the user stated; what was estimated is missing in it.
+        stated: the noise that the user stated, without estimates.
         terms: effects of the model as it stands; they are in every set.
-        progress: called with what is being done and the part of it that is done.
+        progress: called with what is being done and the fraction that is done.
         given: sets that were found elsewhere, with their values, the best last; they are compared
             too.
     """
@@ -111,14 +111,14 @@ def seek(
     listed = found.always | set(said.sure)
     alone = found.refit(listed) if said.verdict is DiagnosisVerdict.EFFECTS_FOUND else None
     if alone is not None and listed != best.names:
-        # what could stand in the place of what is listed, not of a larger set
+        # find what is equivalent to the listed effects, not to members of a larger set
         further = {**in_place(found, listed, classes, problem.robot, terms), listed: alone.score}
         classes = _classes(found, listed, sizes, further)
     if said.imitated is not None:
         odds = max(odds, instead.odds)
         classes = classes.without(instead.replaced, instead.chance)
     free = free_of(joint)
-    # one of that size would have shown: not said where one may have been taken in
+    # no size is stated if something may have been absorbed: one of that size would have shown
     shown = None if said.more or said.imitated else shown_from(
         setting, joint, joint.jacobian * free, joint.width * free
     )  # fmt: skip
@@ -126,7 +126,7 @@ def seek(
 
 
 def _catalogue(problem: Problem, terms: Terms, whole: Calibration) -> Catalogue:
-    """Every effect, and where it starts: from null, or as the joint fit found it promising."""
+    """Every effect with its start: at null, or at the shape that the joint fit found promising."""
     at_once, _later = layouts(problem)
     nulls = (Term(a, a.null) for a in at_once if a.name not in terms)
     here = Terms([*nulls, *(t for t in terms if t.name not in whole.later)])
@@ -136,12 +136,13 @@ def _catalogue(problem: Problem, terms: Terms, whole: Calibration) -> Catalogue:
 def _classes(
     found: Found, own: Names, sizes: Mapping[str, int], further: Mapping[Names, float] = NO_MORE
 ) -> Classes:
-    """Probabilities, and what cannot be told from members of a set.
+    """Probabilities, and what is equivalent to members of a set.
 
     Args:
         found: the compared sets. own: the set.
-        sizes: of all effects, the number of parameters that are told.
-        further: scores of more sets that were fitted.
+        sizes: of all effects, the number of parameters by
+            :func:`crosscheck.calibration.equals.parameters_told`.
+        further: scores of further sets that were fitted.
     """
     scores, fitted = {**all_scores(found), **further}, {*found.refits, *further}
     hints = alike_beyond(found.scores, own, sizes)
@@ -151,7 +152,7 @@ def _classes(
 def in_place(
     found: Found, listed: Names, classes: Classes, robot: Robot, stood: Terms
 ) -> dict[Names, float]:
-    """Scores of what is listed with an equal in a member's place: one in a larger set, so far."""
+    """Scores of the listed set with a member replaced by an equivalent, fitted exactly."""
     out = dict[Names, float]()
     for members in classes.members:
         for name in listed.intersection(members) - found.always:
@@ -164,6 +165,6 @@ def in_place(
 
 
 def _doubted(found: Found) -> Names:
-    """Members of the best set of a size that hardly happens."""
+    """Members of the best set that are implausibly large."""
     own = (term for term in found.best.joint.terms if term.name not in found.always)
     return frozenset(term.name for term in own if hardly_happens(term))

@@ -1,8 +1,8 @@
-"""Which sets of effects explain linear data best: adding, dropping and swapping.
+"""Searches the sets of effects that explain linear data best, by adding, dropping and exchanging.
 
-A set's score is its evidence, averaged over its members' widths, times what was thought of it
-before: all numbers of effects alike likely, all sets of one number alike (Scott and Berger,
-Annals of Statistics 38, 2010). One solve of a set gives the score of every set one effect away.
+A set's score is its ln evidence, averaged over its members' widths, plus the ln of its prior: all
+numbers of effects are equally probable, and so are all sets of one number (Scott and Berger, Annals
+of Statistics 38, 2010). One solve of a set gives the scores of all sets one effect away.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from seecr.effects import Term
 
 Names = frozenset[str]
 _MOVES = 60
-# Larger sets are only thinned, member by member: exchanging comes when they are smaller.
+# Larger sets are thinned member by member before the search; in them nothing is exchanged.
 _LARGE = 8
-# Members worth this much ln evidence stay when a large set is thinned.
+# When a large set is thinned, members that are worth more ln evidence than this stay.
 _KEPT = 3.0
 
 
 def log_prior(count: int, of: int) -> float:
-    """ln chance of a set of ``count`` effects out of ``of``, before the data."""
+    """ln prior of a set of ``count`` effects out of ``of``."""
     return float(
         -np.log(of + 1)
         - special.gammaln(of + 1) + special.gammaln(count + 1) + special.gammaln(of - count + 1)
@@ -37,13 +37,14 @@ class Scores:
     """Scores of sets in one linear model.
 
     Attributes:
-        gram: of all effects.
+        gram: normal equations of all effects.
         of: how many effects the prior counts.
-        always: effects that the model has: in every set, and not counted.
-        shapes: effects with a shape as the fit has it about which this is, amplitudes at null.
-        prices: ln evidence that effects have too much, as their shapes are the best ones.
-        solved: sets whose widths were looked for: score and widths.
-        near: sets one effect away from those: score with the neighbour's widths.
+        always: effects that the model has already: in every set, and not counted in the prior.
+        shapes: effects with a shape, at the shape of the fit that the model is linearised about,
+            amplitudes at null.
+        prices: ln evidence that effects gain too much because their shapes are the best ones.
+        solved: sets whose widths were optimised, with score and widths.
+        near: sets one effect away from those, with approximate scores.
     """
 
     gram: Gram
@@ -55,9 +56,9 @@ class Scores:
     near: dict[Names, float] = field(default_factory=dict)
 
     def score(self, names: Names, start: dict[str, float] | None = None) -> float:
-        """ln evidence of a set and ln prior."""
+        """ln evidence plus ln prior of a set."""
         if names not in self.solved:
-            seen = sorted(names & self.gram.groups.keys())  # all but effects held by the model
+            seen = sorted(names & self.gram.groups.keys())  # without effects that the model holds
             widths = {n: (start or {}).get(n, self.middle(n)) for n in seen}
             widths = best_widths(self.gram, widths)
             price = sum(self.price(name) for name in names)
@@ -66,20 +67,20 @@ class Scores:
         return self.solved[names][0]
 
     def log_prior(self, names: Names) -> float:
-        """ln chance of a set before the data."""
+        """ln prior of a set."""
         return log_prior(len(names - self.always), self.of)
 
     def price(self, name: str) -> float:
-        """What the shape of an effect costs."""
+        """ln evidence that the choice of an effect's shape costs."""
         return self.prices.get(name, 0.0)
 
     def widths(self, names: Names) -> dict[str, float]:
-        """The best widths of a set's members."""
+        """The prior widths of a set's members that maximise its evidence."""
         self.score(names)
         return self.solved[names][1]
 
     def neighbours(self, names: Names) -> dict[Names, float]:
-        """About the scores of sets with one effect more, one less or one other."""
+        """Approximate scores of sets with one effect more, one less or, if small, one exchanged."""
         widths, base = self.widths(names), self.score(names)
         out = self._more(names, widths, base)
         for name in names - self.always:
@@ -93,7 +94,7 @@ class Scores:
         return out
 
     def larger(self, names: Names) -> dict[Names, float]:
-        """About the scores of sets with one effect more."""
+        """Approximate scores of sets with one effect more."""
         return self._more(names, self.widths(names), self.score(names))
 
     def _more(
@@ -106,25 +107,25 @@ class Scores:
         return {names | {n}: base + step + solved.gain(n) - self.price(n) for n in others}
 
     def middle(self, name: str) -> float:
-        """The width nearest to a plausible size."""
+        """The width nearest to one plausible size."""
         widths = self.gram.groups[name].widths
         return float(widths[np.argmin(np.abs(np.log(widths)))])
 
     def best(self, count: int, within: float) -> list[Names]:
-        """The best sets met so far, solved or near, no worse than the best by ``within``."""
+        """The best sets met so far, at most ``within`` worse in score than the best of all."""
         scores = self.near | {names: s for names, (s, _w) in self.solved.items()}
         order = sorted(scores, key=lambda names: -scores[names])
         return [n for n in order if scores[n] > scores[order[0]] - within][:count]
 
 
 def explore(scores: Scores, starts: Iterable[Names], moves: int = _MOVES) -> Names:
-    """The best set that so many moves from any of the starts lead to."""
+    """The best set that is reached from any of the starts by at most so many moves."""
     ends = [climb(scores, start, moves) for start in starts]
     return max(ends, key=scores.score)
 
 
 def thinned(scores: Scores, start: Names) -> Names:
-    """A large set without the members that are worth least, down to a size to search from."""
+    """A set without its least valuable members, while it is large and they are worth little."""
     gram = scores.gram
     widths = {n: scores.middle(n) for n in sorted(start & gram.groups.keys())}
     while len(widths) > _LARGE + len(scores.always):
@@ -139,7 +140,7 @@ def thinned(scores: Scores, start: Names) -> Names:
 
 
 def climb(scores: Scores, start: Names, moves: int = _MOVES) -> Names:
-    """Move to the best neighbour while that is better, at most so often."""
+    """Move to a better neighbouring set as long as there is one, at most so often."""
     at = thinned(scores, start)
     for _ in range(moves):
         around = scores.neighbours(at)

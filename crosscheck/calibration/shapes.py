@@ -1,9 +1,9 @@
-"""What it costs that nobody said which shape an effect has: a period, a time constant.
+"""The evidence that the choice of an effect's shape costs: a period, a time constant.
 
-A fit picks the shape that explains most, also of noise, and the more shapes there are the better
-it does. So a set's evidence is not that at its best shapes: by Laplace, it is less by the part of
-the shapes' prior that explains the data about as well. Every shape that a search starts from is
-alike likely, and what lies between two of them as likely as they are.
+A fit takes the shape that explains most, of noise too, and the more shapes there are the better it
+does. So the evidence of a set is not that at its best shapes. By Laplace's method it is smaller by
+the fraction of the shapes' prior that explains the data about as well. All shapes that a search
+starts from are equally probable a priori, and so is what lies between them.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from seecr.pose import Array
 
 
 def log_shares(joint: JointFit, linear: Linear) -> dict[str, float]:
-    """ln of the part of its prior that an effect's shape is known to, at most 0; of some effects.
+    """ln of the fraction of its prior to which each effect's shape is determined, at most 0.
 
     Args:
         joint: a fit.
-        linear: the linear model about it.
+        linear: the model linearised about it.
     """
     free = np.flatnonzero(linear.width > 0.0)
     shaped = [term for term in joint.terms if term.layout.shape.any()]
@@ -41,13 +41,13 @@ def log_shares(joint: JointFit, linear: Linear) -> dict[str, float]:
 
 
 def prices_about(setting: Setting, joint: JointFit, catalogue: Catalogue) -> dict[str, float]:
-    """What the best shapes of effects gain too much in a linear model about a fit of some."""
+    """ln evidence that the best shapes of effects gain too much in a linear model about a fit."""
     shares = log_shares(joint, linearised(setting, joint))
     return {**catalogue.prices, **{name: -share for name, share in shares.items()}}
 
 
 def _log_share(term: Term, errors: Array, setup: Setup) -> float:
-    """Of one effect, whose values have standard errors (p,); 0 for those that stay."""
+    """The same for one effect whose values have standard errors (p,), 0 for those that stay."""
     layout, total = term.layout, 0.0
     starts = np.array([layout.start(s) for s in layout.effect.shapes(setup)])
     for k in np.flatnonzero(layout.shape & (errors > 0.0)):
@@ -59,7 +59,7 @@ def _log_share(term: Term, errors: Array, setup: Setup) -> float:
 
 
 def _apart(values: Array, at: float) -> float:
-    """How far apart values (n,) lie that rise, where one is."""
+    """Spacing of increasing values (n,) near one of them."""
     steps = np.diff(values)
     middles = [0.5 * (a + b) for a, b in pairwise(values)]
     return float(np.interp(at, middles, steps))

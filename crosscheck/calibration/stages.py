@@ -1,4 +1,4 @@
-"""The stages of a joint fit: all at once, effects alone where that was poor, late ones beside."""
+"""The stages of a joint fit: all effects, single ones if that was poor, those that join later."""
 
 from __future__ import annotations
 
@@ -23,28 +23,33 @@ from seecr.effects import Term, Terms
 from seecr.effects.base import Layout
 
 Progress = Callable[[str, float], None]
-# Rounds of estimating the noise and fitting with it; it has settled within this part.
+# Most rounds of estimating the noise and fitting with it; the change at which the noise has
+# converged; steps of each fit.
 _ROUNDS, _SETTLED, _STEPS = 4, 0.03, 8
+# A fit, or a wider prior, replaces another if it gains this much ln evidence.
 _SURE = 3.0
-# A joint fit that leaves noise so large beside the stated one, or going together like this along
-# runs, is no place to start effects with history from alone.
+# A joint fit is poor if its noise is so much larger than stated, or so strongly autocorrelated:
+# then other starting points are tried.
 _POOR, _ALIKE = 1.5, 0.5
 
-# All rows count alike as noise of so many times the size that outliers have, one after the other.
+# For a while, all rows count equally with noise of so many times the size of outliers, in turn.
 _HEATS = (0.3, 1.0, 3.0, 10.0)
-# A few effects whose cost is so many times that of everything, or less, are begun with too.
+# The joint fit is also started from a few given effects if its objective there is at most so many
+# times that of the fit so far.
 _COMPARABLE = 2.0
 
 
 @dataclass(frozen=True, eq=False)
 class Everything:
-    """All effects that the data see fitted together.
+    """All effects that the data see, fitted together.
 
     Attributes:
-        setting: with rows' history taken as given, where effects with history are in.
+        setting: the data; the history of rows is constant in derivatives if effects with history
+            are in the fit.
         joint: the fit.
         later: all effects that join later, at their most promising shapes, amplitudes at null.
-        prices: of those that did not, what they gain more there than on average over shapes.
+        prices: for those of them that did not join, how much more ln evidence they gain at that
+            shape than on average over shapes.
     """
 
     setting: Setting
@@ -56,12 +61,12 @@ class Everything:
 def fit_everything(
     setting: Setting, terms: Terms, progress: Progress, given: Terms | None = None
 ) -> Everything:
-    """The joint fit, effects that join later among them.
+    """The joint fit, including effects that join later.
 
     Args:
         setting: the data. terms: effects of the model as it stands.
-        progress: called with what is being done and the part of it that is done.
-        given: a few effects that were found elsewhere, with the values that they have there.
+        progress: called with what is being done and the fraction that is done.
+        given: a few effects that were found elsewhere, with their values there.
     """
     at_once, later = layouts(setting.problem)
     progress("fitting all effects", 0.05)
@@ -88,7 +93,7 @@ def fit_everything(
         setting = frozen
     best = to_its_end(setting, widened(setting, joint))
     if back is not before or joint is not back:
-        # rows had been written off that could be explained, or more can be explained now
+        # some rows were no true outliers, or more rows can be explained now
         best = with_rows_back(setting, best)
     there = [at_null(best.terms[a.name]) for a in later if a.name in best.terms]
     others = [one for one in looked if one.term.name not in best.terms]
@@ -97,12 +102,12 @@ def fit_everything(
 
 
 def poor(joint: JointFit) -> bool:
-    """Whether a joint fit leaves much more than the noise."""
+    """Whether a joint fit leaves much larger or more correlated residuals than the stated noise."""
     return float(np.max(joint.colour.scale)) > _POOR or float(np.max(joint.colour.rho)) > _ALIKE
 
 
 def start_of(setting: Setting, terms: Terms, others: Terms) -> State:
-    """The model as it stands, the others at null, the tracker registered if it was not yet."""
+    """The model as it stands with the others at null, the tracker registered if it is not yet."""
     problem = setting.problem
     every = Terms([*terms, *(t for t in others if t.name not in terms)])
     state = evaluate(problem, every, setting.factor)
@@ -114,7 +119,7 @@ def start_of(setting: Setting, terms: Terms, others: Terms) -> State:
 
 
 def with_noise(setting: Setting, joint: JointFit) -> JointFit:
-    """Estimate the noise and fit with it, until it stays."""
+    """Estimate the noise and fit with it, until both converge."""
     for _ in range(_ROUNDS):
         before = joint.colour
         colour = noise_of(setting, joint)
@@ -126,10 +131,10 @@ def with_noise(setting: Setting, joint: JointFit) -> JointFit:
 
 
 def to_its_end(setting: Setting, joint: JointFit) -> JointFit:
-    """The fit, or where it goes on to from derivatives of its own.
+    """Continue a fit with new derivatives until nothing more is gained.
 
-    A fit begins with derivatives from nearby. Where a cable goes slack in between they are others
-    here, and what looked like the least may be none.
+    A fit starts with derivatives from nearby. If a cable goes slack in between, they differ here,
+    and what looked like a minimum may be none.
     """
     for _ in range(_ROUNDS):
         here = cost(setting, joint.colour, joint.weight, joint.state, joint.width)
@@ -142,11 +147,11 @@ def to_its_end(setting: Setting, joint: JointFit) -> JointFit:
 
 
 def with_rows_back(setting: Setting, joint: JointFit) -> JointFit:
-    """The fit, or a better one that did not write off rows it can explain.
+    """The fit, or a better one in which fewer rows count as outliers.
 
-    A fit that has cables slack where they are taut is far off in a few rows, and once these hardly
-    count nothing pulls it back. So all rows count alike for a while, as noise of about the size
-    that outliers have; true outliers are no better explained after it.
+    A fit that has cables slack where they are taut is far off in a few rows, and once these count
+    as outliers nothing pulls it back. So all rows get equal weight for a while, with noise of about
+    the size of outliers. True outliers are explained no better after it.
     """
     alike = replace(setting, weight=np.ones(len(joint.state.white)))
     for heat in _HEATS:
@@ -160,13 +165,13 @@ def with_rows_back(setting: Setting, joint: JointFit) -> JointFit:
 
 
 def noise_of(setting: Setting, joint: JointFit) -> Colour:
-    """The noise by the joint fit's marginal evidence."""
+    """The noise that maximises the marginal likelihood of the joint fit."""
     about = unwhitened(joint)
     return estimate(setting.chain, joint.colour, joint.weight, about.x, about.y, about.width)
 
 
 def widened(setting: Setting, joint: JointFit) -> JointFit:
-    """The fit with wider priors for effects that are surely larger than plausible."""
+    """The fit with wider priors for effects that are clearly larger than plausible."""
     linear = linearised(setting, joint)
     groups = groups_of(joint, wider)
     gram = gram_of(linear.x, linear.y, groups)
@@ -184,7 +189,7 @@ def _from_alone(
     setting: Setting, joint: JointFit, start: State, terms: Terms,
     may_be: tuple[Sequence[Layout], Sequence[Layout]],
 ) -> JointFit:  # fmt: skip
-    """The joint fit, or a better one that begins with an effect, late or not, by itself."""
+    """The joint fit, or a better one that starts from a fit of a single effect."""
     few = start.terms.only([*terms.names, TRACKER])
     plain = settle(
         setting, evaluate(setting.problem, few, setting.factor, start), widths_of(few), WHITE
@@ -204,11 +209,11 @@ def _from_alone(
 
 
 def from_given(setting: Setting, joint: JointFit, start: State, given: Terms) -> JointFit:
-    """The joint fit, or a better one that begins with a few effects that were found elsewhere.
+    """The joint fit, or a better one that starts from a few effects that were found elsewhere.
 
-    Everything together explains at least as much as a part of it, unless the fit ended in a hollow.
-    So where the few explain about as much by themselves, everything is fitted from their values
-    too.
+    All effects together explain at least as much as some of them, unless the fit ended in a local
+    minimum. So if the few explain about as much by themselves, all effects are also fitted from
+    there.
     """
     every = Terms([*given, *(at_null(t) for t in start.terms if t.name not in given)])
     state = evaluate(setting.problem, every, setting.factor, start)
@@ -223,9 +228,9 @@ def from_given(setting: Setting, joint: JointFit, start: State, given: Terms) ->
 
 
 def _joined(setting: Setting, joint: JointFit, first: Terms, added: list[Term]) -> JointFit:
-    """The fit with more effects: from where the others ended and, if that was poor, from afar.
+    """The fit with more effects, from where the others ended and, if that was poor, from null.
 
-    Those that joined before the others did stay, from null.
+    In the latter case, effects that joined before stay in the fit, from null as well.
     """
     starts = [Terms([*joint.terms, *added])]
     if float(np.max(joint.colour.scale)) > _POOR:
@@ -246,6 +251,6 @@ def _joined(setting: Setting, joint: JointFit, first: Terms, added: list[Term]) 
 
 
 def worth(setting: Setting, joint: JointFit) -> float:
-    """ln evidence of a joint fit, by Laplace, with its own noise."""
+    """ln evidence of a joint fit by Laplace's method, with its own noise."""
     about = unwhitened(joint)
     return log_evidence(setting.chain, joint.colour, joint.weight, about.x, about.y, about.width)

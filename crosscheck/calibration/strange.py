@@ -1,9 +1,9 @@
-"""What a fit leaves and takes for noise, and noise is not.
+"""Tests whether what a fit takes for noise is not noise.
 
-A fit finds the noise as it goes: its size, its correlation along runs, rows that hardly count.
-Anything can be taken for noise so. What is much larger than stated, or larger and goes together;
-rows that stick out side by side; residuals that agree with those nearby though whitened along
-the runs: those are effects that nobody knows.
+A fit estimates its noise: the size, the autocorrelation along runs, the weights of outliers. In
+that way anything can be taken for noise. It is not noise if it is much larger than stated, or
+somewhat larger and autocorrelated; if outliers lie side by side; or if whitened residuals are still
+correlated with those nearby. Something unknown is then at work.
 """
 
 from __future__ import annotations
@@ -20,24 +20,25 @@ from crosscheck.calibration.robust import outliers
 from crosscheck.fit.noise import nearest_rows, next_rows, whiteness
 from crosscheck.fit.problem import KINDS
 
-# White noise may be so many times larger than stated; what goes together by more than this, less:
-# people state half of what it is, and trackers are smooth in time, both at once.
+# White noise may be so many times larger than stated; if it is correlated by more than _ALIKE, only
+# _TOGETHER times: people state half of the noise, and trackers are smooth in time, both at once.
 _UNDERSTATED, _TOGETHER, _ALIKE = 3.0, 2.3, 0.3
-# The size of what goes together is known less well, and half stated it may be so many standard
-# errors larger than twice the stated one.
+# The size of autocorrelated noise is less well known. It may be so many standard errors larger than
+# twice the stated size.
 _HALF, _ERRORS = 2.0, 3.0
-# Where noise was estimated from differences of neighbours: what goes together is larger.
+# Estimates from differences of neighbouring rows are too small if noise is autocorrelated, so that
+# larger and more correlated noise is accepted.
 _ESTIMATED, _DRIFT = 5.0, 0.9
-# More rows than this part never are outliers; chance that independent ones lie so side by side.
+# Outliers are never more than this part of the rows; p-value below which they lie side by side.
 _MOST, _CHANCE = 0.15, 1e-3
 
 
 def is_strange(setting: Setting, joint: JointFit, stated: Collection[str]) -> bool:
-    """Whether what a fit takes for noise is none.
+    """Whether what a fit takes for noise is not noise.
 
     Args:
         setting, joint: the fit.
-        stated: names of the kinds of reading whose noise was stated; of others it was estimated.
+        stated: names of the kinds of reading whose noise was stated; for others it was estimated.
     """
     return (
         too_large(joint.colour, np.bincount(setting.chain.kind, minlength=len(KINDS)), stated)
@@ -47,10 +48,10 @@ def is_strange(setting: Setting, joint: JointFit, stated: Collection[str]) -> bo
 
 
 def too_large(colour: Colour, readings: NDArray[np.int64], stated: Collection[str]) -> bool:
-    """Whether the noise of some kind of reading is larger than what was said of it allows.
+    """Whether the noise of some kind of reading is too large for what was stated or estimated.
 
     Args:
-        colour: the noise as fitted. readings: (3,) how many there are of each kind.
+        colour: the noise as fitted. readings: (3,) number of readings of each kind.
         stated: names of the kinds whose noise was stated.
     """
     for k in np.flatnonzero(readings):
@@ -64,9 +65,9 @@ def too_large(colour: Colour, readings: NDArray[np.int64], stated: Collection[st
 
 
 def most_together(rho: float, readings: int) -> float:
-    """How many times the stated size noise may have that goes together by rho along its run.
+    """How many times the stated size autocorrelated noise may have, with correlation rho.
 
-    The logarithm of the size of AR(1) noise, from N readings with rho estimated beside it, has the
+    The logarithm of the size of AR(1) noise, estimated together with rho from N readings, has the
     variance (1 + rho^2)/(1 - rho^2)/(2 N).
     """
     error = np.sqrt((1.0 + rho**2) / max(1.0 - rho**2, 1e-9) / (2.0 * readings))
@@ -74,7 +75,7 @@ def most_together(rho: float, readings: int) -> float:
 
 
 def side_by_side(setting: Setting, joint: JointFit) -> bool:
-    """Whether rows that stick out are many, or more of them neighbours than chance allows."""
+    """Whether outliers are too many, or neighbours of each other more often than by chance."""
     problem = setting.problem
     out = outliers(setting.chain, joint.weight, problem.data.n_rows)
     used = int(problem.use.sum())
@@ -89,6 +90,6 @@ def side_by_side(setting: Setting, joint: JointFit) -> bool:
 
 
 def goes_together(setting: Setting, joint: JointFit) -> bool:
-    """Whether residuals that were made white still agree with those nearby."""
+    """Whether whitened residuals are still correlated with those nearby."""
     left = joint.whitened(setting.chain, joint.state.white)
     return whiteness(setting.problem, left, 0).structured

@@ -1,8 +1,8 @@
-"""How large an effect that no catalogue holds would have to be for these data to show it.
+"""How large an effect that is not in the catalogue must be for these data to show it.
 
-Smooth fields over the workspace are drawn, each of one size in units of the noise. What effects
-imitate of them is lost; what is left earns evidence, more with its size. The size at which nine
-in ten of them would be called unknown is what the data can show.
+Smooth fields over the workspace are drawn at random, all of one size in units of the noise. The
+part of them that effects can imitate is subtracted; what is left earns evidence, more for larger
+fields. The result is the size at which nine in ten fields would be called unknown.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from crosscheck.fit.noise import as_table
 from crosscheck.fit.problem import Rms, rms_by_kind
 from seecr.pose import Array
 
-# Fields drawn, how many of them are to be seen, and sizes in units of the noise that are tried.
+# Number of fields drawn, the part that has to be seen, and the sizes tried, in units of the noise.
 _DRAWN, _SEEN = 100, 0.9
 _SIZES = np.geomspace(0.03, 300.0, 81)
 
 
 def shown_from(setting: Setting, joint: JointFit, columns: Array, width: Array) -> Rms | None:
-    """The rms size by kind of reading from which on a smooth unknown effect is seen.
+    """The rms size, by kind of reading, from which on a smooth unknown effect is seen.
 
     Args:
         setting, joint: a fit and its noise.
-        columns: (N, p) derivatives by z of all effects that may imitate it, in units of the
-            stated noise.
+        columns: (N, p) derivatives by z of all effects that may imitate it, in units of the stated
+            noise.
         width: (p,) prior standard deviations of z.
 
     Returns:
-        rms errors that nine in ten such effects show from; None where they hide at any size.
+        Median rms errors of fields at that size; None if no size that was tried is seen.
     """
     problem = setting.problem
     field = field_of(problem, joint.state.prediction.pose[:, :3])
@@ -52,7 +52,7 @@ def shown_from(setting: Setting, joint: JointFit, columns: Array, width: Array) 
 
 
 def _left(setting: Setting, joint: JointFit, field: Array, columns: Array, width: Array) -> Array:
-    """(k, k) normal matrix of the field's coefficients beside the effects."""
+    """(k, k) normal matrix of the field's coefficients, with all effects integrated out."""
     x, f = (joint.whitened(setting.chain, part) for part in (columns * width, field))
     root = root_beside_one(x)
     cross = linalg.solve_triangular(root, x.T @ f, lower=True, check_finite=False)
@@ -60,13 +60,13 @@ def _left(setting: Setting, joint: JointFit, field: Array, columns: Array, width
 
 
 def _log_odds(power: Array, along: Array) -> Array:
-    """(draws,) ln evidence with a field less that without, averaged over its width."""
+    """(draws,) ln evidence with a field minus that without, averaged over the field's width."""
     gains = gains_along(power, along, FIELD_WIDTHS)
     return np.asarray(special.logsumexp(gains, axis=0) - np.log(len(gains)))
 
 
 def _by_kind(setting: Setting, white: Array) -> Rms:
-    """Middle rms by kind of fields (N, draws) in units of the stated noise."""
+    """Median rms by kind of reading of fields (N, draws) in units of the stated noise."""
     problem = setting.problem
     sigma = np.broadcast_to(problem.reading_sigma, problem.measured.shape)
     every = [rms_by_kind(problem, sigma * as_table(problem, one)) for one in white.T]

@@ -1,9 +1,9 @@
-"""What nobody knows, as what changes smoothly: readings, the pull on the platform, lengths.
+"""What an unknown effect may change smoothly: readings, the force on the platform, cable lengths.
 
-A hose pulls differently everywhere, and known effects imitate in all readings at once what few
-numbers of a force say. So beside cubics of the readings there are a constant force and constant
-lengths of cables that change linearly with the place, and a spring, which pulls all the same
-towards a point. A tracker that moves shows over the session, wherever the platform is.
+A hose pulls differently at each place. A few numbers describe such a force, but known effects can
+imitate what it does to all readings. So besides cubics of the readings, the candidates are a force
+and cable lengths that change linearly with the position, and a spring, which pulls towards a point.
+A tracker that moves shows over the session, wherever the platform is.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _FREE = (
 
 
 class Varying(StrEnum):
-    """What may change smoothly and is no effect, in words, and how to find out about it."""
+    """What may change smoothly without being an effect, in words, and how to find out about it."""
 
     POSITION = "something smooth over the workspace in the position alone", _MOVE
     ORIENTATION = "something smooth over the workspace in the orientation alone", _MOVE
@@ -54,7 +54,7 @@ class Varying(StrEnum):
     advice: str
 
     def __new__(cls, word: str, advice: str) -> Varying:
-        """Words with what to do; none where they name nothing that can be touched."""
+        """Words with advice; the advice is "" if they name nothing that can be checked by hand."""
         varying = str.__new__(cls, word)
         varying._value_, varying.advice = word, advice
         return varying
@@ -66,7 +66,7 @@ _ALONE = {
 
 
 def varying(setting: Setting, joint: JointFit) -> dict[Varying, Array]:
-    """Columns (N, k) of each kind, in units of the noise."""
+    """Columns (N, k) of each candidate that moves a reading, in units of the noise."""
     return {
         what: columns
         for part in (_of_readings, _of_tracker, _of_robot)
@@ -76,7 +76,7 @@ def varying(setting: Setting, joint: JointFit) -> dict[Varying, Array]:
 
 
 def _of_readings(setting: Setting, joint: JointFit) -> Iterator[tuple[Varying, Array]]:
-    """A cubic for each channel, of each kind of readings and of all."""
+    """A cubic in the position for each channel: by kind of reading, and for all together."""
     columns = field_of(setting.problem, joint.state.prediction.pose[:, :3])
     if not columns.shape[1]:
         return
@@ -89,13 +89,13 @@ def _of_readings(setting: Setting, joint: JointFit) -> Iterator[tuple[Varying, A
 
 
 def _of_tracker(setting: Setting, _joint: JointFit) -> Iterator[tuple[Varying, Array]]:
-    """A cubic of the time for each channel of the position."""
+    """A cubic in the time for each channel of the position."""
     columns = field_columns(setting.problem, _session(setting)[:, None], POSITION.stop)
     yield Varying.SESSION, columns
 
 
 def _session(setting: Setting) -> Array:
-    """(n,) when each row was read: by a clock that never goes back, else by its number."""
+    """(n,) when each row was read: by the clock if it never goes back, else by row number."""
     data = setting.problem.data
     clock = data.t_s
     if clock is not None and np.all(np.diff(clock) >= 0.0) and np.ptp(clock) > 0.0:
@@ -104,7 +104,7 @@ def _session(setting: Setting) -> Array:
 
 
 def _of_robot(setting: Setting, joint: JointFit) -> Iterator[tuple[Varying, Array]]:
-    """What moves the platform itself."""
+    """Candidates that move the platform itself: a force, a spring, cable lengths."""
     place = joint.state.prediction.pose[:, :3]
     linear = monomials(place, 1)[setting.problem.row_of]
     force = _rates(setting, joint, "external_wrench")[:, :3]
@@ -117,7 +117,7 @@ def _of_robot(setting: Setting, joint: JointFit) -> Iterator[tuple[Varying, Arra
 
 
 def _rates(setting: Setting, joint: JointFit, name: str) -> Array:
-    """(N, k) how readings change with the parameters of an effect, from nothing on."""
+    """(N, k) derivatives of the readings by the parameters of an effect at null."""
     layout = layout_of(catalogue()[name], setting.problem.robot)
     terms = Terms([*joint.terms.without(name), Term(layout, layout.null)])
     rates = derivatives(setting.problem, joint.state.of(terms), frozen=True)
@@ -125,11 +125,11 @@ def _rates(setting: Setting, joint: JointFit, name: str) -> Array:
 
 
 def _products(columns: Array, shapes: Array) -> Array:
-    """(N, k l) of each column (N, k) with each shape (N, l)."""
+    """(N, k l) products of each column (N, k) with each shape (N, l)."""
     return np.asarray((columns[:, :, None] * shapes[:, None, :]).reshape(len(columns), -1))
 
 
 def _scaled(columns: Array) -> Array:
-    """So that all together move a reading by its noise, on average."""
+    """Columns (N, k), scaled so that all together move a reading by its noise, in the rms."""
     power = float(np.sum(columns**2)) / max(len(columns), 1)
     return columns / np.sqrt(power) if power > 0.0 else columns

@@ -1,13 +1,13 @@
 """What a group of parameters is worth beside others, in a linear model with Gaussian priors.
 
-At an optimum the prediction is y = r + X z with z ~ N(0, lambda^2). Given the others, what is left
-of a group's own normal matrix C and gradient b says what its evidence gains over its absence:
+At an optimum the prediction is y = r + X z with z ~ N(0, lambda^2). With C and b the group's normal
+matrix and gradient after the others are eliminated, the evidence gains over that without the group
 
     ln gain = 1/2 sum lambda^2 b_i^2/(1 + lambda^2 e_i) - 1/2 sum ln(1 + lambda^2 e_i)
 
-in the axes of C = U diag(e) U^T. One width for the group is averaged over, so that a plausible
-size that is off by far does not decide. A single parameter that cannot be negative has half a
-Gaussian as its prior.
+in the axes of C = U diag(e) U^T. It is averaged over the width lambda of the group, so that a badly
+wrong plausible size does not decide. A single parameter that cannot be negative has half a Gaussian
+as its prior.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from seecr.pose import Array
 
 
 def log_gains(normal: Array, gradient: Array, widths: ArrayLike, one_sided: bool = False) -> Array:
-    """(k,) ln gain of a group for each width.
+    """(k,) ln evidence that a group gains, for each width.
 
     Args:
-        normal: (p, p) what the others leave of its normal matrix.
-        gradient: (p,) what they leave of X^T y.
+        normal: (p, p) its normal matrix after the others are eliminated.
+        gradient: (p,) the same of X^T y.
         widths: (k,) prior standard deviations of z.
-        one_sided: the group is one parameter that cannot be negative.
+        one_sided: whether the group is one parameter that cannot be negative.
     """
     power, axes = np.linalg.eigh(normal)
     power = np.maximum(power, 0.0)
@@ -39,10 +39,10 @@ def log_gains(normal: Array, gradient: Array, widths: ArrayLike, one_sided: bool
 
 
 def gains_along(power: Array, along: Array, widths: ArrayLike) -> Array:
-    """(k, ...) ln gain for each width, from the axes of the normal matrix.
+    """(k, ...) ln evidence gained, for each width, in the axes of the normal matrix.
 
     Args:
-        power: (p,) its eigenvalues.
+        power: (p,) eigenvalues of the normal matrix.
         along: (p, ...) gradients along its axes, one or many.
         widths: (k,) prior standard deviations of z.
     """
@@ -55,6 +55,6 @@ def gains_along(power: Array, along: Array, widths: ArrayLike) -> Array:
 def log_gain(
     normal: Array, gradient: Array, widths: Sequence[float] = WIDTHS, one_sided: bool = False
 ) -> float:
-    """ln gain of a group, averaged over its width."""
+    """ln evidence that a group gains, averaged over its width."""
     gains = log_gains(normal, gradient, widths, one_sided)
     return float(special.logsumexp(gains) - np.log(len(gains)))

@@ -1,4 +1,4 @@
-"""Where a model is off: by coordinate, run, pose and region, and what the error goes with."""
+"""Compares a model with measurements: its errors by coordinate, run, pose, region and cause."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""What residuals go with: time, tension, direction of travel, place ... in binned means.
+"""What residuals are associated with: time, tension, direction of travel ... by binned means.
 
-For each quantity the rows fall into a few bins; the share of the residuals' variance that lies
-between the bins (corrected for their number) and its F test say how much they go together. The
-quantities are commanded ones and the model's own, never measured ones: an error in both would
-make them agree by itself. Structure makes rows alike that are near each other, so small p are a
-hint where to look, not a proof.
+For each quantity the rows fall into a few bins. The share of the residuals' variance that lies
+between the bins (corrected for their number) and its F test tell how strong the association is. The
+quantities are commanded ones and the model's own, never measured ones: a reading with an error
+would be associated with its own residual. Rows near each other have similar residuals if there is
+any structure, so that a small p hints at where to look and proves nothing.
 """
 
 from __future__ import annotations
@@ -32,20 +32,20 @@ from seecr.pose import Array
 from seecr.prediction.experiment import Prediction
 
 SIGNIFICANT = 0.01
-"""An association of a smaller p, over all that were tried, counts."""
+"""An association is significant if its p-value, corrected for all that were tried, is smaller."""
 
 _BINS, _IN_A_BIN = 6, 4
-# What comes again in time counts if it explains so much more of the variance than anything else.
+# A period in time counts if it explains more of the variance than anything else by this share.
 _CLEARLY = 0.15
 
 
 @dataclass(frozen=True)
 class Bin:
-    """Rows that are alike in a quantity.
+    """Rows with similar values of a quantity.
 
     Attributes:
-        label: the quantity there. rows: how many.
-        mean: error of the strongest reading, in SI; None where it was not read.
+        label: the values in words. rows: number of rows.
+        mean: mean error of the strongest reading, in SI; None if it was not read.
     """
 
     label: str
@@ -55,15 +55,15 @@ class Bin:
 
 @dataclass(frozen=True)
 class Association:
-    """One thing that residuals go with.
+    """An association of the residuals with one quantity.
 
     Attributes:
-        kind: the sort of thing. against: the quantity, in words.
+        kind: the kind of quantity. against: the quantity, in words.
         of: "readings" or "cable lengths".
-        share: of the variance.
-        p: chance of it, over all quantities tried.
-        strongest: the reading that goes with it most. unit: its.
-        bins: rows that are alike in the quantity.
+        share: fraction of the variance that the quantity explains.
+        p: p-value, corrected for all quantities tried.
+        strongest: the reading with the strongest association. unit: its unit.
+        bins: rows with similar values of the quantity.
     """
 
     kind: QuantityKind
@@ -77,22 +77,22 @@ class Association:
 
     @property
     def significant(self) -> bool:
-        """Whether chance hardly explains it."""
+        """Whether chance is an unlikely explanation."""
         return self.p < SIGNIFICANT
 
     def as_json(self) -> dict[str, Any]:
-        """As in ``comparison.json`` and ``diagnosis.json``."""
+        """The content in ``comparison.json`` and ``diagnosis.json``."""
         kept = {key: value for key, value in vars(self).items() if key != "kind"}
         return {**kept, "bins": [vars(part) for part in self.bins]}
 
 
 def associations(problem: Problem, white: Array, prediction: Prediction) -> list[Association]:
-    """What residuals go with, the strongest first.
+    """Associations of the residuals, the strongest first.
 
     Args:
         problem: the data.
         white: (N,) whitened residuals.
-        prediction: of the model they belong to.
+        prediction: prediction of the model that leaves them.
     """
     raw = problem.residuals(prediction.readings)
     way = travel(problem, prediction)
@@ -129,9 +129,9 @@ def _in_cables(
 
 
 def _swinging(problem: Problem, table: Array, raw: Array, least: float) -> list[Association]:
-    """What comes again and again in time, by its phase; only if it explains clearly more.
+    """The association with the phase of a period in time, if it explains clearly more than others.
 
-    Commands that go to and fro make every error of place come again with them.
+    Commands that go to and fro make every error that depends on the place periodic too.
     """
     again, tried = in_time(problem, table)
     if again is None:
@@ -152,7 +152,7 @@ def _row(
     units: list[str],
     part: float,
 ) -> Association | None:
-    """One association, or None where the quantity never changes."""
+    """The association with one quantity; None if the quantity never changes."""
     index, labels = _binned(quantity, np.asarray(np.isfinite(table).any(axis=1)))
     constant = quantity.kind is QuantityKind.EVERYWHERE
     if len(labels) < (1 if constant else 2):
@@ -187,13 +187,13 @@ def _row(
 def _p(between: Array, won: Array, within: Array, lost: Array) -> Array:
     good = (won > 0) & (lost > 0)
     safe = np.where(good, lost, 1.0)
-    with np.errstate(over="ignore"):  # of rows that are alike to the last digit
+    with np.errstate(over="ignore"):  # rows that are identical have no variance within
         f = (between / np.maximum(won, 1)) / np.maximum(within / safe, 1e-300)
     return np.where(good, stats.f.sf(f, np.maximum(won, 1), safe), 1.0)
 
 
 def _squares(table: Array, index: Any, bins: int, constant: bool) -> tuple[Array, Array, Array]:
-    """Sums of squares between and within bins, and readings, of each column."""
+    """Sums of squares between and within bins, and number of readings, for each column."""
     finite = np.isfinite(table) & (index >= 0)[:, None]
     values = np.where(finite, table, 0.0)
     counts = finite.sum(axis=0).astype(float)
@@ -208,7 +208,7 @@ def _squares(table: Array, index: Any, bins: int, constant: bool) -> tuple[Array
 
 
 def _binned(quantity: Abscissa, some: NDArray[np.bool_]) -> tuple[NDArray[np.int64], list[str]]:
-    """Bin of each row, -1 for none, and what the bins are called."""
+    """Bin of each row, -1 for none, and the labels of the bins."""
     values = quantity.values
     index = np.full(len(values), -1, dtype=np.int64)
     if values.dtype.kind == "U":

@@ -1,8 +1,9 @@
-"""Pose errors as errors of cable length: what kind of effect it is shows here at a glance.
+"""Pose errors converted to errors of cable length, which often show the kind of effect at a glance.
 
 The length error of each cable that would explain a pose error (dt, dw) is
-dl_i = -u_i . (dt + dw x R b_i), u_i from the anchor to the exit point. Constant: an offset; in
-proportion to length: a gain; a sine: a drum; with the sign of motion: friction or play.
+dl_i = -u_i . (dt + dw x R b_i), with u_i from the anchor to the exit point. A constant error hints
+at an offset, one proportional to length at a gain, a sine at a drum out of round, and one that
+changes sign with the motion at friction or backlash.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ def cable_errors(problem: Problem, raw: Array, prediction: Prediction) -> tuple[
 
     Args:
         problem: the data.
-        raw: (n, 6 + m) residuals; rows without a whole pose give NaN.
-        prediction: of the model.
+        raw: (n, 6 + m) residuals; rows without a complete pose give NaN.
+        prediction: prediction of the model.
     """
     unit, arm = _cables(problem, prediction)
     turned = np.cross(raw[:, None, ORIENTATION], arm)
@@ -30,21 +31,21 @@ def cable_errors(problem: Problem, raw: Array, prediction: Prediction) -> tuple[
     turn = (sigma.orientation_rad or 0.0) * ratio[:, 1:2] * lever
     noise = np.hypot((sigma.position_m or 0.0) * ratio[:, :1], turn)
     if problem.uses_angles:
-        # differences of Euler angles are no rotation vector
+        # differences of Euler angles are not a rotation vector
         errors = np.full_like(errors, np.nan)
     return np.where(problem.use[:, None], errors, np.nan), noise
 
 
 def cable_lengths(problem: Problem, prediction: Prediction) -> Array:
-    """Straight lengths (n, m) [m] of the cables where the model rests."""
+    """Straight lengths (n, m) [m] of the cables at the predicted poses."""
     return problem.robot.nominal_lengths(prediction.pose)
 
 
 def independent_part(problem: Problem, prediction: Prediction) -> float:
-    """Part of the m errors of cable length that is independent noise: they share one pose.
+    """Fraction of the m errors of cable length whose noise is independent: they share one pose.
 
-    By m^2/tr(C^2) of their correlations C, which is m where they are independent and the number
-    of groups where they agree in groups.
+    The number of independent errors is m^2/tr(C^2) with the correlations C. That is m if they are
+    independent, and the number of groups if they are identical within groups.
     """
     unit, arm = _cables(problem, prediction)
     sigma = problem.sigma

@@ -1,8 +1,9 @@
-"""Noise that goes together along a run, or holds rows far off: noise all the same.
+"""Autocorrelated noise, or noise with outliers, that explains what a model leaves.
 
-A tracker's error is smooth in time. Its size and correlation come from their likelihood. Made
-white by them, what a model leaves is noise if it is of the size of noise, rows far off do not lie
-side by side, neighbours no longer agree, and a smooth field over the workspace explains nothing.
+The error of a tracker is smooth in time. Size and autocorrelation of the noise maximise the
+likelihood, and residuals are whitened accordingly. What is left is noise if its size is plausible,
+outliers do not lie side by side, neighbours are no longer correlated, and a smooth field over the
+workspace explains nothing.
 """
 
 from __future__ import annotations
@@ -24,18 +25,18 @@ from seecr.counted import counted
 from seecr.effects import Terms
 from seecr.pose import Array
 
-# Noise larger than assumed by this is not as it was stated.
+# Noise that is larger than stated by this factor is not the stated noise.
 _LARGER = 1.5
 
 
 @dataclass(frozen=True)
 class Coloured:
-    """Noise as it is, by kind of reading.
+    """Estimated noise, by kind of reading.
 
     Attributes:
-        scale: its size in units of the assumed one.
-        rho: correlation from one row of a run to the next.
-        outliers: how many rows are far off.
+        scale: its size relative to the assumed one.
+        rho: correlation of successive rows of a run.
+        outliers: number of outlying rows.
     """
 
     scale: dict[str, float]
@@ -56,10 +57,10 @@ class Coloured:
 def coloured_noise(
     problem: Problem, state: State, factor: Array, stated: Collection[str]
 ) -> Coloured | None:
-    """What is left as coloured noise; None where it is none.
+    """The residuals as autocorrelated noise with outliers; None if they are not noise.
 
     Args:
-        problem: the data. state: the model on them. factor: :meth:`Problem.noise`.
+        problem: the data. state: the model's predictions. factor: :meth:`Problem.noise`.
         stated: names of the kinds of reading whose noise was stated.
     """
     setting = Setting(problem, factor, chain_of(problem))

@@ -1,4 +1,4 @@
-"""Limits on a model's errors, with units, from the command line or a TOML file."""
+"""Limits on the errors of a model, with units, from the command line or a TOML file."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from crosscheck.units import EXAMPLE, parse_quantity
 
 @dataclass(frozen=True)
 class Limits:
-    """Largest errors allowed, in SI; None where there is no limit.
+    """Largest errors allowed, in SI; None for no limit.
 
     Attributes:
-        max_position, max_orientation, max_tension: rms over all rows compared and the components
-            read in them, as reported everywhere.
-        max_position_worst, max_orientation_worst, max_tension_worst: length of the error vector
-            (largest tension error) of the worst row.
+        max_position, max_orientation, max_tension: rms over all compared rows and the components
+            that were read, as reported everywhere.
+        max_position_worst, max_orientation_worst, max_tension_worst: length of the error vector (or
+            largest tension error) of the worst row.
     """
 
     max_position: float | None = None
@@ -37,14 +37,14 @@ class Limits:
 
 @dataclass(frozen=True)
 class Rule:
-    """What one limit is on: a kind of reading, over all rows or in the worst row."""
+    """What a limit applies to: a kind of reading, over all rows or in the worst row."""
 
     kind: Kind
     worst: bool
 
     @property
     def words(self) -> str:
-        """What is limited, for a person."""
+        """What is limited, in words."""
         return f"worst {self.kind.name} error" if self.worst else f"{self.kind.name} error (rms)"
 
 
@@ -53,15 +53,15 @@ RULES = {
     for end, worst in (("", False), ("_worst", True))
     for kind in KINDS
 }
-"""What each field of :class:`Limits` is on."""
+"""What each field of :class:`Limits` applies to."""
 
 
 @dataclass(frozen=True)
 class Exceeded:
-    """A limit that does not hold.
+    """A limit that is exceeded.
 
     Attributes:
-        name: of the limit. limit, value: in SI. words: a sentence with where.
+        name: name of the limit. limit, value: in SI. words: a sentence that says where.
     """
 
     name: str
@@ -70,33 +70,33 @@ class Exceeded:
     words: str
 
     def as_json(self) -> dict[str, Any]:
-        """As in ``comparison.json``."""
+        """The content in ``comparison.json``."""
         return vars(self)
 
 
 def parse_limit(name: str, text: str) -> float:
-    """A limit, one of RULES, with its unit, in SI.
+    """Parse a limit, one of RULES, with its unit; SI.
 
     Raises:
-        CrosscheckError: no number above zero with a unit of that kind.
+        CrosscheckError: the text is no positive number with a unit of that kind.
     """
     return parse_quantity(option(name), RULES[name].kind.name, text)
 
 
 def option(name: str) -> str:
-    """The name as on the command line."""
+    """The name of the option on the command line."""
     return "--" + name.replace("_", "-")
 
 
 def load_limits(path: str | Path) -> Limits:
-    """Limits of a TOML file: ``max_position = "0.5mm"``, keys as on the command line.
+    """Limits from a TOML file: ``max_position = "0.5mm"``, keys as on the command line.
 
     Raises:
-        InputFileError: no TOML, an empty one, an unknown key, a value without a unit.
+        InputFileError: the file is no TOML or empty, has an unknown key or a value without a unit.
     """
     expected = 'expected a TOML file with lines such as max_position = "0.5mm"'
     toml = read_toml(Path(path), expected)
-    if not toml.content:  # a gate that nothing can fail
+    if not toml.content:  # nothing could ever exceed such limits
         raise toml.error(f"is empty; {expected}")
     values: dict[str, float] = {}
     for key, value in toml.content.items():
@@ -116,16 +116,16 @@ def load_limits(path: str | Path) -> Limits:
 
 
 def with_options(limits: Limits, options: dict[str, str | None]) -> Limits:
-    """Limits with those of the command line in place of the file's."""
+    """Limits of a file, replaced by those of the command line where given."""
     given: dict[str, Any] = {k: parse_limit(k, v) for k, v in options.items() if v is not None}
     return replace(limits, **given)
 
 
 def check(limits: Limits, found: Comparison) -> list[Exceeded]:
-    """The limits that do not hold.
+    """The limits that are exceeded.
 
     Raises:
-        CrosscheckError: a limit on what was not measured.
+        CrosscheckError: a limit is on something that was not measured.
     """
     out = []
     for name, rule in RULES.items():

@@ -1,6 +1,6 @@
-"""What residuals may go with: commanded quantities and the model's own, row by row.
+"""Quantities that residuals may be associated with, row by row: commanded ones and the model's own.
 
-Never measured ones: an error in both would make them agree by itself.
+Measured ones are not among them: a reading with an error would be associated with its own residual.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from seecr.pose import Array, rotvec_from_quat
 from seecr.prediction.experiment import Prediction
 
 EVERYWHERE = "nothing: it is the same everywhere"
-"""The quantity of what does not change from row to row."""
+"""Name of the quantity that does not change from row to row."""
 
-# A period is one that was seen so many times, of at most so many tried, in so many rows.
+# Least number of cycles of a period, most frequencies tried, least number of rows.
 _CYCLES, _FREQUENCIES, _FEWEST = 3.0, 20000, 24
 
 
 class QuantityKind(Enum):
-    """The sort of thing that residuals may go with."""
+    """The kinds of quantities that residuals may be associated with."""
 
     EVERYWHERE = auto()
     PLACE = auto()
@@ -42,11 +42,11 @@ class QuantityKind(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Abscissa:
-    """What residuals may go with.
+    """A quantity that residuals may be associated with.
 
     Attributes:
-        kind: the sort of thing. name: for people.
-        values: (k,) numbers or names of groups. unit: of the numbers.
+        kind: kind of the quantity. name: its name in words.
+        values: (k,) numbers, or names of groups. unit: unit of the numbers.
     """
 
     kind: QuantityKind
@@ -63,7 +63,7 @@ def channels(problem: Problem) -> tuple[list[str], list[str]]:
 
 
 def of_rows(problem: Problem, prediction: Prediction, way: Travel) -> Iterator[Abscissa]:
-    """What changes from row to row."""
+    """Quantities that change from row to row."""
     n, data = problem.data.n_rows, problem.data
     yield Abscissa(QuantityKind.EVERYWHERE, EVERYWHERE, np.zeros(n))
     turn = rotvec_from_quat(way.pose[:, 3:])
@@ -94,7 +94,7 @@ def of_rows(problem: Problem, prediction: Prediction, way: Travel) -> Iterator[A
 
 
 def of_cables(problem: Problem, prediction: Prediction, way: Travel) -> tuple[Abscissa, ...]:
-    """What changes from cable to cable: (n m,) values, row by row."""
+    """Quantities that change from cable to cable, with (n m,) values, row by row."""
     robot, n = problem.robot, problem.data.n_rows
     lengths = cable_lengths(problem, prediction)
     first = problem.experiment.commands.starts
@@ -124,7 +124,7 @@ def in_time(problem: Problem, table: Array) -> tuple[Abscissa | None, int]:
 
 
 def _period(problem: Problem, table: Array) -> tuple[float | None, int]:
-    """The period [s] that explains most (Lomb and Scargle's), and how many were tried."""
+    """The period [s] that explains most, by Lomb-Scargle, and how many were tried."""
     t = problem.data.t_s
     some = np.isfinite(table).any(axis=1)
     if t is None or some.sum() < _FEWEST:
@@ -132,7 +132,7 @@ def _period(problem: Problem, table: Array) -> tuple[float | None, int]:
     span, steps = float(np.ptp(t[some])), np.diff(np.unique(t[some]))
     if span <= 0.0:
         return None, 0
-    # a quarter of a cycle over the whole span apart, from what was seen a few times on
+    # frequencies are a quarter of a cycle over the whole span apart, from a few cycles on
     step, first = 0.25 / span, round(4 * _CYCLES)
     count = min(int(0.5 / float(np.median(steps)) / step), _FREQUENCIES)
     if count <= first:

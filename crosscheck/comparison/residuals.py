@@ -1,4 +1,4 @@
-"""A model against measurements: where it is off, by how much, and whether what is left is noise."""
+"""The command ``compare``: where a model is off, by how much, and whether the rest is noise."""
 
 from __future__ import annotations
 
@@ -21,27 +21,27 @@ from crosscheck.measurements.read import GivenData, measurements_of
 from seecr.pose import Array
 
 _MOST_WORST = 10
-# Fewer readings than this do not show how noise goes together.
+# Fewer readings than this do not show how noise is correlated.
 _LEAST_READINGS = 60
 
 
 def compare(robot: GivenRobot, data: GivenData, model: GivenModel = ()) -> Comparison:
-    """Hold a model against measurements; nothing is fitted but what the data leave free.
+    """Compare a model with measurements; only values that the data leave free are fitted.
 
     Args:
-        robot: as described, or its MJCF.
+        robot: a robot, or its MJCF file.
         data: its measurements, or their file.
-        model: the effects with their values, or their file; the plain model without.
+        model: the effects with their values, or their file; by default the plain model.
 
     Raises:
-        SeecrError: a file that cannot be read, or is of another robot.
+        SeecrError: a file cannot be read, or is of another robot.
     """
     robot = robot_of(robot)
     data = measurements_of(data, robot)
     terms, said = model_of(model, robot)
     ready = prepare(robot, data, terms)
     problem = ready.problem
-    # nothing is fitted here, so nobody asks how cross-validation would cut the data
+    # nothing is cross-validated here, so that the note about its blocks is left out
     notes = [*said, *ready.notes, *([str(ready.refusal)] if ready.refusal else [])]
     terms = ready.terms
     plain = problem.experiment.predict(terms.effects)

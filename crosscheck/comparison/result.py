@@ -1,7 +1,7 @@
-"""What a model held against measurements comes to: the errors by reading, group and row.
+"""The result of comparing a model with measurements: its errors by reading, group and row.
 
-Errors are measured less predicted: position [m] and rotation vector [rad] in the base frame
-(differences of rx, ry, rz where only some of these were read), tensions [N].
+Errors are measured minus predicted: position [m] and rotation vector [rad] in the base frame
+(differences of rx, ry, rz if only some of these were read), tensions [N].
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ class Coordinate:
     """The errors of one reading.
 
     Attributes:
-        name: of the reading. unit: of its numbers. rows: how many were compared.
+        name: name of the reading. unit: unit of the numbers. rows: number of rows compared.
         bias, rms, max: mean, root mean square, and the error that is largest in size.
-        row, line: of the largest, from 0 and in its file.
+        row, line: where the largest is, counted from 0, and in its file.
     """
 
     name: str
@@ -56,7 +56,7 @@ class Group:
     """The errors of rows that have a run, a direction of travel or a region in common.
 
     Attributes:
-        name: what they have in common. rows: how many were compared. rms: errors by kind.
+        name: what they have in common. rows: number of rows compared. rms: errors by kind.
     """
 
     name: str
@@ -73,8 +73,8 @@ class WorstRow:
     """A row with large errors.
 
     Attributes:
-        row: from 0. line, run: where it is in the file. command: (7,) commanded pose.
-        errors: by reading with its unit. times_noise: rms of the errors over their noise.
+        row: number from 0. line, run: where it is in the file. command: (7,) commanded pose.
+        errors: errors by reading with its unit. times_noise: rms of the errors over their noise.
     """
 
     row: int
@@ -94,7 +94,7 @@ class UnsolvedRow:
     """A row for which the model has no equilibrium.
 
     Attributes:
-        row: from 0. line, run: where it is in the file. status: what became of the solve.
+        row: number from 0. line, run: where it is in the file. status: how the solve ended.
         all_slack: whether no cable pulls.
     """
 
@@ -106,7 +106,7 @@ class UnsolvedRow:
 
     @property
     def why(self) -> str:
-        """What became of it, for a person."""
+        """How the solve ended, in words."""
         return self.status.value + ("; every cable is slack" if self.all_slack else "")
 
     def as_json(self) -> dict[str, Any]:
@@ -116,22 +116,22 @@ class UnsolvedRow:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison(Result):
-    """A model held against measurements.
+    """A model compared with measurements.
 
     Attributes:
         problem: the data; its ``use`` (n,) says which rows were compared.
-        state: the model's prediction and the residuals, ``state.raw`` (n, 6 + m).
+        state: the model's predictions and the residuals, ``state.raw`` (n, 6 + m).
         way: commanded motion to each row.
         rms: errors by kind (``position_rms_m``, ...). floor: what noise alone would give.
-        coordinates: errors of each reading. runs, directions, regions: of groups of rows.
-        associations: what the errors go with, the strongest first.
-        worst: rows, the worst first.
-        whiteness: is what is left noise; None where nothing could be compared.
-        coloured: what is left as noise that goes together along runs or holds rows far off; None
-            where it is white already, or no noise.
-        unsolved: rows that the model has no equilibrium for.
+        coordinates: errors of each reading. runs, directions, regions: errors of groups of rows.
+        associations: what the errors are associated with, the strongest first.
+        worst: rows with the largest errors, the worst first.
+        whiteness: tests whether the residuals are noise; None if nothing could be compared.
+        coloured: the residuals as noise with autocorrelation or outliers; None if they are white
+            noise, or no noise.
+        unsolved: rows for which the model has no equilibrium.
         notes: what was assumed, estimated or left out.
-        refusal: why the data are too little for a verdict; None where they are not.
+        refusal: why the data are insufficient for a verdict; None if they are not.
     """
 
     problem: Problem
@@ -158,7 +158,7 @@ class Comparison(Result):
 
     @property
     def is_noise(self) -> bool:
-        """Whether nothing speaks against what is left being noise of the stated size."""
+        """Whether the data suffice for a verdict and the residuals are noise, white or coloured."""
         if self.whiteness is None or self.refusal is not None:
             return False
         return self.whiteness.is_noise or self.coloured is not None
@@ -176,14 +176,14 @@ class Comparison(Result):
         return BY_NAME[kind].sizes(self.problem, self.state.raw)
 
     def place(self, row: int) -> str:
-        """The commanded position of a row for people; of lengths, where the model rests."""
+        """A row's commanded position in words; if lengths are commanded, the predicted one."""
         x, y, z = self.way.pose[row, :3]
         word = "commanded" if self.problem.data.command_lengths is None else "predicted"
         return f"{word} ({x:.4g} {y:.4g} {z:.4g}) m"
 
     @property
     def sentence(self) -> str:
-        """The verdict for a person."""
+        """The verdict in words."""
         w = self.whiteness
         if w is None:
             why = f": {self.unsolved[0].why}" if self.unsolved else ""
@@ -228,7 +228,7 @@ class Comparison(Result):
         return [head, *sizes, self.sentence]
 
     def records(self) -> list[Record]:
-        """The errors of every row; None where a reading was not compared."""
+        """The errors of every row; None for a reading that was not compared."""
         data = self.problem.data
         names, units = channels(self.problem)
         heads = [f"{n.replace(' ', '_')}_{u}" for n, u in zip(names, units, strict=True)]
@@ -240,7 +240,7 @@ class Comparison(Result):
         ]
 
     def as_json(self) -> dict[str, Any]:
-        """The content of ``comparison.json``: SI, null where there is no number."""
+        """The content of ``comparison.json``: SI, null where a number does not exist."""
         problem, w = self.problem, self.whiteness
         return {
             "sentence": self.sentence,
@@ -266,7 +266,7 @@ class Comparison(Result):
         }
 
     def _rows(self) -> dict[str, Any]:
-        """Every row: errors by reading, in the order of ``channels``; null where not compared."""
+        """Errors of every row by reading, in the order of ``channels``; null if not compared."""
         data = self.problem.data
         names, units = channels(self.problem)
         return {

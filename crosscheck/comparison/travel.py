@@ -1,4 +1,4 @@
-"""How the platform was told to move to each row, and into which region of the workspace."""
+"""The commanded motion of the platform to each row, and the region of the workspace of each row."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from seecr.prediction.experiment import Prediction
 
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 STILL = "still"
-# An axis along which the commands spread by less than this part of the longest is not cut.
+# An axis is not divided if the commands spread along it by less than this part of the widest one.
 _FLAT = 0.05
-# Nearer to the middle of an axis, in parts of it, is on it.
+# A position this near to the middle of an axis, relative to the spread, is on it.
 _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Travel:
-    """Commanded motion to each row from the one before, or from the reference pose in a new run.
+    """Commanded motion to each row, from the row before or, in a new run, from the reference pose.
 
     Attributes:
-        pose: (n, 7) commanded; where lengths are commanded, where the model rests.
+        pose: (n, 7) commanded poses; if lengths are commanded, the predicted ones.
         step: (n, 6) displacement [m] and rotation vector [rad].
-        direction: (n,) sign and axis of the largest part of the step, rotations weighed by the
-            robot's length; "still" where nothing moves.
-        speed: (n,) [m/s], rotations times the robot's length; NaN for the first row of a run
-            and without times.
+        direction: (n,) sign and axis of the largest component of the step, rotations multiplied by
+            the robot's length; "still" if nothing moves.
+        speed: (n,) [m/s], rotations multiplied by the robot's length; NaN for the first row of a
+            run and without times.
     """
 
     pose: Array
@@ -39,7 +39,7 @@ class Travel:
 
 
 def travel(problem: Problem, prediction: Prediction) -> Travel:
-    """The motion that was commanded, never the one measured."""
+    """The commanded motion, never the measured one."""
     commands = problem.experiment.commands
     pose = commands.pose if commands.lengths is None else prediction.pose
     before = np.concatenate([pose[:1], pose[:-1]])
@@ -66,7 +66,7 @@ def regions_of(problem: Problem, pose: Array) -> Names:
 
     Args:
         problem: the data.
-        pose: (n, 7) commanded.
+        pose: (n, 7) commanded poses.
     """
     place = pose[:, :3]
     used = place[problem.use] if problem.use.any() else place

@@ -1,4 +1,4 @@
-"""Which effects a model is missing."""
+"""Diagnoses which effects a model is missing."""
 
 from __future__ import annotations
 

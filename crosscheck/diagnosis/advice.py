@@ -1,4 +1,4 @@
-"""What to do next with a diagnosis: check an effect by itself, tell two apart, find the unknown."""
+"""What to do next: how to check an effect by hand, tell two apart, or find an unknown one."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from seecr.effects import Term, catalogue
 from seecr.pose import Array, rotvec_from_quat
 from seecr.units import with_error
 
-# Ways to tell two effects apart that are named.
+# Most ways that are named to tell two effects apart.
 _MOST_WAYS = 2
 
 
 class _Sure(float):
     """A number that is written to the first digit of its standard error.
 
-    Nobody checks more by hand: 24114 with an error of 160 is 24100.
+    Nobody measures more digits by hand: 24114 with an error of 160 becomes 24100.
     """
 
     error: float
@@ -53,13 +53,13 @@ class _Sure(float):
 
 
 def check_of(term: Term, robot: Robot, stderr: Array | None = None) -> str:
-    """The effect's independent check, with what to expect: in mm, degrees and newtons.
+    """An effect's independent check, with what to expect: in mm, degrees and newtons.
 
-    No number is given that no robot can have.
+    Values that no robot can have are not given.
 
     Args:
-        term: the effect with its values. robot: that has it.
-        stderr: of the values, (k,); numbers then have the digits that these leave.
+        term: the effect with its values. robot: the robot that has it.
+        stderr: (k,) standard errors of the values, which determine how many digits are shown.
     """
     layout = term.layout
     if not term.is_possible(robot):
@@ -77,7 +77,7 @@ def check_of(term: Term, robot: Robot, stderr: Array | None = None) -> str:
 
     for name, unit, value in zip(layout.names, layout.units, term.vector, strict=True):
         values[parameter_name(name, unit)] = number(value, errors[layout.names.index(name)], unit)
-    # of several alike, the one that stands out most
+    # of several parameters, the one that stands out most
     size = np.abs(term.vector - layout.null) / layout.scale * ~layout.shape
     k = int(np.argmax(size))
     values["which"] = parameter_name(layout.names[k], layout.units[k])
@@ -93,7 +93,7 @@ def check_of(term: Term, robot: Robot, stderr: Array | None = None) -> str:
 
 
 def _errors_of_totals(term: Term, robot: Robot, errors: Array) -> dict[str, float]:
-    """Standard errors of what a person would measure, by how far one of each parameter moves it."""
+    """Standard errors of measurable quantities, propagated from those of the parameters (k,)."""
     whole = {name: total.value for name, total in term.effect().totals(robot).items()}
     square = dict.fromkeys(whole, 0.0)
     for k, error in enumerate(errors):
@@ -110,8 +110,8 @@ _CALIBRATE = (
     "crosscheck calibrate writes the model with all effects, each as far as the data know it; "
     "which of them it is, only checks by hand can say"
 )
-# Many small errors at once look like an unknown one: no single effect is worth anything before the
-# others are in.
+# Many small errors at once look like an unknown effect: no single one explains anything before the
+# others are in the model.
 _ALL_AT_ONCE = (
     "if every tolerance of the robot may be a little off: crosscheck calibrate fits all effects at "
     "once and says what that predicts on runs left out"
@@ -126,12 +126,13 @@ def measure_next(
     alternatives: Sequence[Names] = (),
     seen: Varying | None = None,
 ) -> list[str]:
-    """What to measure to tell apart, confirm or find, a sentence each.
+    """What to measure to tell effects apart, confirm or find them, a sentence each.
 
     Args:
-        found: the way to what is missing. missing, verdict, where: as they stand in the diagnosis.
-        alternatives: sets of effects of which it is one.
-        seen: how what nobody knows shows, where effects imitate it.
+        found: the search that leads to what is missing.
+        missing, verdict, where: as in the diagnosis.
+        alternatives: sets of effects of which one is missing.
+        seen: where something unknown shows, if effects imitate it.
     """
     out = []
     plan = Planned(found.problem, found.last.fit, found.factor, Reads.of(found.problem.data))
@@ -155,7 +156,7 @@ def measure_next(
 
 
 def _to_decide(alternatives: Sequence[Names]) -> list[str]:
-    """Checks by hand of what is in some of the sets and not in all; of one set, of all in it."""
+    """Checks by hand of effects that some of the sets have and not all; of all if it is one set."""
     every, always = frozenset().union(*alternatives), frozenset.intersection(*alternatives)
     return [
         f"to find which effects it is: {measured_directly(name)} ({name})"
@@ -164,7 +165,7 @@ def _to_decide(alternatives: Sequence[Names]) -> list[str]:
 
 
 def measured_directly(effect: str) -> str:
-    """How to settle an effect without the robot's poses, in a few words."""
+    """How to measure an effect without the robot's poses, in a few words."""
     return catalogue()[effect].by_hand()
 
 

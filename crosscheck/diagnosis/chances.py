@@ -1,4 +1,4 @@
-"""How probable it is that each effect is missing, as a diagnosis says it."""
+"""The probabilities that effects are missing, as a diagnosis states them."""
 
 from __future__ import annotations
 
@@ -14,28 +14,29 @@ from crosscheck.fit.problem import Rms
 from crosscheck.fit.words import rms_words
 
 PROBABLE = 0.5
-"""From this probability on an effect that is not listed is called probable."""
+"""An effect that is not listed is called probable from this probability on."""
 
 
-# What diagnosis.json says where nothing was weighed.
+# What diagnosis.json has if no probabilities were computed.
 NOT_WEIGHED: dict[str, Any] = {"catalogue": [], "classes": []}
 
 
 @dataclass(frozen=True)
 class Chances:
-    """Probabilities of the effects and of classes of equals.
+    """Posterior probabilities of effects and of classes of equivalent effects.
 
     Attributes:
-        effect: of each effect of the catalogue, that it is missing.
-        classes: members, the first of them the likeliest, and the probability that one of them
-            is missing; the most probable class first.
-        field: ln odds that something smooth is left which no effect of the catalogue explains;
-            None where no joint fit was made.
-        together: the joint fit; None where none was made.
-        further: of effects that share a class with one needed more, that both are missing.
-        shown: rms size by kind of reading from which on a smooth effect that nobody knows would
-            show beside the catalogue; None where it could hide at any size.
-        imitated: something smooth that no effect explains, and some of what was found imitates.
+        effect: for each effect of the catalogue, the probability that it is missing.
+        classes: members, the likeliest first, and the probability that one of them is missing; the
+            most probable class first.
+        field: ln odds that something smooth remains that no effect of the catalogue explains;
+            None without a joint fit.
+        together: errors and noise of the joint fit; None without one.
+        shown: by kind of reading, the rms size from which on a smooth unknown effect would show;
+            None if it could hide at any size.
+        further: for effects that share a class with others that are needed more, the probability
+            that as many members of the class are missing.
+        imitated: something smooth and unknown that some of the effects found imitate.
     """
 
     effect: dict[str, float]
@@ -48,9 +49,9 @@ class Chances:
 
     @property
     def words(self) -> str:
-        """What these data can show of effects that nobody knows, a sentence; "" where one is there.
+        """What these data can show of unknown effects, a sentence; "" if effects imitate one.
 
-        It may be of any size that known effects can imitate.
+        In that case it may have any size that known effects can imitate.
         """
         if self.imitated is not None:
             return ""
@@ -62,7 +63,7 @@ class Chances:
         )
 
     def of(self, name: str) -> float:
-        """Probability that an effect or one of its class is missing, beside those needed more."""
+        """Probability that an effect or an equivalent is missing; see ``further`` for some."""
         every = next((p for members, p in self.classes if name in members), 0.0)
         return self.further.get(name, every)
 
@@ -86,7 +87,7 @@ class Chances:
 
 
 def chances_of(sought: Sought) -> Chances:
-    """The probabilities of compared sets."""
+    """The probabilities that follow from compared sets."""
     classes = sought.classes
     pairs = zip(classes.members, classes.probability, strict=True)
     return Chances(

@@ -1,7 +1,7 @@
-"""Effects that a search ended with, in exchange for others that the probabilities prefer.
+"""Exchanges effects that a search ended with for others that the probabilities prefer.
 
-Steps go one effect at a time: what imitates two together is taken first, and the second then has
-nothing left to add. Sets are compared all at once, and their best is fitted here in earnest.
+The search adds one effect at a time: what imitates two effects together is added first, and leaves
+nothing for the second. Probabilities compare whole sets, and the set they prefer is fitted here.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from crosscheck.diagnosis.search import Search
 from crosscheck.fit.candidates import try_candidate
 
 DOUBTED = 0.5
-"""An effect that steps found and that is less probable may stand in the place of others."""
+"""An effect found by the search that is less probable than this may stand in for others."""
 
 
 def exchanged(found: Search, chances: Chances) -> Search:
-    """The search, or one that ends with other effects where their fit is the better one.
+    """The search, or one that ends with other effects if these fit better.
 
     Args:
         found: a search that ended with noise.
-        chances: about its last model.
+        chances: probabilities about its last model.
     """
     gone = [name for name in found.found if chances.of(name) < DOUBTED]
     inside = set(found.last.fit.terms.names)
@@ -40,7 +40,7 @@ def exchanged(found: Search, chances: Chances) -> Search:
 
 
 def _fitted(found: Search, gone: list[str], come: list[str]) -> Node | None:
-    """The last model with some effects for others; None where that cannot be fitted."""
+    """The last model with some effects exchanged for others; None if that cannot be fitted."""
     trials, terms = found.trials, found.last.fit.terms
     layouts = {c.name: c.layout for c in trials.candidates(trials.problem) if c.why_not is None}
     kept = terms.only([name for name in terms.names if name not in gone])

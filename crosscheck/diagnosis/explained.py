@@ -1,6 +1,6 @@
-"""What sets of effects say where they explain the data: nothing, a few effects, or many.
+"""The diagnosis of data that compared sets of effects explain: by none, by a few, or by many.
 
-Or something unknown, where a field explains in the place of some of them.
+It may also be that something unknown explains the data better in place of some effects.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from crosscheck.fit.problem import KINDS, Rms, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 from crosscheck.fit.words import rms_words
 
-# Noise that is correlated by more than this is told.
+# A note mentions noise with a larger autocorrelation than this.
 _ALIKE = 0.3
 
 MORE = (
@@ -49,7 +49,7 @@ MORE = (
 
 
 def explained(sought: Sought, notes: Sequence[str]) -> Diagnosis:
-    """The diagnosis of compared sets that leave noise."""
+    """The diagnosis by compared sets of effects that leave only noise."""
     verdict, imitated = sought.judgement.verdict, sought.judgement.imitated
     way = way_of(sought, frozenset(sought.judgement.sure))
     chances = chances_of(sought)
@@ -74,8 +74,8 @@ def explained(sought: Sought, notes: Sequence[str]) -> Diagnosis:
 def _missing(sought: Sought, way: Search, chances: Chances, name: str) -> MissingEffect:
     best = way.last.fit
     if sought.judgement.verdict is not DiagnosisVerdict.EFFECTS_FOUND:
-        # others are missing too that are not sure: values beside those are nearer to the truth;
-        # elsewhere what is listed has to be a model by itself
+        # effects that are not sure are missing too, and with them in the model values are better;
+        # for EFFECTS_FOUND, the listed effects have to be a model by themselves
         best = fit_of(sought.calibration.setting, sought.found.best.joint)
     term, part = best.terms[name], best.terms.part(name)
     index = 1 + way.found.index(name)
@@ -94,7 +94,7 @@ def _missing(sought: Sought, way: Search, chances: Chances, name: str) -> Missin
 
 
 def _rivals(sought: Sought, names: Names, name: str) -> list[Rival]:
-    """The other members of an effect's class, each with the model that has it instead."""
+    """The other members of an effect's class, each with a fit of the model that has it instead."""
     found = sought.found
     members = next((m for m in sought.classes.members if name in m), (name,))
     own = found.refit(names)
@@ -105,7 +105,8 @@ def _rivals(sought: Sought, names: Names, name: str) -> list[Rival]:
         swapped = found.refit((names - {name}) | {other}) if other not in names else None
         if swapped is not None:
             every[other] = _rival(sought, own, swapped, other)
-    # one that contains another does all that it does: its further parameters may be there too
+    # an effect that contains another does all that it does, and stays if its further parameters
+    # may be present too
     out = [r for r in every.values() if r.loss <= loss_of_its_part(r.name, name, every) + EQUAL]
     return sorted(out, key=lambda r: r.loss)
 
@@ -116,7 +117,7 @@ def _rival(sought: Sought, own: Refit, swapped: Refit, other: str) -> Rival:
 
 
 def _floor(sought: Sought) -> Rms:
-    """The rms errors that the noise as it was found would give."""
+    """The rms errors of the noise at its estimated size."""
     setting, joint = sought.calibration.setting, sought.calibration.joint
     floor = noise_floor(setting.problem, joint.state)
     scale = joint.colour.scale
@@ -127,7 +128,7 @@ def _floor(sought: Sought) -> Rms:
 
 
 def _noise_notes(sought: Sought, chances: Chances) -> list[str]:
-    """Noise that is not as it was stated, and lines that hardly count."""
+    """Notes about noise that is not as stated, and about lines that hardly count."""
     out, together = [], chances.together
     assert together is not None
     for name, scale in together.scale.items():
@@ -190,7 +191,7 @@ def _sentence(
 
 
 def _not_listed(way: Search, chances: Chances) -> list[NotListed]:
-    """Every effect that is not listed, the most probable first."""
+    """All effects that are not listed, the most probable first."""
     rows = left_out(way, way.found, lambda c: _why_not(way, chances, c))
     return sorted(rows, key=lambda row: (-chances.effect.get(row.effect, 0.0), -row.score))
 

@@ -1,4 +1,4 @@
-"""The model that a diagnosis ends with: what it had and what it misses, fitted together."""
+"""The model that a diagnosis ends with: its previous effects and the missing ones, together."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ __all__ = ["found_covariance", "found_effects"]
 
 
 def found_effects(found: Diagnosis) -> tuple[Fitted, ...]:
-    """All effects of the model with those that are listed, as fitted with them.
+    """All effects of the model and those that are listed, fitted together.
 
-    None where there is no verdict.
+    Empty if there is no verdict.
     """
     if found.search is None:
         return ()
@@ -29,7 +29,7 @@ def found_effects(found: Diagnosis) -> tuple[Fitted, ...]:
 
 
 def _widened(found: Diagnosis) -> float:
-    """How many times as wide as the fit's own the errors of what is listed are."""
+    """Factor by which standard errors of listed effects exceed those of the fit."""
     best = shown_stages(found)[1].step.fit
     for one in found.missing:
         own = best.stderr[best.terms.part(one.term.name)]
@@ -40,9 +40,9 @@ def _widened(found: Diagnosis) -> float:
 
 
 def found_covariance(found: Diagnosis) -> Array | None:
-    """(p, p) of the values of :func:`found_effects`, in their order.
+    """(p, p) covariance of the values of :func:`found_effects`, in their order.
 
-    None where it would tell too little: where more is missing than is listed.
+    None unless the listed effects are all that is missing, because it would be too small.
     """
     if found.search is None or found.verdict is not DiagnosisVerdict.EFFECTS_FOUND:
         return None

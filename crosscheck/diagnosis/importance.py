@@ -1,4 +1,4 @@
-"""Whether what is left matters: structure that is small beside the noise is told, not a verdict."""
+"""Decides whether the remainder matters: structure far below the noise is no unknown effect."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from crosscheck.fit.tolerance import Tolerance, doubt_of, left_over
 
 
 def weighed(found: Diagnosis, problem: Problem, tolerance: Tolerance) -> Diagnosis:
-    """The diagnosis with what is left and how large that is; no unknown effect that is too small.
+    """The diagnosis with the size of the remainder, and without an unknown effect too small.
 
     Args:
-        found: of these data.
+        found: the diagnosis of these data.
         problem: the data.
-        tolerance: from where on what is left matters.
+        tolerance: from which size on the remainder matters.
     """
     if found.search is None:
         return found
@@ -44,10 +44,11 @@ def weighed(found: Diagnosis, problem: Problem, tolerance: Tolerance) -> Diagnos
 
 
 def _left_and_noise(found: Diagnosis, search: Search, problem: Problem) -> tuple[Rms, Rms]:
-    """What the model leaves and what noise alone would, by kind.
+    """The rms errors of the model, and those of noise alone, by kind.
 
-    Errors of commanded lengths move all readings of a row together, by much more than each is
-    read to: then what is left is counted where they do not, in units of the readings' own noise.
+    Errors of commanded lengths move all readings of a row together, by much more than the noise of
+    each. If lengths are noisy, whitened residuals are therefore used, in units of the readings' own
+    noise.
     """
     if not problem.sigma.length_m:
         return found.after, found.floor

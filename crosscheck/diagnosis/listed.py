@@ -1,4 +1,4 @@
-"""What a search by steps has found, as a diagnosis lists it; and what it does not list, and why."""
+"""Turns the steps of a search into a diagnosis: what is listed, what is not, and why."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ def diagnosis_of(
     where: tuple[Association, ...] = (),
     alternatives: Sequence[Names] = (),
 ) -> Diagnosis:
-    """A diagnosis with a way of steps that leads to it.
+    """A diagnosis with the steps that lead to it.
 
     Args:
-        verdict, sentence, missing, before, floor, candidates, notes, chances, where: as they
-            stand in the diagnosis.
-        way: from the model as it stands to what is kept.
-        shown: the way whose errors are shown, where the way itself leads to more than is listed.
-        alternatives: sets of effects of which it is one.
+        verdict, sentence, missing, before, floor, candidates, notes, chances, where: as in the
+            diagnosis.
+        way: steps from the model as it stands to what is kept.
+        shown: the steps whose errors are shown, if ``way`` leads to more than is listed.
+        alternatives: sets of effects of which one is missing.
     """
     last = (way if shown is None else shown).last
     after = rms_by_kind(way.problem, last.fit.state.raw)
@@ -71,9 +71,9 @@ def missing_of(
     """An effect that the search found, with what adding it does.
 
     Args:
-        found: the search. name: of the effect.
+        found: the search. name: name of the effect.
         chances: probabilities of all effects.
-        rivals: what cannot be told from it; looked for where not given.
+        rivals: effects that cannot be told from it; if not given, they are searched.
     """
     best = found.last.fit
     term, part = best.terms[name], best.terms.part(name)
@@ -94,7 +94,7 @@ def missing_of(
 
 
 def not_listed(found: Search, listed: Sequence[str]) -> list[NotListed]:
-    """Every effect that was tried and is not listed, the nearest miss first."""
+    """Every effect that was tried and is not listed, the best first."""
 
     def why(c: Candidate) -> Reason:
         return _later_reason(found, c.name) or _beaten_reason(found, c)
@@ -105,11 +105,11 @@ def not_listed(found: Search, listed: Sequence[str]) -> list[NotListed]:
 def left_out(
     found: Search, listed: Sequence[str], why: Callable[[Candidate], Reason]
 ) -> list[NotListed]:
-    """Every effect tried beside the model as it stood that is not listed.
+    """Every effect that was tried beside the model as it stood and is not listed.
 
     Args:
-        found: the way of the search. listed: names.
-        why: the reason for a candidate that has none of its own.
+        found: the search. listed: names of what is listed.
+        why: gives the reason for a candidate that has none of its own.
     """
     start = found.steps[0]
     return [
@@ -137,7 +137,7 @@ _NOT_NEEDED = Reason(Why.NOT_NEEDED)
 
 
 def _later_reason(found: Search, name: str) -> Reason | None:
-    """Why it was not chosen later on, beside effects that were."""
+    """Why an effect was not chosen later, beside effects that were; None if it was never tried."""
     if name in found.found:
         return Reason(Why.EXPLAINS_PART)
     for step in reversed(found.steps[1:]):

@@ -1,7 +1,7 @@
-"""Probabilities about a model that the steps ended with, by linear algebra and its rivals.
+"""Posterior probabilities about the model that the steps ended with, by its linearisation.
 
-Sets of effects one or a few moves away are compared in the linear model about the final fit;
-which effects are equals is known from refits (:mod:`crosscheck.diagnosis.rivals`).
+Sets of effects one or a few moves away are compared in the model linearised about the final fit.
+Which effects are equivalent is known from refits (:mod:`crosscheck.diagnosis.rivals`).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from crosscheck.fit.state import evaluate
 from seecr.effects import Term, Terms
 from seecr.pose import Array
 
-# Steps to settle the final model with plausible sizes as priors.
+# Gauss-Newton steps that fit the final model with plausible sizes as priors.
 _STEPS = 4
 
 
@@ -39,7 +39,7 @@ def chances_near(found: Search, alike: Mapping[str, Sequence[str]]) -> Chances:
 
     Args:
         found: a search that ended with noise.
-        alike: of each effect that was found, those that cannot be told from it.
+        alike: for each effect that was found, those that cannot be told from it.
     """
     problem, fit = found.problem, found.last.fit
     setting = Setting(problem, found.factor, chain_of(problem), frozen=True)
@@ -65,7 +65,7 @@ def chances_near(found: Search, alike: Mapping[str, Sequence[str]]) -> Chances:
 
 
 def _impossible(found: Search) -> Names:
-    """Effects that would need what no robot can have wherever they were fitted."""
+    """Effects that would need impossible values in every model that they were fitted in."""
     tried: dict[str, list[bool]] = {}
     for one in (c for step in found.steps for c in step.candidates):
         no = one.why_not is not None and one.why_not.why is Why.IMPOSSIBLE
@@ -76,9 +76,9 @@ def _impossible(found: Search) -> Names:
 
 
 def _refitted(found: Search, scores: Scores, last: Names) -> dict[Names, float]:
-    """Scores of the sets that the search fitted in earnest, beside that of its last model.
+    """Scores of the sets that the search fitted, relative to that of its last model.
 
-    Linear algebra about one model says little of one with another effect in its place.
+    The linear model about one set says little of a set in which another effect replaces a member.
     """
     base = scores.score(last) - found.last.evidence.log - scores.log_prior(last)
     out: dict[Names, float] = {}
@@ -91,9 +91,9 @@ def _refitted(found: Search, scores: Scores, last: Names) -> dict[Names, float]:
 
 
 def _all_of(columns: Mapping[str, Array], count: int) -> tuple[Array, Array]:
-    """Columns (N, p) of all effects and prior widths (p,): plausible, or none for the tracker.
+    """Columns (N, p) of all effects and their prior widths (p,), which are flat for the tracker.
 
-    N is the count.
+    N is ``count``.
     """
     width = {name: FLAT if name == TRACKER else 1.0 for name in columns}
     return (
@@ -127,7 +127,7 @@ def _with_equals(
     shown: Rms | None,
     instead: Instead,
 ) -> Chances:
-    """The classes as refits know them: equals share the probability that one of them is missing."""
+    """Probabilities with the classes that refits found: members share that of their class."""
     classes = [(name, *others) for name, others in alike.items()]
     known = {member for members in classes for member in members}
     alone = [(name,) for name in effects if name not in known]

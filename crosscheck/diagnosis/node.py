@@ -1,4 +1,4 @@
-"""A model of the search, and what comes of trying every further effect beside it."""
+"""A model of the search, and the trials of every further effect beside it."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from crosscheck.fit.noise import Whiteness
 from crosscheck.fit.prepare import Progress
 from crosscheck.fit.reasons import Reason, Why
 
-# Least gain in log evidence for one more effect (20:1).
+# Least gain in ln evidence for one more effect (odds of 20:1).
 LEAST_GAIN = 3.0
-# An effect that takes away less than this part of what noise does not explain is no cause.
+# An effect that removes less than this part of what noise does not explain is not the cause.
 LEAST_PART = 0.25
-# Candidates fitted beside a model after the first round, and small ones among them.
+# After the first round, how many candidates are fitted beside a model, and how many of them small.
 _FITTED, _FITTED_SMALL = 7, 2
-# Beside a model that leaves noise, an effect is only fitted if chance explains what its
-# derivative promises with less than this; beside others it must be very likely chance.
+# Largest p-value of the fall of chi2 that the derivatives promise for an effect to be fitted:
+# beside a model that leaves noise, and beside one that leaves more.
 _PRUNE_NOISE, _PRUNE_OTHER = 0.02, 0.3
 
 Names = frozenset[str]
-# Fits of candidates by (effects beside it, its name).
+# Fits of candidates, by the effects that they were tried beside and their own name.
 Fits = Mapping[tuple[Names, str], Fit]
 
 
@@ -35,8 +35,8 @@ class Node:
     """A model of the search.
 
     Attributes:
-        fit, evidence, whiteness: of the model.
-        candidates: what trying further effects gave; none before it was explored.
+        fit, evidence, whiteness: the fit of the model, its evidence, the test of its residuals.
+        candidates: further effects that were tried beside it; none before it was explored.
     """
 
     fit: Fit
@@ -51,7 +51,7 @@ class Node:
 
     @property
     def excess(self) -> float:
-        """What noise does not explain, of chi2."""
+        """The part of chi2 that noise does not explain."""
         return max(self.whiteness.chi2 - self.whiteness.dof, 1e-9)
 
     @property
@@ -61,19 +61,19 @@ class Node:
 
 
 def node_of(trials: Trials, found: Fit) -> Node:
-    """A fit with its evidence and the test of what it leaves."""
+    """A fit with its evidence and the test of its residuals."""
     evidence = trials.evidence(found)
     return Node(found, evidence, trials.whiteness(found, evidence.parameters))
 
 
 def explored(trials: Trials, node: Node, all_: bool, progress: Progress) -> Node:
-    """The node with every effect tried that it does not have.
+    """The node after every effect was tried that it does not have.
 
     Args:
         trials: how effects are tried.
         node: a model.
-        all_: whether all that promise something are fitted, or only those that promise most.
-        progress: called with what is being done and its share.
+        all_: whether to fit all candidates that promise something, or only the best of them.
+        progress: called with what is being done and the fraction that is done.
     """
     refused, promising = _screened(trials, node, lambda text, part: progress(text, 0.5 * part))
     chosen = promising if all_ else _most_promising(promising)
@@ -86,7 +86,7 @@ def explored(trials: Trials, node: Node, all_: bool, progress: Progress) -> Node
 def _screened(
     trials: Trials, node: Node, progress: Progress
 ) -> tuple[list[Candidate], list[Candidate]]:
-    """Effects that are not worth a fit, with the reason; and the others, the best first."""
+    """Effects that are not worth a fit, with the reason; and the others, by their promise."""
     prune = _PRUNE_NOISE if node.whiteness.is_noise else _PRUNE_OTHER
     todo = [c for c in trials.candidates(trials.problem) if c.name not in node.names]
     out = []
@@ -102,15 +102,15 @@ def _screened(
 
 
 def _promise(c: Candidate) -> float:
-    """Linearised gain in evidence, roughly: three for each direction."""
+    """Rough linear estimate of the gain in ln evidence: each direction costs three."""
     directions = c.starts.directions if c.starts is not None else 1
     return 0.5 * c.drop - 3.0 * directions
 
 
 def _most_promising(ranked: Sequence[Candidate]) -> list[Candidate]:
-    """A few candidates to fit: those that promise most, and the small ones that do.
+    """A few candidates to fit: the most promising ones, and the most promising small ones.
 
-    Large groups promise more than any small effect beside them, true or not.
+    Large groups promise more than any small effect beside them, whether or not they are present.
     """
     first = list(ranked[: _FITTED - _FITTED_SMALL])
     small = [c for c in ranked if len(c.layout) <= SMALL and c not in first][:_FITTED_SMALL]
@@ -125,7 +125,7 @@ def _fitted(
     chosen: Sequence[Candidate],
     progress: Progress,
 ) -> list[Candidate]:
-    """The chosen candidates fitted, the others refused, in the same order."""
+    """All promising candidates in their order: the chosen ones fitted, the others refused."""
     best, out = np.inf, []
     for k, c in enumerate(promising):
         if c not in chosen:
@@ -139,16 +139,16 @@ def _fitted(
 
 
 def hopeless(without: float, best: float) -> float:
-    """The chi2 above which a trial is given up: of the model without, of the best so far."""
+    """chi2 above which a trial is given up, given that of the model without and the best so far."""
     limit = 4.0 * best + 0.02 * without
     if best < (1.0 - LEAST_PART) * without:
-        # nobody goes on from what explains little where another explains much
+        # if one effect explains much, the search never goes on from one that explains little
         limit = min(limit, (1.0 - LEAST_PART) * without)
     return limit
 
 
 def _judged(node: Node, candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
-    """Each candidate with the reason why it is not to be added, if there is one."""
+    """Candidates with the reason why they are not added, if there is one."""
     count = sum(1 for c in candidates if c.fit is not None or c.drop > 0)
 
     def reason(c: Candidate) -> Reason | None:
@@ -164,6 +164,6 @@ def _judged(node: Node, candidates: Sequence[Candidate]) -> tuple[Candidate, ...
 
 
 def children_of(trials: Trials, node: Node) -> list[Node]:
-    """Models with one effect more that an explored node says are worth it."""
+    """The models with one more effect that are worth going on from, beside an explored node."""
     chosen = (c for c in node.candidates if c.why_not is None)
     return [node_of(trials, c.fit) for c in chosen if c.fit is not None]

@@ -1,4 +1,4 @@
-"""Looking back on a search: what is needless goes, the rest in the order in which adding pays."""
+"""Looks back on a search: drops effects that became unnecessary, sorts the rest by their gain."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from crosscheck.fit.noise import Whiteness
 from crosscheck.fit.reasons import Reason, Why
 from seecr.effects import Terms
 
-# Steps of Gauss-Newton for a model on the way that the search did not meet.
+# Gauss-Newton steps for a model on the way that the search did not meet.
 _ITERATIONS = 8
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """A model on the way: what was added and how well it does.
+    """A model on the way: what was added last, and how well it does.
 
     Attributes:
-        added: name of the effect added last, "" for the start.
-        node: the model, with what was tried to go on from it.
-        held_out: its errors on runs it was not fitted to.
+        added: name of the effect that was added last, "" for the start.
+        node: the model, with the candidates that were tried beside it.
+        held_out: its errors on held-out runs.
     """
 
     added: str
@@ -34,27 +34,27 @@ class Step:
 
     @property
     def fit(self) -> Fit:
-        """The model fitted to all rows."""
+        """The fit of the model to all rows."""
         return self.node.fit
 
     @property
     def evidence(self) -> Evidence:
-        """Of the fit."""
+        """Evidence of the fit."""
         return self.node.evidence
 
     @property
     def whiteness(self) -> Whiteness:
-        """Of what is left."""
+        """The test of its residuals."""
         return self.node.whiteness
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
-        """What was tried to go on from here."""
+        """The candidates that were tried beside it."""
         return self.node.candidates
 
 
 def step_of(trials: Trials, added: str, node: Node) -> Step:
-    """A node with its errors on runs left out."""
+    """A node with its errors on held-out runs."""
     if added:
         held = hold_out(trials.problem, node.fit, trials.factor, trials.fit)
     else:
@@ -63,7 +63,7 @@ def step_of(trials: Trials, added: str, node: Node) -> Step:
 
 
 def fitted_to_the_end(trials: Trials, node: Node) -> Node:
-    """The node's model fitted until nothing is left to gain: trials stop early."""
+    """The node with its model fitted to convergence, because trials stop early."""
     if not node.fit.terms:
         return node
     full = trials.refit(node.fit.terms, node.fit.state)
@@ -71,7 +71,7 @@ def fitted_to_the_end(trials: Trials, node: Node) -> Node:
 
 
 def without_needless(trials: Trials, node: Node, held: Collection[str]) -> Node:
-    """The node without effects whose absence costs no evidence; those ``held`` stay."""
+    """The node without effects that are not worth their evidence; those in ``held`` stay."""
     own = [name for name in node.fit.terms.names if name not in held]
     if len(own) < 2:
         return node
@@ -90,10 +90,10 @@ def without_needless(trials: Trials, node: Node, held: Collection[str]) -> Node:
 def in_order(
     trials: Trials, root: Node, last: Node, seen: Mapping[Names, Node]
 ) -> tuple[Step, ...]:
-    """Steps from the start to the last model, at each the effect that pays most.
+    """Steps from the start to the last model, each adding the effect that gains most.
 
-    Each is to predict runs left out better than the one before. One that only pays together with
-    the next (alone it extrapolates wildly, say) waits for that.
+    Each step has to predict held-out runs better than the one before. An effect that only does so
+    together with the next one (because alone it extrapolates wildly, say) waits for that.
     """
     steps, waiting = [step_of(trials, "", root)], list[Step]()
     terms = root.fit.terms
@@ -119,7 +119,7 @@ def in_order(
 def _options(
     trials: Trials, terms: Terms, todo: Sequence[str], last: Node, seen: Mapping[Names, Node]
 ) -> list[tuple[str, Node]]:
-    """The model with each of the effects that are still to come, the best first."""
+    """The present model with each of the effects that are still to come, the best fit first."""
     out = []
     for name in todo:
         names = frozenset((*terms.names, name))
@@ -139,7 +139,7 @@ def _options(
 
 
 def _blamed(first: Step, names: Collection[str]) -> Step:
-    """The first step, with the reason why effects that were found all the same are not listed."""
+    """The first step, with the reason why some effects that were found are not listed after all."""
     reason = Reason(Why.NOT_PREDICTIVE)
     candidates = tuple(
         c.refused(reason) if c.name in names and c.why_not is None else c for c in first.candidates

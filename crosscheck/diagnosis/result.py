@@ -1,4 +1,4 @@
-"""What a diagnosis says: the verdict, the effects that are missing, and its JSON."""
+"""The result of a diagnosis: the verdict, the effects that are missing, and its JSON."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ from seecr.result import Record, Result
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MissingEffect(Result):
-    """An effect that the data warrant.
+    """An effect that the data justify adding to the model.
 
     Attributes:
         term: the effect with its values.
-        stderr: (p,) of the values in their units; inf where unseen.
-        at_bound: (p,) bool.
-        rivals: effects these data cannot tell from it.
-        check: how to see it without the robot's poses, with what to expect.
-        rms: errors with it and those before it added, by kind.
-        held_out_rms: the same on runs left out.
-        share: part of the unexplained chi2 (of runs left out) that it took away.
-        probability: that it, or an effect that cannot be told from it, is missing.
+        stderr: (p,) standard errors in the units of the values; inf if unidentifiable.
+        at_bound: (p,) bool, values that are on a bound.
+        rivals: effects that these data cannot tell from it.
+        check: how to check it without the robot's poses, with what to expect.
+        rms: errors by kind, with it and those listed before it in the model.
+        held_out_rms: the same on held-out runs.
+        share: part of the unexplained chi2 (on held-out runs) that it removed.
+        probability: posterior probability that it, or an equivalent, is missing.
     """
 
     term: Term
@@ -53,7 +53,7 @@ class MissingEffect(Result):
 
     @property
     def effect(self) -> str:
-        """Its name."""
+        """Name of the effect."""
         return self.term.name
 
     @property
@@ -63,12 +63,12 @@ class MissingEffect(Result):
 
     @property
     def layout(self) -> Layout:
-        """Its parameters."""
+        """The parameters of the effect."""
         return self.term.layout
 
     @property
     def values(self) -> Array:
-        """(p,) in their units."""
+        """(p,) values in their units."""
         return self.term.vector
 
     def lines(self) -> list[str]:
@@ -89,7 +89,7 @@ class MissingEffect(Result):
         return [{**record, "cannot_be_told_from": rivals} for record in values]
 
     def as_json(self) -> dict[str, Any]:
-        """An item of ``missing``: SI, null where there is no number."""
+        """An item of ``missing``: SI, null where a number does not exist."""
         rows = zip(self.layout.names, self.values, self.stderr, self.at_bound, strict=True)
         return {
             "effect": self.effect,
@@ -111,9 +111,9 @@ class NotListed:
     """An effect of the catalogue that is not listed.
 
     Attributes:
-        effect: its name. title: in words.
-        score: gain in log evidence by itself; 0 where it was not fitted.
-        why_not: the reason.
+        effect: its name. title: the effect in words.
+        score: gain in ln evidence by itself; 0 if it was not fitted.
+        why_not: the reason why it is not listed.
     """
 
     effect: str
@@ -128,23 +128,23 @@ class NotListed:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Diagnosis(Result):
-    """The whole answer.
+    """The complete result of a diagnosis.
 
     Attributes:
-        verdict: what it comes to. sentence: the same for a person.
-        missing: effects, in the order of adding.
+        verdict: the verdict. sentence: the same in words.
+        missing: effects that are missing, in the order of adding.
         before, after, held_out: rms errors by kind (``position_rms_m``, ...).
         floor: rms errors that noise alone would give.
-        candidates: effects that are not listed, the nearest miss first.
-        measure_next: what to measure, in words.
+        candidates: effects that are not listed, the most probable or the best first.
+        measure_next: what to measure next, in words.
         notes: what was assumed, left out or estimated.
-        search: the way, with every model on it; None without a verdict.
-        whiteness: of what is left.
-        where: what the unexplained part goes with, the strongest first.
-        refusal: why there is no verdict; None where there is one.
-        left: what is left beyond noise, and whether it matters; None without a verdict.
-        chances: of every effect; None without a verdict.
-        sight: what the data can show, and what not, whatever the verdict; None without one.
+        search: the steps with every model; None without a verdict.
+        whiteness: test of the residuals.
+        where: what the unexplained part is associated with, the strongest first.
+        refusal: why there is no verdict; None if there is one.
+        left: the remainder beyond noise, and whether it matters; None without a verdict.
+        chances: posterior probabilities of all effects; None without a verdict.
+        sight: what the data can show and what not, whatever the verdict; None without one.
     """
 
     verdict: DiagnosisVerdict
@@ -167,12 +167,12 @@ class Diagnosis(Result):
 
     @property
     def converged(self) -> bool:
-        """Whether nothing failed for want of solutions; for want of data is another matter."""
+        """False if rows could not be solved; True even if the data were insufficient."""
         return self.refusal is None or not self.refusal.unsolved
 
     @property
     def within_catalogue(self) -> bool:
-        """Whether probabilities are the catalogue's alone: nothing unknown was weighed in them."""
+        """Whether probabilities assume the catalogue though something unknown is there."""
         imitated = self.chances is not None and self.chances.imitated is not None
         return self.verdict is DiagnosisVerdict.UNKNOWN_EFFECT and not imitated
 
@@ -182,7 +182,7 @@ class Diagnosis(Result):
         return Terms(found.term for found in self.missing)
 
     def lines(self) -> list[str]:
-        """The verdict, the error on its way down, and what to measure next."""
+        """The verdict, how the error falls, and what to measure next."""
         out = [] if self.sight is None else self.sight.lines()
         out.append(f"{self.verdict.value}: {self.sentence}")
         if self.refusal is None:
@@ -203,7 +203,7 @@ class Diagnosis(Result):
         ]
 
     def as_json(self) -> dict[str, Any]:
-        """The content of ``diagnosis.json``: numbers in SI, null where there is none."""
+        """The content of ``diagnosis.json``: numbers in SI, null where one does not exist."""
         document: dict[str, Any] = plain(
             {
                 "verdict": self.verdict.value,

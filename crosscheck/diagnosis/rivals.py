@@ -1,4 +1,4 @@
-"""What these data cannot tell apart, from the subspaces that effects span, and from refits."""
+"""Effects that these data cannot tell apart, from the subspaces that they span and from refits."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from crosscheck.fit.imitation import basis, beside, imitated
 from seecr.effects import catalogue
 from seecr.effects.base import Layout
 
-# An effect that can imitate less than this part of another's signal is not refitted for it.
+# An effect is only refitted in place of another if it can imitate this part of its signal.
 _LIKELY = 0.9
-# A rival that leaves this much more chi2 has been told apart, whatever its evidence.
+# A rival that leaves this much more chi2 can be told apart, whatever its evidence.
 _TOLD_APART = 9.0
-# What the further parameter of one that contains another must explain to say something.
+# Least evidence that the further parameters of an effect that contains another must gain.
 _FURTHER = 1.0
-# A trial that came to its end this many times as far off is not fitted further.
+# A converged trial is not fitted further if it is so many times as far off as a rival may be.
 _MENDED = 4.0
 
 
@@ -31,7 +31,7 @@ class Rival:
     """An effect that explains the data as well as the one listed.
 
     Attributes:
-        name: of the rival. fit: the model with it instead. loss: evidence lost with it.
+        name: name of the rival. fit: the model with it instead. loss: ln evidence lost with it.
     """
 
     name: str
@@ -40,17 +40,17 @@ class Rival:
 
     @property
     def layout(self) -> Layout:
-        """Its parameters."""
+        """The parameters of the rival."""
         return self.fit.terms[self.name].layout
 
 
 def rivals_of(found: Search, name: str, apart: float = _TOLD_APART) -> list[Rival]:
-    """Effects that could stand in for ``name`` in the final model, the best first.
+    """Effects that could replace ``name`` in the final model, the best first.
 
     Args:
-        found: the search. name: of the effect.
-        apart: chi2 from which on a rival is too far off whatever its evidence; infinite where the
-            effect is not sure, so that evidence alone decides.
+        found: the search. name: name of the effect.
+        apart: difference of chi2 from which on a rival can be told apart, whatever its evidence;
+            infinite if the effect is not sure, so that evidence alone decides.
     """
     final = found.last
     rest = final.fit.terms.without(name)
@@ -62,8 +62,8 @@ def rivals_of(found: Search, name: str, apart: float = _TOLD_APART) -> list[Riva
     every = {rival.name: rival for rival in tried if rival is not None}
     out = {rival.name for rival in every.values() if _explains_as_well(found, rival, own, apart)}
     for rival in sorted(out):
-        # one that contains another (friction on a cable behind the exit point, with no friction)
-        # does all that the other does: it stays where its further parameters may be there too
+        # an effect that contains another (friction on a cable behind the exit point, with zero
+        # friction) does all that the other does; it stays if its further parameters may be there
         loss, alone = every[rival].loss, loss_of_its_part(rival, name, every)
         if alone < loss + _FURTHER:
             out |= {catalogue()[rival].parent} - {name}
@@ -73,7 +73,7 @@ def rivals_of(found: Search, name: str, apart: float = _TOLD_APART) -> list[Riva
 
 
 def loss_of_its_part(rival: str, name: str, every: Mapping[str, Rival]) -> float:
-    """Evidence lost with the effect that a rival of ``name`` contains; infinite if not tried."""
+    """ln evidence lost with the effect that a rival of ``name`` contains; inf if not tried."""
     inner = catalogue()[rival].parent
     if inner == name:
         return 0.0
@@ -81,17 +81,17 @@ def loss_of_its_part(rival: str, name: str, every: Mapping[str, Rival]) -> float
 
 
 def _explains_as_well(found: Search, rival: Rival, own: int, apart: float) -> bool:
-    """Whether it does what the effect of ``own`` parameters does."""
+    """Whether a rival explains as much as the effect, which has ``own`` parameters."""
     worse = (rival.fit.chi2 - found.last.fit.chi2) / found.last.whiteness.inflation**2
     alike = rival.loss > -EQUAL and are_equals(rival.loss, own, len(rival.layout))
     return alike and worse < apart
 
 
 def _in_its_place(found: Search, candidate: Candidate, without: Fit, apart: float) -> Rival | None:
-    """The candidate in place of the effect; None where it leaves far more."""
+    """The candidate fitted in place of the effect; None if it leaves far more."""
     trials, final = found.trials, found.last
-    # where structure is left over, differences count against that, not against the noise, and
-    # residuals that go together count for fewer
+    # if structure remains, differences count relative to it and not to the noise, and correlated
+    # residuals count for fewer
     left = final.whiteness.inflation**2
     trial, far = candidate, hopeless(without.chi2, final.fit.chi2)
     if trial.fit is None or len(found.found) > 1:
@@ -110,13 +110,13 @@ def _in_its_place(found: Search, candidate: Candidate, without: Fit, apart: floa
 
 
 def _likely(found: Search, name: str, without: Fit) -> list[Candidate]:
-    """Candidates that fitted nearly as well as the effect, or can imitate what it does."""
+    """Candidates that fitted nearly as well as the effect, or can imitate its signal."""
     final = found.last
     own = final.fit.terms.own(name)
     signal = final.fit.jacobian[:, own] @ final.fit.terms.sizes[own]
     signal = beside(signal, final.fit.spanned(~own))
     pool, best = _tried_beside(found, name)
-    # structure that was left over then counts as noise
+    # structure that remained then counts as noise
     left = max(best / max(final.whiteness.dof, 1), final.whiteness.inflation**2)
     margin = _MENDED * _TOLD_APART * max(1.0, left)
 
@@ -125,7 +125,7 @@ def _likely(found: Search, name: str, without: Fit) -> list[Candidate]:
             return True
         if len(found.found) < 2:
             return False
-        # fitted beside another model, its own fit does not say all
+        # it was fitted beside another model, so that its chi2 does not tell everything
         columns = beside(fitted.jacobian[:, fitted.terms.own(other)], without.span)
         return imitated(signal, basis(columns)) > _LIKELY
 
@@ -137,7 +137,7 @@ def _likely(found: Search, name: str, without: Fit) -> list[Candidate]:
 
 
 def _tried_beside(found: Search, name: str) -> tuple[Sequence[Candidate], float]:
-    """Candidates of the step that chose the effect, beside all that came before; its chi2."""
+    """Candidates that were tried when the effect was chosen, and the effect's chi2 there."""
     for step in reversed(found.steps):
         for c in step.candidates:
             if c.name == name:

@@ -1,13 +1,14 @@
-"""The search for missing effects: by evidence, a few models abreast, judged on runs left out.
+"""The search for missing effects, by evidence, with a few models in parallel.
 
-One effect is added at a time, to a few models abreast: where two effects are missing, the single
-effect that explains most is often a large group that blurs both, and the way to the truth leads
-through a smaller one that explains less. Every candidate is fitted for itself. The search ends
-with a model that leaves noise, or where the next effect takes away little of what is left; then
-it looks back, drops what is needless, and puts the rest in the order in which adding them pays.
+Effects are added one at a time to a few models in parallel. If two effects are missing, the single
+effect that explains most is often a large group that blurs both, and the way to the right pair
+leads through a smaller effect that explains less. Every candidate is fitted in full. The search
+ends with a model that leaves noise, after ``MOST_EFFECTS``, or when the next effect removes little
+of the remainder. Then effects that became unnecessary are dropped, and the others are sorted by how
+much they gain.
 
-All of it is functions of frozen nodes: a node that was explored is a new node, and the models met
-on the way are a mapping from the names of their effects.
+The code consists of functions of immutable nodes: exploring a node gives a new node, and the models
+that were met are a mapping from the names of their effects.
 """
 
 from __future__ import annotations
@@ -37,12 +38,13 @@ from seecr.effects import catalogue
 from seecr.pose import Array
 
 MOST_EFFECTS = 4
-# Models abreast after the first round, and at least so many though none is small.
+# Models that go on in parallel after the first round, and least number of them.
 _ABREAST, _LARGE = 4, 2
-# The best few models are fitted again, so often, from values so many plausible sizes away.
+# How many of the best models are fitted again, how often, and how far from their values, in
+# plausible sizes.
 _AGAIN, _TIMES, _AWAY = 2, 4, 0.2
 _AGAIN_ITERATIONS = 12
-# Parameters of the second smallest group that a model is looked for in.
+# Largest number of parameters of a medium model, of which one goes on.
 _MEDIUM = 8
 
 Seen = Mapping[Names, Node]
@@ -50,12 +52,12 @@ Seen = Mapping[Names, Node]
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """The way of the search.
+    """The steps of a search.
 
     Attributes:
-        trials: the problem, its noise and how effects were tried, used throughout.
+        trials: the problem, its noise, and how effects were tried.
         steps: from the model as it stood to the last one.
-        fits: of every candidate that was fitted.
+        fits: fits of all candidates.
     """
 
     trials: Trials
@@ -69,12 +71,12 @@ class Search:
 
     @property
     def factor(self) -> Array:
-        """Noise factors used throughout."""
+        """Noise factors of all fits."""
         return self.trials.factor
 
     @property
     def base(self) -> tuple[str, ...]:
-        """Names of the effects that the model had."""
+        """Names of the effects that the model had before."""
         return self.steps[0].fit.terms.names
 
     @property
@@ -84,22 +86,22 @@ class Search:
 
     @property
     def last(self) -> Step:
-        """The model the search ended with."""
+        """The step that the search ended with."""
         return self.steps[-1]
 
     @property
     def found(self) -> tuple[str, ...]:
-        """Effects added, in the order of adding."""
+        """Effects that were added, in their order."""
         return tuple(step.added for step in self.steps[1:])
 
 
 def search(trials: Trials, base: Fit, progress: Progress = lambda _text, _part: None) -> Search:
-    """Add effects to the base model until what is left is noise or nothing helps.
+    """Add effects to the base model until the residuals are noise or nothing helps.
 
     Args:
         trials: the problem, its noise, and how effects are tried.
         base: the model as it stands.
-        progress: called with what is being done and the part of it that is done.
+        progress: called with what is being done and the fraction that is done.
     """
     root = node_of(trials, base)
     best, seen = _climbed(trials, root, progress)
@@ -111,7 +113,7 @@ def search(trials: Trials, base: Fit, progress: Progress = lambda _text, _part: 
 
 
 def _climbed(trials: Trials, root: Node, progress: Progress) -> tuple[Node, Seen]:
-    """The best model, and all that were met, by their effects."""
+    """The best model, and all models that were met, by their effects."""
     best, abreast = root, [root]
     seen: Seen = {root.names: root}
     for depth in range(MOST_EFFECTS):
@@ -130,7 +132,7 @@ def _climbed(trials: Trials, root: Node, progress: Progress) -> tuple[Node, Seen
 
 
 def _next_best(better: Sequence[Node], best: Node) -> Node | None:
-    """The model to go on to; None where what is left has another cause than the next best guess."""
+    """The model to go on from; None if the best one removes too little to be the cause."""
     noise = [c for c in better if c.whiteness.is_noise]
     if not better:
         return None
@@ -141,12 +143,12 @@ def _next_best(better: Sequence[Node], best: Node) -> Node | None:
 def _grown(
     trials: Trials, abreast: Sequence[Node], seen: Seen, depth: int, progress: Progress
 ) -> tuple[list[Node], Seen]:
-    """Models with one effect more that nobody has seen yet, and all seen with them."""
+    """New models with one more effect, and all models met so far, these included."""
     children = []
     for k, node in enumerate(abreast):
 
         def tell(text: str, part: float, before: int = k) -> None:
-            # how many rounds there are nobody knows: each takes half of what is left
+            # the number of rounds is not known: each takes half of what is left of the bar
             share = 1.0 - 0.5**depth * (1.0 - 0.5 * (before + part) / len(abreast))
             progress(f"round {depth + 1}: {text}", share)
 
@@ -161,7 +163,7 @@ def _grown(
 
 
 def _from_nearby(trials: Trials, nodes: Sequence[Node], progress: Progress) -> list[Node]:
-    """The best few fitted again from values nearby: slack cables make local minima."""
+    """Refit the best few models from nearby values, because slack cables make local minima."""
     ranked = sorted(nodes, key=lambda c: -c.evidence.log)
     rng = np.random.default_rng(0)
     again = []
@@ -180,10 +182,10 @@ def _from_nearby(trials: Trials, nodes: Sequence[Node], progress: Progress) -> l
 
 
 def _standing(node: Node) -> tuple[float, int]:
-    """Evidence; of models alike in it (friction that is null, say) the smaller one counts.
+    """Sort key of models: evidence, minus 0.1 for each parameter so that the smaller wins a tie.
 
-    Of exact equals (exit and anchor points of a platform that cannot turn) that which comes
-    first in the catalogue, and not the one that rounding prefers.
+    Of models that are exactly equivalent (exit and anchor points of a platform that cannot turn),
+    the one that comes first in the catalogue wins, and not the one that rounding prefers.
     """
     place = {name: i for i, name in enumerate(catalogue())}
     log = node.evidence.log - 0.1 * len(node.fit.at_bound)
@@ -191,7 +193,7 @@ def _standing(node: Node) -> tuple[float, int]:
 
 
 def _diverse(nodes: Sequence[Node], root: Node) -> list[Node]:
-    """A few models to go on from: the best, and the best of the small ones that explain much."""
+    """A few models to go on from: the best one, and the best small ones that explain much."""
     ranked = sorted(nodes, key=lambda c: -c.evidence.log)
     enough = (1.0 - LEAST_PART) * root.excess
     out = ranked[:1]

@@ -1,4 +1,4 @@
-"""A search by steps that ended with noise: what was found on the way is what is missing."""
+"""The diagnosis of a search that ended with noise: the effects that it added are missing."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 def settled(
     found: Search, notes: Sequence[str], told: Callable[[str], None] = lambda _text: None
 ) -> Diagnosis:
-    """The diagnosis of a search whose last model leaves noise; ``told`` what is going on."""
+    """The diagnosis of a search whose last model leaves noise; ``told`` is called on the way."""
     rivals = _all_rivals(found, told)
     chances = _chances(found, rivals)
     other = exchanged(found, chances)
@@ -74,9 +74,9 @@ def _all_rivals(found: Search, told: Callable[[str], None]) -> dict[str, list[Ri
 def _by_evidence(
     found: Search, rivals: Mapping[str, list[Rival]], chances: Chances
 ) -> dict[str, list[Rival]]:
-    """Rivals, of effects that are not sure all that evidence alone does not tell apart.
+    """Rivals, where effects that are not sure get all rivals that evidence alone does not exclude.
 
-    What they leave more of chi2 may be what a further parameter explains by chance.
+    If a rival leaves more chi2, a further parameter of the effect may explain that by chance.
     """
     out = dict(rivals)
     for name in found.found:
@@ -87,7 +87,7 @@ def _by_evidence(
 
 
 def _sure_part(found: Search, chances: Chances) -> Search:
-    """The way without its last effects that are not sure, where noise is left without them too."""
+    """The search without its last effects that are not sure, if it leaves noise without them."""
     way = found
     while way.found and chances.of(way.found[-1]) < SURE and way.steps[-2].whiteness.is_noise:
         way = replace(way, steps=way.steps[:-1])
@@ -95,7 +95,7 @@ def _sure_part(found: Search, chances: Chances) -> Search:
 
 
 def _with_hints(rows: Sequence[NotListed], hints: Mapping[str, float]) -> list[NotListed]:
-    """What the search found and is not sure of says so."""
+    """Rows in which effects that the search found, and that are not sure, say so."""
     return [
         replace(row, why_not=Reason(Why.NOT_SURE, p=hints[row.effect]))
         if row.effect in hints

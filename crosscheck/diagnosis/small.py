@@ -1,7 +1,7 @@
-"""What can be said where structure is left over: small effects that each explain much.
+"""Lists small effects that each explain much, for data in which structure remains.
 
-Large groups of parameters imitate anything. An effect of a few parameters, of a size that
-happens, that takes away most of what runs left out leave unexplained is there all the same.
+Large groups of parameters imitate anything. An effect with few parameters and a plausible size that
+removes most of what is unexplained on held-out runs is there all the same.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ from crosscheck.fit.smooth import beyond_smooth
 def small_effects_alone(
     found: Search, parameters: int, shares: tuple[float, float]
 ) -> Search | None:
-    """The way by small effects alone, each of which explains much by itself; None without one.
+    """A search among small effects only, each of which explains much; None if there is none.
 
-    For data that keep some structure whatever is added: large groups imitate anything, but an
-    effect of a few parameters that takes away nearly all is there; and so may be the next one,
-    if it takes away a good part of what the first leaves. What a smooth field over the
-    workspace explains as well is not listed: a lens looks much like a scale.
+    This is for data that keep some structure whatever is added. Large groups imitate anything, but
+    an effect with few parameters that removes nearly all of it is there, and so may be the next one
+    if it removes a good part of the rest. Effects are not listed if a smooth field over the
+    workspace explains as much: a lens looks much like a scale.
 
     Args:
         found: a search that did not end with noise.
-        parameters: most that an effect may have.
-        shares: least part of what runs left out leave unexplained that the first effect and
-            each after it must take away.
+        parameters: most parameters that an effect may have.
+        shares: least part of the unexplained chi2 on held-out runs that the first effect, and each
+            later one, must remove.
     """
     way = replace(found, steps=found.steps[:1])
     while len(way.found) < MOST_EFFECTS:
@@ -52,7 +52,7 @@ def small_effects_alone(
 
 
 def _small_step(way: Search, parameters: int, share: float) -> Step | None:
-    """The small effect with the most evidence, if it explains such a share of what is left."""
+    """The small effect with the most evidence, if it explains such a share of the remainder."""
     best = _best_small(way.last.candidates, parameters)
     if best is None or best.fit is None:
         return None
@@ -77,7 +77,7 @@ def _best_small(candidates: Sequence[Candidate], parameters: int) -> Candidate |
 
 
 def _contradicted(candidate: Candidate, others: Sequence[Candidate]) -> bool:
-    """Whether an effect that contains this one explains more: not all drums are off alike, say."""
+    """Whether an effect that contains this one explains more (drums that differ, not all alike)."""
     own = candidate.evidence
     wider = [c.evidence for c in others if c.layout.effect.parent == candidate.name]
     return own is not None and any(e is not None and e.log > own.log + LEAST_GAIN for e in wider)
@@ -98,7 +98,7 @@ def _small_candidates(way: Search, parameters: int) -> list[Candidate]:
 
 
 def share_of(before: Step, step: Step) -> float:
-    """Part of the unexplained chi2 of runs left out that a step took away."""
+    """Part of the unexplained chi2 on held-out runs that a step removed."""
     unexplained = float(before.held_out.chi2.sum() - before.held_out.readings.sum())
     fall = float(before.held_out.chi2.sum() - step.held_out.chi2.sum())
     return float(np.clip(fall / unexplained, 0.0, 1.0)) if unexplained > 0 else 0.0

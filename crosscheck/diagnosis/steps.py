@@ -15,21 +15,22 @@ from crosscheck.fit.problem import KINDS, Kind, Problem, rms_by_kind
 from crosscheck.fit.state import State
 from seecr.pose import Array
 
-# The longest arrow over the widest side of the region, and the percentile that is as long.
+# The longest arrow, as a part of the widest side of the region, and the percentile of errors that
+# is drawn with this length.
 _ARROW, _LARGEST = 0.13, 98.0
-# A side that is shorter than this part of the longest is flat.
+# A side is flat if it is shorter than this part of the longest one.
 _FLAT = 0.02
 
 OTHER = 0.25
-"""Noise of another size than assumed by more than this part is told."""
+"""A size of the noise that differs from the assumed one by more than this part is reported."""
 
 
 class Drawn(Protocol):
-    """A model that can be drawn: it has a name and a state."""
+    """A model that can be drawn: it has a label and a state."""
 
     @property
     def label(self) -> str:
-        """What it is, in words."""
+        """The model in words."""
 
     @property
     def state(self) -> State:
@@ -38,7 +39,7 @@ class Drawn(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Standing:
-    """One model by itself: ``label`` says which, ``state`` is it on the data."""
+    """A single model: ``label`` names it, ``state`` has its predictions for the data."""
 
     label: str
     state: State
@@ -50,9 +51,9 @@ class Stage:
 
     Attributes:
         label: what was added, in words.
-        added: the effect added last, "" for the model as it stood.
+        added: the effect that was added last, "" for the model as it stood.
         listed: whether the diagnosis lists it.
-        step: of the search.
+        step: the step of the search.
     """
 
     label: str
@@ -67,7 +68,7 @@ class Stage:
 
 
 def stages_of(found: Diagnosis) -> list[Stage]:
-    """From the model as it stood to the last one; none where there was no search."""
+    """All models from the one that stood to the last one; none if there was no search."""
     if found.search is None:
         return []
     listed = {effect.effect for effect in found.missing}
@@ -93,7 +94,7 @@ def shown_stages(found: Diagnosis) -> tuple[Stage, Stage]:
 
 
 def by_block(problem: Problem, stage: Stage, kind: Kind) -> Array:
-    """The rms error of each run (or block of time) left out, in SI; NaN where nothing was read."""
+    """The rms error of each held-out run (or block of time), in SI; NaN where nothing was read."""
     out = []
     for rows in blocks_of(problem):
         value = rms_by_kind(problem.only(rows), stage.step.held_out.raw)[kind.key]
@@ -102,9 +103,10 @@ def by_block(problem: Problem, stage: Stage, kind: Kind) -> Array:
 
 
 def magnification(problem: Problem, state: State) -> float:
-    """How many times too long arrows of the position error are drawn; 0 where there are none.
+    """Factor by which arrows of the position error are enlarged; 0 if there are none.
 
-    A round number with which all but the largest are within a part of the measured region.
+    It is a round number with which all but the largest arrows are shorter than a given part of the
+    measured region.
     """
     place = state.prediction.pose[:, :3]
     size = KINDS[0].sizes(problem, state.raw)
@@ -119,19 +121,19 @@ def magnification(problem: Problem, state: State) -> float:
 
 
 def drawn(magnify: float) -> str:
-    """How long arrows are drawn, in words."""
+    """The scale of the arrows, in words."""
     if magnify == 1.0:
         return "to scale"
     return f"{magnify:g} times {'too long' if magnify > 1.0 else 'as long as they are'}"
 
 
 def floor_of(found: Diagnosis, kind: Kind) -> float:
-    """The rms error that noise alone would give, in SI; that of the commanded lengths with it."""
+    """The rms error that noise alone would give, in SI, including that of the commanded lengths."""
     return found.floor.get(kind.key) or 0.0
 
 
 def noise_is_other(found: Diagnosis) -> bool:
-    """Whether noise was found to be of another size than was assumed."""
+    """Whether the estimated size of the noise differs clearly from the assumed one."""
     if found.search is None:
         return False
     assumed = noise_floor(found.search.problem, found.search.last.fit.state)
@@ -140,10 +142,10 @@ def noise_is_other(found: Diagnosis) -> bool:
 
 
 def views_of(place: Array) -> list[tuple[int, int]]:
-    """Pairs of axes to look along: from above and from the side, or the plane of a flat robot.
+    """Pairs of axes to show: from above and from the side, or the plane of a flat robot.
 
     Args:
-        place: (n, 3) [m] of what is to be seen.
+        place: (n, 3) [m] positions that are to be seen.
     """
     span = np.ptp(place, axis=0)
     wide = span > _FLAT * max(float(span.max()), 1e-12)

@@ -1,4 +1,4 @@
-"""The search by steps over measurements as they are: stale values, outliers."""
+"""The stepwise search on real measurements, with outdated values of the model and outliers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from crosscheck.fit.prepare import Progress, outlying_rows
 from crosscheck.fit.problem import Problem
 from seecr.pose import Array
 
-# The model's values are refitted before the search where that takes away so much chi2.
+# The model's values are refitted before the search if that lowers chi2 by this much.
 _STALE_VALUES = 30.0
 
 Notes = tuple[str, ...]
@@ -22,7 +22,7 @@ Notes = tuple[str, ...]
 def by_steps(
     problem: Problem, base: Fit, factor: Array, progress: Progress
 ) -> tuple[Search, Notes]:
-    """Effects added one at a time, and what was done to the data on the way."""
+    """The stepwise search, and notes about what was done to model and data before it."""
     base, refitted = _at_its_best(problem, base, factor)
     found = search(Trials(problem, factor), base, progress)
     found, outliers = _without_outliers(found, base, progress)
@@ -30,7 +30,7 @@ def by_steps(
 
 
 def _at_its_best(problem: Problem, base: Fit, factor: Array) -> tuple[Fit, Notes]:
-    """The model to start from: its values come from other fits, and may settle on these data."""
+    """The model to start from, refitted if its values, which are of other data, fit badly here."""
     if not base.terms:
         return base, ()
     refitted = null_fit(problem, base.terms, factor, refit=True)
@@ -44,7 +44,7 @@ def _with_derivatives(problem: Problem, base: Fit) -> Fit:
 
 
 def _without_outliers(found: Search, base: Fit, progress: Progress) -> tuple[Search, Notes]:
-    """Search again without rows that stick out alone, if there are a few; name them."""
+    """Repeat the search without isolated outliers, if there are a few, and name them."""
     problem, state = found.problem, found.last.fit.state
     rows = outlying_rows(problem, state)
     if not rows.any():
@@ -53,7 +53,7 @@ def _without_outliers(found: Search, base: Fit, progress: Progress) -> tuple[Sea
     cleaned = problem.without(rows, note)
     kept = ~rows[problem.row_of]
     if whiteness(cleaned, state.white[kept], found.last.evidence.parameters).structured:
-        # nor are the others noise: rows that stick out are part of what is not explained
+        # the other rows are not noise either, so that outliers are part of the unexplained
         return found, ()
     again = null_fit(cleaned, base.terms, found.factor, refit=False)
     if base.terms:

@@ -1,7 +1,7 @@
-"""Where structure is left that no effect explains: what the data warrant all the same.
+"""The diagnosis of data in which structure remains that no effect explains.
 
-The effects are added one at a time; listed is what is small, of a size that happens, takes away
-most of what was unexplained, and does more than any smooth field over the workspace.
+Of the effects that were added one at a time, those are listed that are small, have a plausible
+size, remove most of what was unexplained, and do more than any smooth field over the workspace.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from crosscheck.fit.problem import rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.fit.smooth import beyond_smooth
 
-# A small effect is listed only if it took away most of what was unexplained; by itself, two
-# thirds of all and then a third of the rest.
+# Least part of the unexplained chi2 that a small effect must have removed to be listed; among small
+# effects only, the part for the first one and that of the rest for each later one.
 _LEAST_SHARE, _LEAST_ALONE = 0.5, (2.0 / 3.0, 1.0 / 3.0)
-# What the unexplained part goes with is said of so many quantities.
+# Most quantities that the unexplained part is said to be associated with.
 _MOST_WHERE = 5
 
 
 def unexplained(found: Search, chances: Chances, notes: Sequence[str]) -> Diagnosis:
-    """The verdict of a search that leaves structure."""
+    """The diagnosis of a search that leaves structure."""
     missing, shown = _warranted(found, chances)
     found = shown if missing else found
     return diagnosis_of(
@@ -53,8 +53,8 @@ def unexplained(found: Search, chances: Chances, notes: Sequence[str]) -> Diagno
 
 
 def _warranted(found: Search, chances: Chances) -> tuple[list[MissingEffect], Search]:
-    """What the data warrant where structure is left over, and the way that far."""
-    # what was found beside an effect that is not warranted is not warranted either
+    """The effects that may be listed though structure remains, and the search up to these."""
+    # an effect that was found beside one that may not be listed may not be listed either
     first = list(takewhile(lambda name: _is_warranted(found, name), found.found))
     if first:
         way: Search | None = replace(found, steps=found.steps[: 1 + len(first)])
@@ -73,7 +73,7 @@ def _is_warranted(found: Search, name: str) -> bool:
     stopped = bool(np.any(best.at_bound[part]))
     if not few or stopped or share_of(before, step) <= _LEAST_SHARE:
         return False
-    # no share of what the field leaves: that may all be what nobody knows
+    # with a share of 0: all that the field leaves may be something unknown
     return beyond_smooth(found.problem, before.fit.state, step.fit.state, 0.0)
 
 
@@ -85,6 +85,6 @@ def _sentence(missing: Sequence[MissingEffect], tried: int) -> str:
 
 
 def where_of(found: Search) -> tuple[Association, ...]:
-    """What that which is left by the last model goes with."""
+    """What the residuals of the last model are associated with."""
     last = found.last.fit.state
     return tuple(associations(found.problem, last.white, last.prediction)[:_MOST_WHERE])

@@ -1,4 +1,4 @@
-"""Which effects are missing: by steps, and where those do not end with noise by sets of effects."""
+"""The command ``diagnose``: steps first and, if these do not end with noise, sets of effects."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from seecr.effects import catalogue
 from seecr.errors import InputError
 from seecr.pose import Array
 
-# Data that would show no effect of so many plausible sizes show nothing.
+# Data that would not even show effects of so many plausible sizes show nothing.
 _BLIND = 10.0
 
 
@@ -51,16 +51,16 @@ def diagnose(
     """Find the effects that a model misses.
 
     Args:
-        robot: as described, or its MJCF.
+        robot: a robot, or its MJCF file.
         data: its measurements, or their file.
-        model: effects the model has already, or their file; the plain model without.
-        progress: called with what is being done and the part of it that is done.
-        only: names of the effects that may be missing, or one; all of the catalogue without.
+        model: effects that the model has already, or their file; by default the plain model.
+        progress: called with what is being done and the fraction that is done.
+        only: names of the effects that may be missing, or one; by default the whole catalogue.
         exclude: names of effects that are not considered.
-        tolerance: from where on what is left beyond noise counts as missing.
+        tolerance: from which size on a remainder beyond noise counts as missing.
 
     Raises:
-        SeecrError: a file that cannot be read, or is of another robot.
+        SeecrError: a file cannot be read, or is of another robot.
     """
     if not isinstance(tolerance, Tolerance):
         raise InputError(f"tolerance: expected a crosscheck.Tolerance, got {tolerance!r}")
@@ -101,7 +101,7 @@ def _diagnosed(ready: Prepared, said: Notes, progress: Progress) -> Diagnosis:
 
 
 def _nothing_to_try(problem: Problem) -> Refusal | None:
-    """That the data lack what each effect needs, where that is so."""
+    """A refusal if the data lack what each considered effect needs; None otherwise."""
     effects = candidates_for(problem)
     if any(one.why_not is None for one in effects):
         return None
@@ -111,9 +111,9 @@ def _nothing_to_try(problem: Problem) -> Refusal | None:
 
 
 def _is_blind(problem: Problem, base: Fit, sight: Sight) -> bool:
-    """Whether noise hides every effect of the catalogue, and all that there is to see.
+    """Whether noise would hide every effect of the catalogue, and the residuals are no larger.
 
-    Asked of the plain model alone: what a model has already hides others whatever the noise.
+    This is only asked of the plain model: effects that a model has hide others whatever the noise.
     """
     if base.terms or not problem.considered.issuperset(catalogue()):
         return False
@@ -125,7 +125,7 @@ def _is_blind(problem: Problem, base: Fit, sight: Sight) -> bool:
 def _searched(
     ready: Prepared, base: Fit, factor: Array, notes: Notes, progress: Progress
 ) -> Diagnosis:
-    """The verdict of data that are fit for one."""
+    """The diagnosis of data that are fit for one."""
     problem = ready.problem
     found, more = by_steps(problem, base, factor, _part(progress, 0.0, 0.5))
     if found.last.whiteness.is_noise and kinds_stated(problem) == kinds_read(problem):
@@ -133,9 +133,9 @@ def _searched(
         if is_clear(steps):
             large = [e.term for e in steps.missing if hardly_happens(e.term)]
             return replace(steps, notes=(*steps.notes, *size_notes(large)))
-    # no few effects one after the other, or one that is not sure, in a linear model about the
-    # last; noise that goes together, is larger than stated (a few rows far off may have made it
-    # so) or was estimated, from what may be an effect. All at once, in sets
+    # The steps do not end with stated noise, or leave something open: an effect is not sure, or the
+    # noise is autocorrelated, larger than stated (perhaps by a few outliers), or estimated from
+    # what may be an effect. So all effects are fitted at once, and sets of them compared.
     way = [step.fit.terms for step in found.steps[1:]]
     sought = seek(problem, problem.data.sigma, ready.terms, _part(progress, 0.5, 1.0), way)
     said = sought.judgement
@@ -145,9 +145,10 @@ def _searched(
 
 
 def is_clear(steps: Diagnosis) -> bool:
-    """Whether all that steps found is sure, is few, imitates nothing, and nothing else is sure.
+    """Whether the steps settle it: their effects are sure, few enough and imitate nothing unknown.
 
-    Several may hint at the same, of which none pays for itself.
+    Nor may another class be sure, or another effect be hinted at: several effects may hint at the
+    same although none of them is worth its parameters.
     """
     if too_large(len(one.layout) for one in steps.missing):
         return False
@@ -161,12 +162,12 @@ def is_clear(steps: Diagnosis) -> bool:
 
 
 def _part(progress: Progress, first: float, last: float) -> Progress:
-    """Progress of a part of the whole."""
+    """Progress of one part of the whole."""
     return lambda text, part: progress(text, first + (last - first) * min(part, 1.0))
 
 
 def no_verdict(problem: Problem, base: Fit, notes: Sequence[str], refusal: Refusal) -> Diagnosis:
-    """Nothing can be said, and why."""
+    """The diagnosis if nothing can be said, with the reason."""
     before = rms_by_kind(problem, base.state.raw)
     nothing = dict.fromkeys(before)
     return Diagnosis(

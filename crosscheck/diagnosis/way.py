@@ -1,4 +1,4 @@
-"""From compared sets to the way of a diagnosis: effects one by one, each model with its errors."""
+"""Turns compared sets into steps: effects one by one, each model with its errors."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ from crosscheck.fit.reasons import Reason, Why
 from seecr.effects import Term
 from seecr.pose import Array
 
-# A parameter that is not known better than this part of its prior width is not seen.
+# A parameter is not identifiable if its standard error exceeds this part of its prior width.
 _UNSEEN = 0.98
 
 
 def way_of(sought: Sought, names: Names) -> Search:
-    """The way to a set of effects, at each step the one that explains most.
+    """Steps to a set of effects, each adding the effect that explains most.
 
     Args:
-        sought: what was compared.
+        sought: the compared sets.
         names: the effects to add to the model as it stands.
     """
     found, setting = sought.found, sought.calibration.setting
@@ -60,7 +60,7 @@ def _score(found: Found, names: Names) -> float:
 
 
 def fit_of(setting: Setting, joint: JointFit) -> Fit:
-    """A joint fit as the fit that pages and recordings show; inf where the data see nothing."""
+    """A joint fit in the form that pages and recordings show; inf where unidentifiable."""
     known = covariance(setting, joint)
     error, scale = np.sqrt(np.diag(known)), joint.terms.scale
     unseen = error > _UNSEEN * joint.width * scale
@@ -83,7 +83,7 @@ def _step(setting: Setting, added: str, model: Refit) -> Step:
 
 
 def directions(setting: Setting, joint: JointFit) -> int:
-    """How many directions of the parameters the data see rather than the prior."""
+    """How many directions of the parameters are determined by the data rather than the prior."""
     linear = linearised(setting, joint)
     x = linear.x * linear.width
     power = np.linalg.eigvalsh(x.T @ x) if x.shape[1] else np.zeros(0)
@@ -91,7 +91,7 @@ def directions(setting: Setting, joint: JointFit) -> int:
 
 
 def _tried(sought: Sought) -> list[Candidate]:
-    """Every effect beside the model as it stands, by linear algebra; the fit where there is one."""
+    """Every effect tried beside the model as it stands: its fit if there is one, or linearly."""
     found, setting = sought.found, sought.calibration.setting
     out = []
     for c in candidates_for(setting.problem):
@@ -129,7 +129,7 @@ def _candidate(sought: Sought, c: Candidate) -> Candidate:
 
 
 def _needed(sought: Sought, name: str) -> Term:
-    """The values an effect would need by itself, in the linear model."""
+    """The values that an effect would need by itself, in the linear model."""
     term, group = sought.catalogue.start(name), sought.found.scores.gram.groups[name]
     solved = sought.found.scores.gram.solved({name: float(group.widths[-1])})
     own = np.flatnonzero(amplitudes(term))[: len(group.columns)]
@@ -139,7 +139,7 @@ def _needed(sought: Sought, name: str) -> Term:
 
 
 def _drop(gram: Gram, name: str) -> tuple[float, int]:
-    """Fall of chi2 with an effect alone in the linear model, and its directions."""
+    """Fall of chi2 with an effect alone in the linear model, and how many directions are seen."""
     own = gram.groups[name].columns
     power, axes = np.linalg.eigh(gram.normal[np.ix_(own, own)])
     seen = power > 1e-2

@@ -10,12 +10,12 @@ from crosscheck.fit.possible import largest_size
 from seecr.counted import counted
 from seecr.effects import Term
 
-# Effects of a class that are named.
+# How many effects of a class are named.
 _FIRST = 2
 
 
 def words_of(missing: Sequence[MissingEffect]) -> str:
-    """What adding each effect does."""
+    """What adding each effect does, in words."""
     return "; then ".join(_words_of(effect) for effect in missing)
 
 
@@ -30,11 +30,11 @@ def and_what_is_left(text: str, left: str, tried: int) -> str:
 
 
 def agreement(tried: int, hints: Mapping[str, float] | None = None) -> str:
-    """The sentence of a model that lacks nothing that is sure.
+    """The sentence about a model that lacks nothing for sure.
 
     Args:
-        tried: how many effects were.
-        hints: effects, or several of which it is one, that explain a little, with their
+        tried: how many effects were tried.
+        hints: probable effects, or classes in words, that explain a little, with their
             probabilities.
     """
     if not hints:
@@ -52,8 +52,8 @@ def hints_of(
 
     Args:
         chances: probabilities.
-        listed: effects that are.
-        found: effects that a search ended with: their classes are hints, however probable.
+        listed: effects that are listed.
+        found: effects that a search ended with: their classes are hints, however improbable.
     """
     listed, found = set(listed), set(found)
     return {
@@ -64,7 +64,7 @@ def hints_of(
 
 
 def size_notes(terms: Iterable[Term]) -> list[str]:
-    """Of effects that explain only with values that hardly any robot has."""
+    """Notes about effects that only explain the data with implausibly large values."""
     return [
         f"{term.name} would be {largest_size(term):.3g} times a plausible size, which hardly "
         "happens: check it by hand before anything else, it may stand for what is not tried here"
@@ -73,7 +73,7 @@ def size_notes(terms: Iterable[Term]) -> list[str]:
 
 
 def noise_left(hints: Mapping[str, float]) -> str:
-    """That what was added leaves noise, and what it may hide: ``hints`` as for `agreement`."""
+    """Says that what was added leaves noise, with ``hints`` as for `agreement`."""
     return f"what is left is noise{f', with a {_hint_of(hints)}' if hints else ''}"
 
 
@@ -87,12 +87,12 @@ def probable_words(hints: Mapping[str, float]) -> str:
 
 
 def either(sets: Sequence[Iterable[str]]) -> str:
-    """Sets of effects of which it is one: "a + b, or c"."""
+    """Sets of effects of which one is missing: "a + b, or c"."""
     return ", or ".join(" + ".join(sorted(names)) for names in sets)
 
 
 def one_of(members: Sequence[str]) -> str:
-    """Effects of which it is one, the likeliest first: "a or b", "a, b or one of 4 others"."""
+    """Effects of which one is missing, the likeliest first: "a or b", "a, b or one of 4 others"."""
     some, others = list(members[:_FIRST]), members[_FIRST:]
     if others:
         some.append(others[0] if len(others) == 1 else f"one of {len(others)} others")
@@ -100,7 +100,7 @@ def one_of(members: Sequence[str]) -> str:
 
 
 def none_of(tried: int) -> str:
-    """That no effect that was tried explains something, whose name follows."""
+    """Says that no effect that was tried explains something, which is to follow."""
     if tried == 1:
         return "the one effect tried does not explain"
     return f"none of {tried} effects tried explains"
@@ -116,14 +116,14 @@ def _words_of(effect: MissingEffect) -> str:
 
 
 def probability_words(probability: float) -> str:
-    """A probability for people, of what is probable or not."""
+    """A probability as people read it."""
     if probability > 0.99:
         return "> 99 %"
     return "< 1 %" if probability < 0.01 else f"{100.0 * probability:.0f} %"
 
 
 def probability_name(found: Diagnosis) -> str:
-    """What its probabilities are: of an effect, or of one if it is the catalogue's at all."""
+    """What probabilities are called: those within the catalogue say so."""
     return f"probability{' within the catalogue' if found.within_catalogue else ''}"
 
 
@@ -131,9 +131,9 @@ WITHIN = (
     "Within the catalogue: how probable an effect is if what is missing is one of the catalogue's. "
     "Here something remains that is none of them and may act like this one."
 )
-"""What is said of probabilities where structure remains."""
+"""What is said about probabilities if structure remains."""
 
 
 def percent(share: float) -> str:
-    """A share for people; what is not all is not called all."""
+    """A share as people read it; less than all is never rounded to all."""
     return f"{min(100.0 * share, 99.9):.3g} %"

@@ -1,1 +1,1 @@
-"""Effects fitted to measurements: residuals in units of noise, fits, and what they are worth."""
+"""Fits effects to measurements, with residuals in units of noise, and judges the fits."""

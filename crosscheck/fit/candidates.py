@@ -1,7 +1,7 @@
-"""Which effects could be missing, and how each fits beside a model.
+"""Tries each effect of the catalogue as a candidate for what the model misses.
 
-Ranking candidates by their derivative at null is confidently wrong where cables go slack, so
-every candidate is fitted for itself; the derivative only chooses its starts.
+Every candidate is fitted in full beside the model. A ranking by derivatives at the null values
+would be confidently wrong where cables go slack, so derivatives only choose the starting points.
 """
 
 from __future__ import annotations
@@ -27,27 +27,30 @@ from seecr.effects.base import Layout
 from seecr.errors import InputError
 from seecr.pose import Array
 
-# Most Gauss-Newton steps of a trial; what is chosen is fitted to the end.
+# Most Gauss-Newton steps of a trial; the candidate that is chosen is fitted to convergence later.
 _TRIAL_ITERATIONS = 12
-# A chi2 of this many readings is noise, or nearly.
+# A fit with chi2 below this many times the number of readings leaves hardly more than noise.
 _WHITE = 1.3
-# A direction that the data see: squared signal of a plausible size, in units of the noise.
+# The data see a direction if a plausible size of it has a squared signal above this many noise
+# variances.
 _SEEN = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """An effect that might be missing, and how the model with it fits.
+    """An effect that might be missing, and the fit of the model with it.
 
     Attributes:
-        layout: the effect for this robot.
-        fit: of the model with it added; None where it was not fitted.
-        evidence: of that fit.
-        drop: of chi2 against the model without it.
-        p: chance of that drop where the effect is absent.
-        why_not: the reason why it is no candidate or was not chosen; None where it may be.
-        starts: where to start fitting it.
-        alone: the effect with the values it would need by itself, where it was not fitted.
+        layout: the effect's parameters for this robot.
+        fit: the model with the effect added; None if it was not fitted.
+        evidence: the evidence of that fit.
+        drop: how far chi2 falls against the model without the effect; before the fit, how far it
+            should fall by the derivatives.
+        p: p-value of that drop; in the search by steps times the effective number of shapes, which
+            may exceed 1.
+        why_not: why the effect cannot be a candidate or was not chosen; None if it can be.
+        starts: starting points of the fit.
+        alone: the effect with the values that it would need by itself, if it was not fitted.
     """
 
     layout: Layout
@@ -65,18 +68,18 @@ class Candidate:
         return self.layout.name
 
     def refused(self, reason: Reason) -> Candidate:
-        """The same with the reason why it is not chosen."""
+        """The same candidate, with the reason why it is not chosen."""
         return replace(self, why_not=reason)
 
 
 def candidates_for(problem: Problem) -> list[Candidate]:
-    """All effects of the catalogue; those these data cannot show have a ``why_not``."""
+    """All effects of the catalogue; ``why_not`` is set for those that these data cannot show."""
     layouts = [layout_of(effect, problem.robot) for effect in catalogue().values()]
     return [Candidate(layout, why_not=_lacking(problem, layout)) for layout in layouts]
 
 
 def _lacking(problem: Problem, layout: Layout) -> Reason | None:
-    """What the data lack that the effect needs."""
+    """The first thing that the effect needs and the data lack; None if they lack nothing."""
     data, needs = problem.data, layout.effect.needs
     rows = int(problem.use.sum())
     if layout.name not in problem.considered:
@@ -97,13 +100,13 @@ def _lacking(problem: Problem, layout: Layout) -> Reason | None:
 
 @dataclass(frozen=True, eq=False)
 class Trials:
-    """How effects are tried on a problem.
+    """The data, and the functions by which effects are tried on them.
 
     Attributes:
-        problem: the data. factor: noise factors, :meth:`Problem.noise`.
-        fit, starts, candidates: the functions :func:`crosscheck.fit.gauss_newton.fit`,
-            :func:`crosscheck.fit.starts.starts_of` and :func:`candidates_for`, or others of
-            their kind: the search takes no other way to the robot.
+        problem: the data. factor: noise factors, see :meth:`Problem.noise`.
+        fit, starts, candidates: by default :func:`crosscheck.fit.gauss_newton.fit`,
+            :func:`crosscheck.fit.starts.starts_of` and :func:`candidates_for`. The search reaches
+            the robot only through these, so that other functions can take their place.
     """
 
     problem: Problem
@@ -113,26 +116,29 @@ class Trials:
     candidates: Callable[[Problem], list[Candidate]] = candidates_for
 
     def refit(self, terms: Terms, near: State | None, **options: Any) -> Fit:
-        """Fit terms from their values, from a state near them."""
+        """Fit terms, starting from their values; ``near`` is a solved state close to them."""
         return self.fit(self.problem, terms, self.factor, near, **options)
 
     def evidence(self, found: Fit) -> Evidence:
-        """Of a fit."""
+        """Evidence of a fit."""
         return evidence(found)
 
     def whiteness(self, found: Fit, parameters: int) -> Whiteness:
-        """Test of what a fit of so many directions leaves."""
+        """Test the residuals of a fit with this many parameters for being white noise."""
         return whiteness(self.problem, found.state.white, parameters)
 
 
 def try_candidate(trials: Trials, base: Fit, layout: Layout, hopeless: float = np.inf) -> Candidate:
-    """Fit the base model with one effect added, from its most promising starts."""
+    """Fit the base model with one effect added, from its most promising starting points."""
     out = screen(trials, base, layout)
     return out if out.why_not is not None else fit_candidate(trials, base, out, hopeless)
 
 
 def screen(trials: Trials, base: Fit, layout: Layout) -> Candidate:
-    """What the effect's derivative promises beside the base model; nothing is fitted."""
+    """The fall of chi2 that the derivatives of an effect promise beside the base model.
+
+    Nothing is fitted.
+    """
     starts = trials.starts(trials.problem, base, layout, trials.factor)
     out = Candidate(layout, starts=starts)
     if not starts.seen:
@@ -149,8 +155,8 @@ def fit_candidate(
     Args:
         trials: the problem and its noise.
         base: the model without the effect.
-        screened: from :func:`screen`.
-        hopeless: chi2 above which a trial is given up after a few steps.
+        screened: the result of :func:`screen`.
+        hopeless: a trial that is above this chi2 after a few steps is given up.
     """
     layout, starts = screened.layout, screened.starts
     assert starts is not None
@@ -169,7 +175,7 @@ def fit_candidate(
             best = found
             hopeless = min(hopeless, 2.0 * best.chi2)
             if best.chi2 < _WHITE * len(best.state.white):
-                break  # it leaves noise: no other start does better
+                break  # it leaves only noise: no other start can do better
     if best is None:
         why = Why.IMPOSSIBLE if impossible else Why.UNSOLVED
         return Candidate(layout, starts=starts, why_not=Reason(why))
@@ -177,7 +183,7 @@ def fit_candidate(
 
 
 def judged(trials: Trials, found: Fit, base: Fit, screened: Candidate) -> Candidate:
-    """A candidate with its fit: how much better than without it, and by what chance."""
+    """A candidate with its fit: the fall of chi2 against the base model, its p-value, evidence."""
     layout, starts = screened.layout, screened.starts
     assert starts is not None
     one_sided = bool(np.isfinite(layout.lower[0])) and layout.lower[0] == layout.null[0]
@@ -188,13 +194,13 @@ def judged(trials: Trials, found: Fit, base: Fit, screened: Candidate) -> Candid
 
 
 def seen_directions(found: Fit, own: NDArray[np.bool_]) -> int:
-    """How many directions of some parameters (p,) the data see beside the others."""
+    """How many directions of some parameters (p,) the data see beside the other parameters."""
     columns = beside(found.jacobian[:, own], found.spanned(~own))
     return max(1, int(np.sum(np.linalg.eigvalsh(columns.T @ columns) > _SEEN)))
 
 
 def null_fit(problem: Problem, terms: Terms, factor: Array, refit: bool) -> Fit:
-    """The model as it stands, as a fit: refitted, or at its stated values."""
+    """The model as it stands, in the form of a fit: refitted, or at its stated values."""
     if refit and terms:
         return fit(problem, terms, factor)
     state = evaluate(problem, terms, factor)

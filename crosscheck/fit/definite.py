@@ -1,7 +1,8 @@
-"""Normal matrices of effects that move the readings by millions of their noise: still definite.
+"""Linear algebra for normal matrices that rounding has made indefinite.
 
-X^T X + W^-2 is positive definite, but where columns are large and alike rounding makes it anything.
-Brought to a unit diagonal, it is made definite by the least ridge that does.
+Some effects move the readings by millions of their noise. X^T X + W^-2 is positive definite, but if
+such columns are nearly parallel, rounding errors exceed its smallest eigenvalues. The matrix is
+scaled to a unit diagonal, and the smallest ridge that makes it positive definite is added.
 """
 
 from __future__ import annotations
@@ -11,19 +12,19 @@ from scipy import linalg
 
 from seecr.pose import Array
 
-# Tried one after the other on the diagonal, which is one.
+# Ridges to try, one after the other, on a diagonal of ones.
 _RIDGES = (0.0, 1e-14, 1e-11, 1e-8)
-# Up to squares of this size, beside prior precisions about one, rounding does no harm.
+# Rounding does no harm while squares stay below this size, beside prior precisions of about one.
 _USUAL = 1e9
-# What rounding leaves of a sum of squares, and some.
+# Relative rounding error of a sum of squares, with a margin.
 _ROUNDING = 1e-13
 
 
 def root_of(matrix: Array) -> Array:
-    """Lower triangular L with L L^T = matrix, positive definite (k, k) but for rounding.
+    """Lower Cholesky factor of a matrix (k, k) that is positive definite but for rounding.
 
     Raises:
-        LinAlgError: it is not, or has numbers that are none.
+        LinAlgError: the matrix is not positive definite with any ridge, or is not finite.
     """
     if not np.all(np.isfinite(matrix)):
         raise np.linalg.LinAlgError("not a matrix of numbers")
@@ -38,17 +39,20 @@ def root_of(matrix: Array) -> Array:
 
 
 def root_beside_one(columns: Array) -> Array:
-    """Lower triangular L (p, p) with L L^T = 1 + X^T X, of columns X (N, p): exact to rounding."""
+    """Lower triangular L (p, p) with L L^T = 1 + X^T X, for columns X (N, p), exact to rounding."""
     normal, one = columns.T @ columns, np.eye(columns.shape[1])
     if np.max(np.diag(normal), initial=0.0) * _ROUNDING < 1.0:
         return np.asarray(linalg.cholesky(normal + one, lower=True, check_finite=False))
-    # rounding of the squares would swallow the one
+    # the rounding errors of the squares would exceed the one
     (upper,) = linalg.qr(np.concatenate([columns, one]), mode="r", check_finite=False)
     return np.asarray(upper[: len(one)].T)
 
 
 def inverse_of(matrix: Array) -> Array:
-    """The inverse of such a matrix (k, k), itself definite: no variance is negative."""
+    """The inverse of such a matrix (k, k); if its entries are large, by its Cholesky factor.
+
+    The inverse is then definite itself, and no variance is negative.
+    """
     if np.max(np.diag(matrix), initial=0.0) < _USUAL:
         return np.asarray(np.linalg.inv(matrix), float)
     half = linalg.solve_triangular(
@@ -58,7 +62,7 @@ def inverse_of(matrix: Array) -> Array:
 
 
 def roots_of(matrices: Array) -> Array:
-    """The roots of many such matrices (n, k, k)."""
+    """The Cholesky factors of many such matrices (n, k, k)."""
     try:
         return np.asarray(np.linalg.cholesky(matrices), float)
     except np.linalg.LinAlgError:
@@ -66,7 +70,7 @@ def roots_of(matrices: Array) -> Array:
 
 
 def solved(matrix: Array, right: Array) -> Array:
-    """The solution (k,) of such a matrix with a right side (k,)."""
+    """The solution x (k,) of matrix x = right, for such a matrix (k, k)."""
     if np.max(np.diag(matrix), initial=0.0) < _USUAL:
         return np.asarray(np.linalg.solve(matrix, right), float)
     root = root_of(matrix)

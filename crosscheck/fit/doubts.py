@@ -1,4 +1,4 @@
-"""Readings that a model explains so badly that they may be another robot's."""
+"""Warns about readings that the model explains so badly that they may be of another robot."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from crosscheck.units import short
 from seecr.effects.base import Readings
 from seecr.pose import Array
 
-# A model so many times as far from the readings as the commands are, and as noise is, is worse than
-# none. Tensions that are off by such a factor are of something else.
+# A model is worse than none if it is so many times as far from the readings as the commands are,
+# and as the noise is. Tensions that are off by the last factor must have another cause.
 _WORSE, _NOISE, _OTHER_TENSION = 3.0, 10.0, 20.0
 _LEAST_ROWS = 4
 
 
 def doubts(problem: Problem, readings: Readings) -> list[str]:
-    """Sentences where this is hardly the robot that was measured.
+    """Sentences that say why the data are hardly of this robot; none if they may be.
 
     Args:
-        problem: the data with their noise. readings: what the model as it stands expects.
+        problem: the data with their noise. readings: what the model as it stands predicts.
     """
     raw = problem.residuals(readings)
     data = problem.data

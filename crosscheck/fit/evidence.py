@@ -1,16 +1,18 @@
-"""How well a model explains the data for what it costs: Laplace evidence with plausible sizes.
+"""Laplace approximation of the evidence, the marginal likelihood of a fitted model.
 
-A group of 24 parameters always fits better than one of 1. The evidence charges each parameter
-for how much of its plausible range the data rule out: at a model's own optimum, with whitened
-derivatives X by plausible sizes z ~ N(0, lambda^2),
+A group of 24 parameters always fits better than a single one. The evidence charges each parameter
+for the part of its prior range that the data rule out. The model is linearised about its optimum,
+with whitened derivatives X by the plausible sizes z, residuals r there, and the prior
+z ~ N(0, lambda^2):
 
     ln Z(lambda) = -1/2 |y|^2 + 1/2 b^T A^-1 b - 1/2 ln det A,  y = r + X z,
     A = 1 + L X^T X L,  b = L X^T y,  L = diag(lambda)
 
-averaged over lambda, which each effect has for itself, so that a plausible size that is off by far
-does not decide. A parameter the data do not see costs nothing and gains nothing. One that cannot be
-negative and is nothing is charged for what it might have been, by the integral over half a
-Gaussian: friction that these data would show and do not is less likely than none.
+less half the log determinant of the noise. Z is averaged over the prior widths lambda, separately
+for each effect, so that a badly wrong plausible size does not decide. A parameter that moves no
+reading has no influence. A parameter that cannot be negative and is stopped at zero is charged for
+what it might have been, by the integral over half a Gaussian: if these data would show friction and
+do not, then friction is less probable than none.
 """
 
 from __future__ import annotations
@@ -28,16 +30,16 @@ from crosscheck.fit.known import known_readings
 from seecr.effects import Terms
 from seecr.pose import Array
 
-# Family-wise chance of a false alarm, over all candidates of a step.
+# Family-wise false-alarm rate, over all candidates of a step.
 FALSE_ALARM = 0.01
 
 WIDTHS = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
-"""Standard deviations that sizes may have, in plausible ones.
+"""Prior standard deviations of the parameters, in plausible sizes.
 
-What a good tracker sees of some effects is a hundredth of what they may well be: a robot built that
-well is charged for the range of its like, not for that of any robot.
+A good tracker resolves some effects to a hundredth of their plausible size. An effect of a robot
+that was built that well is charged for a prior range of that width, not for that of any robot.
 """
-# Rounds of finding the width of each effect beside those of the others.
+# Rounds in which the best width of each effect is searched, given those of the others.
 _ROUNDS = 2
 
 
@@ -48,7 +50,7 @@ class Evidence:
     Attributes:
         log: ln Z.
         chi2: sum of squared whitened residuals.
-        parameters: how many directions the data see.
+        parameters: how many directions of the parameters the data see.
     """
 
     log: float
@@ -62,7 +64,7 @@ def evidence(fit: Fit) -> Evidence:
     p = fit.jacobian.shape[1]
     if p == 0:
         return Evidence(-0.5 * (float(white @ white) + fit.state.log_det), fit.chi2, 0)
-    # a parameter stopped by its bound is not at the optimum the formula is about
+    # a parameter stopped by its bound is not at the optimum that the approximation assumes
     free, absent = ~fit.at_bound, held_at_nothing(fit.terms)
     columns, readings = known_readings(fit.terms)
     x = np.concatenate([fit.jacobian, columns])
@@ -79,18 +81,19 @@ def evidence(fit: Fit) -> Evidence:
 
 
 def held_at_nothing(terms: Terms) -> NDArray[np.bool_]:
-    """(p,) amplitudes that cannot be negative, would be, and so are nothing."""
+    """(p,) amplitudes that cannot be negative and are stopped at zero by that bound."""
     there = (terms.vector <= terms.lower) & (terms.lower == terms.null)
     shapes = np.concatenate([np.zeros(0, dtype=bool), *(t.layout.shape for t in terms)])
     return np.asarray(there & ~shapes & ~terms.knowledge.fixed)
 
 
 def half_gaussian(power: Array, along: Array, width: Array) -> Array:
-    """ln gain of a parameter that cannot be negative, for prior standard deviations ``width``.
+    """ln evidence gained by a parameter that cannot be negative, with half a Gaussian as prior.
 
     Args:
-        power: what others leave of its normal matrix. along: of its gradient.
-        width: of z; its prior is half a Gaussian.
+        power: its diagonal element of the normal matrix, after the other parameters are eliminated.
+        along: the same of the gradient X^T y.
+        width: prior standard deviations in plausible sizes.
     """
     square = width**2
     grown = 1.0 + square * power
@@ -101,17 +104,17 @@ def half_gaussian(power: Array, along: Array, width: Array) -> Array:
 def _averaged(
     normal: Array, gradient: Array, groups: Sequence[NDArray[np.bool_]], absent: NDArray[np.bool_]
 ) -> float:
-    """ln evidence over that of no effects, each effect's own width averaged over.
+    """ln of the evidence over that of no effects, averaged over the prior width of each effect.
 
-    Several effects: the others keep the widths that serve best, found one effect at a time from
-    the best width that all share.
+    With several effects, one is averaged at a time while the others keep their best widths. These
+    are searched one effect at a time, from the best width that all share.
     """
 
     def gains(widths: Array) -> Array:
         return _gains(normal, gradient, widths, absent)
 
     def gains_with(own: NDArray[np.bool_]) -> Array:
-        """(k,) with one effect at each of its widths."""
+        """(k,) ln evidence with one effect at each of its widths, the others at their best."""
         return gains(np.where(own, np.array(WIDTHS)[:, None], best))
 
     shared = np.tile(np.array(WIDTHS)[:, None], (1, len(gradient)))
@@ -128,9 +131,10 @@ def _averaged(
 
 
 def _gains(normal: Array, gradient: Array, widths: Array, absent: NDArray[np.bool_]) -> Array:
-    """(k,) ln evidence over that of no effects, for prior standard deviations (k, p).
+    """(k,) ln of the evidence over that of no effects, for prior standard deviations (k, p).
 
-    What is ``absent`` (p,) could have been there, and is charged beside the others, each by itself.
+    Parameters that are ``absent`` (p,) are stopped at zero; each is charged beside the others by
+    itself, see :func:`half_gaussian`.
     """
     free = np.flatnonzero(~absent)
     wide = widths[:, free]
@@ -148,9 +152,9 @@ def _gains(normal: Array, gradient: Array, widths: Array, absent: NDArray[np.boo
 
 
 def p_value(drop: float, parameters: int, one_sided: bool) -> float:
-    """Chance of a fall of chi2 by ``drop`` where the effect is absent.
+    """p-value of a fall of chi2 by ``drop``: its probability if the effect is absent.
 
-    A single parameter that cannot be negative halves it (Self & Liang 1987).
+    It is half as large for a single parameter that cannot be negative (Self & Liang 1987).
     """
     if drop <= 0.0:
         return 1.0

@@ -1,4 +1,4 @@
-"""Whether measurements can carry a verdict or a calibration at all; if not, why."""
+"""Decides whether measurements allow a verdict or a calibration at all, and says why if not."""
 
 from __future__ import annotations
 
@@ -10,27 +10,28 @@ from crosscheck.fit.reasons import Refusal, Unfit
 from crosscheck.measurements.data import Sigma
 from seecr.pose import Array
 
-# More rows than this part without an answer, and the data are not fit for a verdict.
+# Data are unfit if more than this part of their rows has no equilibrium.
 _LOST = 0.05
-# Fewer readings, or fewer poses, than this say nothing.
+# Data with fewer readings or fewer poses say nothing.
 _LEAST_READINGS, LEAST_POSES = 6, 6
-# Commands that differ by less are the same [m, or components of a quaternion].
+# Commands that differ by no more than this are the same [m, or components of a quaternion].
 _SAME = 1e-9
-# Two readings without motion between them contradict each other beyond this many of their noise;
-# two of the same command, whatever was between, beyond this part of how far the commands spread.
+# Two readings without motion in between contradict each other if they differ by more than _NOISE
+# times the noise. Two readings of the same command do if they differ by more than _TRAVEL times the
+# spread of the poses.
 _NOISE, _TRAVEL = 10.0, 0.2
-# Readings contradict each other where this part of the pairs does, and of all rows: one row in
-# ten may be far off.
+# The data are contradictory if more than a third of the pairs contradict each other, and more such
+# pairs than a tenth of the rows: one row in ten may be an outlier.
 _PAIRS, _ROWS = 1.0 / 3.0, 0.1
 
 
 def refusal_of(problem: Problem, predicted: Array, stated: Sigma) -> Refusal | None:
-    """Why nothing can be said of measurements; None where something can.
+    """Why these measurements allow no statement; None if they do.
 
     Args:
         problem: the data, without rows that have no equilibrium.
-        predicted: (n, 3) [m] where the model as it stands has the platform.
-        stated: the noise that the user stated; what was estimated is missing in it.
+        predicted: (n, 3) [m] positions of the platform by the model as it stands.
+        stated: the noise that the user stated, without estimates.
     """
     n, readings = int(problem.data.read.sum()), problem.n_readings
     lost = n - int(problem.use.sum())
@@ -55,7 +56,7 @@ def refusal_of(problem: Problem, predicted: Array, stated: Sigma) -> Refusal | N
 
 
 def commands_table(problem: Problem) -> Array:
-    """(n, k) what was commanded in each row, the load that it carried with it."""
+    """(n, k) the command of each row, with the kind of load that the robot carried, if any."""
     commands = problem.experiment.commands
     table = np.asarray(commands.pose if commands.lengths is None else commands.lengths, float)
     if commands.loads is None:
@@ -64,15 +65,15 @@ def commands_table(problem: Problem) -> Array:
 
 
 def _resting(problem: Problem, commands: Array, used: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """(k - 1,) whether nothing moved from each used row to the next."""
+    """(k - 1,) whether the robot rested between a used row and the next one."""
     run = problem.data.run_index[used]
     same = np.all(np.abs(np.diff(commands[used], axis=0)) <= _SAME, axis=1)
-    # what was passed in between moved the robot
+    # a way point in between would have moved the robot
     return np.asarray(same & (run[1:] == run[:-1]) & (np.diff(used) == 1))
 
 
 def _frozen(problem: Problem, used: NDArray[np.intp]) -> bool:
-    """Whether every channel read the same in all rows."""
+    """Whether every channel was read in all rows and never changed."""
     data = problem.data
     turned = data.angles_rad if data.quat_wxyz is None else data.quat_wxyz
     table = np.concatenate([data.position, turned, data.tensions], axis=1)[used]
@@ -84,7 +85,7 @@ def _frozen(problem: Problem, used: NDArray[np.intp]) -> bool:
 def _contradicting(
     problem: Problem, commands: Array, predicted: Array, stated: Sigma
 ) -> tuple[int, int] | None:
-    """Two rows that contradict each other most, where many do; None elsewhere."""
+    """The two rows that contradict each other most, if many rows do; None otherwise."""
     used = np.flatnonzero(problem.use & np.isfinite(problem.data.position).all(axis=1))
     if len(used) < 2:
         return None
@@ -93,7 +94,7 @@ def _contradicting(
     neighbours = np.stack([used[:-1][at_rest], used[1:][at_rest]], axis=1)
     limit = np.inf if stated.position_m is None else _NOISE * np.sqrt(6.0) * stated.position_m
     spread = float(np.linalg.norm(np.std(predicted[used], axis=0)))
-    # files or runs that have values of their own may well differ
+    # an effect with separate values for each file or run may make the same command differ
     kinds = commands
     if problem.groups is not None:
         kinds = np.concatenate([commands, problem.groups[:, None]], axis=1)
@@ -110,7 +111,7 @@ def _contradicting(
 
 
 def _of_same_command(commands: Array, used: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Pairs (k, 2) of rows with the same command, each row with the first of its kind."""
+    """Pairs (k, 2) of rows with the same command: each row with the first one of that command."""
     _rounded, first, kind = np.unique(
         np.round(commands[used] / (10.0 * _SAME)), axis=0, return_index=True, return_inverse=True
     )

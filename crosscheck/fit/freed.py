@@ -1,9 +1,9 @@
-"""Effects that are fitted before anything else: what the data alone can say of themselves.
+"""Fits the effects whose values belong to the data, before anything else is fitted.
 
-Frames that were aligned to the commands have taken in a part of every error. The values that say
-how they stand are therefore the data's own: fitted to them beside whatever else is, and of no use
-to other data. So are the values of a file or run that the model has not seen, of an effect that
-has its own for each.
+A tracker frame that was aligned to the commands has absorbed a part of every error. Its values
+therefore belong to these data: they are fitted together with everything else, and mean nothing for
+other data. The same holds for an effect with separate values for each file or run, if the model has
+not seen that file or run.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ __all__ = ["Freed", "freed"]
 
 @dataclass(frozen=True, eq=False)
 class Freed:
-    """A model with what its data leave free.
+    """A model after the parameters that its data leave free were fitted.
 
     Attributes:
-        terms: with the values that are best there. free: (p,) which were fitted.
-        notes: a sentence about each effect.
+        terms: the model with the fitted values. free: (p,) which parameters were fitted.
+        notes: a sentence for each effect that was fitted or that the TOML names.
     """
 
     terms: Terms
@@ -43,13 +43,11 @@ class Freed:
 
 
 def freed(problem: Problem, laid: LaidOut) -> Freed:
-    """The model with what its data leave free at the best values there.
-
-    All other values stay.
+    """Fit the parameters that the data leave free; all other values stay.
 
     Args:
         problem: the data; :attr:`Measurements.free` names the effects.
-        laid: effects of the model as it stands, and of which files or runs it knows nothing.
+        laid: the model as it stands, and the files or runs for which it has no values.
     """
     names, terms = problem.data.free, laid.terms
     if not (names or laid.fresh) or not problem.n_readings:
@@ -62,14 +60,14 @@ def freed(problem: Problem, laid: LaidOut) -> Freed:
     best = fit(problem, state.terms, factor, state, free=free)
     found = best.terms
     moved = free & ~found.knowledge.fixed
-    # where the model misses something, values are no surer than it is right
+    # if the model leaves more than noise, standard errors grow accordingly
     error = best.stderr * max(1.0, np.sqrt(best.state.chi2 / problem.n_readings))
     told = [_told(found, name, moved, error, problem, name in names) for name in found.names]
     return Freed(found, moved, tuple(filter(None, told)))
 
 
 def _new(problem: Problem, name: str) -> Term:
-    """An effect that the model has not; each of several files has its own."""
+    """An effect that the model lacks, at its null values; separate for each of several files."""
     layout, data = layout_of(effect_named(name), problem.robot), problem.data
     if data.files:
         files = data.free_in.get(name, range(len(data.files)))
@@ -80,7 +78,7 @@ def _new(problem: Problem, name: str) -> Term:
 def _free(
     terms: Terms, names: Sequence[str], fresh: Sequence[tuple[str, str]]
 ) -> NDArray[np.bool_]:
-    """(p,) the parameters that are free: of some effects all, of others of some files or runs."""
+    """(p,) the free parameters: all those of named effects, others only for new files or runs."""
     free = np.array([effect in names for effect, _key in terms.labels], dtype=bool)
     for effect, part in fresh:
         layout = terms[effect].layout
@@ -91,9 +89,9 @@ def _free(
 
 
 def _registered(problem: Problem, terms: Terms, factor: Array, free: NDArray[np.bool_]) -> State:
-    """The model as it stands, or with the tracker's frame turned and shifted where that is nearer.
+    """The model as it stands, or with the tracker frame registered to it, whichever fits better.
 
-    Gauss-Newton would have a long way from another frame.
+    Gauss-Newton would need many steps from a frame that is far away.
     """
     stood = evaluate(problem, terms, factor)
     if TRACKER not in terms or not free[terms.part(TRACKER)].any():
@@ -112,7 +110,7 @@ def _registered(problem: Problem, terms: Terms, factor: Array, free: NDArray[np.
 def _told(
     terms: Terms, name: str, moved: NDArray[np.bool_], error: Array, problem: Problem, by_toml: bool
 ) -> str:
-    """What an effect was found to be; "" where it was not fitted."""
+    """A sentence with the values that an effect was fitted to; "" if it was not fitted."""
     term, mine = terms[name], moved[terms.part(name)]
     if not (mine.any() or by_toml):
         return ""

@@ -1,9 +1,9 @@
-"""Fit effects to measurements: damped Gauss-Newton in plausible sizes, with honest errors.
+"""Damped Gauss-Newton fit of effects to measurements.
 
-Unknowns are counted in plausible sizes from null, z = (value - null)/scale. A weak prior of ten
-plausible sizes keeps directions that the data do not see at null instead of at random. A trial
-with a row that cannot be solved is no trial; a fit that ends on one is invalid, never a number.
-Fixed values stay as they are; values measured independently are readings like the others.
+Unknowns are in plausible sizes from null, z = (value - null)/scale. A weak prior with a standard
+deviation of ten plausible sizes keeps unidentifiable directions near null. A trial step is rejected
+if a row cannot be solved there; a fit whose start cannot be solved is invalid and gives no number.
+Fixed values stay as they are; values measured independently count as further readings.
 """
 
 from __future__ import annotations
@@ -23,22 +23,22 @@ from crosscheck.fit.state import State, evaluate
 from seecr.effects import Terms
 from seecr.pose import Array
 
-# The weak prior: this many plausible sizes are one standard deviation.
+# Standard deviation of the weak prior, in plausible sizes.
 PRIOR_SIZES = 10.0
-# A direction seen no better than this many plausible sizes is not seen.
+# A direction with a larger standard error than this, in plausible sizes, is not identifiable.
 UNSEEN_SIZES = 100.0
 _ITERATIONS = 40
 _GAIN = 1e-3
-# Trials of a step, each damped ten times more; the longest step, in plausible sizes.
+# Most trials of a step, each damped ten times more than the last; longest step, in plausible sizes.
 _DAMPINGS, _LONGEST = 12, 5.0
-# A trial is given up after a few steps, or fewer where it is that much further off.
+# A hopeless fit is given up after _FEW steps, or after _FEW_FAR if chi2 is _FAR times the limit.
 _FEW, _FEW_FAR, _FAR = 4, 2, 10.0
-# Derivatives are computed afresh after this many more steps at the latest.
+# Derivatives serve for at most this many further steps before they are computed again.
 _STALE = 2
 
 
 class FitStatus(Enum):
-    """How a fit ended; the values are what people read."""
+    """How a fit ended; the values of the enum are what people read."""
 
     SOLVED = "every row that counts was solved"
     UNSOLVED_AT_START = "rows could not be solved at the start of the fit"
@@ -47,19 +47,19 @@ class FitStatus(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Fitted terms and what the data say of their parameters.
+    """Fitted terms and the uncertainty of their parameters.
 
-    Of most fits of a search only the values are asked for: derivatives take longer than they do,
-    and wait until somebody asks.
+    Most fits of a search are only asked for their values. Derivatives at these values cost more
+    than the values themselves, so they are computed when they are first needed.
 
     Attributes:
         state: the model at its best values.
-        derive: gives ``jacobian``.
-        spread: gives ``covariance`` from it.
+        derive: computes ``jacobian``.
+        spread: computes ``covariance`` from the jacobian.
         at_bound: (p,) bool parameters that ended on a bound.
-        status: whether the rows were solved.
-        iterations: Gauss-Newton steps.
-        settled: the steps came to an end by themselves.
+        status: whether all rows were solved.
+        iterations: number of Gauss-Newton steps.
+        settled: whether the fit converged before it ran out of steps.
     """
 
     state: State
@@ -72,7 +72,7 @@ class Fit:
 
     @property
     def valid(self) -> bool:
-        """Whether every counted row was solved, so that the numbers are of a fit."""
+        """Whether every counted row was solved, so that the numbers are those of a fit."""
         return self.status is FitStatus.SOLVED
 
     @property
@@ -87,23 +87,24 @@ class Fit:
 
     @cached_property
     def jacobian(self) -> Array:
-        """(N, p) whitened derivatives by z; 0 for fixed values."""
+        """(N, p) whitened derivatives of the prediction by z; 0 for fixed values."""
         return self.derive()
 
     @cached_property
     def covariance(self) -> Array:
-        """(p, p) of the values in their units; inf on the diagonal where unseen."""
+        """(p, p) covariance of the values in their units; inf on the diagonal if unidentifiable."""
         return self.spread(self.jacobian)
 
     @cached_property
     def span(self) -> Array:
-        """Basis (N, k) of what the parameters can imitate, see :meth:`spanned`."""
+        """Basis (N, k) of all signals that the parameters can imitate, see :meth:`spanned`."""
         return self.spanned(np.ones(len(self.terms), dtype=bool))
 
     def spanned(self, which: NDArray[np.bool_]) -> Array:
-        """Basis (N, k) of what some parameters (p,) can imitate.
+        """Basis (N, k) of the signals that some parameters (p,) can imitate.
 
-        Orthonormal; shorter where values are known: those are not free to imitate anything.
+        The basis is orthonormal. If values were measured independently its vectors are shorter,
+        because such parameters are not free to imitate anything.
         """
         columns, _readings = known_readings(self.terms)
         whole = np.concatenate([self.jacobian, columns])[:, which]
@@ -111,12 +112,12 @@ class Fit:
 
     @property
     def stderr(self) -> Array:
-        """(p,) standard errors; inf where the data do not see a parameter."""
+        """(p,) standard errors; inf for a parameter that is not identifiable."""
         return np.sqrt(np.diag(self.covariance))
 
     @property
     def correlation(self) -> Array:
-        """(p, p) correlations; 0 beside parameters that are not seen."""
+        """(p, p) correlations of the values; 0 for parameters that are not identifiable."""
         error = np.where(np.isfinite(self.stderr) & (self.stderr > 0), self.stderr, np.inf)
         finite = np.where(np.isfinite(self.covariance), self.covariance, 0.0)
         out = finite / error[:, None] / error[None, :]
@@ -134,18 +135,18 @@ def fit(
     hopeless: float = np.inf,
     quick: bool = False,
 ) -> Fit:
-    """Fit the terms' parameters from their values.
+    """Fit the terms' parameters, starting from their values.
 
     Args:
         problem: readings and their noise.
-        terms: effects; their values are the start.
-        factor: noise factors, :meth:`Problem.noise`, kept through the fit.
-        start: a state near the start, to save solving.
-        free: (p,) which parameters may move; by default all that are not fixed.
+        terms: effects; their values are the starting point.
+        factor: noise factors, :meth:`Problem.noise`, constant during the fit.
+        start: a solved state near the starting point, to save time.
+        free: (p,) which parameters may move, apart from fixed ones; by default all.
         iterations: most Gauss-Newton steps.
-        quick: take rows' history as given when deriving; near enough to compare models, not for
-            values.
-        hopeless: stop after a few steps where chi2 is still above this.
+        hopeless: stop after a few steps if chi2 is still above this.
+        quick: treat the history of the rows as constant in derivatives. That is accurate enough to
+            compare models, but not for final values.
     """
     state = evaluate(problem, terms, factor, start)
     p = len(terms)
@@ -169,7 +170,7 @@ def fit(
 
 
 def _spread(jacobian: Array, found: Terms, moved: NDArray[np.bool_]) -> Array:
-    """Covariance (p, p) of the values by what was read and what is known; 0 where fixed."""
+    """Covariance (p, p) of the values, given readings and independent measurements; 0 if fixed."""
     whole = np.concatenate([jacobian, known_readings(found)[0]])
     covariance = _covariance(whole, found.scale, moved)
     covariance[found.knowledge.fixed] = 0.0
@@ -188,7 +189,7 @@ def _invalid(state: State, p: int, status: FitStatus) -> Fit:
 
 
 def _corrected(jacobian: Array, before: State, after: State) -> Array:
-    """Broyden's update: the derivatives made to agree with what the last step did."""
+    """Broyden's rank-one update: makes the derivatives agree with the change of the last step."""
     step = after.terms.sizes - before.terms.sizes
     change = before.white - after.white  # of the prediction
     length = float(step @ step)
@@ -207,8 +208,8 @@ class _End:
     """Where a descent ended.
 
     Attributes:
-        state: the best. jacobian: there, if it is known already.
-        count: steps it took. settled: whether there was nothing left to gain.
+        state: the best state. jacobian: its derivatives, if they are known already.
+        count: number of steps. settled: whether nothing was left to gain.
     """
 
     state: State
@@ -222,9 +223,9 @@ class _Step:
     """One step of a descent.
 
     Attributes:
-        state: where it led; None where no step improves.
-        damping: to begin the next one with.
-        gain: of the objective. promised: the gain that the derivatives foretold.
+        state: the new state; None if no step improves the objective.
+        damping: what the next step begins with.
+        gain: how far the objective fell. promised: how far it should fall by the derivatives.
     """
 
     state: State | None
@@ -235,7 +236,7 @@ class _Step:
 
 @dataclass(frozen=True, eq=False)
 class _Descent:
-    """Damped Gauss-Newton on a problem; ``free`` (p,) parameters move."""
+    """Damped Gauss-Newton on a problem, in which only the ``free`` (p,) parameters move."""
 
     problem: Problem
     factor: Array
@@ -243,11 +244,11 @@ class _Descent:
     quick: bool
 
     def jacobian(self, state: State) -> Array:
-        """(N, p) whitened derivatives by z."""
+        """(N, p) whitened derivatives of the prediction by z."""
         return free_derivatives(self.problem, state, frozen=self.quick)
 
     def run(self, state: State, iterations: int, hopeless: float) -> _End:
-        """Down to the best state."""
+        """Descend to the best state within so many steps; give up where chi2 is hopeless."""
         damping, count, stale = 1e-3, 0, 0
         jacobian = np.zeros((0, len(state.terms)))
         while count < iterations:
@@ -259,9 +260,9 @@ class _Descent:
             if after is None:
                 if stale == 0:
                     return _End(state, jacobian, count, True)
-                stale = 0  # not the derivatives' last word: they are of an earlier step
+                stale = 0  # the derivatives are of an earlier step: try again with new ones
                 continue
-            # derivatives cost much more than a trial: they serve again where steps go well
+            # derivatives cost much more than a trial: they are reused while steps go well
             if stale < _STALE and (
                 after.chi2 < 0.3 * state.chi2 or step.gain > 0.9 * step.promised
             ):
@@ -278,7 +279,7 @@ class _Descent:
         return _End(state, None, count, iterations == 0)
 
     def step(self, state: State, jacobian: Array, damping: float) -> _Step:
-        """The first step that improves, damped more and more."""
+        """The first step that improves the objective, with more and more damping."""
         terms, z = state.terms, state.terms.sizes
         known, off = known_readings(terms)[0], known_left(terms)
         gradient = z / PRIOR_SIZES**2 - jacobian.T @ state.white - known.T @ off
@@ -301,14 +302,14 @@ class _Descent:
         return _Step(None, damping)
 
     def _moving(self, terms: Terms, gradient: Array) -> NDArray[np.intp]:
-        """Parameters that are free and not pushed against a bound."""
+        """Indices of parameters that are free and not pushed against a bound."""
         low = (terms.vector <= terms.lower) & (gradient > 0)
         high = (terms.vector >= terms.upper) & (gradient < 0)
         return np.flatnonzero(self.free & ~low & ~high)
 
 
 def _damped_step(normal: Array, gradient: Array, move: NDArray[np.intp], damping: float) -> Array:
-    """(p,) step in plausible sizes; no parameter moves by more than a few at once."""
+    """(p,) step in plausible sizes, shortened so that no element exceeds ``_LONGEST``."""
     part = normal[np.ix_(move, move)]
     step = np.zeros(len(gradient))
     step[move] = -np.linalg.solve(part + np.diag(damping * np.diag(part)), gradient[move])
@@ -316,7 +317,7 @@ def _damped_step(normal: Array, gradient: Array, move: NDArray[np.intp], damping
 
 
 def _covariance(jacobian: Array, scale: Array, moved: NDArray[np.bool_]) -> Array:
-    """Covariance of the values; inf where the data see a parameter no better than not at all."""
+    """Covariance of the values; inf on the diagonal for parameters that are not identifiable."""
     p = jacobian.shape[1]
     out = np.zeros((p, p))
     index = np.flatnonzero(moved)
@@ -331,7 +332,7 @@ def _covariance(jacobian: Array, scale: Array, moved: NDArray[np.bool_]) -> Arra
         block[:, unseen] = 0.0
         block[unseen, unseen] = np.inf
         out[np.ix_(index, index)] = block * scale[index][:, None] * scale[index][None, :]
-    # a parameter on its bound has an error of its own scale at least: it was not measured
+    # a parameter that did not move or is on its bound gets the error that it would have by itself
     for k in np.flatnonzero(~moved):
         norm = float(np.linalg.norm(jacobian[:, k])) if len(jacobian) else 0.0
         out[k, k] = (scale[k] / norm) ** 2 if norm * UNSEEN_SIZES > 1.0 else np.inf

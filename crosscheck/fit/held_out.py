@@ -1,4 +1,4 @@
-"""Errors on runs that were not fitted to: the only ones that say whether a model is right."""
+"""Cross-validation: errors on held-out runs, which alone tell whether a model is right."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from crosscheck.fit.problem import Problem, rms_by_kind
 from seecr.counted import counted
 from seecr.pose import Array
 
-# Fewer runs than this are cut into blocks of time.
+# Data with fewer runs than this are cut into blocks of time instead.
 _LEAST_RUNS = 3
-# One run alone is cut into this many blocks of time.
+# Most blocks of time.
 _BLOCKS = 5
-# Standard errors by which blocks left out must be predicted better to be significant.
+# A fall of chi2 on held-out blocks is significant from this many standard errors on.
 _SIGNIFICANT = 2.0
-# Steps of Gauss-Newton without a block, from the fit to all of them.
+# Most Gauss-Newton steps of a refit without one block, starting from the fit to all blocks.
 _ITERATIONS = 6
 
 
@@ -29,12 +29,12 @@ class HeldOut:
     """Cross-validation of a model.
 
     Attributes:
-        raw: (n, 6 + m) residuals, each row by a model that was not fitted to its block.
-        chi2: (blocks,) of each block left out.
-        readings: (blocks,) their number of readings.
+        raw: (n, 6 + m) residuals, each row predicted by a model that was not fitted to its block.
+        chi2: (blocks,) chi2 of each held-out block.
+        readings: (blocks,) number of readings in each.
         values: (blocks, p) parameters fitted without each block.
-        rms: by kind, of the left-out rows.
-        valid: every fold could be fitted and predicted.
+        rms: errors of the held-out rows, by kind.
+        valid: whether every fold could be fitted and predicted.
     """
 
     raw: Array
@@ -46,10 +46,10 @@ class HeldOut:
 
 
 def blocks_of(problem: Problem) -> list[NDArray[np.bool_]]:
-    """Rows (n,) of each block to leave out: runs, or blocks of time where runs are too few.
+    """Rows (n,) of each block to hold out: runs, or blocks of time if there are too few runs.
 
-    Where effects have values of their own for each file or run, a part of each is left out: what
-    those are in one of which nothing was seen, nothing says.
+    If effects have separate values for each file or run, each block is a part of every one of
+    them: without any reading of a file or run, nothing would determine its values.
     """
     if problem.groups is not None:
         groups = [problem.groups == k for k in np.unique(problem.groups[problem.use])]
@@ -65,7 +65,7 @@ def blocks_of(problem: Problem) -> list[NDArray[np.bool_]]:
 
 
 def blocks_note(problem: Problem) -> str:
-    """That blocks of time are left out instead of runs, where it is so; "" elsewhere."""
+    """A note that the blocks held out are not whole runs; "" if they are."""
     if problem.groups is not None:
         return "cross-validation leaves out a part of each file or run, as they have own values"
     if _enough_runs(problem):
@@ -85,18 +85,18 @@ def _enough_runs(problem: Problem) -> bool:
 
 
 def _count(problem: Problem) -> int:
-    """Blocks of time."""
+    """Number of blocks of time."""
     return min(_BLOCKS, max(2, int(problem.use.sum()) // 2))
 
 
 def hold_out(problem: Problem, best: Fit, factor: Array, fit: Callable[..., Fit] = fit) -> HeldOut:
-    """Refit without each block, from the full fit, and predict the block.
+    """Refit the model without each block, starting from the full fit, and predict that block.
 
     Args:
         problem: the data.
         best: the model fitted to all of them.
         factor: noise factors.
-        fit: :func:`crosscheck.fit.gauss_newton.fit`, or another of its kind.
+        fit: :func:`crosscheck.fit.gauss_newton.fit`, or a function that can replace it.
     """
     blocks = blocks_of(problem)
     raw = np.full(problem.measured.shape, np.nan)
@@ -119,23 +119,24 @@ def hold_out(problem: Problem, best: Fit, factor: Array, fit: Callable[..., Fit]
 
 
 def improves(without: HeldOut, with_effect: HeldOut) -> tuple[float, float]:
-    """Mean fall of chi2 over the blocks left out, and its standard error."""
+    """Mean fall of chi2 over the held-out blocks, and its standard error."""
     delta = without.chi2 - with_effect.chi2
     error = float(np.std(delta, ddof=1) / np.sqrt(len(delta))) if len(delta) > 1 else np.inf
     return float(delta.mean()), error
 
 
 def pays(without: HeldOut, with_effect: HeldOut) -> bool:
-    """Whether blocks left out are predicted better with an effect."""
+    """Whether an effect lowers chi2 of held-out blocks, by half a standard error of the mean."""
     mean, error = improves(without, with_effect)
     return with_effect.valid and mean > 0.0 and mean >= 0.5 * error
 
 
 def significantly_improves(without: HeldOut, with_effect: HeldOut) -> bool:
-    """Whether blocks left out are predicted better by more than they scatter.
+    """Whether held-out blocks are predicted better by more than their scatter.
 
-    By two standard errors of the mean fall, or every one of at least five blocks: one block that
-    falls much more than the others makes the mean uncertain, not the sign.
+    This holds if the mean fall of chi2 exceeds two standard errors, or if chi2 falls in each of at
+    least five blocks. A block that falls much more than the others makes the size of the mean
+    uncertain, not its sign.
     """
     mean, error = improves(without, with_effect)
     delta = without.chi2 - with_effect.chi2
@@ -144,7 +145,7 @@ def significantly_improves(without: HeldOut, with_effect: HeldOut) -> bool:
 
 
 def unfitted(problem: Problem, base: Fit) -> HeldOut:
-    """The model as it stands: nothing is fitted to any row, so it predicts every row left out."""
+    """Errors of the model as it stands: it was fitted to no row, so all rows count as held out."""
     blocks = blocks_of(problem)
     table = np.zeros(problem.measured.shape)
     table[problem.row_of, problem.column_of] = base.state.white

@@ -1,8 +1,8 @@
-"""What is known of a model's values beside the data, as fits in plausible sizes take it.
+"""Values that were measured independently or are fixed, in the form that fits take them.
 
-A value z = (value - null)/scale that was measured independently with the standard error s is one
-more reading: y = z_measured/s with the column 1/s and noise of unit size. It adds
-((z_measured - z)/s)^2 to what a fit makes small. A fixed value has no column at all.
+A value z = (value - null)/scale that was measured with the standard error s counts as one more
+reading: y = z_measured/s, with the derivative 1/s and unit noise. It adds ((z_measured - z)/s)^2 to
+the objective. A fixed value has zero derivatives.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from seecr.pose import Array
 
 
 def known_readings(terms: Terms) -> tuple[Array, Array]:
-    """Values measured independently as readings of unit noise.
+    """Independently measured values as readings with unit noise.
 
     Returns:
-        columns (k, p) by z, and the readings (k,).
+        Their derivatives by z (k, p), and the readings (k,).
     """
     known = terms.knowledge
     own = np.flatnonzero(known.measured)
@@ -29,13 +29,13 @@ def known_readings(terms: Terms) -> tuple[Array, Array]:
 
 
 def known_left(terms: Terms) -> Array:
-    """(k,) how far off the values are from those measured independently, in standard errors."""
+    """(k,) measured minus current values of those measured independently, in standard errors."""
     columns, readings = known_readings(terms)
     return np.asarray(readings - columns @ terms.sizes)
 
 
 def free_derivatives(problem: Problem, state: State, frozen: bool = False) -> Array:
-    """(N, p) whitened derivatives of the prediction by z; 0 for values that are fixed."""
+    """(N, p) whitened derivatives of the prediction by z; 0 for fixed values."""
     terms = state.terms
     if not len(terms):
         return np.zeros((len(state.white), 0))

@@ -1,4 +1,4 @@
-"""Is what is left noise? Goodness of fit, and structure along the way."""
+"""Tests whether residuals are white noise: their size, and the correlation of neighbours."""
 
 from __future__ import annotations
 
@@ -11,32 +11,32 @@ from scipy import spatial, special, stats
 from crosscheck.fit.problem import Problem
 from seecr.pose import Array, rotvec_from_quat
 
-# Residuals are structured where neighbours agree by more than this many standard errors.
+# Residuals are structured if neighbours are correlated by more than this many standard errors.
 STRUCTURED = 4.0
-# A goodness of fit below this is not noise of the stated size.
+# Residuals with a smaller p-value of chi2 are not noise of the stated size.
 POOR_FIT = 1e-3
-# Fewer pairs than this say nothing of how rows go together.
+# Fewer pairs than this say nothing about a correlation.
 _LEAST_PAIRS = 8
-# Robot's lengths by which commands under different loads are taken to be apart.
+# Distance, in lengths of the robot, that is put between commands under different loads.
 _APART = 1e3
-# From so many standard errors on chances add up, and P is too close to one for doubles.
+# Beyond so many standard errors 1 - P is lost in doubles, and tail probabilities simply add up.
 _TAIL = 5.0
-# Residuals are not taken to go together more than this.
+# Largest correlation of residuals that standard errors are scaled for.
 _MOST_ALIKE = 0.98
 
 
 @dataclass(frozen=True)
 class Whiteness:
-    """Tests of whitened residuals against noise.
+    """Tests of whitened residuals against white noise.
 
     Attributes:
-        chi2: sum of squares; dof: readings less parameters seen.
-        p: chance of a chi2 this large from noise of the stated size.
-        scale: sqrt(chi2/dof), the noise in units of the stated one.
+        chi2: sum of squares. dof: number of readings minus number of parameters.
+        p: probability that noise of the stated size has a chi2 at least this large.
+        scale: sqrt(chi2/dof), the estimated noise over the stated one.
         lag: correlation of a residual with the next one of its run.
-        lag_errors: the same in standard errors, those of a single test.
+        lag_errors: ``lag`` in standard errors of a single test.
         neighbour: correlation with the residual at the nearest commanded pose.
-        neighbour_errors: the same in standard errors.
+        neighbour_errors: ``neighbour`` in standard errors of a single test.
     """
 
     chi2: float
@@ -50,15 +50,15 @@ class Whiteness:
 
     @property
     def structured(self) -> bool:
-        """Whether neighbours agree more than noise would."""
+        """Whether neighbours are more strongly correlated than noise would be."""
         return max(self.lag_errors, self.neighbour_errors) > STRUCTURED
 
     @property
     def inflation(self) -> float:
-        """By how much standard errors of fitted values grow over those of the stated noise.
+        """Factor by which standard errors of fitted values grow over those of the stated noise.
 
-        By the size of what is left; and where that has structure, residuals that go together
-        count for fewer: n (1 - rho)/(1 + rho) of n with correlation rho from one to the next.
+        They grow with the size of the residuals. If these have structure, n residuals with a
+        correlation rho between neighbours also count for only n (1 - rho)/(1 + rho).
         """
         grown = max(1.0, self.scale)
         if not self.structured:
@@ -68,12 +68,12 @@ class Whiteness:
 
     @property
     def is_noise(self) -> bool:
-        """Whether nothing speaks against noise of the stated size."""
+        """Whether the residuals are consistent with white noise of the stated size."""
         return self.p > POOR_FIT and not self.structured
 
 
 def whiteness(problem: Problem, white: Array, parameters: int) -> Whiteness:
-    """Test whitened residuals (N,) that ``parameters`` directions were fitted to."""
+    """Test the whitened residuals (N,) of a fit with this many ``parameters``."""
     table = as_table(problem, white)
     dof = max(len(white) - parameters, 1)
     chi2 = float(white @ white)
@@ -92,18 +92,18 @@ def whiteness(problem: Problem, white: Array, parameters: int) -> Whiteness:
 
 
 def as_table(problem: Problem, white: Array) -> Array:
-    """Whitened residuals as (n, 6 + m), NaN where nothing counts."""
+    """Whitened residuals as a table (n, 6 + m), NaN where no reading counts."""
     table = np.full(problem.measured.shape, np.nan)
     table[problem.row_of, problem.column_of] = white
     return table
 
 
 def agreement(table: Array, pairs: NDArray[np.integer]) -> tuple[float, float]:
-    """Correlation of residual rows in pairs (k, 2), and its size in standard errors; 0 if none.
+    """Largest correlation of residual rows in pairs (k, 2), and its size in standard errors.
 
-    A structure in one channel is not to drown in the noise of the others: all channels together
-    and each by itself are tried, and the strongest counts. The best of many is large by chance:
-    its standard errors are those that a single test of the same chance would show.
+    Structure in one channel should not drown in the noise of the others, so all channels together
+    and each one by itself are tested, and the strongest result counts. The standard errors are
+    corrected for the number of tests, see :func:`best_of`. Both are 0 if nothing is positive.
     """
     product = table[pairs[:, 0]] * table[pairs[:, 1]]
     channels = np.flatnonzero(np.isfinite(product).sum(axis=0))
@@ -127,9 +127,9 @@ def _correlation(table: Array, product: Array) -> tuple[float, float]:
 
 
 def best_of(errors: float, tests: int) -> float:
-    """Standard errors of one test that chance exceeds as often as the best of ``tests`` those.
+    """The size of a single test that is as improbable as ``errors`` is for the best of ``tests``.
 
-    With P the chance of fewer errors, that of the best is P^tests (Sidak).
+    If P is the probability of a smaller value in one test, it is P^tests for the best (Sidak).
     """
     if errors < _TAIL:
         return float(special.ndtri_exp(tests * stats.norm.logcdf(errors)))
@@ -137,7 +137,7 @@ def best_of(errors: float, tests: int) -> float:
 
 
 def next_rows(problem: Problem) -> NDArray[np.int64]:
-    """Pairs (k, 2) of rows that follow one another in a run."""
+    """Pairs (k, 2) of used rows that follow one another in a run."""
     run, use = problem.data.run_index, problem.use
     rows = np.flatnonzero(use)
     together = run[rows[1:]] == run[rows[:-1]]
@@ -145,7 +145,7 @@ def next_rows(problem: Problem) -> NDArray[np.int64]:
 
 
 def nearest_rows(problem: Problem) -> NDArray[np.int64]:
-    """Each row with the row of nearest command that is not its neighbour in time."""
+    """Pairs (k, 2): each row and the row of the nearest command that is not next to it in time."""
     commands = problem.experiment.commands
     rows = np.flatnonzero(problem.use)
     if len(rows) < _LEAST_PAIRS:
@@ -156,7 +156,7 @@ def nearest_rows(problem: Problem) -> NDArray[np.int64]:
         turn = rotvec_from_quat(commands.pose[rows, 3:]) * problem.robot.length
         place = np.concatenate([commands.pose[rows, :3], turn], axis=1)
     if commands.loads is not None:
-        # another load is another place
+        # commands under different loads are not neighbours
         apart = _APART * problem.robot.length * commands.loads.kinds[rows, None]
         place = np.concatenate([place, apart], axis=1)
     tree = spatial.cKDTree(place)

@@ -1,7 +1,7 @@
-"""Effects with values of their own for each file or run, laid out for some data.
+"""Lays out effects with separate values for each file or run, for the files or runs of some data.
 
-A model keeps the values of the files or runs that it has seen. In a fit every file or run of the
-data has its own; those that the model has not seen begin where one of no file in particular is.
+A model keeps the values of the files or runs that it has seen. In a fit each file or run of the
+data has its own values; those that the model has not seen start from the effect's common values.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ class LaidOut:
     """A model for some data.
 
     Attributes:
-        terms: effects, those with values of their own laid out for the files or runs of the data.
-        fresh: effects, and files or runs that the model has no values for.
-        notes: what was taken from where.
+        terms: its effects, those with separate values laid out for the files or runs of the data.
+        fresh: pairs of an effect and a file or run for which the model has no values.
+        notes: which values were taken from the model, and which are new.
     """
 
     terms: Terms
@@ -33,7 +33,7 @@ class LaidOut:
 
 
 def laid_out(data: Measurements, terms: Terms) -> LaidOut:
-    """The model with its effects that have values of their own laid out for the data."""
+    """The model, with separate values for the files or runs of the data where effects have them."""
     out, fresh, notes = [], [], []
     for term in terms:
         if term.own is None or isinstance(term.layout, ApartLayout):
@@ -54,7 +54,7 @@ def names_in(data: Measurements, kind: str) -> tuple[str, ...]:
 
 
 def groups_of(data: Measurements, terms: Terms) -> NDArray[np.int64] | None:
-    """(n,) number of the part each row is of, where effects have values of their own for parts."""
+    """(n,) number of each row's file or run, if effects have separate values for these."""
     kinds = [term.layout.kind for term in terms if isinstance(term.layout, ApartLayout)]
     if not kinds:
         return None
@@ -70,7 +70,7 @@ def _term(term: Term, values: dict[str, Values]) -> Term:
 
 
 def _known(own: Own, name: str) -> Values | None:
-    """What the model has of a file or run; people may write its name without the folder."""
+    """The model's values for a file or run; its name may be written without the folder."""
     for written, values in own.values.items():
         if name == written or name.endswith(f"/{written}"):
             return values
@@ -78,7 +78,10 @@ def _known(own: Own, name: str) -> Values | None:
 
 
 def _unknown(term: Term) -> Values:
-    """One that the model has not seen: what it is measured to be elsewhere says nothing of it."""
+    """Starting values for a file or run that the model has not seen.
+
+    Independent measurements of other files or runs say nothing about it and are not taken over.
+    """
     count = len(term.layout)
     knowledge = Knowledge.nothing(count)
     fixed = Knowledge(term.knowledge.fixed, knowledge.value, knowledge.stderr)

@@ -1,4 +1,4 @@
-"""Measurements made ready: rows without an answer and outliers left out, noise filled in."""
+"""Prepares measurements: leaves out rows without equilibrium, fills in noise, finds outliers."""
 
 from __future__ import annotations
 
@@ -22,24 +22,25 @@ from seecr.effects import Terms, catalogue
 from seecr.prediction.experiment import Prediction
 
 Progress = Callable[[str, float], None]
-"""Called with what is being done and the part of it that is done, 0 to 1."""
+"""Called with what is being done and the fraction that is done, 0 to 1."""
 
-# Rows that stick out by this many robust deviations, alone, are outliers.
+# A single row is an outlier if it is so many robust standard deviations above the median; if more
+# than this part of the rows are, none counts as one.
 _OUTLIER = 6.0
 _MOST_OUTLIERS = 0.05
 
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """Measurements made ready.
+    """Measurements ready for a fit.
 
     Attributes:
-        problem: without the rows that have no equilibrium, with all noise filled in.
+        problem: the data without the rows that have no equilibrium, and with all noise filled in.
         terms: effects of the model, with those that the data leave free.
         notes: what was assumed, estimated or left out.
-        blocks_note: how cross-validation would cut the data, where that is to be said.
-        refusal: why nothing can be said of these data; None where something can.
-        fitted: how many values were fitted to the data first, as these leave them free.
+        blocks_note: which blocks cross-validation leaves out, if they are not whole runs; else "".
+        refusal: why nothing can be said about these data; None if something can.
+        fitted: how many values were fitted in advance because the data leave them free.
     """
 
     problem: Problem
@@ -51,19 +52,19 @@ class Prepared:
 
     @property
     def all_notes(self) -> tuple[str, ...]:
-        """The notes for whoever cross-validates."""
+        """The notes with that about cross-validation, for commands that use it."""
         return (*self.notes, self.blocks_note) if self.blocks_note else self.notes
 
 
 def prepare(
     robot: Robot, data: Measurements, terms: Terms, considered: frozenset[str] | None = None
 ) -> Prepared:
-    """Leave out the rows that have no equilibrium, estimate noise that nobody stated.
+    """Leave out rows that have no equilibrium, estimate unstated noise, and fit what is free.
 
     Args:
         robot, data: what was measured.
         terms: effects of the model as it stands.
-        considered: names of the effects that may be missing; all of the catalogue without.
+        considered: names of the effects that may be missing; by default the whole catalogue.
     """
     considered = frozenset(catalogue()) if considered is None else considered
     every = np.ones(data.n_rows, dtype=bool)
@@ -80,7 +81,7 @@ def prepare(
     terms, said = found.terms, (*laid.notes, *found.notes)
     if found.free.any():
         plain = problem.experiment.predict(terms.effects)
-        if estimates:  # what was left then was the frame's
+        if estimates:  # the first residuals also contained the error of the frame
             known = replace(problem, sigma=data.sigma)
             problem, estimates = estimate_sigma(known, plain)
     odd = doubts(problem, plain.readings)
@@ -103,7 +104,10 @@ def _solved_rows(problem: Problem, plain: Prediction) -> Problem:
 
 
 def noise_floor(problem: Problem, state: State | None = None) -> Rms:
-    """The rms errors that noise alone would give a perfect model, that of lengths included."""
+    """The rms errors of a perfect model, by kind: noise of the readings alone.
+
+    With a state, the noise of the commanded lengths is included, as whitening at that state has it.
+    """
     raw = np.broadcast_to(problem.reading_sigma, problem.measured.shape).copy()
     if state is not None:
         raw = np.sqrt(np.einsum("nij,nij->ni", state.factor, state.factor))
@@ -111,7 +115,7 @@ def noise_floor(problem: Problem, state: State | None = None) -> Rms:
 
 
 def outlying_rows(problem: Problem, state: State) -> np.ndarray:
-    """(n,) rows whose whitened residual is far beyond all others, in few places."""
+    """(n,) isolated outliers: rows whose whitened residuals far exceed all others; none if many."""
     power = np.zeros(problem.data.n_rows)
     count = np.zeros(problem.data.n_rows)
     np.add.at(power, problem.row_of, state.white**2)
@@ -124,7 +128,7 @@ def outlying_rows(problem: Problem, state: State) -> np.ndarray:
     rows = used & (size > max(limit, 4.0))
     if rows.sum() > max(_MOST_OUTLIERS * used.sum(), 1):
         return np.zeros_like(rows)
-    # a neighbour that sticks out as well makes it structure, not an outlier
+    # if a neighbour sticks out as well, it is structure and not an outlier
     for k in np.flatnonzero(rows):
         near = [j for j in (k - 1, k + 1) if 0 <= j < len(rows) and used[j]]
         if any(size[j] > middle + 0.5 * (size[k] - middle) for j in near):

@@ -1,9 +1,9 @@
 """Measurements as a weighted least-squares problem: residuals, their noise, their rows.
 
-A residual is measured less predicted: position [m], orientation as the rotation vector from the
-predicted to the measured one [rad] (or the differences of those angles that were read), tension
-[N]. The noise of a row is that of its readings plus that of the commanded lengths, which reaches
-the readings through the robot's own sensitivity:
+A residual is measured minus predicted: position [m], orientation as the rotation vector from the
+predicted to the measured one [rad] (or the differences of the angles that were read), tension [N].
+The noise of a row is that of its readings plus that of the commanded lengths, which the robot's own
+sensitivity carries over to the readings:
 
     Sigma = diag(sigma^2) + (dy/dl0) sigma_length^2 (dy/dl0)^T
 
@@ -43,13 +43,14 @@ class Problem:
 
     Attributes:
         robot, data: what was measured.
-        sigma: noise of each kind of reading; every kind that was read has a number.
-        use: (n,) bool rows that count; others are way points or were left out, see ``left_out``.
-        left_out: sentences that name the rows left out and why.
-        considered: names of the effects that may explain them.
-        far_off: (n,) bool rows that hardly count in fits and not at all in their errors, if any.
-        groups: (n,) number of the file or run of each row, where effects have values of their own
-            for each.
+        sigma: noise of each kind of reading, for every kind that was read.
+        use: (n,) bool rows that count; the others are way points or were left out, see
+            ``left_out``.
+        left_out: sentences that name the rows left out, and why.
+        considered: names of the effects that may explain the readings.
+        far_off: (n,) bool outliers, if any are known; they hardly count in fits, and not at all in
+            rms errors.
+        groups: (n,) number of each row's file or run, if effects have separate values for these.
     """
 
     robot: Robot
@@ -67,7 +68,7 @@ class Problem:
         self.use = self.use & self.data.read
 
     def without(self, rows: NDArray[np.bool_], why: str) -> Problem:
-        """The same problem with some rows left out, sharing what is already computed."""
+        """The same problem with some rows left out; predictions already computed are shared."""
         return self._like(use=self.use & ~rows, left_out=(*self.left_out, why))
 
     def only(self, rows: NDArray[np.bool_]) -> Problem:
@@ -79,11 +80,11 @@ class Problem:
         return self._like(sigma=sigma)
 
     def with_far_off(self, rows: NDArray[np.bool_]) -> Problem:
-        """The same problem, some of whose rows are known to be far off all others."""
+        """The same problem with some rows marked as outliers."""
         return self._like(far_off=rows)
 
     def with_groups(self, groups: NDArray[np.int64] | None) -> Problem:
-        """The same problem, whose rows go together otherwise."""
+        """The same problem with other groups of rows."""
         return self._like(groups=groups)
 
     def _like(self, **changes: object) -> Problem:
@@ -93,7 +94,7 @@ class Problem:
 
     @cached_property
     def measured(self) -> NDArray[np.bool_]:
-        """(n, 6 + m) which readings there are."""
+        """(n, 6 + m) which readings exist."""
         data = self.data
         if data.quat_wxyz is not None:
             whole = np.asarray(np.isfinite(data.quat_wxyz).all(axis=1))
@@ -106,7 +107,7 @@ class Problem:
 
     @property
     def counted(self) -> NDArray[np.bool_]:
-        """(n, 6 + m) readings that count."""
+        """(n, 6 + m) which readings exist and count."""
         return self.measured & self.use[:, None]
 
     @cached_property
@@ -126,11 +127,11 @@ class Problem:
 
     @cached_property
     def uses_angles(self) -> bool:
-        """Whether the orientation was read as some angles only."""
+        """Whether the orientation was read as single angles only."""
         return self.data.quat_wxyz is None and bool(np.isfinite(self.data.angles_rad).any())
 
     def residuals(self, readings: Readings) -> Array:
-        """Measured less predicted, (n, 6 + m), NaN where nothing was read."""
+        """Measured minus predicted, (n, 6 + m), NaN where nothing was read."""
         data = self.data
         if data.quat_wxyz is not None:
             turn = quat_multiply(data.quat_wxyz, quat_conjugate(readings.quat_wxyz))
@@ -148,7 +149,7 @@ class Problem:
         )
 
     def as_read(self, change: Array, readings: Readings) -> Array:
-        """Derivatives (n, 6 + m, p) by rotation vector turned into those of what was read."""
+        """Convert derivatives (n, 6 + m, p) of rotation vectors to those of the angles read."""
         if not self.uses_angles:
             return change
         change = change.copy()
@@ -159,14 +160,14 @@ class Problem:
 
     @cached_property
     def reading_sigma(self) -> Array:
-        """(n, 6 + m) noise of each reading."""
+        """(n, 6 + m) standard deviation of each reading; 1 for kinds without a stated noise."""
         stated = (self.sigma.position_m, self.sigma.orientation_rad, self.sigma.tension_N)
         by_kind = np.array([value or 1.0 for value in stated]) * self.data.sigma_ratio[:, :3]
         return np.repeat(by_kind, [3, 3, self.data.n_cables], axis=1)
 
     @cached_property
     def length_sigma(self) -> Array:
-        """(n, 1) [m] noise of each row's commanded lengths."""
+        """(n, 1) [m] standard deviation of each row's commanded lengths."""
         return (self.sigma.length_m or 0.0) * self.data.sigma_ratio[:, 3:]
 
     def by_length(self, at: Prediction) -> Array:
@@ -178,7 +179,7 @@ class Problem:
         return self.noise_about(self.by_length(at) if self.sigma.length_m else None)
 
     def noise_about(self, by_length: Array | None) -> Array:
-        """The same from the derivative by lengths; None where those are exact."""
+        """The same, given the derivative by lengths (n, 6 + m, m); None if lengths are exact."""
         _n, width = self.measured.shape
         own = np.where(self.measured, self.reading_sigma, 1.0)
         if by_length is None or not self.sigma.length_m:
@@ -187,7 +188,7 @@ class Problem:
         return noise_factors(own, rate)
 
     def whiten(self, factor: Array, values: Array) -> Array:
-        """Counted residuals (N,) or derivatives (N, p), in units of their noise."""
+        """Counted residuals (N,) or derivatives (N, p), divided by the Cholesky factor of noise."""
         single = values.ndim == 2
         table = values[..., None] if single else values
         table = np.where(self.measured[..., None], table, 0.0)
@@ -196,7 +197,7 @@ class Problem:
 
 
 def in_units_of(factor: Array, table: Array, correlated: bool) -> Array:
-    """Residuals or derivatives (n, k, p) in units of their noise, by its Cholesky factors."""
+    """Whiten residuals or derivatives (n, k, p) by Cholesky factors (n, k, k) of their noise."""
     if correlated:
         return np.asarray(np.linalg.solve(factor, table), float)
     return table / np.diagonal(factor, axis1=1, axis2=2)[..., None]
@@ -205,9 +206,9 @@ def in_units_of(factor: Array, table: Array, correlated: bool) -> Array:
 def angle_rates(quat_wxyz: Array) -> Array:
     """d(rx, ry, rz)/d(rotation vector in the base frame), (n, 3, 3).
 
-    With R = Rx Ry Rz, turning on by w is w = x' rx + y' ry + z' rz with the axes x' = x,
-    y' = Rx y and z' = Rx Ry z. Its inverse; at ry = +-90 deg, where there is none, what the
-    smallest cosine that is not zero gives.
+    With R = Rx Ry Rz, a small rotation w changes the angles by drx, dry, drz such that
+    w = x' drx + y' dry + z' drz, with the axes x' = x, y' = Rx y and z' = Rx Ry z. This is the
+    inverse of that relation. It does not exist at ry = +-90 deg, where cos(ry) is replaced by 1e-9.
     """
     angles = rxyz_from_quat(quat_wxyz)
     sx, cx = np.sin(angles[:, 0]), np.cos(angles[:, 0])
@@ -225,8 +226,8 @@ class Kind:
     """A kind of reading.
 
     Attributes:
-        name: in words. key: of its rms errors. sigma: name of its noise in :class:`Sigma`.
-        columns: of the residuals. si: its unit.
+        name: name in words. key: key of its rms errors. sigma: name of its noise in :class:`Sigma`.
+        columns: its columns in a row of residuals. si: its SI unit.
     """
 
     name: str
@@ -237,12 +238,12 @@ class Kind:
 
     @property
     def factor(self) -> float:
-        """From SI to ``unit``."""
+        """Factor from SI to ``unit``."""
         return in_unit(self.si)[0]
 
     @property
     def unit(self) -> str:
-        """The unit people read it in."""
+        """The unit in which people read it."""
         return in_unit(self.si)[1]
 
     def sizes(self, problem: Problem, raw: Array) -> Array:
@@ -273,12 +274,12 @@ BY_NAME = {kind.name: kind for kind in KINDS}
 
 
 def kinds_read(problem: Problem) -> list[Kind]:
-    """Kinds of reading that the data hold."""
+    """The kinds of readings that count in these data."""
     return [kind for kind in KINDS if problem.counted[:, kind.columns].any()]
 
 
 def kinds_stated(problem: Problem) -> list[Kind]:
-    """Those whose noise was stated, not estimated."""
+    """The kinds of readings whose noise was stated, not estimated."""
     given = problem.data.sigma
     return [kind for kind in kinds_read(problem) if getattr(given, kind.sigma) is not None]
 
@@ -286,8 +287,8 @@ def kinds_stated(problem: Problem) -> list[Kind]:
 def rms_by_kind(problem: Problem, raw: Array) -> Rms:
     """Root mean square of the counted residuals: position [m], orientation [rad], tension [N].
 
-    Of single components, so that noise alone gives its sigma; None where nothing was read. Rows
-    far off all others are no part of it.
+    The mean is over single components, so that noise alone gives its sigma. It is None where
+    nothing was read, and leaves out rows that are marked as ``far_off``.
     """
     out: Rms = {}
     counted = problem.counted
@@ -303,8 +304,8 @@ def noise_factors(own: Array, rate: Array) -> Array:
     """Cholesky factors (n, k, k) of the covariances diag(own^2) + rate rate^T.
 
     Args:
-        own: (n, k) deviations of readings by themselves.
-        rate: (n, k, m) what errors common to them do, in their deviations.
+        own: (n, k) standard deviations of the readings by themselves.
+        rate: (n, k, m) effect of m common errors on the readings, each of one standard deviation.
     """
     covariance = rate @ np.swapaxes(rate, 1, 2)
     index = np.arange(own.shape[1])
@@ -312,7 +313,7 @@ def noise_factors(own: Array, rate: Array) -> Array:
     try:
         return np.asarray(np.linalg.cholesky(covariance), float)
     except np.linalg.LinAlgError:
-        # where a platform is all but free to move, rates are so large that squares lose the rest
+        # where a platform is almost free to move, the squares of its rates swallow the rest
         wide = np.concatenate([np.nan_to_num(rate), own[:, :, None] * np.eye(len(index))], axis=2)
         upper = np.linalg.qr(np.swapaxes(wide, 1, 2), mode="r")
         sign = np.where(np.diagonal(upper, axis1=1, axis2=2) < 0.0, -1.0, 1.0)

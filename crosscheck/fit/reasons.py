@@ -1,6 +1,6 @@
-"""Reasons: what happened is an enum, its value the sentence that people read, numbers beside it.
+"""Reasons as enums: the value of each is the sentence that people read, numbers are kept beside it.
 
-Nothing is decided by the text: whoever asks why looks at the enum, as with :class:`seecr.Status`.
+Programs decide by the enum, never by the text, as with :class:`seecr.Status`.
 """
 
 from __future__ import annotations
@@ -60,11 +60,11 @@ class Reason:
     """Why an effect is not listed.
 
     Attributes:
-        why: what is the matter.
-        parameters: of the effect. rows: of the data.
-        p: chance of what it explains where it is absent.
-        by: effects that explain it better.
-        beside: effects of the model that it was tried beside; none for the model as it stood.
+        why: the kind of reason.
+        parameters: number of parameters of the effect. rows: number of rows of the data.
+        p: p-value of what it explains, or a probability, see ``why``.
+        by: effects that explain it better, or as well.
+        beside: effects of the model beside which it was tried; empty for the model as it stood.
     """
 
     why: Why
@@ -81,7 +81,7 @@ class Reason:
 
     @property
     def words(self) -> str:
-        """The reason alone."""
+        """The reason alone, as a sentence."""
         return self.why.value.format(
             parameters=counted(self.parameters, "parameter"),
             rows=counted(self.rows, "row"),
@@ -135,12 +135,13 @@ _REMEDIES = {
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why nothing can be said of measurements.
+    """Why nothing can be said about some measurements.
 
     Attributes:
-        unfit: what is the matter.
-        rows: of the data. lost: those without an equilibrium. readings: that are left.
-        lines: of the file that show it. noise: of the readings, with units.
+        unfit: the kind of reason.
+        rows: number of rows of the data, or of poses if these are too few.
+        lost: how many have no equilibrium. readings: how many readings are left.
+        lines: lines of the file that show it. noise: noise of the readings, with units.
         lacking: effects, and what the data lack for each.
     """
 
@@ -154,12 +155,12 @@ class Refusal:
 
     @property
     def remedy(self) -> str:
-        """What to do about it."""
+        """What to do about it, as a sentence."""
         return _REMEDIES[self.unfit]
 
     @property
     def unsolved(self) -> bool:
-        """Whether solutions are wanting, not data."""
+        """Whether it is solutions of the statics that are lacking, not data."""
         if self.unfit is Unfit.FEW_READINGS:
             return self.readings == 0
         return self.unfit in (Unfit.NO_EQUILIBRIUM, Unfit.UNSOLVED_MODEL)
@@ -177,7 +178,7 @@ class Refusal:
 
 
 class DiagnosisVerdict(StrEnum):
-    """What a diagnosis comes to, in the words of ``diagnosis.json``."""
+    """The verdict of a diagnosis, in the words of ``diagnosis.json``."""
 
     NO_EFFECT_MISSING = "no_effect_missing", "model and data agree"
     EFFECTS_FOUND = "effects_found", "what is left after them is noise"
@@ -188,7 +189,7 @@ class DiagnosisVerdict(StrEnum):
     meaning: str
 
     def __new__(cls, word: str, meaning: str) -> DiagnosisVerdict:
-        """A word with what it means."""
+        """A verdict with the sentence that says what it means."""
         verdict = str.__new__(cls, word)
         verdict._value_, verdict.meaning = word, meaning
         return verdict
@@ -198,7 +199,7 @@ class DiagnosisVerdict(StrEnum):
         """The verdict of that name.
 
         Raises:
-            CrosscheckError: there is none; lists them, nearest first.
+            CrosscheckError: there is no such verdict; the message lists all, the nearest first.
         """
         by_word = {verdict.value: verdict for verdict in cls}
         if word in by_word:
@@ -209,5 +210,5 @@ class DiagnosisVerdict(StrEnum):
 
     @property
     def heading(self) -> str:
-        """The same as a heading."""
+        """The verdict as a heading."""
         return self.value.replace("_", " ").capitalize()

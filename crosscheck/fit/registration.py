@@ -1,7 +1,7 @@
-"""Where the tracker stands: its frame registered before anything else, by any angle.
+"""Registers the tracker's frame to the predicted poses, by any angle, before anything is fitted.
 
-Every effect is read through the tracker, so its frame goes first, with no plausible size: what
-is then left does not depend on how the tracker was set up.
+All effects are seen through the tracker. Its frame is therefore registered first and without a
+prior, so that the remaining errors do not depend on how the tracker was set up.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ from seecr.pose import Array, quat_conjugate, quat_multiply, quat_rotate, rotvec
 from seecr.prediction.experiment import Prediction
 
 NAME = "tracker_frame"
-# Rows count by the median distance; a few rounds settle which.
+# Rounds of reweighting; the scale of the weights is the median distance.
 _ROUNDS = 10
-# Points that spread by less than this part of their largest spread do not show a turn.
+# Points show no rotation if their second-largest spread is less than this part of the largest.
 _THIN = 1e-3
 
 
 def registered(problem: Problem, at: Prediction) -> Term | None:
-    """The tracker's frame that brings the predicted poses nearest to the measured ones.
+    """The tracker frame that brings the predicted poses nearest to the measured ones.
 
-    Rows far off count little. None where neither whole positions nor orientations were read.
+    Outliers get little weight. None if the positions and orientations read determine no rotation.
     """
     layout = layout_of(effect_named(NAME), problem.robot)
     data = problem.data
@@ -42,11 +42,11 @@ def registered(problem: Problem, at: Prediction) -> Term | None:
 
 
 def registered_each(problem: Problem, at: Prediction, term: Term, mine: NDArray[np.bool_]) -> Term:
-    """The tracker's frame registered, that of each file or run where they have their own.
+    """The effect with its tracker frame registered, or that of each file or run if separate.
 
     Args:
         problem: the data.
-        at: the prediction with frames at null.
+        at: the prediction with all frames at null.
         term: the effect as it stands.
         mine: (p,) which of its parameters may move.
     """
@@ -59,7 +59,7 @@ def registered_each(problem: Problem, at: Prediction, term: Term, mine: NDArray[
 
 
 def _frames(problem: Problem, layout: Layout) -> list[tuple[NDArray[np.bool_], slice]]:
-    """The rows that see a frame, and where its parameters stand."""
+    """For each frame, the rows (n,) that are read in it and the slice of its parameters."""
     if not isinstance(layout, ApartLayout):
         return [(problem.use, slice(0, len(layout)))]
     names = problem.data.parts[layout.kind]
@@ -67,7 +67,7 @@ def _frames(problem: Problem, layout: Layout) -> list[tuple[NDArray[np.bool_], s
 
 
 def _turn(problem: Problem, at: Prediction) -> Array | None:
-    """The turn (4,) between predicted and measured orientations; None where none were read."""
+    """The rotation (4,) from predicted to measured orientations; None if none were read."""
     quat = problem.data.quat_wxyz
     if quat is None:
         return None
@@ -77,7 +77,7 @@ def _turn(problem: Problem, at: Prediction) -> Array | None:
     turns = quat_multiply(quat[rows], quat_conjugate(at.readings.quat_wxyz[rows]))
     weight, mean = np.ones(len(turns)), turns[0]
     for _ in range(_ROUNDS):
-        # the quaternion of the largest eigenvalue (Markley et al. 2007)
+        # the mean is the eigenvector of the largest eigenvalue (Markley et al. 2007)
         mean = np.linalg.eigh((turns * weight[:, None]).T @ turns)[1][:, -1]
         off = np.linalg.norm(rotvec_from_quat(quat_multiply(turns, quat_conjugate(mean))), axis=1)
         weight = _counting(off)
@@ -85,11 +85,10 @@ def _turn(problem: Problem, at: Prediction) -> Array | None:
 
 
 def turn_of_points(here: Array, there: Array) -> Array | None:
-    """The turn (4,) that brings points (k, 3) nearest to others; None where they are in one line.
+    """The rotation (4,) that brings points (k, 3) nearest to others, by iterative reweighting.
 
-    As fewer than three always are.
-
-    By the eigenvector of Horn's matrix (Closed-form solution of absolute orientation, 1987).
+    It is the eigenvector of Horn's matrix (Closed-form solution of absolute orientation, 1987).
+    None if the points lie on a line, as fewer than three always do.
     """
     if len(here) < 3:
         return None
@@ -105,7 +104,7 @@ def turn_of_points(here: Array, there: Array) -> Array | None:
 
 
 def _turn_of_weighted(here: Array, there: Array, weight: Array) -> Array | None:
-    # what bends in one of the frames alone is an error, and shows no turn
+    # points on a line in either frame show no rotation: what bends them in the other is an error
     spreads = [np.linalg.svd(points, compute_uv=False) for points in (here, there)]
     if any(spread[1] <= _THIN * spread[0] for spread in spreads):
         return None
@@ -119,5 +118,5 @@ def _turn_of_weighted(here: Array, there: Array, weight: Array) -> Array | None:
 
 
 def _counting(off: Array) -> Array:
-    """How much rows count by how far off they are (Cauchy's weights)."""
+    """Cauchy weights of rows by their distances, scaled by the median."""
     return np.asarray(1.0 / (1.0 + (off / max(float(np.median(off)), 1e-12)) ** 2))

@@ -1,8 +1,8 @@
-"""What a smooth field over the workspace could explain just as well as an effect does.
+"""Whether a smooth field over the workspace could explain as much as an effect does.
 
-An error that no catalogue holds (the lens of a tracker, a curved reference) is often smooth over
-the workspace, and much of it looks like a scale or a shift. Where structure is left over, an
-effect is told from such a field only by what the field cannot imitate.
+An error that is not in the catalogue (the lens of a tracker, a curved reference) is often smooth
+over the workspace, and much of it looks like a scale or a shift. If structure remains, an effect
+therefore counts only for what such a field cannot imitate.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from crosscheck.fit.state import State
 from seecr.pose import Array
 
 _DEGREE = 3
-# Where nothing else is left a name is owed from a fall of chi2 of about 25 beside others; where
-# structure is left, which no cubic follows quite, from twice as many standard errors.
+# If nothing else remains, an effect is named from a fall of chi2 of about 25 on. If structure
+# remains, which no cubic follows exactly, it takes twice as many standard errors.
 _OWED = 100.0
 
 
 def monomials(place: Array, degree: int = _DEGREE) -> Array:
-    """(n, k) monomials to some degree of places (n, d), each axis scaled to [-1, 1].
+    """(n, k) monomials up to some degree of places (n, d), each axis scaled to [-1, 1].
 
     Axes along which nothing moves are left out.
     """
@@ -39,7 +39,7 @@ def monomials(place: Array, degree: int = _DEGREE) -> Array:
 
 
 def field_columns(problem: Problem, place: Array, last: int = TENSION.start) -> Array:
-    """(N, k) a cubic of places (n, 3) for each channel that was read before one; of the pose."""
+    """(N, k) a cubic in place (n, 3) for each channel below ``last`` that was read; of the pose."""
     shapes = monomials(place)[problem.row_of]
     channels = [c for c in np.unique(problem.column_of) if c < last]
     parts = [shapes * (problem.column_of == c)[:, None] for c in channels]
@@ -47,12 +47,12 @@ def field_columns(problem: Problem, place: Array, last: int = TENSION.start) -> 
 
 
 def beyond_smooth(problem: Problem, before: State, after: State, share: float) -> bool:
-    """Whether an effect explains what a smooth field of the measured pose would not.
+    """Whether an effect explains what a smooth field of the predicted positions would not.
 
     Args:
         problem: the data.
-        before, after: the model without the effect and with it.
-        share: least part of what the field leaves unexplained that the effect must take away.
+        before, after: the model without the effect, and with it.
+        share: the effect must explain at least this part of what the field leaves beyond noise.
     """
     span = basis(field_columns(problem, before.prediction.pose[:, :3]))
 

@@ -1,10 +1,10 @@
-"""Where to start fitting an effect: what its derivative promises, and the forces as measured.
+"""Chooses starting points for the fit of an effect, from its derivatives and from the forces.
 
-The derivative at null says where a linear fit would end. Where cables go slack and taut as a
-parameter moves, the solved pose jumps about, and a fit from null ends in the next hollow. At the
-*measured* pose the forces depend on the parameters smoothly but for each cable's own slackness:
-parameters that make them balance there are a start near the truth. (In identification: the
-equation error, in place of the output error.)
+The derivative at null tells where a linear fit would end. But where cables change between slack and
+taut as a parameter moves, the solved pose jumps, and a fit that starts at null ends in a local
+minimum nearby. At the *measured* poses, forces depend smoothly on the parameters apart from each
+cable's own slackness, so parameters that balance them there are a start near the optimum. (In
+system identification: the equation error instead of the output error.)
 """
 
 from __future__ import annotations
@@ -33,34 +33,35 @@ from seecr.statics import batch
 from seecr.statics.tables import assemble
 from seecr.threads import run_parts
 
-# Most times that the forces are evaluated; a fall of their squares by less ends the search.
+# Most evaluations of the forces; the search ends if their sum of squares falls by a smaller part.
 _EVALUATIONS, _FALL = 15, 1e-3
-# So far inside its bounds it begins, in plausible sizes.
+# The search begins so far inside the bounds, in plausible sizes.
 _INSIDE = 1e-6
-# Directions softer than this part of a row's stiffest say little about forces.
+# Directions that are softer than this part of a row's stiffest one say little about forces.
 _SOFT = 0.02
 # No cable is as stiff as this [N/m].
 _ABSURD = 1e20
 # A start is at most this many plausible sizes from null.
 _START_SIZES = 3.0
-# Part of the cables that are slack from which a fit may end in a hollow.
+# If more than this part of the cables is slack, a fit may end in a local minimum.
 _SLACK_PART = 0.02
-# Effects that shift no reading by this part of its noise, for plausible sizes, are not seen.
+# An effect is not seen if its plausible size shifts no reading by more than this part of its noise.
 _UNSEEN = 0.02
-# Fewer rows than this are not worth a second thread for the shapes of an effect.
+# With fewer rows than this, a second thread for the shapes of an effect does not pay.
 _MANY_ROWS = 600
 
 
 @dataclass(frozen=True, eq=False)
 class Starts:
-    """Where to start fitting an effect, and what its derivative at null promises.
+    """Starting points for the fit of an effect, and what its derivative at null promises.
 
     Attributes:
         vectors: starting values, the most promising first.
-        balanced: gives further ones, or None: those that balance the forces, which take a while.
-        gain: linearised fall of chi2 of the best. directions: that the data see.
-        shapes: about how many shapes were tried for it.
-        seen: whether any reading moves by more than a trace of its noise.
+        balanced: computes values that balance the forces, or None; it takes a while.
+        gain: promised fall of chi2 at the best shape.
+        directions: how many directions of the parameters the data see.
+        shapes: effective number of shapes that were tried, to correct p-values.
+        seen: whether a plausible size moves any reading by more than a trace of its noise.
     """
 
     vectors: tuple[Array, ...]
@@ -71,7 +72,7 @@ class Starts:
     balanced: Callable[[], Array | None] | None = None
 
     def __iter__(self) -> Iterator[Array]:
-        """The starting values in the order in which to try them."""
+        """The starting values, in the order in which to try them."""
         yield from self.vectors
         further = None if self.balanced is None else self.balanced()
         if further is not None:
@@ -79,7 +80,7 @@ class Starts:
 
 
 def starts_of(problem: Problem, base: Fit, layout: Layout, factor: Array) -> Starts:
-    """The most promising starts of an effect beside the base model."""
+    """The most promising starting points of an effect beside the base model."""
     shapes = layout.effect.shapes(base.state.prediction.setup)
     if not shapes:
         return Starts((), 0.0, 1, 1.0, False)
@@ -90,7 +91,7 @@ def starts_of(problem: Problem, base: Fit, layout: Layout, factor: Array) -> Sta
     gain, directions = best.gain, best.directions
     vectors = [one.vector for one in scored[:2]]
     if np.any((layout.lower == layout.null) & ~layout.shape):
-        # the derivative at a bound can point the wrong way: start inside as well
+        # at a bound the derivative can point the wrong way: start inside as well
         inside, across = _across(problem, base, Term(layout, best.null), factor)
         vectors = [vectors[0], inside] if across < gain else [inside, vectors[0]]
         gain = max(gain, across)
@@ -99,7 +100,7 @@ def starts_of(problem: Problem, base: Fit, layout: Layout, factor: Array) -> Sta
     balanced = None
     if int(np.sum(~layout.shape)) > 1 and _some_slack(base):
         balanced = partial(equation_start, problem, base.state, layout, best.null, factor)
-    # neighbouring shapes are alike: about every third is one more chance of its own
+    # neighbouring shapes are alike: every third counts as an independent trial
     return Starts(tuple(vectors), gain, directions, max(1.0, len(shapes) / 3.0), seen, balanced)
 
 
@@ -108,8 +109,9 @@ class _Scored:
     """What the linear model promises of an effect at one shape.
 
     Attributes:
-        null: (p,) values that do nothing, at the shape. vector: those that explain most.
-        gain: fall of chi2. directions: of the parameters that the data see. seen: whether any is.
+        null: (p,) null values at this shape. vector: (p,) values that explain most.
+        gain: fall of chi2. directions: number of directions that the data see.
+        seen: whether a plausible size moves any reading.
     """
 
     null: Array
@@ -122,8 +124,8 @@ class _Scored:
 def _scored(
     problem: Problem, base: Fit, layout: Layout, shapes: Sequence[dict[str, float]]
 ) -> list[_Scored]:
-    """Every shape of an effect, in their order."""
-    span = base.span  # made once, for all threads
+    """What the linear model promises of an effect at each shape, in their order."""
+    span = base.span  # computed once, before the threads need it
     scale = layout.scale * ~layout.shape
 
     def score(shape: dict[str, float]) -> _Scored:
@@ -135,7 +137,7 @@ def _scored(
         vector = np.clip(null + z * scale, layout.lower, layout.upper)
         return _Scored(null, vector, gain, directions, seen)
 
-    out: list[_Scored] = [score(shapes[0])]  # makes what all of them ask for
+    out: list[_Scored] = [score(shapes[0])]  # fills the caches that all of them share
     rest = shapes[1:]
     if problem.data.n_rows < _MANY_ROWS:
         return out + [score(shape) for shape in rest]
@@ -149,10 +151,10 @@ def _scored(
 
 
 def _across(problem: Problem, base: Fit, null: Term, factor: Array) -> tuple[Array, float]:
-    """Values inside the bounds, and the fall of chi2 that what a plausible size does promises.
+    """Values inside the bounds, and the fall of chi2 promised by the change at a plausible size.
 
-    Sag goes with the square of a weight: what the derivative at null says of it may be the
-    contrary of what any weight does.
+    The sag of a cable grows with the square of its weight, so its derivative at null may point
+    opposite to the effect of any weight.
     """
     layout = null.layout
     span = np.where(layout.shape, 0.0, layout.scale)
@@ -174,13 +176,13 @@ def _across(problem: Problem, base: Fit, null: Term, factor: Array) -> tuple[Arr
 
 
 def _some_slack(base: Fit) -> bool:
-    """Whether cables go slack in enough places for a fit to end in a hollow."""
+    """Whether enough cables are slack for a fit to end in a local minimum."""
     slack = base.state.prediction.slack
     return float(np.mean(slack)) > _SLACK_PART
 
 
 def amplitude_columns(problem: Problem, base: Fit, layout: Layout, null: Array) -> Array:
-    """(N, p) whitened derivatives by the effect's own parameters at null; 0 for shapes."""
+    """(N, p) whitened derivatives by an effect's parameters at null; columns of shapes are 0."""
     terms = base.terms.with_term(Term(layout, null))
     own = terms.own(layout.name)
     wanted = np.flatnonzero(own)
@@ -204,18 +206,19 @@ def _linear(x: Array, r: Array) -> tuple[Array, float, int]:
 def equation_start(
     problem: Problem, base: State, layout: Layout, start: Array, factor: Array
 ) -> Array | None:
-    """Values of an effect that balance the forces at the measured poses best.
+    """Values of an effect that best balance the forces at the measured poses.
 
     Args:
-        problem: the data; poses must have been measured as a whole.
+        problem: the data; poses must have been measured completely.
         base: the model without the effect.
         layout: the effect.
-        start: (p,) values to start from; shapes stay as they are there.
+        start: (p,) values to start from; shapes are kept.
         factor: noise factors, :meth:`Problem.noise`.
 
     Returns:
-        (p,) values, or None where this says nothing: effects of the sensors, rows that depend
-        on the rows before, rotations that were not read, platforms on joints.
+        (p,) values. None if this is impossible: for effects of the sensors, models with history,
+        users' cable laws or separate values for files or runs, platforms on joints, data without
+        orientations.
     """
     rows = _balanced_rows(problem, base, layout)
     if not rows.any():
@@ -237,7 +240,7 @@ def equation_start(
         return np.concatenate([-rates, np.eye(len(z)) / PRIOR_SIZES])
 
     lower, upper = (layout.lower[free] - null) / scale, (layout.upper[free] - null) / scale
-    # from inside the bounds: friction that is null is another problem than any friction
+    # start inside the bounds: at null, friction has other derivatives than at any other value
     begin = np.clip((start[free] - null) / scale, lower + _INSIDE, upper - _INSIDE)
     if not np.all(np.isfinite(residuals(begin))):
         return None
@@ -255,10 +258,10 @@ def equation_start(
 
 
 def _balanced_rows(problem: Problem, base: State, layout: Layout) -> NDArray[np.bool_]:
-    """(n,) rows whose measured pose says what the forces there are; none where nothing does."""
+    """(n,) rows whose measured pose determines the forces there; none if no row's does."""
     data, at = problem.data, base.prediction
     senses = layout.effect.edit_readings is not Effect.edit_readings
-    # platforms on joints: a measured pose is off what they can reach, by its noise
+    # with joints, noise puts a measured pose off the poses that the platform can reach
     silent = senses or at.has_history or bool(at.setup.laws) or bool(problem.robot.joints)
     silent = silent or isinstance(at, PartedPrediction)
     if silent or data.quat_wxyz is None:
@@ -268,7 +271,7 @@ def _balanced_rows(problem: Problem, base: State, layout: Layout) -> NDArray[np.
 
 
 class _Forces:
-    """Forces left over at the measured poses, as the displacements that would balance them."""
+    """Forces that are unbalanced at the measured poses, as the displacements that balance them."""
 
     def __init__(
         self, problem: Problem, base: State, layout: Layout, factor: Array,
@@ -279,7 +282,7 @@ class _Forces:
         assert data.quat_wxyz is not None
         measured = np.concatenate([data.position, data.quat_wxyz], axis=1)
         read = np.concatenate([at.readings.position, at.readings.quat_wxyz], axis=1)
-        # what the sensors do to a pose is taken off
+        # the readings are freed of what the sensors add, by the model
         self.rows = rows & np.isfinite(read).all(axis=1)
         self.poses = at.pose.copy()
         off = pose_difference(measured[self.rows], read[self.rows])
@@ -290,7 +293,7 @@ class _Forces:
         return self.base.terms.with_term(Term(self.layout, values))
 
     def displacements(self, values: Array) -> Array:
-        """(N,) displacements that would balance the forces, whitened; inf where there are none."""
+        """(N,) whitened displacements that would balance the forces; inf without a solution."""
         at = self._at(values)
         if at is None:
             return np.full(self.problem.n_readings, np.inf)
@@ -301,7 +304,7 @@ class _Forces:
         return self.problem.whiten(self.factor, table)
 
     def derivatives(self, values: Array) -> Array:
-        """(N, k) of the prediction by the effect's amplitudes, whitened; 0 where there is none."""
+        """(N, k) whitened derivatives by the effect's amplitudes; 0 without a solution."""
         at, terms = self._at(values), self.terms(values)
         wanted = np.flatnonzero(terms.own(self.layout.name))[~self.layout.shape].tolist()
         if at is None:
@@ -312,7 +315,7 @@ class _Forces:
         return self.problem.whiten(self.factor, rates)
 
     def _at(self, values: Array) -> Prediction | None:
-        """The model held at the measured poses; None where it has no answer there."""
+        """The model held at the measured poses; None if it has no solution there."""
         setup = self.base.experiment.setup(self.terms(values).effects)
         if setup.has_history:
             return None
@@ -322,7 +325,7 @@ class _Forces:
         start.deviation[:] = batch.deviations(tables, self.poses)
         found = batch.evaluate(tables, start)
         found.deviation[:] = start.deviation
-        # where a law has no answer the numbers are what was left of trying
+        # where a cable law has no solution, numbers of the last attempt are left in the arrays
         size = np.where(np.isfinite(found.hessian), np.abs(found.hessian), np.inf)
         broken = (found.outcome != CONVERGED) | (size.max(axis=(1, 2)) > _ABSURD)
         if np.any(broken & self.rows):
@@ -333,7 +336,7 @@ class _Forces:
 
 
 def _damped_inverse(stiffness: Array) -> Array:
-    """(K^2 + mu^2)^-1 K: what is soft or pushes away at the measured pose is not followed far."""
+    """(K^2 + mu^2)^-1 K: keeps displacements small in soft or unstable directions."""
     power, vectors = np.linalg.eigh(stiffness)
     soft = _SOFT * np.max(np.abs(power), axis=1, keepdims=True)
     damped = power / np.maximum(power**2 + soft**2, 1e-300)

@@ -1,4 +1,4 @@
-"""A model at given values on a problem: predicted, compared, and its derivatives."""
+"""A model at given values: its predictions for a problem, their residuals and derivatives."""
 
 from __future__ import annotations
 
@@ -15,25 +15,26 @@ from seecr.pose import Array
 from seecr.prediction.experiment import Experiment, Prediction
 from seecr.prediction.parted import rates
 
-# A row is far off beyond this mean square of its whitened residuals; only where few rows are
-# (this part of all), it may be that they rest in another equilibrium.
+# A row is far off if the mean square of its whitened residuals exceeds _FAR_OFF. It may then rest
+# in another equilibrium, but only if no more than _FEW_ROWS of all rows are far off.
 _FAR_OFF, _FEW_ROWS = 25.0, 0.25
 
 
 @dataclass(eq=False)
 class State:
-    """A model at given values on a problem.
+    """A model at given values, compared with the data of a problem.
 
     Attributes:
         terms: the effects with their values.
-        prediction: of all rows; where commanded lengths are noisy, with their likeliest errors.
-        raw: (n, 6 + m) residuals of the commanded lengths in their units, NaN where not read.
-        table: (n, 6 + m) the same in units of their noise.
-        white: (N,) those that count.
+        prediction: prediction of all rows; if commanded lengths are noisy, at their most likely
+            errors.
+        raw: (n, 6 + m) residuals at the commanded lengths, in SI units; NaN where nothing was read.
+        table: (n, 6 + m) whitened residuals.
+        white: (N,) whitened residuals that count.
         factor: (n, 6 + m, 6 + m) Cholesky factors of the noise.
-        chi2: sum of squares of ``white``; inf where a counted row was not solved.
-        log_det: log determinant of the counted rows' noise, less that of the readings alone.
-        experiment: with the likeliest length errors.
+        chi2: sum of squares of ``white``; inf if a counted row was not solved.
+        log_det: log determinant of the counted rows' noise over that of the readings alone.
+        experiment: the commands with the most likely length errors.
     """
 
     terms: Terms
@@ -52,21 +53,21 @@ class State:
         return bool(np.isfinite(self.chi2))
 
     def of(self, terms: Terms) -> State:
-        """The same state seen as that of other terms (some more, at null)."""
+        """The same state, as that of other terms (usually some more, at their null values)."""
         return replace(self, terms=terms)
 
 
 def evaluate(problem: Problem, terms: Terms, factor: Array, near: State | None = None) -> State:
-    """Predict with the terms and compare.
+    """Predict with the terms, and compare with the readings.
 
-    Where commanded lengths are noisy, the errors they most likely had are found row by row
-    (Gauss-Newton on errors in variables), and the noise is propagated there: cables that go
-    slack at the commanded lengths may well have been taut at the true ones.
+    If commanded lengths are noisy, their most likely errors are found row by row (Gauss-Newton on
+    errors in variables), and the noise is propagated from there: a cable that is slack at the
+    commanded length may have been taut at the true one.
 
     Args:
         problem: readings and noise.
         terms: effects with values.
-        factor: :meth:`Problem.noise`; used as it is where commanded lengths are exact.
+        factor: :meth:`Problem.noise`; only used if commanded lengths are exact.
         near: a state to start from.
     """
     effects = terms.effects
@@ -84,10 +85,11 @@ def evaluate(problem: Problem, terms: Terms, factor: Array, near: State | None =
 
 
 def _on_measured_branch(problem: Problem, state: State) -> State:
-    """Where a few rows are far off, take the equilibrium nearest to the measured pose.
+    """If a few rows are far off, move them to the equilibrium nearest to the measured pose.
 
-    A platform with slack cables can have several stable equilibria. Which one the robot came to
-    rest in is what the reading says; the model has only to have it.
+    With slack cables a platform can have several stable equilibria. The reading tells in which of
+    them the robot came to rest; the model only has to contain it. Models with history or users'
+    cable laws, platforms on joints and data without quaternions are left as they are.
     """
     data, at = problem.data, state.prediction
     if data.quat_wxyz is None or at.has_history or at.setup.laws or problem.robot.joints:
@@ -138,10 +140,10 @@ def _compared(
 
 
 def _as_likely(problem: Problem, state: State, cost: Array) -> State:
-    """The state with each row's residuals as large as its likeliest errors really leave them.
+    """The state with residuals scaled up to the true cost of each row's most likely errors.
 
-    Beyond the length at which a cable goes slack straight lines promise less than any errors give,
-    and a fit would go where they promise most.
+    If a cable goes slack, the linearised residuals promise a lower chi2 than any length errors
+    reach, and a fit would run to where they promise most.
     """
     promised = np.nansum(state.table**2, axis=1)
     more = np.where(np.isfinite(cost) & (promised > 0.0), cost / np.maximum(promised, 1e-300), 1.0)
@@ -157,31 +159,31 @@ def derivatives(
     columns: Sequence[int] = (),
     frozen: bool = False,
 ) -> Array:
-    """Whitened derivative of the prediction by the terms' parameters, (N, p)."""
+    """(N, p) whitened derivatives of the prediction by the terms' parameters."""
     change = rates(state.experiment, state.terms, state.prediction, columns, frozen)
     return problem.whiten(state.factor, problem.as_read(change, state.prediction.readings))
 
 
-# Rounds of finding the likeliest errors: afresh, and from a state nearby.
+# Rounds of the search for the most likely length errors: from scratch, and from a nearby state.
 _ROUNDS, _ROUNDS_NEAR = 8, 3
 
 
 def with_length_errors(
     problem: Problem, effects: Sequence[Effect], errors: Array | None, near: Prediction | None
 ) -> Rows:
-    """The rows with the likeliest errors of their lengths, and the noise about them.
+    """The rows with the most likely errors of their lengths, and the noise about these.
 
     Args:
         problem: readings and noise, that of lengths included.
-        effects: of the model.
-        errors: (n, m) [m] to start from, or None.
-        near: a prediction to start from, or None: then more rounds are made.
+        effects: effects of the model.
+        errors: (n, m) [m] errors to start from, or None.
+        near: a prediction to start from; without one, more rounds are made.
     """
     spread = problem.length_sigma
     if errors is None:
         errors = np.zeros((problem.data.n_rows, problem.data.n_cables))
     here = Rows.predicted(problem, effects, errors, near)
-    share = np.ones(len(errors))  # of the full step, a row
+    share = np.ones(len(errors))  # length of each row's step, as a fraction of the full one
     together = True
     for _ in range(_ROUNDS if near is None else _ROUNDS_NEAR):
         step = here.better_errors(problem, spread) - here.length_errors
@@ -202,7 +204,7 @@ def with_length_errors(
 
 @dataclass(eq=False)
 class Rows:
-    """Rows with given errors of their lengths, and what the readings say of them."""
+    """Rows with given errors of their lengths, and their residuals."""
 
     length_errors: Array
     prediction: Prediction
@@ -221,7 +223,7 @@ class Rows:
         return cls(errors, at, at.solved, raw, rate, problem.noise_about(rate))
 
     def with_rows(self, other: Rows, rows: NDArray[np.bool_]) -> Rows:
-        """The same with some rows of another; with history, the prediction is only near that."""
+        """These rows, some replaced by another's; with history, the prediction is approximate."""
 
         def mixed(mine: Array, theirs: Array) -> Array:
             return np.where(rows.reshape(-1, *[1] * (mine.ndim - 1)), theirs, mine)
@@ -244,11 +246,11 @@ class Rows:
         return np.where(self.solved, cost, np.inf)
 
     def linear_raw(self) -> Array:
-        """Residuals as they would be at the commanded lengths, to first order."""
+        """Residuals at the commanded lengths, to first order."""
         return self.raw + (self.rate @ self.length_errors[..., None])[..., 0]
 
     def better_errors(self, problem: Problem, spread: Array) -> Array:
-        """Errors of the lengths (n, m) that the readings make likeliest, to first order."""
+        """Most likely errors of the lengths (n, m) given the readings, to first order."""
         read = np.where(problem.measured, self.linear_raw(), 0.0)[..., None]
         white = np.linalg.solve(self.factor, np.concatenate([read, self.rate], axis=2))
         along = np.swapaxes(white[..., 1:], 1, 2) @ white[..., :1]

@@ -1,9 +1,8 @@
-"""How far fitted values would move if another effect were missing: the error of what is left out.
+"""How far fitted values would move if another effect were in the model (omitted-variable bias).
 
-Where a fit leaves structure, something else acts, and what it has in common with the fitted
-effects is in their values already. How much that may be is told by the effects of the catalogue:
-each is added to the linear model about the fit, and those that explain most of what is left say
-how far the values move with them.
+If a fit leaves structure, something else acts, and the fitted values have absorbed what it has in
+common with them. The catalogue shows how much that may be: each effect is added to the model
+linearised about the fit, and those that explain most of the remainder tell how far the values move.
 """
 
 from __future__ import annotations
@@ -17,20 +16,22 @@ from crosscheck.fit.problem import Problem
 from crosscheck.fit.starts import amplitude_columns
 from seecr.pose import Array
 
-# Effects count that explain at least this part of what the best of them explains.
+# An effect counts if it explains more than this part of what the best one explains.
 _AS_MUCH = 0.5
 
 
 def moved_by_others(problem: Problem, found: Fit) -> Array:
-    """How far each value would move with another effect that explains much of what is left.
+    """How far each value moves when an effect is added that explains much of the remainder.
+
+    Effects with several shapes are only tried at the first one.
 
     Args:
         problem: the data.
         found: a fit that leaves more than noise.
 
     Returns:
-        (p,) the largest move among such effects, in the values' units; 0 for fixed values and
-        those on a bound.
+        (p,) the largest move among such effects, in the values' units; 0 for values that are fixed
+        or on a bound.
     """
     falls, moves = [], []
     for candidate in candidates_for(problem):
@@ -49,7 +50,7 @@ def moved_by_others(problem: Problem, found: Fit) -> Array:
 
 
 def _with_columns(found: Fit, columns: Array) -> tuple[float, Array]:
-    """Fall of chi2 with more columns (N, k) in the linear model, and the moves (p,) of z."""
+    """Fall of the linear model's chi2 with more columns (N, k), and the moves (p,) of z."""
     known, p = known_readings(found.terms)[0], len(found.terms)
     stays = found.at_bound | found.terms.knowledge.fixed
     x = np.concatenate([found.jacobian * ~stays, columns], axis=1)

@@ -1,12 +1,12 @@
-"""Long logs of a robot that moves slowly: a search takes some of the rows, and tells of the others.
+"""Thins long logs of a slow robot for the search, and tests the result on the other rows.
 
-Rows read every few millimetres say little that every tenth of them does not, and a search through
-the catalogue takes minutes and gigabytes for each ten thousand. So rows are taken at even steps
-along each run, and those at which a cable turns round: what depends on the way (friction,
-backlash) depends on where lengths turn. Where they turn at nearly every row, the poses are in no
-order, and the first rows of each run are taken: the way to these is as it was.
+Rows that were read every few millimetres say little more than every tenth of them, but a search
+through the catalogue takes minutes and gigabytes for each ten thousand. So rows are taken at even
+steps along each run, together with those at which a cable reverses, because friction and backlash
+depend on where lengths turn. If too many rows are reversals, the poses are in no order; then the
+first rows of each run are taken, so that the way to them is unchanged.
 
-The rows that were not taken are rows that no fit has seen.
+The rows that were not taken are held out: no fit has seen them.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from seecr.counted import counted
 from seecr.description.robot import Robot
 from seecr.effects import Terms
 
-MOST = 2000
-"""Of more rows than this, about so many are searched."""
+MOST = 1500
+"""If there are more rows than this, between half as many and so many of them are searched."""
 
-# A cable turns round where its length goes back by this part of its range.
+# A cable reverses where its length goes back by this part of its range.
 _TURN = 1e-3
-# Rows whose error is so many times that in the middle are no part of what is told.
+# Rows with more than so many times the median error are left out of the stated rms.
 _FAR = 10.0
 
 
@@ -38,9 +38,9 @@ class Thinned:
     """Measurements for a search.
 
     Attributes:
-        robot: measured. whole: all that was measured.
-        data: the rows that are searched. others: (n,) bool, rows of ``whole`` that were read and
-            are not among them.
+        robot: the robot that was measured. whole: all measurements.
+        data: the rows that are searched.
+        others: (n,) bool, rows of ``whole`` that were read and are not searched.
     """
 
     robot: Robot
@@ -49,7 +49,7 @@ class Thinned:
     others: NDArray[np.bool_]
 
     def note_on_others(self, terms: Terms, sigma: Sigma) -> tuple[str, ...]:
-        """How well a model predicts the rows that it was not fitted to; nothing where none are.
+        """How well a model predicts the rows that were held out; empty if there are none.
 
         Args:
             terms: the model. sigma: the noise that was assumed.
@@ -73,12 +73,12 @@ class Thinned:
 
 
 def thinned(robot: Robot, data: Measurements, most: int = MOST) -> Thinned:
-    """The rows that a search takes.
+    """Choose the rows for a search.
 
     Args:
-        robot: measured.
-        data: of which all rows are taken where no more than ``most`` were read.
-        most: about how many are taken of others.
+        robot: the robot that was measured.
+        data: its measurements; all rows are taken if no more than ``most`` were read.
+        most: otherwise between half as many and so many are taken, and the rows at reversals.
     """
     read = data.read
     every = -(-int(read.sum()) // most)
@@ -102,14 +102,14 @@ def thinned(robot: Robot, data: Measurements, most: int = MOST) -> Thinned:
 
 
 def _place_in_run(data: Measurements) -> NDArray[np.int64]:
-    """(n,) number of each row in its run."""
+    """(n,) number of each row within its run."""
     index = np.arange(data.n_rows)
     begins = np.append(True, data.run[1:] != data.run[:-1])
     return index - np.maximum.accumulate(np.where(begins, index, 0))
 
 
 def _turns(robot: Robot, data: Measurements) -> NDArray[np.bool_]:
-    """(n,) rows at which the length of a cable turns round, or loads change, and the row before."""
+    """(n,) rows at which a cable reverses or the load changes, and the row before such a change."""
     commands = data.as_commands(robot)
     told = commands.change(robot)
     turns = np.zeros(data.n_rows, dtype=bool)

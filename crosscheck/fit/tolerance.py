@@ -1,7 +1,7 @@
-"""Importance beside significance: how large is what is left beyond noise, and does it matter?
+"""Importance beside significance: how large is the remainder beyond noise, and does it matter?
 
-Many rows show structure that is a few hundredths of the noise. It counts as missing where it
-matters: above a tolerance that the user states, else above half the noise.
+With many rows, structure of a few hundredths of the noise is significant. It only counts as missing
+if it matters: above a tolerance that the user states, or else above half the noise.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from crosscheck.units import SI, parse_kind
 
 __all__ = ["HALF_THE_NOISE", "LeftOver", "Tolerance", "doubt_of", "left_over"]
 
-# What is smaller than this part of the noise does not matter, where nobody says what does.
+# Without a stated tolerance, what is smaller than this part of the noise does not matter.
 _PART = 0.5
-# The size of the noise is known to so many standard errors of the mean square.
+# Chance may add so many standard errors to the mean square of the noise.
 _DOUBT = 2.0
 
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How large an error that noise does not explain has to be to matter; rms, by kind.
+    """How large an error beyond noise must be to matter, as rms by kind of reading.
 
     Attributes:
-        position_m, orientation_rad, tension_N: None where half the noise is the limit.
+        position_m, orientation_rad, tension_N: None for half the noise.
     """
 
     position_m: float | None = None
@@ -40,10 +40,10 @@ class Tolerance:
 
     @classmethod
     def parsed(cls, texts: Iterable[str]) -> Tolerance:
-        """From quantities such as ``0.1mm``, ``0.05deg`` and ``1N``; the unit says the kind.
+        """Parse quantities such as ``0.1mm``, ``0.05deg`` and ``1N``; the unit tells the kind.
 
         Raises:
-            CrosscheckError: no quantity, one in another unit, or two of a kind.
+            CrosscheckError: a text is no quantity, has another unit, or repeats a kind.
         """
         values: dict[str, float] = {}
         for text in texts:
@@ -56,7 +56,7 @@ class Tolerance:
 
 
 HALF_THE_NOISE = Tolerance()
-"""What matters where nobody says it."""
+"""The tolerance if the user states none."""
 
 
 @dataclass(frozen=True)
@@ -64,10 +64,10 @@ class LeftOver:
     """What a model leaves that noise does not explain.
 
     Attributes:
-        size: its rms by kind, keys as in :class:`crosscheck.fit.problem.Kind`; 0 where noise
+        size: rms by kind, with the keys of :class:`crosscheck.fit.problem.Kind`; 0 if noise
             explains all, None where nothing was read.
-        limit: from where on it matters; None where nobody said it and the noise is not stated.
-        important: whether it does, for some kind with a limit.
+        limit: from where on it matters; None if neither tolerance nor noise was stated.
+        important: whether the size exceeds the limit for some kind, by more than chance.
     """
 
     size: Rms
@@ -76,12 +76,12 @@ class LeftOver:
 
     @property
     def undecided(self) -> bool:
-        """Whether nothing says what would matter, for some kind that was read."""
+        """Whether some kind that was read has no limit."""
         return any(self.limit[key] is None for key, size in self.size.items() if size is not None)
 
     @property
     def words(self) -> str:
-        """How large it is and what would matter, in a few words."""
+        """The size and the limit, in a few words."""
         matters = rms_words(self.limit) or "not stated, see --tolerance"
         return f"{rms_words(self.size)} (what matters: {matters})"
 
@@ -97,14 +97,14 @@ def left_over(
     stated: Sigma,
     doubt: Mapping[str, float] | None = None,
 ) -> LeftOver:
-    """What errors are beyond the noise, and whether that matters.
+    """How far errors exceed the noise, and whether that matters.
 
     Args:
-        rms: of what the model leaves, by kind. noise: what noise alone would leave.
-        tolerance: what the user said.
-        stated: the noise that the user stated. Noise that was estimated holds some of what is
-            left, and half of it says nothing of what matters.
-        doubt: by kind, the relative standard error of a mean square of noise; see
+        rms: errors of the model, by kind. noise: what noise alone would leave.
+        tolerance: the user's tolerance.
+        stated: the noise that the user stated. Estimated noise sets no limit, because it may
+            contain some of the remainder.
+        doubt: by kind, the relative standard error of a mean square of noise, see
             :func:`doubt_of`. What chance may add to the noise does not count as important.
     """
     size: Rms = {}
@@ -128,8 +128,8 @@ def left_over(
 def doubt_of(problem: Problem, correlation: float = 0.0) -> dict[str, float]:
     """By kind, the relative standard error of the mean square of its noise.
 
-    Of n readings, sqrt(2/n); along a run with the correlation rho from one to the next they
-    count for n (1 - rho^2)/(1 + rho^2) (Bartlett 1946).
+    It is sqrt(2/n) for n readings. With a correlation rho between successive rows, they count for
+    n (1 - rho^2)/(1 + rho^2) (Bartlett 1946).
     """
     rho2 = float(np.clip(correlation, 0.0, 0.98)) ** 2
     counts = {kind.key: int(problem.counted[:, kind.columns].sum()) for kind in KINDS}

@@ -1,4 +1,4 @@
-"""Noise that nobody stated, from what no model would explain."""
+"""Estimates noise that was not stated, from what no smooth model could explain."""
 
 from __future__ import annotations
 
@@ -12,26 +12,27 @@ from crosscheck.fit.smooth import monomials
 from seecr.pose import Array, rotvec_from_quat
 from seecr.prediction.experiment import Prediction
 
-# What is left over the estimated noise, below which the estimate was wrong.
+# An estimate was wrong if the rms of the remainder is less than this part of it.
 _TOO_LARGE = 0.5
 # A third difference takes so many rows.
 _ROWS = 4
-# A shape that is fitted to residuals takes so many rows.
+# Least number of rows for each shape that is fitted to residuals.
 _EACH = 1.5
-# An estimate that is smaller than another by less than this is no better.
+# A later estimate replaces an earlier one only if it is less than this part of it.
 _MUCH = 0.7
 
 
 def estimate_sigma(problem: Problem, at: Prediction) -> tuple[Problem, tuple[str, ...]]:
-    """Fill in noise that nobody stated.
+    """Fill in noise that was not stated.
 
-    Third differences of residuals along a run hold almost none of a smooth model error but
-    all of the noise (times sqrt(20)); the median keeps jumps out. Rows in no order have no
-    neighbours along a run: what a cubic of the pose leaves of the residuals is the noise there.
-    Where there are too few rows for either, the residuals themselves are taken for it.
+    Third differences of residuals along a run contain almost nothing of a smooth model error, but
+    all of the noise (times sqrt(20)); the median ignores jumps. If rows are in no order they have
+    no neighbours along a run, so a second estimate is what a cubic in the pose (or a quadratic or
+    plane, if rows are few) leaves of the residuals. It is taken if it is clearly smaller. With too
+    few rows for either, the residuals themselves count as noise.
 
     Args:
-        problem: the data. at: what the model as it stands says of them.
+        problem: the data. at: the prediction of the model as it stands.
     """
     sigma, notes, raw = problem.sigma, [], problem.residuals(at.readings)
     shapes = _shapes(problem, at)
@@ -59,7 +60,7 @@ def estimate_sigma(problem: Problem, at: Prediction) -> tuple[Problem, tuple[str
 
 
 def _best(sizes: Mapping[str, float]) -> str | None:
-    """The smallest; of two that are much the same the first, which assumes less."""
+    """The smallest; of two similar ones the first, which assumes less."""
     best = None
     for how, size in sizes.items():
         if best is None or size < _MUCH * sizes[best]:
@@ -68,12 +69,12 @@ def _best(sizes: Mapping[str, float]) -> str | None:
 
 
 def overestimated(problem: Problem, left: Rms) -> list[str]:
-    """Noise that was estimated, and is larger than all that is left, a sentence each.
+    """A sentence for each noise that was estimated too large: the remainder is much smaller.
 
-    Between rows that are far apart a large model error differs as noise does.
+    Between rows that are far apart, a large model error differs as noise does.
 
     Args:
-        problem: with its noise. left: rms of what is left, by kind.
+        problem: the data with their noise. left: rms of the residuals, by kind.
     """
     out = []
     for kind in kinds_read(problem):
@@ -88,9 +89,9 @@ def overestimated(problem: Problem, left: Rms) -> list[str]:
 
 
 def _differences(problem: Problem, raw: Array) -> Array | None:
-    """Third differences of residuals (n, k) along the runs, as noise; None where runs are short.
+    """Third differences of residuals (n, k) along runs, scaled to noise; None if runs are short.
 
-    Of each channel between rows where it was read.
+    Differences of each channel are between the rows where it was read.
     """
     index = problem.data.run_index
     parts = [
@@ -103,7 +104,7 @@ def _differences(problem: Problem, raw: Array) -> Array | None:
 
 
 def _shapes(problem: Problem, at: Prediction) -> Array | None:
-    """(n, k) monomials of the pose, and a step for each load; None where rows are too few."""
+    """(n, k) monomials of the pose, and a step for each load; None if there are too few rows."""
     commands, rows = problem.experiment.commands, int(problem.use.sum())
     place = at.pose[:, :3]
     if commands.lengths is None:
@@ -122,7 +123,7 @@ def _shapes(problem: Problem, at: Prediction) -> Array | None:
 
 
 def _beside(problem: Problem, raw: Array, shapes: Array | None) -> Array | None:
-    """What some shapes (n, k) leave of residuals (n, c), as noise; None where rows are too few."""
+    """What shapes (n, k) leave of residuals (n, c), scaled to noise; None if rows are too few."""
     if shapes is None:
         return None
     out = np.full(raw.shape, np.nan)
@@ -138,12 +139,12 @@ def _beside(problem: Problem, raw: Array, shapes: Array | None) -> Array | None:
 
 
 def _enough(rows: int, shapes: Array) -> bool:
-    """Whether so many rows leave noise beside shapes (n, k) that are fitted to them."""
+    """Whether so many rows leave enough noise beside shapes (n, k) that are fitted to them."""
     count = int(shapes.shape[1])
     return rows >= max(_EACH * count, count + _ROWS)
 
 
 def _size(values: Array) -> float:
-    """The standard deviation of normal noise of which these are some; outliers do not count."""
+    """Robust standard deviation of normal noise, by the median of its absolute values."""
     every = np.abs(values[np.isfinite(values)])
     return max(float(np.median(every)) / 0.6745, 1e-12) if len(every) else 1.0

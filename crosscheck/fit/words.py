@@ -1,4 +1,4 @@
-"""Errors and fitted values as people read them, and as rows of a data frame."""
+"""Errors and fitted values in words, and as records for a data frame."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ def rms_words(rms: Rms) -> str:
 
 
 def shown(value: float, unit: str) -> str:
-    """A number with its unit as people read it."""
+    """A number with its unit, as people read it."""
     factor, word = in_unit(unit)
     return f"{factor * value:.4g} {word}".strip()
 
 
 def belongs(key: str, name: str, unit: str) -> bool:
-    """Whether a parameter, such as ``gain_3``, is of an effect's field with that unit."""
+    """Whether a parameter, such as ``gain_3``, belongs to an effect's field with that unit."""
     stem = key.removesuffix(f"_{unit}") if unit else key
     return stem == name or (stem.startswith(f"{name}_") and len(stem) > len(name) + 1)
 
@@ -50,7 +50,7 @@ def value_lines(
 
 
 def measured(value: float, error: float, unit: str) -> str:
-    """A value with its standard error to the digits that are known, such as 8.369 ± 0.013 mm."""
+    """A value with its standard error, to the digits that are known: 8.369 ± 0.013 mm."""
     if not np.isfinite(error):
         return f"{shown(value, unit)} not seen by these data"
     if error == 0.0:
@@ -63,7 +63,7 @@ def measured(value: float, error: float, unit: str) -> str:
 def value_records(
     layout: Layout, values: Array, stderr: Array, at_bound: NDArray[np.bool_]
 ) -> Iterator[Record]:
-    """A record for each parameter (p,) of an effect, in SI; None where the data see nothing."""
+    """A record for each parameter (p,) of an effect, SI; ``stderr`` None if unidentifiable."""
     for name, unit, value, error, bound in zip(
         layout.names, layout.units, values, stderr, at_bound, strict=True
     ):
@@ -88,7 +88,7 @@ def fitted_lines(fitted: Iterable[Fitted]) -> list[str]:
 
 
 def fitted_records(fitted: Iterable[Fitted]) -> list[Record]:
-    """A record for each of their parameters: value and standard error, SI."""
+    """A record for each parameter of effects that were fitted together: value, error, SI."""
     return [
         record
         for one in fitted

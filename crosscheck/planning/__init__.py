@@ -1,4 +1,4 @@
-"""What measurements would show, before they are made."""
+"""Predicts what measurements would show before they are made."""
 
 from __future__ import annotations
 

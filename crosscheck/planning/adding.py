@@ -1,4 +1,4 @@
-"""Measurements that could be added: of what kind, in which words, as which plan."""
+"""The kinds of measurements that could be added, each with words and a plan of its readings."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ NO_LIMITS: Limits = (0.0, np.inf)
 
 
 class Adding(StrEnum):
-    """What can be added to measurements, in the words of ``plan.json``."""
+    """Kinds of measurements that could be added, in the words of ``plan.json``."""
 
     TENSIONS = "tensions"
     POSE = "pose"
@@ -36,7 +36,7 @@ class Extension:
 
     Attributes:
         kind: what is added. words: what to do. plan: the added readings.
-        poses: (k, 7) commanded, for added poses.
+        poses: (k, 7) commanded poses, if poses are added.
     """
 
     kind: Adding
@@ -48,7 +48,7 @@ class Extension:
 def like(
     plan: Planned, data: Measurements, reads: Reads | None = None, sigma: Sigma | None = None
 ) -> Planned:
-    """Other rows, other sensors; all else as in the plan."""
+    """A plan with other rows or sensors, everything else unchanged."""
     return planned(
         plan.problem.robot, data, sigma or plan.problem.sigma, reads or plan.reads,
         plan.base.terms,

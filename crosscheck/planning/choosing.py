@@ -1,4 +1,4 @@
-"""Poses to measure, from nothing but a robot: those that tell most, in runs."""
+"""Chooses poses to measure for a robot, those that tell most, and arranges them in runs."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from seecr.description.joints import pose_of_values
 from seecr.description.robot import Robot
 from seecr.pose import Array
 
-# Candidates along x, y, z, or so many random ones on joints, and most of them that are weighed.
+# Candidates along x, y, z; number of random ones for joints; most candidates that are evaluated.
 _GRID, _JOINT_POSES, _MOST = (6, 6, 4), 400, 240
-# Parts of the room between the exit points that are left free at the sides and at the top, and
-# how far joints turn [rad].
+# Parts of the space between the exit points that are kept free at the sides and at the top, and how
+# far joints turn [rad].
 _SIDE, _TOP, _TURN = 0.15, 0.15, 0.2
-# How far below home robots go whose exit points are all above, over the way above home.
+# If all exit points are above home: how far below home poses go, relative to the height above it.
 _BELOW = 0.25
-# An effect is to be told from so many others, those that are most like it.
+# An effect should be told from so many others, those that are most like it.
 _RIVALS = 3
-# Candidates that each step of the choice tries.
+# Number of candidates that each step of the choice tries.
 _SAMPLE = 40
-# Rows of a run, and least runs: diagnoses leave one out after the other.
+# Rows of a run, and least number of runs: diagnoses hold out one after the other.
 _ROWS_A_RUN, _LEAST_RUNS = 12, 3
 
 
@@ -51,19 +51,19 @@ def choose_poses(
     """Choose poses to measure: those that together show and tell apart most effects.
 
     Args:
-        robot: as described, or its MJCF.
-        rows: how many.
-        sigma: noise to expect; that of good sensors without.
+        robot: a robot, or its MJCF file.
+        rows: number of poses.
+        sigma: expected noise; by default that of good sensors.
         reads: kinds of readings there will be; see :func:`make_plan`.
         limits: lowest and highest tension [N].
-        box: (2, 3) [m] lowest and highest position; inside the exit points without.
-        progress: called with what is being done and the part of it that is done.
+        box: (2, 3) [m] lowest and highest position; by default inside the exit points.
+        progress: called with what is being done and the fraction that is done.
 
     Returns:
-        commands, in runs that go from each pose to one nearby.
+        Commands, in runs that go from each pose to one nearby.
 
     Raises:
-        CrosscheckError: too few poses at which the robot holds still within the limits.
+        CrosscheckError: the robot can hold too few poses within the limits.
     """
     robot = robot_of(robot)
     progress("looking for poses", 0.0)
@@ -74,7 +74,7 @@ def choose_poses(
     if robot.n_cables >= robot.n_dof:
         plan = _usable(robot, held_within(robot, tried, limits), full, channels, limits)
         found = 0 if plan is None else plan.problem.data.n_rows
-    if robot.n_cables <= robot.n_dof and found < rows:  # few cables hold little, but rest near it
+    if robot.n_cables <= robot.n_dof and found < rows:  # few cables hold little, but rest nearby
         plan = _usable(robot, tried, full, channels, limits)
         found = 0 if plan is None else plan.problem.data.n_rows
     if plan is None or found < rows:
@@ -113,7 +113,7 @@ def _candidates(robot: Robot, box: Array | None) -> Array:
 
 
 def _room(robot: Robot) -> tuple[Array, Array]:
-    """Inside the exit points; as low as these, or below home by a part of the way above it."""
+    """A box inside the exit points; if these are all above home, it begins a little below home."""
     low, high = robot.exit_points.min(axis=0), robot.exit_points.max(axis=0)
     home, span = robot.reference_pose[:3], high - low
     inner_low, inner_high = low + _SIDE * span, high - _SIDE * span
@@ -136,7 +136,7 @@ def _usable(
     kept = np.flatnonzero(good)
     if len(kept) == 0:
         return None
-    # spread over all of them: their order is that of the grid
+    # a selection spread over all of them, as they are in the order of the grid
     kept = kept[np.unique(np.linspace(0, len(kept) - 1, min(_MOST, len(kept))).astype(int))]
     return _plan(robot, poses[kept], sigma, reads)
 
@@ -150,7 +150,7 @@ def _plan(robot: Robot, poses: Array, sigma: Sigma, reads: Reads) -> Planned:
 
 
 def _wanted(there: dict[str, Signal]) -> list[Wanted]:
-    """Each effect that all poses together show, and those most like it."""
+    """Each effect that all poses together show, and the effects that are most like it."""
     out = []
     for name, found in all_visible(there).items():
         if not found.visible:
@@ -167,7 +167,7 @@ def _wanted(there: dict[str, Signal]) -> list[Wanted]:
 
 
 def _way(robot: Robot, poses: Array) -> NDArray[np.int64]:
-    """An order in which each pose is followed by the nearest that is left."""
+    """An order in which each pose is followed by the nearest one that is left."""
     at, left, out = robot.reference_pose[:3], list(range(len(poses))), []
     while left:
         nearest = min(left, key=lambda k: float(np.linalg.norm(poses[k, :3] - at)))

@@ -1,4 +1,4 @@
-"""Before measuring: what planned poses will be able to show, and what to add to them."""
+"""What planned poses will be able to show, and which measurements to add to them."""
 
 from __future__ import annotations
 
@@ -40,21 +40,21 @@ def make_plan(
     reads: Collection[str] = (),
     limits: Limits = NO_LIMITS,
 ) -> Plan:
-    """What planned commands will show of each effect.
+    """Predict what planned commands will show of each effect.
 
     Args:
-        robot: as described, or its MJCF.
-        commands: planned poses (n, 7), or a file of poses or lengths, or as read from it; readings
-            in it are ignored.
-        sigma: noise to expect; the commands' own by default.
-        progress: called with what is being done and the part of it that is done.
+        robot: a robot, or its MJCF file.
+        commands: planned poses (n, 7), or a file of poses or lengths, or what was read from it;
+            readings in it are ignored.
+        sigma: expected noise; by default that of the commands.
+        progress: called with what is being done and the fraction that is done.
         reads: kinds of readings there will be, of "position", "orientation" and "tension"; by
-            default the pose, and tensions where their noise is stated.
+            default the pose, and tensions if their noise is stated.
         limits: lowest and highest tension [N] of poses that are proposed.
 
     Raises:
-        CrosscheckError: an unknown kind of reading.
-        InputError: no commands.
+        CrosscheckError: there is an unknown kind of reading.
+        InputError: there are no commands.
     """
     robot = robot_of(robot)
     commands = commands_of(commands, robot)
@@ -112,7 +112,7 @@ def _confusion(own: Mapping[str, Signal]) -> tuple[tuple[str, ...], Array]:
 def _wanted(own: Mapping[str, Signal], effects: Mapping[str, Visible]) -> list[Wanted]:
     """What these poses do not show or tell apart.
 
-    Exact twins count: poses never part them, but a payload or a sensor may.
+    Exact twins are included: no pose separates them, but a payload or a sensor may.
     """
     out = []
     for name, v in effects.items():

@@ -1,4 +1,4 @@
-"""Plans of their own that a robot's user can carry out besides: loads aside, poses from beyond."""
+"""Additional plans that a user can carry out: payloads off centre, poses reached from beyond."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from seecr.commands.loads import Loads
 from seecr.pose import Array
 from seecr.workspace.zones import feasible
 
-# A payload aside hangs so far off the centre of mass, over the widest distance of two anchor
-# points across; a way point lies so much of the way beyond a pose.
+# Distance of an off-centre payload from the centre of mass, relative to the widest horizontal
+# extent of the anchor points; distance of a way point beyond a pose, relative to the way to it.
 _ASIDE, _BEYOND_POSE = 0.25, 0.5
 
 
 def detours(plan: Planned) -> Iterator[Extension]:
-    """A payload aside, and each pose again from beyond it."""
+    """An off-centre payload, and each pose reached again from beyond it."""
     data = plan.problem.data.rows(plan.problem.use)
     yield from _aside(plan, data)
     yield from _way_points(plan, data)
@@ -45,7 +45,7 @@ def _aside(plan: Planned, data: Measurements) -> Iterator[Extension]:
 
 
 def _way_points(plan: Planned, data: Measurements) -> Iterator[Extension]:
-    """Each pose again from beyond it: a row without readings before each that has some."""
+    """Each pose again from beyond it, by a way point before each row that has readings."""
     beyond = _beyond(plan, data)
     if beyond is None or data.command_pose is None:
         return
@@ -57,7 +57,7 @@ def _way_points(plan: Planned, data: Measurements) -> Iterator[Extension]:
         run=named_again(both),
         t_s=None if data.t_s is None else _halfway(data.t_s),
         command_pose=np.stack([beyond, data.command_pose], axis=1).reshape(2 * n, 7),
-        # something is read at the stops and nothing between them; what, is the model's
+        # any number marks a stop as read; the readings themselves come from the model
         position=np.where(stops[:, None], np.zeros(3), np.nan),
         quat_wxyz=None,
         angles_rad=np.full((2 * n, 3), np.nan),
@@ -68,13 +68,13 @@ def _way_points(plan: Planned, data: Measurements) -> Iterator[Extension]:
 
 
 def _halfway(t_s: Array) -> Array:
-    """Times (2n,) [s] of a way point before each row, halfway from the row before it, and of it."""
+    """Times (2n,) [s] of each row and of a way point halfway between the row before and it."""
     before = np.concatenate([[t_s[0] - np.diff(t_s[:2], append=t_s[0])[0]], t_s[:-1]])
     return np.stack([np.minimum(0.5 * (before + t_s), t_s), t_s], axis=1).ravel()
 
 
 def _beyond(plan: Planned, data: Measurements) -> Array | None:
-    """Poses (n, 7) beyond each as it is come to, where the robot can hold; None where it cannot."""
+    """Poses (n, 7) beyond each pose in the direction of travel, where these can be held."""
     robot = plan.problem.robot
     if data.command_pose is None or robot.joints:
         return None

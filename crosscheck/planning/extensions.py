@@ -1,4 +1,4 @@
-"""What could be measured besides: sensors, a payload, the way back, more poses."""
+"""What could be measured in addition: sensors, a payload, the way back, more poses."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from crosscheck.planning.planned import (
 from seecr.commands.loads import Loads
 from seecr.description.robot import Robot
 
-# A known load, over the platform's mass.
+# A known payload, relative to the platform's mass.
 PAYLOAD = 0.25
 
 _AN_HOUR = 3600.0
 
 
 def extensions(plan: Planned, limits: Limits = NO_LIMITS) -> Iterator[Extension]:
-    """All that can be added to measurements made or planned, one after the other.
+    """All that can be added to measurements that were made or planned, one after the other.
 
     Args:
-        plan: what is read so far, about the model that predicts it.
+        plan: what is read so far, with the model that predicts it.
         limits: lowest and highest tension [N] of added poses.
     """
     ways = ~plan.problem.data.read & ~plan.unsolved
@@ -74,7 +74,7 @@ def _payload(plan: Planned, data: Measurements) -> Iterator[Extension]:
 
 
 def _heavier(data: Measurements, robot: Robot, mass: float) -> Loads:
-    """The rows' loads and a payload [kg] at the platform's centre of mass besides."""
+    """The rows' loads plus a payload [kg] at the platform's centre of mass."""
     here = data.loads or Loads.of(data.n_rows)
     total, centre = here.mass + mass, here.centre
     share = np.divide(here.mass, total, out=np.zeros_like(total), where=total != 0.0)[:, None]
@@ -91,7 +91,7 @@ def _way_back(plan: Planned, data: Measurements) -> Iterator[Extension]:
 
 
 def _later(plan: Planned, data: Measurements) -> Iterator[Extension]:
-    """All again after an hour, on the clock of each file; what creeps goes by that."""
+    """All rows again an hour later, on the clock of each file, as creep depends on the time."""
     if data.t_s is None:
         return
     n = data.n_rows
@@ -112,7 +112,7 @@ def named_again(data: Measurements) -> np.ndarray:
 
 
 def _backwards(data: Measurements) -> Measurements:
-    """Each run from its last row to its first, at the same pace."""
+    """Each run from its last row to its first, with the same times."""
     order = np.concatenate([np.flatnonzero(data.run == name)[::-1] for name in data.runs])
     turned = data.rows(order)
     return replace(turned, run=named_again(turned), t_s=data.t_s)

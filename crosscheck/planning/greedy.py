@@ -1,7 +1,8 @@
-"""Choose the poses that tell most: one after the other, each the best beside those before.
+"""Chooses the poses that tell most, one after the other, each the best beside those before.
 
-For an effect g and its imitator h the signal left over is tr(M_gg - M_gh M_hh^+ M_hg) with M the
-sum of J^T J over all readings (diagnosis: T-criterion), so a pose is tried by adding its own M.
+For an effect g and its imitator h, the signal that h cannot imitate is
+tr(M_gg - M_gh M_hh^+ M_hg), with M the sum of J^T J over all readings (the T-criterion of model
+discrimination). So a pose is tried by adding its own M.
 """
 
 from __future__ import annotations
@@ -15,17 +16,18 @@ from numpy.typing import NDArray
 from crosscheck.planning.visibility import Signal
 from seecr.pose import Array
 
-# Directions of M_hh this much weaker than the strongest are none (squares of columns).
+# Directions of M_hh (squares of columns) do not count if they are so much weaker than the best.
 _RANK = 1e-10
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """Something that readings do not show yet, or two effects that they do not tell apart.
+    """An effect that readings do not show yet, or two effects that they do not tell apart.
 
     Attributes:
-        effect: that is to show. other: what it is to be told from, "" where it is to be seen.
-        now: squared signal so far. needed: for a test to find it.
+        effect: the effect that should show. other: the one to tell it from; "" if it should only be
+            seen.
+        now: squared signal so far. needed: squared signal that a test finds.
     """
 
     effect: str
@@ -46,12 +48,12 @@ def chosen_poses(
 
     Args:
         own: signals in the readings planned so far.
-        there: the same effects' signals in the readings of all candidates.
-        row_of: (N,) candidate that each of those readings belongs to.
+        there: signals of the same effects in the readings of all candidates.
+        row_of: (N,) the candidate that each of those readings belongs to.
         pairs: what is not shown or told apart so far.
-        most: poses to choose.
-        sample: try so many candidates in each step, drawn anew; all without. Nearly as good, and
-            that much faster (Mirzasoleiman et al. 2015, Lazier than lazy greedy).
+        most: most poses to choose.
+        sample: how many candidates to try in each step, drawn anew; by default all. A sample is
+            nearly as good and much faster (Mirzasoleiman et al. 2015, Lazier than lazy greedy).
     """
     if not pairs:
         return []
@@ -66,7 +68,7 @@ def chosen_poses(
     score = _scores(total[None], part, pairs)[0]
     random = np.random.default_rng(0)
     for _ in range(min(most, len(candidates))):
-        # once each: a pose measured again tells nothing new
+        # each pose once: measuring it again tells nothing new
         left = np.flatnonzero(~np.isin(candidates, chosen))
         if sample is not None and len(left) > sample:
             left = random.choice(left, sample, replace=False)
@@ -92,7 +94,7 @@ def _gram(columns: Array) -> Array:
 
 
 def _scores(grams: Array, part: Mapping[str, slice], pairs: Sequence[Wanted]) -> Array:
-    """How far each candidate (k,) brings all pairs: mostly by what is needed, a little beyond."""
+    """Score of each candidate (k,): the sum over pairs of signal over needed, hardly beyond 1."""
     score = np.zeros(len(grams))
     inverse: dict[str, Array] = {}
     for want in pairs:

@@ -1,4 +1,4 @@
-"""Poses that could be measured: a grid with tilts, where the robot can hold still."""
+"""Poses that could be measured: a grid with tilts, as far as the robot can hold still there."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from seecr.description.robot import Robot
 from seecr.pose import Array, quat_from_rotvec, quat_multiply
 from seecr.workspace.zones import feasible
 
-# Candidate poses: steps along x, y, z, and how far out of the planned region they go.
+# Candidate poses along x, y, z, and how far they extend beyond the planned region.
 _GRID, _BEYOND = (4, 3, 3), 0.25
 _TILT_RAD = np.radians(10.0)
 _TILTS = np.array(
     [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1], [1, 1, 0], [0, 0, -1], [-1, 1, 0]]
 )
 _JOINT_POSES = 60
-# A pose with less than this part of the usual smallest stiffness is nearly free to move.
+# A pose is nearly free to move if its smallest stiffness is below this part of the usual one.
 _SOFT = 0.05
 
 
@@ -38,12 +38,12 @@ def more_poses(plan: Planned, limits: Limits = NO_LIMITS) -> Extension | None:
 
 
 def held_within(robot: Robot, poses: Array, limits: Limits = NO_LIMITS) -> Array:
-    """Those of poses (n, 7) at which tensions within limits balance the load."""
+    """The poses (n, 7) at which tensions within the limits balance the load."""
     return poses[feasible(robot, poses, lowest=limits[0], highest=limits[1])]
 
 
 def trustworthy(candidates: Planned, plan: Planned) -> np.ndarray:
-    """(n,) poses whose sensitivities can be relied on: solved, stiff, no cable about to switch."""
+    """(n,) poses with reliable sensitivities: solved, stiff, with no cable about to go slack."""
     usual = plan.base.state.prediction.solution().smallest_eigenvalue[plan.problem.use]
     own = candidates.base.state.prediction.solution().smallest_eigenvalue
     good = candidates.problem.use & (own > _SOFT * float(np.median(usual)))
@@ -97,14 +97,14 @@ def tilted_grid(robot: Robot, low: Array, high: Array, steps: tuple[int, int, in
 
 
 def _box(robot: Robot, place: Array) -> tuple[Array, Array]:
-    """The planned region and somewhat more, inside the exit points."""
+    """The planned region with a margin, inside the exit points."""
     exits_low, exits_high = robot.exit_points.min(axis=0), robot.exit_points.max(axis=0)
     low, high = place.min(axis=0), place.max(axis=0)
     room = np.maximum(exits_high - exits_low, 0.2 * float(np.max(exits_high - exits_low)))
     margin = _BEYOND * np.maximum(high - low, 0.2 * room)
     inside = 0.1 * (exits_high - exits_low)
     new_low, new_high = low - margin, high + margin
-    # sideways not beyond the exit points; upwards not into them
+    # at the sides no further than the exit points; upwards not up to them
     new_low[:2] = np.maximum(new_low[:2], np.minimum(exits_low[:2] + inside[:2], low[:2]))
     new_high[:2] = np.minimum(new_high[:2], np.maximum(exits_high[:2] - inside[:2], high[:2]))
     new_high[2] = min(new_high[2], max(exits_high[2] - 0.1 * room[2], high[2]))

@@ -1,4 +1,4 @@
-"""Measurements that nobody has made yet: planned commands with the noise to be expected."""
+"""Planned measurements: commands with the model's own predictions and expected noise."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from seecr.pose import Array, rxyz_from_quat
 from seecr.prediction.experiment import Experiment
 from seecr.workspace.zones import load_scale
 
-# Noise of a good tracker over the mean cable length (30 micrometres on a DemoBot), of its angles,
-# and of load cells over the mean tension.
+# Noise of a good tracker relative to the mean cable length (30 micrometres on a DemoBot), of its
+# angles, and of load cells relative to the mean tension.
 _POSITION, _ORIENTATION_RAD, LOAD_CELL = 6e-5, 3.5e-4, 0.01
-# A cable stretched or loose by less than this part of the usual stretch may switch.
+# A cable whose stretch or slack is less than this part of the usual stretch may switch.
 _NEAR_SLACK = 0.05
-# No load cell is better than this [N].
+# Smallest noise of a load cell [N].
 _LEAST_CELL = 1e-9
 READ = ("position", "orientation", "tension")
 """Kinds of readings."""
@@ -34,11 +34,11 @@ READ = ("position", "orientation", "tension")
 
 @dataclass(frozen=True, eq=False)
 class Reads:
-    """What is read of a pose.
+    """What is read at a pose.
 
     Attributes:
-        position: (3,) bool coordinates. orientation: whether as a whole.
-        angles: (3,) bool angles read by themselves. tensions: (m,) bool cables.
+        position: (3,) bool coordinates. orientation: whether all of it.
+        angles: (3,) bool single angles. tensions: (m,) bool cables.
     """
 
     position: NDArray[np.bool_]
@@ -48,22 +48,22 @@ class Reads:
 
     @classmethod
     def of(cls, data: Measurements) -> Reads:
-        """What measurements hold."""
+        """What some measurements contain."""
         whole = data.quat_wxyz is not None
         return cls(data.position_mask, whole, data.angle_mask, data.tension_mask)
 
     @classmethod
     def whole(cls, n_cables: int, pose: bool = True, tensions: bool = False) -> Reads:
-        """The whole pose, all tensions, or both."""
+        """The complete pose, all tensions, or both."""
         every = np.full(3, pose)
         return cls(every, pose, np.zeros(3, dtype=bool), np.full(n_cables, tensions))
 
     @classmethod
     def of_kinds(cls, n_cables: int, kinds: Collection[str]) -> Reads:
-        """Whole positions, orientations, tensions: those that are named.
+        """Complete positions, orientations and tensions, as far as they are named.
 
         Raises:
-            CrosscheckError: another word, or none.
+            CrosscheckError: a name is unknown, or there is none.
         """
         wrong = [kind for kind in kinds if kind not in READ]
         if wrong or not kinds:
@@ -75,23 +75,23 @@ class Reads:
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """Names of what is read."""
+        """Names of the kinds of readings."""
         there = (self.position.any(), self.orientation or self.angles.any(), self.tensions.any())
         return tuple(kind for kind, some in zip(READ, there, strict=True) if some)
 
     @property
     def whole_pose(self) -> bool:
-        """Whether nothing of the pose is left to read."""
+        """Whether the complete pose is read."""
         return self.orientation and bool(self.position.all())
 
 
 @dataclass(frozen=True, eq=False)
 class Planned:
-    """A problem whose readings are a model's own.
+    """A problem whose readings are a model's own predictions.
 
     Attributes:
-        problem: rows that have an equilibrium count. base: the model on it.
-        factor: noise factors. reads: what is read of each row.
+        problem: the data; rows with an equilibrium count. base: the model on them.
+        factor: noise factors. reads: what is read in each row.
     """
 
     problem: Problem
@@ -106,21 +106,21 @@ class Planned:
 
 
 def kinds_of(reads: Collection[str], sigma: Sigma) -> tuple[str, ...]:
-    """The kinds that are named, or the pose, and tensions where their noise is stated."""
+    """The kinds that are named; by default the pose, and tensions if their noise is stated."""
     return tuple(reads) or (READ if sigma.tension_N is not None else READ[:2])
 
 
 def usual_cell(tension: float) -> float:
-    """The noise [N] of a load cell for usual tensions [N]."""
+    """The noise [N] of a load cell for tensions of this usual size [N]."""
     return float(f"{max(LOAD_CELL * tension, _LEAST_CELL):.1g}")
 
 
 def expected_sigma(
     robot: Robot, stated: Sigma, kinds: Collection[str] = READ[:2]
 ) -> tuple[Sigma, tuple[str, ...]]:
-    """The noise to plan with: what is stated, else that of good sensors; and what was assumed.
+    """The noise to plan with, as stated or else that of good sensors, and notes on assumptions.
 
-    What is assumed of other kinds than those that are read is not said.
+    Assumptions about kinds that are not read are not noted.
     """
     length = float(np.mean(robot.nominal_lengths(robot.reference_pose[None])))
     notes = []
@@ -148,11 +148,11 @@ def planned(
     """The problem of commands as they would be measured.
 
     Args:
-        robot: as described.
-        commands: planned; readings in it are ignored.
-        sigma: noise of every kind wanted.
+        robot: the robot.
+        commands: planned commands; readings in it are ignored.
+        sigma: noise of every kind that is read.
         reads: what will be read.
-        terms: effects of the model; plain without.
+        terms: effects of the model; by default none.
     """
     model = Terms() if terms is None else terms
     prediction = Experiment(robot, commands.as_commands(robot)).predict(model.effects)
@@ -163,9 +163,9 @@ def planned(
 
 
 def _as_read(commands: Measurements, readings: Readings, reads: Reads) -> Measurements:
-    """Commands with the readings that would be made of them, but for way points.
+    """Commands with the readings that would be made, except at way points.
 
-    Way points are those without readings among others that have some: a list of commands has none.
+    Way points are rows without readings among others that have some: a list of commands has none.
     """
     stops = (commands.read | ~commands.read.any())[:, None]
     angles = np.zeros((commands.n_rows, 3))
@@ -184,7 +184,7 @@ def _as_read(commands: Measurements, readings: Readings, reads: Reads) -> Measur
 
 
 def near_slack(plan: Planned) -> list[tuple[int, int]]:
-    """Rows and cables about to go slack or taut: there small errors change what pulls."""
+    """Rows and cables about to go slack or taut, where small errors change which cables pull."""
     states = plan.base.state.prediction.found.states
     rest = plan.base.state.prediction.tables.cables[..., REST]
     stretch = states[..., STRAIN] * rest

@@ -1,7 +1,7 @@
-"""What to measure next: each measurement that could be added, tried by its sensitivities.
+"""What to measure next: tries each measurement that could be added, by its sensitivities.
 
-The same for poses that are only planned and for data that leave two effects alike: a measurement
-is worth proposing where it brings a signal that does not show now near what a test finds.
+This serves planned poses as well as data that leave two effects equivalent. A measurement is worth
+proposing if it raises a signal that is too weak now to near what a test finds.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from seecr.pose import Array
 
 # Squared signal, in units of the noise, that tells two effects apart (docs/diagnosis.md).
 NEEDED = 15.0
-# Poses added at most.
+# Most poses that are added.
 MORE_POSES = 6
-# Repeating everything doubles each signal: a proposal must do more than that, and bring it to
-# this part of what is needed.
+# Repeating everything doubles each signal. A proposal must multiply it by more than _GAINS, and
+# bring it to this part of what is needed.
 _GAINS, _NEAR = 2.5, 0.1
-# What is added to the same poses.
+# Kinds of measurements that are added at the same poses.
 _SENSORS = (Adding.TENSIONS, Adding.POSE)
 
 Signals = Mapping[str, Signal]
@@ -42,8 +42,8 @@ class Gain:
     """What an added measurement would show or tell apart.
 
     Attributes:
-        effect: that gains. other: what it is told from; "" where it becomes visible.
-        now, then: squared signal. needed: for a test to find it.
+        effect: the effect that gains. other: what it is told from; "" if it becomes visible.
+        now, then: squared signal without and with it. needed: squared signal that a test finds.
     """
 
     effect: str
@@ -54,11 +54,11 @@ class Gain:
 
     @property
     def enough(self) -> bool:
-        """Whether a test finds it then."""
+        """Whether a test finds the effect then."""
         return self.then >= self.needed
 
     def as_json(self) -> dict[str, Any]:
-        """As in ``plan.json``."""
+        """The content in ``plan.json``."""
         return {**vars(self), "enough": self.enough}
 
 
@@ -68,8 +68,8 @@ class Suggestion:
 
     Attributes:
         kind: what is added. words: what to do.
-        gains: what crosses what is needed, then what only comes nearer.
-        poses: (k, 7) to add, for poses.
+        gains: first what reaches the needed signal, then what only comes nearer to it.
+        poses: (k, 7) poses to add, if poses are added.
         commands: what to command for it; None for sensors.
     """
 
@@ -81,11 +81,11 @@ class Suggestion:
 
     @property
     def reached(self) -> tuple[Gain, ...]:
-        """Those that a test finds then."""
+        """The gains that a test finds."""
         return tuple(g for g in self.gains if g.enough)
 
     def as_json(self) -> dict[str, Any]:
-        """As in ``plan.json``."""
+        """The content in ``plan.json``."""
         return {
             "kind": self.kind.value,
             "words": self.words,
@@ -107,8 +107,8 @@ def propose(
         options: :func:`crosscheck.planning.extensions.extensions`.
         own: signals of effects in what is read so far.
         wanted: what these do not show or tell apart.
-        signals: of the same effects in added readings.
-        progress: called with what is being done and the part of it that is done.
+        signals: computes the signals of the same effects in added readings.
+        progress: called with what is being done and the fraction that is done.
     """
     out = []
     for k, option in enumerate(options):
@@ -140,9 +140,9 @@ def _gains(own: Signals, there: Signals, wanted: Sequence[Wanted]) -> tuple[Gain
 def _few_poses(
     grid: Extension, own: Signals, there: Signals, wanted: Sequence[Wanted]
 ) -> Suggestion:
-    """The few poses that do most."""
+    """The few poses that gain most."""
     row_of = grid.plan.problem.row_of
-    # twins stay twins at any pose
+    # exact twins stay twins at any pose
     open_ = [want for want in wanted if not want.other or want.now > 0.0]
     rows = chosen_poses(own, there, row_of, open_, MORE_POSES)
     if not rows or grid.poses is None:
@@ -157,13 +157,13 @@ def _few_poses(
 def telling_apart(
     plan: Planned, options: Sequence[Extension], name: str, rival: Layout
 ) -> tuple[Suggestion, ...]:
-    """What would tell an effect of the plan's model from another that could stand in for it.
+    """What would tell an effect of the plan's model from another one that could replace it.
 
     Args:
-        plan: the data, about the model with the effect.
+        plan: the data, with the model that has the effect.
         options: :func:`crosscheck.planning.extensions.extensions`.
-        name: of the effect.
-        rival: the other.
+        name: name of the effect.
+        rival: the other effect.
     """
     own = _pair(plan, name, rival)
     now = left_over(own[name], own[rival.name])
@@ -176,7 +176,7 @@ def telling_apart(
 
 
 def _pair(plan: Planned, name: str, rival: Layout) -> dict[str, Signal]:
-    """What the effect does at its values, and all that could imitate it: the rival and the rest."""
+    """Signal of an effect at its values, and of all that could imitate it: rival and the rest."""
     shapes = rival.effect.shapes(plan.base.state.prediction.setup)
     shape = shapes[0] if shapes else {}
     terms = plan.base.terms.with_term(Term(rival, rival.start(shape)))

@@ -1,4 +1,4 @@
-"""What a plan says: which effects will show, which can be named, what to add; and its JSON."""
+"""The result of planning: which effects will show, which can be named, what to add; its JSON."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ class Visible:
     """What a plan will show of an effect.
 
     Attributes:
-        signal: what it does to the readings.
+        signal: what the effect does to the readings.
         needed: squared signal that a test finds.
-        factor: smallest size that shows, of all its parameters alike, in plausible sizes; inf
-            where the poses do not see it at all.
+        factor: smallest size that shows, in plausible sizes, with all parameters scaled alike; inf
+            if the poses do not see it at all.
         identifiable: the same beside the best imitator that is no exact twin.
-        imitator: its name, "" where there is none.
-        confused: (name, what it cannot imitate) of effects it cannot be told from at its
-            plausible size, the best imitator first; exact twins not included.
-        twins: effects that imitate it exactly, whatever the poses read alike.
+        imitator: name of that imitator, "" if there is none.
+        confused: (name, signal it cannot imitate) of effects that cannot be told from this one at
+            its plausible size, the best imitator first; without exact twins.
+        twins: effects that imitate this one exactly in what the poses read.
     """
 
     signal: Signal
@@ -59,14 +59,14 @@ class Visible:
         return self.visible and not self.confused and not self.twins
 
     def sizes(self, factor: float) -> dict[str, float]:
-        """Parameters at a multiple of their plausible sizes, without those that only shape it."""
+        """Parameters at a multiple of their plausible sizes, without shapes."""
         layout = self.signal.layout
         own = np.any(self.signal.columns != 0.0, axis=0)
         own = own if own.any() else ~layout.shape
         return {k: factor * float(layout.scale[i]) for i, k in enumerate(layout.names) if own[i]}
 
     def words(self, factor: float) -> str:
-        """The same for people, such as "radius 0.3 mm"; "none" where factor is inf."""
+        """The same in words, such as "radius 0.3 mm"; "none" if factor is inf."""
         if not np.isfinite(factor):
             return "none"
         effect, sizes = self.signal.layout.effect, self.sizes(factor)
@@ -111,12 +111,12 @@ class Plan(Result):
     """What planned commands will show.
 
     Attributes:
-        planned: commands and noise. effects: the best visible first.
+        planned: commands and noise. effects: effects, the best visible first.
         missing: effects that cannot be looked for, and why.
-        confusion: names and their (k, k) containment: part of the row's effect that the column's
-            imitates.
+        confusion: names of effects, and a table (k, k): the part of the row's effect that the
+            column's effect imitates.
         suggestions: what to add, the most useful first.
-        slack: (line, cable) about to go slack or taut.
+        slack: (line, cable) of cables about to go slack or taut.
         notes: what was assumed or left out.
     """
 

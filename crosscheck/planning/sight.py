@@ -1,4 +1,4 @@
-"""What data can show of each effect, whatever they turn out to say: before any verdict."""
+"""What data can show of each effect, whatever they say: this is stated before any verdict."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Sight:
     """What data can show.
 
     Attributes:
-        effects: those that could be looked for. missing: those that cannot, and why.
+        effects: effects that could be looked for. missing: those that cannot, and why.
     """
 
     effects: tuple[Visible, ...]
@@ -38,7 +38,7 @@ class Sight:
 
     @property
     def alike(self) -> dict[str, tuple[str, ...]]:
-        """Effects that others imitate, exactly or within the noise, and which do."""
+        """Effects that others imitate, exactly or within the noise, and the names of these."""
         return {
             found.name: (*found.twins, *(name for name, _left in found.confused))
             for found in self.effects
@@ -46,7 +46,7 @@ class Sight:
         }
 
     def lines(self) -> list[str]:
-        """The same as sentences: what shows, what does not, what cannot be told apart."""
+        """The same in sentences: what shows, what does not, what cannot be told apart."""
         asked = [why for why in self.missing.values() if why.why is not Why.EXCLUDED]
         total = len(self.effects) + len(asked)
         seen = len(self.effects) - len(self.hidden)
@@ -72,7 +72,7 @@ class Sight:
 
 
 def _by_reason(missing: Mapping[str, Reason]) -> list[str]:
-    """Effects that lack the same, together; what the user left out need not be said."""
+    """Effects grouped by what the data lack for them, without those that the user excluded."""
     words: dict[str, list[str]] = {}
     for name, why in missing.items():
         if why.why is not Why.EXCLUDED:
@@ -84,7 +84,7 @@ def sight_of(problem: Problem, base: Fit, factor: Array) -> Sight:
     """What data can show beside a model.
 
     Args:
-        problem: the data. base: the model on it. factor: noise factors.
+        problem: the data. base: the model on them. factor: noise factors.
     """
     found, missing = signals(Planned(problem, base, factor, Reads.of(problem.data)))
     ranked = sorted(all_visible(found).values(), key=lambda one: one.factor)
@@ -92,7 +92,7 @@ def sight_of(problem: Problem, base: Fit, factor: Array) -> Sight:
 
 
 def all_visible(own: Mapping[str, Signal]) -> dict[str, Visible]:
-    """What signals show of each effect, and which they leave alike."""
+    """What signals show of each effect, and which effects they cannot tell apart."""
     return {name: _visible(name, own) for name in own}
 
 

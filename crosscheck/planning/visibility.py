@@ -1,9 +1,10 @@
-"""How large an effect must be to show, and to be told from another, by sensitivities alone.
+"""How large an effect must be to show, or to be told from another, by sensitivities alone.
 
-With columns G of an effect (whitened, by plausible sizes) the squared signal to be expected is
-lam = |G|^2, and what another effect's columns H cannot imitate is lam_gh = |G - H H^+ G|^2. A
-chi2 test of the family-wise level finds the effect in four of five cases where lam is at least
-``needed``; so the smallest visible size is the plausible one times sqrt(needed/lam).
+With the whitened derivatives G of an effect by its plausible sizes, the expected squared signal is
+lam = |G|^2, and the part that another effect's derivatives H cannot imitate is
+lam_gh = |G - H H^+ G|^2. A chi2 test of the family-wise level finds the effect in four of five
+cases if lam is at least ``needed``. So the smallest visible size is the plausible one times
+sqrt(needed/lam).
 """
 
 from __future__ import annotations
@@ -26,15 +27,15 @@ from seecr.effects.base import Layout
 from seecr.pose import Array
 
 LEVEL, POWER = 0.05, 0.8
-"""Family-wise chance of a false alarm, and chance to find what is there."""
+"""Family-wise false-alarm rate, and power: the probability of finding an effect that is there."""
 
 NAMED = 2.0
-"""Times the smallest size that shows at which diagnoses name nine in ten effects, themselves or as
-what the data cannot tell from them: measured, ``scripts/score_success.py``, docs/diagnosis.md."""
+"""From this multiple of the smallest visible size on, diagnoses name nine in ten effects, or their
+equivalents: measured by ``scripts/score_success.py``, see docs/diagnosis.md."""
 
-# A direction this much weaker than the strongest is no direction.
+# A direction does not count if it is this much weaker than the strongest.
 _RANK = 1e-5
-# What an exact twin leaves, of the signal.
+# Relative signal that is left of an exact twin by rounding.
 EXACT = 1e-6
 
 
@@ -43,7 +44,7 @@ class Signal:
     """What an effect does to planned readings.
 
     Attributes:
-        layout: the effect. shape: values of the shape parameters it was computed at.
+        layout: the effect. shape: values of its shape parameters.
         columns: (N, p) whitened change of each reading by each plausible size; 0 for shapes.
     """
 
@@ -58,19 +59,19 @@ class Signal:
 
     @property
     def power(self) -> float:
-        """Squared signal to be expected of plausible sizes."""
+        """Expected squared signal of plausible sizes."""
         return float(np.sum(self.columns**2))
 
     @property
     def directions(self) -> int:
-        """How many directions of its parameters show."""
+        """How many directions of its parameters change the readings."""
         s = np.linalg.svd(self.columns, compute_uv=False)
         return max(1, int(np.sum(s > _RANK * s[0]))) if len(s) and s[0] > 0 else 1
 
 
 @lru_cache(maxsize=256)
 def needed(directions: int, tried: int) -> float:
-    """Squared signal that a test finds: noncentrality for POWER at LEVEL/tried."""
+    """Squared signal that a test finds: the noncentrality for POWER at the level LEVEL/tried."""
     limit = stats.chi2.isf(LEVEL / tried, directions)
     return float(
         optimize.brentq(lambda nc: stats.ncx2.sf(limit, directions, nc) - POWER, 1e-6, 1e4)
@@ -78,7 +79,7 @@ def needed(directions: int, tried: int) -> float:
 
 
 def signals(plan: Planned) -> tuple[dict[str, Signal], dict[str, Reason]]:
-    """Signals of all effects of the catalogue, and why some have none."""
+    """Signals of all effects of the catalogue, and the reasons why some have none."""
     found: dict[str, Signal] = {}
     missing: dict[str, Reason] = {}
     span = _of_model(plan)
@@ -98,7 +99,7 @@ def signals(plan: Planned) -> tuple[dict[str, Signal], dict[str, Reason]]:
 
 
 def signals_like(plan: Planned, like: Mapping[str, Signal]) -> dict[str, Signal]:
-    """Signals of the same effects, of the same sizes, in another plan."""
+    """Signals of the same effects, at the same sizes, in another plan."""
     span = _of_model(plan)
     return {
         name: Signal(s.layout, s.shape, beside(_columns(plan, s.layout, s.shape), span))
@@ -107,7 +108,7 @@ def signals_like(plan: Planned, like: Mapping[str, Signal]) -> dict[str, Signal]
 
 
 def _of_model(plan: Planned) -> Array:
-    """Basis (N, k) of what the model's own effects can imitate: they are fitted along."""
+    """Basis (N, k) of what the model's own effects can imitate, since they are fitted together."""
     return basis(free_derivatives(plan.problem, plan.base.state))
 
 
@@ -119,8 +120,8 @@ def _middle_shape(plan: Planned, layout: Layout) -> dict[str, float] | None:
 def _columns(plan: Planned, layout: Layout, shape: dict[str, float]) -> Array:
     start = layout.start(shape)
     columns = amplitude_columns(plan.problem, plan.base, layout, start)
-    # a length behind the exit point is only where friction is looked for: its own signal is
-    # another effect's
+    # a length behind the exit point only makes friction possible: its own signal is that of
+    # another effect
     given = (start != layout.null) | layout.shape
     return np.asarray(np.where(given, 0.0, columns * layout.scale))
 
@@ -131,7 +132,7 @@ def left_over(g: Signal, h: Signal) -> float:
 
 
 def joined(a: Mapping[str, Signal], b: Mapping[str, Signal]) -> dict[str, Signal]:
-    """Signals of two sets of readings together; an effect that one lacks is 0 in it."""
+    """Signals of two sets of readings together; 0 where one of them lacks an effect."""
     out = {}
     rows = [len(next(iter(s.values())).columns) if s else 0 for s in (a, b)]
     for name in {**a, **b}:

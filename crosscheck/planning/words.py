@@ -1,4 +1,4 @@
-"""What a plan says, in words that terminal and page share."""
+"""The words of a plan that terminal and page share."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from seecr.counted import some
 
 
 def alike(found: Visible) -> str:
-    """Effects that it cannot be told from, exact ones first."""
+    """Effects from which an effect cannot be told, exact twins first."""
     names = [f"{name} (exactly)" for name in found.twins]
     names += [name for name, _left in found.confused]
     if not found.visible and not found.twins:
@@ -17,7 +17,7 @@ def alike(found: Visible) -> str:
 
 
 def gain_words(gain: Gain) -> str:
-    """What a measurement would bring, with numbers."""
+    """What a measurement would gain, with numbers."""
     numbers = f"(signal now {gain.now:.2g}, then {gain.then:.2g}, needs {gain.needed:.2g})"
     if gain.other:
         return f"tells {gain.effect} from {gain.other} {numbers}"

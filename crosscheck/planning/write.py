@@ -1,4 +1,4 @@
-"""What a plan proposes, as files of commands that a controller can take."""
+"""Writes what a plan proposes as files of commands for a controller."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ __all__ = ["box_of", "write_plan"]
 
 
 def write_plan(plan: Plan, folder: str | Path, own: bool = True) -> tuple[str, ...]:
-    """Write the commands of a plan, and those of each thing to add, for a controller to take.
+    """Write the commands of a plan, and those of each useful addition, for a controller.
 
     Args:
-        plan: what :func:`make_plan` gave.
-        folder: where to; made if need be.
+        plan: the result of :func:`make_plan`.
+        folder: folder to write to; it is created if necessary.
         own: whether to write the plan's own commands, ``poses.csv``, or only ``add-KIND.csv``.
 
     Returns:
-        names of the files.
+        Names of the files.
 
     Raises:
         InputFileError: the folder cannot be made or written to.
@@ -45,13 +45,13 @@ def write_plan(plan: Plan, folder: str | Path, own: bool = True) -> tuple[str, .
 
 
 def remark_of(commands: Measurements) -> str:
-    """Which lines, below the remark and the header, are not to be read; "" where all are."""
+    """Which lines, below the remark and the header, are way points; "" if none are."""
     lines = ", ".join(str(row + 3) for row in np.flatnonzero(~commands.read))
     return lines and f"way points, gone through without a reading: lines {lines}"
 
 
 def _unread(data: Measurements) -> Measurements:
-    """Commands alone, and the loads that go with them."""
+    """Commands and their loads, without any readings."""
     n, nothing = data.n_rows, np.zeros(3, dtype=bool)
     return replace(
         data,
@@ -66,10 +66,10 @@ def _unread(data: Measurements) -> Measurements:
 
 
 def box_of(text: str) -> Array:
-    """Lowest and highest position (2, 3) [m] of six numbers between commas.
+    """Parse six numbers with commas to the lowest and highest position (2, 3) [m].
 
     Raises:
-        CrosscheckError: other than that.
+        CrosscheckError: the text is anything else.
     """
     expected = "X0,Y0,Z0,X1,Y1,Z1 in metres, the lower corner first"
     values = numbers_of("--box", text, 6, expected)

@@ -21,6 +21,7 @@ from seecr.equilibrium.search import solve_setup
 from seecr.errors import InputError
 from seecr.pose import Array
 from seecr.prediction.experiment import Experiment, effects_of
+from seecr.statics.led import led
 from seecr.statics.solution import Solution
 from seecr.statics.starts import commanded_poses
 
@@ -52,7 +53,8 @@ def solve(
         poses: (n, 7) or (7,) commanded poses; the winches pay out the straight lengths from A_i to
             B_i at these poses (eqs 1, 2). Or :class:`seecr.Commands` with runs, times or lengths.
         rest_lengths: (n, m) or (m,) [m] absolute lengths instead of poses. Poses given as well are
-            only where the search starts; by default that is the reference pose.
+            only where the search starts; by default it starts at the poses whose straight lengths
+            fit these best, found from the reference pose.
         effects: how the robot differs from the paper's model: a model, its file, or effects with
             values. If one has a history, rows are solved in order.
         method: ``"newton"`` is the compiled Newton descent on the potential energy; ``"fsolve"``
@@ -113,6 +115,14 @@ def solve(
         starts = commanded_poses(start, "start")
         if len(starts) != len(commands):
             raise InputError(f"start must have {counted(len(commands), 'pose')}, got {len(starts)}")
+    elif method == "newton" and not follow:
+        # rows of a batch are independent: each is a run of its own
+        apart = (
+            commands
+            if isinstance(poses, Commands)
+            else replace(commands, run=np.arange(len(commands)))
+        )
+        starts = led(robot, apart)
     pushes = np.broadcast_to(np.zeros(6) if pushed is None else pushed, (len(commands), 6))
     if follow:
         if method != "newton" or start is not None:

@@ -23,6 +23,7 @@ from seecr.effects.terms import Term
 from seecr.pose import Array
 from seecr.result import COORDINATES, Record, Result, named
 from seecr.statics import batch
+from seecr.statics.led import led
 from seecr.statics.solution import Solution, certify
 from seecr.statics.starts import commanded_poses, start_of
 from seecr.statics.tables import Tables, assemble, relengthened, take
@@ -151,6 +152,7 @@ class Experiment:
     # keyed by the identity of the commands, which the setup keeps alive, so that no id is reused
     _plain: dict[int, Setup] = field(default_factory=dict, repr=False)
     _edits: dict[int, Edits] = field(default_factory=dict, repr=False)
+    _led: list[Array | None] = field(default_factory=list, repr=False)
 
     @property
     def path(self) -> Path:
@@ -161,7 +163,8 @@ class Experiment:
 
     def with_length_errors(self, errors: Array | None) -> Experiment:
         """The same experiment with other errors of the paid-out lengths."""
-        return Experiment(self.robot, self.commands, errors, self._path, self._plain)
+        kept = (self._path, self._plain)
+        return Experiment(self.robot, self.commands, errors, *kept, _led=self._led)
 
     def setup(self, effects: Sequence[Effect], commands: Commands | None = None) -> Setup:
         """The setup as the effects leave it."""
@@ -221,21 +224,38 @@ class Experiment:
 
     def _solve(self, setup: Setup, near: Prediction | None) -> tuple[Tables, batch.Evaluation]:
         def run(tables: Tables, start: batch.Evaluation | None) -> batch.Evaluation:
-            if start is None:
+            if start is None and self._first is None:
                 return batch.descend(tables, limit=_LIMIT)
 
             def warm(rows: NDArray[np.intp]) -> batch.Evaluation:
+                assert start is not None
                 return batch.descend(
                     take(tables, rows), start.deviation[rows], _LIMIT,
                     start_values=start.values[rows], staged=False, guess=start.guess[rows],
                 )  # fmt: skip
 
+            def on_the_way(rows: NDArray[np.intp]) -> batch.Evaluation:
+                assert self._first is not None
+                some = take(tables, rows)
+                first, values = start_of(self.robot, some, self._first[rows])
+                return batch.descend(some, first, _LIMIT, start_values=values)
+
             def afresh(rows: NDArray[np.intp]) -> batch.Evaluation:
                 return batch.descend(take(tables, rows), limit=_LIMIT)
 
-            found = batch.take_evaluation(start, np.arange(len(start.outcome)))
+            if start is None:
+                n, m = tables.cables.shape[:2]
+                found = batch.Evaluation.empty(n, m, tables.n_dof)
+            else:
+                found = batch.take_evaluation(start, np.arange(len(start.outcome)))
             found.outcome[:] = ITERATIONS
-            return _among(_among(found, warm), afresh)
+            for search in (
+                *([] if start is None else [warm]),
+                *([] if self._first is None else [on_the_way]),
+                afresh,
+            ):
+                found = _among(found, search)
+            return found
 
         start = None if near is None else near.found
         if near is not None and _differ_in_length(setup, near.setup):
@@ -243,6 +263,13 @@ class Experiment:
             tables = relengthened(near.tables, setup)
             return tables, run(tables, start)
         return _with_laws(setup, run, start)
+
+    @property
+    def _first(self) -> Array | None:
+        """Poses (n, 7) at which searches start if lengths are commanded; computed once."""
+        if not self._led:
+            self._led.append(led(self.robot, self.commands))
+        return self._led[0]
 
     def walk(self, effects: Sequence[Effect]) -> tuple[Tables, batch.Evaluation]:
         """Solve all waypoints of the path in order, each from the one before."""

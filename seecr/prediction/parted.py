@@ -78,7 +78,7 @@ class Parted(Experiment):
 
     def with_length_errors(self, errors: Array | None) -> Parted:
         same = (self.robot, self.commands, errors, self._path, self._plain)
-        return Parted(*same, _parts=self._parts)
+        return Parted(*same, _led=self._led, _parts=self._parts)
 
     def parts(self, effects: Sequence[Effect]) -> list[Part]:
         """The groups of rows that share values under some effects; empty if all rows do."""
