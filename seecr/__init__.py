@@ -63,7 +63,7 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-# Imported when first used: the compiled loop and MuJoCo take a while to load.
+# Imported on first use: the compiled loop and MuJoCo take a while to load.
 _MODULES = {
     "equilibrium.passes": ("Barrier", "barriers"),
     "workspace.chances": ("held_chance", "kept_chance"),

@@ -1,4 +1,4 @@
-"""What callers give: numbers and counts, or one sentence about something else."""
+"""Arguments from callers: numbers and counts, or a one-sentence error."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from seecr.pose import LARGEST, Array, all_finite
 
 
 def numbers(values: ArrayLike, name: str) -> Array:
-    """An array of real numbers; ``name`` is what an error calls it.
+    """An array of real numbers; ``name`` is for errors.
 
     Raises:
         InputError: it is something else.
     """
     try:
         array = np.asarray(values)
-        if array.dtype.kind == "c":  # NumPy would drop what is imaginary
+        if array.dtype.kind == "c":  # NumPy would drop the imaginary part
             raise TypeError
         return np.asarray(array, dtype=float)
     except (TypeError, ValueError):
@@ -28,10 +28,10 @@ def numbers(values: ArrayLike, name: str) -> Array:
 
 
 def finite(values: ArrayLike, name: str) -> Array:
-    """An array of numbers, all finite; ``name`` is what an error calls it.
+    """An array of finite numbers; ``name`` is for errors.
 
     Raises:
-        InputError: one of them is not, or it is something else.
+        InputError: a number is not finite, or it is something else.
     """
     array = numbers(values, name)
     if not all_finite(array):
@@ -42,10 +42,10 @@ def finite(values: ArrayLike, name: str) -> Array:
 
 
 def whole(value: object, name: str, least: int = 0) -> int:
-    """A whole number; ``name`` is what an error calls it.
+    """A whole number; ``name`` is for errors.
 
     Raises:
-        InputError: less than the least, or something else.
+        InputError: less than the least, or not a whole number.
     """
     try:
         number = operator.index(value)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Numbers in sentences: with their nouns, from one to another, and of lists that are long."""
+"""Numbers in sentences: with nouns, as ranges, and long lists cut short."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ def counted(number: int, noun: str, form: str = "d") -> str:
     """A number with its noun: 1 row, 2 rows.
 
     Args:
-        number: how many. noun: in the singular, one that takes an s. form: of the number.
+        number: how many. noun: in the singular, with a plural in s. form: format of the number.
     """
     return f"{number:{form}} {plural(number, noun)}"
 
 
 def plural(number: int, noun: str) -> str:
-    """A noun that takes an s, for so many."""
+    """A noun with a plural in s, for so many."""
     return noun if number == 1 else f"{noun}s"
 
 
 def between(low: float, high: float, form: str = ".4g", lead: str = "") -> str:
-    """From one number to another, "0 to 3"; one, without what leads, where both read alike."""
+    """A range such as "0 to 3", after ``lead``; if both ends read the same, only that number."""
     first, last = f"{low:{form}}", f"{high:{form}}"
     return first if first == last else f"{lead}{first} to {last}"
 
 
 def some(words: Sequence[str], most: int = 4, mark: str = ", ") -> str:
-    """The first few, and how many more: a, b and 3 more; a; b; and 3 more."""
+    """The first few words, and how many more: a, b and 3 more, or a; b; and 3 more."""
     more = len(words) - most
     if more <= 0:
         return mark.join(words)
@@ -42,10 +42,10 @@ def some(words: Sequence[str], most: int = 4, mark: str = ", ") -> str:
 
 
 def rows_words(rows: Iterable[int], line: NDArray[np.int64] | None, most: int = 8) -> str:
-    """Rows as people find them: line 24 of their file; without a file pose 3, counted from 0.
+    """The names of rows: their lines in a file; without a file pose 3, counted from 0.
 
     Args:
-        rows: counted from 0. line: (n,) of the file, that of each row. most: that are named.
+        rows: counted from 0. line: (n,) line of each row in the file. most: how many are named.
     """
     numbers = [str(row if line is None else line[row]) for row in rows]
     return f"{plural(len(numbers), 'pose' if line is None else 'line')} {some(numbers, most)}"

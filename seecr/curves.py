@@ -1,4 +1,4 @@
-"""Curves that lie on each other are drawn once, with all names: one would hide the others."""
+"""Curves that coincide are drawn once, with all names: one would hide the others."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ import numpy as np
 
 from seecr.pose import Array
 
-# Curves that are nearer to each other than this part of the largest lie on each other.
+# Curves closer to each other than this part of the largest value coincide.
 _ALIKE = 1e-6
 
 
 def alike(curves: Sequence[Array]) -> list[list[int]]:
-    """Numbers of curves that lie on each other on all timelines: one would hide the others.
+    """Groups of indices of curves that coincide on all timelines.
 
     Args:
-        curves: (n, k) of each timeline.
+        curves: (n, k) for each timeline.
     """
     whole = np.concatenate([np.asarray(values, float) for values in curves])
     near = _ALIKE * float(np.nanmax(np.abs(whole), initial=0.0))
@@ -32,7 +32,7 @@ def alike(curves: Sequence[Array]) -> list[list[int]]:
 
 
 def joined(names: Sequence[str]) -> str:
-    """Several names in one: what they begin with is said once, as in "cable1, 2"."""
+    """Several names as one, with a common beginning only once, as in "cable1, 2"."""
     first, *others = names
     stem = first.rstrip("0123456789")
     same = stem and all(

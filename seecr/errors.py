@@ -1,4 +1,4 @@
-"""Exceptions: each message is one line, for the person who can mend the cause."""
+"""Exceptions: each message is one line, for the person who can remedy the cause."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ class SeecrError(ValueError):
     """Base of every error raised on purpose, by seecr and by crosscheck.
 
     Attributes:
-        exit_status: what a command line ends with (2: bad input or usage).
+        exit_status: of a command that ends with this error (2: bad input or usage).
     """
 
     exit_status = 2
@@ -24,17 +24,17 @@ class InputError(SeecrError):
 
 
 class NoRestError(SeecrError):
-    """A command at which the platform does not come to rest, where something needs that it does."""
+    """A command without an equilibrium, where one is needed."""
 
     exit_status = 3
 
 
 class MissingPackageError(SeecrError):
-    """Something asked for that needs a package which is not installed."""
+    """A request that needs a package which is not installed."""
 
 
 class InputFileError(SeecrError):
-    """A file of the user's that is missing, of another kind, or wrong at some place."""
+    """A user's file that is missing, of another kind, or wrong at some place."""
 
     @classmethod
     def at(
@@ -46,7 +46,7 @@ class InputFileError(SeecrError):
         column: str | None = None,
         line_word: str = "line",
     ) -> InputFileError:
-        """Error whose message starts with the place: ``FILE: line 3, column t_s: text``.
+        """An error whose message starts with the place: ``FILE: line 3, column t_s: text``.
 
         Args:
             path: the file.

@@ -1,7 +1,7 @@
-"""Files of the user's: read with the place of what is wrong in them, written whole or not at all.
+"""Users' files: errors name the place of a mistake, and files are written completely or not at all.
 
-Text, TOML and JSON of both packages go through here, so that a file that is missing, of another
-kind or not to be written is told in the same words everywhere.
+Text, TOML and JSON of both packages are read and written here, so that a missing, unsuitable or
+unwritable file is reported in the same words everywhere.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ _BEGINNINGS = (
 
 
 def no_text(data: bytes) -> str:
-    """What bytes are instead of UTF-8 text, such as ``"a PNG picture"``; empty if perhaps text."""
+    """What bytes are if not UTF-8 text, such as ``"a PNG picture"``; empty if perhaps text."""
     known = next((kind for beginning, kind in _BEGINNINGS if data.startswith(beginning)), "")
     return known or ("a binary file" if b"\0" in data else "")
 
@@ -102,7 +102,7 @@ def reason_of(error: OSError) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Toml:
-    """A TOML file of the user's: what it says, and on which line it says so.
+    """A user's TOML file: its content, and the line of each key.
 
     Attributes:
         path: the file. text: all of it. content: its tables and values.
@@ -113,11 +113,11 @@ class Toml:
     content: dict[str, Any]
 
     def error(self, text: str, key: str = "") -> InputFileError:
-        """An error, at the line of a key or table where one is named."""
+        """An error, at the line of a key or table if one is named."""
         return InputFileError.at(self.path, text, line=self.line_of(key) if key else None)
 
     def line_of(self, key: str) -> int | None:
-        """The first line, from 1, that gives a key its value or opens the table of that name."""
+        """The first line, from 1, that sets a key or opens the table of that name."""
         name = re.escape(key)
         pattern = re.compile(rf"^[^#]*(?:\b{name}\b[\"']?\s*=|\[\s*{name}\s*\])")
         lines = enumerate(self.text.splitlines(), start=1)
@@ -125,10 +125,10 @@ class Toml:
 
 
 def path_of(given: object, what: str) -> Path:
-    """A path; ``what`` says of which file.
+    """A path; ``what`` is the expected file, for the error.
 
     Raises:
-        InputError: none.
+        InputError: not a path.
     """
     if isinstance(given, str | Path):
         return Path(given)
@@ -145,17 +145,17 @@ def read_toml(path: Path, expected: str) -> Toml:
     try:
         return Toml(path, text, tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:
-        # tomllib's sentence ends with line and column
+        # tomllib's message ends with line and column
         raise InputFileError.at(path, f"is not TOML: {error}; {expected}") from None
 
 
 @contextmanager
 def written(*paths: Path, failure: str = "cannot be written") -> Iterator[tuple[Path, ...]]:
-    """Temporary files that take the place of others, all together, when the block ends well.
+    """Temporary files that replace others, all together, if the block ends without an error.
 
     Args:
         paths: the files to be written, renamed in that order; errors name the last.
-        failure: what went wrong if the system refuses, such as "cannot write the report".
+        failure: the beginning of the error if writing fails, such as "cannot write the report".
 
     Raises:
         InputFileError: one of them cannot be written; all are then as they were.
@@ -163,7 +163,7 @@ def written(*paths: Path, failure: str = "cannot be written") -> Iterator[tuple[
     temporary = tuple(path.with_name(f".{path.name}.{os.getpid()}.part") for path in paths)
     try:
         for path in paths:
-            if path.is_dir():  # else found out after others have been renamed
+            if path.is_dir():  # else it would only show after others have been renamed
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
         yield temporary
         for part, path in zip(temporary, paths, strict=True):
@@ -184,20 +184,20 @@ def write_texts(contents: Mapping[Path, str], failure: str = "cannot be written"
 
 
 def write_text(path: Path, text: str, failure: str = "cannot be written") -> None:
-    """Write one file in UTF-8, or leave what was there."""
+    """Write one file in UTF-8, or keep the old one on failure."""
     write_texts({path: text}, failure)
 
 
 def check_writable(path: Path) -> None:
-    """That a file can be written there, before the work that it is for.
+    """Check that a file can be written there, before the work that it is for.
 
     Raises:
-        InputFileError: it is a folder, or lies below what is none or may not be written to.
+        InputFileError: it is a folder, or the folder above it does not exist or is not writable.
     """
     above = next(folder for folder in path.absolute().parents if folder.exists())
     what = "is a folder" if path.is_dir() else ""
     try:
-        with tempfile.TemporaryFile(dir=above):  # permissions do not tell all, nor to all
+        with tempfile.TemporaryFile(dir=above):  # permission bits do not tell all
             pass
     except OSError as error:
         what = f"{above} is no folder to write to: {reason_of(error)}"
@@ -208,17 +208,17 @@ def check_writable(path: Path) -> None:
 def check_replaces(
     out: str | Path, names: Sequence[str], mark: str, same: Mapping[str, Path] | None = None
 ) -> None:
-    """That files in a folder are of an older result before new ones replace them.
+    """Check that files in a folder belong to an older result before new ones replace them.
 
-    What was measured cannot be made again.
+    Measurements cannot be made again.
 
     Args:
-        out: the folder; it need not be there yet.
-        names: of the files that are to be written. mark: the one that only such a result has.
-        same: by name, what a file is a copy of, which it may be already.
+        out: the folder; it need not exist yet.
+        names: of the files to be written. mark: a file that only such a result has.
+        same: by name, the file that it is a copy of; it may already be that file.
 
     Raises:
-        InputFileError: files of these names without the mark.
+        InputFileError: there are files of these names without the mark.
     """
     out = Path(out)
     there = [name for name in names if (out / name).exists()]
@@ -236,18 +236,18 @@ def check_replaces(
 
 @contextmanager
 def staged(out: str | Path, option: str = "--out", sometimes: Iterable[str] = ()) -> Iterator[Path]:
-    """A temporary folder whose files move into ``out`` when the block ends well.
+    """A temporary folder whose files move into ``out`` if the block ends without an error.
 
     It lies inside ``out``, so that moving is renaming; if the block fails, ``out`` is as it was.
 
     Args:
         out: the folder of results, made if need be.
-        option: of the command line that named it, for the error.
-        sometimes: names of files that belong to such a result, but not to each. Those that are not
-            written now are removed, since they are of an older one; nothing else is.
+        option: the option that named it, for the error.
+        sometimes: names of files that only some results have. If they are not written now they are
+            removed, since they belong to an older result; nothing else is.
 
     Raises:
-        InputError: it cannot be made or written to; said before any work is done.
+        InputError: the folder cannot be made or written to; this comes before any work is done.
     """
     out = Path(out)
     made = _missing(out)
@@ -277,7 +277,7 @@ def staged(out: str | Path, option: str = "--out", sometimes: Iterable[str] = ()
 
 
 def _missing(path: Path) -> list[Path]:
-    """The folders that have to be made, innermost first."""
+    """The folders that do not exist yet, innermost first."""
     return [folder for folder in (path, *path.parents) if not folder.exists()]
 
 
@@ -293,9 +293,9 @@ def json_text(document: Mapping[str, Any], indent: int | None = 1) -> str:
 
 
 def plain(value: Any) -> Any:
-    """What JSON can say: null for numbers that are not finite, an enum's name in small letters.
+    """A value in JSON's types: null for numbers that are not finite, an enum's name in lower case.
 
-    Whatever has a method ``as_json`` says itself what it is.
+    Objects with a method ``as_json`` are replaced by its result.
     """
     if hasattr(value, "as_json"):
         return plain(value.as_json())

@@ -1,4 +1,4 @@
-"""Names of a package that are imported when first used."""
+"""Names of a package that are imported on first use."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def lazily(
     Args:
         package: its full name.
         where: public names, each with the module of the package that defines it.
-        modules: of the package, themselves to be had by their name.
+        modules: of the package, themselves available by name.
     """
 
     def get(name: str) -> Any:

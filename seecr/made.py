@@ -1,4 +1,4 @@
-"""What made a result: version, command, day, and the files by their hashes."""
+"""Provenance of a result: version, command, day, and hashes of the files read."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from seecr import __version__
 
 __all__ = ["Made", "digits_of"]
 
-# Of a SHA-256: more than files are ever mistaken by.
+# Digits of a SHA-256: enough to tell files apart.
 _DIGITS = 16
 
 
@@ -24,11 +24,11 @@ def digits_of(file: Path) -> str:
 
 @dataclass(frozen=True)
 class Made:
-    """How a result came about.
+    """The provenance of a result.
 
     Attributes:
-        version: of the software. command: as it was typed. date: of the day.
-        files: by name the first digits of the SHA-256 of what was read.
+        version: of the software. command: as it was typed. date: the day.
+        files: by name, the first digits of the SHA-256 of each file that was read.
     """
 
     version: str
@@ -38,13 +38,13 @@ class Made:
 
     @classmethod
     def now(cls, command: str, files: Iterable[Path | None]) -> Made:
-        """Today, of files and of the TOML beside each; those that are not there are left out."""
+        """Today's provenance, with files and the TOML beside each; missing ones are left out."""
         given = [file for file in files if file is not None]
         beside = [file.with_suffix(".toml") for file in given]
         read = [file for file in dict.fromkeys([*given, *beside]) if file.is_file()]
         names = [file.name for file in read]
         hashes = {
-            # files of one name are told apart by their folders
+            # files with the same name are named with their folders
             str(file) if names.count(file.name) > 1 else file.name: digits_of(file)
             for file in read
         }
@@ -52,7 +52,7 @@ class Made:
 
     @property
     def words(self) -> str:
-        """The same in a line."""
+        """Command, date and files in one line."""
         files = ", ".join(f"{name} {digits}" for name, digits in self.files.items())
         return " · ".join(part for part in (self.command, self.date, files) if part)
 

@@ -1,8 +1,8 @@
 """Planar robots in closed form: a bar on two cables, and pairs of parallel cables.
 
-Everything here lies in the paper's vertical plane: x horizontal, y upwards, and a tilt theta
-that turns x towards y (Fig 2). In the shipped planar robots, which lie in the x-z plane, that
-is minus the value of the hinge about +y.
+Everything here lies in the paper's vertical plane: x horizontal, y upwards, and a tilt theta that
+turns x towards y (Fig 2). In the shipped planar robots, which lie in the x-z plane, theta is minus
+the value of the hinge about +y.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from seecr.errors import InputError
 from seecr.pose import Array
 from seecr.result import Record, Result
 
-# A root of the quartic this far off the unit circle is no angle (roots are polished later).
+# A root of the quartic this far off the unit circle is not an angle (roots are polished later).
 _OFF_CIRCLE = 1e-5
 
 
 def bar_tilt(exit_points: ArrayLike, positions: ArrayLike, half_length: float = 0.0) -> Array:
-    """Tilt at which a bar on two inextensible cables hangs at rest (paper, section III-A).
+    """Tilt at which a bar on two inextensible cables is in equilibrium (paper, section III-A).
 
     The centre of mass is the bar's middle. For a half length of zero this is the paper's
     closed form, eqs 5 and 6 without their misprints,
@@ -30,10 +30,10 @@ def bar_tilt(exit_points: ArrayLike, positions: ArrayLike, half_length: float = 
         theta = 2 atan((B + sqrt(B^2 + A^2)) / -A) = atan(A / B),
         A = Y1 X2 + Y2 X1,  B = 2 X1 X2,  X_i = a_ix - p_x,  Y_i = a_iy - p_y,
 
-    which the paper gives for any bar but which holds only as the half length goes to zero.
-    Else it is where the lines of both cables and of the weight meet in one point, to rounding; of
-    several such tilts the one at which both cables pull and the bar rests stably, the most level
-    of those.
+    which the paper gives for any bar, but which only holds in the limit of zero half length.
+    Otherwise it is the tilt at which the lines of both cables and of the weight meet in one point,
+    to rounding. If there are several, it is the most level one that is stable with both cables
+    taut.
 
     Args:
         exit_points: a_1, a_2, (2, 2) [m].
@@ -41,7 +41,7 @@ def bar_tilt(exit_points: ArrayLike, positions: ArrayLike, half_length: float = 
         half_length: from the middle to either anchor point, h [m]; cable 1 holds the end at -h.
 
     Returns:
-        theta, (...) [rad]; nan where the two cables cannot hold the bar.
+        theta, (...) [rad]; nan if the two cables cannot hold the bar.
     """
     exits, places = _points(exit_points, 2), np.asarray(positions, float)
     if places.shape[-1:] != (2,):
@@ -58,12 +58,13 @@ def bar_tilt(exit_points: ArrayLike, positions: ArrayLike, half_length: float = 
 
 @dataclass(frozen=True, repr=False)
 class BarRest(Result):
-    """One way in which a bar on two inextensible cables is in balance.
+    """An equilibrium of a bar on two inextensible cables.
 
     Attributes:
         theta: tilt [rad].
-        tensions: of both cables, in weights; below zero for one that would have to push.
-        stable: whether both pull and the bar stays: its one free motion raises its middle.
+        tensions: of both cables, in weights; negative for a cable that would have to push.
+        stable: whether both cables pull and the equilibrium is stable: the bar's one free motion
+            raises its middle.
     """
 
     theta: float
@@ -71,7 +72,7 @@ class BarRest(Result):
     stable: bool
 
     def lines(self) -> list[str]:
-        """Tilt, tensions, and whether it stays."""
+        """One line: tilt, tensions, and stability."""
         first, second = self.tensions
         return [
             f"tilted by {np.degrees(self.theta):.4g} deg, tensions {first:.4g} and {second:.4g} "
@@ -87,11 +88,11 @@ class BarRest(Result):
 def bar_equilibria(
     exit_points: ArrayLike, position: ArrayLike, half_length: float
 ) -> tuple[BarRest, ...]:
-    """All tilts at which a bar on two cables is in balance at a position, by tilt.
+    """All tilts at which a bar on two cables is in equilibrium at a position, in ascending order.
 
-    The lines of both cables and of the weight meet in one point there: the roots of a quartic in
-    exp(i theta), two or four. The paper speaks of a unique one; where there are more, several can
-    be stable.
+    There the lines of both cables and of the weight meet in one point. The tilts are the roots of a
+    quartic in exp(i theta), two or four. The paper speaks of a unique one; if there are more,
+    several can be stable.
 
     Args:
         exit_points: (2, 2) [m].
@@ -99,7 +100,7 @@ def bar_equilibria(
         half_length: h [m], above zero.
 
     Raises:
-        InputError: shapes, a length that is not above zero.
+        InputError: wrong shapes, or a length that is not above zero.
     """
     if not (np.isfinite(half_length) and half_length > 0.0):
         raise InputError(f"half_length must be above zero [m], got {half_length:g}")
@@ -117,7 +118,7 @@ def bar_equilibria(
 def solution_manifold(
     exit_points: ArrayLike, x: ArrayLike, y: ArrayLike, half_length: float = 0.0
 ) -> Array:
-    """Tilts at which the bar rests, over a grid of positions (paper, Fig 3).
+    """Tilts at which the bar is in equilibrium, over a grid of positions (paper, Fig 3).
 
     Args:
         exit_points: (2, 2) [m].
@@ -135,15 +136,15 @@ def midline_point(exit_points: ArrayLike, anchor_points: ArrayLike) -> Array:
     """Where the midlines of two pairs of parallel cables meet: the paper's V or H (Fig 9).
 
     Cables 1 and 2 are one pair, 3 and 4 the other. Equal tensions in a parallel pair amount to
-    one force along its midline, so that the platform can rest with equal tensions on each side
-    only where the weight passes through this point.
+    one force along its midline. So the platform can only be in equilibrium with equal tensions on
+    each side if the weight acts through this point.
 
     Args:
         exit_points: (4, 2) or (..., 4, 2) [m].
         anchor_points: in the same frame, at the pose in question, (..., 4, 2) [m].
 
     Returns:
-        (..., 2) [m]; infinite where the midlines are parallel.
+        (..., 2) [m]; infinite if the midlines are parallel.
     """
     exits, anchors = np.asarray(exit_points, float), np.asarray(anchor_points, float)
     if exits.shape[-2:] != (4, 2) or anchors.shape[-2:] != (4, 2):
@@ -180,20 +181,20 @@ def _point_tilt(to_exit: Array) -> Array:
     """Eqs 5 and 6 as one arctangent, whose numerator and denominator do not cancel."""
     (x1, y1), (x2, y2) = to_exit[..., 0, :].T, to_exit[..., 1, :].T
     a, b = (y1 * x2 + y2 * x1).T, (2.0 * x1 * x2).T
-    # both pull: horizontally apart, and together upwards
+    # both cables pull: they are on either side, and together pull upwards
     lift = (y1 * x2 - y2 * x1).T * np.sign((x2 - x1).T)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where((b < 0.0) & (lift > 0.0), np.arctan(a / b), np.nan)
 
 
 def _equation(theta: Array, to_exit: Array, h: float) -> tuple[Array, Array]:
-    """Zero where the lines of both cables and of the weight meet in one point; its derivative.
+    """Zero where the lines of both cables and of the weight meet in one point; and its derivative.
 
         -2 X1 X2 sin + h sin cos (X1 - X2) + cos (Y1 X2 + Y2 X1) + h cos^2 (Y2 - Y1)
 
-    with X_i = a_ix - p_x and Y_i = a_iy - p_y: the torque about the bar's middle of the two
-    forces that balance its weight, cleared of denominators. It replaces eqs 5 and 6 for a bar
-    of half length h.
+    with X_i = a_ix - p_x and Y_i = a_iy - p_y. It is the torque about the bar's middle of the two
+    forces that balance its weight, cleared of denominators, and replaces eqs 5 and 6 for a bar of
+    half length h.
     """
     x1, y1 = to_exit[..., 0, 0], to_exit[..., 0, 1]
     x2, y2 = to_exit[..., 1, 0], to_exit[..., 1, 1]
@@ -229,10 +230,10 @@ def _rests(theta: float, to_exit: Array, h: float) -> bool:
 
 
 def _balance(theta: float, to_exit: Array, h: float) -> tuple[tuple[float, float], bool]:
-    """Tensions in weights; whether both cables pull, and the bar's one free motion raises it.
+    """Tensions in weights; whether both cables pull and the bar's one free motion raises it.
 
-    That motion leaves both cable lengths as they are; the second change of the energy along it
-    is tension times second change of length, summed over the cables.
+    That motion keeps both cable lengths. The second derivative of the energy along it is tension
+    times second derivative of length, summed over the cables.
     """
     arms = h * np.array([[-1.0], [1.0]]) * np.array([np.cos(theta), np.sin(theta)])
     cables = to_exit - arms
@@ -240,7 +241,7 @@ def _balance(theta: float, to_exit: Array, h: float) -> tuple[tuple[float, float
     if np.any(lengths == 0.0):
         return (np.nan, np.nan), False
     u = cables / lengths[:, None]
-    # forces that cancel sideways and lift the weight: tau_1 u_1x + tau_2 u_2x = 0
+    # forces that cancel horizontally and carry the weight: tau_1 u_1x + tau_2 u_2x = 0
     lift = _cross(u[0], u[1])
     if lift == 0.0:
         return (np.nan, np.nan), False

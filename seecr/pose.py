@@ -1,9 +1,9 @@
-"""Poses and rotations as plain arrays; leading axes are batch.
+"""Poses and rotations as plain arrays; leading axes are batch axes.
 
 A pose is ``(..., 7)``: position x y z [m] in the base frame, then a unit quaternion, scalar
 first, that takes platform coordinates to base coordinates (``quat_wxyz`` of
-``R_world_platform``). A small change of a pose is ``(..., 6)``: translation [m] over rotation
-vector [rad], both in the base frame, rotations multiplied from the left:
+``R_world_platform``). A small change of a pose is ``(..., 6)``: translation [m], then rotation
+vector [rad], both in the base frame, with rotations multiplied from the left:
 ``R_new = exp(rotvec) R_old``.
 """
 
@@ -15,14 +15,14 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 LARGEST = 1e30
-"""Squares of larger numbers get lost, and nothing that is measured is so large."""
+"""Largest number accepted: squares of larger ones overflow, and no measured value is so large."""
 
-# Below this angle the series of sin(x)/x are exact to double precision.
+# Below this angle the series of sin(x)/x is exact to double precision.
 _SMALL_ANGLE = 1e-4
 
 
 def all_finite(values: ArrayLike) -> bool:
-    """Whether all are numbers that can be reckoned with: finite, none beyond :data:`LARGEST`."""
+    """Whether all are finite numbers, and none is beyond :data:`LARGEST`."""
     return bool(np.all(np.abs(np.asarray(values, float)) <= LARGEST))
 
 
@@ -31,7 +31,7 @@ def quat_multiply(a: Array, b: Array) -> Array:
     a, b = np.asarray(a, float), np.asarray(b, float)
     aw, ax, ay, az = a[..., 0], a[..., 1], a[..., 2], a[..., 3]
     bw, bx, by, bz = b[..., 0], b[..., 1], b[..., 2], b[..., 3]
-    # component by component: half of the time that vectors of three take
+    # component by component, which takes half the time of vector operations
     product = [
         aw * bw - (ax * bx + ay * by + az * bz),
         aw * bx + bw * ax + (ay * bz - az * by),
@@ -76,7 +76,7 @@ def quat_from_rotvec(rotvec: Array) -> Array:
     """Unit quaternions (..., 4) of rotation vectors (..., 3) [rad], exact also near zero."""
     v = np.asarray(rotvec, float)
     angle = np.linalg.norm(v, axis=-1, keepdims=True)
-    # np.sinc(x) = sin(pi x)/(pi x): sin(angle/2)/angle without a division by zero.
+    # np.sinc(x) = sin(pi x)/(pi x): gives sin(angle/2)/angle without a division by zero.
     half = 0.5 * np.sinc(angle / (2.0 * np.pi))
     return np.concatenate([np.cos(angle / 2.0), half * v], axis=-1)
 
@@ -114,7 +114,7 @@ def rxyz_from_quat(quat_wxyz: Array) -> Array:
 
 
 def pose_difference(pose_a: Array, pose_b: Array) -> Array:
-    """What takes pose b to pose a, (..., 6): t_a - t_b [m] over log(R_a R_b^T) [rad]."""
+    """The change from pose b to pose a, (..., 6): t_a - t_b [m], then log(R_a R_b^T) [rad]."""
     a, b = np.asarray(pose_a, float), np.asarray(pose_b, float)
     turn = quat_multiply(a[..., 3:], quat_conjugate(b[..., 3:]))
     return np.concatenate([a[..., :3] - b[..., :3], rotvec_from_quat(turn)], axis=-1)

@@ -1,4 +1,4 @@
-"""What results have in common: a few lines in print, a page in a notebook, a data frame."""
+"""Common parts of results: a few lines in print, a table in a notebook, a data frame."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from numpy.typing import NDArray
 from seecr.counted import counted
 from seecr.errors import MissingPackageError
 
-# Rows of the table in a notebook; all of them are in the data frame.
+# Rows of the table in a notebook; the data frame has all of them.
 _MOST_ROWS = 20
 
 Record = dict[str, Any]
-"""One row of a data frame: numbers in SI, names that end in their unit."""
+"""One row of a data frame: numbers in SI units, with names that end in their unit."""
 
 
 COORDINATES = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
-"""Of a pose, as columns of a data frame."""
+"""Columns of a pose in a data frame."""
 
 
 def named(pattern: str, names: Sequence[str], values: NDArray[Any]) -> Record:
-    """A part of a record: values (k,) under the pattern's name of each."""
+    """Part of a record: values (k,), with keys from the pattern and each name."""
     return {pattern.format(name): value for name, value in zip(names, values.tolist(), strict=True)}
 
 
 class Result(ABC):
-    """A result that shows itself; its class says what there is to read, see and tabulate."""
+    """A result that can be printed and tabulated; subclasses define the lines and rows."""
 
     @abstractmethod
     def lines(self) -> Sequence[str]:
@@ -38,7 +38,7 @@ class Result(ABC):
 
     @abstractmethod
     def records(self) -> Sequence[Record]:
-        """The result's rows, all with the same names."""
+        """The result's rows, all with the same keys."""
 
     def __str__(self) -> str:
         return "\n".join(self.lines())

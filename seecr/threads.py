@@ -1,4 +1,4 @@
-"""Batches in several threads: compiled functions run without Python's lock."""
+"""Batches in several threads: compiled functions run without Python's global lock."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ __all__ = [
 
 # Fewer poses than this are not worth a second thread.
 _CHUNK = 128
-# Of each thread, whether it is at a part of a batch: that is not parted again.
+# Per thread, whether it works on a part of a batch; such a part is not divided again.
 _at = threading.local()
 
 
 def processors() -> int:
-    """Processors that this process may use: in a container often fewer than the machine has."""
+    """Processors available to this process: in a container often fewer than the machine has."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def in_parts(run: Callable[[slice], None], n: int, threads: int | None = None) -> None:
-    """Run a job on n rows, in as many parts as there are threads and rows enough for them.
+    """Run a job on n rows, in as many parts as there are threads, if these have enough rows.
 
-    Within a part of another job there is one: the other threads have theirs.
+    Within a part of another job it is not divided: the other threads are busy.
     """
     count = max(1, n // _CHUNK)
     if count > 1:  # asking the system takes longer than a few rows
@@ -43,10 +43,10 @@ def in_parts(run: Callable[[slice], None], n: int, threads: int | None = None) -
 
 
 def run_parts(run: Callable[[slice], None], parts: list[slice]) -> None:
-    """Run a job on every part of a batch, in this thread and in as many as have processors.
+    """Run a job on every part of a batch, in this thread and others, one per processor.
 
-    Each takes the next part that nobody has taken: none waits for another before the end. After an
-    error no further part is begun.
+    Each thread takes the next part that is left, so that none waits for another before the end.
+    After an error no further part is begun.
     """
     if getattr(_at, "part", False) or len(parts) == 1:
         for part in parts:

@@ -1,4 +1,4 @@
-"""Units: as files spell them, as people type and read them, and what they are in SI.
+"""Units: as files spell them, as people type and read them, and their SI equivalents.
 
 People read numbers in the units of this table, with no more digits than are known.
 """
@@ -25,14 +25,14 @@ _MOST_DIGITS = 6
 class Unit:
     """One unit.
 
-    A factor is a product and a quotient, each exact, so that 103 mm is the double 0.103, which
-    103 * 1e-3 is not.
+    The factor is a product and a quotient of exact numbers, so that 103 mm is the double 0.103,
+    which 103 * 1e-3 is not.
 
     Attributes:
-        suffix: as a column's or a parameter's name ends. si: the SI's for the same quantity.
+        suffix: with which a column's or a parameter's name ends. si: the SI unit of the quantity.
         times, over: x of this unit are ``x * times / over`` in SI.
         symbol: as people read it. also: other ways to type it.
-        column: whether a column of measurements may be in it.
+        column: whether a column of measurements may use it.
         shown: whether results in ``si`` are printed in it.
     """
 
@@ -46,7 +46,7 @@ class Unit:
     shown: bool = False
 
     def to_si(self, values: Numbers) -> Numbers:
-        """Numbers of this unit in SI."""
+        """Numbers of this unit, in SI."""
         return values * self.times / self.over
 
 
@@ -75,12 +75,12 @@ UNITS = (
 
 
 def of_columns(si: str) -> dict[str, Unit]:
-    """Units, by suffix, of columns of measurements that hold a quantity of this SI unit."""
+    """Units, by suffix, that columns of measurements may use for a quantity of this SI unit."""
     return {unit.suffix: unit for unit in UNITS if unit.si == si and unit.column}
 
 
 def short(value: float | None, digits: int = 3) -> str:
-    """A number of so many digits, without an exponent where that is readable."""
+    """A number with so many digits, without an exponent if that is readable."""
     if value is None or not np.isfinite(value):
         return "–"
     if value == 0.0:
@@ -94,7 +94,7 @@ def short(value: float | None, digits: int = 3) -> str:
 
 
 def joules(energy: float, form: str = ".3g") -> str:
-    """An energy [J] in mJ, from 1 J on in J."""
+    """An energy [J] in mJ, or from 1 J on in J."""
     return f"{energy:{form}} J" if abs(energy) >= 1.0 else f"{1e3 * energy:{form}} mJ"
 
 

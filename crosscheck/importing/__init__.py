@@ -1,4 +1,4 @@
-"""Other people's files: exports of motion capture and logs, made into measurements."""
+"""Other programs' files: exports of motion capture and logs, converted to measurements."""
 
 from __future__ import annotations
 

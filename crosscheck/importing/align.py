@@ -1,8 +1,8 @@
-"""Where a tracker stands and how its body sits on the platform, roughly.
+"""Approximate alignment of a tracker's frame, and of its body on the platform.
 
-What is logged is T_base_tracker^-1 T_platform T_target. Both transforms are found from points that
-the user names, or from the commands; then they have taken in a part of the model's error, and stay
-free in every later fit.
+Logged is T_base_tracker^-1 T_platform T_target. Both unknown transforms are found from points that
+the user names, or from the commands. In the latter case they have absorbed a part of the model's
+error, and stay free in every later fit.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from crosscheck.measurements.dwells import mean_rotation
 from seecr.counted import counted
 from seecr.pose import Array, quat_conjugate, quat_multiply, quat_rotate, rotvec_from_quat
 
-# What is left may be this part of the spread of the points, and of named points.
+# Largest residual relative to the spread of the points, for commands and for named points.
 _LEFT, _LEFT_OF_POINTS = 0.2, 0.05
-# That much of the dwells is left by no more; others may be far off.
+# This part of the dwells must be within that; others may be far off.
 _MOST = 0.8
-# Commands that are turned by less than this about their mean do not show where the target sits.
+# Commands with smaller rotations about their mean do not show where the target is.
 _TURNED = np.radians(3.0)
 _ROUNDS = 10
 _LEAST = 3
@@ -37,12 +37,12 @@ _NONE = np.array([1.0, 0.0, 0.0, 0.0])
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """How poses in the tracker's frame become poses of the platform in the base frame.
+    """Transform from poses in the tracker's frame to poses of the platform in the base frame.
 
     Attributes:
         turn, shift: base = turn * tracker + shift.
         target_turn, target_shift: of the body in the platform's frame.
-        how: what was done, in words. free: effects that later fits take as free.
+        how: what was done, in words. free: effects that later fits leave free.
     """
 
     turn: Array
@@ -53,18 +53,18 @@ class Frames:
     free: tuple[str, ...]
 
     def poses(self, position: Array, quat: Array | None) -> tuple[Array, Array | None]:
-        """Positions (n, 3) and quaternions (n, 4) of the platform; the body's where not read."""
+        """Positions (n, 3) and quaternions (n, 4) of the platform, or the body's positions."""
         place = quat_rotate(self.turn, position) + self.shift
         if quat is None:
             return place, None
         turned = quat_multiply(quat_multiply(self.turn, quat), quat_conjugate(self.target_turn))
-        # q and -q are one turn: people expect the one that is near 1 0 0 0
+        # q and -q are the same rotation: people expect the one near 1 0 0 0
         turned = np.where(turned[:, :1] < 0.0, -turned, turned)
         return place - quat_rotate(turned, self.target_shift), turned
 
 
 def as_they_are(target: Array | None) -> Frames:
-    """A tracker that is in the base frame already."""
+    """A tracker that already reads in the base frame."""
     shift = np.zeros(3) if target is None else target
     return Frames(_NONE, np.zeros(3), _NONE, shift, "frames taken as they are", ())
 
@@ -73,7 +73,7 @@ def by_points(names: Sequence[str], there: Array, here: Array) -> Frames:
     """The tracker's frame from points (k, 3) that are known in it and in the base frame.
 
     Raises:
-        CrosscheckError: fewer than three, in one line, or with other distances between them.
+        CrosscheckError: fewer than three points, points in one line, or inconsistent distances.
     """
     turn = turn_of_points(there, here)
     if turn is None:
@@ -101,11 +101,11 @@ def to_commands(position: Array, quat: Array | None, told: Array, target: Array 
     Args:
         position, quat: (n, 3) [m] and (n, 4) or None, as tracked.
         told: (n, 7) commanded.
-        target: (3,) [m] of the body's origin in the platform's frame, its axes parallel to the
-            platform's; None to find both too.
+        target: (3,) [m] of the body's origin in the platform's frame, with parallel axes; None
+            estimates both.
 
     Raises:
-        CrosscheckError: fewer than three, commands in one line, or too much is left.
+        CrosscheckError: fewer than three dwells, commands in one line, or large residuals.
     """
     if len(told) < _LEAST:
         raise CrosscheckError(
@@ -137,7 +137,7 @@ def to_commands(position: Array, quat: Array | None, told: Array, target: Array 
 
 
 def with_target(frames: Frames, quat: Array | None, told: Array, target: Array | None) -> Frames:
-    """With the turn of the body on the platform, unless it is known; then its place is free too."""
+    """With the body's position ``target`` on the platform, or its rotation, which stays free."""
     if target is not None:
         return replace(frames, target_shift=target)
     free = (*frames.free, "tracker_target")
@@ -157,14 +157,14 @@ def with_target(frames: Frames, quat: Array | None, told: Array, target: Array |
 
 
 def place_of_target(frames: Frames, position: Array, told: Array) -> Frames:
-    """With the place of the body on the platform, in a frame of the tracker that is known."""
+    """The frames with the body's position on the platform, for a known tracker frame."""
     base = quat_rotate(frames.turn, position) + frames.shift
     inside = quat_rotate(quat_conjugate(told[:, 3:]), base - told[:, :3])
     return replace(frames, target_shift=np.median(inside, axis=0))
 
 
 def _target(base: Array, told: Array) -> Array:
-    """The place (3,) of the body by commands that are turned: base = p + R target - shift."""
+    """The position (3,) of the body from rotated commands: base = p + R target - shift."""
     n = len(told)
     turned = np.stack([quat_rotate(told[:, 3:], np.tile(e, (n, 1))) for e in np.eye(3)], axis=2)
     matrix = np.concatenate([np.tile(np.eye(3), (n, 1, 1)), turned], axis=2).reshape(3 * n, 6)
@@ -178,7 +178,7 @@ def _varies(quat: Array) -> bool:
 
 
 def _aside(points: Array) -> float:
-    """How far points (n, 3) usually lie from the line that is nearest to them."""
+    """Typical distance of points (n, 3) from the line nearest to them."""
     sizes = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     return float(np.sqrt(np.sum(sizes[1:] ** 2) / len(points)))
 

@@ -1,4 +1,4 @@
-"""From other people's files to a case folder that every command reads."""
+"""From other programs' files to a case folder that every command reads."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ from seecr.result import Record, Result
 
 # Samples that scatter by less than this part of the least change between them show the last digit
 # written and no noise. From q / 2 on, the mean of numbers rounded to q is off by 0.002 q at most:
-# q exp(-2 (pi / 2)^2) / pi, the first term of the Fourier series of what rounding adds.
+# q exp(-2 (pi / 2)^2) / pi, the first term of the Fourier series of the rounding error.
 _DIGITS = 0.5
-# Recordings follow one another after so long [s].
+# Time between consecutive recordings [s].
 _BETWEEN = 60.0
 NAME = "import.json"
 FILES = ("robot.xml", "measured.csv", "measured.toml", "dwells.csv", NAME)
@@ -48,11 +48,11 @@ FILES = ("robot.xml", "measured.csv", "measured.toml", "dwells.csv", NAME)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Imported(Result):
-    """What was made of the files.
+    """The result of an import.
 
     Attributes:
-        robot: whose they are. measured: the dwells as measurements.
-        frames: how the tracker's poses became the platform's.
+        robot: the recorded robot. measured: the dwells as measurements.
+        frames: the transform from the tracker's poses to the platform's.
         takes: the recordings. notes: what was done, for people.
     """
 
@@ -63,12 +63,12 @@ class Imported(Result):
     notes: tuple[str, ...]
 
     def lines(self) -> list[str]:
-        """How many dwells, and what was done."""
+        """The number of dwells, and what was done."""
         n = int(self.measured.read.sum())
         return [f"{counted(n, 'dwell')} of {self.robot.name}", *self.notes]
 
     def records(self) -> list[Record]:
-        """A record for each dwell: when, how many samples, their scatter and the mean's error."""
+        """One row for each dwell: time, number of samples, their scatter and the mean's error."""
         return [
             {
                 "file": take.stream.path.name,
@@ -88,7 +88,7 @@ class Imported(Result):
         ]
 
     def as_json(self) -> dict[str, Any]:
-        """The content of ``import.json``, SI."""
+        """The content of ``import.json``, in SI units."""
         return {
             "robot": self.robot.name,
             "files": [str(take.stream.path) for take in self.takes],
@@ -114,24 +114,24 @@ def import_case(
     *,
     out: str | Path | None = None,
 ) -> Imported:
-    """Make measurements of other people's recordings: of motion capture, or plain logs.
+    """Make measurements of other programs' recordings: of motion capture, or plain logs.
 
     Args:
         form: "motive" (CSV exports of OptiTrack), "vicon" (of Nexus), or "poses" (a log with the
             columns t_s, x_mm, y_mm, z_mm, qw, qx, qy, qz).
-        files: a recording, or several of one tracker that stood still between them.
-        robot: whose they are, or its MJCF.
-        commands: of each recording a log of commands with times by the same clock, or one row
+        files: a recording, or several of one tracker that was not moved between them.
+        robot: the recorded robot, or its MJCF.
+        commands: for each recording a log of commands with times by the same clock, or one row
             per dwell without times.
-        choices: what else the user says of the files.
+        choices: what else the user states about the files.
         out: folder for the case, as ``crosscheck import`` writes it; None writes nothing.
 
     Returns:
-        an :class:`Imported`, whose ``measured`` every other function takes.
+        an :class:`Imported`, whose ``measured`` every other function accepts.
 
     Raises:
-        InputFileError, CrosscheckError: whatever is wrong with the files.
-        InputError: another form, or a case of a robot that was read from no file.
+        InputFileError, CrosscheckError: any mistake in the files.
+        InputError: an unknown form, or a case of a robot without a file.
     """
     if form not in READERS:
         raise InputError(f"form must be one of {', '.join(READERS)}, got {form!r}")
@@ -170,16 +170,16 @@ def import_case(
 
 
 def check_case(out: str | Path, robot_path: Path) -> None:
-    """That a case may be written into a folder, before the work that it is for.
+    """Check that a case may be written into a folder, before the work that it is for.
 
     Raises:
-        InputFileError: measurements or a robot are in it that no import made.
+        InputFileError: it holds measurements or a robot that no import made.
     """
     check_replaces(out, FILES, NAME, {"robot.xml": robot_path})
 
 
 def write_case(found: Imported, robot_path: Path, out: Path, made: Made | None = None) -> None:
-    """Write the case folder, whole or not at all; ``made`` says how it came about."""
+    """Write the case folder, completely or not at all; ``made`` is its provenance."""
     said = {} if made is None else {"made": made}
     check_case(out, robot_path)
     with staged(out) as folder:
@@ -203,7 +203,7 @@ def _frames(robot: Robot, takes: Sequence[Take], choices: ImportChoices) -> Fram
     told = np.concatenate(
         [commanded(robot, t.held.log.rows(t.held.row[t.number >= 0])) for t in takes]
     )
-    # where markers sit on the platform was said
+    # the markers' positions on the platform are given
     target = np.zeros(3) if choices.shape and choices.target is None else choices.target
     if choices.aligned:
         return as_they_are(target)
@@ -217,7 +217,7 @@ def _frames(robot: Robot, takes: Sequence[Take], choices: ImportChoices) -> Fram
 
 
 def _place(export: Logged, name: str) -> Array:
-    """A marker's mean place (3,) [m], or the numbers that stand in its stead."""
+    """A marker's mean position (3,) [m], or the coordinates given in its place."""
     if name not in export.markers and name.count(",") == 2:
         return numbers_of("--point", name)
     return np.asarray(np.nanmean(export.marker(name), axis=0))
@@ -243,7 +243,7 @@ def _measured(take: Take, frames: Frames) -> tuple[Measurements, Array]:
 
 
 def _one(parts: Sequence[Measurements]) -> Measurements:
-    """All recordings as one file, each beginning a while after the one before has ended."""
+    """All recordings as one file, each beginning some time after the end of the one before."""
     if len(parts) == 1:
         return parts[0]
     whole = together(parts)
@@ -257,7 +257,7 @@ def _one(parts: Sequence[Measurements]) -> Measurements:
 
 
 def _sigma(takes: Sequence[Take], tensions: Sequence[Array]) -> Sigma:
-    """The noise of means, over all dwells; None where the digits of the files hide it."""
+    """The noise of means, over all dwells; None if the rounding in the files hides it."""
 
     def pooled(values: Array) -> float | None:
         rms = _rms(values)

@@ -1,4 +1,4 @@
-"""What a user says of recordings beside the files themselves."""
+"""What a user states about recordings besides the files themselves."""
 
 from __future__ import annotations
 
@@ -17,25 +17,26 @@ from crosscheck.units import parse_quantity
 from seecr.description.robot import Robot
 from seecr.pose import Array
 
-# No axis twice in a row, which would be one turn.
+# No axis twice in succession, which would be one rotation.
 _ROTATION = re.compile(r"vector|(?:([xyz])(?!\1)){3}|(?:([XYZ])(?!\2)){3}")
 
 
 @dataclass(frozen=True, eq=False)
 class ImportChoices:
-    """What the user says of the files.
+    """What the user states about the files.
 
     Attributes:
-        body: name of the rigid body, where there are several.
-        markers: names of three or more that make the body instead.
-        shape: [m] where markers sit in the platform's frame, by name.
-        points: markers, or places in the tracker's frame, with their places in the base frame.
-        aligned: the tracker's frame is the base frame.
-        target: (3,) [m] of the body's origin in the platform's frame, axes parallel to it.
+        body: name of the rigid body, if there are several.
+        markers: names of three or more that make up the body instead.
+        shape: [m] positions of markers in the platform's frame, by name.
+        points: markers, or positions in the tracker's frame, with their positions in the base
+            frame.
+        aligned: whether the tracker's frame is the base frame.
+        target: (3,) [m] of the body's origin in the platform's frame, with parallel axes.
         up: axis that points up in the file, "y" or "z"; the program's own by default.
-        unit: of lengths, where a log's names have none.
-        rotation: what three numbers mean, :data:`crosscheck.importing.vicon.ROTATIONS`.
-        rest_for: [s]. rest_speed: [m/s]. clock: [s], the tracker's less the commands'; found
+        unit: of lengths, if a log's names have none.
+        rotation: meaning of three numbers, :data:`crosscheck.importing.vicon.ROTATIONS`.
+        rest_for: [s]. rest_speed: [m/s]. clock: [s], the tracker's minus the commands'; estimated
             by default.
     """
 
@@ -57,10 +58,10 @@ class ImportChoices:
         cls, robot: Robot, *, markers: str | None, shape: Path | None, points: Sequence[str],
         target: str | None, rest_speed: str | None, **others: Any,
     ) -> ImportChoices:  # fmt: skip
-        """ImportChoices as people type them; see ``crosscheck import --help``.
+        """The choices as people type them; see ``crosscheck import --help``.
 
         Raises:
-            CrosscheckError, InputFileError: something else than that.
+            CrosscheckError, InputFileError: a text that is not valid.
         """
         return cls(
             markers=tuple(name.strip() for name in (markers or "").split(",") if name.strip()),
@@ -72,10 +73,10 @@ class ImportChoices:
         )
 
     def check(self, form: str) -> None:
-        """That nothing is said which a recording of this form, or what else is said, leaves no use.
+        """Refuse choices that are useless for a recording of this form, or contradict each other.
 
         Raises:
-            CrosscheckError: what is, or a rotation that is none.
+            CrosscheckError: there is one, or an invalid rotation.
         """
         said = [
             (self.aligned and self.points, "--aligned and --point", "one of them: the frame is "

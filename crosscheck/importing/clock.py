@@ -1,7 +1,7 @@
-"""What the tracker's clock shows more than that of the commands, found from where each rests.
+"""Offset between the tracker's clock and that of the commands, found from the resting poses.
 
-Two programs that log one day seldom share a clock. How far apart two resting poses are is the same
-in any frame: with the right shift the tracked distances are those between the commands.
+Two programs that log at the same time seldom share a clock. The distance between two resting poses
+is the same in any frame: with the right offset the tracked distances are those between commands.
 """
 
 from __future__ import annotations
@@ -15,22 +15,22 @@ from crosscheck.importing.dwells import Dwells
 from crosscheck.importing.join import HeldCommands, owners
 from seecr.pose import Array
 
-# So many rests show a pattern.
+# Least number of rests that show a pattern.
 _LEAST = 4
-# Shifts looked at: those by which most commands begin as the platform leaves a rest.
+# Number of offsets tried: those at which most commands begin as the platform leaves a rest.
 _MOST = 40
-# Distances that are off by this part of their usual size still belong together; a shift is taken
-# if all others are off by so many times as much, and no shift too if it is not so much worse.
+# Distances that are off by this part of their usual size still match. An offset is accepted if all
+# others are worse by this factor, and no offset is preferred unless it is worse by as much.
 _ALIKE, _CLEAR = 0.2, 1.5
 
 
 @dataclass(frozen=True)
 class Clock:
-    """A shift between two clocks.
+    """An offset between two clocks.
 
     Attributes:
-        shift: [s] what the tracker's shows more.
-        said: how it was found; nothing where the clocks are one, or nothing else can be told.
+        shift: [s] tracker's clock minus commands'.
+        said: how it was found; empty if the clocks agree or nothing can be inferred.
     """
 
     shift: float
@@ -38,7 +38,7 @@ class Clock:
 
 
 def find_clock(held: HeldCommands, told: Array, rests: Dwells) -> Clock:
-    """The shift that brings the rests to the commands.
+    """The offset that matches the rests with the commands.
 
     Args:
         held: by the clock of the commands. told: (k, 3) [m] where they should bring the platform.
@@ -67,7 +67,7 @@ def find_clock(held: HeldCommands, told: Array, rests: Dwells) -> Clock:
 
 
 def _likely(begin: Array, end: Array) -> Array:
-    """Shifts [s], none first, by which many commands begin as a rest ends."""
+    """Offsets [s], zero first, at which many commands begin as a rest ends."""
     every = np.sort((end[None, :] - begin[1:, None]).ravel())
     gap = 0.25 * float(np.min(np.diff(begin)))
     votes = np.searchsorted(every, every + gap) - np.searchsorted(every, every - gap)
@@ -81,9 +81,9 @@ def _likely(begin: Array, end: Array) -> Array:
 
 
 def _off(told: Array, place: Array, number: NDArray[np.int64]) -> float:
-    """How far distances between rests are from those between commands, as a part of these.
+    """Relative error of the distances between rests, compared with those between commands.
 
-    A command without a rest counts as one whose distances are nothing.
+    Missing rests count as if their distances were zero.
     """
     there = number >= 0
     every = min(len(told), len(place))
@@ -101,6 +101,6 @@ def _distances(points: Array) -> Array:
 
 
 def _leaves(begin: Array, rests: Dwells, number: NDArray[np.int64]) -> tuple[float, int]:
-    """Usual time [s] from a command to the end of the rest before it, and of how many."""
+    """Median time [s] from a command to the end of the rest before it, and the number of these."""
     k = 1 + np.flatnonzero((number[:-1] >= 0) & (number[1:] >= 0))
     return float(np.median(rests.end_s[number[k - 1]] - begin[k])), len(k)

@@ -1,4 +1,4 @@
-"""Where a stream rests, and what it reads there on average."""
+"""Dwells: where a stream rests, and its mean readings there."""
 
 from __future__ import annotations
 
@@ -15,33 +15,33 @@ from seecr.counted import counted
 from seecr.pose import Array
 
 REST_FOR = 0.5
-"""A dwell takes so long at least [s]."""
+"""Shortest dwell [s]."""
 
-# Speeds are differences of means over so long before and after [s].
+# Speeds are differences of means over this time before and after [s].
 _WINDOW = 0.1
-# At rest: slower than this many times the speed that noise feigns, or this part of the usual
-# speed on the way.
+# At rest is slower than this many times the speed that noise simulates, or this part of the usual
+# speed of motion.
 _NOISE, _PART = 6.0, 0.01
-# Least samples of a dwell.
+# Fewest samples of a dwell.
 LEAST = 5
-# Smaller changes [m, rad] are the rounding of our own arithmetic.
+# Smaller changes [m, rad] are rounding of our own arithmetic.
 _SAME = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
 class Dwells:
-    """Rests of a stream, in time order.
+    """Dwells of a stream, in time order.
 
     Attributes:
         start, stop: (k,) first row of each in the stream, and the row after its last.
         begin_s, end_s: (k,) [s].
         samples: (k,) rows in which the body was seen.
         position: (k, 3) [m] means. quat_wxyz: (k, 4) means as rotations, or None.
-        scatter_m, scatter_rad: (k,) standard deviation of single samples, by coordinate.
+        scatter_m, scatter_rad: (k,) standard deviation of single samples, per coordinate.
         error_m, error_rad: (k,) standard error of the means: from means of parts, since
-            neighbouring samples go together.
-        step_m, step_rad: (k,) least change from a sample to the next; inf where all are the same.
-        speed: [m/s] slower than this was at rest.
+            neighbouring samples are correlated.
+        step_m, step_rad: (k,) least change from a sample to the next; inf if all are the same.
+        speed: [m/s] slower than this counted as rest.
     """
 
     start: NDArray[np.int64]
@@ -70,14 +70,14 @@ def find_dwells(
     rest_speed: float | None = None,
     arm: float = 0.0,
 ) -> Dwells:
-    """The rests of a stream.
+    """The dwells of a stream.
 
     Args:
         stream: as logged.
-        breaks: [s] where a dwell ends at the latest, as another command begins.
-        rest_for: [s] of a dwell at least.
-        rest_speed: [m/s] slower is at rest; found from the stream by default.
-        arm: [m] by which turning counts as moving.
+        breaks: [s] times at which a dwell ends at the latest, as another command begins.
+        rest_for: [s] shortest dwell.
+        rest_speed: [m/s] slower counts as rest; estimated from the stream by default.
+        arm: [m] lever by which rotation counts as motion.
 
     Raises:
         InputFileError: nothing rests long enough, or for too few samples.
@@ -113,7 +113,7 @@ def find_dwells(
 
 
 def _means(values: Array, half: int) -> tuple[Array, Array]:
-    """Means (n, k) of the ``half`` rows before each and after it; NaN where none was seen."""
+    """Means (n, k) of the ``half`` rows before and after each row; NaN if none was seen."""
     there = np.isfinite(values)
     start = np.zeros((1, values.shape[1]))
     total = np.concatenate([start, np.cumsum(np.where(there, values, 0.0), axis=0)])
@@ -131,7 +131,7 @@ def _means(values: Array, half: int) -> tuple[Array, Array]:
 
 
 def _speed(stream: Stream, values: Array, half: int) -> Array:
-    """(n,) rate of change of columns (n, k); of the nearest whole window at the ends."""
+    """(n,) rate of change of columns (n, k); at the ends that of the nearest whole window."""
     before, after = _means(values, half)
     times = np.where(np.isfinite(values[:, :1]), stream.t_s[:, None], np.nan)
     early, late = _means(times, half)
@@ -143,7 +143,7 @@ def _speed(stream: Stream, values: Array, half: int) -> Array:
 
 
 def _turning(stream: Stream, half: int) -> Array:
-    """(n,) rate of turning [rad/s]."""
+    """(n,) angular velocity [rad/s]."""
     if stream.quat_wxyz is None:
         return np.zeros(len(stream.t_s))
     quat = stream.quat_wxyz.copy()
@@ -155,7 +155,7 @@ def _turning(stream: Stream, half: int) -> Array:
 
 
 def _limit(stream: Stream, speed: Array, half: int, step: float) -> float:
-    """[m/s] Slower is at rest: what noise feigns, or a small part of the speed on the way."""
+    """[m/s] Slower is at rest: the speed that noise simulates, or a part of the usual one."""
     bend = stream.position[2:] - 2.0 * stream.position[1:-1] + stream.position[:-2]
     noise = float(np.nanmedian(np.linalg.norm(bend, axis=1))) / np.sqrt(6.0)
     feigned = noise * np.sqrt(2.0 / half) / ((half + 1) * step)
@@ -202,7 +202,7 @@ def _averaged(stream: Stream, bounds: list[tuple[int, int]], limit: float) -> Dw
 
 
 def _about(quat: Array, mean: Array) -> Array:
-    """Rotation vectors (n, 3) [rad] of rotations about their mean."""
+    """Rotation vectors (n, 3) [rad] of rotations relative to their mean."""
     middle = Rotation.from_quat(mean, scalar_first=True)
     return np.asarray((Rotation.from_quat(quat, scalar_first=True) * middle.inv()).as_rotvec())
 
@@ -212,6 +212,6 @@ def _rms(values: Array) -> float:
 
 
 def _step(values: Array) -> float:
-    """The least change from a row (n, 3) to the next; inf where there is none."""
+    """The least change from a row (n, 3) to the next; inf if there is none."""
     size = np.linalg.norm(np.diff(values, axis=0), axis=1)
     return float(np.min(size[size > _SAME], initial=np.inf))

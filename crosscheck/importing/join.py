@@ -1,4 +1,4 @@
-"""Commands in time, and which dwell belongs to which."""
+"""Commands in time, and the dwell that belongs to each."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class HeldCommands:
     Attributes:
         log: all rows. row: (k,) first row of each held command.
         begin_s, end_s: (k,) [s] by the tracker's clock; None without times.
-        passed: rows of set points on the way between them.
-        clock: [s] what the tracker's clock shows more than that of the commands.
+        passed: number of set points on the way between them.
+        clock: [s] tracker's clock minus commands'.
     """
 
     log: Measurements
@@ -38,7 +38,7 @@ class HeldCommands:
     clock: float = 0.0
 
     def shifted(self, clock: float) -> HeldCommands:
-        """The same by a clock that shows so much [s] more."""
+        """The same with a clock offset that is larger by so much [s]."""
         if self.begin_s is None or self.end_s is None:
             return self
         return replace(
@@ -47,19 +47,19 @@ class HeldCommands:
 
 
 def commanded(robot: Robot, log: Measurements) -> Array:
-    """Poses (n, 7) that were commanded, or that the plain model comes to where lengths were."""
+    """Commanded poses (n, 7), or the plain model's poses for commanded lengths."""
     if log.command_pose is not None:
         return log.command_pose
     return Experiment(robot, log.as_commands(robot)).predict(()).pose
 
 
 def held_commands(log: Measurements, rest_for: float, clock: float, end: float) -> HeldCommands:
-    """The commands of a log that were held for so long.
+    """The commands of a log that were held long enough.
 
     Args:
         log: commands with times, or one row per pose without.
-        rest_for: [s] at least.
-        clock: [s] what the tracker's clock shows more than that of the commands.
+        rest_for: [s] shortest time.
+        clock: [s] tracker's clock minus commands'.
         end: [s] of the tracker's stream.
     """
     command = log.command_pose if log.command_lengths is None else log.command_lengths
@@ -67,7 +67,7 @@ def held_commands(log: Measurements, rest_for: float, clock: float, end: float) 
     carried = np.zeros((log.n_rows, 1)) if log.loads is None else log.loads.mass[:, None]
     told = np.concatenate([command, carried], axis=1)
     changes = np.any(np.abs(np.diff(told, axis=0)) > 1e-9, axis=1)
-    if log.t_s is None:  # what is told twice in a row rests but once
+    if log.t_s is None:  # a command given twice in succession rests only once
         return HeldCommands(log, np.concatenate([[0], 1 + np.flatnonzero(changes)]), None, None, 0)
     changes |= log.run[1:] != log.run[:-1]
     first = np.concatenate([[0], 1 + np.flatnonzero(changes)])
@@ -95,8 +95,8 @@ def matched(stream: Stream, held: HeldCommands, dwells: Dwells) -> NDArray[np.in
     """The dwell of each held command, -1 for none.
 
     Raises:
-        InputFileError: without times, when there are not as many dwells as commands; with times,
-            when none falls into a command.
+        InputFileError: without times, if there are not as many dwells as commands; with times, if
+            no dwell falls into a command.
     """
     if held.begin_s is None or held.end_s is None:
         if len(dwells) != len(held.row):
@@ -123,7 +123,7 @@ def joined(
 ) -> tuple[Measurements, Array]:
     """The held commands as rows without poses yet, and the noise (k,) of averaged tensions.
 
-    Times are the dwells' middles; tensions are those of the log, averaged over each dwell.
+    Times are the middles of the dwells; tensions are those of the log, averaged over each dwell.
     """
     last = int(np.flatnonzero(number >= 0)[-1]) + 1
     rows = held.log.rows(held.row[:last])
@@ -144,7 +144,7 @@ def joined(
 
 
 def _average(values: Array) -> tuple[Array, float]:
-    """Means (m,) of rows (n, m), NaN where nothing was read, and their usual standard error."""
+    """Means (m,) of rows (n, m), NaN if not read, and their rms standard error."""
     there = np.isfinite(values)
     count = there.sum(axis=0)
     mean = np.divide(np.where(there, values, 0.0).sum(axis=0), count,

@@ -1,4 +1,4 @@
-"""What a tracker logged, whoever's file it was: bodies and markers in time."""
+"""A tracker's log, whatever file it came from: bodies and markers in time."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from seecr.counted import some
 from seecr.errors import InputFileError
 from seecr.pose import Array, quat_conjugate, quat_multiply, quat_rotate
 
-# Turns axes with Y up, as they are on screens, into axes with Z up: by 90 degrees about x.
+# Rotates axes with Y up, as on screens, to axes with Z up: by 90 degrees about x.
 _UPRIGHT = np.array([np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0])
 _MOST_NAMED = 12
 
@@ -25,7 +25,7 @@ class Stream:
     """One body in time, in the tracker's frame.
 
     Attributes:
-        path: the file. t_s: (n,) [s], growing. line: (n,) of the file.
+        path: the file. t_s: (n,) [s], increasing. line: (n,) in the file.
         position: (n, 3) [m], NaN where it was lost.
         quat_wxyz: (n, 4), NaN where it was lost, or None.
     """
@@ -38,26 +38,26 @@ class Stream:
 
     @property
     def seen(self) -> NDArray[np.bool_]:
-        """(n,) whether the body was seen, all of it."""
+        """(n,) whether the body was seen completely."""
         parts = [self.position] if self.quat_wxyz is None else [self.position, self.quat_wxyz]
         return np.asarray(np.isfinite(np.concatenate(parts, axis=1)).all(axis=1))
 
     def error(self, text: str, row: int | None = None) -> InputFileError:
-        """An error of the file, at a row counted from 0."""
+        """An error in the file, at a row counted from 0."""
         return InputFileError.at(self.path, text, line=None if row is None else int(self.line[row]))
 
 
 @dataclass(frozen=True, eq=False)
 class Logged:
-    """All that a file holds.
+    """The content of a file.
 
     Attributes:
-        path: the file. t_s: (n,) [s]. line: (n,) of the file.
+        path: the file. t_s: (n,) [s]. line: (n,) in the file.
         bodies: by name, position (n, 3) [m] and quaternions (n, 4) or None.
         markers: by name, positions (n, 3) [m].
         up: the axis that points up in it, "y" or "z".
         notes: what was done in reading it.
-        began: the time of day at which t_s is 0, where the file says so.
+        began: the time of day at which t_s is 0, if the file states it.
     """
 
     path: Path
@@ -70,7 +70,7 @@ class Logged:
     began: datetime | None = None
 
     def upright(self) -> Logged:
-        """The same with Z up; a body that is not turned stays so."""
+        """The same with Z up; a body without rotation stays so."""
         if self.up == "z":
             return self
         back = quat_conjugate(_UPRIGHT)

@@ -15,9 +15,9 @@ from seecr.errors import InputFileError
 from seecr.pose import Array
 from seecr.units import of_columns
 
-# Points that spread across by less than this part of their length show no turn.
+# Points whose width is less than this part of their length do not determine a rotation.
 THIN = 0.02
-# Frames that fit worse than this, times the usual misfit, or part of the size, are taken as lost.
+# Frames that fit worse than so many times the usual misfit, or part of the size, count as lost.
 _SWAPPED, _BENT = 10.0, 0.05
 
 
@@ -29,14 +29,14 @@ def body_of_markers(
     Args:
         export: holds them.
         names: of the markers, three or more.
-        shape: (k, 3) [m] where they sit in the body's frame; without, as they are where all are
-            seen first, with the origin in their middle.
+        shape: (k, 3) [m] their positions in the body's frame; by default those of the first frame
+            in which all are seen, relative to their mean.
 
     Returns:
         the body and a sentence on how well it fits.
 
     Raises:
-        InputFileError: too few markers, in one line, or that do not keep their distances.
+        InputFileError: too few markers, markers in one line, or without constant distances.
     """
     points = np.stack([export.marker(name) for name in names], axis=1)
     seen = np.asarray(np.isfinite(points).all(axis=2))
@@ -90,8 +90,8 @@ def _fitted(points: Array, seen: NDArray[np.bool_], shape: Array) -> tuple[Array
 def aligning(here: Array, there: Array) -> Array:
     """Rotations (n, 3, 3) that bring points (k, 3) nearest to others (n, k, 3), both about 0.
 
-    SciPy's ``align_vectors`` for all frames at once, which takes a hundredth of the time (Kabsch
-    1976, with the sign of Umeyama 1991 against reflections).
+    They are those of SciPy's ``align_vectors``, for all frames at once in a hundredth of the time
+    (Kabsch 1976, with the sign of Umeyama 1991 against reflections).
     """
     u, _s, vt = np.linalg.svd(np.einsum("nki,kj->nij", there, here))
     u[:, :, 2] *= np.linalg.det(u @ vt)[:, None]
@@ -99,10 +99,10 @@ def aligning(here: Array, there: Array) -> Array:
 
 
 def read_shape(path: Path) -> dict[str, Array]:
-    """Where markers sit on the platform: a CSV with the columns name, x_mm, y_mm, z_mm.
+    """Positions of markers on the platform: a CSV with the columns name, x_mm, y_mm, z_mm.
 
     Raises:
-        InputFileError: no such table.
+        InputFileError: there is no such table.
     """
     table = read_table(path)
     units = of_columns("m")

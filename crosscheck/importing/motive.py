@@ -1,8 +1,8 @@
-"""CSV exports of OptiTrack's Motive 1.2x, by their labels.
+"""CSV exports of OptiTrack's Motive 1.2x, recognised by their labels.
 
-A first row of pairs (format version, units, rotation type), then a few rows of labels, of which
-versions leave out some or add others, then ``Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,...``. Quaternions
-have the scalar last; Y is up unless chosen otherwise; cells of what was hidden are blank.
+The first row has pairs (format version, units, rotation type), then there are a few rows of labels,
+some of which depend on the version, then ``Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,...``. Quaternions
+have the scalar last; Y is up unless chosen otherwise; cells of hidden bodies are blank.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _AXES = ("X", "Y", "Z")
 
 @dataclass(frozen=True)
 class _Labels:
-    """The rows of labels above the numbers: of each column its type, its name, its quantity."""
+    """The rows of labels above the numbers: the type, name and quantity of each column."""
 
     kind: Row
     name: Row
@@ -77,7 +77,7 @@ def _settings(rows: FileRows) -> Mapping[str, str]:
 
 
 def _labels(rows: FileRows, top: int) -> _Labels:
-    """The rows of labels by what stands in them: 1.22 does not name them, 1.25 adds one."""
+    """The rows of labels by their content: version 1.22 does not name them, 1.25 adds one."""
     kind: Row = []
     name: Row = []
     quantity: Row = []

@@ -24,15 +24,16 @@ _LABEL = re.compile(
 
 
 def read_poses(path: Path, unit: str | None = None) -> Logged:
-    """Read a log whose columns are t, x, y, z and qw, qx, qy, qz or rx, ry, rz with their units.
+    """Read a log with columns t, x, y, z and qw, qx, qy, qz or rx, ry, rz with their units.
 
     Args:
-        path: the file; names may have our prefix ``meas_`` and units as ours, ``x_mm`` or
+        path: the file; names may have our prefix ``meas_``, and units as ours, ``x_mm`` or
             ``x [mm]``. R = Rx(rx) Ry(ry) Rz(rz), as for all our columns.
-        unit: of lengths, where the names have none.
+        unit: of lengths, if the names have none.
 
     Raises:
-        InputFileError: no table, no times, no positions, an unknown unit, or times that jump back.
+        InputFileError: no table, no times, no positions, an unknown unit, or decreasing times.
+        InputError: ``unit`` is unknown, or the names already have units.
     """
     lengths = of_columns("m")
     if unit is not None and unit not in lengths:
@@ -54,7 +55,7 @@ def read_poses(path: Path, unit: str | None = None) -> Logged:
 
 
 def _columns(table: Table) -> dict[str, tuple[int, str]]:
-    """By quantity, the column and the unit in its name."""
+    """For each quantity, the column and the unit in its name."""
     out: dict[str, tuple[int, str]] = {}
     for c, name in enumerate(table.names):
         match = _LABEL.fullmatch(name)
@@ -119,7 +120,7 @@ def _turns(table: Table, found: dict[str, tuple[int, str]]) -> Array | None:
     if "qw" in found:
         values = np.stack([table.numbers(found[n][0], blank_is_nan=True) for n in quat], axis=1)
         size = np.linalg.norm(values, axis=1, keepdims=True)
-        size[size == 0.0] = np.nan  # how some trackers write that a body was not seen
+        size[size == 0.0] = np.nan  # how some trackers mark a body that was not seen
         return np.asarray(values / size)
     if "rx" not in found:
         return None

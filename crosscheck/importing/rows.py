@@ -28,7 +28,7 @@ class FileRows:
     """A file's rows.
 
     Attributes:
-        path: the file. cells: of each line, stripped; none for an empty one.
+        path: the file. cells: of each line, stripped; none for an empty line.
     """
 
     path: Path
@@ -36,10 +36,10 @@ class FileRows:
 
     @classmethod
     def of(cls, path: Path, expected: str) -> FileRows:
-        """Read a file whose cells stand between commas, semicolons or tabs.
+        """Read a file whose cells are separated by commas, semicolons or tabs.
 
         Raises:
-            InputFileError: missing, not UTF-8, empty, or a quotation mark without its partner.
+            InputFileError: missing, not UTF-8 or empty.
         """
         lines = read_text(path, expected).split("\n")
         if not any(line.strip() for line in lines):
@@ -67,7 +67,7 @@ class FileRows:
         return next(k for k, row in enumerate(self.cells) if any(row))
 
     def taken_for(self) -> str:
-        """What kind of file this seems to be, and what to do with such; "" if it is not known."""
+        """What kind of file this seems to be, and what to do with it; "" if unknown."""
         names = self.cells[self.first]
         if any(name.startswith(("cmd_", "meas_")) for name in names):
             return "; these are columns of a log: crosscheck import poses"
@@ -76,10 +76,10 @@ class FileRows:
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """FileRows of numbers under a row of labels.
+    """Rows of numbers under a row of labels.
 
     Attributes:
-        rows: the file. label_row: its row of labels. body: its rows of numbers.
+        rows: the file. label_row: index of the labels. body: indices of the numbers.
     """
 
     rows: FileRows
@@ -93,14 +93,14 @@ class Block:
 
     @property
     def line(self) -> NDArray[np.int64]:
-        """(n,) where each row of numbers stands in the file, from 1."""
+        """(n,) line of each row of numbers in the file, from 1."""
         return np.arange(self.body.start + 1, self.body.stop + 1)
 
     def numbers(self, columns: Sequence[int]) -> Array:
-        """The numbers (n, k) of some columns; NaN in empty cells.
+        """The numbers (n, k) of some columns; NaN for empty cells.
 
         Raises:
-            InputFileError: a row too short, or a cell that holds no number.
+            InputFileError: a row that is too short, or a cell that is not a number.
         """
         out = np.empty((len(self.body), len(columns)))
         for k, row in enumerate(self.body):
@@ -140,7 +140,7 @@ class Block:
             )
 
     def check_times(self, t_s: Array, label: str) -> None:
-        """Refuse times (n,) [s] that are missing or jump back."""
+        """Refuse times (n,) [s] that are missing or do not increase."""
         wrong = np.flatnonzero(~(np.diff(t_s, prepend=-np.inf) > 0.0))
         if len(wrong) == 0:
             return

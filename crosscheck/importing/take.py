@@ -1,4 +1,4 @@
-"""One recording: read, cut into dwells, each given its command."""
+"""One recording: read, divided into dwells, each with its command."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ READERS: Mapping[str, Callable[[Path, ImportChoices], Logged]] = {
 
 @dataclass(frozen=True, eq=False)
 class Take:
-    """One recording: its stream, the commands held in it, the dwells, and which is whose."""
+    """One recording: its stream, the commands held in it, the dwells, and each command's dwell."""
 
     stream: Stream
     export: Logged
@@ -46,7 +46,7 @@ class Take:
 
     @property
     def used(self) -> NDArray[np.int64]:
-        """Dwells that belong to a command, in the order of these."""
+        """Dwells that belong to a command, in the order of the commands."""
         return self.number[self.number >= 0]
 
 
@@ -72,7 +72,7 @@ def take_of(
 
 
 def _apart(tracker: datetime | None, commands: datetime | None) -> float:
-    """What the first clock shows more [s] where both files say the time of day, and its zone."""
+    """Clock offset [s] from the times of day, if both files state them, with zones or without."""
     if tracker is None or commands is None or (tracker.tzinfo is None) != (commands.tzinfo is None):
         return 0.0
     return (commands - tracker).total_seconds()
@@ -86,7 +86,7 @@ def _clock(
     arm: float,
     apart: float,
 ) -> Clock:
-    """As the user says, or found; beyond what times of day (``apart`` [s]) say."""
+    """The clock offset, from the user or found, on top of that by times of day (``apart`` [s])."""
     if choices.clock is not None or log.t_s is None:
         return Clock(apart + (choices.clock or 0.0))
     held = held_commands(log, choices.rest_for, apart, np.inf)

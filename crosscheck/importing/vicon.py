@@ -1,7 +1,7 @@
 """CSV and text exports of Vicon's Nexus: blocks of segments and of trajectories.
 
 A block begins with its kind and its rate, then rows of names, labels and units; other blocks
-(devices, joints) are passed over. Time is frame over rate.
+(devices, joints) are ignored. Time is frame over rate.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ def read_vicon(path: Path, rotation: str | None = None, *, bodies_too: bool = Tr
 
     Args:
         path: the file.
-        rotation: what three numbers of a rotation mean, :data:`ROTATIONS`; None where there are
+        rotation: the meaning of three numbers of a rotation, :data:`ROTATIONS`; None if there are
             none.
-        bodies_too: read segments; without them nobody asks what their rotations mean.
+        bodies_too: read segments; without them the meaning of rotations does not matter.
 
     Raises:
         InputFileError: another kind of file, broken rows, or rotations of unknown meaning.
@@ -113,7 +113,7 @@ def _frames(one: _Found) -> Array:
 
 
 def _things(one: _Found) -> dict[str, dict[str, int]]:
-    """By name, the column of each label; a name stands above the first of its columns."""
+    """By name, the column of each label; a name is above the first of its columns."""
     out: dict[str, dict[str, int]] = {}
     name = ""
     for c, label in enumerate(one.block.labels):
@@ -160,7 +160,7 @@ def _rotations(one: _Found, columns: dict[str, int], rotation: str | None) -> Ar
 
 
 def rotations(angles: Array, rotation: str) -> Rotation:
-    """Rotations of three numbers (n, 3) [rad] of a kind of :data:`ROTATIONS`."""
+    """Rotations from three numbers (n, 3) [rad], of a kind in :data:`ROTATIONS`."""
     if rotation == "vector":
         return Rotation.from_rotvec(angles)
     order = ["xyz".index(axis) for axis in rotation.lower()]

@@ -1,1 +1,1 @@
-"""The CSV of a robot's measurements, the TOML beside it, and what they hold."""
+"""The CSV of a robot's measurements, the TOML beside it, and their content."""

@@ -1,4 +1,4 @@
-"""The TOML beside a file of measurements: noise, what lengths mean, where runs start."""
+"""The TOML beside a file of measurements: noise, meaning of lengths, start of runs."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ _SIGMAS = tuple(item.name for item in fields(Sigma))
 
 @dataclass(frozen=True)
 class Beside:
-    """What the TOML says.
+    """The content of the TOML.
 
     Attributes:
         sigma: stated noise.
-        told: ``lengths = "told"``: lengths are what the winches were told.
+        told: ``lengths = "told"``: lengths are told lengths.
         stands: ``start = "first_row"``: runs start at their first row.
-        free: names of effects that every fit of these data fits too.
+        free: names of effects that every fit of these data includes.
     """
 
     sigma: Sigma = field(default_factory=Sigma)
@@ -37,8 +37,8 @@ def read_beside(path: Path) -> Beside:
     """Read the TOML.
 
     Raises:
-        InputFileError: missing or broken TOML, an unknown key, a value that is no positive
-            quantity, or another word than those a key may say.
+        InputFileError: a missing or broken TOML, an unknown key, a value that is not a positive
+            quantity, or a value that its key does not allow.
     """
     toml = read_toml(path, "expected a TOML file with a table [sigma]")
     _check_names(toml)
@@ -51,7 +51,7 @@ def read_beside(path: Path) -> Beside:
 
 
 def _check_names(toml: Toml) -> None:
-    """Other names are the user's own; a misspelt one of ours must not be passed over."""
+    """Refuse misspelt keys; other names are the user's own."""
     known = ["sigma", "free", *CHOICES]
     for name in toml.content:
         if name in _SIGMAS:

@@ -1,7 +1,7 @@
-"""Measurements of a robot at rest: what was commanded and what was read, row by row, in SI.
+"""Measurements of a robot at rest: commands and readings, row by row, in SI units.
 
-Each row is one resting pose. Readings may be any part of the pose and of the tensions; what
-was not read is NaN. :mod:`crosscheck.measurements.read` reads them from files.
+Each row is one resting pose. Readings may be any part of the pose and of the tensions; missing ones
+are NaN. :mod:`crosscheck.measurements.read` reads them from files.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from seecr.result import Record, Result
 Mask = NDArray[np.bool_]
 Names = NDArray[np.str_]
 
-# Default of fields that __post_init__ makes from the others when they are not given.
+# Default of fields that __post_init__ computes from the others if they are not given.
 _FILLED_IN: Any = None
 _PER_ROW = (
     "run",
@@ -48,7 +48,7 @@ _PER_ROW = (
 
 @dataclass(frozen=True)
 class Sigma:
-    """One standard deviation of each kind of reading; None where nobody stated it.
+    """Standard deviation of each kind of reading; None if it was not stated.
 
     Attributes:
         position_m: of each measured coordinate [m].
@@ -72,37 +72,37 @@ def origin_of(path: Path, depth: int = 2) -> str:
 class Measurements(Result):
     """Commands and readings of n resting poses of a robot with m cables.
 
-    Exactly one of ``command_pose`` and ``command_lengths`` is given. Orientation is in one of
-    two places: in ``quat_wxyz`` where every row that has any has all of it, else (only some of
-    the angles read) in ``angles_rad``.
+    Exactly one of ``command_pose`` and ``command_lengths`` is given. Orientation is in one of two
+    fields: in ``quat_wxyz`` if every row has all or nothing of it, else (only some of the angles
+    were read) in ``angles_rad``.
 
     Attributes:
-        path: the file, or what it will be called.
+        path: the file, or its future name.
         n_cables: m.
-        run: (n,) name of the continuous motion each row belongs to.
+        run: (n,) name of the continuous motion that each row belongs to.
         command_pose: (n, 7) commanded platform pose, or None.
-        command_lengths: (n, m) [m] rest lengths, or None. told: whether they are what the winches
-            were told, counted as the plain model counts; else they are absolute.
-        t_s: (n,) [s] or None. began: the time of day at which it is 0, where the file says so.
-        position: (n, 3) [m] in the base frame, NaN where not read.
-        quat_wxyz: (n, 4) unit quaternions, NaN rows where not read, or None.
-        angles_rad: (n, 3) [rad] rx ry rz with R = Rx(rx) Ry(ry) Rz(rz), NaN where not read.
-        tensions: (n, m) [N], NaN where not read.
+        command_lengths: (n, m) [m] rest lengths, or None. told: whether they are told lengths, in
+            the plain model's terms; else they are absolute.
+        t_s: (n,) [s] or None. began: the time of day at which it is 0, if the file states it.
+        position: (n, 3) [m] in the base frame, NaN if not read.
+        quat_wxyz: (n, 4) unit quaternions, NaN rows if not read, or None.
+        angles_rad: (n, 3) [rad] rx ry rz with R = Rx(rx) Ry(ry) Rz(rz), NaN if not read.
+        tensions: (n, m) [N], NaN if not read.
         position_mask: (3,) coordinates that were read in some row.
-        angle_mask: (3,) angles that were read in some row; all false beside ``quat_wxyz``.
+        angle_mask: (3,) angles that were read in some row; all false with ``quat_wxyz``.
         tension_mask: (m,) cables whose tension was read in some row.
         temperature_C: (n,) [deg C] or None.
-        loads: what the platform carried, or None.
+        loads: known loads, or None.
         stands: (n,) bool, rows whose run starts at its first row instead of the reference pose.
         sigma: stated noise.
-        sigma_ratio: (n, 4) noise of each row over that, by kind: each file has its own.
-        free: names of effects that every fit of these data fits too: how the tracker stands, where
-            that was found from the data. free_in: numbers of the files that say so, by the effects'
-            names, where not all do.
-        files: their names, where they are several; file: (n,) number of each row's file.
-        origins: names by which models know the files, where they are several.
-        line: (n,) line of the file (row, for Parquet) each row came from.
-        unused_columns: names of columns that mean nothing here.
+        sigma_ratio: (n, 4) noise of each row relative to that, by kind: files may differ.
+        free: names of effects that every fit of these data includes: the tracker's frame, if it was
+            estimated from the data. free_in: indices of the files that state so, by the effects'
+            names, if not all do.
+        files: their names, if there are several; file: (n,) index of each row's file.
+        origins: names by which models know the files, if there are several.
+        line: (n,) line in the file (row, for Parquet) of each row.
+        unused_columns: names of columns without a known meaning.
         notes: sentences for the reader: what was assumed, filled in or left out.
     """
 
@@ -178,7 +178,7 @@ class Measurements(Result):
 
     @property
     def name(self) -> str:
-        """The file's name; of several, each by what tells it from the others."""
+        """The file's name; for several files, the shortest names that tell them apart."""
         return " + ".join(self.files) or self.path.name
 
     @property
@@ -188,10 +188,10 @@ class Measurements(Result):
 
     @property
     def parts(self) -> dict[str, Names]:
-        """Names (n,) of the "file" and the "run" that each row is of, as models know them."""
+        """Names (n,) of the "file" and the "run" of each row, as models know them."""
         origin = np.array(self.origins or (origin_of(self.path),), dtype=np.str_)[self.file]
         run = self.run
-        if self.files:  # runs of several files are named after these
+        if self.files:  # runs of several files have the file's name in front
             own = [len(self.files[k]) + 2 for k in self.file]
             run = np.array([name[cut:] for name, cut in zip(run, own, strict=True)], dtype=np.str_)
         return {"file": origin, "run": np.char.add(np.char.add(origin, ": "), run)}
@@ -203,18 +203,18 @@ class Measurements(Result):
 
     @property
     def run_index(self) -> NDArray[np.int64]:
-        """(n,) number of each row's run in :attr:`runs`."""
+        """(n,) index of each row's run in :attr:`runs`."""
         number = {name: i for i, name in enumerate(self.runs)}
         return np.array([number[name] for name in self.run.tolist()], dtype=np.int64)
 
     @property
     def absolute(self) -> bool:
-        """Whether lengths are commanded that no reference applies to."""
+        """Whether absolute lengths are commanded."""
         return self.command_lengths is not None and not self.told
 
     @property
     def read(self) -> Mask:
-        """(n,) rows of which anything was read; the others are way points."""
+        """(n,) rows with any reading; the others are way points."""
         tables = [self.position, self.angles_rad, self.tensions]
         tables += [] if self.quat_wxyz is None else [self.quat_wxyz]
         return np.asarray(np.isfinite(np.concatenate(tables, axis=1)).any(axis=1))
@@ -224,26 +224,26 @@ class Measurements(Result):
         return dataclasses.replace(self, notes=(*self.notes, *notes))
 
     def places(self, rows: ArrayLike, most: int = 8) -> str:
-        """Lines of some rows (numbers or a mask) in words, with their files where several are.
+        """Lines of some rows (indices or a mask) in words, with their files if there are several.
 
-        Such as ``3, 5 and 2 more`` or ``monday.csv 3, tuesday.csv 5``.
+        For example ``3, 5 and 2 more`` or ``monday.csv 3, tuesday.csv 5``.
         """
         chosen = np.arange(self.n_rows)[np.asarray(rows)]
         return some([self.place(int(row)) for row in chosen], most)
 
     def lines_of(self, rows: ArrayLike) -> str:
-        """The same after its noun: ``line 3``, ``lines 3, 5``."""
+        """The same with a noun: ``line 3``, ``lines 3, 5``."""
         count = len(np.arange(self.n_rows)[np.asarray(rows)])
         return f"{plural(count, 'line')} {self.places(rows)}"
 
     def place(self, row: int) -> str:
-        """The line of one row, and its file where several are."""
+        """The line of one row, with its file if there are several."""
         return (
             f"{self.files[self.file[row]]} {self.line[row]}" if self.files else f"{self.line[row]}"
         )
 
     def as_commands(self, robot: Robot) -> Commands:
-        """What the robot was told and carried, as the statics takes it."""
+        """The commands and known loads, as the statics takes them."""
         poses = self.command_pose
         if poses is None:
             poses = np.tile(robot.reference_pose, (self.n_rows, 1))
@@ -276,7 +276,7 @@ class Measurements(Result):
         return bool(np.any(self.tension_mask))
 
     def lines(self) -> list[str]:
-        """What there is of it, and what was assumed, filled in or left out."""
+        """What was measured, and what was assumed, filled in or left out."""
         read = [
             word
             for word, there in (
@@ -291,7 +291,7 @@ class Measurements(Result):
         return [f"{self.name}: {rows} in {runs}, {what}", *self.notes]
 
     def records(self) -> list[Record]:
-        """Commands and readings row by row, named as in the file; None where not read."""
+        """Commands and readings row by row, named as in the file; None if not read."""
         columns = dict(self.columns())
         return [
             dict(zip(columns, values, strict=True))
@@ -299,11 +299,11 @@ class Measurements(Result):
         ]
 
     def columns(self) -> Iterator[tuple[str, list[Any]]]:
-        """The columns of the file, in SI, by name; None where nothing was read."""
+        """The columns of the file, in SI units, by name; None if not read."""
         return named_columns(self)
 
     def rows(self, index: ArrayLike | slice) -> Measurements:
-        """Some rows: numbers, a mask (n,) or a slice. Masks of what was read stay as they are."""
+        """Some rows, by index, mask (n,) or slice. The masks of what was read are kept."""
         chosen = np.arange(self.n_rows)[index if isinstance(index, slice) else np.asarray(index)]
         values: dict[str, Any] = {}
         for name in _PER_ROW:

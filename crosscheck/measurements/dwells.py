@@ -1,8 +1,8 @@
-"""Readings of long logs, averaged where the robot rests: what a tracker reads at 100 Hz.
+"""Readings of long logs, averaged where the robot rests: for trackers that read at 100 Hz.
 
-Rows one after the other of one command are one pose. Their mean is as sure as their scatter says:
-from means of parts, since neighbouring readings go together. Of the stated noise what is not seen
-as scatter in a dwell stays as it is: averaging does not remove it.
+Consecutive rows of one command are one pose. The uncertainty of their mean follows from their
+scatter, by means of parts, since neighbouring readings are correlated. The part of the stated noise
+that does not show as scatter within a dwell is kept: averaging does not remove it.
 """
 
 from __future__ import annotations
@@ -16,26 +16,27 @@ from crosscheck.measurements.data import Measurements, Sigma
 from seecr.counted import between, counted, plural
 from seecr.pose import Array, quat_conjugate, quat_multiply
 
-# Shorter logs are taken row by row; longer ones where dwells have so many rows on average.
+# Shorter logs are taken row by row; longer ones are averaged if dwells have so many rows on
+# average.
 _LONG, _LEAST = 1000, 5
-# Readings of a dwell follow within so long, and no mean is taken over longer [s]: what creeps
-# while a robot rests is to be seen.
+# Largest gap between readings of a dwell, and longest time of a mean [s], so that creep at rest
+# remains visible.
 _NEXT_S, _LONGEST_S = 1.0, 30.0
-# Parts into which a dwell is cut to see how sure its mean is.
+# Parts into which a dwell is divided for the uncertainty of its mean.
 _PARTS = 5
-# Readings that scatter by this part of the stated noise show all of it: that is a round number.
+# Scatter of this part of the stated noise counts as all of it, since that is a round number.
 _ALL_SEEN = 0.8
-# Part of the noise that is left some rows on: less is chance, more is a drift.
+# Correlation at a lag: less is chance, more is a drift.
 _LEAST_LEFT, _MOST_LEFT = 0.1, 0.95
 
 
 @dataclass(frozen=True, eq=False)
 class _Scatter:
-    """Of one kind of reading in all dwells.
+    """Scatter of one kind of reading in all dwells.
 
     Attributes:
         single: standard deviation of a reading about its dwell's mean.
-        alike: how many readings count as one, since neighbours go together.
+        alike: how many correlated readings count as one.
     """
 
     single: float
@@ -43,7 +44,7 @@ class _Scatter:
 
 
 def averaged_dwells(data: Measurements) -> Measurements:
-    """A long log with a row for each dwell; shorter ones as they are."""
+    """A long log with a row for each dwell; shorter logs unchanged."""
     if data.n_rows <= _LONG:
         return data
     start = np.flatnonzero(_begins(data))
@@ -71,7 +72,7 @@ def averaged_dwells(data: Measurements) -> Measurements:
 
 
 def _begins(data: Measurements) -> NDArray[np.bool_]:
-    """(n,) rows that another row's dwell does not go on in."""
+    """(n,) rows that begin a dwell."""
     told = data.command_pose if data.command_lengths is None else data.command_lengths
     assert told is not None
     new = np.ones(data.n_rows, dtype=bool)
@@ -92,7 +93,7 @@ def _means(values: Array | None, rows: list[slice]) -> Array | None:
 
 
 def _table_means(values: Array, rows: list[slice]) -> Array:
-    """(k, w) means of what was read; NaN where nothing was."""
+    """(k, w) means of what was read; NaN without readings."""
     there = np.isfinite(values)
     starts = [some.start for some in rows]
     total = np.add.reduceat(np.where(there, values, 0.0), starts, axis=0)
@@ -101,18 +102,18 @@ def _table_means(values: Array, rows: list[slice]) -> Array:
 
 
 def _angle_means(angles_rad: Array, rows: list[slice]) -> Array:
-    """The same of angles: of the two beside a half turn that is a half turn, not nothing."""
+    """The same for angles: the mean of two beside a half turn is a half turn, not zero."""
     sine, cosine = (_table_means(of(angles_rad), rows) for of in (np.sin, np.cos))
     return np.asarray(np.arctan2(sine, cosine))
 
 
 def _between(angle: Array, other: Array) -> Array:
-    """Differences of angles, the short way round."""
+    """Differences of angles, the shorter way round."""
     return np.asarray((angle - other + np.pi) % (2.0 * np.pi) - np.pi)
 
 
 def mean_rotation(quat_wxyz: Array) -> Array:
-    """The rotation (4,) in the middle of others (n, 4); NaN rows do not count (Markley 2007)."""
+    """The mean rotation (4,) of others (n, 4); NaN rows do not count (Markley 2007)."""
     from scipy.spatial.transform import Rotation
 
     seen = quat_wxyz[np.isfinite(quat_wxyz).all(axis=1)]
@@ -122,9 +123,9 @@ def mean_rotation(quat_wxyz: Array) -> Array:
 
 
 def mean_error(values: Array) -> float:
-    """Standard error of the mean of rows (n, k), by coordinate.
+    """Standard error of the mean of rows (n, k), per coordinate.
 
-    From the means of a few parts (batch means), so that samples which go together count for
+    It follows from the means of a few parts (batch means), so that correlated samples count for
     fewer than they are.
     """
     parts = np.array_split(values, min(_PARTS, len(values)))
@@ -135,7 +136,7 @@ def mean_error(values: Array) -> float:
 def _sureness(
     data: Measurements, mean: Measurements, rows: list[slice], size: NDArray[np.int64]
 ) -> tuple[Array, str]:
-    """(k, 4) noise of the means over that of readings, by kind, and a few words on it."""
+    """(k, 4) noise of the means relative to that of readings, by kind, and a few words on it."""
     row_of = np.repeat(np.arange(len(rows)), size)
     turned = _between(data.angles_rad, mean.angles_rad[row_of])
     if data.quat_wxyz is not None and mean.quat_wxyz is not None:
@@ -163,7 +164,7 @@ def _sureness(
 
 
 def _scatter(off: Array, rows: list[slice]) -> _Scatter | None:
-    """How readings of one kind (n, w) lie about the means of their dwells; None where unread."""
+    """Scatter of readings of one kind (n, w) about the means of their dwells; None if unread."""
     columns = np.isfinite(off).any(axis=0)
     whole = [off[some][:, columns] for some in rows]
     whole = [some[np.isfinite(some).all(axis=1)] for some in whole]
@@ -175,17 +176,17 @@ def _scatter(off: Array, rows: list[slice]) -> _Scatter | None:
     single = np.sqrt(power / count)
     if single == 0.0:
         return _Scatter(0.0, 1.0)
-    # pooled over dwells: what readings of one dwell say of its mean, in readings' variances
+    # pooled over dwells: variance of a dwell's mean, in variances of a reading
     parts = np.mean([mean_error(some) ** 2 * len(some) for some in whole]) / single**2
     single, alike = _going_on(whole, single)
     return _Scatter(float(single), float(max(parts, alike, 1.0)))
 
 
 def _going_on(whole: list[Array], single: float) -> tuple[float, float]:
-    """The same two numbers of noise that fades with time, AR(1), from differences at two lags.
+    """The same two numbers for AR(1) noise, from differences at two lags.
 
-    Half their mean square is sigma^2 (1 - rho^lag), whatever the dwells' means are. A dwell that
-    is short beside the time in which noise fades does not show all of it.
+    Half their mean square is sigma^2 (1 - rho^lag), whatever the dwells' means are. A dwell that is
+    short relative to the correlation time does not show all of the noise.
     """
     lag = max(1, min(len(some) for some in whole) // 8)
     near, far = (_half_square(whole, step) for step in (lag, 2 * lag))
@@ -197,6 +198,6 @@ def _going_on(whole: list[Array], single: float) -> tuple[float, float]:
 
 
 def _half_square(whole: list[Array], lag: int) -> float:
-    """Half the mean square difference of readings so many rows apart."""
+    """Half the mean square difference of readings at a lag in rows."""
     off = [np.mean((some[lag:] - some[:-lag]) ** 2) for some in whole]
     return 0.5 * float(np.mean(off))

@@ -1,4 +1,4 @@
-"""Measurements as the columns of a file, by name and in SI."""
+"""Measurements as the columns of a file, by name and in SI units."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def named_columns(data: Measurements) -> Iterator[tuple[str, list[Any]]]:
-    """Names and values (n,) of all columns that say anything; None where nothing was read."""
+    """Names and values (n,) of all columns with content; None if not read."""
     yield "run", data.run.tolist()
     cables = range(1, data.n_cables + 1)
     yield from _columns(["t_s"], data.t_s)
@@ -33,7 +33,7 @@ def named_columns(data: Measurements) -> Iterator[tuple[str, list[Any]]]:
 
 
 def _load_columns(loads: Loads) -> Iterator[tuple[str, list[Any]]]:
-    """Those of payload and wrench that say anything."""
+    """The columns of payload and wrench with content."""
     if np.any(loads.mass):
         yield from _columns(["payload_kg"], loads.mass)
         if np.isfinite(loads.centre).any():
@@ -46,7 +46,7 @@ def _load_columns(loads: Loads) -> Iterator[tuple[str, list[Any]]]:
 def _columns(
     names: list[str], values: Array | None, mask: NDArray[np.bool_] | None = None
 ) -> Iterator[tuple[str, list[Any]]]:
-    """Columns (n,) or (n, k) under their names; none of what the mask (k,) says was not read."""
+    """Columns (n,) or (n, k) with their names, without those that the mask (k,) excludes."""
     if values is None:
         return
     for k, name in enumerate(names):

@@ -1,4 +1,4 @@
-"""Mistakes that no single cell shows: units, orders and rows that cannot be what they say."""
+"""Mistakes that no single cell shows: units, orders, and implausible rows."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ if TYPE_CHECKING:
 
 # Commands beyond this many times the frame's reach are odd.
 _FAR = 2.5
-# Readings that spread by this much more, or less, than what was commanded are in another unit.
+# Readings whose spread is so many times that of the commands, or less, are in another unit.
 _OTHER_UNIT, _LEAST_ROWS = 100.0, 4
-# An axis along which commands spread over so much of the frame was moved along on purpose.
+# Commands that spread over this part of the frame along an axis are meant to move along it.
 _MOVED = 0.02
-# Quaternions this far [rad] from where they should be, and near it in another order.
+# Quaternions this far [rad] from where they should be, but near it in another order.
 _TURNED, _UNTURNED = np.radians(90.0), np.radians(45.0)
-# Positions that are usually further from the commands than this part of how these spread, and of
-# the frame, are of something else; angles in radians that are so far off are degrees.
+# Positions whose usual distance from the commands exceeds these parts of the commands' spread and
+# of the frame belong to something else; angles in radians that are so far off are degrees.
 _ASTRAY, _OF_FRAME, _ODD_ANGLE = 0.5, 0.05, 0.5
 _MOST_LINES = 8
 
 
 def notice(columns: Columns, robot: Robot, data: Measurements) -> list[str]:
-    """What a reader should be told of.
+    """Notes that a reader should see.
 
     Raises:
         InputFileError: commands or readings that must be in another unit or order.
@@ -60,7 +60,7 @@ def _far(robot: Robot, data: Measurements) -> list[str]:
 
 
 def _spread(values: Array) -> float:
-    """Usual distance [m] from the middle, (n, k), of what is not NaN."""
+    """Median distance [m] from the median, (n, k), without NaN."""
     known = values[np.isfinite(values).all(axis=1)]
     if len(known) < _LEAST_ROWS:
         return 0.0
@@ -68,7 +68,7 @@ def _spread(values: Array) -> float:
 
 
 def _check_spread(columns: Columns, robot: Robot, data: Measurements) -> None:
-    """Positions read in another unit than their columns say, all of them or one."""
+    """Refuse positions in another unit than their columns state, all of them or one."""
     if data.command_pose is None:
         return
     which = [k for k in range(3) if data.position_mask[k]]
@@ -83,7 +83,7 @@ def _check_spread(columns: Columns, robot: Robot, data: Measurements) -> None:
 
 
 def _mean_spread(values: Array) -> float:
-    """Mean distance [m] from the middle, (n,), which one that is far off makes larger only."""
+    """Mean distance [m] from the median, (n,); an outlier can only make it larger."""
     if len(values) < _LEAST_ROWS:
         return 0.0
     return float(np.mean(np.abs(values - np.median(values))))
@@ -100,7 +100,7 @@ def _other_unit(columns: Columns, k: int, read: float, told: float) -> InputFile
 
 
 def _elsewhere(robot: Robot, data: Measurements) -> list[str]:
-    """Positions that do not follow the commands."""
+    """A note about positions that do not follow the commands."""
     if data.command_pose is None or "tracker_frame" in data.free:
         return []
     which = [k for k in range(3) if data.position_mask[k]]
@@ -120,7 +120,7 @@ def _elsewhere(robot: Robot, data: Measurements) -> list[str]:
 
 
 def _degrees(columns: Columns, data: Measurements) -> list[str]:
-    """Angles in radians that are far from the commanded ones."""
+    """A note about angles in radians that are far from the commanded ones."""
     if data.command_pose is None:
         return []
     told = rxyz_from_quat(data.command_pose[:, 3:])
@@ -147,7 +147,7 @@ def _turn(quat: Array, of: Array) -> Array:
 
 
 def _other_order(columns: Columns, robot: Robot, data: Measurements) -> list[str]:
-    """Quaternions that stand on their head, but not if their last number is the scalar."""
+    """Find quaternions that are far off, unless their last number is the scalar."""
     home = np.tile(robot.reference_pose[3:], (data.n_rows, 1))
     if data.command_pose is not None and "cmd_qw" in columns.known:
         quat = data.command_pose[:, 3:]
@@ -177,7 +177,7 @@ def _other_order(columns: Columns, robot: Robot, data: Measurements) -> list[str
 
 
 def twice(data: Measurements) -> list[str]:
-    """Rows that say the same as another to the last digit: noise never does."""
+    """A note about rows equal to others to the last digit, which noise never produces."""
     columns = [column for name, column in data.columns() if name != "run"]
     first: dict[tuple[object, ...], int] = {}
     pairs = []

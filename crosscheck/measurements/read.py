@@ -1,7 +1,7 @@
 """Read measurements of a robot: a CSV (or Parquet) with the robot's commands and readings.
 
-Everything that is wrong with a file is said in one sentence with file, line and column. Units are
-SI from here on.
+Every mistake in a file is reported in one sentence with file, line and column. Units are SI from
+here on.
 """
 
 from __future__ import annotations
@@ -44,15 +44,15 @@ def load_measurements(
     *,
     sigma_path: str | Path | None = None,
 ) -> Measurements:
-    """Read measurements, and the TOML beside them where there is one: noise and the like.
+    """Read measurements, and the TOML beside them if there is one: noise and the like.
 
     Args:
-        path: CSV or Parquet, or several of them: each has its own TOML, runs keep apart.
-        robot: whose measurements these are, or its MJCF.
-        sigma_path: the TOML, where it is not the data file's name with ``.toml``.
+        path: CSV or Parquet, or several of them: each has its own TOML, and runs stay separate.
+        robot: the measured robot, or its MJCF.
+        sigma_path: the TOML, if its name is not the data file's with ``.toml``.
 
     Raises:
-        InputFileError: anything wrong with either file.
+        InputFileError: any mistake in either file.
         InputError: no path.
     """
     robot = robot_of(robot)
@@ -79,32 +79,32 @@ def _measured(path: Path, robot: Robot, sigma_path: str | Path | None) -> Measur
 def load_commands(
     path: str | Path, robot: GivenRobot, *, sigma_path: str | Path | None = None
 ) -> Measurements:
-    """Like :func:`load_measurements`, for poses that nobody has measured yet.
+    """Like :func:`load_measurements`, for commands that have not been measured yet.
 
     Args:
         path: CSV or Parquet.
-        robot: that is to be commanded so, or its MJCF.
-        sigma_path: the TOML, where it is not the data file's name with ``.toml``.
+        robot: the robot to be commanded, or its MJCF.
+        sigma_path: the TOML, if its name is not the data file's with ``.toml``.
 
     Raises:
-        InputFileError: anything wrong with either file.
+        InputFileError: any mistake in either file.
     """
     robot = robot_of(robot)
     return _load(_open(path, robot), robot, sigma_path)
 
 
 def measurements_of(given: GivenData, robot: Robot) -> Measurements:
-    """The measurements, read if need be, with the dwells of long logs averaged."""
+    """The measurements, read if a path is given, with the dwells of long logs averaged."""
     whole = given if isinstance(given, Measurements) else load_measurements(given, robot)
     return averaged_dwells(whole)
 
 
 def commands_of(given: GivenCommands, robot: Robot) -> Measurements:
-    """The commands, read if need be; poses (n, 7) are one run.
+    """The commands, read if a path is given; poses (n, 7) are one run.
 
     Raises:
-        InputFileError: anything wrong with the file.
-        InputError: something else than commands.
+        InputFileError: any mistake in the file.
+        InputError: something other than commands.
     """
     if isinstance(given, Measurements):
         return given

@@ -14,14 +14,14 @@ __all__ = ["stated", "with_stated"]
 
 
 def with_stated(data: Measurements, texts: Iterable[str]) -> Measurements:
-    """The measurements with noise as stated, in place of what the TOML says of those kinds.
+    """The measurements with stated noise, in place of the TOML's for these kinds.
 
     Args:
         data: as read.
         texts: each a kind of reading and a quantity, such as ``"tension=0.5N"``.
 
     Raises:
-        CrosscheckError: an unknown kind, no quantity, one in another unit, or two of a kind.
+        CrosscheckError: an unknown kind, no quantity, one in another unit, or two for one kind.
     """
     texts = list(texts)
     sigma, ratio = stated(data.sigma, texts), data.sigma_ratio.copy()
@@ -33,7 +33,7 @@ def with_stated(data: Measurements, texts: Iterable[str]) -> Measurements:
 
 
 def stated(sigma: Sigma, texts: Iterable[str]) -> Sigma:
-    """The noise with some of it stated anew; see :func:`with_stated`."""
+    """The noise with some kinds replaced; see :func:`with_stated`."""
     values: dict[str, float] = {}
     for text in texts:
         kind, equals, quantity = text.partition("=")

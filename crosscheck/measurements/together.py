@@ -15,12 +15,12 @@ from seecr.commands.loads import Loads
 from seecr.errors import InputFileError
 from seecr.pose import Array, rxyz_from_quat
 
-# Of files that state no noise of their lengths beside one that does: next to none.
+# Relative noise of lengths in files that state none, if others do: practically zero.
 _EXACT = 1e-6
 
 
 def together(parts: Sequence[Measurements]) -> Measurements:
-    """The measurements of several files, whose runs keep apart, as do their clocks and noise.
+    """The measurements of several files, with separate runs, clocks and noise.
 
     Args:
         parts: each as read from its file.
@@ -66,13 +66,13 @@ def together(parts: Sequence[Measurements]) -> Measurements:
         unused_columns=tuple(dict.fromkeys(name for part in parts for name in part.unused_columns)),
         notes=(*notes, *said, *lost_times, *lost_warmth),
     )
-    # what a file repeats of itself is in its own notes already
+    # repetitions within a file are in its own notes already
     own = any(twice(part) for part in parts)
     return whole if own else whole.with_notes(twice(whole))
 
 
 def _free(parts: Sequence[Measurements]) -> dict[str, tuple[int, ...]]:
-    """Which files leave which effects free: each has values of its own."""
+    """The files that leave each effect free; each file has values of its own."""
     names = dict.fromkeys(name for part in parts for name in part.free)
     return {name: tuple(k for k, part in enumerate(parts) if name in part.free) for name in names}
 
@@ -99,7 +99,7 @@ def _commanded_in(data: Measurements) -> str:
 
 
 def _short_names(paths: Sequence[Path], least: int = 1) -> list[str]:
-    """Names that tell files apart, with as many folders as that takes."""
+    """Names that tell files apart, with as many folders as necessary."""
     for depth in range(least, max(len(path.parts) for path in paths) + 1):
         names = ["/".join(path.parts[-depth:]) for path in paths]
         if len(set(names)) == len(names):
@@ -120,7 +120,7 @@ def _stack(columns: Sequence[Array | None]) -> Array | None:
 def _of_all(
     what: str, columns: Sequence[Array | None], names: Sequence[str]
 ) -> tuple[Array | None, list[str]]:
-    """A column of all files, or none where some file has none; and what is said of that."""
+    """A column of all files, or None if some file lacks it; and a note about that."""
     without = [name for name, column in zip(names, columns, strict=True) if column is None]
     if not without or len(without) == len(columns):
         return _stack(columns), []
@@ -128,7 +128,7 @@ def _of_all(
 
 
 def _orientations(parts: Sequence[Measurements]) -> tuple[Array | None, Any]:
-    """Quaternions, or angles where some file has only these."""
+    """Quaternions, or angles if some file has only these."""
     if any(part.angle_mask.any() for part in parts):
         turned = [
             part.angles_rad if part.quat_wxyz is None else _angles(part.quat_wxyz) for part in parts
@@ -158,7 +158,7 @@ def _loads(parts: Sequence[Measurements]) -> Loads | None:
 
 
 def _noise(parts: Sequence[Measurements], names: Sequence[str]) -> tuple[Sigma, Array, list[str]]:
-    """Noise of the first file that states it, each row's over that, and what is taken over."""
+    """Noise of the first file that states it, each row's ratio to it, and notes about gaps."""
     kinds = [item.name for item in fields(Sigma)]
     common: dict[str, float] = {}
     ratios = np.ones((len(parts), len(kinds)))

@@ -1,4 +1,4 @@
-"""Write measurements as the CSV and the TOML that are read back."""
+"""Write measurements as a CSV and a TOML that can be read again."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from crosscheck.measurements.data import Measurements
 
 
 def write_measurements(path: str | Path, data: Measurements, remark: str = "") -> None:
-    """Write the CSV and, beside it, the TOML with all that is no column; both whole or not at all.
+    """Write the CSV and, beside it, the TOML with everything else; both completely or not at all.
 
-    Numbers have 9 significant digits, readings that are missing are empty cells. Runs start all at
-    the reference pose or all at their first rows: a TOML cannot say it run by run.
+    Numbers have 9 significant digits, missing readings are empty cells. Either all runs start at
+    the reference pose or all at their first rows: a TOML cannot state it run by run.
 
     Args:
         path: of the CSV. data: what is written.
-        remark: what a line before the header says.
+        remark: text of a line before the header.
 
     Raises:
         InputFileError: the folder cannot be written.
@@ -46,7 +46,7 @@ def _quoted(name: str) -> str:
 
 
 def _toml(data: Measurements) -> str:
-    """The text that reading gives back exactly."""
+    """The text of the TOML, which reading reproduces exactly."""
     lines = ['lengths = "told"'] if data.told else []
     lines += ['start = "first_row"'] if data.stands.any() else []
     lines += [f"free = {json.dumps(data.free)}"] if data.free else []

@@ -25,13 +25,13 @@ def load_diagnosed(path: str | Path, robot: Robot) -> tuple[Terms, tuple[str, ..
 
     Args:
         path: a ``diagnosis.json``.
-        robot: that it is of.
+        robot: the robot that was diagnosed.
 
     Returns:
-        the effects, and notes about what of the robot has changed since.
+        the effects, and notes about what has changed of the robot since.
 
     Raises:
-        InputFileError: no such file, no diagnosis, one of another robot, or one that lists none.
+        InputFileError: no such file, not a diagnosis, of another robot, or without missing effects.
     """
     path = Path(path)
     document = _document(path)
@@ -51,7 +51,7 @@ def load_diagnosed(path: str | Path, robot: Robot) -> tuple[Terms, tuple[str, ..
 
 
 def _check_robot(path: Path, document: Mapping[str, Any], robot: Robot) -> tuple[str, ...]:
-    """Notes on what has changed of the robot; by its numbers, since files move and are edited."""
+    """Notes on changes of the robot, by its numbers, since files are moved and edited."""
     table, made = document.get("robot"), document.get("made")
     hashes = made.get("sha256") if isinstance(made, Mapping) else None
     now = None if robot.source is None else digits_of(robot.source)

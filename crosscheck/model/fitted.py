@@ -1,4 +1,4 @@
-"""An effect as a fit left it."""
+"""An effect as fitted."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Fitted:
     """An effect as fitted.
 
     Attributes:
-        term: with its values. stderr: (p,), inf where unseen. at_bound: (p,) bool.
+        term: with its values. stderr: (p,), inf if unseen. at_bound: (p,) bool.
     """
 
     term: Term
@@ -22,7 +22,7 @@ class Fitted:
     at_bound: Any
 
     def as_json(self) -> dict[str, Any]:
-        """Its parameters by name, in SI."""
+        """Its parameters by name, in SI units."""
         layout = self.term.layout
         return {
             key: {

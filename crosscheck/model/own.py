@@ -1,4 +1,4 @@
-"""Fitted values of each file or run, as a model keeps them: by their names, and what is usual."""
+"""Fitted values of each file or run, as a model keeps them: by name, with what is usual."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ class Kept:
     """An effect as a model keeps it.
 
     Attributes:
-        usual: its values wherever it has none of its own, with these beside them.
-        parts: newly fitted values by the names that the model has for files or runs.
+        usual: its values for other files or runs, together with those of the known ones.
+        parts: newly fitted values by the model's names of files or runs.
     """
 
     usual: Fitted
@@ -28,12 +28,12 @@ class Kept:
 def kept(one: Fitted, before: Term | None) -> Kept:
     """What a model keeps of a fit.
 
-    A file or run of which nothing is known is expected to have the mean of the others, by as much
-    as these differ and are uncertain; by a plausible size where there is one alone.
+    For an unknown file or run the mean of the known ones is expected, with a standard error from
+    their differences and uncertainties; if only one is known, with a plausible size.
 
     Args:
         one: the effect as fitted.
-        before: the same in the model as it was, if there.
+        before: the same in the model before, if it was there.
     """
     term, layout = one.term, one.term.layout
     if not isinstance(layout, ApartLayout):
@@ -60,7 +60,7 @@ def _part(one: Fitted, layout: ApartLayout, name: str) -> Fitted:
 
 
 def _usual(layout: ApartLayout, values: Mapping[str, Values]) -> tuple[Array, Array]:
-    """Mean of the values and by how much they differ, (p,) each."""
+    """Mean of the values and how much a further one may differ, (p,) each."""
     every = np.array([one.vector for one in values.values()])
     if len(every) < 2:
         return every[0], layout.base.scale.copy()
@@ -69,7 +69,7 @@ def _usual(layout: ApartLayout, values: Mapping[str, Values]) -> tuple[Array, Ar
 
 
 def without_parts(fitted: Sequence[Fitted], covariance: Array) -> tuple[list[Fitted], Array]:
-    """The effects that are the same everywhere, and the covariance of theirs."""
+    """The effects that are the same everywhere, and their covariance."""
     same = np.array([not isinstance(one.term.layout, ApartLayout) for one in fitted], dtype=bool)
     own = np.repeat(same, [len(one.term.layout) for one in fitted])
     return (

@@ -13,11 +13,11 @@ _EXPECTED = "expected the name of a new file, or a model to be replaced"
 
 
 def check_place(path: Path) -> None:
-    """That a model can be written there, before the work that it is for.
+    """Check that a model can be written there, before the work that it is for.
 
     Raises:
-        InputFileError: nothing can be written there, or what is there is no model: a robot or
-            measurements that were named by mistake are often the only ones.
+        InputFileError: nothing can be written there, or the file there is not a model: a robot or
+            measurements named by mistake may be the only copies.
     """
     check_writable(path)
     if path.exists():

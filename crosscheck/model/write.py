@@ -1,4 +1,4 @@
-"""Write a model: fitted values into its tree, comments kept, and the tree into its file."""
+"""Write a model: fitted values into its tree, with comments kept, and the tree into its file."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 Rms = Mapping[str, float | None]
 _ERRORS = ("before", "after", "held_out")
-# Digits of values and of errors: a standard error is not known better.
+# Digits of values and of standard errors, which are not known better.
 _VALUE, _ERROR = 10, 3
 
 
@@ -55,7 +55,7 @@ class Provenance:
 
 
 def provenance_of(data: str, by: str) -> Provenance:
-    """Of values fitted today to a file by a command."""
+    """The provenance of values fitted today to a file by a command."""
     return Provenance(data, date.today().isoformat(), f"seecr {__version__}", by)
 
 
@@ -70,14 +70,14 @@ def with_fit(
     """The model with effects added (or fitted again), and all values as fitted.
 
     Args:
-        model: left as it is.
+        model: not changed.
         fitted: all effects of the new model.
-        added: names of those that are new; they get provenance and errors. The others, whose
-            values have moved with them, get a table ``refitted``.
+        added: names of the new ones, which get provenance and errors. The others, whose values have
+            changed too, get a table ``refitted``.
         provenance: of the fit.
         errors: rms by kind: "before", "after", "held_out".
-        covariance: (p, p) of the values in the order of ``fitted``. It is kept where all of them
-            are seen: of others no number says what they may move. That of the fit before is not.
+        covariance: (p, p) of the values in the order of ``fitted``. It is kept if all values are
+            seen, since an unseen one has none. That of the previous fit is removed.
     """
     document = copy.deepcopy(model.document)
     tables = {str(table["name"]): table for table in document.get("effect", [])}
@@ -117,10 +117,10 @@ def calibrated(
     provenance: Provenance,
     errors: Mapping[str, Rms],
 ) -> Model:
-    """The model with all effects as fitted together, and how their errors go together.
+    """The model with all effects as fitted together, and the correlations of their errors.
 
     Args:
-        model: left as it is.
+        model: not changed.
         fitted: all effects of the new model.
         covariance: (p, p) of their values in the order of ``fitted``.
         provenance: of the fit.
@@ -150,7 +150,7 @@ def _kept(model: Model, fitted: Sequence[Fitted]) -> list[Kept]:
 
 
 def _appended(document: Any, one: Kept) -> Any:
-    """A table for an effect that the document has not, at its end."""
+    """A new table at the end of the document, for an effect that it does not have."""
     table, term = tomlkit.table(), one.usual.term
     table["name"] = term.name
     table["name"].comment(term.layout.effect.title)
@@ -163,7 +163,7 @@ def _appended(document: Any, one: Kept) -> Any:
 
 
 def _together() -> Any:
-    """The table of what is the same for all values of the last fit."""
+    """The table of correlations of the last fit."""
     table = tomlkit.table()
     table.trivia.indent = "\n"
     table.add(tomlkit.comment("Errors of the values above in full, and how they go together."))
@@ -171,7 +171,7 @@ def _together() -> Any:
 
 
 def _forget_covariance(document: Any) -> None:
-    """Leave out what was said of errors that a new fit has changed."""
+    """Remove what is stated about errors that a new fit has changed."""
     document.pop(FIT, None)
     table = document.get(CALIBRATION)
     for key in (PARAMETERS, STDERR, CORRELATION):
@@ -180,10 +180,9 @@ def _forget_covariance(document: Any) -> None:
 
 
 def _with_covariance(table: Any, fitted: Sequence[Fitted], covariance: Array) -> Any:
-    """The table with the errors of the values in full, and their correlations.
+    """The table with the standard errors of the values with all digits, and their correlations.
 
-    A row ends at its diagonal. Values of single files or runs go with nothing else elsewhere, and
-    are not among them.
+    A row ends at its diagonal. Values of single files or runs are left out, as if uncorrelated.
     """
     if not fitted:
         return table
@@ -199,7 +198,7 @@ def _with_covariance(table: Any, fitted: Sequence[Fitted], covariance: Array) ->
 
 
 def _floats(row: Iterable[float]) -> str:
-    """Numbers that TOML reads as such: all floats, none an integer."""
+    """Numbers that TOML reads as floats, none as an integer."""
     cells = (f"{one:.{_VALUE}g}" for one in row)
     return ", ".join(cell if {".", "e"} & set(cell) else f"{cell}.0" for cell in cells)
 
@@ -211,7 +210,7 @@ def _lines(items: Sequence[str]) -> Any:
 
 
 def _fill(table: Any, one: Kept) -> None:
-    """Values into an effect's table, and those of files or runs into theirs."""
+    """Write values into an effect's table, and those of files or runs into theirs."""
     own = one.usual.term.own
     if own is not None:
         table[f"per_{own.kind}"] = True
@@ -230,7 +229,7 @@ def _fill_cells(parameters: Any, fitted: Fitted) -> None:
     layout = fitted.term.layout
     for i, key in enumerate(layout.names):
         if key in parameters and fitted.term.knowledge.fixed[i]:
-            continue  # stands as somebody wrote it
+            continue  # stays as somebody wrote it
         cell = _cell(layout, i, fitted)
         if isinstance(parameters.get(key), Mapping):
             parameters[key].update(cell)
@@ -241,7 +240,7 @@ def _fill_cells(parameters: Any, fitted: Fitted) -> None:
 
 
 def _known(knowledge: Knowledge, i: int) -> dict[str, Any]:
-    """What is known of a parameter beside the data."""
+    """What is known about a parameter from outside the data."""
     if knowledge.fixed[i]:
         return {"fixed": True}
     if not knowledge.measured[i]:
@@ -259,7 +258,7 @@ def _inline(cell: Mapping[str, Any]) -> Any:
 def _cell(layout: Layout, i: int, fitted: Fitted) -> dict[str, Any]:
     error = float(fitted.stderr[i])
     value = float(f"{float(fitted.term.vector[i]):.{_VALUE}g}")
-    # rounding must not carry a value over its bound
+    # rounding must not carry a value beyond its bound
     value = min(max(value, float(layout.lower[i])), float(layout.upper[i]))
     if math.isnan(error):  # somebody's number, not a fit's
         return {"value": value, "unit": layout.units[i]}
@@ -286,11 +285,11 @@ def _plain(values: Mapping[str, Any]) -> Any:
 
 
 def renewed(model: Model, robot: Robot, data: Measurements) -> Model:
-    """The model with the robot's numbers as they are now: all values have just been fitted.
+    """The model with the robot's present numbers, as all values have just been fitted.
 
     Args:
         model: with its new values.
-        robot, data: that they were fitted to; how far these reach is kept.
+        robot, data: that they were fitted to; the range of the data is stored.
     """
     document = copy.deepcopy(model.document)
     if document.get("robot") is None or model.notes:
@@ -311,15 +310,15 @@ def renewed(model: Model, robot: Robot, data: Measurements) -> Model:
 def save_model(path: str | Path, model: Model) -> None:
     """Write a model, such as a calibration's ``model``, with the comments that its file had.
 
-    Through a temporary file, so that the old one stays whole until then.
+    It is written to a temporary file first, so that the old one stays complete until then.
 
     Args:
         path: of the TOML; its folder is made if need be.
-        model: as read, or the ``model`` that a calibration or an addition has.
+        model: as read, or the ``model`` of a calibration or an addition.
 
     Raises:
-        InputFileError: the file cannot be written, or what is there is no model.
-        InputError: no model.
+        InputFileError: the file cannot be written, or the file there is not a model.
+        InputError: not a model.
     """
     if not isinstance(model, Model):
         raise InputError(

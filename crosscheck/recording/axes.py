@@ -1,4 +1,4 @@
-"""Axes and the scale of colours around a map in a plane; y of the drawing points down."""
+"""Axes and a colour scale around a map in a plane; y of the drawing points down."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from seecr.recording.stream import Recording
 
 # Ticks of an axis; slices of the bar; radii of lines in points of the screen.
 _TICKS, _SLICES, _LINE = 3, 32, 0.8
-# Room around the dots, and where axes and bar stand in it, over the larger side of the map.
+# Margin of the dots, and positions of axes and bar in it, relative to the larger side of the map.
 _MARGIN, _ABOVE, _BELOW, _BAR = 0.08, 0.12, 0.24, 0.14
-# Left of the map are numbers, right of it the bar and its words, which keep their size in points.
+# Numbers are left of the map, the bar and its words right of it; text keeps its size in points.
 _LEFT, _RIGHT = 0.3, 0.7
 _TICK, _THICK, _WORDS = 0.02, 0.035, 0.27
 
 
 def bounds(points: Array) -> tuple[tuple[float, float], tuple[float, float]]:
-    """What a view has to show of a map of points (n, 2): its ranges along both axes."""
+    """Ranges of a view along both axes, for a map of points (n, 2)."""
     low, high, size = _box(points)
     return (low[0] - _LEFT * size, high[0] + _RIGHT * size), (
         low[1] - _ABOVE * size,
@@ -28,11 +28,11 @@ def bounds(points: Array) -> tuple[tuple[float, float], tuple[float, float]]:
 
 
 def draw_axes(recording: Recording, entity: str, points: Array, words: str) -> None:
-    """Two axes with round numbers in metres, beside points (n, 2) whose second axis is turned.
+    """Two axes with round numbers in metres, for points (n, 2) whose second axis points down.
 
     Args:
         recording: where. entity: under which. points: what is in the map.
-        words: of the bar's end, such as "5 mm".
+        words: at the end of the bar, such as "5 mm".
     """
     low, high, size = _box(points)
     corner = np.array([low[0], high[1]])
@@ -46,7 +46,7 @@ def draw_axes(recording: Recording, entity: str, points: Array, words: str) -> N
     for value in _round(-high[1], -low[1]):
         lines.append(np.array([[low[0] - tick, -value], [low[0], -value]]))
         labels.append(f"{value:g}")
-        # the viewer hangs labels under their points
+        # the viewer draws labels below their points
         places.append((low[0] - 5.0 * tick, -value - 2.2 * tick))
     strips = rr.LineStrips2D(lines, radii=-_LINE, colors=colours.FRAME)
     recording.always(f"{entity}/axes", strips)
@@ -63,7 +63,7 @@ def draw_axes(recording: Recording, entity: str, points: Array, words: str) -> N
 
 
 def _bar(recording: Recording, entity: str, low: Array, high: Array, size: float) -> None:
-    """The scale of colours, 0 at the bottom."""
+    """The colour scale, with 0 at the bottom."""
     x, y = high[0] + _BAR * size, np.linspace(high[1], low[1], _SLICES + 1)
     pieces = [np.array([[x, y[i]], [x, y[i + 1]]]) for i in range(_SLICES)]
     shades = colours.scale_colours(np.linspace(0.0, 1.0, _SLICES), 1.0)
@@ -72,7 +72,7 @@ def _bar(recording: Recording, entity: str, low: Array, high: Array, size: float
 
 
 def _box(points: Array) -> tuple[Array, Array, float]:
-    """Corners of the axes' frame and the map's larger side; not nothing for a single point."""
+    """Corners of the axes' frame, and the map's larger side, positive even for one point."""
     size = max(float(np.max(np.ptp(points, axis=0))), 1e-9)
     margin = _MARGIN * size
     return points.min(axis=0) - margin, points.max(axis=0) + margin, size

@@ -1,4 +1,4 @@
-"""Bars of the errors, model by model, against the noise; the one under the cursor is lit."""
+"""Bars of the errors, model by model, compared with the noise; the current one is bright."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from seecr.recording.colours import Rgba
 from seecr.recording.stream import Recording
 
 ROOT = "bars"
-# The drawing is 100 wide; y points down, one row per model.
+# The drawing is 100 wide; y points down, with one row per model.
 _LEFT, _RIGHT, _ROW, _HEAD = 31.0, 82.0, 4.4, 5.6
 _DIM, _LABEL = 0.45, 2.2
-# Points of the screen for one part of the drawing, of the title, of a column; most of a column.
+# Screen points per unit of the drawing, of the title, of a column; largest part of a column.
 _POINTS, _TITLE, _COLUMN, _MOST = 5.2, 32.0, 1010.0, 0.6
 
 
 def write_bars(
     recording: Recording, index: rr.TimeColumn, found: Diagnosis, stages: list[Stage]
 ) -> None:
-    """One block per kind of reading: bars from half the noise to the error on runs left out."""
+    """One block per kind of reading: bars from half the noise to the error on held-out runs."""
     assert found.search is not None
     for block, kind in enumerate(kinds_read(found.search.problem)):
         _block(recording, index, found, stages, kind, block * _block_height(len(stages)))
@@ -45,9 +45,9 @@ def view(found: Diagnosis, stages: list[Stage]) -> rrb.Spatial2DView:
 
 
 def share(found: Diagnosis, stages: list[Stage]) -> float:
-    """Height over that of a column in a window of 1080 points, so that labels have room.
+    """Height relative to a column in a window of 1080 points, with room for the labels.
 
-    The viewer's letters keep their size whatever the drawing's is.
+    The viewer's letters keep their size whatever the size of the drawing.
     """
     return min((_POINTS * _height(found, stages) + _TITLE) / _COLUMN, _MOST)
 
@@ -77,7 +77,7 @@ def _block(
     root = f"{ROOT}/{kind.name}"
     strips = [np.array([[_LEFT, y], [x, y]]) for x, y in zip(ends, rows, strict=True)]
     thick = 0.3 * _ROW
-    # the viewer draws 2D boxes as outlines only: bars are thick lines
+    # the viewer draws 2D boxes as outlines only, so bars are thick lines
     dim = (_DIM * lit).astype(np.uint8)
     dim[:, 3] = 255
     recording.always(
@@ -102,7 +102,7 @@ def _block(
 
 
 def _places(values: np.ndarray, every: np.ndarray, floor: float) -> np.ndarray:
-    """Where bars end: logarithmic from half the noise, linear where there is no noise."""
+    """Ends of the bars: logarithmic from half the noise, or linear without noise."""
     if floor <= 0.0:
         return _LEFT + (_RIGHT - _LEFT) * values / max(float(every.max()), 1e-300)
     low = np.log(0.5 * min(floor, float(every[every > 0].min(initial=floor))))
@@ -121,7 +121,7 @@ def _lit(stage: Stage, found: Diagnosis) -> Rgba:
 def _words(
     recording: Recording, entity: str, places: list[tuple[float, float]], words: list[str]
 ) -> None:
-    # the viewer hangs labels under their points
+    # the viewer draws labels below their points
     places = [(x, y - _LABEL) for x, y in places]
     points = rr.Points2D(places, radii=0.01, colors=colours.COMMAND, labels=words, show_labels=True)
     recording.always(entity, points)

@@ -26,11 +26,11 @@ if TYPE_CHECKING:
 
 
 def write_case_recording(result: CaseResult, path: str | Path) -> None:
-    """Write what a person wants to see of a case: scene, plots, lanes, text, layout.
+    """Write the recording of a case: scene, plots, lanes, text, layout.
 
     Args:
         result: of :func:`crosscheck.suite.run.run_case`.
-        path: the ``.rrd`` file; a temporary one takes its place when complete.
+        path: the ``.rrd`` file, written through a temporary one.
 
     Raises:
         CrosscheckError: the file cannot be written.

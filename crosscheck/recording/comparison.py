@@ -1,4 +1,4 @@
-"""The recording of a comparison: the model against what was measured, pose by pose."""
+"""The recording of a comparison: the model compared with measurements, pose by pose."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ _MOST_LISTED, _MOST_WORST = 5, 6
 
 
 def write_comparison_recording(found: Comparison, path: str | Path) -> None:
-    """Write what a person wants to see of a comparison.
+    """Write the recording of a comparison.
 
     Args:
-        found: the comparison; one in which nothing could be compared is text alone.
-        path: the ``.rrd`` file; a temporary one takes its place when complete.
+        found: the comparison; if nothing could be compared, there is only text.
+        path: the ``.rrd`` file, written through a temporary one.
 
     Raises:
         CrosscheckError: the file cannot be written.
@@ -84,7 +84,7 @@ def _blueprint(found: Comparison, shown: Misfit, name: str, seen: np.ndarray) ->
 
 
 def _over_poses(recording: Recording, scene: Scene, found: Comparison, shown: Misfit) -> None:
-    """The measured poses one by one; all errors are to be seen at each."""
+    """The measured poses one by one, with all errors visible at each."""
     n = found.problem.data.n_rows
     index, begin = pose_index(n), pose_index(1)
     misfit.arrows(recording, begin, shown, [found.state], scene.size)
@@ -105,13 +105,13 @@ def _over_poses(recording: Recording, scene: Scene, found: Comparison, shown: Mi
 
 
 def _errors_of(found: Comparison, kind: Kind) -> tuple[np.ndarray, np.ndarray]:
-    """(n, k) what counts of the readings of one kind, and their errors, NaN where none does."""
+    """(n, k) which readings of one kind count, and their errors, NaN for the others."""
     counted = found.problem.counted[:, kind.columns]
     return counted, np.where(counted, found.state.raw[:, kind.columns], np.nan) * kind.factor
 
 
 def _short(name: str) -> str:
-    """A reading's name in a plot whose title says of what kind it is."""
+    """A reading's name in a plot whose title states its kind."""
     return name.removeprefix("tension of ").removeprefix("rotation ")
 
 

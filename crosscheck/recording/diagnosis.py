@@ -1,8 +1,7 @@
-"""The recording of a diagnosis: its timeline steps from the model as it stood through the effects.
+"""The recording of a diagnosis: its timeline steps through the models, effect by effect.
 
-On the timeline ``model_step`` every pose's error is seen under one model after the other. On
-``pose`` the platform goes through the measured poses, as it was measured, as the first model says
-and as the last one does.
+The timeline ``model_step`` shows every pose's error under one model after the other. The timeline
+``pose`` goes through the measured poses: as measured, under the first model and under the last.
 """
 
 from __future__ import annotations
@@ -28,17 +27,17 @@ from seecr.recording.stream import MODEL_STEP, Recording, pose_index, recording_
 
 _MARKDOWN = rr.MediaType.MARKDOWN
 _STEPS_A_SECOND = 1.0
-# Of the plot, in points of a window of 1920 by 1080.
+# Size of the plot, in points of a window of 1920 by 1080.
 _PLOT = (820.0, 250.0)
 _BETWEEN = (colours.YELLOW, colours.PINK, colours.GREEN, colours.SILVER)
 
 
 def write_diagnosis_recording(found: Diagnosis, path: str | Path) -> None:
-    """Write what a person wants to see of a diagnosis.
+    """Write the recording of a diagnosis.
 
     Args:
-        found: the diagnosis; one without a search (no verdict) is text alone.
-        path: the ``.rrd`` file; a temporary one takes its place when complete.
+        found: the diagnosis; without a search (no verdict) there is only text.
+        path: the ``.rrd`` file, written through a temporary one.
 
     Raises:
         CrosscheckError: the file cannot be written.
@@ -153,7 +152,7 @@ def _over_poses(recording: Recording, scene: Scene, stages: list[Stage], shown: 
 def _plots(
     recording: Recording, index: rr.TimeColumn, stages: list[Stage], shown: Misfit, kind: Kind
 ) -> None:
-    """The error of each pose under each model; over the steps, that of all runs left out."""
+    """The error of each pose under each model; over the steps, that on all held-out runs."""
     for k, stage in enumerate(stages):
         entity = f"plot/{kind.name}/model_{k}"
         sizes = kind.sizes(shown.problem, stage.state.raw) * kind.factor
@@ -169,7 +168,7 @@ def _plots(
 
 
 def _legend(stages: list[Stage], shown: Misfit, kind: Kind) -> Legend:
-    """Its corner: a longer axis for it would leave little of the one curve over the steps."""
+    """Its corner only: a longer axis would leave little room for the one curve over the steps."""
     sizes = [kind.sizes(shown.problem, stage.state.raw) * kind.factor for stage in stages]
     legend = legend_of([np.stack(sizes, axis=1)], [stage.label for stage in stages], _PLOT)
     return replace(legend, values=None)

@@ -35,7 +35,7 @@ def verdict_words(found: Diagnosis, shown: Misfit | None) -> str:
 
 
 def plain(text: str) -> str:
-    """A user's text, that no character of it means anything to Markdown."""
+    """A user's text, with the characters escaped that Markdown would interpret."""
     return "".join(f"\\{c}" if c in "\\`*_[]<>#|" else c for c in text)
 
 
@@ -49,7 +49,7 @@ def _listed(title: str, lines: list[str]) -> list[str]:
 
 
 def model_words(found: Diagnosis, stages: list[Stage], k: int, shown: Misfit, worst: int) -> str:
-    """One model: its errors, and what its last effect is."""
+    """One model: its errors, and its last effect."""
     stage = stages[k]
     head = f"## Step {k} of {len(stages) - 1}: {plain(stage.label)}\n"
     parts = [head, _errors(found, stage, shown)]

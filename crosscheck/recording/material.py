@@ -1,4 +1,4 @@
-"""What a case's recording shows, taken from the case's result before anything is drawn."""
+"""The content of a case's recording, taken from the case's result before anything is drawn."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 _EQUILIBRIA = (Status.CONVERGED, Status.SINGULAR)
 _FRAMES = 240
-# How long the settling plays [s].
+# Duration of the settling when played [s].
 _WATCH_S = 12.0
 
 
@@ -35,11 +35,11 @@ class Motion:
     """A platform on its way to rest.
 
     Attributes:
-        t_s: (k,) simulated time [s], increasing; the first is 0, the commanded pose.
+        t_s: (k,) simulated time [s], increasing; the first is 0, at the start pose.
         pose: (k, 7).
         kinetic_energy: (k,) [J].
         tensions: (k, m) [N].
-        settling: where it ended; the motion is stage 1, without the polish.
+        settling: its result; the motion is stage 1, without the polish.
     """
 
     t_s: Array
@@ -51,12 +51,12 @@ class Motion:
 
 @dataclass(frozen=True, eq=False)
 class Material:
-    """A case and what of it is to be seen.
+    """A case and what its recording shows.
 
     Attributes:
         result: the case's.
         watched: the pose, counted from 0, whose settling is shown.
-        motion: that settling; None where MuJoCo did not come to rest at any pose.
+        motion: that settling; None if MuJoCo did not come to rest at any pose.
     """
 
     result: CaseResult
@@ -65,12 +65,12 @@ class Material:
 
     @property
     def name(self) -> str:
-        """Of the case."""
+        """The case's name."""
         return self.result.case.name
 
     @property
     def robot(self) -> Robot:
-        """Of the case."""
+        """The case's robot."""
         return self.result.robot
 
     @property
@@ -95,7 +95,7 @@ class Material:
 
     @cached_property
     def seecr(self) -> States:
-        """SEECR's answers; a pose that it does not call an equilibrium is NaN."""
+        """SEECR's answers; NaN at poses that are no equilibria to it."""
         found = self.result.solution
         known = np.array([status in _EQUILIBRIA for status in found.status])
         pose = np.where(known[:, None], found.pose, np.nan)
@@ -103,7 +103,7 @@ class Material:
 
     @cached_property
     def mujoco(self) -> States:
-        """MuJoCo's, after the polish."""
+        """MuJoCo's answers, after the polish."""
         found = self.result.settling
         return States(found.pose, found.tensions, self.result.mujoco_rest_lengths, found.slack)
 
@@ -124,7 +124,7 @@ class Material:
 
     @property
     def gap(self) -> Differences:
-        """MuJoCo against SEECR."""
+        """Differences between MuJoCo and SEECR."""
         return self.result.difference
 
     @property
@@ -137,7 +137,7 @@ class Material:
 
     @property
     def seen(self) -> Array:
-        """Every pose (k, 7) that the 3D view has to have room for."""
+        """Every pose (k, 7) that the 3D view has to contain."""
         return np.concatenate([self.command, self.seecr.pose, self.mujoco.pose])
 
     @cached_property
@@ -148,7 +148,7 @@ class Material:
 
 
 def gather(result: CaseResult) -> Material:
-    """Choose the settling worth watching, and let MuJoCo repeat it."""
+    """Choose the most interesting settling, and let MuJoCo repeat it."""
     watched = _worth_watching(result)
     if watched is None:
         return Material(result, 0, None)
@@ -159,7 +159,7 @@ def gather(result: CaseResult) -> Material:
 
 
 def _worth_watching(result: CaseResult) -> int | None:
-    """The pose at which MuJoCo moves the platform most, of those that differ if any do."""
+    """The pose at which MuJoCo moves the platform most, among those that differ if any do."""
     settled = result.settling.settled
     if not settled.any():
         return None
@@ -175,11 +175,11 @@ def _worth_watching(result: CaseResult) -> int | None:
 def record_motion(
     settler: Settler, pose: Array, rest_lengths: Array, *, max_frames: int = _FRAMES
 ) -> Motion:
-    """Settle from a pose (7,) and keep what happened, the last state always included.
+    """Settle from a pose (7,) and keep the motion, including the last state.
 
     Args:
         settler: the robot.
-        pose: (7,) where it is let go.
+        pose: (7,) start pose.
         rest_lengths: (m,) [m].
         max_frames: frames kept, spread evenly over the steps.
     """
@@ -187,7 +187,7 @@ def record_motion(
     clock = 0.0
 
     def observe(physics: Physics) -> None:
-        # Pose, kinetic energy and tensions after a step of MuJoCo are those before it moved on.
+        # After a MuJoCo step, pose, kinetic energy and tensions are still those before it.
         nonlocal clock
         frames.append((clock, physics.pose(), physics.kinetic_energy, physics.tensions()))
         clock += float(physics.model.opt.timestep)

@@ -1,4 +1,4 @@
-"""How errors of a model are drawn: arrows in the 3D view, maps, and boxes of the platform."""
+"""Drawings of a model's errors: arrows in the 3D view, maps, and boxes of the platform."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from seecr.recording.stream import Index, Recording
 MEASURED: colours.Rgba = colours.MUJOCO
 # Top of a colour scale: this percentile of the errors.
 _LARGEST = 95.0
-# Radii of arrows over the robot's size, of dots in points of the screen.
+# Radii of arrows relative to the robot's size, of dots in points of the screen.
 _ARROW, _DOT, _RING, _THIN = 0.0021, 5.0, 9.0, 0.8
 
 
 @dataclass(frozen=True, eq=False)
 class Misfit:
-    """What is measured, and the scales that all models on the way are drawn with.
+    """The measurements, and the scales with which all models are drawn.
 
     Attributes:
         problem: the data.
-        first: the model whose errors set the scales, and whose predictions are the places.
+        first: the model whose errors set the scales, and whose predictions are the positions.
     """
 
     problem: Problem
@@ -40,22 +40,22 @@ class Misfit:
 
     @property
     def kinds(self) -> list[Kind]:
-        """Kinds of reading that there are."""
+        """Kinds of reading in the data."""
         return kinds_read(self.problem)
 
     @property
     def rows(self) -> NDArray[np.int64]:
-        """Numbers of the rows that count."""
+        """Indices of the rows that count."""
         return np.flatnonzero(self.problem.use)
 
     @property
     def place(self) -> Array:
-        """(n, 3) [m] where the rows are drawn."""
+        """(n, 3) [m] positions at which the rows are drawn."""
         return self.first.prediction.readings.position
 
     @property
     def magnify(self) -> float:
-        """How many times too long arrows are drawn; 0 where no position was read."""
+        """Factor on the length of arrows; 0 if no position was read."""
         return magnification(self.problem, self.first)
 
     def top(self, kind: Kind) -> float:
@@ -70,7 +70,7 @@ class Misfit:
 
     @property
     def measured(self) -> Array:
-        """(n, 7) measured poses, filled up with the first model's where only a part was read."""
+        """(n, 7) measured poses, completed by the first model's predictions."""
         data, readings = self.problem.data, self.first.prediction.readings
         position = np.where(np.isfinite(data.position), data.position, readings.position)
         if data.quat_wxyz is not None:
@@ -84,13 +84,13 @@ class Misfit:
 
 
 def read_poses(state: State) -> Array:
-    """(n, 7) poses that the model says would be read."""
+    """(n, 7) poses that would be read according to the model."""
     readings = state.prediction.readings
     return np.concatenate([readings.position, readings.quat_wxyz], axis=1)
 
 
 def states_of(state: State) -> States:
-    """The model's platform and cables at every row; NaN where it has no equilibrium."""
+    """The model's platform and cables at every row; NaN without equilibrium."""
     prediction = state.prediction
     pose = np.where(prediction.solved[:, None], prediction.pose, np.nan)
     lengths = prediction.tables.cables[..., REST]
@@ -98,7 +98,7 @@ def states_of(state: State) -> States:
 
 
 def stacked(rows: list[tuple[State, int]]) -> States:
-    """One row of each of several models, one below the other."""
+    """One row of each of several models, stacked."""
     parts = [(states_of(state), k) for state, k in rows]
     return States(
         np.stack([s.pose[k] for s, k in parts]),
@@ -109,7 +109,7 @@ def stacked(rows: list[tuple[State, int]]) -> States:
 
 
 def worst_row(misfit: Misfit) -> int:
-    """The row that is furthest off, in units of the noise."""
+    """The row with the largest error, in units of the noise."""
     table = np.zeros(misfit.problem.measured.shape)
     table[misfit.problem.row_of, misfit.problem.column_of] = misfit.first.white
     return int(np.argmax((table**2).sum(axis=1)))
@@ -118,7 +118,7 @@ def worst_row(misfit: Misfit) -> int:
 def arrows(
     recording: Recording, index: Index, misfit: Misfit, states: list[State], size: float
 ) -> None:
-    """At each time the errors of one model: arrows of position, or dots where none was read."""
+    """At each time the errors of one model: arrows of position, or dots if none was read."""
     rows, place = misfit.rows, misfit.place
     count = [len(rows)] * len(states)
     kind = misfit.kinds[0]
@@ -137,13 +137,13 @@ def arrows(
 
 
 def _vectors(misfit: Misfit, state: State) -> Array:
-    """(n, 3) arrows [m] from what the model says to what was measured, drawn too long."""
+    """(n, 3) arrows [m] from predictions to measurements, magnified."""
     counted = misfit.problem.counted[:, POSITION]
     return misfit.magnify * np.where(counted, state.raw[:, POSITION], 0.0)
 
 
 def maps(recording: Recording, index: Index, misfit: Misfit, states: list[State]) -> None:
-    """A map a kind of reading, its dots coloured by the error."""
+    """One map per kind of reading, with dots coloured by the error."""
     rows = misfit.rows
     for kind in misfit.kinds:
         words = f"{misfit.top(kind):g} {kind.unit}"
@@ -166,7 +166,7 @@ def maps(recording: Recording, index: Index, misfit: Misfit, states: list[State]
 
 
 def cursor(recording: Recording, index: Index, misfit: Misfit) -> None:
-    """A ring around the dot of the row under the cursor, on every map."""
+    """A ring around the dot of the current row, on every map."""
     points = _flat(misfit, misfit.place)
     radius = _on_screen(_RING)
     for kind in misfit.kinds:
@@ -177,12 +177,12 @@ def cursor(recording: Recording, index: Index, misfit: Misfit) -> None:
 
 
 def _on_screen(points: float) -> float:
-    """A radius in points of the screen, whatever the zoom: Rerun counts those below zero."""
+    """A radius in points of the screen at any zoom, which Rerun expects as a negative one."""
     return -points
 
 
 def _flat(misfit: Misfit, vectors: Array) -> Array:
-    """(n, 2) in the map's plane, the second axis up."""
+    """(n, 2) coordinates in the map's plane, with the second axis up."""
     first, second = views_of(misfit.place[misfit.rows])[0]
     return np.stack([vectors[:, first], -vectors[:, second]], axis=1)
 
@@ -209,7 +209,7 @@ def _arrow_words(misfit: Misfit, kind: Kind) -> str:
 
 
 def words_of(misfit: Misfit) -> str:
-    """What arrows and colours mean, in a sentence or two."""
+    """The meaning of arrows and colours, in a sentence or two."""
     kind = misfit.kinds[0]
     scale = f"from dark (none) to yellow ({misfit.top(kind):g} {kind.unit} or more)"
     if not misfit.magnify:

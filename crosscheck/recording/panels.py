@@ -1,4 +1,4 @@
-"""Panels of text of a case: what to look at, and the numbers under the cursor."""
+"""Text panels of a case: what to look at, and the numbers of the current pose."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ class Panels:
         return lines
 
     def _worst(self) -> list[tuple[str, ...]]:
-        """Largest difference of each quantity, where, and what is allowed there."""
+        """Largest difference of each quantity, its pose, and the allowance there."""
         return [
             (
                 _TITLES[name],

@@ -20,9 +20,9 @@ DEVIATION, TILT, TENSION = "plot/deviation", "plot/tilt", "plot/tension"
 DIFFERENCE, SETTLED, LIMIT = "plot/difference", "plot/plain_settling", "plot/limit"
 LANES = "lanes"
 VERDICT = f"{LANES}/Verdict"
-# A component of the deviation below this part of the largest one is left out of the plots.
+# A component of the deviation below this part of the largest one is not plotted.
 _UNSEEN = 1e-6
-# What moves less than this [mm or degrees] does not move, and is shown on an axis of this.
+# Smaller motions [mm or degrees] count as zero, and are shown on an axis of the second size.
 _NOISE, _STILL = 1e-6, 0.1
 _GREEN: Rgba = (24, 92, 60, 255)
 _RED: Rgba = (215, 45, 45, 255)
@@ -43,7 +43,7 @@ _QUANTITIES: dict[str, tuple[str, Rgba]] = {
     "tension": ("tension [N]", colours.GREEN),
 }
 _QUANTITY_NAMES = [name for name, _colour in _QUANTITIES.values()]
-# Of the plots, top to bottom, over the column's height, and in points of a window of 1920 by 1080.
+# Heights of the plots, top to bottom, in parts and in points of a window of 1920 by 1080.
 SHARES = (2.8, 3.0, 3.8, 3.6)
 _WIDTH, _HEIGHTS = 640.0, [1000.0 * share / sum(SHARES) - 55.0 for share in SHARES]
 
@@ -90,7 +90,7 @@ class Series:
         self._style()
 
     def over_settling(self, index: Index) -> None:
-        """MuJoCo on its way, and how far it still is from SEECR's answer."""
+        """MuJoCo's motion, and its distance from SEECR's answer."""
         material, i = self.material, self.material.watched
         assert material.motion is not None
         moving, k = material.settling, len(material.motion.t_s)
@@ -135,7 +135,7 @@ class Series:
         self.recording.scalars(f"{root}/{quantity}", index, plots.log10(values))
 
     def _style(self) -> None:
-        """Lines for SEECR and dots for MuJoCo, or two kinds of dots where poses are unrelated."""
+        """Lines for SEECR and dots for MuJoCo, or two kinds of dots if poses are unrelated."""
         for name, colour in _COMPONENTS.items():
             root = DEVIATION if name in plots.TRANSLATIONS else TILT
             self._pair(root, _entity(name), name, colour)
@@ -162,7 +162,7 @@ class Series:
 
 
 def _verdict_style(recording: Recording) -> None:
-    """Green where all is well, red where a threshold is exceeded, in between findings."""
+    """Green for agreement, red where a threshold is exceeded, other colours for findings."""
     shades = {verdict.name.lower(): _YELLOW for verdict in Verdict}
     shades |= {"agrees": _GREEN, "differs": _RED}
     shades |= {verdict.name.lower(): _PURPLE for verdict in UNSOLVED}
@@ -170,7 +170,7 @@ def _verdict_style(recording: Recording) -> None:
 
 
 def _components(material: Material) -> tuple[list[str], list[str]]:
-    """Which components are worth a line: those that move at all."""
+    """Components that are worth a line: those that move at all."""
     parts = plots.deviation(material.seecr.pose, material.command)
     largest = {name: np.nanmax(np.abs(values), initial=0.0) for name, values in parts.items()}
     most = max(largest[n] for n in plots.TRANSLATIONS)
@@ -180,13 +180,13 @@ def _components(material: Material) -> tuple[list[str], list[str]]:
 
 
 def _largest(material: Material, names: list[str]) -> float:
-    """The largest of some components of the deviation [mm or degrees]."""
+    """The largest value of some components of the deviation [mm or degrees]."""
     parts = plots.deviation(material.seecr.pose, material.command)
     return max(float(np.nanmax(np.abs(parts[name]), initial=0.0)) for name in names)
 
 
 def _components_legend(material: Material, names: list[str], height: float) -> Legend:
-    """Where the legend of some components of the deviation goes, over poses and the settling."""
+    """The legend's place for some components of the deviation, over poses and the settling."""
     still = _still(_largest(material, names))
     if still is not None:
         return Legend(values=still)
@@ -212,7 +212,7 @@ def _tension_legend(material: Material, groups: list[list[int]]) -> Legend:
 
 
 def _drawn(material: Material) -> list[list[int]]:
-    """Cables whose tensions lie on each other, of which the first is drawn, where a legend fits."""
+    """Cables whose tensions coincide, of which the first is drawn, if a legend fits."""
     groups = alike(_tensions(material))
     if _tension_legend(material, groups).fits:
         return groups
@@ -220,7 +220,7 @@ def _drawn(material: Material) -> list[list[int]]:
 
 
 def _tension_view(material: Material) -> rrb.TimeSeriesView:
-    """Tensions with a legend where there is room for one; lanes have the same colours."""
+    """Tensions, with a legend if there is room for one; lanes have the same colours."""
     groups = _drawn(material)
     legend = _tension_legend(material, groups)
     title = "Tension [N]" + ("" if legend.fits else ", cables in the colours of their lanes")
@@ -229,7 +229,7 @@ def _tension_view(material: Material) -> rrb.TimeSeriesView:
 
 
 def _logarithms(material: Material) -> list[Array]:
-    """What is drawn of differences and their limits: (n, 8) over the poses, (k, 3) over time."""
+    """Curves of differences and their limits: (n, 8) over the poses, (k, 3) over time."""
     gap, limit = material.gap, material.result.allowance
     out = [
         gap.position_m, gap.orientation_rad, gap.tension_N, gap.settled_position_m,
@@ -240,7 +240,7 @@ def _logarithms(material: Material) -> list[Array]:
 
 
 def _from_the_answer(material: Material) -> tuple[Array, Array, Array]:
-    """How far MuJoCo is from SEECR's answer as it settles: (k,) [m], [rad], [N]."""
+    """Distance of MuJoCo from SEECR's answer as it settles: (k,) [m], [rad], [N]."""
     moving, i = material.settling, material.watched
     gap = pose_difference(moving.pose, np.tile(material.seecr.pose[i], (len(moving.pose), 1)))
     worst = np.abs(moving.tensions - material.seecr.tensions[i]).max(axis=1)
@@ -248,7 +248,7 @@ def _from_the_answer(material: Material) -> tuple[Array, Array, Array]:
 
 
 def _still(largest: float) -> tuple[float, float] | None:
-    """Range of an axis on which nothing moves, lest it show rounding; else the viewer's choice."""
+    """Range of an axis on which nothing moves, which hides rounding; else the viewer's choice."""
     return (-_STILL, _STILL) if largest < _NOISE else None
 
 

@@ -36,12 +36,12 @@ _CROSSES = "Crosses are SEECR, the dots on them MuJoCo."
 
 
 def pose_heading(k: int, count: int) -> str:
-    """The heading of what is said of one of so many poses, counted from 0."""
+    """The heading for one of so many poses, counted from 0."""
     return f"## Pose {k}" + (f" (of 0 to {count - 1})" if count > 1 else "")
 
 
 def unused(data: Measurements, k: int) -> str:
-    """Why nothing is shown of a row that does not count."""
+    """Why nothing is shown for a row that does not count."""
     if data.read[k]:
         return "\nLeft out, see the notes."
     return "\nA way point: gone through, not compared."
@@ -62,12 +62,13 @@ def read_me(
 
     Args:
         name: of the case.
-        sentence: what robot, cable and poses it has.
-        count: of poses.
-        watched: which pose, counted from 0, the settling shows; None for no settling.
-        rows: quantity, largest difference, at which pose, what is allowed there.
+        sentence: its robot, cable and poses.
+        count: number of poses.
+        watched: the pose, counted from 0, whose settling is shown; None for no settling.
+        rows: quantity, largest difference, its pose, the allowance there.
         findings: sentences.
         lines: whether SEECR is drawn as lines in the plots.
+        along: the timeline over the poses.
     """
     listed = "\n".join(["", "", "## Findings", *(f"- {text}" for text in findings), ""])
     return _READ_ME.format(
@@ -83,7 +84,7 @@ def read_me(
 
 
 def table(rows: Sequence[tuple[str, ...]], head: tuple[str, ...] | None = None) -> str:
-    """A Markdown table; without a head its first row is the head, as Markdown knows no other."""
+    """A Markdown table; without a head its first row is the head, as Markdown needs one."""
     if head is None:
         head, *rows = rows
     lines = ["| " + " | ".join(head) + " |", "|" + " --- |" * len(head)]
@@ -91,7 +92,7 @@ def table(rows: Sequence[tuple[str, ...]], head: tuple[str, ...] | None = None) 
 
 
 def number(value: float, unit: str, digits: int = 3) -> str:
-    """A number with its unit, or a dash where there is none."""
+    """A number with its unit, or a dash if there is none."""
     return f"{value:.{digits}g} {unit}" if np.isfinite(value) else "–"
 
 
@@ -127,7 +128,7 @@ def instant(t_s: float, kinetic: float, distance: Array, slack: str) -> str:
 
     Args:
         t_s: simulated time [s].
-        kinetic: energy of motion [J].
+        kinetic: kinetic energy [J].
         distance: (2,) [m, rad] from SEECR's answer.
         slack: names of slack cables.
     """

@@ -1,8 +1,8 @@
-"""A user's MJCF made ready for settling: compiled, checked, and stripped to springs and gravity.
+"""A user's MJCF prepared for settling: compiled, checked, and reduced to springs and gravity.
 
-What would hide or shift the rest state that statics predicts is switched off: contacts, joint and
-tendon limits, dry friction (with it a platform rests anywhere in a band), and damping (which moves
-no rest state, only delays it).
+What would hide or shift the equilibrium that statics predicts is switched off: contacts, joint and
+tendon limits, dry friction (with it a platform rests anywhere in a band), and damping (which shifts
+no equilibrium, but delays it).
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from seecr.description.mjcf import not_mjcf
 from seecr.errors import InputFileError
 
 _DISABLE = (
-    mujoco.mjtDisableBit.mjDSBL_AUTORESET,  # else a diverging run restarts as if nothing happened
+    mujoco.mjtDisableBit.mjDSBL_AUTORESET,  # else a diverging run restarts silently
     mujoco.mjtDisableBit.mjDSBL_CONSTRAINT,  # contacts, limits, dry friction
-    mujoco.mjtDisableBit.mjDSBL_CONTACT,  # without even looking for contacts
+    mujoco.mjtDisableBit.mjDSBL_CONTACT,  # skips the search for contacts
     mujoco.mjtDisableBit.mjDSBL_DAMPER,
     mujoco.mjtDisableBit.mjDSBL_SENSOR,
 )
@@ -33,7 +33,7 @@ _quiet_depth = 0
 
 @contextmanager
 def quiet_mujoco() -> Iterator[None]:
-    """Keep MuJoCo from writing MUJOCO_LOG.TXT into the working folder; statuses tell instead."""
+    """Keep MuJoCo from writing MUJOCO_LOG.TXT into the working folder; statuses report instead."""
     global _quiet_depth
     with _quiet_lock:
         _quiet_depth += 1
@@ -49,11 +49,11 @@ def quiet_mujoco() -> Iterator[None]:
 
 
 def _ignore(message: str) -> None:
-    """Take a warning of MuJoCo's and do nothing with it."""
+    """Discard a warning of MuJoCo's."""
 
 
 def compile_model(source: str | Path | mujoco.MjModel) -> mujoco.MjModel:
-    """Compile a file, or copy a model, so that it is ours to change."""
+    """Compile a file, or copy a model, so that the result may be changed."""
     if isinstance(source, mujoco.MjModel):
         return copy(source)
     path = Path(source)
@@ -70,7 +70,7 @@ def compile_model(source: str | Path | mujoco.MjModel) -> mujoco.MjModel:
 
 
 def platform_of(model: mujoco.MjModel, name: str) -> int:
-    """Number of the one moving body."""
+    """Number of the only moving body."""
     moving = np.flatnonzero(model.body_jntnum > 0)
     if len(moving) != 1:
         raise InputFileError(
@@ -81,7 +81,7 @@ def platform_of(model: mujoco.MjModel, name: str) -> int:
 
 
 def check_cables(model: mujoco.MjModel, body: int, where: str) -> None:
-    """Hold the tendons to the contract: straight cables from the world to the platform."""
+    """Check that the tendons are straight cables from the world to the platform."""
     if model.ntendon == 0:
         raise InputFileError(f"{where}: no cables; expected one <spatial> tendon per cable")
     for i in range(model.ntendon):
@@ -102,7 +102,7 @@ def check_cables(model: mujoco.MjModel, body: int, where: str) -> None:
 
 
 def hindrances(model: mujoco.MjModel) -> tuple[str, ...]:
-    """Names of what would hide or shift the rest state of springs and gravity, if it is there."""
+    """Names of features present that would hide or shift the equilibrium."""
     found = {
         "joint limits": model.jnt_limited.any(),
         "tendon limits": model.tendon_limited.any(),
@@ -114,7 +114,7 @@ def hindrances(model: mujoco.MjModel) -> tuple[str, ...]:
 
 
 def switch_off(model: mujoco.MjModel) -> None:
-    """Leave springs, gravity and inertia."""
+    """Leave springs, gravity and inertia only."""
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
     model.opt.disableflags |= sum(int(flag) for flag in _DISABLE)
     model.opt.tolerance = 1e-8  # relative, of the solve for the implicit step
@@ -123,7 +123,7 @@ def switch_off(model: mujoco.MjModel) -> None:
 
 
 def ignored_note(name: str | Path, ignored: Sequence[str]) -> str:
-    """One sentence about the :func:`hindrances` of a file."""
+    """A sentence about the :func:`hindrances` of a file."""
     return (
         f"{name}: switched off here: {', '.join(ignored)}; the platform hangs on springs and "
         "gravity alone, as statics has it"
@@ -131,7 +131,7 @@ def ignored_note(name: str | Path, ignored: Sequence[str]) -> str:
 
 
 def change_mass_unit(model: mujoco.MjModel, mass_unit: float) -> None:
-    """Count mass in another unit [kg]: all that carries one, and what MuJoCo derives from it."""
+    """Change the unit of mass [kg] of everything with mass, and of what MuJoCo derives from it."""
     for array in (
         model.body_mass,
         model.body_inertia,

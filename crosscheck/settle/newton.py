@@ -1,4 +1,4 @@
-"""The one Newton of settling and of twins: on MuJoCo's forces, downhill in MuJoCo's energy."""
+"""Newton's method of settling and of twins: on MuJoCo's forces, downhill in MuJoCo's energy."""
 
 from __future__ import annotations
 
@@ -8,27 +8,27 @@ from numpy.typing import NDArray
 from crosscheck.settle.physics import Physics
 from seecr.pose import Array, pose_difference
 
-# Differences across this much of the robot's length: central, so the truncation is its square.
+# Step of finite differences [robot's length]; central, so the error is of second order.
 _DIFFERENCE = 2e-5
-# Longest step, in the robot's own lengths.
+# Longest step [robot's length].
 _REACH = 0.5
-# A step is tried at this many lengths, each so much shorter than the last.
+# Number of lengths at which a step is tried, and their ratio.
 _TRIES, _SHORTER = 6, 0.3
-# Of what the energy may rise by rounding.
+# Relative increase of the energy that counts as rounding.
 _ROUNDING = 1e-12
 
 
 def minimise(physics: Physics, goal: float, limit: int) -> tuple[float, int]:
-    """Go from the present state to where the forces balance, as near as rounding lets it.
+    """Go from the present state to an equilibrium, as exactly as rounding permits.
 
     Args:
         physics: left in the last state.
-        goal: unbalanced force relative to the load from which on it stops as soon as a step does
-            not halve it.
-        limit: steps to take at most.
+        goal: residual force relative to the load; below it the search stops as soon as a step does
+            not halve the residual.
+        limit: most steps.
 
     Returns:
-        the unbalanced force relative to the load, and the steps taken.
+        the residual force relative to the load, and the number of steps.
     """
     force = physics.residual() / physics.metre
     size = float(np.linalg.norm(force)) / physics.force_scale
@@ -38,7 +38,7 @@ def minimise(physics: Physics, goal: float, limit: int) -> tuple[float, int]:
             return size, iteration
         physics.update()
         matrix = stiffness(physics, physics.tensions() > 0.0)
-        # with all cables slack there is no stiffness to compare with, only the load
+        # if all cables are slack there is no stiffness to compare with, only the load
         largest = float(np.max(np.abs(matrix))) + physics.force_scale / physics.length
         better = None
         while better is None and damping < 1e6 * largest:
@@ -56,14 +56,13 @@ def minimise(physics: Physics, goal: float, limit: int) -> tuple[float, int]:
 
 
 def stiffness(physics: Physics, taut: NDArray[np.bool_]) -> Array:
-    """Stiffness (d, d) [N/m] at the present qpos, rotations as metres at the robot's length.
+    """Stiffness (d, d) [N/m] at the present qpos, with rotations times the robot's length.
 
-    Central differences of MuJoCo's unbalanced force with the set of taut tendons held: a stiff
-    cable is stretched by less than any useful difference, so plain differences would straddle
-    taut and slack.
+    Central differences of MuJoCo's residual force with a fixed set of taut tendons: a stiff cable
+    stretches by less than any useful step, so that plain differences would mix taut and slack.
 
     Args:
-        physics: in the state asked about.
+        physics: in the state in question.
         taut: (k,) tendons that pull; the others are left out.
     """
     step, data, n = _DIFFERENCE * physics.length, physics.data, physics.n_dof
@@ -81,14 +80,14 @@ def stiffness(physics: Physics, taut: NDArray[np.bool_]) -> Array:
             matrix[rows, columns] = ((forces[1] - forces[0]) / (2.0 * step))[rows]
     data.qpos[:] = start
     physics.update()
-    # what cables with parts of their own do to the platform is what the platform does to them
+    # cables with bodies of their own act on the platform as it acts on them
     d = physics.n_platform
     matrix[:d, d:] = matrix[d:, :d].T
     return np.asarray(0.5 * (matrix + matrix.T))
 
 
 def neutral_stiffness(physics: Physics) -> float:
-    """Stiffness [N/m] that rounding of the forces can pretend in a difference."""
+    """Stiffness [N/m] that rounding of the forces can simulate in a difference."""
     return 10.0 * physics.rounding() * physics.force_scale / (_DIFFERENCE * physics.length)
 
 

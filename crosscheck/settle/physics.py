@@ -1,7 +1,7 @@
-"""One cable robot inside MuJoCo: cables, load and pose in; forces, energy and tensions out.
+"""One cable robot in MuJoCo: cables, load and pose in; forces, energy and tensions out.
 
-Nothing here comes from seecr's statics: the file is compiled by MuJoCo itself, and every force
-is MuJoCo's.
+Nothing here comes from seecr's statics: the file is compiled by MuJoCo itself, and every force is
+MuJoCo's.
 """
 
 from __future__ import annotations
@@ -29,24 +29,26 @@ from seecr.pose import Array, pose_difference
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-# MuJoCo's implicit step takes generalised forces below some 1e-8 (in its own units) for zero, so a
-# light platform would stop moving before its forces balance. The unit of mass is free in mechanics:
-# we choose it so that the platform has about this mass. A power of two, so no digit changes.
+# MuJoCo's implicit step treats generalised forces below about 1e-8 (in its own units) as zero, so
+# that a light platform would stop moving before its forces balance. The unit of mass is arbitrary
+# in mechanics: it is chosen to give the platform about this mass, as a power of two, so that no
+# digit changes.
 _MASS_IN_MUJOCO = 1e6
 Index = NDArray[np.int64]
 Together = tuple[Index, Index, Index]
-"""Coordinates, and the (rows, columns) of the stiffness that one shift of all of them gives."""
+"""Coordinates, and the (rows, columns) of the stiffness that shifting all of them together yields.
+"""
 _FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """Where a robot's parts are in MuJoCo's model.
+    """Indices of a robot's parts in MuJoCo's model.
 
     Attributes:
-        platform: number of its body.
-        exits, anchors: (m,) numbers of the sites.
+        platform: index of its body.
+        exits, anchors: (m,) indices of the sites.
     """
 
     platform: int
@@ -57,36 +59,36 @@ class Parts:
 class Physics:
     """MuJoCo's model and state of one platform on cables.
 
-    What the methods take and give is in SI units; ``model`` and ``data`` count mass in
-    ``mass_unit``, so forces and energies read from them have to be multiplied by it.
+    Arguments and results of the methods are in SI units. ``model`` and ``data`` have masses in
+    ``mass_unit``, so forces and energies read from them must be multiplied by it.
 
     Attributes:
-        model: MuJoCo's model; its springs and load are ours to change.
+        model: MuJoCo's model; its springs and load may be changed.
         data: MuJoCo's state.
         mass_unit: MuJoCo's unit of mass here [kg].
-        parts: where the platform and its sites are in the model.
-        body: number of the platform's body.
+        parts: indices of the platform and its sites in the model.
+        body: index of the platform's body.
         is_free: whether it has a free joint (else slide and hinge joints).
         mass: of the platform [kg].
-        length: the robot's own length [m], which weighs newton-metres against newtons: half the
-            largest distance of two anchor points, at least a hundredth of the longest distance
-            from the reference position to an exit point.
-        rotations: (d,) which coordinates are angles.
-        metre: (d,) [m] what one unit of each coordinate counts as: 1, or the length for angles.
-        force_scale: [N] what residuals are relative to: weight, plus force and torque over length
-            of the wrench; without any load, the cables' own forces.
-        coupling: groups of coordinates that may be shifted together to difference the forces.
+        length: the robot's characteristic length [m], which makes torques comparable with forces:
+            half the largest distance of two anchor points, at least a hundredth of the largest
+            distance from the reference position to an exit point.
+        rotations: (d,) whether each coordinate is an angle.
+        metre: (d,) [m] value of one unit of each coordinate: 1, or the length for angles.
+        force_scale: [N] unit of relative residuals: weight, plus force, and torque over length, of
+            the wrench; without any load, the cables' own forces.
+        coupling: groups of coordinates that may be shifted together in finite differences.
         wrench: (6,) [N, N m] as set.
-        ignored: what of the MJCF is switched off here, in words such as "contacts".
+        ignored: features of the MJCF that are switched off here, such as "contacts".
     """
 
     def __init__(self, model: mujoco.MjModel, parts: Parts, length: float | None = None) -> None:
-        """Take a model over: it is changed from now on.
+        """Take over a model, which is changed from now on.
 
         Args:
-            model: compiled; nobody else's.
-            parts: where the platform and its sites are in it.
-            length: the robot's own [m]; None takes it from the sites.
+            model: compiled; not used by anybody else.
+            parts: indices of the platform and its sites in it.
+            length: the robot's characteristic length [m]; None computes it from the sites.
         """
         self.model, self.parts, self.body = model, parts, parts.platform
         self.is_free = int(model.jnt_type[model.body_jntadr[parts.platform]]) == _FREE
@@ -101,7 +103,7 @@ class Physics:
         self.wrench = np.zeros(6)
         mujoco.mj_forward(model, self.data)
         self.length = self._characteristic_length() if length is None else length
-        # One length for rotations makes all coordinates metres: residuals and eigenvalues compare.
+        # With a length for rotations all coordinates are metres: residuals and eigenvalues compare.
         self.rotations = self._which_rotate()
         self.metre = np.where(self.rotations, self.length, 1.0)
         every = np.arange(self.n_dof)
@@ -114,7 +116,7 @@ class Physics:
         """Compile an MJCF file, or copy a compiled model.
 
         Raises:
-            InputFileError: no such file, not MJCF, or not one platform on cables.
+            InputFileError: there is no such file, it is not MJCF, or not one platform on cables.
         """
         name = "model" if isinstance(source, mujoco.MjModel) else str(source)
         model = compile_model(source)
@@ -136,7 +138,7 @@ class Physics:
 
     @property
     def n_platform(self) -> int:
-        """How many of the coordinates are the platform's own: the first ones."""
+        """Number of the platform's own coordinates, which are the first ones."""
         return self.n_dof
 
     @property
@@ -156,7 +158,7 @@ class Physics:
 
     @property
     def kinetic_energy(self) -> float:
-        """Kinetic energy [J] as of the last step's beginning."""
+        """Kinetic energy [J] at the beginning of the last step."""
         return float(self.data.energy[1]) * self.mass_unit
 
     @property
@@ -193,7 +195,7 @@ class Physics:
         self.force_scale = self._load or self._own_forces()
 
     def place(self, pose: Array) -> None:
-        """Put the platform at rest at a pose (7,), or as near to it as its joints allow."""
+        """Put the platform at a pose (7,), or as near to it as its joints allow, at rest."""
         pose = _finite("pose", pose, (7,))
         norm = float(np.linalg.norm(pose[3:]))
         if abs(norm - 1.0) > 1e-3:
@@ -210,7 +212,7 @@ class Physics:
         self.force_scale = self._load or self._own_forces()
 
     def _own_forces(self) -> float:
-        """What cables pull among themselves [N]: without a load that is the measure."""
+        """Scale [N] of the forces of the cables among themselves, used without a load."""
         pull = self.stiffness * self.rest_lengths
         return float(max(np.sum(self.tensions()), 1e-6 * np.max(pull)))
 
@@ -220,16 +222,16 @@ class Physics:
         return np.concatenate([self.data.xpos[self.body], quat * np.copysign(1.0, quat[0])])
 
     def update(self) -> None:
-        """Bring body poses and cable lengths up to the present qpos."""
+        """Update body poses and cable lengths to the present qpos."""
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_comPos(self.model, self.data)
         mujoco.mj_tendon(self.model, self.data)
 
     def residual(self) -> Array:
-        """Unbalanced generalised force (d,) [N, N m] at rest at the present qpos.
+        """Residual generalised force (d,) [N, N m] at the present qpos, without velocity.
 
-        MuJoCo's inverse dynamics at zero velocity and acceleration gives the force that would
-        hold the platform there; what the external wrench does not give is unbalanced.
+        MuJoCo's inverse dynamics at zero velocity and acceleration gives the force that would hold
+        the platform there; the part that the external wrench does not supply is the residual.
         """
         self.data.qvel[:] = 0.0
         self.data.qacc[:] = 0.0
@@ -239,9 +241,9 @@ class Physics:
 
     def push(self) -> None:
         """Apply the constant wrench at the present pose, as MuJoCo's generalised force."""
-        # Not through xfrc_applied: that acts at the centre of mass, so its torque would have to
-        # follow the offset as the platform turns. Nor as qpos-independent qfrc_applied: the
-        # free joint's torque is in body axes.
+        # Not by xfrc_applied, which acts at the centre of mass, so that its torque would have to
+        # follow the offset as the platform rotates; nor by a constant qfrc_applied, since the free
+        # joint's torque is in body axes.
         self.data.qfrc_applied[:] = 0.0
         if self.wrench.any():
             where = self.data.xpos[self.body]
@@ -257,17 +259,17 @@ class Physics:
             )
 
     def relative(self, force: Array) -> float:
-        """Size of a generalised force (d,) relative to the load, torques over the length."""
+        """Norm of a generalised force (d,) relative to the load, with torques over the length."""
         return float(np.linalg.norm(force / self.metre)) / self.force_scale
 
     def rounding(self) -> float:
-        """Relative residual that rounding alone can leave: stiffness times the ulp of lengths."""
+        """Relative residual due to rounding alone: stiffness times the spacing of floats."""
         size = np.maximum(self.rest_lengths, np.max(np.abs(self.exit_points())))
         pull = float(np.linalg.norm(self.stiffness * size))
         return float(np.finfo(float).eps) * pull / self.force_scale
 
     def tensions(self) -> Array:
-        """Tensions (m,) [N] as of the last update; exactly 0 where the cable is slack."""
+        """Tensions (m,) [N] as of the last update; exactly 0 if the cable is slack."""
         stretch = self.data.ten_length - self.rest_lengths
         return np.asarray(self.stiffness * np.maximum(stretch, 0.0))
 
@@ -287,13 +289,13 @@ class Physics:
         return stored - float(self.wrench[:3] @ self.data.xpos[self.body])
 
     def move(self, change: Array) -> None:
-        """Move by a generalised displacement (d,), rotations of a free joint in body axes."""
+        """Move by a generalised displacement (d,), with rotations of a free joint in body axes."""
         mujoco.mj_integratePos(self.model, self.data.qpos, change, 1.0)
 
     def solve(self, stiffness: Array, force: Array, damping: float, neutral: float) -> Array | None:
-        """Displacement (d,) [m] that balances a force (d,) [N], rotations as metres at the length.
+        """Displacement (d,) [m] that balances a force (d,) [N], rotations times the robot's length.
 
-        Directions whose stiffness is at most ``neutral`` are left alone.
+        There is no motion in directions whose stiffness is at most ``neutral``.
 
         Args:
             stiffness: (d, d) [N/m]; force: in the same coordinates.
@@ -301,7 +303,7 @@ class Physics:
             neutral: [N/m].
 
         Returns:
-            None where the damped stiffness is not positive definite: no way leads downhill.
+            None if the damped stiffness is not positive definite, so that no step leads downhill.
         """
         values, vectors = np.linalg.eigh(stiffness)
         stiff = np.abs(values) > neutral
@@ -312,7 +314,7 @@ class Physics:
 
     @contextmanager
     def frozen_slack(self, taut: NDArray[np.bool_]) -> Iterator[None]:
-        """Let some cables (m,) pull and push, the others vanish: smooth, for Newton's method."""
+        """Let some cables (m,) pull and push and remove the others: smooth, for Newton's method."""
         spring, stiffness = self.model.tendon_lengthspring, self.model.tendon_stiffness
         kept = stiffness.copy()
         stiffness[~taut] = 0.0
@@ -333,7 +335,7 @@ class Physics:
         return array
 
     def _joints_towards(self, pose: Array) -> None:
-        """Gauss-Newton on the platform's joints until it is as near to the pose as they let it."""
+        """Gauss-Newton on the platform's joints, until it is as near to the pose as they permit."""
         n = self.n_platform
         weigh = np.array([1.0, 1.0, 1.0] + 3 * [self.length])
         jacobian = np.zeros((6, self.n_dof))

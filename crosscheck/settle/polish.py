@@ -1,4 +1,4 @@
-"""The last digits: Newton on MuJoCo's inverse dynamics, from where the platform came to rest."""
+"""The last digits: Newton's method on MuJoCo's inverse dynamics, from the settled pose."""
 
 from __future__ import annotations
 
@@ -16,18 +16,17 @@ _MAX_ITERATIONS = 30
 
 @dataclass(frozen=True)
 class Polished:
-    """What the polish did; the physics is left at the polished state.
+    """Result of the polish; the physics is left in the polished state.
 
     Attributes:
-        residual: unbalanced force relative to the load.
-        iterations: Newton steps taken.
-        moved_m: distance [m] from where it started.
-        moved_rad: rotation [rad] from where it started.
-        smallest_eigenvalue: of the stiffness there [N/m], rotations as metres at the robot's
-            length.
+        residual: residual force relative to the load.
+        iterations: number of Newton steps.
+        moved_m: distance [m] from the start.
+        moved_rad: rotation [rad] from the start.
+        smallest_eigenvalue: of the stiffness there [N/m], rotations times the robot's length.
         softest: (d,) its unit eigenvector.
-        neutral: below this an eigenvalue [N/m] is rounding, not stiffness.
-        wall_s: time it took [s].
+        neutral: a smaller eigenvalue [N/m] is rounding, not stiffness.
+        wall_s: time taken [s].
     """
 
     residual: float
@@ -41,14 +40,15 @@ class Polished:
 
     @property
     def unstable(self) -> bool:
-        """Whether the energy falls in some direction from there."""
+        """Whether the energy decreases in some direction from there."""
         return self.smallest_eigenvalue < -self.neutral
 
 
 def polish(physics: Physics) -> Polished:
-    """Newton steps until rounding is all that is left of the unbalanced force.
+    """Newton steps until the residual force is mere rounding.
 
-    Directions without stiffness (a platform on one cable may turn about it) are left alone.
+    There is no motion in directions without stiffness (a platform on one cable may rotate about
+    it).
     """
     began = time.perf_counter()
     physics.update()
@@ -70,10 +70,10 @@ def polish(physics: Physics) -> Polished:
 
 
 def _softest(physics: Physics) -> tuple[float, Array]:
-    """Smallest eigenvalue of the stiffness [N/m] and its unit vector (d,).
+    """Smallest eigenvalue of the stiffness [N/m] and its unit eigenvector (d,).
 
-    A cable whose tension is only rounding hinders on one side at most: without it, the platform
-    may be free to move to the other. Where it would be unstable, such cables prop it up.
+    A cable whose tension is mere rounding resists on one side at most: without it, the platform may
+    be free to move to the other. If it would be unstable without them, such cables are included.
     """
     tensions = physics.tensions()
     firm = tensions > 10.0 * physics.rounding() * physics.force_scale

@@ -1,12 +1,12 @@
 """Stage 1 of a settling: MuJoCo's own dynamics with kinetic damping.
 
-The platform moves freely; whenever its kinetic energy has passed a peak it is stopped, and
-starts again from there (dynamic relaxation with kinetic damping: Day 1965, Cundall 1976). Each
-stop takes energy away, so it ends in a minimum of it: a stable equilibrium. Which one, where there
-are several, is the time step's say too: between stops the integrator keeps energy only nearly.
+The platform moves freely; whenever its kinetic energy has passed a peak it is stopped, and starts
+again from there (dynamic relaxation with kinetic damping: Day 1965, Cundall 1976). Each stop
+removes energy, so it ends in a minimum of it: a stable equilibrium. If there are several, the time
+step also influences which one: between stops the integrator conserves energy only approximately.
 
-The integrator is MuJoCo's ``discrete``, implicit in the springs, so the time step need not
-resolve the cables' vibrations; it has to resolve the swinging under the load.
+The integrator is MuJoCo's ``discrete``, implicit in the springs. So the time step need not resolve
+the cables' vibrations, only the swinging under the load.
 """
 
 from __future__ import annotations
@@ -24,33 +24,33 @@ from crosscheck.settle.physics import Physics
 
 Observer = Callable[[Physics], None]
 
-# Time step over the robot's own time sqrt(length m/F): on the DemoBot (0.4 kg, 0.058 m) these are
-# 5 ms and 2 ms, the second for cables stiffer than 5e4 N/m, as measured there. Written so, the
-# same numbers hold for robots of any size, mass and load.
+# Time step over the robot's characteristic time sqrt(length m/F). On the DemoBot (0.4 kg, 0.058 m)
+# these are 5 ms and 2 ms, the second for cables stiffer than 5e4 N/m, as measured there. In this
+# form the same numbers hold for robots of any size, mass and load.
 _TIME_STEP = 0.065
 _TIME_STEP_STIFF = 0.026
 _STIFF = 740.0
 # A platform with little inertia in rotation swings faster than it travels.
 _TIME_STEP_ROTATION = 0.3
-# MuJoCo's implicit step takes the smallest forces for zero. When nothing moves at all, this
-# relative residual is rest; above it the time step is halved, which makes MuJoCo notice smaller
+# MuJoCo's implicit step treats the smallest forces as zero. If nothing moves at all, this relative
+# residual counts as rest; above it the time step is halved, which makes MuJoCo notice smaller
 # forces.
 _AT_REST = 1e-7
-# Peaks of kinetic energy without the unbalanced force halving, after which the time step is
-# halved: nearly rigid cables can flip between slack and taut for ever at a long time step.
+# Number of peaks of kinetic energy without the residual force halving, after which the time step is
+# halved: nearly rigid cables can alternate for ever between slack and taut at a long time step.
 _PATIENCE = 40
 _SHORTEST = 1e-4
-# Steps between the checks that need not be made at each.
+# Steps between checks that need not be made at each step.
 _STRIDE = 64
-# A state that is not finite is tried again from the start with shorter time steps.
+# After a state that is not finite, the run is repeated with shorter time steps.
 _RETRIES = 3
 _SHORTER = 8.0
-# How many times the robot's size a platform may travel before it counts as fallen.
+# A platform that travels this many times the robot's size counts as fallen.
 _FALL = 10.0
 
 
 class SettleStatus(Enum):
-    """How a settling ended; the value is the sentence a person reads."""
+    """How a settling ended; the value is the sentence that people read."""
 
     SETTLED = "MuJoCo came to rest in a stable equilibrium"
     DIVERGED = "MuJoCo's state became infinite or not a number, also with shorter time steps"
@@ -63,15 +63,15 @@ class SettleStatus(Enum):
 
 @dataclass(frozen=True)
 class Rest:
-    """How stage 1 ended; the physics is left in its last state.
+    """Result of stage 1; the physics is left in its last state.
 
     Attributes:
         status: SETTLED, DIVERGED, TIME_LIMIT or FELL.
-        residual: unbalanced force relative to the load, at rest in that state.
+        residual: residual force relative to the load in that state, without velocity.
         steps: of MuJoCo, retries included.
         simulated_s: simulated time [s], retries included.
         time_step: the last [s].
-        wall_s: time it took [s].
+        wall_s: time taken [s].
     """
 
     status: SettleStatus
@@ -82,7 +82,7 @@ class Rest:
     wall_s: float
 
     def after(self, first: Rest) -> Rest:
-        """This rest, with the cost of an earlier one added."""
+        """This result, with the cost of an earlier one added."""
         return Rest(
             self.status,
             self.residual,
@@ -112,7 +112,7 @@ def come_to_rest(
 
     Args:
         physics: robot, cables and load set, platform placed.
-        tolerance: unbalanced force relative to the load at which it rests.
+        tolerance: residual force relative to the load at which it rests.
         max_steps: after which to give up.
         observe: called after each step.
     """
@@ -155,7 +155,7 @@ def _run(
             velocity[:] = 0.0
             last = 0.0
             size = physics.relative(unit * force)
-            # The step has moved on from where this force was: only the state it left counts.
+            # The step has moved on from where this force was: only the state that it left counts.
             if size < tolerance and (size := physics.relative(physics.residual())) < tolerance:
                 return SettleStatus.SETTLED, size, step
             best, stalled = (size, 0) if size < 0.5 * best else (best, stalled + 1)
@@ -180,7 +180,7 @@ def _run(
 
 
 def _advance(physics: Physics) -> Callable[[], None]:
-    """One MuJoCo step; what acts at each, such as a wrench, acts at the pose of that very step."""
+    """One MuJoCo step; forces such as a wrench are applied at the pose of that step."""
     model, data = physics.model, physics.data
     data.qfrc_applied[:] = 0.0
     if not physics.steers:
@@ -198,8 +198,8 @@ def _advance(physics: Physics) -> Callable[[], None]:
 def _fall_distance(physics: Physics) -> float:
     """Distance [m] from the start beyond which the platform counts as fallen.
 
-    The distance to the farthest exit point is the robot's size, stretched as if the softest
-    cable bore the load alone.
+    The distance to the farthest exit point is the robot's size, stretched as if the softest cable
+    carried the load alone.
     """
     ea = physics.stiffness * physics.rest_lengths
     exits = physics.exit_points() - physics.data.xpos[physics.body]

@@ -1,9 +1,8 @@
 """A cable robot brought to rest by MuJoCo: an answer that shares nothing with seecr's statics.
 
-Stage 1 (:mod:`crosscheck.settle.relax`) lets the platform move from the commanded pose by its own
-dynamics until it rests, which shows that the equilibrium is stable and reached from there.
-Stage 2 (:mod:`crosscheck.settle.polish`) adds digits without leaving that equilibrium. Both are
-reported.
+In stage 1 (:mod:`crosscheck.settle.relax`) the platform moves from the commanded pose by its own
+dynamics until it rests, which shows that the equilibrium is stable and reached from there. Stage 2
+(:mod:`crosscheck.settle.polish`) adds digits without leaving that equilibrium. Both are reported.
 """
 
 from __future__ import annotations
@@ -23,11 +22,11 @@ from crosscheck.settle.relax import Observer, Rest, SettleStatus, come_to_rest
 from seecr.pose import Array
 from seecr.result import Record
 
-# Relative residual after the polish; where rounding leaves more, that is the limit.
+# Largest relative residual after the polish, unless rounding alone leaves more.
 _POLISHED = 1e-9
-# A polish that moves the platform by more of its length has gone to another equilibrium.
+# A polish that moves the platform by more than this, in lengths, has gone to another equilibrium.
 _MOVED = 1e-2
-# An unstable equilibrium is left by this much of the length, up to this often.
+# Push off an unstable equilibrium [robot's length], and how often it is repeated.
 _NUDGE = 1e-3
 _NUDGES = 3
 
@@ -41,12 +40,12 @@ class Settling:
         pose: (7,) after the polish.
         qpos: (nq,) MuJoCo's coordinates of that pose.
         tensions: (m,) [N] after the polish.
-        slack: (m,) which cables carry nothing; all False on failure.
+        slack: (m,) whether each cable has no tension; all False on failure.
         energy: potential energy [J], see :meth:`crosscheck.settle.physics.Physics.energy`.
         settled_pose: (7,) after stage 1 alone.
-        rounding: the relative residual that rounding alone may leave.
-        rest: what stage 1 did, also on failure.
-        polished: what stage 2 did.
+        rounding: the relative residual due to rounding alone.
+        rest: result of stage 1, also on failure.
+        polished: result of stage 2.
         nudges: how often the platform was pushed off an unstable equilibrium.
     """
 
@@ -64,7 +63,7 @@ class Settling:
 
     @property
     def residual(self) -> float:
-        """Unbalanced force after the polish relative to the load (torques over length)."""
+        """Residual force after the polish relative to the load (torques over length)."""
         return self.polished.residual
 
     @property
@@ -74,12 +73,12 @@ class Settling:
 
     @property
     def smallest_eigenvalue(self) -> float:
-        """Of the stiffness [N/m]; within ``neutral`` of zero the platform may move freely."""
+        """Of the stiffness [N/m]; at or below ``neutral`` the platform may move freely."""
         return self.polished.smallest_eigenvalue
 
     @property
     def neutral(self) -> float:
-        """Below this an eigenvalue is rounding [N/m]."""
+        """A smaller eigenvalue is rounding [N/m]."""
         return self.polished.neutral
 
     @property
@@ -99,10 +98,10 @@ class Settling:
 
     @property
     def free_to_move(self) -> bool:
-        """Whether some motion changes no force: where it stops along it is then arbitrary.
+        """Whether some motion changes no force, so that the end point along it is arbitrary.
 
-        Two taut cables, say, leave a platform free to turn about the line through their
-        anchor points when its centre of mass lies on that line.
+        For example, two taut cables leave a platform free to rotate about the line through their
+        anchor points if its centre of mass is on that line.
         """
         return self.settled and self.smallest_eigenvalue <= self.neutral
 
@@ -132,7 +131,7 @@ class SettlingBatch(tuple[Settling, ...]):
         return np.array(values)
 
     def as_json(self) -> Record:
-        """``mujoco`` of a case in ``results.json``: the answers of all poses, by quantity."""
+        """``mujoco`` of a case in ``results.json``: the answers for all poses, by quantity."""
         return {
             "settled_pose": self.settled_pose,
             "settled_residual": self.settled_residual,
@@ -152,12 +151,12 @@ _FIELDS = frozenset(Settling.__dataclass_fields__)
 
 
 class Settler:
-    """Settles one robot in MuJoCo, pose after pose. One thread at a time.
+    """Settles one robot in MuJoCo, pose after pose; not thread-safe.
 
     Attributes:
         physics: the robot in MuJoCo.
         ea: (m,) [N] k_c = E S of each cable.
-        tolerance: unbalanced force, relative to the load, at which stage 1 is at rest.
+        tolerance: residual force, relative to the load, at which stage 1 ends.
         max_steps: of MuJoCo in stage 1.
     """
 
@@ -196,12 +195,12 @@ class Settler:
         """Bring the platform to rest from a pose.
 
         Args:
-            pose: (7,) where it starts at rest, the commanded pose.
+            pose: (7,) where it starts without velocity, usually the commanded pose.
             rest_lengths: (m,) [m].
             observe: called with the physics after each step of stage 1.
 
         Raises:
-            CrosscheckError: a wrong shape, or numbers that are no lengths or stiffnesses.
+            CrosscheckError: a wrong shape, or numbers that are not valid lengths or stiffnesses.
         """
         physics = self.physics
         self._prepare(pose, rest_lengths)
@@ -234,11 +233,11 @@ class Settler:
 
 
 def settle_batch(settler: Settler, poses: Array, rest_lengths: Array) -> SettlingBatch:
-    """Settle many poses, each from its own commanded pose, so that their order is irrelevant.
+    """Settle many poses, each from its own start pose, so that their order does not matter.
 
     Args:
         settler: the robot.
-        poses: (n, 7).
+        poses: (n, 7) start poses.
         rest_lengths: (n, m) [m].
     """
     poses = np.asarray(poses, dtype=float)

@@ -1,4 +1,4 @@
-"""SEECR held against MuJoCo, pose by pose: what `crosscheck run` does."""
+"""SEECR compared with MuJoCo, pose by pose: what `crosscheck run` does."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far SEECR and MuJoCo are apart at each pose, and how far they may be."""
+"""The differences between SEECR and MuJoCo at each pose, and the allowed differences."""
 
 from __future__ import annotations
 
@@ -23,21 +23,23 @@ QUANTITIES = (
     "orientation_rad",
     "tension_N",
 )
-"""What thresholds apply to; ``settled_`` is MuJoCo after plain settling, the rest polished."""
+"""Quantities with thresholds; ``settled_`` is MuJoCo after plain settling, the others after the
+polish.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Differences:
-    """MuJoCo against SEECR at n poses; NaN where one of them has no answer.
+    """Differences between MuJoCo and SEECR at n poses; NaN if one of them has no answer.
 
     Attributes:
         settled_position_m: (n,) [m] distance after plain settling.
         settled_orientation_rad: (n,) [rad] angle between them after plain settling.
         position_m: (n,) [m] distance after the polish.
         orientation_rad: (n,) [rad] angle after the polish.
-        cable_tension_N: (n, m) [N] of each cable, not negative, after the polish.
-        slack_same: (n,) both find the same cables slack. A cable that one of them finds slack
-            and the other taut by less than the allowed difference of tension counts as same.
+        cable_tension_N: (n, m) [N] absolute difference of each cable's tension after the polish.
+        slack_same: (n,) whether both find the same cables slack. A cable that is slack for one and
+            taut for the other, by less than the allowed difference of tension, counts as the same.
     """
 
     settled_position_m: Array
@@ -55,10 +57,10 @@ class Differences:
 
 @dataclass(frozen=True, eq=False)
 class Allowance:
-    """Largest difference that counts as agreement at each of n poses.
+    """Largest differences that count as agreement at each of n poses.
 
-    The thresholds, except where a robot is so nearly singular that the forces left unbalanced
-    move it further: residual over the smallest eigenvalue of the stiffness is allowed then.
+    They are the thresholds, unless a robot is so nearly singular that the residual forces move it
+    farther. Then the residual over the smallest eigenvalue of the stiffness is allowed.
 
     Attributes:
         settled_position_m, settled_orientation_rad, position_m, orientation_rad, tension_N:
@@ -75,10 +77,10 @@ class Allowance:
 
 
 def allowances(thresholds: Thresholds, solution: Solution, settling: SettlingBatch) -> Allowance:
-    """Thresholds, widened by residual over smallest eigenvalue where that is more."""
+    """Thresholds, or residual over smallest eigenvalue where that is larger."""
     load = solution.tables.scale
     softest = np.fmin(solution.smallest_eigenvalue, settling.smallest_eigenvalue)
-    # At or below rounding there is no stiffness to divide by: the thresholds hold as they are.
+    # Below rounding there is no stiffness to divide by: the thresholds hold as they are.
     firm = softest > settling.neutral
     per_newton = np.divide(1.0, softest, out=np.zeros_like(softest), where=firm)
     length = solution.robot.length
@@ -101,12 +103,12 @@ def allowances(thresholds: Thresholds, solution: Solution, settling: SettlingBat
 def differences_of(
     solution: Solution, settling: SettlingBatch, tension_allowed: Array
 ) -> Differences:
-    """MuJoCo's answers against SEECR's.
+    """Differences between MuJoCo's and SEECR's answers.
 
     Args:
         solution: n poses.
         settling: the same n poses.
-        tension_allowed: (n,) [N] below which a taut cable may be slack for the other.
+        tension_allowed: (n,) [N] below this a taut cable may be slack for the other.
     """
     settled_m, settled_rad = gap(settling.settled_pose, solution.pose)
     position_m, orientation_rad = gap(settling.pose, solution.pose)
@@ -124,13 +126,13 @@ def differences_of(
 
 
 def ratios(difference: Differences, allowance: Allowance) -> Array:
-    """Each difference over what is allowed, (n, 5) in the order of ``QUANTITIES``."""
+    """Each difference over its allowance, (n, 5) in the order of ``QUANTITIES``."""
     parts = [getattr(difference, name) / getattr(allowance, name) for name in QUANTITIES]
     return np.stack(parts, axis=1)
 
 
 def within(difference: Differences, allowance: Allowance) -> NDArray[np.bool_]:
-    """Where all differences are allowed and the same cables are slack, (n,)."""
+    """Whether all differences are allowed and the same cables are slack, (n,)."""
     close = np.all(ratios(difference, allowance) <= 1.0, axis=1)  # False where NaN
     return np.asarray(close & difference.slack_same)
 
@@ -143,5 +145,5 @@ def _by_quantity(thresholds: Thresholds) -> dict[str, float]:
 
 
 def _known(residual: Array) -> Array:
-    """Residuals, nothing where there is no answer: NaN and infinity widen no threshold."""
+    """Residuals, with zero where there is no answer: NaN and infinity widen no threshold."""
     return np.where(np.isfinite(residual), residual, 0.0)

@@ -1,4 +1,4 @@
-"""What the suite runs: a robot, a cable and the poses that both physics are given."""
+"""The cases of the suite: a robot, a cable, and the poses that both physics are given."""
 
 from __future__ import annotations
 
@@ -28,44 +28,43 @@ from seecr.pose import Array, quat_from_rotvec
 
 
 class Named(Protocol):
-    """What ``--case`` can select."""
+    """Objects that ``--case`` can select."""
 
     @property
     def name(self) -> str:
-        """As on the terminal."""
+        """The name on the terminal."""
 
 
 N = TypeVar("N", bound=Named)
 
 N_RANDOM = 200
-# Cogiro withstands moments: its random poses are turned, by up to this about a random axis.
+# Cogiro withstands moments: its random poses are rotated by up to this about a random axis.
 _COGIRO_TURN = np.deg2rad(12.0)
-# Planar robots: half the width of the sweep [m], tilt of the turned one, and other heights in
-# parts of what is between the reference position and the exit points.
+# Planar robots: half the width of the sweep [m], tilt of the tilted one, and other heights as parts
+# of the distance between the reference position and the exit points.
 _PLANAR_HALF_WIDTH = 0.15
 _PLANAR_TURN = np.deg2rad(8.0)
 _PLANAR_HEIGHTS = (-0.3, -0.15, 0.2, 0.4)
-# Robots of another size and kind, each with fewer poses: a part of the random ones, of the sweeps.
+# Robots of other sizes and kinds, with only a part of the number of random poses.
 _OTHERS = ("cogiro_large", "ipanema", "camera")
 _FEWER = 8
 
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """One robot on one cable, and the poses it is sent to.
+    """A robot with a cable, and the poses that it is commanded to.
 
     Attributes:
-        name: as on the terminal, in files' names and for ``--case``.
+        name: on the terminal, in file names and for ``--case``.
         model: MJCF file that SEECR reads.
         mujoco_model: MJCF file that MuJoCo settles; the same one, unless the two are to differ.
-        cable: name of one of ``CABLES`` of :mod:`seecr.description.shipped`; None leaves the
-            MJCF's stiffness.
+        cable: name of one of ``CABLES`` of :mod:`seecr.description.shipped`; None keeps the MJCF's
+            stiffness.
         kind: ``"sweep"``, whose poses follow each other along a line, ``"random"``, or
-            ``"starts"``: one command from several.
+            ``"starts"``: one command from several starts.
         poses: (n, 7) commanded.
-        has_names: whether thresholds can name its poses: not those of another seed or of a
-            user's robot.
-        starts: (n, 7) where both physics begin, each row alone; None begins at the commands.
+        has_names: whether thresholds can name its poses: not with another seed or a user's robot.
+        starts: (n, 7) start poses of both physics, each row alone; None starts at the commands.
     """
 
     name: str
@@ -83,22 +82,22 @@ class Case:
 
     @property
     def begins(self) -> Array:
-        """Where MuJoCo lets the platform go, (n, 7), and SEECR's search begins."""
+        """Start poses of MuJoCo's settling and of SEECR's search, (n, 7)."""
         return self.poses if self.starts is None else self.starts
 
     @property
     def ea(self) -> float | None:
-        """k_c = E S [N] of every cable; None where the MJCF says it."""
+        """k_c = E S [N] of every cable; None if the MJCF states it."""
         return None if self.cable is None else CABLES[self.cable]
 
     @property
     def mujoco_ea(self) -> float | None:
-        """The same for MuJoCo's side; None where its own MJCF says it."""
+        """The same for MuJoCo's side; None if its own MJCF states it."""
         return self.ea if self.mujoco_model == self.model else None
 
 
 def shipped_cases(seed: int = 0, n_random: int = N_RANDOM) -> list[Case]:
-    """DemoBots along the paper's sweeps, turned, at random and tilted; planar and other robots."""
+    """DemoBots along the paper's sweeps, rotated, at random and tilted; planar and other robots."""
     cases = []
     for robot, turn in (("cogiro", _COGIRO_TURN), ("parallel", 0.0)):
         path = model_path(f"demobot_{robot}")
@@ -134,10 +133,10 @@ def user_cases(
         robot: its MJCF, or as read from that.
         mujoco_model: another MJCF for MuJoCo's side; None takes the same.
         seed: of the random poses.
-        n_random: how many.
+        n_random: number of random poses.
 
     Raises:
-        InputError: a robot of no file, or with other numbers than its file has.
+        InputError: a robot without a file, or with numbers other than its file's.
     """
     model, robot = file_of(robot), robot_of(robot)
     name, other = model.stem, model if mujoco_model is None else robot_file(mujoco_model)
@@ -154,10 +153,10 @@ def select(cases: Sequence[N], patterns: Sequence[str], option: str = "") -> lis
     Args:
         cases: to choose from.
         patterns: such as "cogiro-*".
-        option: of the command line that gave them, for the error.
+        option: the option of the command line that gave them, for the error.
 
     Raises:
-        CrosscheckError: a pattern that matches none; names the nearest.
+        CrosscheckError: a pattern that matches no case; the message names the nearest.
     """
     if not patterns:
         return list(cases)
@@ -174,10 +173,10 @@ def select(cases: Sequence[N], patterns: Sequence[str], option: str = "") -> lis
 
 
 def _tilted_case(cable: str) -> Case:
-    """A command with two rests, once let go where it is and once at the reference pose.
+    """A command with two equilibria, started once at the command and once at the reference pose.
 
-    Either start leads to one of the two; either physics has to find the one that its start
-    leads to. Let go from a start alike, they are compared like with like.
+    Each start leads to one of the two, and each physics has to find the one that its start leads
+    to.
     """
     from seecr.description.mjcf import load_robot
 
@@ -189,7 +188,7 @@ def _tilted_case(cable: str) -> Case:
 
 
 def _planar_cases(robot: str) -> list[Case]:
-    """A planar robot of the paper (Figs 2 to 9): along a short sweep, at other heights, turned."""
+    """A planar robot of the paper (Figs 2 to 9): a short sweep, other heights, and tilted poses."""
     from seecr.description.mjcf import load_robot
 
     path, stem = model_path(f"planar_{robot}"), f"planar-{robot}".replace("_", "-")
@@ -210,7 +209,7 @@ def _planar_cases(robot: str) -> list[Case]:
 
 
 def _own_cable_cases(robot: str, turn: float, seed: int, n_random: int) -> list[Case]:
-    """A DemoBot whose cables are those of its file, along a turned sweep and at random."""
+    """A DemoBot with the cables of its file, along a rotated sweep and at random."""
     path, stem = model_path(f"demobot_{robot}"), robot.replace("_", "-")
     random = demobot_random(_generator(seed, f"{stem}-random"), n_random // 2, turn)
     return [
@@ -220,7 +219,7 @@ def _own_cable_cases(robot: str, turn: float, seed: int, n_random: int) -> list[
 
 
 def _other_cases(robot: str, seed: int, n_random: int) -> list[Case]:
-    """A robot of another size and kind, as any robot of a user's."""
+    """A robot of another size and kind, treated like a user's robot."""
     from seecr.description.mjcf import load_robot
 
     path, stem = model_path(robot), robot.replace("_", "-")
@@ -234,5 +233,5 @@ def _other_cases(robot: str, seed: int, n_random: int) -> list[Case]:
 
 
 def _generator(seed: int, name: str) -> np.random.Generator:
-    """Its own random numbers for each case, whichever others run."""
+    """Random numbers of a case, independent of which other cases run."""
     return np.random.default_rng([seed, *name.encode()])

@@ -1,4 +1,4 @@
-"""What callers give to be run: cases, names of shipped ones, robots."""
+"""Cases as callers give them: cases, names of shipped ones, robots."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ GivenCase: TypeAlias = Case | EffectCase | GivenRobot
 def chosen_cases(
     given: GivenCase | Iterable[GivenCase] | None, seed: int
 ) -> list[Case | EffectCase]:
-    """The cases that are meant: a robot's are a sweep and random poses; None is all shipped ones.
+    """The chosen cases. A robot stands for a sweep and random poses; None for all shipped cases.
 
     Raises:
-        CrosscheckError: a name or pattern that no shipped case has; names the nearest.
+        CrosscheckError: a name or pattern that no shipped case has; the message names the nearest.
         InputError: no case, one without poses, or something else.
     """
     shipped = every_shipped(seed)
@@ -75,6 +75,6 @@ def _no_case(got: object) -> InputError:
 
 
 def _is_robot(name: str) -> bool:
-    """Whether a word means a robot, its file or a shipped one, and no case."""
+    """Whether a word is a robot's file or the name of a shipped one, and not of a case."""
     path = Path(name)
     return name in model_names() or path.suffix.lower() == ".xml" or path.is_file()

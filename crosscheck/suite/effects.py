@@ -1,4 +1,4 @@
-"""Every effect held against a robot in MuJoCo that really has it, pose for pose.
+"""Every effect compared with a robot in MuJoCo that really has it, pose for pose.
 
 For each robot and effect a few commands are settled by :mod:`crosscheck.twin.measure`, where the
 effect is part of the robot, and solved by seecr with its own physics of the effect.
@@ -35,35 +35,35 @@ from seecr.prediction.experiment import Experiment
 
 GROUP, PREFIX = "effects", "effect-"
 LOADS = "known_loads"
-"""In an effect's place: payloads and wrenches, other ones in each row."""
+"""In place of an effect: payloads and wrenches, different ones in each row."""
 ROBOTS = ("demobot_cogiro", "demobot_parallel")
 _LARGE = "cogiro_large"
 
-# Both are exact but for rounding, so they agree as plain robots do: [m], [rad], [N].
+# Both are exact to within rounding, so the limits are those of plain robots: [m], [rad], [N].
 POSITION_M, ORIENTATION_RAD, TENSION_N = 1e-8, 1e-7, 1e-6
-# Tensions go with the weight: the limit is that of DemoBot's, and of whatever is lighter [N].
+# Tensions scale with the weight: the limit is for DemoBot's and for smaller weights [N].
 _WEIGHT_N = 0.4 * 9.81
-# Chains this fine, extrapolated, are that near to the catenary.
+# Chains with so many segments, extrapolated, are that close to the catenary.
 _SEGMENTS = (16, 32)
-# What happens between two rows is asked for at the same points by both.
+# Both sides evaluate the motion between two rows at the same points.
 _WAYPOINTS = (6, 2)
-# Rows of each sweep; half the way that the robot's own twin would go.
+# Rows of each sweep, and its reach; the robot's own twin goes twice as far.
 _POINTS, _REACH = 4, 0.3
-# Slow creep: seecr takes the tension as constant between waypoints, the truth as linear in time.
+# Creep is slow: seecr takes the tension as constant between waypoints, the truth as linear in time.
 _CREEP_TIME_S = 2000.0
 # These take tens of times as long as any other: chains of many links.
 _LONG = ("cable_weight",)
 
 
 class Counterpart(Enum):
-    """What stands against seecr's mathematics of an effect."""
+    """What seecr's mathematics of an effect is compared with."""
 
     MUJOCO = "MuJoCo's own means"
     OURS = "our own mathematics, written a second time"
 
 
-# MuJoCo has no winches, no sensors of this kind and no cables with a memory: what these effects do
-# is written out in crosscheck.twin, from their definitions; MuJoCo settles the robot with it.
+# MuJoCo has no winches, no such sensors, and no cables with a history. crosscheck.twin implements
+# these effects from their definitions; MuJoCo settles the robot with them.
 _OURS = frozenset(
     {
         "cable_length_offset",
@@ -99,12 +99,12 @@ class EffectCase:
 
     @property
     def name(self) -> str:
-        """As on the terminal, in files and for ``--case``."""
+        """The name on the terminal, in files and for ``--case``."""
         return f"{PREFIX}{self.model.stem}-{self.effect}"
 
     @property
     def against(self) -> Counterpart:
-        """What stands against seecr's mathematics of the effect."""
+        """What seecr's mathematics of the effect is compared with."""
         return Counterpart.OURS if self.effect in _OURS else Counterpart.MUJOCO
 
     def __len__(self) -> int:
@@ -113,17 +113,17 @@ class EffectCase:
 
     @property
     def robot(self) -> Robot:
-        """As described."""
+        """The robot as described."""
         return _robot_and_commands(self.model)[0]
 
     @property
     def commands(self) -> Commands:
-        """Two sweeps to and fro about the reference pose, and a change of temperature."""
+        """Two sweeps to and fro about the reference pose, with a change of temperature."""
         return _robot_and_commands(self.model)[1]
 
     @property
     def loads(self) -> Loads | None:
-        """Of the rows, where they are what is looked at: at the platform's own centre, or not."""
+        """Known loads, for the case of loads; half of them at the platform's own centre."""
         if self.effect != LOADS:
             return None
         robot, n = self.robot, len(self)
@@ -140,26 +140,27 @@ class EffectCase:
 
     @property
     def effects(self) -> list[Effect]:
-        """The effect with its values, if it is one."""
+        """The effect with its values; empty for the case of loads."""
         return [] if self.effect == LOADS else [self.term.effect()]
 
     @property
     def term(self) -> Term:
-        """The effect with its values."""
+        """The effect with its values, as a term."""
         random = np.random.default_rng([self.seed, _number(self.effect)])
         return _slow(choose(self.robot, random, [self.effect])[0])
 
 
 @dataclass(frozen=True, eq=False)
 class EffectResult:
-    """How far seecr's effect and MuJoCo's are apart over n rows.
+    """Differences between seecr's effect and MuJoCo's over n rows.
 
     Attributes:
         case: what was run.
-        position_m, orientation_rad, tension_N: (n,) largest differences of the readings.
+        position_m, orientation_rad, tension_N: (n,) differences of the readings; of tensions the
+            largest.
         compared: (n,) rows at which both came to rest.
         moved_m: the largest distance by which the effect moves a reading [m].
-        wall_s: [s] it took.
+        wall_s: [s] time taken.
     """
 
     case: EffectCase
@@ -175,7 +176,7 @@ class EffectResult:
 
     @property
     def worst(self) -> tuple[float, float, float]:
-        """Largest differences [m], [rad], [N] of the rows compared."""
+        """Largest differences [m], [rad], [N] over the compared rows."""
         position, orientation, tension = (
             float(np.max(part[self.compared], initial=0.0))
             for part in (self.position_m, self.orientation_rad, self.tension_N)
@@ -184,17 +185,17 @@ class EffectResult:
 
     @property
     def unsolved(self) -> int:
-        """Rows at which seecr or MuJoCo did not come to rest."""
+        """Number of rows at which seecr or MuJoCo did not come to rest."""
         return int(np.sum(~self.compared))
 
     @property
     def tension_limit(self) -> float:
-        """How far tensions may be apart [N]."""
+        """Allowed difference of tensions [N]."""
         return TENSION_N * max(1.0, self.case.robot.weight / _WEIGHT_N)
 
     @property
     def outcome(self) -> Outcome:
-        """How it ended."""
+        """How the comparison ended."""
         limits = (POSITION_M, ORIENTATION_RAD, self.tension_limit)
         near = all(part <= limit for part, limit in zip(self.worst, limits, strict=True))
         if not near:
@@ -221,7 +222,7 @@ class EffectResult:
 
 
 def effect_cases(robots: Sequence[str | Path] = ROBOTS, seed: int = 0) -> list[EffectCase]:
-    """All effects and known loads on robots, their sizes drawn from a seed.
+    """All effects and known loads on robots, with sizes drawn from a seed.
 
     Args:
         robots: names of shipped models, or MJCF files.
@@ -233,12 +234,12 @@ def effect_cases(robots: Sequence[str | Path] = ROBOTS, seed: int = 0) -> list[E
 
 
 def shipped_effect_cases(seed: int = 0) -> list[EffectCase]:
-    """All effects and known loads on DemoBots, and sag where it is large."""
+    """All effects and known loads on DemoBots, and sag on a robot where it is large."""
     return [*effect_cases(seed=seed), EffectCase(model_path(_LARGE), "cable_weight", seed)]
 
 
 def run_effect(case: EffectCase) -> EffectResult:
-    """Settle one effect in MuJoCo, solve it with seecr, compare the readings."""
+    """Settle one effect in MuJoCo, solve it with seecr, and compare the readings."""
     began = time.perf_counter()
     plain = Experiment(case.robot, case.commands).predict()
     commands = replace(case.commands, loads=case.loads)
@@ -264,7 +265,7 @@ def run_effects(
 
     Args:
         cases: what to run.
-        pool: where.
+        pool: the processes.
         tell: called with each result as it comes.
 
     Returns:
@@ -280,7 +281,7 @@ def _seen(readings: Any) -> Array:
 
 
 def _number(effect: str) -> int:
-    """Which random numbers an effect has: one that another contains comes last and moves none."""
+    """The seed of an effect; those contained in others come last, so that they shift no other."""
     return [*(name for name in TRUE_EFFECTS if name not in CONTAINED), *CONTAINED].index(effect)
 
 

@@ -1,7 +1,7 @@
-"""How far two poses are apart, by code that neither SEECR nor MuJoCo's side uses.
+"""The distance between two poses, by code that neither SEECR's nor MuJoCo's side uses.
 
-Both sides turn platforms with :mod:`seecr.pose`; an error there could cancel in a difference taken
-with it. Here SciPy makes rotation matrices of the quaternions.
+Both sides compute rotations with :mod:`seecr.pose`; an error there could cancel in a difference
+computed with it. Here SciPy makes rotation matrices of the quaternions.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ def _matrix(poses: Array) -> Array:
 
 
 def _angle(a: Array, b: Array) -> Array:
-    """Angle (k,) [rad] of the rotations that lead from matrices a to b, both (k, 3, 3).
+    """Angle (k,) [rad] of the rotations from matrices a to b, both (k, 3, 3).
 
     The chord ``|a - b|`` is 2 sqrt(2) sin(angle/2), which keeps the digits of small angles; the
-    trace, 1 + 2 cos(angle), decides for large ones.
+    trace, 1 + 2 cos(angle), determines large ones.
     """
     half_sine = np.sqrt(np.sum((a - b) ** 2, axis=(1, 2)) / 8.0)
     half_cosine = np.sqrt(np.maximum(1.0 + np.einsum("kij,kij->k", a, b), 0.0)) / 2.0

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from crosscheck.suite.results import CaseResult
     from crosscheck.suite.run import Run
 
-# Characters that XML 1.0 cannot hold at all, escaped or not.
+# Characters that XML 1.0 cannot hold, escaped or not.
 _FORBIDDEN = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
@@ -26,7 +26,7 @@ _TAGS = {Outcome.DIFFER: "failure", Outcome.NOT_CONVERGED: "error"}
 def junit_xml(run: Run) -> str:
     """One test case per case of the suite; differences are failures, unsolved poses errors.
 
-    Poses and effects are a suite each, where there are any.
+    Poses and effects are separate test suites, if there are any.
     """
     both: list[CaseResult | EffectResult] = [*run.results, *run.effects]
     root = ET.Element("testsuites", {"name": "crosscheck run", **_counts(both, run.wall_s)})

@@ -1,4 +1,4 @@
-"""A robot in MuJoCo commanded in poses, as SEECR is, with lengths that MuJoCo measured itself."""
+"""A robot in MuJoCo commanded in poses, like SEECR's, with lengths that MuJoCo computes itself."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ import numpy as np
 from crosscheck.settle.settler import Settler, Settling, SettlingBatch, settle_batch
 from seecr.pose import Array, pose_difference, quat_from_rotvec, quat_multiply, quat_rotate
 
-# Points looked at between two poses that should be joined by a free motion.
+# Points checked between two poses that a free motion should join.
 _STATIONS = 9
-# A turn [rad] below which a screw is straight to rounding, and its axis is lost in it.
+# A screw whose rotation [rad] is smaller is a translation to rounding, and its axis is undefined.
 _STRAIGHT = 1e-7
 
 
 class MujocoRobot:
-    """A robot in MuJoCo that is commanded in poses, as SEECR is.
+    """A robot in MuJoCo that is commanded in poses, like SEECR's.
 
     Attributes:
-        settler: the robot, at rest where asked.
-        pretension: (m,) [m] rest lengths of the MJCF less the straight lengths at its reference.
+        settler: the robot in MuJoCo.
+        pretension: (m,) [m] rest lengths of the MJCF minus the straight lengths at its reference.
     """
 
     def __init__(self, model: str | Path, ea: float | Array | None = None) -> None:
@@ -37,7 +37,7 @@ class MujocoRobot:
 
     @property
     def ignored(self) -> tuple[str, ...]:
-        """What of the MJCF is switched off, such as "contacts"."""
+        """Features of the MJCF that are switched off, such as "contacts"."""
         return self.settler.physics.ignored
 
     def rest_lengths(self, poses: Array) -> Array:
@@ -52,13 +52,13 @@ class MujocoRobot:
     def settle(self, poses: Array, starts: Array | None = None) -> SettlingBatch:
         """Bring the platform to rest with the lengths of commanded poses (n, 7), each by itself.
 
-        It is let go at the commands, or at other poses (n, 7).
+        It is released at the commands, or at other poses (n, 7).
         """
         begins = poses if starts is None else starts
         return settle_batch(self.settler, begins, self.rest_lengths(poses))
 
     def settle_from(self, start: Array, command: Array) -> Settling:
-        """Rest with the lengths of one command (7,), started from another pose (7,)."""
+        """The equilibrium with the lengths of one command (7,), started from another pose (7,)."""
         return self.settler.settle(start, self.rest_lengths(command[None])[0])
 
     def energy(self, pose: Array, command: Array) -> float:
@@ -71,9 +71,9 @@ class MujocoRobot:
         return np.asarray(self.settler.physics.data.qpos.copy())
 
     def imbalance_between(self, pose_a: Array, pose_b: Array, command: Array) -> float:
-        """Largest unbalanced force, relative to the load, on the screw from pose a to pose b.
+        """Largest residual force, relative to the load, on the screw motion from pose a to pose b.
 
-        Zero up to rounding says that the platform is free to move from one to the other.
+        Zero up to rounding means that the platform is free to move from one to the other.
         """
         physics = self.settler.physics
         physics.set_cables(self.rest_lengths(command[None])[0], self.settler.ea)
@@ -88,8 +88,8 @@ class MujocoRobot:
 def screw_motion(pose_a: Array, pose_b: Array, k: int) -> Array:
     """Poses (k, 7) from pose a to pose b along the one screw that joins them (Chasles).
 
-    Unlike interpolation of position and orientation apart, it keeps to a turn about a fixed
-    axis where that is what leads from a to b.
+    Unlike separate interpolation of position and orientation, it is a rotation about a fixed axis
+    if such a rotation leads from a to b.
     """
     change = pose_difference(pose_b, pose_a)
     shift, turn = change[:3], change[3:]
@@ -101,7 +101,7 @@ def screw_motion(pose_a: Array, pose_b: Array, k: int) -> Array:
         axis = turn / angle
         along = (shift @ axis) * axis
         across = shift - along
-        # From the axis to the platform: half the chord away from it, by the cotangent sideways.
+        # From the axis to the platform: half the chord back, and sideways by the cotangent.
         arm = -0.5 * (across + np.cross(axis, across) / np.tan(0.5 * angle))
     positions = pose_a[:3] + part * along + quat_rotate(quats, arm) - arm
     turned = quat_multiply(quats, pose_a[3:])

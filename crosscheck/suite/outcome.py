@@ -20,6 +20,6 @@ class Outcome(Enum):
 
     @classmethod
     def of_all(cls, outcomes: Iterable[Outcome]) -> Outcome:
-        """A difference outweighs a solve without an answer; of nothing, nothing converged."""
+        """A difference outweighs a solve that did not converge; of none, nothing converged."""
         found = set(outcomes) or {cls.NOT_CONVERGED}
         return next((one for one in (cls.DIFFER, cls.NOT_CONVERGED) if one in found), cls.AGREE)

@@ -17,10 +17,10 @@ R = TypeVar("R")
 
 
 class Pool:
-    """So many processes, or this one alone; a context manager that ends them.
+    """A number of processes, or only this one; a context manager that ends them.
 
-    In processes, not threads: a settling is thousands of calls of a few microseconds, between
-    which Python lets one thread run at a time; two threads took longer than one.
+    Processes are used, not threads: a settling consists of thousands of calls of a few
+    microseconds, between which Python runs one thread at a time; two threads took longer than one.
     """
 
     def __init__(self, jobs: int) -> None:
@@ -54,9 +54,9 @@ class Pool:
         """Call a function with each item.
 
         Args:
-            function: of a module, or a ``partial`` of one, so that a process can have it.
-            items: what to call it with.
-            order: in which they start, the longest first so that none is left over at the end.
+            function: of a module, or a ``partial`` of one, so that it can be sent to a process.
+            items: its arguments.
+            order: order of starting, the longest first so that none is left over at the end.
             tell: called with each result as it comes.
 
         Returns:
@@ -87,5 +87,5 @@ def _told(result: R, tell: Callable[[R], None]) -> R:
 
 
 def _leave_interrupts() -> None:
-    """Let the process that asked handle Ctrl-C, and tell the others to stop."""
+    """Let the calling process handle Ctrl-C, and tell the others to stop."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)

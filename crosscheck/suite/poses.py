@@ -1,4 +1,4 @@
-"""Poses that the suite sends robots to: along lines, turned on the way, and at random."""
+"""Commanded poses of the suite: along lines, rotated on the way, and at random."""
 
 from __future__ import annotations
 
@@ -16,17 +16,18 @@ N_SWEEP = 24
 _SWEEP_X = (0.17, 0.63)
 _SWEEP_Y = 0.25
 SWEEP_Z = (0.1, 0.2)
-# Inside DemoBot's frame of 0.80 x 0.50 x 0.50 m, the platform clear of posts and exit points [m].
+# Inside DemoBot's frame of 0.80 x 0.50 x 0.50 m, with the platform clear of posts and exit points
+# [m].
 _FRAME = ((0.10, 0.10, 0.05), (0.70, 0.40, 0.35))
-# Turned sweeps: by up to this about each axis.
+# Rotated sweeps: by up to this about each axis.
 _SWEEP_TURN = np.deg2rad(6.0)
-# Commands of the parallel DemoBot with two rests, 16 mm and 26 degrees or 5 mm and 19 degrees
-# apart, by cable: of some 1,900 tilted by up to 40 degrees these two.
+# Commands of the parallel DemoBot with two equilibria, 16 mm and 26 degrees or 5 mm and 19 degrees
+# apart, by cable: these two were found among some 1,900 tilted by up to 40 degrees.
 _TILTED = {
     "vectran": (0.351, 0.216, 0.109, 0.943, 0.163, -0.288, -0.038),
     "fishing": (0.189, 0.410, 0.143, 0.956, -0.218, 0.196, -0.001),
 }
-# Of the way from the reference position to the exit points that a user's robot is sent.
+# Part of the distance from the reference position to the exit points that a user's robot covers.
 _USER_REACH = 0.6
 _USER_TURN = np.deg2rad(10.0)
 
@@ -40,7 +41,7 @@ def demobot_sweep(z: float, n: int = N_SWEEP) -> Array:
 
 
 def demobot_turned_sweep(n: int = N_SWEEP) -> Array:
-    """The same line between the two heights, (n, 7), the platform commanded to turn on the way."""
+    """The same line between the two heights, (n, 7), with rotations commanded on the way."""
     poses = demobot_sweep(0.5 * sum(SWEEP_Z), n)
     angle = np.linspace(0.0, 2.0 * np.pi, n)
     parts = [np.sin(angle), np.sin(angle + 1.0), np.cos(2.0 * angle)]
@@ -49,7 +50,7 @@ def demobot_turned_sweep(n: int = N_SWEEP) -> Array:
 
 
 def demobot_random(random: np.random.Generator, n: int, turn: float) -> Array:
-    """Poses (n, 7) in DemoBot's frame, turned by up to ``turn`` [rad]."""
+    """Poses (n, 7) in DemoBot's frame, rotated by up to ``turn`` [rad]."""
     poses = np.zeros((n, 7))
     poses[:, :3] = random.uniform(*_FRAME, (n, 3))
     poses[:, 3:] = quat_from_rotvec(_turns(random, n, turn))
@@ -57,7 +58,7 @@ def demobot_random(random: np.random.Generator, n: int, turn: float) -> Array:
 
 
 def demobot_tilted(cable: str) -> Array:
-    """The command (7,) at which the parallel DemoBot on that cable has two rests."""
+    """The command (7,) at which the parallel DemoBot on that cable has two equilibria."""
     pose = np.array(_TILTED[cable])
     pose[3:] /= np.linalg.norm(pose[3:])
     return pose
@@ -75,10 +76,10 @@ def robot_sweep(robot: Robot, n: int = N_SWEEP) -> Array:
 
 
 def robot_random(robot: Robot, random: np.random.Generator, n: int) -> Array:
-    """Poses (n, 7) between the reference position and the exit points, slightly turned.
+    """Poses (n, 7) between the reference position and the exit points, slightly rotated.
 
-    A convex combination of exit points lies in their hull, flat or not, so does any point
-    between it and the reference position if that one does.
+    A convex combination of exit points lies in their hull, flat or not, and so does any point
+    between it and the reference position if that does.
     """
     weights = random.dirichlet(np.full(robot.n_cables, 0.5), n)
     towards = weights @ robot.exit_points - robot.reference_pose[:3]
@@ -93,19 +94,19 @@ def _turns(random: np.random.Generator, n: int, largest: float) -> Array:
     """Rotation vectors (n, 3) [rad] of random axes and angles up to the largest."""
     axes = random.normal(size=(n, 3))
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-    # adding zero makes -0.0, which nobody wants to read, 0.0
+    # adding zero turns -0.0, which nobody wants to read, into 0.0
     return np.asarray(axes * random.uniform(0.0, largest, (n, 1))) + 0.0
 
 
 def _level(robot: Robot, vectors: Array) -> Array:
-    """Vectors (k, 3) without their part along gravity."""
+    """Vectors (k, 3) without their component along gravity."""
     if not np.any(robot.gravity):
         return vectors
     return np.asarray(vectors - np.outer(vectors @ robot.up, robot.up))
 
 
 def _reachable(robot: Robot, poses: Array) -> Array:
-    """The poses (n, 7), or what a jointed robot can do of them: one Gauss-Newton step's joints."""
+    """The poses (n, 7), or for a robot on joints the nearest that one Gauss-Newton step gives."""
     if not robot.joints:
         return poses
     from seecr.description.joints import motion_columns, pose_of_values

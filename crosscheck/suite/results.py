@@ -1,4 +1,4 @@
-"""What became of a case: both physics' answers, how far apart they are, and how it ended."""
+"""The result of a case: both physics' answers, their differences, and how the case ended."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Worst:
-    """The largest difference of one quantity over a case, against what was allowed there.
+    """The largest difference of one quantity over a case, relative to its allowance.
 
     Attributes:
         quantity: one of ``QUANTITIES``.
         value: the difference [m, rad or N].
-        allowed: at that pose.
+        allowed: its allowance at that pose.
         pose: its number in the case, from 0.
     """
 
@@ -41,7 +41,7 @@ class Worst:
 
     @property
     def ratio(self) -> float:
-        """Difference over what is allowed: above 1 it fails."""
+        """Difference over allowance: above 1 it fails."""
         return self.value / self.allowed
 
     def as_json(self) -> dict[str, Any]:
@@ -55,7 +55,7 @@ class CaseResult(Result):
 
     Attributes:
         case: what was run; ``case.poses`` (n, 7) are the commanded poses.
-        robot: as SEECR read it, on the case's cable.
+        robot: as SEECR read it, with the case's cable.
         solution: SEECR's answers: ``pose`` (n, 7), ``tensions`` (n, m) [N], ``slack`` (n, m),
             ``deviation`` (n, 6), ``residual``, ``status``, ``smallest_eigenvalue``, ... (n,).
         settling: MuJoCo's answers, the same way: ``settled_pose`` (n, 7) after plain settling,
@@ -63,13 +63,13 @@ class CaseResult(Result):
             ``settled_residual``, ``residual``, ``steps``, ``simulated_s``, ``status``,
             ``smallest_eigenvalue``, ... (n,).
         mujoco_rest_lengths: (n, m) [m] as MuJoCo's side paid them out.
-        ignored: what of MuJoCo's MJCF was switched off, such as "contacts".
-        difference: between the two, NaN where one has no answer.
-        allowance: what may differ, (n,) each.
+        ignored: features of MuJoCo's MJCF that were switched off, such as "contacts".
+        difference: between the two, NaN if one has no answer.
+        allowance: allowed differences, (n,) each.
         verdict: (n,) of :class:`crosscheck.suite.verdicts.Verdict`.
-        findings: more about every pose whose verdict is not ``AGREES``.
-        seecr_s: [s] SEECR took for all poses on one processor, compiled beforehand.
-        wall_s: [s] the whole case took, recording included.
+        findings: details of every pose whose verdict is not ``AGREES``.
+        seecr_s: [s] SEECR's time for all poses on one processor, after compilation.
+        wall_s: [s] time of the whole case, recording included.
         recording: name of its recording in the results' folder; None if there is none.
     """
 
@@ -96,12 +96,12 @@ class CaseResult(Result):
 
     @property
     def compared(self) -> NDArray[np.bool_]:
-        """Poses whose differences mean something: no free motion or branch between, (n,)."""
+        """Poses whose differences are meaningful: no free motion or second equilibrium, (n,)."""
         return np.asarray((self.verdict == Verdict.AGREES) | (self.verdict == Verdict.DIFFERS))
 
     @property
     def outcome(self) -> Outcome:
-        """How it ended."""
+        """How the case ended."""
         if self.count(Verdict.DIFFERS) or any(one.beyond_limits for one in self.findings):
             return Outcome.DIFFER
         unsolved = any(self.count(verdict) for verdict in UNSOLVED)
@@ -109,7 +109,7 @@ class CaseResult(Result):
 
     @property
     def worst(self) -> dict[str, Worst]:
-        """Largest difference of each quantity over its allowance; none if nothing compares."""
+        """Largest difference of each quantity over its allowance; empty if nothing compares."""
         rows = np.flatnonzero(self.compared)
         if len(rows) == 0:
             return {}
@@ -132,13 +132,13 @@ class CaseResult(Result):
         return 1e3 * float(np.sum(self.settling.wall_s)) / len(self)
 
     def lines(self) -> list[str]:
-        """How it ended, the worst difference, and each pose that does not simply agree."""
+        """The outcome, the worst difference, and each pose that does not simply agree."""
         from crosscheck.suite import words
 
         return [words.case_line(self), *words.failures(self), *words.findings(self)]
 
     def records(self) -> list[Record]:
-        """A record for each pose: what was commanded, what both say of it, how far apart [SI]."""
+        """One row per pose: the command, both answers, and their differences [SI]."""
         poses = {"cmd": self.case.poses, "seecr": self.solution.pose, "mujoco": self.settling.pose}
         gaps = {name: getattr(self.difference, name).tolist() for name in QUANTITIES}
         return [
@@ -176,12 +176,12 @@ class CaseResult(Result):
         }
 
     def mujoco_robot(self) -> MujocoRobot:
-        """MuJoCo's robot of the case, anew: to settle one of its poses again."""
+        """A new MuJoCo robot for the case, to settle one of its poses again."""
         return MujocoRobot(self.case.mujoco_model, self.case.mujoco_ea)
 
 
 def worst_of(results: Sequence[CaseResult]) -> tuple[CaseResult, Worst] | None:
-    """The case and difference nearest to, or furthest beyond, what is allowed."""
+    """The case and difference nearest to its allowance, or farthest beyond it."""
     pairs = [(result, worst) for result in results for worst in result.worst.values()]
     return max(pairs, key=lambda pair: pair[1].ratio, default=None)
 
@@ -192,14 +192,14 @@ def _pose(name: str, pose: Array) -> Record:
 
 
 class Counted(Protocol):
-    """Whatever counts poses by their verdict."""
+    """Objects that count poses by their verdict."""
 
     def count(self, verdict: Verdict) -> int:
         """Number of poses with a verdict."""
 
 
 def counts(counted: Counted) -> dict[str, int]:
-    """Number of poses with each verdict, by the verdict's name in small letters."""
+    """Number of poses with each verdict, by the verdict's name in lower case."""
     return {verdict.name.lower(): counted.count(verdict) for verdict in Verdict}
 
 

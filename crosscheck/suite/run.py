@@ -34,10 +34,10 @@ from seecr.result import Result
 from seecr.statics.solution import Solution
 
 FORMAT = 1
-"""Of ``results.json``; raised when a key changes its meaning or goes."""
+"""Version of ``results.json``; raised when a key changes its meaning or is removed."""
 
 _PACKAGES = ("seecr", "mujoco", "numpy", "scipy", "numba", "rerun-sdk")
-# SEECR takes microseconds: the best of this many runs is what it needs, the rest is the machine.
+# SEECR takes microseconds: the shortest of this many runs is its time, the rest is other load.
 _REPEATS = 3
 
 Recorder = Callable[[CaseResult], str]
@@ -50,10 +50,10 @@ class Run(Result):
 
     Attributes:
         results: of its cases.
-        thresholds: that held.
+        thresholds: that were applied.
         seed: of the random poses.
-        jobs: cases at a time.
-        wall_s: [s] it took.
+        jobs: number of processes.
+        wall_s: [s] time taken.
         effects: results of its effects.
     """
 
@@ -71,17 +71,17 @@ class Run(Result):
 
     @property
     def outcome(self) -> Outcome:
-        """How it ended."""
+        """How the run ended."""
         return Outcome.of_all(result.outcome for result in self.every)
 
     @property
     def worst(self) -> tuple[CaseResult, Worst] | None:
-        """The case and difference nearest to, or furthest beyond, what is allowed."""
+        """The case and difference nearest to its allowance, or farthest beyond it."""
         return worst_of(self.results)
 
     @property
     def notes(self) -> list[str]:
-        """What of the robots' files MuJoCo's side leaves out, a sentence per file."""
+        """Features of the robots' files that MuJoCo's side ignores, a sentence per file."""
         found = {result.case.mujoco_model: result.ignored for result in self.results}
         return [ignored_note(path, names) for path, names in found.items() if names]
 
@@ -90,7 +90,7 @@ class Run(Result):
         return sum(result.count(verdict) for result in self.results)
 
     def lines(self) -> list[str]:
-        """The verdict, what fails, and what MuJoCo's side leaves out."""
+        """The verdict, the failures, and what MuJoCo's side ignores."""
         from crosscheck.suite import words
 
         failures = [f"{r.case.name}, {line}" for r in self.results for line in words.failures(r)]
@@ -110,7 +110,7 @@ class Run(Result):
         return {**self.head_json(), "cases": self.results}
 
     def head_json(self) -> dict[str, Any]:
-        """All but the cases."""
+        """Everything but the cases."""
         worst = self.worst
         return {
             "format": FORMAT,
@@ -176,20 +176,19 @@ def run_suite(
     """Run cases and effects, several at a time.
 
     Args:
-        cases: what to run: cases; names of shipped ones, and patterns such as "cogiro-*";
-            robots or their MJCF, each along a sweep and at random poses. All that are shipped by
-            default.
-        thresholds: what counts as agreement, or a file of it; the shipped ones by default.
+        cases: what to run: cases; names of shipped ones, and patterns such as "cogiro-*"; robots or
+            their MJCF, each along a sweep and at random poses. All shipped ones by default.
+        thresholds: what counts as agreement, or a file with it; the shipped ones by default.
         seed: of the shipped cases' random poses and of the effects' sizes.
-        jobs: how many at a time.
-        record: see :func:`run_case`; of a module, so that other processes find it.
+        jobs: number of processes.
+        record: see :func:`run_case`; a function of a module, so that other processes find it.
         progress: called with each result as it comes.
 
     Returns:
         the results in the order of the cases.
 
     Raises:
-        InputError: no case, or something that is none.
+        InputError: no case, or something that is not one.
         CrosscheckError: a name that no shipped case has.
     """
     began = time.perf_counter()
@@ -217,7 +216,7 @@ def results_json(run: Run) -> str:
 
 
 def package_versions() -> dict[str, str]:
-    """Versions of what took part."""
+    """Versions of the packages involved."""
     found = {"python": platform.python_version()}
     for name in _PACKAGES:
         try:
@@ -228,7 +227,7 @@ def package_versions() -> dict[str, str]:
 
 
 def _warm_up(case: Case | EffectCase) -> None:
-    """Have the compiled loop on disk before several processes want it."""
+    """Compile the loop into the cache before several processes need it."""
     robot = load_robot(case.model)
     seecr_solve(robot, robot.reference_pose[None])
 

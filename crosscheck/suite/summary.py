@@ -1,4 +1,4 @@
-"""The suite's results as ``summary.md``, fit for the step summary of continuous integration."""
+"""The suite's results as ``summary.md``, for the step summary of continuous integration."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def summary_md(run: Run, worst_pose: str) -> str:
     """The verdict, a table of the cases, then failures, findings, widened thresholds, effects.
 
     Args:
-        run: what to tell about.
+        run: the run.
         worst_pose: sentence about the file with the worst pose.
     """
     parts = ["# SEECR against MuJoCo", words.verdict_line(run)]
@@ -45,7 +45,7 @@ def _cases(run: Run, worst_pose: str) -> list[str]:
 
 
 def _effects(run: Run) -> list[str]:
-    """How they ended, those that failed, and a folded table of all."""
+    """How the effects ended, which failed, and a folded table of all."""
     heads = words.EFFECT_HEADS
     rule = ["---", "---", *["---:"] * (len(heads) - 4), "---", "---"]
     table = "\n".join(_row(row) for row in [heads, rule, *map(words.effect_cells, run.effects)])
@@ -71,7 +71,7 @@ def _row(cells: Sequence[str]) -> str:
 
 
 def _section(run: Run, title: str, lines: Callable[[CaseResult], list[str]]) -> list[str]:
-    """A heading and, case by case, folded lists; nothing where there is nothing to say."""
+    """A heading and, case by case, folded lists; empty if there are no items."""
     found = [(result, lines(result)) for result in run.results]
     blocks = [
         f"<details><summary>{result.case.name}: {len(items)}</summary>\n\n"

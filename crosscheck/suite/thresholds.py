@@ -17,7 +17,7 @@ SHIPPED = Path(__file__).with_name("thresholds.toml")
 
 @dataclass(frozen=True)
 class SettledLimits:
-    """For MuJoCo after plain settling."""
+    """Limits for MuJoCo after plain settling."""
 
     position_m: float = math.nan
     orientation_rad: float = math.nan
@@ -25,7 +25,7 @@ class SettledLimits:
 
 @dataclass(frozen=True)
 class PolishedLimits:
-    """For MuJoCo after the polish."""
+    """Limits for MuJoCo after the polish."""
 
     position_m: float = math.nan
     orientation_rad: float = math.nan
@@ -37,9 +37,9 @@ class FindingLimits:
     """How many poses of a case may have more than one right answer.
 
     Attributes:
-        branches: at most so many with two stable equilibria.
+        branches: largest number with two stable equilibria.
         free_to_move: names ``CASE POSE``, or patterns, of those that may be free to move.
-        free_elsewhere: largest share of those in a case whose poses no name can know.
+        free_elsewhere: largest share of those in a case whose poses have no names.
     """
 
     branches: int = 0
@@ -47,7 +47,7 @@ class FindingLimits:
     free_elsewhere: float = 0.0
 
     def names(self, case: str, pose: int) -> bool:
-        """Whether a pose is one of those named as free to move."""
+        """Whether a pose is named as free to move."""
         return any(fnmatch.fnmatchcase(f"{case} {pose}", name) for name in self.free_to_move)
 
 
@@ -71,13 +71,13 @@ class Thresholds:
 
 
 def load_thresholds(path: str | Path | None = None) -> Thresholds:
-    """Read thresholds; what the file leaves out keeps its shipped value.
+    """Read thresholds; those that the file leaves out keep their shipped values.
 
     Args:
         path: a TOML file; None for the shipped one.
 
     Raises:
-        InputFileError: not TOML, an unknown table or key, a value of another kind.
+        InputFileError: not TOML, an unknown table or key, or a value of another kind.
     """
     shipped = _merge(Thresholds(), SHIPPED)
     return shipped if path is None else _merge(shipped, Path(path))
@@ -118,7 +118,7 @@ def _check_names(file: Toml, got: dict[str, Any], known: dict[str, Any], what: s
 
 
 def _value(file: Toml, table: str, key: str, value: Any) -> Any:
-    """A value as the dataclasses hold it, of the kind that its key asks for."""
+    """A value in the form that the dataclasses hold, checked for the kind that its key needs."""
     expected, fits, hold = _KINDS.get(key, ("a positive number", _is_positive, float))
     if not fits(value):
         raise file.error(f"[{table}] {key}: expected {expected}, got {value!r}", key)

@@ -1,4 +1,4 @@
-"""What to make of each pose: agreement, a finding, a difference, or no answer to compare."""
+"""The verdict on each pose: agreement, a finding, a difference, or no answer to compare."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ if TYPE_CHECKING:
     from crosscheck.suite.thresholds import FindingLimits
     from seecr.statics.solution import Solution
 
-# Unbalanced force, relative to the load, below which a platform counts as free to move: what
-# an answer may leave unbalanced itself.
+# Residual force, relative to the load, below which a platform counts as free to move: as much as an
+# answer itself may have.
 _BALANCED = 1e-9
 
 
 class Verdict(Enum):
-    """What the two physics say together about one pose; the value is the sentence."""
+    """The joint verdict of the two physics on one pose; the value is the sentence."""
 
     AGREES = "both rest at the same pose"
     NEUTRAL = "both agree, and the platform is free to move from one answer to the other"
@@ -41,29 +41,29 @@ class Verdict(Enum):
 
 
 FINDINGS = (Verdict.NEUTRAL, Verdict.BRANCH)
-"""More than one answer is right: counted, listed, and held against the limits of a run."""
+"""More than one answer is right: counted, listed, and checked against the limits of a run."""
 
 UNSOLVED = (Verdict.SEECR_UNSOLVED, Verdict.MUJOCO_UNSOLVED)
-"""Nothing to compare: the run ends 3."""
+"""There is nothing to compare: the run ends with status 3."""
 
 
 @dataclass(frozen=True)
 class PoseFinding:
-    """A pose at which there is more to say than that both agree.
+    """Details of a pose at which the two do not simply agree.
 
     Attributes:
         pose: its number in the case, from 0.
-        verdict: what it is.
-        text: one sentence with figures.
+        verdict: its verdict.
+        text: one sentence with numbers.
         energy_seecr_J: MuJoCo's potential energy at SEECR's answer; NaN if not compared.
-        energy_mujoco_J: at MuJoCo's own answer.
+        energy_mujoco_J: the same at MuJoCo's own answer.
         mujoco_stays: whether MuJoCo, started from SEECR's answer, comes to rest there.
-        seecr_stays: whether SEECR, started from MuJoCo's answer, comes to rest there; where the
-            platform is free to move along, whether its forces balance there.
+        seecr_stays: whether SEECR, started from MuJoCo's answer, comes to rest there; if the
+            platform is free to move, whether its forces balance there.
         position_m: distance of the answers [m].
         orientation_rad: angle between them [rad].
         tension_N: largest difference of a tension [N].
-        beyond_limits: a finding that the run's limits do not allow.
+        beyond_limits: whether it is a finding that the run's limits do not allow.
     """
 
     pose: int
@@ -80,7 +80,7 @@ class PoseFinding:
 
     @property
     def fails(self) -> bool:
-        """Whether the case fails for it."""
+        """Whether the case fails because of it."""
         return self.beyond_limits or self.verdict not in FINDINGS
 
     def as_json(self) -> dict[str, Any]:
@@ -89,7 +89,7 @@ class PoseFinding:
 
 
 class Answers(NamedTuple):
-    """Everything a verdict rests on."""
+    """Everything that a verdict is based on."""
 
     mujoco: MujocoRobot
     solution: Solution
@@ -135,7 +135,7 @@ def _look_closer(answers: Answers, i: int, close: bool) -> PoseFinding | None:
 
 @dataclass(frozen=True)
 class _Pair:
-    """Two answers of one pose, each tried in the other physics."""
+    """The two answers for one pose, each tried in the other physics."""
 
     answers: Answers
     i: int
@@ -187,7 +187,7 @@ class _Pair:
         )
 
     def finding(self, verdict: Verdict) -> PoseFinding:
-        """What to tell about the pair."""
+        """The finding about the pair."""
         difference, i = self.answers.difference, self.i
         position = float(difference.position_m[i])
         angle = float(difference.orientation_rad[i])
@@ -212,15 +212,15 @@ def _seecr_stays(answers: Answers, i: int, pose: Array) -> bool:
 
 
 def _seecr_balances(answers: Answers, i: int, pose: Array) -> bool:
-    # One evaluation moves nothing: the residual is that of the pose itself. Let go, the platform
-    # may be anywhere on its free motion.
+    # With one evaluation nothing moves: the residual is that of the pose itself. A search could end
+    # anywhere on the free motion.
     command = answers.solution.command[i : i + 1]
     here = seecr_solve(answers.solution.robot, command, start=pose[None], max_iterations=1)
     return bool(here.residual[0] <= _BALANCED)
 
 
 def _near(answers: Answers, i: int, pose_a: Array, pose_b: Array) -> bool:
-    """Whether two poses of row i are the same as far as the polished thresholds see."""
+    """Whether two poses of row i are equal to within the polished thresholds."""
     distance, angle = gap(pose_a, pose_b)
     allowed = answers.allowance
     return bool(distance <= allowed.position_m[i] and angle <= allowed.orientation_rad[i])
@@ -233,12 +233,11 @@ def _stays(it_does: bool) -> str:
 def held_to(
     limits: FindingLimits, case: Case, findings: Sequence[PoseFinding]
 ) -> tuple[PoseFinding, ...]:
-    """The findings of a case, those marked that it may not have.
+    """The findings of a case, with those marked that exceed the limits.
 
-    Each physics is right at such a pose, but a solver that systematically took another
-    equilibrium, or stopped short of one, would be right at every pose. So branches are counted,
-    and a platform may be free to move only at poses that are named; where poses have no names,
-    at a share of them.
+    Each physics is right at such a pose. But a solver that systematically took another equilibrium,
+    or stopped short of one, would be right at every pose. So branches are limited in number, and a
+    platform may only be free to move at named poses, or at a share of poses without names.
     """
     branches = [finding for finding in findings if finding.verdict is Verdict.BRANCH]
     free = [finding for finding in findings if finding.verdict is Verdict.NEUTRAL]

@@ -1,4 +1,4 @@
-"""Figures of the suite as people read them: the one place where they get units and rounding."""
+"""Numbers of the suite as people read them: the one place where they get units and rounding."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _SHORT = {
 
 
 def difference(worst: Worst | None) -> str:
-    """A difference for a table's cell."""
+    """A difference for a cell of a table."""
     return "–" if worst is None else f"{worst.value:.1e}"
 
 
@@ -94,9 +94,9 @@ def threshold_cells(run: Run) -> list[str]:
 
 
 def verdict_line(run: Run) -> str:
-    """How it ended, and the difference nearest to, or furthest over, what is allowed.
+    """How the run ended, and the difference nearest to its allowance or farthest beyond it.
 
-    Of effects only those that fail are named here; where nothing else was run, it is theirs.
+    Effects are only named here if they fail; if nothing else was run, the line is about them.
     """
     if not run.every:
         return "Nothing was run."
@@ -117,7 +117,7 @@ def verdict_line(run: Run) -> str:
 
 
 def worst_sentence(pair: tuple[CaseResult, Worst] | None) -> str:
-    """The worst difference with its place."""
+    """The worst difference, with case and pose."""
     if pair is None:
         return "no pose could be compared"
     result, worst = pair
@@ -129,12 +129,12 @@ def worst_sentence(pair: tuple[CaseResult, Worst] | None) -> str:
 
 
 def failures(result: CaseResult) -> list[str]:
-    """One line for each pose for which a case fails."""
+    """One line for each pose that makes a case fail."""
     return [_line(result, finding) for finding in result.findings if finding.fails]
 
 
 def findings(result: CaseResult) -> list[str]:
-    """One line for each finding for which a case does not fail."""
+    """One line for each finding that does not make a case fail."""
     return [_line(result, finding) for finding in result.findings if not finding.fails]
 
 
@@ -144,7 +144,7 @@ def _line(result: CaseResult, finding: PoseFinding) -> str:
 
 
 def case_line(result: CaseResult) -> str:
-    """A case in a line: name, poses, how it ended, the worst difference."""
+    """A case in a line: name, poses, outcome, the worst difference."""
     worst = max(result.worst.values(), key=lambda one: one.ratio, default=None)
     poses, pair = counted(len(result), "pose"), None if worst is None else (result, worst)
     notes = f" ({remarks(result)})" if remarks(result) else ""
@@ -152,7 +152,7 @@ def case_line(result: CaseResult) -> str:
 
 
 def widened(result: CaseResult) -> list[str]:
-    """One line for each pose whose thresholds are wider than those given."""
+    """One line for each pose with widened thresholds."""
     rows = [i for i, wide in enumerate(result.allowance.widened) if wide]
     return [
         f"pose {i}, commanded {command(result, i)}: allowed "
@@ -166,7 +166,7 @@ def widened(result: CaseResult) -> list[str]:
 
 
 def command(result: CaseResult, pose: int) -> str:
-    """A commanded pose, position [m] and quaternion, and where it was begun if elsewhere."""
+    """A commanded pose, position [m] and quaternion, and its start if that is elsewhere."""
     case = result.case
     begun = "" if case.starts is None else f", begun at {_pose(case.starts[pose])}"
     return f"{_pose(case.poses[pose])}{begun}"
@@ -177,7 +177,7 @@ def _pose(row: Array) -> str:
 
 
 def _share(ratio: float) -> str:
-    """A ratio as a percentage, in no more digits than it needs."""
+    """A ratio as a percentage, with no more digits than it needs."""
     if ratio >= 10.0:
         return f"{ratio:.3g} times"
     return f"{100 * ratio:.2g} % of" if ratio < 1.0 else f"{100 * ratio:.4g} % of"
@@ -213,7 +213,7 @@ def effects_line(results: Sequence[EffectResult]) -> str:
 
 
 def _counterparts(results: Sequence[EffectResult]) -> str:
-    """How many effects stand against what, in words."""
+    """How many effects are compared with what, in words."""
     kinds = {
         kind: {r.case.effect for r in results if r.case.against is kind} - {LOADS}
         for kind in Counterpart
@@ -223,7 +223,7 @@ def _counterparts(results: Sequence[EffectResult]) -> str:
 
 
 def against_line(results: Sequence[EffectResult]) -> str:
-    """What stood against seecr's mathematics: MuJoCo's own means, or ours a second time."""
+    """What seecr's mathematics was compared with: MuJoCo's own means, or our own, written again."""
     kinds: dict[Counterpart, list[str]] = {}
     for result in results:
         kinds.setdefault(result.case.against, []).append(result.case.effect)
@@ -234,7 +234,7 @@ def against_line(results: Sequence[EffectResult]) -> str:
 
 
 def effect_text(result: EffectResult) -> str:
-    """One effect's differences, what is allowed, and what the effect itself does."""
+    """One effect's differences, the allowed ones, and the size of the effect itself."""
     position, orientation, tension = result.worst
     parts = [
         f"position {position:.1e} m, orientation {orientation:.1e} rad, tension {tension:.1e} N",

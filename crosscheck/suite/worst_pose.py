@@ -1,4 +1,4 @@
-"""The pose of a run that deserves a look in MuJoCo's viewer, as an MJCF with a keyframe at rest."""
+"""The pose of a run that deserves a look in MuJoCo's viewer, as an MJCF with a keyframe."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ FILE_NAME = "worst_pose.xml"
 
 
 def worst_pose(results: Sequence[CaseResult]) -> tuple[CaseResult, int]:
-    """The case and pose furthest over its thresholds; else unsolved; else nearest to them."""
+    """The case and pose farthest beyond its thresholds; else an unsolved one; else the nearest."""
     worst = worst_of(results)
     if worst is None or worst[1].ratio <= 1.0:
         for kinds in ((Verdict.DIFFERS, *FINDINGS), UNSOLVED):
@@ -33,7 +33,7 @@ def worst_pose(results: Sequence[CaseResult]) -> tuple[CaseResult, int]:
 
 
 def write_worst_pose(results: Sequence[CaseResult], folder: Path) -> str:
-    """Write its MJCF into a folder; returns a sentence that says what it shows."""
+    """Write its MJCF into a folder; returns a sentence about what it shows."""
     result, i = worst_pose(results)
     mujoco, settling = result.mujoco_robot(), result.settling[i]
     if settling.settled:
@@ -55,9 +55,9 @@ def write_worst_pose_mjcf(
 ) -> None:
     """Copy an MJCF with other rest lengths and stiffnesses, and a keyframe ``worst``.
 
-    The XML tree is edited rather than MuJoCo's own writer used: that one writes six digits,
-    which moves the platform by half a micrometre. An ``<include>`` stays, its path made
-    absolute, so a robot whose tendons are in another file is refused.
+    The XML tree is edited, since MuJoCo's own writer keeps six digits only, which moves the
+    platform by half a micrometre. An ``<include>`` stays, with an absolute path; a robot whose
+    tendons are in another file is therefore refused.
 
     Args:
         model_path: the robot's MJCF.
@@ -67,7 +67,7 @@ def write_worst_pose_mjcf(
         path: the file to write, through a temporary one.
 
     Raises:
-        InputFileError: the MJCF cannot be read, or has not m tendons itself.
+        InputFileError: the MJCF cannot be read, or does not itself have m tendons.
     """
     model_path, path = Path(model_path), Path(path)
     try:
@@ -100,7 +100,7 @@ def _set_springs(root: ET.Element, rest_lengths: Array, ea: Array, path: Path) -
 
 
 def _make_paths_absolute(root: ET.Element, folder: Path) -> None:
-    """Keep meshes, textures and includes found from another folder."""
+    """Make paths of meshes, textures and includes independent of the file's folder."""
     for include in root.iter("include"):
         include.set("file", str(folder / include.get("file", "")))
     compilers = root.findall("compiler")

@@ -1,12 +1,13 @@
 """Measurements with MuJoCo as the truth: a robot that really has its effects.
 
-An effect's physics is built by MuJoCo's own means where it has them: pulleys as wrapped
-cylinders on swivels, weight of cables as chains of point masses, polynomial tendons, exit
-points on springs, elastic cable behind the exit point as a spring that the winch pulls on.
-Shared with seecr are the effects' names and parameters and the robot's numbers, no physics.
+The physics of an effect is built by MuJoCo's own means if it has them: pulleys as wrapped cylinders
+on swivels, cable weight as chains of point masses, polynomial tendons, exit points on springs, and
+elastic cable behind the exit point as a spring that holds the winch. Shared with seecr are the
+effects' names and parameters and the robot's numbers, but no physics.
 
-What MuJoCo has no law for is added cable by cable, between settlings, until MuJoCo's own
-equilibrium holds with it: hysteresis, creep and friction (see :mod:`crosscheck.twin.springs`).
+Laws that MuJoCo does not have are added cable by cable, between settlings, until MuJoCo's own
+equilibrium is consistent with them: hysteresis, creep and friction
+(:mod:`crosscheck.twin.springs`).
 """
 
 from __future__ import annotations

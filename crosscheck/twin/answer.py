@@ -1,7 +1,7 @@
-"""What a twin hides, and the file that keeps it: nobody reads that by accident.
+"""What a twin hides, and the file that keeps it from being read by accident.
 
-It is packed, not encrypted: the point is that neither a person who looks into the folder nor a
-command that goes through it learns what was hidden before they mean to.
+The file is packed, not encrypted: neither a person who looks into the folder nor a command that
+searches it should learn what was hidden before they mean to.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ _EXPECTED = f"expected a file {NAME} of crosscheck twin"
 
 @dataclass(frozen=True)
 class Moves:
-    """Largest and rms change of the readings, over their noise."""
+    """Largest and rms change of the readings, relative to their noise."""
 
     max: float
     rms: float
 
     @classmethod
     def of(cls, truth: Truth, plain: Truth, sigma: Sigma) -> Moves:
-        """How far a truth is from the plain one, at the rows where both rest."""
+        """The change from the plain truth to another, at the rows where both are at rest."""
         rows = truth.at_rest & plain.at_rest
         a = np.concatenate([truth.position, truth.quat_wxyz], axis=1)[rows]
         b = np.concatenate([plain.position, plain.quat_wxyz], axis=1)[rows]
@@ -54,12 +54,12 @@ class Answer:
     """What was hidden in a twin's measurements.
 
     Attributes:
-        robot: its name; seed: what everything was drawn from.
-        values: by effect and parameter, in the parameter's unit; empty where nothing is hidden.
-        moves_over_noise: what each effect alone does to the readings.
-        all_move_over_noise: what all of them do.
+        robot: its name; seed: of everything that was drawn.
+        values: by effect and parameter, in the parameter's unit; empty if nothing is hidden.
+        moves_over_noise: the change of the readings by each effect alone.
+        all_move_over_noise: the change by all of them.
         sigma: noise of the readings, by kind.
-        poses: rows measured.
+        poses: number of rows measured.
         truth: what measured them.
     """
 
@@ -74,19 +74,19 @@ class Answer:
 
     @property
     def hidden(self) -> list[str]:
-        """Names of the effects, none where nothing is hidden."""
+        """Names of the effects; empty if nothing is hidden."""
         return list(self.values)
 
     def as_json(self) -> dict[str, Any]:
-        """As in the file; a reader of JSON finds ``["null"]`` where nothing is hidden."""
+        """As in the file; ``hidden`` is ``["null"]`` if nothing is hidden."""
         return {"hidden": self.hidden or ["null"], **asdict(self)}
 
     @classmethod
     def of_json(cls, document: dict[str, Any]) -> Answer:
-        """The answer that :meth:`as_json` said.
+        """The answer that :meth:`as_json` described.
 
         Raises:
-            KeyError, TypeError: it said something else.
+            KeyError, TypeError: the document is something else.
         """
         moves = {name: Moves(**one) for name, one in document["moves_over_noise"].items()}
         together = Moves(**document["all_move_over_noise"])
@@ -107,7 +107,7 @@ def unseal(path: str | Path) -> Answer:
     """The answer in a sealed file, or in the case folder that holds one.
 
     Raises:
-        InputFileError: no such file, or not a sealed answer.
+        InputFileError: there is no such file, or it is not a sealed answer.
     """
     path = Path(path)
     file = path / NAME if path.is_dir() else path

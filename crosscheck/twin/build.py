@@ -4,16 +4,15 @@ A cable starts behind its exit point A and ends on the platform:
 
     winch site - (wrapped sheave | exit site) - chain of point masses - anchor site
 
-Each part is there only where an effect asks for it:
+Each part is only there if an effect needs it:
 
-- sheave: a cylinder on a mocap body at A that is turned to face the cable. The turn has to come
-  from outside: MuJoCo wraps geodesics of the cylinder, on which a free swivel turns away from
-  its cable, because nothing keeps the cable in its groove.
+- sheave: a cylinder on a mocap body at A that is turned to face the cable. It is turned from
+  outside, since MuJoCo wraps geodesics of the cylinder, and a free swivel would turn away from its
+  cable, as nothing keeps the cable in its groove.
 - winch site: on a slider below A whose spring is the elastic cable behind the exit point.
 - exit site: on slides whose springs are the frame's compliance, sideways and upwards. With a
-  sheave, whose own load is not along the cable, the compliance sits in the winch's slider
-  instead, where it acts along the cable as the effect says: there it has to be alike in all
-  directions.
+  sheave, whose own load is not along the cable, the compliance is in the winch's slider instead,
+  where it acts along the cable as the effect specifies; there it has to be isotropic.
 - point masses: one between two segments, half a one on the platform.
 """
 
@@ -28,26 +27,27 @@ from crosscheck.settle.physics import Index
 from crosscheck.twin.robot import TrueRobot
 from seecr.pose import Array, quat_conjugate, quat_rotate
 
-# Mass of the bodies that carry exit points and winches, over that of the platform; it moves no
-# equilibrium (their springs start from where it has sunk them to).
+# Mass of the bodies that carry exit points and winches [platform's mass]. It shifts no equilibrium,
+# since the springs' rest positions compensate for the weight.
 _SMALL_MASS = 0.1
 _NODE = "n{}_{}"
-# Turns a cylinder's axis, z, to y: across the sheave's plane.
+# Turns a cylinder's axis from z to y, normal to the sheave's plane.
 _ACROSS = np.array([1.0, -1.0, 0.0, 0.0]) / np.sqrt(2.0)
 
 
 @dataclass(eq=False)
 class Places:
-    """Where things are in the compiled model, per cable.
+    """Indices of parts in the compiled model, per cable.
 
     Attributes:
-        platform: its body; n_platform: its coordinates, the first ones. payload: a body on it.
+        platform: its body; n_platform: number of its coordinates, which come first. payload: a body
+            on it.
         exit_dofs: (m, 3) or (m, 0); slider_dofs: (m, 1) or (m, 0).
         node_dofs: (m, N - 1, 3).
-        tendons: (m, N), the first the one at the exit point.
+        tendons: (m, N), the first is the one at the exit point.
         exits, anchors: (m,) sites.
         node_bodies: (m, N - 1); end_bodies: (m,) point masses on the platform, or (m, 0).
-        top_next: (m,) sites that the cables first go to from their exit points.
+        top_next: (m,) sites next to the exit points along the cables.
         tail: [m] of tendon behind the exit point when the winch's spring is at rest.
     """
 
@@ -87,7 +87,7 @@ def build(true: TrueRobot, segments: int = 1) -> tuple[mujoco.MjModel, Places]:
 
 
 def tail_of(true: TrueRobot) -> float:
-    """Length [m] of tendon behind the exit point: any, as long as no winch is pulled out."""
+    """Length [m] of tendon behind the exit point; any that exceeds the winch's motion."""
     if not (true.pulley_radius or _slides(true)):
         return 0.0
     reference = true.robot.reference_pose[None]
@@ -100,7 +100,7 @@ def _yields(true: TrueRobot) -> bool:
 
 
 def _slides(true: TrueRobot) -> bool:
-    """Whether the winch is on a spring; with friction the cable's law holds it instead."""
+    """Whether the winch is on a spring; with friction the cable's law includes it instead."""
     behind = true.winch_side > 0 and true.friction == 0
     return behind or (true.compliance > 0 and true.pulley_radius > 0)
 
@@ -139,7 +139,7 @@ def _give_mass(body: mujoco.MjsBody, mass: float, length: float) -> None:
 
 
 def _add_exit(spec: mujoco.MjSpec, true: TrueRobot, i: int) -> None:
-    """What is at and behind an exit point: its site, a sheave, a winch, each where needed."""
+    """Parts at and behind an exit point: its site, a sheave, a winch, each if needed."""
     carrier, origin = spec.worldbody, true.exit_points[i]
     if _yields(true):
         carrier = spec.worldbody.add_body(name=f"x{i}", pos=origin)
@@ -166,7 +166,7 @@ def _soft_axes(true: TrueRobot) -> list[tuple[Array, float]]:
 
 
 def _add_winch(carrier: mujoco.MjsBody, true: TrueRobot, i: int, place: Array) -> None:
-    """A winch that the cable pulls up against a spring: all that stretches behind the exit."""
+    """A winch that the cable pulls up against a spring: all elasticity behind the exit point."""
     winch = carrier.add_body(name=f"p{i}", pos=place)
     _give_mass(winch, _SMALL_MASS * true.mass, true.robot.length)
     series = true.winch_side / true.ea[i] if true.friction == 0 else 0.0
@@ -188,9 +188,9 @@ def _add_sheave(spec: mujoco.MjSpec, true: TrueRobot, i: int) -> None:
         contype=0,
         conaffinity=0,
     )
-    # MuJoCo wraps over the top as long as this site lies, seen from the centre, between the
-    # normals to the tangent from the winch and to the straight line to the anchor point: just
-    # inside the first of them, to leave all the room to the second
+    # MuJoCo wraps over the top as long as this site, seen from the centre, is between the normals
+    # to the tangent from the winch and to the straight line to the anchor point. It is just inside
+    # the first of them, which leaves most room to the second
     lean = 0.9 * np.arctan2(r, tail_of(true))
     side = [r + 2.0 * r * np.sin(lean), 0.0, 2.0 * r * np.cos(lean)]
     wheel.add_site(name=f"o{i}", pos=side)
@@ -223,10 +223,10 @@ def _add_tendons(spec: mujoco.MjSpec, true: TrueRobot, i: int, segments: int) ->
 
 
 def _hang_springs(model: mujoco.MjModel, true: TrueRobot) -> None:
-    """Let springs of exit points and winches hold their own weight: at zero they rest."""
+    """Preload the springs of exit points and winches with their own weight: they rest at zero."""
     for joint in np.flatnonzero(model.jnt_stiffness > 0):
         body = model.jnt_bodyid[joint]
-        # what hangs on a carrier is its weight too
+        # bodies on a carrier add to its weight
         carried = np.flatnonzero(model.body_parentid == body)
         mass = model.body_mass[body] + np.sum(model.body_mass[carried])
         weight = mass * float(model.jnt_axis[joint] @ true.gravity)

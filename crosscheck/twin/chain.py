@@ -1,8 +1,7 @@
-"""Where the point masses of hanging cables start: MuJoCo then finds where they rest.
+"""Initial positions of the point masses of hanging cables; MuJoCo then finds their equilibrium.
 
-With both ends held, the tension in the lowest segment determines the shape, and it minimises a
-convex function (the complementary energy), so that Newton's method always finds it, however slack
-the cable is.
+With both ends held, the tension in the lowest segment determines the shape. It minimises a convex
+function (the complementary energy), so Newton's method always finds it, however slack the cable is.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""From a state of a true robot down to rest: Newton's method on MuJoCo's energy and forces."""
+"""Descent of a true robot to its equilibrium: Newton's method on MuJoCo's energy and forces."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ _NUDGE, _NUDGES = 1e-3, 3
 
 @dataclass(frozen=True)
 class Descent:
-    """How it ended; the world is left there.
+    """How a descent ended; the world is left there.
 
     Attributes:
-        balanced: MuJoCo's forces balance, and no way leads further down.
-        free: some motion changes no force: where it stops along it is arbitrary.
-        residual: unbalanced force relative to the load.
-        iterations: steps taken.
+        balanced: MuJoCo's forces balance, and no direction leads further down.
+        free: some motion changes no force, so that the end point along it is arbitrary.
+        residual: residual force relative to the load.
+        iterations: number of steps.
     """
 
     balanced: bool
@@ -33,7 +33,7 @@ class Descent:
 
     @property
     def at_rest(self) -> bool:
-        """In a stable equilibrium."""
+        """Whether it ended in a stable equilibrium."""
         return self.balanced and not self.free
 
 
@@ -42,8 +42,8 @@ def descend(world: World, judge: bool = True, limit: int = _MAX_ITERATIONS) -> D
 
     Args:
         world: left where it ends.
-        judge: look whether it is stable there, and go on if it is not.
-        limit: steps to take at most.
+        judge: check stability there, and continue if it is unstable.
+        limit: most steps.
     """
     total, goal = 0, max(0.01 * _TOLERANCE, world.rounding())
     for nudge in range(1 + _NUDGES):
@@ -61,10 +61,10 @@ def descend(world: World, judge: bool = True, limit: int = _MAX_ITERATIONS) -> D
 
 
 def _softest(world: World) -> tuple[float, Array, float]:
-    """Smallest eigenvalue of the stiffness [N/m], its vector (d,), and what counts as zero.
+    """Smallest eigenvalue of the stiffness [N/m], its eigenvector (d,), and what counts as zero.
 
-    A cable whose tension is rounding hinders on one side at most: without it, the platform may
-    be free to move to the other. Where it would be unstable, such cables prop it up.
+    A cable whose tension is mere rounding resists on one side at most: without it, the platform may
+    be free to move to the other. If it would be unstable without them, such cables are included.
     """
     world.update()
     tensions = world.tensions()

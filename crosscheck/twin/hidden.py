@@ -1,4 +1,4 @@
-"""Which effects a twin hides and how large they are, drawn from its seed."""
+"""The effects that a twin hides and their sizes, drawn from its seed."""
 
 from __future__ import annotations
 
@@ -13,17 +13,19 @@ from seecr.description.robot import Robot
 from seecr.effects import Layout, Term, effect_named, layout_of
 from seecr.pose import transform_points
 
-# How often a seed hides none, one and two.
+# Probabilities that a seed hides none, one and two effects.
 _SHARES = (0.2, 0.6, 0.2)
-# Sizes drawn, in plausible sizes: of an effect with one number, of each of several numbers.
+# Range of sizes, in plausible sizes: for an effect with one number, and for each of several.
 _ONE, _SEVERAL = (1.0, 2.0), (0.5, 2.0)
-# A cable that loses stiffness as it stretches breaks in the end: these only stiffen.
+# A cable that softens as it stretches breaks in the end: these effects only stiffen.
 _UPWARDS = ("nonlinear_elasticity",)
 # Sheaves need anchor points this far aside of exit points, in cable lengths.
 _ASIDE = 0.15
 
 CONTAINED = ("length_scale",)
-"""Never drawn, since another contains it: all drums alike is a case of the drums' gains."""
+"""Never drawn, since another effect contains it: the same gain for all drums is a case of drum
+gains.
+"""
 
 Generator = np.random.Generator
 
@@ -34,7 +36,7 @@ def values_of(term: Term) -> dict[str, float]:
 
 
 def times(term: Term, factor: float) -> Term:
-    """An effect ``factor`` times as large, inside its bounds; shapes stay as they are."""
+    """An effect ``factor`` times as large, within its bounds; shapes are kept."""
     layout = term.layout
     grown = layout.null + factor * (term.vector - layout.null)
     vector = np.where(layout.shape, term.vector, np.clip(grown, layout.lower, layout.upper))
@@ -54,16 +56,16 @@ def choose(
     What a seed hides does not depend on the commands: measured again, it is the same robot.
 
     Args:
-        robot: whose plausible sizes count.
+        robot: for its plausible sizes.
         random: of the twin's seed.
         names: these effects; None draws them.
         count: how many to draw; None draws that too.
-        tensions: whether tensions are recorded (else their scale is no candidate).
-        lacking: what the commands have not of what effects need, in words.
+        tensions: whether tensions are recorded (otherwise their scale is no candidate).
+        lacking: data needed by effects that the commands do not have, in words.
 
     Raises:
-        CrosscheckError: an effect that MuJoCo has no truth for, more than there are, or effects
-            that these commands lack something of; those that the seed chose are not named.
+        CrosscheckError: an effect that MuJoCo has no truth for, more effects than there are, or
+            effects that need data which the commands lack; those chosen by the seed are not named.
     """
     lacking = lacking or {}
     if names is None:
@@ -74,7 +76,7 @@ def choose(
                 "seed"
             )
     for name in names:
-        if want := _wanted([name], lacking):  # says which effects are known, nearest first
+        if want := _wanted([name], lacking):  # its error lists known effects
             raise CrosscheckError(f"effect {name}: needs {want}; expected commands that have them")
         if name not in TRUE_EFFECTS:
             raise CrosscheckError(f"effect {name}: no truth with MuJoCo, so no twin can hide it")
@@ -85,14 +87,14 @@ def choose(
 
 
 def _alike_both_ways(hidden: Term) -> Term:
-    """Beside sheaves MuJoCo's truth has frames that yield the same sideways and upwards only."""
+    """With sheaves, MuJoCo's truth only has frames with the same compliance both ways."""
     if hidden.name != "frame_compliance":
         return hidden
     return Term(hidden.layout, np.full(2, hidden.vector[0]))
 
 
 def _wanted(names: Sequence[str], lacking: Mapping[str, str]) -> str:
-    """What effects need of what is lacking, in words; "" where nothing is."""
+    """What effects need that is lacking, in words; "" if nothing is."""
     needs = {need for name in names for need in effect_named(name).needs}
     return " and ".join(words for need, words in lacking.items() if need in needs)
 
@@ -123,7 +125,7 @@ def _with_numbers(layout: Layout, robot: Robot, random: Generator) -> Term:
     sign = random.choice([-1.0, 1.0], len(layout))
     one_sided = (layout.lower >= layout.null) | (layout.name in _UPWARDS)
     vector = layout.null + np.where(one_sided, 1.0, sign) * size
-    # a size that leaves the bounds goes the other way: a factor is never under a tenth
+    # a size beyond the bounds changes its sign: a factor is never below a tenth
     low = np.maximum(layout.lower, np.where(layout.null > 0.0, 0.1 * layout.null, layout.lower))
     vector = np.where(vector < low, layout.null + size, vector)
     vector = np.minimum(vector, layout.upper)

@@ -1,4 +1,4 @@
-"""How a twin is measured: what is commanded, where MuJoCo rests there, and the noise."""
+"""How a twin is measured: its commands, MuJoCo's equilibria, and the noise."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from seecr.description.robot import Robot
 from seecr.effects import Effect, Term
 from seecr.pose import quat_from_rotvec, quat_multiply
 
-# Noise of a tracker, over the mean cable length (30 micrometres on a DemoBot), and of its angles.
+# Noise of a tracker, relative to the mean cable length (30 micrometres on a DemoBot), and in angle.
 _POSITION, _ORIENTATION_RAD = 6e-5, 3.5e-4
-# Noise of load cells over the mean tension.
+# Noise of load cells relative to the mean tension.
 _TENSION = 0.02
-# An effect that moves no reading by this many times its noise is made larger, so often.
+# An effect that moves no reading by this many times its noise is enlarged by these factors.
 _VISIBLE, _ENLARGED = 2.0, (1.0, 2.0, 3.0)
-# Extents of the sweeps, the smaller ones tried where MuJoCo finds no rest at some commands.
+# Extents of the sweeps; smaller ones are tried if MuJoCo finds no rest at some commands.
 EXTENTS = (1.0, 0.75, 0.5, 0.35)
-# Digits of commands that tell them apart: a nanometre.
+# Decimals of commands that distinguish them: a nanometre.
 _TOLD = 9
-# Rows at which it has to rest; the others are left out.
+# Part of the rows at which the platform has to rest; the others are left out.
 _AT_REST = 0.95
 
 Progress = Callable[[int, str], None]
@@ -39,11 +39,11 @@ Progress = Callable[[int, str], None]
 
 @dataclass(frozen=True, eq=False)
 class Lab:
-    """Who measures.
+    """A laboratory that measures twins.
 
     Attributes:
-        robot, seed: whose twin. stated: noise. tensions: whether they are read.
-        tell: called with progress. commanded: what the noise differs by, besides its seed.
+        robot, seed: of the twin. stated: noise. tensions: whether they are read.
+        tell: called with progress. commanded: seeds of the noise besides the twin's.
     """
 
     robot: Robot
@@ -54,7 +54,7 @@ class Lab:
     commanded: tuple[int, ...] = ()
 
     def measure(self, case: Measurements, effects: Sequence[Effect], now: str) -> Truth:
-        """The truth at commands, their lengths off by the noise of the winches."""
+        """The truth at commands, with lengths off by the noise of the winches."""
         errors = None
         if self.stated.length_m is not None:
             noise = random_of(self.seed, 3, self.commanded).standard_normal(
@@ -69,7 +69,7 @@ class Lab:
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """What MuJoCo said: without effects, with all, and with each alone."""
+    """MuJoCo's answers: without effects, with all of them, and with each alone."""
 
     case: Measurements
     plain: Truth
@@ -82,12 +82,12 @@ class Measured:
 def random_of(
     seed: int, stream: int, commanded: tuple[int, ...] = ()
 ) -> np.random.Generator:  # fmt: skip
-    """Its own random numbers for each purpose: the noise does not depend on what is hidden."""
+    """Random numbers for one purpose: the noise does not depend on what is hidden."""
     return np.random.default_rng([seed, stream, *commanded])
 
 
 def key_of(case: Measurements) -> tuple[int, ...]:
-    """Numbers that commands of a user's own are known by: other poses are read with other noise."""
+    """Numbers that identify a user's own commands: other commands get other noise."""
     told = case.command_lengths if case.command_pose is None else case.command_pose
     carried = None if case.loads is None else case.loads.mass
     parts = [np.round(part, _TOLD) + 0.0 for part in (told, carried) if part is not None]
@@ -96,7 +96,7 @@ def key_of(case: Measurements) -> tuple[int, ...]:
 
 
 def lacking_in(case: Measurements) -> dict[str, str]:
-    """What commands have not of what effects need, in words."""
+    """Data needed by effects that the commands do not have, in words."""
     there = {
         "time": (case.t_s is not None, "the time of each row (t_s)"),
         "temperature": (case.temperature_C is not None, "temperature_C"),
@@ -106,7 +106,7 @@ def lacking_in(case: Measurements) -> dict[str, str]:
 
 
 def rest_of(lab: Lab, cases: Sequence[Measurements], hidden: list[Term]) -> Measured:
-    """The first commands at which MuJoCo rests, and sizes of effects that show there."""
+    """The first commands at which MuJoCo comes to rest, with sizes of effects that show there."""
     for case in cases:
         plain = lab.measure(case, (), "without effects")
         if not _mostly(plain.at_rest):
@@ -130,7 +130,7 @@ def rest_of(lab: Lab, cases: Sequence[Measurements], hidden: list[Term]) -> Meas
 
 
 def _mostly(at_rest: NDArray[np.bool_]) -> bool:
-    """Whether few rows have to be left out, because nobody can measure a platform that sways."""
+    """Whether few rows are left out; a platform that does not rest cannot be measured."""
     return float(np.mean(at_rest)) >= _AT_REST
 
 
@@ -145,7 +145,7 @@ def sweeps(robot: Robot, points: int, extent: float, seed: int) -> Measurements:
     """Sweeps to and fro, and the temperature at which they are commanded."""
     way = trajectory(robot, points, extent)
     random = random_of(seed, 1)
-    # a hall that warms up, and somebody opens the door now and then
+    # a hall that warms up, with a door that is opened now and then
     t = way.t_s
     rise, period = random.uniform(3.0, 6.0), random.uniform(200.0, 400.0)
     drift = rise * (1.0 - np.exp(-t / 300.0)) + 0.5 * np.sin(2.0 * np.pi * t / period)
@@ -158,7 +158,7 @@ def sweeps(robot: Robot, points: int, extent: float, seed: int) -> Measurements:
 def _made_visible(
     lab: Lab, case: Measurements, hidden: Term, plain: Truth, sigma: Sigma
 ) -> tuple[Term, Truth] | None:
-    """The effect, larger where it would drown in the noise; None where MuJoCo finds no rest."""
+    """The effect, enlarged if the noise would hide it; None if MuJoCo does not come to rest."""
     best = None
     for factor in _ENLARGED:
         one = times(hidden, factor)
@@ -172,7 +172,7 @@ def _made_visible(
 
 
 def _sigma(lab: Lab, plain: Truth) -> Sigma:
-    """What is stated, else the noise of a good tracker and, where they are read, of load cells."""
+    """The stated noise, else that of a good tracker and, if tensions are read, of load cells."""
     robot, stated = lab.robot, lab.stated
     length = float(np.mean(robot.nominal_lengths(robot.reference_pose[None])))
     pull = _one_digit(_TENSION * float(np.nanmean(plain.tensions))) if lab.tensions else None
@@ -189,7 +189,7 @@ def _one_digit(value: float) -> float:
 
 
 def read_of(made: Measured, random: np.random.Generator) -> Measurements:
-    """Readings with noise, none at way points and where the platform does not rest."""
+    """Readings with noise; none at way points and where the platform is not at rest."""
     case, truth, sigma = made.case, made.truth, made.sigma
     assert sigma.position_m is not None and sigma.orientation_rad is not None
     n = len(truth.position)

@@ -1,4 +1,4 @@
-"""What the winches really pay out, command by command."""
+"""The lengths that the winches really pay out, command by command."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from seecr.commands.data import Commands
 from seecr.pose import Array, pose_add, pose_difference, transform_points
 
 WAYPOINTS = (12, 4)
-"""Points looked at on the way to the first row of a run, and from row to row."""
+"""Number of points on the way to the first row of a run, and from row to row."""
 
-# Parts of the way from point to point in which winches are watched for turning round.
+# Parts of the way between two points in which winches are checked for reversals.
 _WATCHED = 64
 
 
@@ -25,10 +25,10 @@ class Way:
     """The commands with all points on the way, N in all.
 
     Attributes:
-        pose: (N, 7) commanded; lengths: (N, m) [m] commanded, or None. told: whether they are what
-            winches were told, counted from the reference pose's rest lengths.
-        row: (N,) the row a point belongs to; is_row: (N,) whether it is that row.
-        fresh: (N,) where a run starts from, at rest: the reference pose or its first row.
+        pose: (N, 7) commanded; lengths: (N, m) [m] commanded, or None. told: whether these are told
+            lengths, relative to the reference pose's rest lengths.
+        row: (N,) the row that a point belongs to; is_row: (N,) whether it is that row.
+        fresh: (N,) whether a run starts here, at rest: at the reference pose or its first row.
         elapsed: (N,) [s] since the point before.
     """
 
@@ -44,7 +44,7 @@ class Way:
 def way_of(true: TrueRobot, commands: Commands, waypoints: tuple[int, int] = WAYPOINTS) -> Way:
     """Every run from the reference pose straight to its first row, then from row to row.
 
-    A run that starts at its first row is there at once; a load is changed before setting out.
+    A run that starts at its first row has no way to it; a load changes before the motion.
     """
     robot, n = true.robot, len(commands)
     clock = np.zeros(n) if commands.time is None else commands.time
@@ -77,7 +77,7 @@ def way_of(true: TrueRobot, commands: Commands, waypoints: tuple[int, int] = WAY
 
 
 def _reloaded(commands: Commands, k: int) -> bool:
-    """Whether a row's load is another than that of the row before."""
+    """Whether a row has another load than the row before."""
     loads = commands.loads
     if loads is None:
         return False
@@ -88,14 +88,14 @@ def _reloaded(commands: Commands, k: int) -> bool:
 
 
 def _guide(true: TrueRobot) -> World | None:
-    """The robot as described on its joints, to be led along them; None where it is free."""
+    """The robot as described, to be moved along its joints; None for a free platform."""
     if not true.robot.joints:
         return None
     return World(replace(_bare(true), pulley_radius=0.0))
 
 
 def _straight_way(guide: World | None, before: Array, after: Array, parts: Array) -> Array:
-    """Poses (k, 7) at parts (k,) of a way, straight in pose or in the values of joints."""
+    """Poses (k, 7) at fractions (k,) of a way, straight in pose or in joint values."""
     if guide is None:
         return pose_add(before, parts[:, None] * pose_difference(after, before))
     n = guide.places.n_platform
@@ -126,7 +126,7 @@ def paid_out(true: TrueRobot, way: Way, temperature: Array | None) -> Array:
         told = way.lengths - (0.0 if absolute else true.robot.rest_lengths)
     turned = told
     if true.backlash > 0.0:
-        # lengths are told evenly: nothing turns round between two points
+        # lengths are commanded evenly: nothing reverses between two points
         watched = _watched(true, way) if way.lengths is None else [told[:0]] * len(told)
         turned = _with_play(told, watched, way.fresh, 0.5 * true.backlash)
     paid = (1.0 + true.gain) * turned + true.offset
@@ -143,7 +143,7 @@ def paid_out(true: TrueRobot, way: Way, temperature: Array | None) -> Array:
 
 
 def _straight_change(true: TrueRobot, poses: Array) -> Array:
-    """Straight lengths of the described robot less those at its reference, (N, m) [m]."""
+    """Straight lengths of the described robot minus those at its reference, (N, m) [m]."""
     return _straight(true, poses) - _straight(true, true.robot.reference_pose[None])
 
 
@@ -154,13 +154,13 @@ def _straight(true: TrueRobot, poses: Array) -> Array:
 
 
 def _watched(true: TrueRobot, way: Way) -> list[Array]:
-    """Lengths (k, m) [m] that winches are told on the way to each of N points, in order.
+    """Lengths (k, m) [m] commanded on the way to each of N points, in order.
 
-    The squared length at even steps, each put right by the vertex of the parabola through it and
-    its neighbours where it turns round there; for a translation that is all of its course.
+    The squared length is taken at even steps. At a reversal it is replaced by the vertex of the
+    parabola through a step and its neighbours, which is exact for a translation.
     """
     guide, home = _guide(true), _straight(true, true.robot.reference_pose[None])[0]
-    # a step too far at either end: what turns round there is seen too
+    # one step more at either end, to see reversals there too
     parts = np.arange(-1, _WATCHED + 2) / _WATCHED
     watched = []
     for k, pose in enumerate(way.pose):
@@ -171,7 +171,7 @@ def _watched(true: TrueRobot, way: Way) -> list[Array]:
 
 
 def _with_vertices(value: Array, parts: Array) -> Array:
-    """Values (k + 2, m) without the outer ones, at parts (k,) of a way, least and most in full."""
+    """Values (k + 2, m) without the outer ones, at fractions (k,) of a way, with exact extrema."""
     earlier, now, later = value[:-2], value[1:-1], value[2:]
     rise, bend = 0.5 * (later - earlier), later - 2.0 * now + earlier
     near = (np.abs(rise) <= 0.5 * np.abs(bend)) & (bend != 0.0)
@@ -182,7 +182,7 @@ def _with_vertices(value: Array, parts: Array) -> Array:
 
 
 def _with_play(told: Array, watched: list[Array], fresh: NDArray[np.bool_], half: float) -> Array:
-    """The drum stands still until the motor has taken up the play; centred as a run starts."""
+    """The drum stands still until the motor has taken up the play; it is centred at first."""
     drum = told.copy()
     for k in range(1, len(told)):
         if not fresh[k]:
@@ -193,12 +193,12 @@ def _with_play(told: Array, watched: list[Array], fresh: NDArray[np.bool_], half
 
 
 def _zero(true: TrueRobot) -> Array:
-    """Lengths (m,) [m] when the winches were zeroed, over the true geometry as MuJoCo has it."""
+    """Lengths (m,) [m] when the winches were zeroed, over the true geometry, as MuJoCo has it."""
     robot = true.robot
     bare = _bare(true)
     world = World(bare)
     if true.robot.joints and not np.array_equal(true.zero_pose, robot.reference_pose):
-        # misplaced by hand, off its joints too: put there as a free body
+        # misplaced by hand, and so off its joints: placed as a free body
         world = World(replace(bare, robot=replace(robot, joints=())))
     world.place(true.zero_pose)
     if not world.wraps:
@@ -211,6 +211,6 @@ def _zero(true: TrueRobot) -> Array:
 
 
 def _bare(true: TrueRobot) -> TrueRobot:
-    """The robot with nothing that moves but the platform and its sheaves."""
+    """The robot with no moving parts but the platform and its sheaves."""
     rigid = replace(true, compliance=0.0, compliance_up=0.0, winch_side=0.0)
     return replace(rigid, cable_weight=0.0, friction=0.0)

@@ -1,7 +1,7 @@
 """Measurements with MuJoCo as the truth and effects that are not disclosed: a case folder.
 
-``robot.xml`` is what a user would have, ``measured.csv`` and ``measured.toml`` what they would
-have measured, and ``answer.sealed`` what the robot really had.
+``robot.xml`` is what a user would have, ``measured.csv`` and ``measured.toml`` what they would have
+measured, and ``answer.sealed`` what the robot really had.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from seecr.effects import Term
 from seecr.result import Record, Result
 
 FILES = ("robot.xml", "measured.csv", "measured.toml", NAME)
-"""What a case's folder holds."""
+"""The files of a case's folder."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -50,12 +50,12 @@ class Twin(Result):
 
     Attributes:
         robot: as described.
-        measured: what its sensors read, noise included.
-        truth: MuJoCo's answers to all commands, before the noise.
+        measured: its sensors' readings, noise included.
+        truth: MuJoCo's answers to all commands, without noise.
         kept: (n,) bool, commands that were measured: those at which MuJoCo came to rest.
         hidden: the effects.
-        answer: what the sealed file holds.
-        notes: what of the MJCF plays no part in the truth, and what was said of the poses given.
+        answer: the content of the sealed file.
+        notes: features of the MJCF that the truth ignores, and notes about the given poses.
     """
 
     robot: Robot
@@ -67,7 +67,7 @@ class Twin(Result):
     notes: tuple[str, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
-        """What may be told of it: nothing of what it hides."""
+        """What may be disclosed: nothing of what it hides."""
         return {
             "robot": self.robot.name,
             "seed": self.answer.seed,
@@ -83,7 +83,7 @@ class Twin(Result):
         return [head, *self.measured.lines(), *(f"note: {note}" for note in self.notes)]
 
     def records(self) -> Sequence[Record]:
-        """A record for each row of the measurements."""
+        """One row for each row of the measurements."""
         return self.measured.records()
 
 
@@ -100,26 +100,31 @@ def make_twin(
     sigma: Sigma | None = None,
     progress: Progress | None = None,
 ) -> Twin:
-    """Measure a robot that has effects nobody is told of.
+    """Measure a robot with undisclosed effects.
 
     Args:
-        robot: without them: its MJCF, the name of a shipped one, or as read from its file.
-        seed: draws effects, their sizes and the noise.
+        robot: without effects: its MJCF, the name of a shipped one, or as read from its file.
+        seed: of effects, their sizes and the noise.
         effects: names of the effects; None lets the seed choose, ``()`` hides none.
         n_effects: how many the seed chooses; None lets it choose that too.
         out: folder for the case; None writes nothing.
         tensions: record tensions too.
         points: of each sweep; 18 make 144 rows.
         poses: instead of the sweeps: poses (n, 7), or commands, loads and way points, or their
-            file. Rows without readings among others that have some are way points; a list of
-            commands has none.
-        sigma: noise; kinds that nobody stated are those of a good tracker.
+            file. If some rows have readings, those without are way points; a list of commands has
+            none.
+        sigma: noise; kinds that are not stated are those of a good tracker.
         progress: called with the number of rows done since the last call, and what is going on.
 
+    Returns:
+        the measurements, and what was hidden in them.
+
     Raises:
-        CrosscheckError: an effect that no twin can hide, or a robot that MuJoCo cannot rest.
-        InputFileError: poses that cannot be read, or files in ``out`` that are of no older twin.
-        InputError: a robot of no file, or with other numbers than its file has.
+        CrosscheckError: an effect that no twin can hide, or a robot that MuJoCo cannot bring to
+            rest.
+        InputFileError: poses that cannot be read, or files in ``out`` that are not from an older
+            twin.
+        InputError: a robot without a file, or with numbers other than its file's.
     """
     seed, points = whole(seed, "seed"), whole(points, "points", least=1)
     n_effects = None if n_effects is None else whole(n_effects, "n_effects")
@@ -139,7 +144,7 @@ def make_twin(
     measured = read_of(made, random_of(seed, 2, commanded))
     twin = Twin(
         robot=robot,
-        # of a user's own commands all are kept: where nothing rested they were gone through
+        # of a user's own commands all are kept: those not at rest count as way points
         measured=measured if given is not None else measured.rows(made.at_rest),
         truth=made.truth,
         kept=made.at_rest,
@@ -177,6 +182,6 @@ def _write(twin: Twin, robot_path: Path, out: Path) -> None:
 
 
 def _notes(path: Path) -> tuple[str, ...]:
-    """What of the MJCF the truth leaves out: it is built anew from the robot's numbers."""
+    """Features of the MJCF that the truth ignores, as it is built from the robot's numbers."""
     found = hindrances(compile_model(path))
     return (ignored_note(path, found),) if found else ()

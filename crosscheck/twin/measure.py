@@ -21,18 +21,19 @@ from seecr.effects import Effect
 from seecr.pose import Array, pose_add, pose_difference
 
 SEGMENTS = (8, 16)
-"""Segments N of a cable with weight. A chain errs by some 1/N^2 of what the weight does, from two
-of them the error of that order is taken away (Richardson)."""
+"""Segments N of a cable with weight. The error of a chain is of order 1/N^2; with two values of N
+that order is eliminated (Richardson).
+"""
 
-# Of MuJoCo's dynamics, before the last digits are polished.
+# For MuJoCo's dynamics, before the last digits are polished.
 _AT_REST, _MAX_STEPS = 1e-6, 40_000
-# Tangents of a law with memory until it agrees with MuJoCo: relative to the load.
+# Agreement of a law with history and MuJoCo [load], and most tangents until then.
 _AGREED, _TANGENTS = 1e-9, 60
-# A single step for a tangent that leaves more than this part of what was out of balance crawls.
+# One step per tangent is too slow if it leaves more than this part of the residual.
 _CRAWLS = 0.5
-# Steps downhill.
+# Most steps downhill.
 _LIMIT = 300
-# Rounds until what lies on the sheaves and what hangs free agree, relative to a cable.
+# Agreement of the parts of a cable on and off its sheave, and most rounds until then.
 _SHARE, _SHARES = 1e-10, 20
 
 Progress = Callable[[int], None]
@@ -41,15 +42,16 @@ _NOWHERE = Descent(False, False, np.nan, 0)
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What MuJoCo says of n rows.
+    """MuJoCo's answers for n rows.
 
     Attributes:
-        pose: (n, 7) where the platform rests; tensions: (n, m) [N] where cables leave.
-        position: (n, 3) [m]; quat_wxyz: (n, 4); tension_readings: (n, m) [N], as read, no noise.
-        rest_lengths: (n, m) [m] really paid out.
+        pose: (n, 7) equilibria; tensions: (n, m) [N] where cables leave.
+        position: (n, 3) [m]; quat_wxyz: (n, 4); tension_readings: (n, m) [N], as read, without
+            noise.
+        rest_lengths: (n, m) [m] actually paid out.
         at_rest: (n,) bool, a stable equilibrium was found.
-        free: (n,) bool, balanced, but free to move along some direction: a pose, no rest.
-        residual: (n,) unbalanced force relative to the load.
+        free: (n,) bool, in equilibrium, but free to move along some direction.
+        residual: (n,) residual force relative to the load.
     """
 
     pose: Array
@@ -65,7 +67,7 @@ class Truth:
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """Rests of rows: pose (n, 7), tensions (n, m) [N], how each ended (n,), residual (n,)."""
+    """Results of rows: pose (n, 7), tensions (n, m) [N], how each ended (n,), residual (n,)."""
 
     pose: Array
     tensions: Array
@@ -94,11 +96,12 @@ def measure(
     Args:
         robot: as described.
         commands: n rows.
-        effects: what it has besides, in the order in which they act.
-        length_errors: (n, m) [m] paid out besides in each row: noise of the winches, no effect.
-        segments: N of each cable, where cables have weight; of two, the poses are extrapolated.
-        waypoints: on the way to the first row of a run and from row to row, where what happened
-            on the way counts.
+        effects: its effects, in the order in which they act.
+        length_errors: (n, m) [m] additional length in each row: noise of the winches, not an
+            effect.
+        segments: N of each cable, if cables have weight; with two, the poses are extrapolated.
+        waypoints: numbers on the way to the first row of a run and from row to row, for effects
+            with history.
         progress: called with the number of rows done since the last call.
     """
     true = true_robot(robot, effects)
@@ -128,7 +131,7 @@ def measure(
 
 
 def _extrapolated(coarse: _Rows, fine: _Rows, ratio: float) -> _Rows:
-    """Rows free of the leading error, which is ``ratio`` times as large in the coarse ones."""
+    """Rows without the leading error, which is ``ratio`` times as large in the coarse ones."""
     part = 1.0 / (ratio - 1.0)
     both = np.isfinite(fine.pose[:, 0]) & np.isfinite(coarse.pose[:, 0])
     pose = np.full_like(fine.pose, np.nan)
@@ -154,21 +157,21 @@ def _each(world: World, way: Way, rest: Array, loads: Loads | None, tell: Progre
 
 
 def _carry(worlds: tuple[World, ...], loads: Loads | None, row: int) -> None:
-    """Hang the load of a row on the platform."""
+    """Attach the load of a row to the platform."""
     if loads is not None:
         for world in worlds:
             world.carry(float(loads.mass[row]), loads.centre[row], loads.wrench[row])
 
 
 def _without_weight(world: World) -> World:
-    """The world itself, or one whose cables have no weight, where they do."""
+    """A world whose cables have no weight; the world itself if it has none."""
     if world.segments == 1:
         return world
     return World(replace(world.true, cable_weight=0.0))
 
 
 def _start(world: World, bare: World, pose: Array, springs: Springs) -> bool:
-    """Let the platform move to rest from a pose; cables with weight take theirs on there."""
+    """Bring the platform to rest from a pose; cables with weight get theirs afterwards."""
     bare.set_springs(springs)
     bare.place(pose)
     if not _moves_to_rest(bare):
@@ -182,7 +185,7 @@ def _start(world: World, bare: World, pose: Array, springs: Springs) -> bool:
 
 
 def _settle(world: World, springs: Springs, judge: bool = True, limit: int = _LIMIT) -> Descent:
-    """Polish, or go downhill; with chains over sheaves until their free parts are right."""
+    """Polish, or go downhill; chains over sheaves repeat that until their free parts are right."""
     found = _NOWHERE
     for _ in range(_SHARES):
         world.set_springs(springs)
@@ -211,7 +214,7 @@ def _note(world: World, out: _Rows, k: int, found: Descent) -> None:
 
 
 def _walk(world: World, way: Way, rest: Array, loads: Loads | None, tell: Progress) -> _Rows:
-    """All points of the way in order, each from where the last one rested."""
+    """All points of the way in order, each from the equilibrium of the last one."""
     true = world.true
     out = _Rows.empty(int(way.is_row.sum()), world.n_cables)
     cables = [Cable(true, float(ea)) for ea in true.ea]
@@ -232,17 +235,17 @@ def _walk(world: World, way: Way, rest: Array, loads: Loads | None, tell: Progre
 
 
 def _agree(world: World, cables: list[Cable]) -> Descent:
-    """Tangents of the cables' laws and MuJoCo's settling in turns until both hold."""
+    """Tangents of the cables' laws and MuJoCo's settling alternate until both are consistent."""
     world.update()
     springs, before, last, crawls = None, None, np.inf, False
     for turn in range(_TANGENTS):
         tangent = _tangents(world, cables)
         if springs is not None and turn > _TANGENTS // 3:
-            # a kink at which tangents flip: meet halfway
+            # a kink between whose tangents it alternates: take the mean
             tangent = tangent.halfway(springs)
         springs = tangent
-        # one step for each tangent is Newton's method on both; all of them where that gets
-        # nowhere, as with cables in pieces
+        # one step per tangent is Newton's method on both; if that makes no progress, as with cables
+        # in segments, the descent is completed for each tangent
         quick = turn < _TANGENTS // 6 and not crawls
         step = _settle(world, springs, judge=False, limit=1 if quick else _LIMIT)
         fine, crawls = step.balanced, crawls or (turn > 1 and step.residual > _CRAWLS * last)
@@ -264,7 +267,7 @@ def _agree(world: World, cables: list[Cable]) -> Descent:
 
 
 def _tangents(world: World, cables: list[Cable]) -> Springs:
-    """Springs that touch the cables' laws at their present lengths."""
+    """Springs tangent to the cables' laws at their present lengths."""
     lengths = world.cable_lengths()
     pairs = [cable.tangent(float(at)) for cable, at in zip(cables, lengths, strict=True)]
     rest, stiffness = np.array(pairs).T

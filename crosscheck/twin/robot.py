@@ -1,8 +1,7 @@
-"""The robot as it really is: its described numbers, and what each effect makes of them.
+"""The robot as it really is: its described numbers, changed by each effect.
 
-Written from the effects' definitions, not from seecr's code for them: only names and parameters
-are shared. All numbers are SI; the base frame, the platform frame and signs as in the effects'
-own texts.
+This is written from the effects' definitions, not from seecr's code for them: only names and
+parameters are shared. All numbers are SI; frames and signs are as in the effects' own docstrings.
 """
 
 from __future__ import annotations
@@ -25,11 +24,11 @@ Sensor = Callable[[Reading], Reading]
 
 @dataclass(eq=False)
 class TrueRobot:
-    """Numbers that MuJoCo's model and the winches are made from; m cables.
+    """Numbers for MuJoCo's model and the winches; m cables.
 
     Attributes:
         robot: as described.
-        exit_points, anchor_points: (m, 3) [m] where they really are.
+        exit_points, anchor_points: (m, 3) [m] true positions.
         mass: [kg]; centre_of_mass: (3,) [m]; gravity: (3,) [m/s^2]; wrench: (6,) [N, N m].
         ea: (m,) [N]; quadratic, cubic: of T = EA (eps + quadratic eps^2 + cubic eps^3).
         pulley_radius: [m]; winch_side: [m]; cable_weight: [N/m].
@@ -40,7 +39,7 @@ class TrueRobot:
         zero_pose: (7,) of the platform when the winches were zeroed.
         offset: (m,) [m]; gain: (m,); backlash: [m]; expansion: [1/K]; zero_temperature: [C].
         run_out: (sine (m,) [m], cosine (m,) [m], drum radius [m]) of each eccentricity.
-        sensors: what each sensing effect makes of the readings, in order.
+        sensors: functions of the sensing effects on the readings, in order.
     """
 
     robot: Robot
@@ -79,12 +78,12 @@ class TrueRobot:
 
     @property
     def up(self) -> Array:
-        """Unit vector (3,) on which pulleys swivel: the frame's own vertical."""
+        """Unit vector (3,) about which pulleys swivel: the frame's own vertical."""
         return self.robot.up
 
     @property
     def has_history(self) -> bool:
-        """Whether a cable's pull depends on what it did before."""
+        """Whether a cable's tension depends on its past."""
         return self.hysteresis > 0 or self.friction > 0 or self.creep > 0
 
 

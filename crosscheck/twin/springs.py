@@ -1,8 +1,8 @@
-"""Springs that MuJoCo's tendons are made of, and laws that it has no tendon for.
+"""Springs for MuJoCo's tendons, and laws for which it has no tendon.
 
-A cable in MuJoCo is a one-sided spring, T = k x + p x^2 + q x^3 with x = L - rest. Hysteresis,
-creep and friction have no such spring: there the law is written out here, and its tangent at the
-present length is the spring; MuJoCo settles, the tangent is taken anew, until the two agree.
+A cable in MuJoCo is a one-sided spring, T = k x + p x^2 + q x^3 with x = L - rest. For hysteresis,
+creep and friction the law is implemented here, and the spring is its tangent at the present length.
+MuJoCo settles, and a new tangent is taken, until the two agree.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class Springs:
         return cls(lengths.copy(), k, poly)
 
     def halfway(self, other: Springs) -> Springs:
-        """Springs between these and others."""
+        """The mean of these springs and others."""
         rest = 0.5 * (self.rest + other.rest)
         stiffness = 0.5 * (self.stiffness + other.stiffness)
         return Springs(rest, stiffness, 0.5 * (self.poly + other.poly))
@@ -46,17 +46,17 @@ class Springs:
 
 @dataclass(eq=False)
 class Cable:
-    """One cable with a memory.
+    """One cable with a history.
 
     Attributes:
         true: the robot; ea: [N].
         rest: paid-out length [m].
         stretch, pull: e = l0 eps [m] and Dahl's part of the tension [N] when it last pulled: a
-            slack cable keeps those at which its tension ended, and pulls again from there.
+            slack cable keeps those at which its tension became zero, and continues from there.
         crept: creep strain then.
-        creep_by_tension: creep strain by the end of this step per newton of tension at its end.
-        winch_tension: [N] behind the exit point if the cable does not slip.
-        fresh: at the start of a run, without any history but creep.
+        creep_by_tension: creep strain at the end of this step per newton of tension at its end.
+        winch_tension: [N] behind the exit point while the cable does not slip.
+        fresh: whether a run starts, without any history but creep.
     """
 
     true: TrueRobot
@@ -78,7 +78,7 @@ class Cable:
         slope = self.ea * (1.0 + 2.0 * q * strain + 3.0 * c * strain**2)
         if self.fresh or self.true.hysteresis == 0.0:
             return tension, slope, 0.0
-        # dz/de = (amplitude - z sign(de)) / stretch, integrated from where it last rested
+        # dz/de = (amplitude - z sign(de)) / stretch, integrated from the last equilibrium
         change = self.rest * strain - self.stretch
         end = math.copysign(self.true.hysteresis, change)
         left = math.exp(-abs(change) / self.true.hysteresis_stretch)
@@ -87,7 +87,7 @@ class Cable:
         return tension + z, slope + z_slope, z
 
     def behind(self, tension: float) -> tuple[float, float]:
-        """Tension behind the exit point [N], and its slope, with the capstan's friction."""
+        """Tension behind the exit point [N], and its slope, with capstan friction."""
         if self.fresh or self.true.friction == 0.0:
             return tension, 1.0
         grip = math.exp(self.true.friction)
@@ -108,19 +108,19 @@ class Cable:
         return length, rate, tension, slope
 
     def tangent(self, length: float) -> tuple[float, float]:
-        """Rest length [m] and stiffness [N/m] of the spring that touches the law there."""
+        """Rest length [m] and stiffness [N/m] of the spring tangent to the law at a length."""
         self.strain = self._strain_at(length)
         at, rate, tension, slope = self.length(self.strain)
         stiffness = slope / rate
         if tension == 0.0:
-            # slack: the spring takes up where the law does
+            # slack: the spring becomes taut where the law does
             return at, stiffness
         return at - tension / stiffness, stiffness
 
     def _strain_at(self, length: float) -> float:
-        """Strain at which the cable has this length, or at which it just goes taut.
+        """Strain at which the cable has this length, or at which it just becomes taut.
 
-        Newton's method inside a bracket; to where a cable goes taut the bracket alone leads.
+        Newton's method inside a bracket; at the point where a cable becomes taut, bisection alone.
         """
         low, high = 0.0, max(2.0 * self.strain, 1e-6)
         while not self._reaches(length, high):
@@ -147,11 +147,12 @@ class Cable:
         return tension > 0.0 and at >= length
 
     def rests(self, slack: bool) -> None:
-        """Remember the state the cable has come to rest in."""
+        """Store the state in which the cable has come to rest."""
         tension, _, z = self.tension(self.strain)
         tension = 0.0 if slack else max(tension, 0.0)
         self.winch_tension = self.behind(tension)[0]
-        # of a slack cable the strain is that at which its tension ends, if it has not before
+        # for a slack cable the strain is that at which its tension becomes zero, unless it already
+        # was
         if self.fresh or not slack or self.rest * self.strain < self.stretch:
             self.stretch = self.rest * self.strain
             self.pull = 0.0 if self.fresh else z
@@ -162,8 +163,8 @@ class Cable:
     def pays_out(self, rest: float, elapsed: float, fresh: bool) -> None:
         """Begin a step: a new rest length [m], some time later [s].
 
-        Creep strain c follows time dc/dt = amount T/EA - c, with a tension that goes linearly
-        from the last to the coming one; between runs it is the coming one throughout.
+        Creep strain c follows time dc/dt = amount T/EA - c, with a tension that is linear in time
+        from the last value to the coming one; between runs it is the coming one throughout.
         """
         paid, self.rest, self.fresh = rest - self.rest, rest, fresh
         if self.true.friction > 0.0 and self.true.winch_side > 0.0:

@@ -1,4 +1,4 @@
-"""Commands that a person would measure: sweeps to and fro, and a tilted loop, scaled to a robot."""
+"""Commands as a person would measure: sweeps to and fro, and a tilted loop, scaled to a robot."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from crosscheck.measurements.data import Names
 from seecr.description.robot import Robot
 from seecr.pose import Array, pose_add, pose_difference
 
-# Of the way from the reference pose to where the exit points end, in each direction.
+# Parts of the distance from the reference pose to the outermost exit points, in each direction.
 _ALONG, _ACROSS, _HEIGHT, _LOOP = 0.64, 0.56, 0.15, 0.5
 # Tilt of the loop about the three directions [rad].
 _TILT = np.deg2rad([4.0, 4.0, 6.0])
@@ -48,7 +48,7 @@ def trajectory(robot: Robot, points: int = 18, extent: float = 1.0) -> Trajector
 
 
 def _frame(robot: Robot) -> tuple[Array, Array]:
-    """Directions along, across and up as rows (3, 3), and the room (3, 2) [m] on either side."""
+    """Directions along, across and up as rows (3, 3), and the reach (3, 2) [m] on either side."""
     up = robot.up
     exits = robot.exit_points - robot.reference_pose[:3]
     level = exits - np.outer(exits @ up, up)
@@ -68,7 +68,7 @@ def _line(points: int, reach: Array, part: float) -> Array:
 
 
 def _across(points: int, reach: Array) -> Array:
-    """A sweep (points, 3) across the robot; up and down where it has no width."""
+    """A sweep (points, 3) across the robot; up and down if it has no width."""
     line = _line(points, reach[1], _ACROSS)
     height = np.full(points, _HEIGHT)
     if np.ptp(line) < 0.05 * np.ptp(reach[0]):
@@ -81,7 +81,7 @@ def _to_and_fro(runs: dict[str, Array], name: str, part: Array) -> None:
 
 
 def _base_change(robot: Robot, frame: Array, reach: Array, part: Array) -> Array:
-    """Change (n, 6) of the reference pose; heights are in parts of the room above."""
+    """Change (n, 6) of the reference pose; heights are fractions of the reach upwards."""
     local = part * np.array([1.0, 1.0, reach[2, 1]])
     return np.concatenate([local @ frame, np.zeros_like(local)], axis=1)
 
@@ -103,7 +103,7 @@ def _loop(robot: Robot, frame: Array, reach: Array, points: int) -> Array:
 
 
 def _reachable(robot: Robot, change: Array) -> Array:
-    """Poses (n, 7) changed from the reference; on joints, the joints' share of the change."""
+    """Poses (n, 7) changed from the reference; on joints, the part of the change along them."""
     start = np.tile(robot.reference_pose, (len(change), 1))
     if not robot.joints:
         return pose_add(start, change)

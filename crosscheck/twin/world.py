@@ -1,4 +1,4 @@
-"""The true robot inside MuJoCo: its cables' springs, its state, its forces."""
+"""The true robot in MuJoCo: its cables' springs, its state, its forces."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from seecr.pose import Array, quat_multiply
 class World(Physics):
     """MuJoCo's model and state of a true robot; see :class:`crosscheck.settle.physics.Physics`.
 
-    Coordinates are those of the platform, then those of each cable's exit point, winch and
-    point masses.
+    Coordinates are those of the platform, then those of each cable's exit point, winch and point
+    masses.
 
     Attributes:
         true: the robot.
-        places: where its parts are in the model.
+        places: indices of its parts in the model.
         segments: N of each cable.
         cable_dofs: (m, h) coordinates of each cable's own parts.
         coupling: a few groups, however long the chains are, see :func:`_coupling`.
@@ -52,13 +52,13 @@ class World(Physics):
         self.set_springs(Springs.plain(true.robot.rest_lengths, true))
 
     def _start_sheaves(self, up: Array) -> None:
-        """The frame in which sheaves turn: up, and two directions across it."""
+        """The frame in which sheaves turn: up, and two horizontal directions."""
         frame = np.linalg.svd(up[None])[2]
         frame[0] = up
         self._ahead, self._side = frame[1], np.cross(up, frame[1])
         upright = np.zeros(4)
         mujoco.mju_mat2Quat(upright, np.stack([self._ahead, self._side, up], axis=1).ravel())
-        # a half turn about the sheave's own vertical follows it
+        # followed by half a turn about the sheave's own vertical
         self._swivel = np.stack([upright, quat_multiply(upright, np.array([0.0, 0.0, 0.0, 1.0]))])
 
     @property
@@ -68,18 +68,18 @@ class World(Physics):
 
     @property
     def n_platform(self) -> int:
-        """How many of the coordinates are the platform's own: the first ones."""
+        """Number of the platform's own coordinates, which come first."""
         return self.places.n_platform
 
     @property
     def steers(self) -> bool:
-        """Whether something has to be done at every step: sheaves turned, a wrench applied."""
+        """Whether something has to be done at every step: turn sheaves, apply a wrench."""
         return bool(self.true.pulley_radius or self.wrench.any())
 
     def set_springs(self, springs: Springs) -> None:
-        """Give all segments their rest length, stiffness and weight.
+        """Set rest length, stiffness and weight of all segments.
 
-        The top segment has what lies on the sheave too: all of the cable that is not free.
+        The top segment includes what lies on the sheave: the part of the cable that is not free.
         """
         n, model = self.segments, self.model
         free = springs.rest * self.free_share
@@ -108,7 +108,7 @@ class World(Physics):
         self._segment_weight = self.true.cable_weight * segment
 
     def carry(self, mass: float, centre: Array, wrench: Array) -> None:
-        """Hang a payload on the platform, and let a known wrench act on it besides the robot's own.
+        """Attach a payload to the platform, and apply a known wrench in addition to its own.
 
         Args:
             mass: [kg]. centre: (3,) [m] in the platform's frame; NaN is its centre of mass.
@@ -122,7 +122,7 @@ class World(Physics):
         self.set_load(self.true.wrench + wrench, self.true.gravity)
 
     def place(self, pose: Array) -> None:
-        """Platform at a pose (7,), cables straight, or hanging where they have weight."""
+        """Put the platform at a pose (7,), with cables straight, or hanging if they have weight."""
         self.data.qpos[:] = self.reference_qpos
         self.data.qvel[:] = 0.0
         self.data.time = 0.0
@@ -136,7 +136,7 @@ class World(Physics):
             self.update()
 
     def _string(self) -> None:
-        """Point masses where a chain hangs between its ends."""
+        """Put point masses where a chain hangs between its ends."""
         end = self.data.site_xpos[self.parts.anchors]
         free = self._rest * self.free_share
         up = -self.true.gravity / np.linalg.norm(self.true.gravity)
@@ -146,18 +146,18 @@ class World(Physics):
         self.data.qpos[self._address(self.places.node_dofs)] = nodes
 
     def _leaves_towards(self, ends: Array) -> Array:
-        """Where straight cables to points (m, 3) leave: exit points, or sheaves' tangents."""
+        """Where straight cables to points (m, 3) leave: exit points, or about sheaves' tangents."""
         start = self.exit_points().copy()
         if self.true.pulley_radius:
             start += (1.0 - self.free_share)[:, None] * (ends - start)
         return start
 
     def _address(self, dofs: Index) -> Index:
-        """Where in qpos: a free platform has one number more there."""
+        """Indices in qpos: a free platform has one more number there."""
         return dofs + (1 if self.is_free else 0)
 
     def update(self) -> None:
-        """Bring poses, sheaves and cable lengths up to the present qpos."""
+        """Update poses, sheaves and cable lengths to the present qpos."""
         mujoco.mj_kinematics(self.model, self.data)
         if self.true.pulley_radius:
             self._turn_sheaves()
@@ -166,14 +166,14 @@ class World(Physics):
         mujoco.mj_tendon(self.model, self.data)
 
     def _turn_sheaves(self) -> None:
-        """Turn each sheave about the vertical until it faces where its cable goes."""
+        """Turn each sheave about the vertical until it faces its cable."""
         reach = self.data.site_xpos[self.places.top_next] - self.true.exit_points
         half = 0.5 * np.arctan2(reach @ self._side, reach @ self._ahead)
         self.data.mocap_quat[:] = np.stack([np.cos(half), np.sin(half)], axis=1) @ self._swivel
 
     @contextmanager
     def frozen_slack(self, taut: NDArray[np.bool_]) -> Iterator[None]:
-        """Let some tendons (m N,) pull and push, the others vanish, curved laws included."""
+        """Let some tendons (m N,) pull and push, nonlinear laws included, and remove the others."""
         poly = self.model.tendon_stiffnesspoly
         kept = poly.copy()
         poly[~taut] = 0.0
@@ -184,7 +184,7 @@ class World(Physics):
             poly[:] = kept
 
     def residual(self) -> Array:
-        """Unbalanced generalised force (d,) [N, N m] at rest at the present qpos."""
+        """Residual generalised force (d,) [N, N m] at the present qpos, without velocity."""
         if self.true.pulley_radius:
             mujoco.mj_kinematics(self.model, self.data)
             self._turn_sheaves()
@@ -199,7 +199,7 @@ class World(Physics):
     def solve(
         self, stiffness: Array, force: Array, damping: float, neutral: float = 0.0
     ) -> Array | None:
-        """As for any robot, cable by cable; directions that are nearly free are not left alone."""
+        """As for any robot, but cable by cable, and also along directions that are nearly free."""
         d, own = self.n_platform, self.cable_dofs
         h = own.shape[1]
         try:
@@ -230,7 +230,7 @@ class World(Physics):
         tension = self.tensions()[self.places.tendons[:, 0]]
         if self.segments == 1:
             return tension
-        # half a segment's weight hangs on the exit point itself
+        # half a segment's weight acts on the exit point itself
         along = self.data.site_xpos[self.places.top_next] - self._leaves()
         along /= np.linalg.norm(along, axis=1, keepdims=True)
         half = 0.5 * self._segment_weight[:, None] * self.true.gravity
@@ -261,7 +261,7 @@ class World(Physics):
         return np.asarray(self.data.ten_length[self.places.tendons].sum(axis=1) - self.places.tail)
 
     def measure_free_share(self) -> Array:
-        """Part of each cable (m,) that hangs free of its sheave, at the present state."""
+        """Part of each cable (m,) that hangs free of its sheave, in the present state."""
         self.update()
         top = self.data.ten_length[self.places.tendons[:, 0]] - self.places.tail
         ends = self.data.site_xpos[self.places.top_next]
@@ -279,10 +279,10 @@ class World(Physics):
 
 
 def _coupling(places: Places, n_dof: int, segments: int) -> list[Together]:
-    """Groups of coordinates that may be shifted together to difference the forces.
+    """Groups of coordinates that may be shifted together in finite differences of the forces.
 
-    Cables meet only on the platform and segments only at their ends, so however
-    long the chains are, a few groups do.
+    Cables meet only on the platform and segments only at their ends, so a few groups suffice,
+    however long the chains are.
     """
     groups: list[Together] = []
     for k in range(places.n_platform):
@@ -291,7 +291,7 @@ def _coupling(places: Places, n_dof: int, segments: int) -> list[Together]:
     hubs = np.concatenate([places.exit_dofs, places.slider_dofs], axis=1)
     blocks = [hubs, *(places.node_dofs[:, j] for j in range(segments - 1))]
     for part in range(4):
-        # hubs first, then every third mass: what lies between them keeps their forces apart
+        # hubs first, then every third mass: their forces do not overlap
         mine = [0] if part == 0 else list(range(part, segments, 3))
         for axis in range(max((blocks[b].shape[1] for b in mine), default=0)):
             columns: list[Index] = []

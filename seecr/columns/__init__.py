@@ -1,1 +1,1 @@
-"""What the columns of a file of commands and measurements mean: one reader for both packages."""
+"""The columns of files of commands and measurements: one reader for both packages."""

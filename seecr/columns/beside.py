@@ -1,18 +1,18 @@
-"""What the TOML beside a file says of its commands; the rest of it is of measurements."""
+"""The commands part of the TOML beside a file; the rest of it is about measurements."""
 
 from __future__ import annotations
 
 from seecr.files import Toml
 
-# What a key may say, the default first.
+# Allowed values of each key, the default first.
 CHOICES = {"lengths": ("absolute", "told"), "start": ("reference", "first_row")}
 
 
 def choice(toml: Toml, key: str) -> str:
-    """What a key of :data:`CHOICES` says.
+    """The value of a key of :data:`CHOICES`.
 
     Raises:
-        InputFileError: another word than those it may say.
+        InputFileError: the value is not an allowed one.
     """
     value = toml.content.get(key, CHOICES[key][0])
     if value not in CHOICES[key]:

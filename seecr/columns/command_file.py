@@ -1,7 +1,7 @@
 """Commands from a file: poses or lengths, with runs, times, temperatures and known loads.
 
-The columns are those of a file of measurements, readings being passed over, and ``want_*``, the
-poses that lengths are for. The TOML beside it may say ``lengths = "told"`` and
+The columns are those of a file of measurements, whose readings are ignored, and ``want_*``, the
+poses that lengths are for. The TOML beside it may state ``lengths = "told"`` and
 ``start = "first_row"``.
 """
 
@@ -30,7 +30,7 @@ __all__ = ["CommandFile", "read_commands"]
 
 @dataclass(frozen=True, eq=False)
 class CommandFile:
-    """Commands as read.
+    """Commands as read from a file.
 
     Attributes:
         path: the file.
@@ -51,11 +51,11 @@ def read_commands(path: str | Path, robot: Robot) -> CommandFile:
     """Read a list of commands for a robot.
 
     Args:
-        path: the CSV or Parquet.
-        robot: its number of cables, and the reference pose for what the file does not say.
+        path: the CSV or Parquet file.
+        robot: for its number of cables, and its reference pose where the file states none.
 
     Raises:
-        InputFileError: with line and column of what is wrong.
+        InputFileError: with line and column of the mistake.
     """
     path = Path(path)
     columns = know_columns(read_table(path), robot.n_cables)
@@ -83,7 +83,7 @@ def read_commands(path: str | Path, robot: Robot) -> CommandFile:
 
 
 def _beside(path: Path) -> tuple[bool, bool]:
-    """Whether lengths were told, and whether runs start at their first row."""
+    """Whether lengths are told ones, and whether runs start at their first row."""
     if not path.exists():
         return False, False
     toml = read_toml(path, "expected a TOML beside the commands")
@@ -91,6 +91,6 @@ def _beside(path: Path) -> tuple[bool, bool]:
 
 
 def _numbers(run: NDArray[np.str_]) -> NDArray[np.int64]:
-    """Runs (n,) by number, in the order in which they come."""
+    """Runs (n,) as numbers, in the order in which they come."""
     order = {name: number for number, name in enumerate(dict.fromkeys(run.tolist()))}
     return np.array([order[name] for name in run.tolist()], dtype=np.int64)

@@ -1,7 +1,7 @@
 """What the columns of commands and measurements mean: names, units, and which belong together.
 
 A name is a quantity and, after the last underscore, its unit: ``cmd_x_mm``, ``length_3_m``.
-Quaternions (``cmd_qw``) have no unit. Columns of other names are kept out and named as unused.
+Quaternions (``cmd_qw``) have no unit. Columns with other names are ignored and listed as unused.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ POSITION = ("x", "y", "z")
 QUATERNION = ("qw", "qx", "qy", "qz")
 ANGLES = ("rx", "ry", "rz")
 
-# These begin many other names; only these endings are surely meant as a unit.
+# Many other names begin with these; only the listed suffixes are certain to be meant as units.
 _SURE_UNITS = {
     "t": {"", "s", "ms", "us", "ns", "sec", "min", "h", "S"},
     "payload": {"", "kg", "g", "mg", "t", "lb", "lbs", "oz", "N", "Kg", "KG"},
@@ -35,7 +35,7 @@ _SURE_UNITS = {
 
 @dataclass(frozen=True)
 class Column:
-    """One known column: its name and place in the file, and the unit of its numbers."""
+    """A known column: its name and index in the file, and the unit of its numbers."""
 
     name: str
     index: int
@@ -44,13 +44,12 @@ class Column:
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """The columns of a table that are known, as numbers in SI.
+    """The known columns of a table, as numbers in SI units.
 
     Attributes:
         table: the cells. known: columns by quantity (``"cmd_x"``, ``"length_3"``).
-        unused: names of the others. meant: what those of them are thought to mean that are near
-            a name that is not there.
-        notes: sentences for the reader, taken while reading.
+        unused: names of the others. meant: for those close to a missing name, that name.
+        notes: sentences for the reader, collected while reading.
     """
 
     table: Table
@@ -74,12 +73,12 @@ class Columns:
         return tuple(sorted(int(q.removeprefix(start)) for q in self.known if q.startswith(start)))
 
     def numbers(self, quantity: str, *, blank_is_nan: bool = False) -> Array:
-        """One column (n,) in SI."""
+        """One column (n,) in SI units."""
         column = self.known[quantity]
         return column.unit.to_si(self.table.numbers(column.index, blank_is_nan=blank_is_nan))
 
     def readings(self, prefix: str, parts: Sequence[str]) -> Array:
-        """Columns ``prefix_part`` (n, k) in SI; NaN where there is no column or an empty cell."""
+        """Columns ``prefix_part`` (n, k) in SI units; NaN for a missing column or an empty cell."""
         values = np.full((self.n_rows, len(parts)), np.nan)
         for k, part in enumerate(parts):
             quantity = f"{prefix}_{part}"
@@ -91,29 +90,29 @@ class Columns:
         return values
 
     def refuse(self, wrong: NDArray[np.bool_], quantity: str, text: Callable[[int], str]) -> None:
-        """Raise at the first row that is wrong (n,), if any."""
+        """Raise an error at the first row that is ``wrong`` (n,), if any."""
         if np.any(wrong):
             row = int(np.argmax(wrong))
             raise self.table.error(text(row), row=row, column=self.known[quantity].name)
 
     def half_there(self, what: str, missing: Sequence[str], need: str) -> InputFileError:
-        """Error for a group of columns that is not complete."""
+        """The error about an incomplete group of columns."""
         text = f"{what} columns half there; expected {need}, {' '.join(missing)} missing"
         return self.table.error(text + self.near_misses())
 
     def near_misses(self) -> str:
-        """`` (NOTE; NOTE)`` of misspelt columns, for errors about a column that is not there."""
+        """`` (NOTE; NOTE)`` about misspelt columns, for errors about a missing column."""
         notes = [question(name, meant) for name, meant in self.meant.items()]
         notes += unused_note([], other_rotations(self.unused))
         return f" ({'; '.join(note.rstrip('.') for note in notes)})" if notes else ""
 
 
 def know_columns(table: Table, n_cables: int) -> Columns:
-    """Know the columns of a table for a robot with ``n_cables`` cables.
+    """Identify the columns of a table for a robot with ``n_cables`` cables.
 
     Raises:
-        InputFileError: missing or unknown unit, repeated column, a cable that the robot has
-            not, no header at all, two ways of saying the same.
+        InputFileError: a missing or unknown unit, a repeated column, a cable that the robot does
+            not have, no header, or the same quantity given in two ways.
     """
     _check_names(table)
     known: dict[str, Column] = {}
@@ -138,7 +137,7 @@ def know_columns(table: Table, n_cables: int) -> Columns:
 
 
 def _check_names(table: Table) -> None:
-    """A header is there, and no name in it twice."""
+    """Check that there is a header, without repeated names."""
     numbers = [name for name in table.names if re.fullmatch(r"[+-]?\d*\.?\d+(e[+-]?\d+)?", name)]
     if numbers:
         raise table.error(
@@ -178,7 +177,7 @@ def _si_of(quantity: str) -> str:
     return "rad" if last in ANGLES else "m"
 
 
-# Of quantities, and of those that begin so where all of them have one.
+# SI units of quantities, or of all quantities with a prefix.
 _SI = {
     "run": "", "t": "s", "temperature": "C", "payload": "kg", "payload_x": "m", "payload_y": "m",
     "payload_z": "m", "tension": "N", "length": "m", "force": "N", "moment": "Nm",
@@ -207,7 +206,7 @@ def _check_cable(table: Table, quantity: str, name: str, n_cables: int) -> None:
 
 
 def _absent(known: dict[str, Column], n_cables: int) -> list[str]:
-    """Names, in each of their units, of every quantity that has no column."""
+    """Names, in each possible unit, of every quantity without a column."""
     of_poses = [f"{p}_{part}" for p in ("cmd", "meas") for part in POSITION + QUATERNION + ANGLES]
     of_cables = [f"{p}_{i}" for p in ("length", "tension") for i in range(1, n_cables + 1)]
     of_loads = [f"{p}_{axis}" for p in ("payload", "force", "moment") for axis in POSITION]

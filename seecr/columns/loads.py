@@ -11,11 +11,11 @@ from seecr.pose import Array
 
 
 def known_loads(columns: Columns, robot: Robot) -> Loads | None:
-    """What the platform carried in each row, or None where the file has no such columns.
+    """The known load of each row, or None if the file has no such columns.
 
     Raises:
-        InputFileError: a centre without a payload or half there, or a payload that leaves the
-            platform no mass.
+        InputFileError: a centre without a payload, an incomplete centre, or a payload that leaves
+            the platform without mass.
     """
     mass = _payload(columns, robot)
     wrench = np.zeros((columns.n_rows, 6))

@@ -1,4 +1,4 @@
-"""Names of columns that are near to ours, and names that are only alike."""
+"""Column names that are close to known ones, and names that only look alike."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from collections.abc import Sequence
 
 from seecr.columns.table import show
 
-# What others call a column, where the spelling is not close enough to be guessed from.
+# Other programs' names for a column, if the spelling is not close enough to guess.
 _ALIASES = {"time": "t_s", "time_s": "t_s", "timestamp": "t_s", "temp_c": "temperature_C"}
-# Likeness from which on a name may be a misspelt one.
+# Similarity from which a name may be a misspelt one.
 _NEAR = 0.75
 _ROTATION = re.compile(
     r"roll|pitch|yaw|euler|heading|rotvec|rodrigues|(?:^|_)(?:phi|theta|psi|rot)(?:_|$)",
@@ -23,10 +23,10 @@ OUR_ROTATIONS = (
 
 
 def meant_by(unused: Sequence[str], absent: Sequence[str]) -> dict[str, str]:
-    """Of unused names, what those are thought to mean that are near one that is absent.
+    """For unused names that are close to a missing one, that name.
 
-    Only spelling is guessed at: what tells one of ours from another (the axis, the cable) has to
-    stand in the name as it is.
+    Only the spelling may differ: what distinguishes one known name from another (the axis, the
+    cable) has to be in the name.
     """
     ours = {name.lower(): name for name in absent}
     ours |= {alias: name for alias, name in _ALIASES.items() if name in absent}
@@ -42,26 +42,26 @@ def meant_by(unused: Sequence[str], absent: Sequence[str]) -> dict[str, str]:
 
 
 def _distinct(name: str) -> set[str]:
-    """Parts of a name that say which one it is: x, qw, rz, the number of a cable."""
+    """The distinguishing parts of a name: x, qw, rz, the number of a cable."""
     parts = re.split(r"[\W_]+|(?<=\D)(?=\d)|(?<=\d)(?=\D)", name.lower())
     whole = {part for part in parts if re.fullmatch(r"q[wxyz]|r?[xyz]|\d+", part)}
-    # cmdx_m: the axis stuck to the word before
+    # as in cmdx_m, with the axis attached to the word
     stuck = {part[-1] for part in parts if re.fullmatch(r"[a-pr-z]{2,}[xyz]", part)}
     return whole | stuck
 
 
 def other_rotations(unused: Sequence[str]) -> list[str]:
-    """Those that name rotations in words which mean different things to different people."""
+    """Names of rotations by words that have different meanings for different people."""
     return [name for name in unused if _ROTATION.search(name)]
 
 
 def question(name: str, meant: str) -> str:
-    """What is asked about a name that is near one of ours."""
+    """The question about a name that is close to a known one."""
     return f"Column {show(name)} is not used; did you mean {meant}?"
 
 
 def unused_note(names: Sequence[str], rotations: Sequence[str]) -> list[str]:
-    """Sentences that name the columns that mean nothing here."""
+    """Sentences that list the columns without a known meaning."""
     notes = []
     if rotations:
         word = "Column" if len(rotations) == 1 else "Columns"

@@ -1,4 +1,4 @@
-"""Poses and lengths in a file: as commanded, as wanted, and how the platform was turned."""
+"""Poses and lengths in a file: commanded poses, wanted poses, and measured orientations."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from seecr.pose import Array, quat_from_rxyz, rxyz_from_quat
 if TYPE_CHECKING:
     from seecr.description.robot import Robot
 
-# Files with six digits are rounded by up to 1e-6; a quaternion farther off is a mistake.
+# Files with six digits are off by up to 1e-6; a norm farther from one is a mistake.
 _NORM_TOLERANCE = 1e-3
 
 
 def command_lengths(columns: Columns, robot: Robot) -> Array | None:
-    """Commanded rest lengths (n, m) [m], or None where the file has no such columns."""
+    """Commanded rest lengths (n, m) [m], or None if the file has no such columns."""
     given = columns.cables("length")
     if not given:
         return None
@@ -41,10 +41,10 @@ def _length(columns: Columns, quantity: str) -> Array:
 
 
 def command_poses(columns: Columns, robot: Robot) -> Array:
-    """Commanded poses (n, 7); what the robot cannot change may be left out of the file.
+    """Commanded poses (n, 7); coordinates that the robot cannot change may be missing in the file.
 
     Raises:
-        InputFileError: no command at all, or one that is half there.
+        InputFileError: there is no command, or an incomplete one.
     """
     poses = poses_of(columns, robot, "cmd", "commanded")
     if poses is None:
@@ -56,10 +56,10 @@ def command_poses(columns: Columns, robot: Robot) -> Array:
 
 
 def poses_of(columns: Columns, robot: Robot, prefix: str, word: str) -> Array | None:
-    """Poses (n, 7) of the columns of a prefix, called so in notes; None where there are none.
+    """Poses (n, 7) of columns with a prefix; None if there are none. ``word`` is for notes.
 
     Raises:
-        InputFileError: a pose that is half there.
+        InputFileError: a pose is incomplete.
     """
     present = columns.present
     if not present(prefix, POSITION + QUATERNION + ANGLES):
@@ -156,7 +156,7 @@ def _check_norm(columns: Columns, prefix: str, quat: Array, norm: Array) -> None
 
 
 def measured_orientation(columns: Columns) -> tuple[Array | None, Array]:
-    """Quaternions (n, 4) or None, and angles (n, 3) [rad] where these are all there is."""
+    """Quaternions (n, 4) or None, and angles (n, 3) [rad] of incomplete orientations."""
     angles = columns.readings("meas", ANGLES)
     if columns.present("meas", QUATERNION):
         quat = _quaternions(columns, "meas", blank_is_nan=True)
@@ -167,5 +167,5 @@ def measured_orientation(columns: Columns) -> tuple[Array | None, Array]:
     blank = np.isnan(angles)
     if np.all(blank) or np.any(blank != blank[:, :1]):
         return None, angles
-    # Every row has all three angles or none, so nothing is lost by going to quaternions.
+    # each row has all three angles or none, so they convert to quaternions without loss
     return quat_from_rxyz(angles), np.full_like(angles, np.nan)

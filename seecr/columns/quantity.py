@@ -1,4 +1,4 @@
-"""What a column's name is made of: a quantity and, after the last underscore, its unit."""
+"""The parts of a column's name: a quantity and, after the last underscore, its unit."""
 
 from __future__ import annotations
 
@@ -13,6 +13,6 @@ QUANTITY = re.compile(
 
 
 def is_number(name: str) -> bool:
-    """Whether a column of that name holds numbers that are read: runs have names."""
+    """Whether a column of that name holds numbers that are read; runs have names."""
     found = QUANTITY.fullmatch(name.strip())
     return found is not None and found[1] != "run"

@@ -1,4 +1,4 @@
-"""Commands that a robot cannot have been given: of another unit, or of another robot."""
+"""Implausible commands: in another unit, or for another robot."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from seecr.description.joints import off_joints
 from seecr.description.robot import ABSURD, Robot
 from seecr.pose import Array
 
-# So many commands say where a robot goes.
+# Number of commands from which their median is meaningful.
 _SEVERAL = 4
 # Numbers below this part of the frame are near its origin, and no cable is so short.
 _TINY = 0.01
@@ -20,7 +20,7 @@ __all__ = ["ABSURD", "away_from", "check_reach"]
 
 
 def away_from(robot: Robot, poses: Array | None, lengths: Array | None) -> Array:
-    """How far (n, k) [m] commands are from the reference position; lengths (n, m) as they are."""
+    """Distances (n, k) [m] of commands from the reference position; lengths (n, m) as they are."""
     if lengths is not None:
         return lengths
     assert poses is not None
@@ -47,7 +47,7 @@ def check_reach(columns: Columns, robot: Robot, poses: Array | None, lengths: Ar
 
 
 def _refuse_another(columns: Columns, robot: Robot, poses: Array) -> None:
-    """Commands (n, 7) that most likely are those of another robot."""
+    """Refuse commands (n, 7) that are most likely for another robot."""
     off = off_joints(robot, poses)
     if off is not None:
         raise columns.table.error(
@@ -79,7 +79,7 @@ def _refuse_far(columns: Columns, quantity: str, away: Array, reach: float) -> N
 
 
 def _refuse_small(columns: Columns, quantity: str, home: float, reach: float) -> None:
-    """Metres under the name of a smaller unit: all near nothing, and as metres inside the frame."""
+    """Refuse metres under a smaller unit's name: all near zero, but inside the frame as metres."""
     unit, given = columns.known[quantity].unit, columns.numbers(quantity)
     as_metres = given / unit.to_si(1.0)
     length = quantity.startswith("length_")

@@ -1,7 +1,6 @@
-"""A file of rows and named columns, CSV or Parquet, as text with the place of each cell.
+"""A file of rows and named columns, CSV or Parquet, as text with the line of each cell.
 
-Nothing here knows what a column means; what is wrong with a file or a cell is said with its
-line and column.
+This module does not know what a column means. Errors name the line and column of the mistake.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ _TEXT_BEGINNINGS = {"{": "JSON", "[": "JSON or TOML", "<": "XML, such as a robot
 VICON = ("segments", "trajectories", "devices", "joints", "model outputs")
 _QUALISYS = "no_of_frames"
 _SEPARATORS = (",", ";", "\t")
-# What stands for a reading that was not made, besides an empty cell.
+# Marks of a missing reading, besides an empty cell.
 _NOT_READ = ("nan", "NaN")
 _COMMA_NUMBER = re.compile(r"[+-]?(\d+,\d*|,\d+)(e[+-]?\d+)?", re.IGNORECASE)
 _POINT_NUMBER = re.compile(r"[+-]?(\d+\.\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE)
@@ -45,9 +44,9 @@ class Table:
     Attributes:
         path: the file.
         names: of the columns, stripped, as in the header.
-        line: (n,) where each row begins, counted from 1.
-        header_line: where the header is; None where the file has no lines.
-        cells: of each column the stripped texts, (n,) each; numbers with decimal points.
+        line: (n,) line at which each row begins, counted from 1.
+        header_line: line of the header; None if the file has no lines.
+        cells: for each column the stripped texts, (n,) each; numbers with decimal points.
     """
 
     path: Path
@@ -59,14 +58,14 @@ class Table:
     def error(
         self, text: str, *, row: int | None = None, column: str | None = None
     ) -> InputFileError:
-        """Error at a row (counted from 0) or, without one, in the header."""
+        """An error at a row (counted from 0) or, without one, in the header."""
         in_lines = self.header_line is not None
         line = self.header_line if row is None else int(self.line[row])
         word = "line" if in_lines else "row"
         return InputFileError.at(self.path, text, line=line, column=column, line_word=word)
 
     def numbers(self, index: int, *, blank_is_nan: bool) -> Array:
-        """Numbers (n,) of one column, as written; NaN where nothing was read, if that may be."""
+        """Numbers (n,) of one column, as written; NaN for missing readings, if allowed."""
         cells = self.cells[index]
         if blank_is_nan:
             cells = ["" if cell in _NOT_READ else cell for cell in cells]
@@ -94,7 +93,7 @@ def show(text: str) -> str:
 
 
 def taken_for(names: Sequence[str]) -> str:
-    """Of what program's file this seems the first row, and what to do; "" if it is not known."""
+    """The program whose export begins like this, and what to do; "" if unknown."""
     cell = names[0].lower()
     if cell == "format version":
         return "; this is an export of Motive: crosscheck import motive"
@@ -167,9 +166,9 @@ def _read_csv(path: Path, data: bytes) -> Table:
 
 
 def _with_points(names: list[str], cells: list[list[str]]) -> list[list[str]]:
-    """Decimal commas become points, if no number has a point: one file has one kind.
+    """Decimal commas as points, if no number has a point: a file uses only one kind.
 
-    A run's name may be 1.5, and so may be what nobody reads.
+    Columns without numbers are left out of that test: a run's name may be 1.5.
     """
     pairs = zip(names, cells, strict=True)
     every = [cell for name, column in pairs if is_number(name) for cell in column]
@@ -194,7 +193,7 @@ def _check_first_line(path: Path, number: int, line: str) -> None:
 
 
 def _separator(path: Path, number: int, line: str) -> str:
-    """What stands between the names of the header: a comma, a semicolon or a tab."""
+    """The mark between the names of the header: a comma, a semicolon or a tab."""
     outside = re.sub(r'"[^"]*"', "", line)
     counts = {mark: outside.count(mark) for mark in _SEPARATORS}
     mark = max(_SEPARATORS, key=lambda one: counts[one])
@@ -249,7 +248,7 @@ def _read_parquet(path: Path) -> Table:
         import pyarrow
         from pyarrow import parquet
     except ModuleNotFoundError as error:
-        if error.name != "pyarrow":  # it is there, and something of it is not
+        if error.name != "pyarrow":  # installed, but one of its own imports is missing
             raise
         raise MissingPackageError(
             f"{path}: is Parquet, which needs pyarrow; pip install pyarrow, or save it as CSV"

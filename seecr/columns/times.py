@@ -1,4 +1,4 @@
-"""The runs of a file, its clock and its thermometer: names, seconds or times of day, Celsius."""
+"""Runs, times and temperatures of a file: names, seconds or times of day, Celsius."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from seecr.columns.table import Table, show
 from seecr.errors import InputFileError
 from seecr.pose import Array
 
-# A date, and a time of day or none.
+# A date, with or without a time of day.
 _ISO = re.compile(r"\d{4}-?\d\d-?\d\d([T ]\d.*)?")
 _ABSOLUTE_ZERO_C = -273.15
 
 
 def runs(columns: Columns) -> NDArray[np.str_]:
-    """Names of the runs (n,); "all" where the file has no such column.
+    """Names of the runs (n,); "all" if the file has no such column.
 
     Raises:
         InputFileError: a row without a name, or a run that comes back after another.
@@ -54,7 +54,7 @@ def times(columns: Columns, run: NDArray[np.str_]) -> Array | None:
     """Times (n,) [s], or None; times of day count from that of the first row.
 
     Raises:
-        InputFileError: a cell that is no time, or rows of a run (n,) out of time order.
+        InputFileError: a cell that is not a time, or rows of a run (n,) out of time order.
     """
     if "t" not in columns.known:
         return None
@@ -81,11 +81,11 @@ def temperatures(columns: Columns) -> Array | None:
     """Temperatures (n,) [deg C], or None.
 
     Raises:
-        InputFileError: a cell that is empty or no temperature.
+        InputFileError: a cell that is empty or not a temperature.
     """
     if "temperature" not in columns.known:
         return None
-    # It acts on the cables in every row, so a gap cannot be passed over like a lost reading.
+    # It affects the cables in every row, so it may not be missing like a reading.
     celsius = columns.numbers("temperature")
     columns.refuse(
         celsius < _ABSOLUTE_ZERO_C,
@@ -96,10 +96,10 @@ def temperatures(columns: Columns) -> Array | None:
 
 
 def began(table: Table, index: int) -> datetime | None:
-    """The time of day in the first row of a column; None where it has numbers.
+    """The time of day in the first row of a column; None if the column has numbers.
 
     Raises:
-        InputFileError: it looks like a time of day and is none.
+        InputFileError: it looks like a time of day but is not one.
     """
     cell = table.cells[index][0]
     of_day = _ISO.fullmatch(cell) is not None and not cell.isdigit()
@@ -110,7 +110,8 @@ def times_of_day(table: Table, index: int) -> Array:
     """Seconds (n,) since the first row of a column of times of day.
 
     Raises:
-        InputFileError: a cell that is no time of day, or of another zone.
+        InputFileError: a cell that is not a time of day, or has a time zone only if others have
+            not.
     """
     cells = table.cells[index]
     first = _moment(table, index, 0)

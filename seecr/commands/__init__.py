@@ -1,1 +1,1 @@
-"""What the winches were told, the loads that were carried, and the way from row to row."""
+"""Commands to the winches, known loads, and the path between rows."""

@@ -1,4 +1,4 @@
-"""What the winches were told, row by row, and play between what they were told and what they do."""
+"""Commands to the winches, row by row, and the play between commanded and actual motion."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from seecr.pose import Array
 
 @dataclass(frozen=True, eq=False)
 class Commands:
-    """What the robot was told, row by row, in time order within a run.
+    """The commands to a robot, row by row, in time order within a run.
 
     Attributes:
-        pose: (n, 7) commanded poses; for lengths, where the solver starts from.
+        pose: (n, 7) commanded poses; if lengths are commanded, where the solver starts.
         lengths: (n, m) [m] commanded rest lengths, or None.
-        run: (n,) int, number of the continuous motion a row belongs to.
+        run: (n,) int, number of the continuous motion that a row belongs to.
         time: (n,) [s] or None.
         temperature: (n,) [deg C] or None.
-        passed: (k, n, m) [m] commanded changes of length (or lengths) that the way to each row
-            passes, in order: where it starts and where cables turn round; None where nobody asks.
-        told: whether lengths are what the winches were told, counted as the plain robot counts: its
-            rest lengths at the reference pose, and from there the winch turns by the difference.
-            Lengths that are not told are absolute: all the cable there is from the exit point on.
-        loads: what the platform carried, or None.
-        stands: (n,) bool, rows whose run starts at its first row, at rest; the others' runs start
-            at the reference pose. None: all of them.
-        clock: (n,) int, number of the clock that ``time`` is read from; None for one alone.
-        parts: names (n,) of the "file" and the "run" that each row is of, for effects that have
-            values of their own for each.
-        line: (n,) of the file that rows were read from; None where there is none.
+        passed: (k, n, m) [m] commanded changes of length (or lengths) passed on the way to each
+            row, in order: at its start and where cables reverse; None if no effect needs them.
+        told: whether lengths are in the plain model's terms: at the reference pose they are the
+            robot's rest lengths, and from there the winch turns by the difference. Otherwise they
+            are absolute: the whole cable from the exit point on.
+        loads: known loads, or None.
+        stands: (n,) bool, rows whose run starts at its first row, at rest; other runs start at the
+            reference pose. None means that all of them do.
+        clock: (n,) int, number of the clock of ``time``; None if there is only one.
+        parts: names (n,) of the "file" and the "run" of each row, for effects that have values of
+            their own for each.
+        line: (n,) line of each row in its file; None without a file.
     """
 
     pose: Array
@@ -70,7 +70,7 @@ class Commands:
 
     @property
     def starts(self) -> NDArray[np.bool_]:
-        """(n,) rows that start a run: the first, and those whose run is another than before."""
+        """(n,) rows that start a run: the first, and those with another run than the row before."""
         fresh = np.zeros(len(self), dtype=bool)
         fresh[:1] = True
         if self.run is not None:
@@ -79,7 +79,7 @@ class Commands:
 
     @property
     def absolute(self) -> bool:
-        """Whether lengths are commanded that no reference applies to."""
+        """Whether absolute lengths are commanded."""
         return self.lengths is not None and not self.told
 
     @property
@@ -88,36 +88,36 @@ class Commands:
         return self.starts & (False if self.stands is None else self.stands)
 
     def change(self, robot: Robot) -> Array:
-        """Lengths (n, m) [m] that winches were told to pay out since they were zeroed.
+        """Commanded changes of length (n, m) [m] since the winches were zeroed.
 
-        For absolute lengths these themselves.
+        For absolute lengths these are the lengths themselves.
         """
         if self.lengths is None:
             return self.nominal_change(robot)
         return self.lengths - robot.rest_lengths if self.told else self.lengths
 
     def home(self, robot: Robot) -> Array:
-        """What ``change`` is where a run starts, at the reference pose, (m,) [m]."""
+        """The value of ``change`` at the reference pose, (m,) [m]."""
         return robot.rest_lengths if self.absolute else np.zeros(robot.n_cables)
 
     def before(self, rows: Array, home: Array) -> Array:
-        """What ``rows`` (n, k) are at the start of the way to each row.
+        """The values of ``rows`` (n, k) at the start of the way to each row.
 
-        That is the row before, ``home`` (k,) where a run starts, or the row itself if it starts
-        there.
+        They are those of the row before, or ``home`` (k,) if a run starts there, or those of the
+        row itself if its run starts where it is.
         """
         before = np.roll(rows, 1, axis=0)
         before[self.starts] = home
         return np.where(self.starts_here[:, None], rows, before)
 
     def nominal_change(self, robot: Robot) -> Array:
-        """Straight lengths at the commanded poses less those at the reference, (n, m) [m]."""
+        """Straight lengths at the commanded poses minus those at the reference pose, (n, m) [m]."""
         if not self._kept or self._kept[0][0] is not robot:
             change = robot.nominal_lengths(self.pose) - robot.reference_lengths
             self._kept[:] = [(robot, change)]
         return self._kept[0][1]
 
-    # of the last robot asked for: every trial of a fit asks again
+    # for the last robot asked for, since every trial of a fit asks again
     _kept: list[tuple[Robot, Array]] = field(default_factory=list, repr=False, init=False)
 
 
@@ -126,15 +126,14 @@ def play(
 ) -> Array:
     """The play operator: an output that lags its input (n, m) by up to the half-width (m,).
 
-    It starts centred where each run starts: on the rows of ``starts`` (n,), or on ``passed[0]``
-    there. Between rows the input goes through ``passed`` (k, n, m), if given, and one way in
-    between.
+    It starts centred at the start of each run (``starts`` (n,)): on that row, or on ``passed[0]``.
+    Between rows the input passes through ``passed`` (k, n, m), if given, monotonically in between.
     """
     way = told[None] if passed is None else np.concatenate([passed, told[None]])
     low, high = way[0] - half_width, way[0] + half_width
     low[starts] = high[starts] = way[0, starts]
-    # an input moves the output to the nearest point of a band about it, and so do many inputs
-    # in turn, with one band for all: that of each row first, then of 2, 4, 8, ... rows
+    # an input moves the output to the nearest point of a band about it. A sequence of inputs acts
+    # as one band, too: computed for each row first, then for 2, 4, 8, ... rows
     for at in way[1:]:
         low, high = _band_of_both(low, high, at - half_width, at + half_width)
     rows = 1
@@ -145,5 +144,5 @@ def play(
 
 
 def _band_of_both(low: Array, high: Array, least: Array, most: Array) -> tuple[Array, Array]:
-    """The band that limits to ``low`` and ``high`` and then to ``least`` and ``most``."""
+    """The band equivalent to ``low`` and ``high`` followed by ``least`` and ``most``."""
     return np.clip(low, least, most), np.clip(high, least, most)

@@ -1,4 +1,4 @@
-"""Known loads: what the platform carried besides itself, row by row."""
+"""Known loads: what the platform carried in each row."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from seecr.pose import LARGEST, Array, all_finite
 
 @dataclass(frozen=True, eq=False)
 class Loads:
-    """Payloads and external wrenches of n rows that are known, such as weights hung on.
+    """Known payloads and external wrenches of n rows, such as weights hung on the platform.
 
-    A payload weighs through the model's gravity and hangs before the way to its row begins.
+    A payload's weight follows the model's gravity. It is attached before the way to its row begins.
 
     Attributes:
         mass: (n,) [kg] of the payload.
-        centre: (n, 3) [m] of the payload, in the platform's frame; NaN where it is the platform's
-            own centre of mass, wherever effects move that.
+        centre: (n, 3) [m] of the payload, in the platform's frame; NaN if it is the platform's own
+            centre of mass, including any effect on that.
         wrench: (n, 6) [N, N m] force at the platform's origin and moment, base frame.
     """
 
@@ -36,7 +36,7 @@ class Loads:
         centre: Array | None = None,
         wrench: Array | None = None,
     ) -> Loads:
-        """Loads of n rows from what there is of them; one number or vector is that of all rows.
+        """Loads of n rows; one number or vector applies to all rows, None means no load.
 
         Raises:
             InputError: a shape that does not fit n rows, or numbers that are not finite.
@@ -51,11 +51,11 @@ class Loads:
         return len(self.mass)
 
     def rows(self, index: NDArray[np.integer]) -> Loads:
-        """Those of some rows."""
+        """The loads of some rows."""
         return Loads(self.mass[index], self.centre[index], self.wrench[index])
 
     def followed_by(self, other: Loads) -> Loads:
-        """These rows and then others."""
+        """These rows, then those of another."""
         return Loads(
             *(
                 np.concatenate([getattr(self, name), getattr(other, name)])
@@ -65,9 +65,10 @@ class Loads:
 
     @property
     def kinds(self) -> NDArray[np.int64]:
-        """(n,) number of each row's load among the different ones."""
+        """(n,) number of each row's load among the different loads."""
         loaded = self.mass[:, None] != 0.0
-        # NaN, the platform's own centre, is alike to itself; and where nothing hangs is no matter
+        # NaN (the platform's own centre) equals NaN, and the centre does not matter without a
+        # payload
         own = np.isnan(self.centre) & loaded
         centre = np.where(loaded & ~own, self.centre, 0.0)
         table = np.concatenate([self.mass[:, None], own, centre, self.wrench], axis=1)
@@ -75,7 +76,7 @@ class Loads:
 
     @property
     def changes(self) -> NDArray[np.bool_]:
-        """(n,) rows that carry another load than the row before."""
+        """(n,) rows with another load than the row before."""
         return np.concatenate([[False], np.diff(self.kinds) != 0])
 
 

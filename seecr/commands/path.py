@@ -1,9 +1,9 @@
-"""The way of a robot through its commands: waypoints, and where cables turn round between them.
+"""The path of a robot through its commands: waypoints, and where cables reverse between them.
 
-A run starts at the robot's reference pose (or at its first row, where commands say so), goes
-straight to its first row and straight from row to row, in what the platform may do. Where the load
-changes it does so first, at the row before. What depends on the rows before (see
-:mod:`seecr.compiled.walk`, and :func:`seecr.commands.data.play`) depends on this way.
+A run starts at the robot's reference pose (or at its first row, if the commands say so) and goes
+straight to its first row and from row to row, in the platform's degrees of freedom. Loads change at
+the row before, ahead of the motion. Effects with history depend on this path (see
+:mod:`seecr.compiled.walk` and :func:`seecr.commands.data.play`).
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from seecr.description.joints import motion_columns, pose_of_values, values_of_p
 from seecr.description.robot import Robot
 from seecr.pose import Array, cross, pose_add, pose_difference, quat_rotate
 
-# Waypoints on the way to the first row of a run, and from row to row.
+# Number of waypoints on the way to the first row of a run, and from row to row.
 _APPROACH, _BETWEEN = 6, 2
-# Turns of a cable's length are looked for in pieces of a way on which the platform turns by less
-# [rad]; two turns in one piece, which go unseen, differ by less than a millionth of an anchor
-# point's distance.
+# Reversals of a cable's length are searched in pieces in which the platform turns by less than this
+# [rad]. Two reversals in one piece would go unseen; they differ by less than a millionth of an
+# anchor point's distance.
 _PIECE = 0.02
-# Rate of a squared length that is rounding, relative to the largest squared length; rounds until
-# it is that small (a few).
+# Derivative of a squared length that is rounding, relative to the largest squared length; and most
+# iterations until it is that small (a few are needed).
 _STILL, _ROUNDS = 1e-14, 20
 
 
@@ -37,9 +37,9 @@ class Path:
     Attributes:
         robot: as described; given: commands of the n rows.
         commands: of all N waypoints.
-        rows: (n,) which waypoints are the rows asked for.
-        source: (N,) which row a waypoint belongs to.
-        fresh: (N,) bool, waypoints at which a run starts from the reference pose.
+        rows: (n,) index of each row among the waypoints.
+        source: (N,) index of the row that a waypoint belongs to.
+        fresh: (N,) bool, waypoints at which a run starts.
         elapsed: (N,) [s] since the waypoint before.
     """
 
@@ -53,7 +53,7 @@ class Path:
 
     @property
     def new_clock(self) -> NDArray[np.bool_]:
-        """(N,) bool, waypoints from which on another clock tells the time; the first is one."""
+        """(N,) bool, waypoints at which another clock begins, including the first."""
         clock = self.commands.clock
         changes = np.zeros(len(self.source), dtype=bool)
         if clock is not None:
@@ -63,12 +63,12 @@ class Path:
 
     @cached_property
     def turning(self) -> Commands:
-        """Of all waypoints, with where lengths turn round in between, for backlash."""
+        """Commands of all waypoints with the reversals in between, for backlash."""
         return turning(self.robot, self.commands)
 
     @cached_property
     def given_turning(self) -> Commands:
-        """Of the n rows alone, with where lengths turn round in between."""
+        """Commands of the n rows with the reversals in between."""
         return turning(self.robot, self.given)
 
 
@@ -78,12 +78,12 @@ def path_of(robot: Robot, commands: Commands, waypoints: float | None = None) ->
     Args:
         robot: as described.
         commands: n rows.
-        waypoints: [of the robot's length] by which what is commanded moves between them at most;
-            a few for each row by default.
+        waypoints: largest motion of the command between them [robot's length]; by default there is
+            a fixed number for each row.
     """
     n = len(commands)
     ways, fresh = _ways(robot, commands), commands.starts
-    # a way begins with a waypoint of its own where a run starts, or with another load
+    # the way begins with a waypoint of its own if a run starts or the load changes
     begins = fresh.copy() if commands.loads is None else fresh | commands.loads.changes
     steps = np.where(fresh, _APPROACH, _BETWEEN)
     if waypoints is not None:
@@ -102,7 +102,7 @@ def path_of(robot: Robot, commands: Commands, waypoints: float | None = None) ->
         lengths = last[source] + part[:, None] * (commands.lengths - last)[source]
         lengths[rows] = commands.lengths
     since = _since(commands)
-    # a run's clock starts at its first row: before, the robot waits at home
+    # a run's clock starts at its first row: until then the robot waits at the reference pose
     elapsed = np.where(fresh, 0.0, since / np.maximum(steps, 1))[source]
     elapsed[step == 0] = np.where(fresh, since, 0.0)[source[step == 0]]
     whole = Commands(
@@ -120,7 +120,7 @@ def path_of(robot: Robot, commands: Commands, waypoints: float | None = None) ->
 
 
 def _moved(ways: _Ways, commands: Commands) -> Array:
-    """How far what is commanded moves on the way to each row, (n,), over the robot's length."""
+    """Motion of the command on the way to each row, (n,), over the robot's length."""
     robot = ways.robot
     if commands.lengths is not None:
         last = commands.before(commands.lengths, robot.rest_lengths)
@@ -130,7 +130,7 @@ def _moved(ways: _Ways, commands: Commands) -> Array:
 
 
 def _since(commands: Commands) -> Array:
-    """(n,) [s] since the row before; none where another clock begins."""
+    """(n,) [s] since the row before; zero where another clock begins."""
     if commands.time is None:
         return np.zeros(len(commands))
     since = np.maximum(np.diff(commands.time, prepend=commands.time[:1]), 0.0)
@@ -141,11 +141,11 @@ def _since(commands: Commands) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Ways:
-    """The ways to n rows, straight in what the platform may do: poses, or values of its joints.
+    """The straight ways to n rows, in poses or in joint values.
 
     Attributes:
         start: (n, 7) poses or (n, d) values; change: (n, 6) or (n, d).
-        turn: (n,) [rad] no less than the platform turns on the way.
+        turn: (n,) [rad] upper bound of the platform's rotation on the way.
     """
 
     robot: Robot
@@ -154,7 +154,7 @@ class _Ways:
     turn: Array
 
     def at(self, row: NDArray[np.integer], part: Array) -> tuple[Array, Array]:
-        """Poses (k, 7) at parts (k,) of the ways to rows (k,), and their rates (k, 6) by part."""
+        """Poses (k, 7) at fractions (k,) of the ways to rows (k,), and their derivatives (k, 6)."""
         change = self.change[row]
         moved = part[:, None] * change
         if not self.robot.joints:
@@ -165,7 +165,7 @@ class _Ways:
     def rates(
         self, row: NDArray[np.integer], part: Array, exits: Array, anchors: Array
     ) -> tuple[Array, Array]:
-        """Half the rates of squared lengths (k, c) [m^2] by part, and lengths (k, c) [m]."""
+        """Half the derivatives (k, c) [m^2] of squared lengths, and lengths (k, c) [m]."""
         pose, rate = (one[:, None] for one in self.at(row, part))
         arm = quat_rotate(pose[..., 3:], anchors)
         span = pose[..., :3] + arm - exits
@@ -186,10 +186,10 @@ def _ways(robot: Robot, commands: Commands) -> _Ways:
 
 
 def turning(robot: Robot, commands: Commands) -> Commands:
-    """The same commands, with what the ways to their rows pass (``Commands.passed``).
+    """The same commands, with what is passed on the way to each row (``Commands.passed``).
 
-    Between rows a cable's commanded length turns round where its rate is zero. Lengths commanded
-    as such never do.
+    A cable's commanded length reverses between rows where its derivative is zero. Commanded lengths
+    never do.
     """
     told = commands.change(robot)
     start = commands.before(told, commands.home(robot))
@@ -206,9 +206,9 @@ def turning(robot: Robot, commands: Commands) -> Commands:
 def _turns(
     ways: _Ways,
 ) -> tuple[NDArray[np.integer], NDArray[np.integer], NDArray[np.integer], Array]:
-    """Where cables turn round: row, cable, how many turns before on that way, and length [m]."""
+    """Where cables reverse: row, cable, number of reversals before on that way, and length [m]."""
     robot = ways.robot
-    # without turning the square of a length is a parabola: its rate has one zero at most
+    # without rotation the squared length is a parabola: its derivative has one zero at most
     pieces = 1 + np.ceil(ways.turn / _PIECE).astype(int)
     row = np.repeat(np.arange(len(pieces)), pieces + 1)
     first = np.cumsum(pieces + 1) - pieces - 1
@@ -227,9 +227,9 @@ def _length_at_rest(
     ways: _Ways, row: NDArray[np.integer], cable: NDArray[np.integer],
     one: tuple[Array, Array], other: tuple[Array, Array],
 ) -> Array:  # fmt: skip
-    """Lengths (k,) [m] of cables (k,) where their rates are zero between two parts of the way.
+    """Lengths (k,) [m] of cables (k,) where their derivative is zero between two parts of the way.
 
-    By the Illinois variant of the rule of false position (Dowell and Jarratt, BIT 11, 1971).
+    By the Illinois variant of the regula falsi (Dowell and Jarratt, BIT 11, 1971).
     """
     (a, at_a), (b, at_b) = one, other
     exits = ways.robot.exit_points[cable, None]

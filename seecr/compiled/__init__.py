@@ -1,1 +1,1 @@
-"""All that is compiled by numba: arrays in, arrays out, and nothing of the rest of seecr."""
+"""Everything that numba compiles: arrays in, arrays out, without imports from the rest of seecr."""

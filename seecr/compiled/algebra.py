@@ -9,7 +9,7 @@ from seecr.compiled.jit import jit, jit_inner
 
 @jit
 def cholesky(a, shift, out):
-    """Lower factor of a + shift I; False where that is not positive definite."""
+    """Lower Cholesky factor of a + shift I; False if that is not positive definite."""
     n = a.shape[0]
     for j in range(n):
         total = a[j, j] + shift
@@ -45,7 +45,7 @@ def solve_factored(factor, b, out):
 
 @jit_inner
 def eliminate(a, b, out):
-    """Solve a general small system by elimination with row pivots; ``a`` is spent."""
+    """Solve a general small system by elimination with row pivots; ``a`` is overwritten."""
     n = a.shape[0]
     copy_vector(b, out)
     for c in range(n):
@@ -88,7 +88,7 @@ def solve_3x3(a, b, out):
 
 @jit_inner
 def largest_diagonal(a):
-    """Largest diagonal entry by size."""
+    """Largest absolute diagonal entry."""
     top = 0.0
     for k in range(a.shape[0]):
         top = max(top, abs(a[k, k]))

@@ -1,9 +1,10 @@
-"""A catenary found by brackets: slower than Newton's method, and it cannot get lost.
+"""A catenary found by bracketing: slower than Newton's method, but it cannot fail to converge.
 
 For a cable that hangs nearly straight down and is barely slack, Newton's method on the whole
-system crawls along a bent valley. One unknown at a time is safe: at a given horizontal pull h
-the vertical span grows with the vertical pull v, and with v so chosen the horizontal span grows
-with h (the complementary energy of a cable is convex), so that both roots can be bracketed.
+system advances very slowly along a curved valley. One unknown at a time is safe: at a given
+horizontal pull h the vertical span grows with the vertical pull v, and with v solved for, the
+horizontal span grows with h (the complementary energy of a cable is convex). So both roots can be
+bracketed.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from seecr.compiled.columns import CREEP, EA, RADIUS, REST, WEIGHT
 from seecr.compiled.jit import jit, jit_inner
 from seecr.compiled.pulley import pulley_geometry
 
-# Halvings and steps that bring a bracket to rounding; most widenings of one.
+# Most steps to shrink a bracket to rounding, and most widenings of one.
 _STEPS, _WIDER = 200, 2000
 
 
@@ -28,7 +29,7 @@ def _inside(guess, low, high):
 
 @jit_inner
 def _vertical_pull(h, rise, w, length, ea, v):
-    """Vertical pull [N] at the lower end of a cable that spans ``rise``, from a guess."""
+    """Vertical pull [N] at the lower end of a cable that spans ``rise``, from a first guess."""
     low, high, reach = v, v, w * length + h
     for _ in range(_WIDER):
         if catenary_span(h, low, w, length, ea)[1] <= rise:
@@ -60,7 +61,7 @@ def bracketed_pull(across, rise, w, length, ea):
         across, rise: spans [m] from the lower to the upper end, across > 0.
         w: weight per metre [N/m]. length: unstretched [m]. ea: E S [N].
     """
-    # in logarithms: the pull of a cable that hangs in a loop is small beyond all measure
+    # logarithmic, since the pull of a cable that hangs in a loop is extremely small
     u, v = math.log(0.5 * w * length), 0.5 * w * (rise - length)
     low, high = u, u
     for _ in range(_WIDER):
@@ -93,7 +94,7 @@ def bracketed_pull(across, rise, w, length, ea):
 
 @jit_inner
 def guess_by_brackets(row, across, rise, unknown):
-    """A start for :func:`solve_catenary`: exact, but for what is in series with the catenary."""
+    """A start for :func:`solve_catenary`: exact, except for what is in series with the catenary."""
     length = row[REST] * (1.0 + row[CREEP])
     if row[RADIUS] > 0.0:
         whole, free, tx, tz = pulley_geometry(across, -rise, row[RADIUS])

@@ -1,7 +1,7 @@
-"""One cable in space: the force on its anchor point, and how stiff it is there.
+"""One cable in space: the force on its anchor point, and its stiffness there.
 
 A cable is a row of a table (:mod:`seecr.compiled.columns`). It runs from its exit point A, over a
-swivelling pulley of radius r where there is one, to its anchor point B.
+swivelling pulley of radius r if there is one, to its anchor point B.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from seecr.compiled.law import straight_law, strain_of_tension, winch_tension
 from seecr.compiled.pulley import length_in_plane, pulley_geometry
 from seecr.compiled.yielding import along, lift_slope, lowered, soften
 
-# Most Newton steps for how far an exit point is lifted; two or three do.
+# Most Newton steps for the lift of an exit point; two or three suffice.
 _LIFTINGS = 50
 
 
@@ -40,10 +40,10 @@ def cable_pull(row, start, move, up, guess, work, force, stiffness, gradient, st
     Args:
         row: the cable (N_COLUMNS,).
         start: (3,) [m] its anchor point at the commanded pose, base frame.
-        move: (3,) [m] how far the anchor point has moved from there. Kept apart, since the
-            stretch of a stiff cable is lost in the rounding of absolute coordinates.
+        move: (3,) [m] displacement of the anchor point from there. It is separate, since the
+            stretch of a stiff cable would be lost in the rounding of absolute coordinates.
         up: (3,) unit vector against gravity.
-        guess: (3,) where the catenary starts and ends up.
+        guess: (3,) start of the catenary, overwritten with its solution.
         work: (N_WORK, 6) scratch.
         force: (3,) [N], filled.
         stiffness: (3, 3) [N/m], minus the derivative of the force by ``move``, filled; with weight
@@ -52,7 +52,7 @@ def cable_pull(row, start, move, up, guess, work, force, stiffness, gradient, st
         state: (N_STATE,), filled.
 
     Returns:
-        False when the cable's own equations could not be solved.
+        False if the cable's own equations could not be solved.
     """
     if row[LIFT] == 0.0:
         return _fixed_pull(row, start, move, up, guess, work, force, stiffness, gradient, state)
@@ -68,14 +68,14 @@ def cable_pull(row, start, move, up, guess, work, force, stiffness, gradient, st
             break
         lift -= error / lift_slope(more, up, stiffness)
     soften(more, up, stiffness, gradient, work[33])
-    # of what yields, and of the cable's weight that is lifted with it
+    # energy of the yielding frame, and of the cable's weight that is lifted with it
     state[ENERGY] += lift * (0.5 * pull + hanging)
     return True
 
 
 @jit_inner
 def _fixed_pull(row, start, move, up, guess, work, force, stiffness, gradient, state):
-    """See cable_pull; of a cable whose exit point is where it is."""
+    """See cable_pull; for a cable whose exit point is not lifted."""
     if row[WEIGHT] > 0.0:
         return _catenary_pull(row, start, move, up, guess, work, force, stiffness, gradient, state)
     if row[RADIUS] > 0.0:
@@ -121,7 +121,7 @@ def _plane(row, start, move, up, out):
         for k in range(3):
             out[k] /= across
         return across, rise
-    # straight below the exit point every plane is as good: take one
+    # straight below the exit point any plane will do
     pick = 0 if abs(up[0]) < 0.9 else 1
     for k in range(3):
         out[k] = (1.0 if k == pick else 0.0) - up[pick] * up[k]
@@ -131,7 +131,8 @@ def _plane(row, start, move, up, out):
 @jit_inner
 def _lift(row, across, rise, e, up, f, k2, g2, force, stiffness, gradient):
     """From the cable's plane to the base frame: f = force, k2 = stiffness, g2 = gradient."""
-    # turning the plane about the vertical through A: stiffness -f_across/across, sideways
+    # rotation of the plane about the vertical through A gives the stiffness -f_across/across
+    # sideways
     side = -f[0] / max(across, 1e-9 * row[REST])
     for i in range(3):
         force[i] = f[0] * e[i] + f[1] * up[i]
@@ -156,7 +157,7 @@ def _pulley_pull(row, start, move, up, work, force, stiffness, gradient, state):
     tension, rate = straight_law(row, length - row[REST], state)
     f[0], f[1] = -tension * tx, -tension * tz
     g2[0], g2[1] = rate * tx, rate * tz
-    # moving across the tangent turns it by 1/free
+    # a motion across the tangent turns it by 1/free
     turn = tension / max(free, 1e-9 * row[REST])
     k2[0] = rate * tx * tx + turn * tz * tz
     k2[1] = (rate - turn) * tx * tz
@@ -173,7 +174,7 @@ def _catenary_pull(row, start, move, up, guess, work, force, stiffness, gradient
     jacobian = work[4:7]
     error, scratch = work[7], work[8:10]
     if not solve_catenary(row, flat, -rise, guess, error, jacobian, scratch):
-        guess[2] = 0.0  # once more from a first guess of its own
+        guess[2] = 0.0  # try again, from a first guess of its own
         if not solve_catenary(row, flat, -rise, guess, error, jacobian, scratch):
             guess_by_brackets(row, flat, -rise, guess)
             if not solve_catenary(row, flat, -rise, guess, error, jacobian, scratch):
@@ -182,7 +183,7 @@ def _catenary_pull(row, start, move, up, guess, work, force, stiffness, gradient
     top = v + row[WEIGHT] * length
     tension = math.sqrt(h * h + top * top)
     f[0], f[1] = -h, v
-    # columns of the inverse Jacobian: change of the unknowns by across and by -rise
+    # columns of the inverse Jacobian: derivatives of the unknowns by across and by -rise
     by_across, by_drop = work[10], work[11]
     error[0], error[1], error[2] = 1.0, 0.0, 0.0
     solve_3x3(jacobian, error, by_across)

@@ -1,7 +1,7 @@
 """A cable with weight: an elastic catenary (Irvine, Cable Structures, 1981, section 1.2).
 
-Its unknowns are the components of its pull and the length of its free part; solved to rounding,
-with exact derivatives.
+Its unknowns are the two components of its pull and the length of its free part. They are solved to
+rounding, with exact derivatives.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def catenary_span(h, v, w, length, ea):
     """Span of an elastic catenary whose lower end is pulled by (h, v) towards the upper one.
 
     Returns horizontal and vertical span and their derivatives xh, xv, zv, xl, zl by h, v and
-    unstretched length. Written so that nothing cancels as w goes to zero (Irvine 1981, 1.2).
+    unstretched length. The form is such that nothing cancels as w goes to zero (Irvine 1981, 1.2).
     """
     top = v + w * length
     t_low, t_top = math.sqrt(h * h + v * v), math.sqrt(h * h + top * top)
@@ -57,11 +57,11 @@ def catenary_span(h, v, w, length, ea):
 
 @jit_inner
 def _change_of_angle(v, h, w, length):
-    """(asinh(top/h) - asinh(v/h))/w as a logarithm, each form where its terms do not cancel."""
+    """(asinh(top/h) - asinh(v/h))/w as a logarithm, in the form whose terms do not cancel."""
     top = v + w * length
     t_low, t_top = math.sqrt(h * h + v * v), math.sqrt(h * h + top * top)
     rise = length * (v + top) / (t_top + t_low)
-    # the first two hold for either sign of their end, and cancel only where it is steep
+    # the first two forms hold for either sign of their end, and only cancel where it is steep
     if v >= -h:
         return math.log1p(w * (length + rise) / (v + t_low)) / w
     if top <= h:
@@ -81,9 +81,9 @@ def _change_of_sine(v, top, h, w, length):
 
 @jit_inner
 def _sag_energy(h, v, w, length):
-    """Energy [J] that sagging sets free, h^2 (sinh D - D)/(2 w) with D = asinh(top/h) - asinh(v/h).
+    """Energy [J] that sag releases, h^2 (sinh D - D)/(2 w) with D = asinh(top/h) - asinh(v/h).
 
-    The trapezium rule's error in the integral of the tension, T'' = w^2 h^2/T^3.
+    It is the trapezium rule's error in the integral of the tension, T'' = w^2 h^2/T^3.
     """
     grow = _change_of_angle(v, h, w, length)
     turned = w * grow
@@ -91,7 +91,7 @@ def _sag_energy(h, v, w, length):
         top = v + w * length
         both = math.sqrt(h * h + v * v) * math.sqrt(h * h + top * top)
         return 0.5 * (_change_of_sine(v, top, h, w, length) * both - h * h * grow)
-    # (sinh D - D)/(D^3/6) from its smallest term on
+    # series of (sinh D - D)/(D^3/6), starting with its smallest term
     square, share = turned * turned, 1.0
     for k in (17, 15, 13, 11, 9, 7, 5):
         share = 1.0 + share * square / (k * (k - 1))
@@ -100,26 +100,27 @@ def _sag_energy(h, v, w, length):
 
 @jit_inner
 def catenary_energy(row, unknown, fall, raised):
-    """Energy [J] of a hanging cable; its derivatives by the anchor point are minus the force.
+    """Potential energy [J] of a hanging cable; the force is minus its gradient by the anchor point.
 
-    What it stores, E = int T^2/(2 EA) ds, what its weight does, both in the complementary form
-    E = h x + v z - int (T + T^2/(2 EA)) ds, our own: by h and v it is stationary where x and z are
-    the catenary's; with its large terms cancelled by hand. And what all else in series with the
-    tension T at the exit point stores: length paid out by it does T + T^2/(2 EA) per metre.
+    It is the elastic energy, E = int T^2/(2 EA) ds, and the weight's, both in the complementary
+    form E = h x + v z - int (T + T^2/(2 EA)) ds (our own derivation), which is stationary in h and
+    v where x and z are the catenary's spans; large terms are cancelled by hand. Everything else in
+    series with the tension T at the exit point is added: each metre paid out by it contributes
+    T + T^2/(2 EA).
 
     Args:
         row: the cable (N_COLUMNS,).
         unknown: (3,) its pull (h, v) [N] and unstretched length [m], solved.
         fall: [m] height of the exit point above the anchor point.
-        raised: [m] height of the anchor point above where it is at the commanded pose, from which
-            the weight of a cable that hung straight there counts.
+        raised: [m] height of the anchor point above that at the commanded pose; the weight's energy
+            is relative to a cable that hangs straight there.
 
     Returns:
-        nan for a law without energy, and over a pulley, where the pull has no potential.
-        Cable that is paid out to the span brings its height with it, w r sin psi per metre. Of
-        what the wheel's turning pays out, d(psi), that is the work of an unstretched cable's
-        weight on the wheel. What arc and series stretch by, S(T, psi), comes from a cable that is
-        taken to weigh nothing: round a closed way the pull does the work w r int sin psi dS.
+        The energy; nan for a law without one, and over a pulley, where the pull has no potential:
+        cable that reaches the free span brings its height along, w r sin psi per metre. For cable
+        paid out by the wheel's rotation, d(psi), that is the work of an unstretched cable's weight
+        on the wheel. But the stretch S(T, psi) of arc and series is that of a weightless cable, so
+        that on a closed path the pull does the work w r int sin psi dS.
     """
     if row[RADIUS] > 0.0 or not has_energy(row):
         return np.nan
@@ -133,7 +134,7 @@ def catenary_energy(row, unknown, fall, raised):
     tension = math.sqrt(pulled)
     soft = rest * row[CREEP_RATE] + row[COMPLIANCE] + (row[WINCH_SIDE] - rest * row[CREEP]) / ea
     if not is_linear(row):
-        # the curve's own stretch, rest (eps - T/EA), is one more in the series
+        # the curve's own stretch, rest (eps - T/EA), is one more element in series
         strain = strain_of_tension(row, tension)[0]
         soft -= rest * (strain - tension / ea) / ea
         stored += rest * (stored_per_metre(row, strain) - 0.5 * pulled / ea)
@@ -142,10 +143,10 @@ def catenary_energy(row, unknown, fall, raised):
 
 @jit_inner
 def _other_stretch(row, tension):
-    """Unstretched length [m] that all but the catenary's own T/EA would add, and its slope.
+    """Unstretched length [m] equivalent to all stretch but the catenary's own T/EA, and its slope.
 
-    At the tension of the upper end. A cable that stretches by it as the straight one does
-    is one that is longer by stretch/(1 + T/EA) before the catenary stretches it again.
+    It is taken at the tension of the upper end. A cable with this additional stretch is equivalent
+    to one that is longer by stretch/(1 + T/EA) before the catenary stretches it again.
     """
     ea, rest = row[EA], row[REST]
     behind, behind_slope = winch_tension(row, tension)
@@ -161,7 +162,7 @@ def _other_stretch(row, tension):
 
 @jit_inner
 def _catenary_equations(row, unknown, across, rise, error, jacobian):
-    """Where the catenary over its pulley ends, against where it should, with derivatives.
+    """Errors of the ends of a catenary over its pulley, with derivatives.
 
     Unknowns: horizontal and vertical pull at the anchor, unstretched length of the free part.
     """
@@ -202,7 +203,7 @@ def _first_guess(row, across, rise, unknown):
         across, rise = free * tx, -free * tz
     chord2 = across * across + rise * rise
     if length * length <= chord2:
-        # taut: pull along the chord with the elastic stretch, or the nearly taut catenary
+        # taut: the pull along the chord by elastic stretch, or that of a nearly taut catenary
         chord = math.sqrt(chord2)
         soft = length + row[WINCH_SIDE] + row[EA] * (row[COMPLIANCE] + row[REST] * row[CREEP_RATE])
         pull = row[EA] * (chord - length) / soft
@@ -226,10 +227,10 @@ def _size(error, length):
 
 @jit_inner
 def solve_catenary(row, across, rise, unknown, error, jacobian, work):
-    """Find the pull of a catenary with the given span; True when found to rounding.
+    """Find the pull of a catenary with the given span; True if found to rounding.
 
-    ``unknown`` is the start where its third entry is positive (a warm start), else a first
-    guess is made. On return ``jacobian`` is that of the equations at the solution.
+    ``unknown`` is a warm start if its third entry is positive; otherwise a first guess is made. On
+    return ``jacobian`` is that of the equations at the solution.
     """
     scale = row[REST]
     if not unknown[2] > 0.0:
@@ -247,7 +248,7 @@ def solve_catenary(row, across, rise, unknown, error, jacobian, work):
         for _ in range(40):
             for k in range(3):
                 trial[k] = unknown[k] - damping * step[k]
-            # without a pulley the pull is towards the exit point; the length is positive
+            # without a pulley the pull is towards the exit point; and the length is positive
             if row[RADIUS] == 0.0:
                 trial[0] = max(trial[0], 0.1 * unknown[0])
             trial[2] = max(trial[2], 0.5 * unknown[2])

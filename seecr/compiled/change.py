@@ -1,8 +1,8 @@
-"""What a change of the tables does at fixed poses, evaluated for the changed cables alone.
+"""Effect of a change of the tables at fixed poses, evaluated only for the cables that changed.
 
-A parameter mostly changes a few cables. The others pull the same before and after, so only
-those whose rows differ are evaluated: both times, and subtracted. What they pull is asked of
-:func:`seecr.compiled.cable.cable_pull`; nothing is solved, so no stiffness is put together.
+A parameter usually changes a few cables. The others pull the same before and after, so only those
+whose rows differ are evaluated, before and after, and subtracted. Their forces are those of
+:func:`seecr.compiled.cable.cable_pull`. Nothing is solved, so no stiffness is assembled.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from seecr.compiled.rotation import rotated_less
 
 @jit_allocating
 def make_change_space(joints):
-    """Scratch: made once for a batch."""
+    """Scratch arrays, made once per batch."""
     return (
         np.empty(7), np.zeros((joints, 7)), np.empty((joints, 6)), np.empty(3), np.empty(3),
         np.empty(3), np.empty(3), np.empty((3, 3)), np.empty(3), np.empty(N_STATE),
@@ -47,7 +47,7 @@ def differ(a, b):
 
 @jit_inner
 def place_platform(screws, values, length, pose, deviation, space):
-    """Fill the space with where the platform is, and its joints."""
+    """Fill the scratch arrays with the platform's deviation and its joints."""
     place, current, columns = space[0], space[1], space[2]
     copy_vector(deviation, place)
     if screws.shape[0] > 0:
@@ -58,7 +58,7 @@ def place_platform(screws, values, length, pose, deviation, space):
 
 @jit_inner
 def _moved_arm(point, pose, place):
-    """Arm (3,) of a platform point at the commanded pose, and its change to where it is."""
+    """Arm (3,) of a platform point at the commanded pose, and its change up to the current pose."""
     a, b, c = point[0], point[1], point[2]
     dx, dy, dz = rotated_less(pose[3], pose[4], pose[5], pose[6], a, b, c)
     a, b, c = a + dx, b + dy, c + dz
@@ -68,7 +68,7 @@ def _moved_arm(point, pose, place):
 
 @jit_inner
 def _take_force(ax, ay, az, fx, fy, fz, per, gradient):
-    """Take a force on a platform point, its arm given, from the gradient (6,)."""
+    """Subtract a force on a platform point with a given arm from the gradient (6,)."""
     gradient[0] -= fx
     gradient[1] -= fy
     gradient[2] -= fz
@@ -79,7 +79,7 @@ def _take_force(ax, ay, az, fx, fy, fz, per, gradient):
 
 @jit_inner
 def add_pull(sign, row, pose, up, per, guess, space):
-    """Add what a cable does to the gradient (6,), times a sign; returns that of its tension."""
+    """Add a cable's part times ``sign`` to the gradient (6,); returns that of its tension."""
     place, start, move, keep = space[0], space[3], space[4], space[5]
     force, stiffness, slope, state, work, gradient = space[6:12]
     a, b, c, dx, dy, dz = _moved_arm(row[ANCHOR : ANCHOR + 3], pose, place)
@@ -96,7 +96,7 @@ def add_pull(sign, row, pose, up, per, guess, space):
 
 @jit_inner
 def add_load(sign, load, pose, per, space):
-    """The same of the weight and the external wrench."""
+    """Add the contribution of the weight and the external wrench, times ``sign``."""
     place, gradient = space[0], space[11]
     a, b, c, dx, dy, dz = _moved_arm(load[CENTRE_OF_MASS : CENTRE_OF_MASS + 3], pose, place)
     fx, fy, fz = load[FORCE_OF_WEIGHT], load[FORCE_OF_WEIGHT + 1], load[FORCE_OF_WEIGHT + 2]
@@ -108,7 +108,7 @@ def add_load(sign, load, pose, per, space):
 
 @jit_inner
 def put_gradient(space, out):
-    """The gathered gradient, as a platform on joints feels it, into ``out`` (d,)."""
+    """Write the accumulated gradient to ``out`` (d,), projected onto the joints if any."""
     columns, gradient = space[2], space[11]
     if columns.shape[0] == 0:
         copy_vector(gradient, out)
@@ -121,7 +121,7 @@ def change_at_rest(
     plus, minus, plus_load, minus_load, poses, screws, deviation, values, length, guess,
     gradient, tension,
 ):  # fmt: skip
-    """Gradient (n, d) and tensions (n, m) of ``plus`` less ``minus``; NaN where unsolved.
+    """Gradient (n, d) and tensions (n, m) of ``plus`` minus ``minus``; NaN where unsolved.
 
     All outputs are filled.
     """

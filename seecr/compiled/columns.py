@@ -1,19 +1,19 @@
-"""What the numbers of the compiled tables mean: columns of a cable, of its state, of a load."""
+"""Columns and entries of the compiled tables: of a cable, of its state, of a load."""
 
 from __future__ import annotations
 
-# Of a cable.
+# Columns of a cable.
 N_COLUMNS = 28
 (
     EXIT, _, _,  # A in the base frame [m]
     ANCHOR, _, _,  # B in the platform frame [m]
     REST,  # paid-out rest length l0 from A on, wrap included [m]
-    GAP,  # geometric length at the commanded pose less the rest length [m], kept exact
+    GAP,  # geometric length at the commanded pose minus the rest length [m], kept exact
     EA,  # E S [N]
     QUADRATIC, CUBIC,  # T = EA (eps + quadratic eps^2 + cubic eps^3)
     RADIUS,  # of the pulley [m]
     COMPLIANCE,  # of the exit point along the cable [m/N]
-    LIFT,  # compliance of the exit point upwards less that sideways [m/N]
+    LIFT,  # compliance of the exit point upwards minus that sideways [m/N]
     WINCH_SIDE,  # length of elastic cable behind the exit point [m]
     WEIGHT,  # per metre of cable [N/m]
     CREEP, CREEP_RATE,  # creep strain = creep + creep_rate T
@@ -21,13 +21,13 @@ N_COLUMNS = 28
     HYSTERESIS, HYSTERESIS_STRETCH,  # Dahl: amplitude [N], stretch over which it turns [m]
     STRETCH_BEFORE, HYSTERESIS_BEFORE,  # state the Dahl law starts from [m, N]
     FRICTION,  # exponent of the capstan at the exit point
-    STUCK,  # tension behind the exit point if the cable does not slip [N]
+    STUCK,  # tension behind the exit point while the cable does not slip [N]
     EXTRA, EXTRA_SLOPE,  # a user's law, linearised: T += extra + extra_slope eps [N]
 ) = range(N_COLUMNS)  # fmt: skip
-# Those that a walk fills with what is left of the rows before.
+# Columns that a walk along a path fills with the history.
 OF_THE_PAST = (CREEP, CREEP_RATE, STRETCH_BEFORE, HYSTERESIS_BEFORE, STUCK)
 
-# Of what a law returns beside force and stiffness (see straight_law).
+# Entries that a law returns besides force and stiffness (see straight_law).
 N_STATE = 6
 TENSION, STRAIN, HYSTERESIS_NOW, WINCH_TENSION, ENERGY, SLACK = range(N_STATE)
 

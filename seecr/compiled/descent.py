@@ -1,4 +1,4 @@
-"""The descent of a platform to where it rests, one pose after the other."""
+"""Newton descent of a platform to its equilibrium, one pose after the other."""
 
 from __future__ import annotations
 
@@ -32,22 +32,22 @@ from seecr.compiled.steps import (
     turns_about_moment,
 )
 
-# The descent goes on to this part of the load while it still gains digits.
+# The descent continues down to this part of the load while it gains digits.
 FINE = 1e-13
-# Rounding ends the search for more digits after this many steps within the tolerance.
+# The search for more digits ends after this many steps within the tolerance.
 LATE = 8
-# After so many steps that a shift has made this short a part of the trust region, each
-# direction steps by its own stiffness.
+# After so many steps that a shift has shortened to this part of the trust region, each
+# eigenvector's step uses its own stiffness.
 PATIENCE, SHORT = 4, 0.1
-# A moment that has turned the platform so many times round will not find what holds it.
+# After so many turns by an external moment, no equilibrium is expected.
 MOST_TURNS = 3.0
-# Cables stiffer than this many loads are made stiff in stages (see solve_in_stages).
+# Cables stiffer than this many loads are stiffened in stages by this factor (solve_in_stages).
 STIFF, STAGE = 2000.0, 10.0
 
 
 @jit_allocating
 def make_space(m, n, joints):
-    """Scratch of a descent: made once for a batch."""
+    """Scratch arrays of a descent, made once per batch."""
     return (
         np.zeros(n), np.zeros((n, n)), np.zeros(7), np.zeros(n), np.zeros(n), np.zeros((n, n)),
         np.zeros((m, N_STATE)), np.zeros((m, n)), np.zeros((m, 3)), np.zeros((joints, 7)),
@@ -60,20 +60,20 @@ def solve_one(
     cables, load, pose, screws, start, start_values, length, scale, radius, reach, limit,
     guess, gradient, hessian, states, slopes, deviation, values, enough, space,
 ):  # fmt: skip
-    """Descend from a start to the equilibrium it leads to.
+    """Descend from a start to the equilibrium that it leads to.
 
-    A Newton method on the energy: the exact stiffness, shifted until it is positive definite,
-    steps kept within a trust region, taken where the energy falls. Where it has none in closed
-    form (friction, hysteresis, laws of users, weight over pulleys, moments), the work along the
-    step, by the trapezium rule, stands for it. From a stationary point that is no minimum the
-    descent goes on along the softest direction.
+    This is a Newton method on the potential energy: the exact stiffness is shifted until it is
+    positive definite, and steps are kept within a trust region and accepted if the energy falls. If
+    there is no energy in closed form (friction, hysteresis, users' laws, weight over pulleys,
+    moments), the work along the step, by the trapezium rule, takes its place. From a stationary
+    point that is not a minimum the descent continues along the softest direction.
 
     Args:
         scale: load [N] that residuals are measured against.
         radius: first trust region [m].
         reach: deviations beyond this [m] count as falling.
         limit: most evaluations.
-        enough: residual/scale at which to stop; FINE for all digits there are.
+        enough: residual/scale at which to stop; FINE for as many digits as possible.
         space: from make_space.
 
     Returns:
@@ -176,10 +176,11 @@ def solve_in_stages(
     cables, load, pose, screws, start, start_values, length, scale, radius, reach, limit,
     guess, gradient, hessian, states, slopes, deviation, values, softened, staged, space,
 ):  # fmt: skip
-    """Like solve_one, from soft to stiff: a stiff robot's energy is a narrow curved valley.
+    """Like solve_one, if ``staged`` from soft to stiff.
 
-    Cables stiffer than STIFF loads start as soft as that and are made STAGE times stiffer
-    until they are themselves; each stage starts from the equilibrium of the one before.
+    The energy of a stiff robot is a narrow curved valley. So all cables are first softened by
+    powers of STAGE, until the stiffest has at most STIFF loads, and then stiffened by STAGE in each
+    stage. A stage starts from the equilibrium of the one before.
     """
     top = 0.0
     for i in range(cables.shape[0]):

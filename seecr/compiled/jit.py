@@ -1,4 +1,4 @@
-"""How this package compiles: kept on disk, without Python's lock."""
+"""How this package is compiled: cached on disk, and without Python's global lock."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from numba.core import event
 from seecr.compiled import telling
 
 _COMMON = {"cache": True, "nogil": True, "error_model": "numpy"}
-# Numba counts who uses an array at every call and slice, atomically. A call here takes as long as
-# the physics in it, so that counting took three quarters of the time; what makes no array, and
-# gets its own from a caller that holds them, need not count.
+# Numba counts references to arrays, atomically, at every call and slice. That took three quarters
+# of the time, as calls here are short. Functions that create no arrays, and whose callers hold the
+# arrays, need not count.
 _UNCOUNTED = {**_COMMON, "_nrt": False}
 
 
 class _Listener(event.Listener):
-    """Hears of what Numba compiles; what its cache holds it does not compile."""
+    """Is notified when Numba compiles; functions from its cache are not compiled."""
 
     def on_start(self, _: event.Event) -> None:
         telling.begins()
@@ -28,14 +28,18 @@ event.register("numba:compile", _Listener())  # type: ignore[no-untyped-call]
 
 jit = njit(**_UNCOUNTED)  # type: ignore[call-overload]
 """Decorator of compiled functions. A division by zero gives inf or nan, as NumPy's does. They
-cannot make arrays: compiling such a one fails. Callers hand over arrays that may be written to:
-Numba compiles everything once more for those that may not."""
+cannot create arrays: compiling one that does fails. Callers must pass writable arrays, since Numba
+compiles everything once more for read-only ones.
+"""
 
 jit_inner = njit(  # type: ignore[call-overload]
     **_UNCOUNTED, no_cpython_wrapper=True, no_cfunc_wrapper=True
 )
-"""The same for those that only compiled functions call: a fifth of the time of compiling went
-into ways for Python to call them."""
+"""The same for functions that only compiled functions call: wrappers for calls from Python took a
+fifth of the compile time.
+"""
 
 jit_allocating = njit(**_COMMON, _nrt=True)  # type: ignore[call-overload]
-"""The same for those that make arrays: said, since what is not is taken from the caller."""
+"""The same for functions that create arrays. It has to be explicit: otherwise the caller's setting
+would apply.
+"""

@@ -1,7 +1,7 @@
-"""A platform on slide and hinge joints: where they put it, and forces as its joints feel them.
+"""A platform on slide and hinge joints: its pose, and forces projected onto the joints.
 
-A platform on joints steps in its joint values, times the robot's length for hinges: the first
-joint is the outermost, as in MJCF.
+Its coordinates are the joint values, times the robot's length for hinges. The first joint is the
+outermost, as in MJCF.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from seecr.compiled.rotation import quaternion_product, rotated_less, turned
 
 @jit
 def place_joints(screws, values, length, origin, deviation, current):
-    """Deviation (7,) of a jointed platform, and its joints as they stand there.
+    """Deviation (7,) of a platform on joints, and the current joint axes and points.
 
-    The platform moves by E_1 E_2 ... E_n, E_j along or about joint j as it stands at the
-    commanded pose (product of exponentials); ``screws`` and ``current`` are (n, 7): kind (0
-    slide, 1 hinge), axis, point.
+    The platform moves by E_1 E_2 ... E_n, with E_j along or about joint j at the commanded pose
+    (product of exponentials). ``screws`` and ``current`` are (n, 7): kind (0 slide, 1 hinge), axis,
+    point.
     """
     w, x, y, z = 1.0, 0.0, 0.0, 0.0
     mx = my = mz = 0.0
@@ -34,7 +34,7 @@ def place_joints(screws, values, length, origin, deviation, current):
             continue
         angle = values[j] / length
         a, b, c, d = turned(ax * angle, ay * angle, az * angle, 1.0, 0.0, 0.0, 0.0)
-        # the platform's origin goes round the hinge, as the joints before have turned that
+        # the platform's origin rotates about the hinge, which the joints before have rotated
         sx, sy, sz = rotated_less(a, b, c, d, ox - px, oy - py, oz - pz)
         tx, ty, tz = rotated_less(w, x, y, z, sx, sy, sz)
         mx, my, mz = mx + sx + tx, my + sy + ty, mz + sz + tz
@@ -45,14 +45,14 @@ def place_joints(screws, values, length, origin, deviation, current):
 
 @jit
 def place_batch(screws, values, length, poses, deviation, current):
-    """The joints (n, d, 7) of n platforms as they stand; ``deviation`` (7,) is left of the last."""
+    """Current joints (n, d, 7) of n platforms; ``deviation`` (7,) is that of the last one."""
     for r in range(screws.shape[0]):
         place_joints(screws[r], values[r], length, poses[r], deviation, current[r])
 
 
 @jit_inner
 def joint_columns(current, x, y, z, per, columns):
-    """Motion (n, 6) of the platform origin, now at x, y, z, by the joints in scaled steps."""
+    """Motion (n, 6) of the platform origin, now at x, y, z, per scaled step of each joint."""
     for j in range(current.shape[0]):
         a, b, c = current[j, 1], current[j, 2], current[j, 3]
         if current[j, 0] == 0.0:
@@ -80,8 +80,8 @@ def onto_joints_gradient(g, columns, gradient):
 def onto_joints(g, h, columns, per, gradient, hessian):
     """From the platform's own gradient and stiffness to those of its joints.
 
-    Joint j moves on with each hinge i further out: the origin's motion v_j turns by a_i x v_j,
-    and the rotation vector of both has half of a_i x a_j to second order.
+    A hinge i further out also moves joint j: the origin's motion v_j rotates by a_i x v_j, and the
+    rotation vector of both has half of a_i x a_j to second order.
     """
     onto_joints_gradient(g, columns, gradient)
     for j in range(gradient.shape[0]):

@@ -1,10 +1,9 @@
-"""The law of one cable along itself: what it pulls with when it is stretched.
+"""The law of one cable along itself: its tension as a function of its stretch.
 
-All that is elastic about a cable acts in series:
-
+All elastic parts of a cable act in series:
     stretch = l0 (eps + creep) + winch_side/EA T_winch + compliance T,   T = T(eps)
 
-so that a straight cable is a law in one unknown, its strain eps, solved to rounding.
+so a straight cable has a law in one unknown, its strain eps, which is solved to rounding.
 """
 
 from __future__ import annotations
@@ -45,10 +44,10 @@ LEAST = 0.01
 
 @jit
 def dahl(row, strain):
-    """Hysteretic tension [N] and its slope at a strain, from the state before.
+    """Hysteretic tension [N] and its slope at a strain, from the previous state.
 
-    Dahl's model in closed form for a monotone change of stretch (Dahl 1968, with exponent 1):
-    z = s Z + (z0 - s Z) exp(-|d e| / e_c), s the sign of the change of the stretch e = l0 eps.
+    Dahl's model in closed form for a monotonic change of stretch (Dahl 1968, with exponent 1):
+    z = s Z + (z0 - s Z) exp(-|d e| / e_c), with s the sign of the change of the stretch e = l0 eps.
     """
     amplitude = row[HYSTERESIS]
     if amplitude == 0.0:
@@ -65,15 +64,15 @@ def dahl(row, strain):
 def _polynomial(ea, q, c, strain):
     """Tension, slope and energy per metre [N] of EA (eps + q eps^2 + c eps^3), kept stiff.
 
-    Where the slope would fall below a hundredth of EA it stays there, so that the tension is the
-    integral of the slope: a softening cable still carries more when it is stretched further. The
-    energy is the integral of the tension.
+    The slope is never less than a hundredth of EA, and the tension is its integral, so that a
+    softening cable still carries more when it is stretched further. The energy is the integral of
+    the tension.
     """
     low, high = _soft_part(q, c)
     share, work = _bare(q, c, min(strain, low))
     slope = 1.0 + 2.0 * q * strain + 3.0 * c * strain**2
     if strain > low:
-        # not as the polynomial and what it lacks: far out the two would cancel
+        # not as the polynomial plus a correction: far out the two would cancel
         soft = min(strain, high) - low
         work += (share + 0.5 * LEAST * soft) * soft
         share += LEAST * soft
@@ -96,7 +95,7 @@ def _bare(q, c, strain):
 
 @jit_inner
 def _soft_part(q, c):
-    """From where to where the slope 1 + 2 q eps + 3 c eps^2 is less than a hundredth."""
+    """The interval in which the slope 1 + 2 q eps + 3 c eps^2 is less than a hundredth."""
     low, high = np.inf, np.inf
     disc = q * q - 3.0 * c * (1.0 - LEAST)
     if disc > 0.0:
@@ -111,9 +110,9 @@ def _soft_part(q, c):
 
 @jit_inner
 def stored_per_metre(row, strain):
-    """Energy [N] that a metre of cable holds at a strain; nan where its law has none.
+    """Energy [N] per metre of cable at a strain; nan if its law has none.
 
-    Hysteresis and friction lose some on the way, and of a user's law only the slope is known.
+    Hysteresis and friction dissipate energy, and of a user's law only the slope is known.
     """
     if not has_energy(row):
         return np.nan
@@ -122,14 +121,14 @@ def stored_per_metre(row, strain):
 
 @jit_inner
 def has_energy(row):
-    """Whether what the law holds depends on where it is alone, not on how it came there."""
+    """Whether the energy of the law depends only on the current state, not on the path to it."""
     lost = row[HYSTERESIS] != 0.0 or row[FRICTION] != 0.0
     return not lost and row[EXTRA] == 0.0 and row[EXTRA_SLOPE] == 0.0
 
 
 @jit_inner
 def tension_of_strain(row, strain):
-    """Tension [N], its slope dT/d eps [N] and the hysteretic part of it, at strain >= 0."""
+    """Tension [N], its slope dT/d eps [N] and its hysteretic part, at strain >= 0."""
     ea = row[EA]
     z, z_slope = dahl(row, strain)
     q, c = row[QUADRATIC], row[CUBIC]
@@ -146,8 +145,8 @@ def tension_of_strain(row, strain):
 def winch_tension(row, tension):
     """Tension behind the exit point [N] and its slope, for capstan friction (Euler-Eytelwein).
 
-    The cable sticks on the exit point while the ratio of the tensions stays within
-    exp(+-friction), and slips at that ratio otherwise.
+    The cable sticks at the exit point while the ratio of the tensions is within exp(+-friction),
+    and otherwise slips at that ratio.
     """
     if row[FRICTION] == 0.0:
         return tension, 1.0
@@ -168,7 +167,7 @@ def is_linear(row):
 
 @jit_inner
 def series_length(row, strain):
-    """Stretch [m] that goes with a strain, and its slope, tension and tension slope."""
+    """Stretch [m] at a strain, its slope, tension, slope of the tension, and hysteretic part."""
     tension, slope, z = tension_of_strain(row, strain)
     if tension < 0.0:
         tension, slope = 0.0, 0.0
@@ -184,8 +183,8 @@ def series_length(row, strain):
 def straight_law(row, stretch, state):
     """Tension and dT/dL of a straight cable stretched by ``stretch`` [m]; fills ``state``.
 
-    The rest of the robot sees a taut cable at zero stretch as taut: its stiffness is there
-    for the first step of the solver, which starts from exactly that pose.
+    A cable at exactly zero stretch counts as taut, so that it has its stiffness in the solver's
+    first step, which starts at that pose.
     """
     state[ENERGY] = 0.0
     soft = row[REST] + row[EA] * (row[REST] * row[CREEP_RATE] + row[COMPLIANCE])
@@ -220,7 +219,7 @@ def straight_law(row, stretch, state):
 
 @jit_inner
 def _solve_strain(row, stretch, guess):
-    """Strain at which the series has the given stretch: Newton kept inside a bracket."""
+    """Strain at which the series has the given stretch: Newton's method inside a bracket."""
     low, high = 0.0, max(2.0 * guess, 1e-6)
     for _ in range(200):
         if series_length(row, high)[0] >= stretch:
@@ -247,7 +246,7 @@ def _solve_strain(row, stretch, guess):
 
 @jit_inner
 def strain_of_tension(row, tension):
-    """Strain at which the cable itself pulls with a tension: Newton kept inside a bracket.
+    """Strain at which the cable itself has a given tension: Newton's method inside a bracket.
 
     Returns strain, slope dT/d eps [N] and the hysteretic part of the tension.
     """

@@ -1,9 +1,9 @@
-"""How far inside their limits tensions can stay that balance a load: exact, without a search.
+"""How far inside their limits tensions that balance a load can stay: exact, without a search.
 
-With W = L Q^T (Householder), the tensions that balance are tau = tau_p + N nu, N the null space
-of W. The margin is max over nu of the least of tau_i - low_i and high_i - tau_i, a small linear
-program in nu and the margin itself: its dual simplex starts from a basis of artificial functions
-and ends after a few pivots.
+With W = L Q^T (Householder), the tensions that balance are tau = tau_p + N nu, with N the null
+space of W. The margin is the maximum over nu of the smallest tau_i - low_i and high_i - tau_i. This
+is a small linear program in nu and the margin itself. Its dual simplex starts from a basis of
+artificial functions and ends after a few pivots.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from seecr.compiled.algebra import eliminate
 from seecr.compiled.jit import jit_allocating, jit_inner
 from seecr.compiled.rotation import rotated_less
 
-# A matrix is singular where a pivot of its factor falls below this part of the largest.
+# A matrix is singular if a pivot of its factor is below this part of the largest.
 _SINGULAR = 1e-11
-# The artificial functions start at this many loads: a margin that they hold has no bound.
+# Value of the artificial functions in loads: a margin that they limit is unbounded.
 _TOP = 1e7
 _PIVOTS, _ROUNDING = 200, 1e-12
-# Rounding of numbers as large as the artificial functions; a weight beyond it holds.
+# Rounding relative to the artificial functions, and the weight from which one of them is active.
 _OWN_ROUNDING, _HOLDS = 1e-14, 1e-9
 
 
@@ -43,7 +43,8 @@ def null_space(matrix, load, work, particular, null):
             return False
         sign = 1.0 if work[k, k] >= 0.0 else -1.0
         head = work[k, k] + sign * size
-        # the vector is kept below the diagonal with a head of one, its factor in the last column
+        # the vector is stored below the diagonal with a first entry of one, its factor in the last
+        # column
         factor = head / (sign * size)
         for i in range(k + 1, m):
             work[i, k] /= head
@@ -86,7 +87,7 @@ def null_space(matrix, load, work, particular, null):
 
 @jit_inner
 def _rows(particular, null, low, high, top, a, b):
-    """The functions a nu + b whose least is to be largest; how many. Artificial ones first."""
+    """The functions a nu + b whose minimum is maximised, artificial first; returns how many."""
     m, r = null.shape
     for j in range(r + 1):
         for k in range(r):
@@ -108,15 +109,15 @@ def _rows(particular, null, low, high, top, a, b):
 
 @jit_allocating
 def _largest_least(a, b, count, r, scale, answer):
-    """max over nu of min_i (a_i nu + b_i) by the dual simplex; nan where it does not end.
+    """max over nu of min_i (a_i nu + b_i) by the dual simplex; nan if it does not end.
 
-    Infinite where artificial functions, the first r + 1, hold it: it would go on with them.
-    ``answer`` (r + 1,) is nu and the least, there as far as those let them go.
+    Infinite if artificial functions, the first r + 1, limit it. ``answer`` (r + 1,) is nu and the
+    minimum, which the artificial functions keep finite.
     """
     k = r + 1
     basis = np.arange(k)
     system, right = np.empty((k, k)), np.empty(k)
-    # of the basis: they make nothing of nu and one of the margin
+    # weights of the basis: they sum the coefficients of nu to zero and those of the margin to one
     weights, change = np.full(k, 1.0 / k), np.empty(k)
     for _ in range(_PIVOTS):
         for row in range(k):
@@ -141,7 +142,7 @@ def _largest_least(a, b, count, r, scale, answer):
                 if basis[row] < k:
                     held += weights[row]
             return np.inf if held > _HOLDS else answer[r]
-        # the newcomer as a combination of the basis
+        # the entering function as a combination of the basis
         for row in range(k):
             for c in range(r):
                 system[c, row] = a[basis[row], c]
@@ -166,7 +167,7 @@ def _largest_least(a, b, count, r, scale, answer):
 
 @jit_allocating
 def _space(d, m):
-    """Room to work in, for any number of poses."""
+    """Scratch arrays for any number of poses."""
     rows = m - d + 1 + 2 * m
     return (
         np.empty((m, d + 1)), np.empty(m), np.empty((m, m - d)),
@@ -176,7 +177,7 @@ def _space(d, m):
 
 @jit_inner
 def _least_margin(matrix, loads, low, high, scale, space):
-    """The least margin [N] over loads (k, d); nan where the matrix is singular."""
+    """The smallest margin [N] over loads (k, d); nan if the matrix is singular."""
     work, particular, null, a, b, answer = space
     least = np.inf
     for k in range(len(loads)):
@@ -192,7 +193,7 @@ def _least_margin(matrix, loads, low, high, scale, space):
 
 @jit_allocating
 def margins_of(matrices, loads, low, high, scale, out):
-    """Margins (n,) of matrices (n, d, m) and loads (n, k, d): the least of k loads counts."""
+    """Margins (n,) of matrices (n, d, m) and loads (n, k, d): the smallest over k loads."""
     space = _space(*matrices.shape[1:])
     for r in range(len(matrices)):
         out[r] = _least_margin(matrices[r], loads[r], low, high, scale, space)
@@ -200,9 +201,9 @@ def margins_of(matrices, loads, low, high, scale, out):
 
 @jit_allocating
 def innermost_of(matrices, loads, low, high, scale, out, tensions):
-    """As :func:`margins_of` with one load (n, d) and limits (n, m) each; the tensions besides.
+    """Like :func:`margins_of`, with one load (n, d) and limits (n, m) each; also fills tensions.
 
-    ``tensions`` (n, m) are those that stay farthest inside; nan where there is no end to that.
+    ``tensions`` (n, m) are those that stay farthest inside; nan if the margin is not finite.
     """
     space = _space(*matrices.shape[1:])
     null, particular, answer = space[2], space[1], space[5]
@@ -216,7 +217,7 @@ def innermost_of(matrices, loads, low, high, scale, out, tensions):
 
 @jit_allocating
 def margins_at(poses, exits, anchors, centre, weight, wrenches, low, high, length, scale, out):
-    """Margins (n,) of a free platform at poses (n, 7); wrenches (k, 6) besides its weight."""
+    """Margins (n,) of a free platform at poses (n, 7); wrenches (k, 6) add to its weight."""
     m = len(exits)
     matrix, load = np.empty((6, m)), np.empty((len(wrenches), 6))
     arm, unit, space = np.empty(3), np.empty(3), _space(6, m)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-# equilibrium.py turns them into sentences.
+# seecr/statics/solution.py turns them into sentences.
 CONVERGED, UNSTABLE, SINGULAR, STALLED, FALLING, CABLE_LAW, ITERATIONS, SPINNING = range(8)
 
-# A stiffness below this part of the largest diagonal entry is none.
+# A stiffness below this part of the largest diagonal entry counts as zero.
 SINGULAR_PART = 1e-11
 # A tension below this part of the load is rounding.
 IDLE = 1e-11
-# An equilibrium leaves at most this part of the load.
+# Largest residual of an equilibrium, relative to the load.
 TOLERANCE = 1e-9

@@ -1,6 +1,6 @@
-"""What a cable keeps of the rows before, and what the next row starts from.
+"""The history that a cable carries from row to row.
 
-Hysteresis and friction start anew with each run. Creep alone goes by the clock.
+Hysteresis and friction start anew with each run. Only creep follows the clock across runs.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from seecr.compiled.columns import (
 from seecr.compiled.jit import jit_inner
 from seecr.compiled.law import strain_of_tension
 
-# What a cable keeps: creep strain, stretch [m], hysteretic part of the tension [N], the tension on
+# A cable's history: creep strain, stretch [m], hysteretic part of the tension [N], tensions on
 # either side of the exit point [N], rest length [m].
 N_KEPT = 6
 _CREPT, _STRETCHED, _HYSTERETIC, _PULLED, _BEHIND, _PAID = range(N_KEPT)
@@ -36,10 +36,10 @@ _CREPT, _STRETCHED, _HYSTERETIC, _PULLED, _BEHIND, _PAID = range(N_KEPT)
 
 @jit_inner
 def _shares(span):
-    """What a load linear in time leaves of itself after ``span`` time constants.
+    """Creep response to a load that is linear in time, after ``span`` time constants.
 
-    Of its value before and now: the convolution of a ramp with exp(-t); the rest, exp(-span),
-    is left of the creep there was.
+    Returned are its weights on the load before and now: the convolution of a ramp with exp(-t). The
+    rest, exp(-span), is the weight of the earlier creep.
     """
     if span < 1e-3:
         before = span / 2 - span**2 / 3 + span**3 / 8
@@ -50,10 +50,10 @@ def _shares(span):
 
 @jit_inner
 def take_past(row, kept, elapsed, fresh):
-    """Fill the columns OF_THE_PAST of a cable with what it kept.
+    """Fill the columns OF_THE_PAST of a cable with its history.
 
-    Where a run starts the platform waits at the reference pose, history cleared: the cable
-    neither lags nor sticks there.
+    At the start of a run the platform waits at the reference pose with its history cleared: there
+    the cable has neither hysteresis nor friction.
 
     Args:
         row: the cable (N_COLUMNS,). kept: (N_KEPT,).
@@ -76,17 +76,17 @@ def take_past(row, kept, elapsed, fresh):
 
 @jit_inner
 def keep_past(row, state, fresh, kept):
-    """Keep of a solved cable what the next row needs.
+    """Store the history that the next row needs of a solved cable.
 
     Args:
-        row: the cable as it was solved. state: (N_STATE,) what its law returned; what is
-            hysteretic of a slack cable's tension is put in.
+        row: the cable as it was solved. state: (N_STATE,) from its law; the hysteretic part of a
+            slack cable's tension is filled in.
         kept: (N_KEPT,), filled.
     """
     kept[_CREPT] = row[CREEP] + row[CREEP_RATE] * state[TENSION]
     strain = state[STRAIN]
     if state[TENSION] == 0.0:
-        # a slack cable keeps the stretch and the friction at which its tension ended
+        # a slack cable keeps the stretch and the hysteresis at which its tension became zero
         strain, _slope, hysteretic = strain_of_tension(row, 0.0)
         if not fresh and strain * row[REST] >= kept[_STRETCHED]:
             strain, hysteretic = kept[_STRETCHED] / row[REST], row[HYSTERESIS_BEFORE]
@@ -100,19 +100,19 @@ def keep_past(row, state, fresh, kept):
 
 @jit_inner
 def has_stretch_memory(row):
-    """Whether more than its tension matters to the next row: where it turned round, what stuck."""
+    """Whether the next row depends on more than the tension: on hysteresis or friction."""
     return row[HYSTERESIS] != 0.0 or row[FRICTION] != 0.0
 
 
 @jit_inner
 def keep_tension(row, tension, kept):
-    """Keep of a solved cable what matters where it has no stretch memory."""
+    """Store the history of a solved cable without stretch memory."""
     kept[_CREPT] = row[CREEP] + row[CREEP_RATE] * tension
     kept[_PULLED], kept[_BEHIND], kept[_PAID] = tension, tension, row[REST]
 
 
 @jit_inner
 def begin(row, kept):
-    """What a cable starts from where a run starts, once it was solved there."""
+    """Initialise the history at the start of a run, after the cable was solved there."""
     row[STRETCH_BEFORE], row[HYSTERESIS_BEFORE] = kept[_STRETCHED], 0.0
     row[STUCK] = kept[_BEHIND]

@@ -1,12 +1,12 @@
 """Wrench, stiffness and energy of a platform on its cables, one pose at a time.
 
-A pose is kept as the deviation from its commanded pose: a displacement of the platform origin
-[m] and a rotation from the left, as a quaternion whose small vector part keeps its digits.
-Rotations enter the equations multiplied by the robot's length, so that all components of a
-gradient are newtons and all steps are metres.
+A pose is stored as the deviation from its commanded pose: a displacement of the platform origin [m]
+and a rotation from the left, as a quaternion, whose small vector part keeps its digits. Rotations
+enter the equations multiplied by the robot's length, so that all components of a gradient are
+newtons and all steps are metres.
 
-A free platform steps in (translation, rotation vector), both in the base frame; one on joints as
-:mod:`seecr.compiled.joints` says.
+The coordinates of a free platform are (translation, rotation vector), both in the base frame. For a
+platform on joints see :mod:`seecr.compiled.joints`.
 """
 
 from __future__ import annotations
@@ -46,19 +46,19 @@ from seecr.compiled.joints import joint_columns, onto_joints, place_joints
 from seecr.compiled.law import is_linear
 from seecr.compiled.rotation import rotated_less
 
-# Columns of what stays as the platform moves (see prepare), one row per cable and one for the load:
-# arm of the anchor point and the point itself at the commanded pose, its distance to the exit
-# point, and where the law is a linear spring its strain per stretch [1/m] and stiffness [N/m],
+# Columns of what is constant while the platform moves (see prepare), one row per cable and one for
+# the load: arm of the anchor point and the point itself at the commanded pose, its distance to the
+# exit point, and if the law is a linear spring its strain per stretch [1/m] and stiffness [N/m],
 # else 0.
 ARM, START, BEFORE, YIELD, RATE = 0, 3, 6, 7, 8
 N_READY = 9
-# Rows of scratch that evaluate needs, and one more for each cable.
+# Rows of scratch that evaluate needs, plus one for each cable.
 N_WORK = 34
 
 
 @jit_inner
 def prepare(cables, load, pose, ready):
-    """Fill ``ready`` (m + 1, N_READY) with what stays as the platform moves from a command."""
+    """Fill ``ready`` (m + 1, N_READY) with what does not change as the platform moves."""
     m = cables.shape[0]
     w, x, y, z = pose[3], pose[4], pose[5], pose[6]
     for i in range(m):
@@ -97,10 +97,10 @@ def _linear_pull(cables, ready, i, stretch, states):
 
 @jit_inner
 def _add_point(ax, ay, az, fx, fy, fz, per, gradient, hessian):
-    """Add a force on a platform point: to the gradient, and what bending its path adds.
+    """Add a force on a platform point to the gradient, and its geometric stiffness to the hessian.
 
-    The point's arm is in units of the robot's length 1/per. Its path bends with rotation:
-    -force . d2x is the geometric part of the stiffness.
+    The point's arm is in units of the robot's length 1/per. Its path is curved under rotation,
+    hence the geometric stiffness -force . d2x.
     """
     gradient[0] -= fx
     gradient[1] -= fy
@@ -119,7 +119,7 @@ def _add_point(ax, ay, az, fx, fy, fz, per, gradient, hessian):
 
 @jit_inner
 def _other_pull(cables, ready, load, i, dx, dy, dz, guess, work, states):
-    """What a cable that is no linear spring does; see cable_pull. Fills work[12:19]."""
+    """Force and stiffness of a cable that is no linear spring (cable_pull), in work[12:19]."""
     start, move = work[14], work[15]
     for k in range(3):
         start[k] = ready[i, START + k]
@@ -134,7 +134,7 @@ def _other_pull(cables, ready, load, i, dx, dy, dz, guess, work, states):
 def _evaluate(
     cables, ready, load, deviation, length, guess, gradient, hessian, states, slopes, work
 ):
-    """See evaluate; of a free platform."""
+    """See evaluate; for a free platform."""
     m = cables.shape[0]
     px, py, pz = deviation[0], deviation[1], deviation[2]
     w, x, y, z = deviation[3], deviation[4], deviation[5], deviation[6]
@@ -182,7 +182,7 @@ def _evaluate(
             kxx, kxy, kxz = work[16, 0], work[17, 0], work[18, 0]
             kyy, kyz, kzz = work[17, 1], work[18, 1], work[18, 2]
         energy += states[i, ENERGY]
-        # J^T k J with J = [I, -[arm]x] the motion of the anchor point
+        # J^T k J with J = [I, -[arm]x] the Jacobian of the anchor point
         xx, xy, xz = ay * kxz - az * kxy, ay * kyz - az * kyy, ay * kzz - az * kyz
         yx, yy, yz = az * kxx - ax * kxz, az * kxy - ax * kyz, az * kxz - ax * kzz
         zx, zy, zz = ax * kxy - ay * kxx, ax * kyy - ay * kxy, ax * kyz - ay * kxz
@@ -193,7 +193,7 @@ def _evaluate(
         mzx, mzy, mzz = mzx + zx, mzy + zy, mzz + zz
         gx, gy, gz = gx - fx, gy - fy, gz - fz
         hx, hy, hz = hx - (ay * fz - az * fy), hy - (az * fx - ax * fz), hz - (ax * fy - ay * fx)
-        # and the bending of its path: -force . d2x
+        # and the geometric stiffness: -force . d2x
         fx, fy, fz = fx * per, fy * per, fz * per
         sx, sy, sz = fx * ax, fy * ay, fz * az
         rxx += ay * xz - az * xy + sy + sz
@@ -233,14 +233,14 @@ def _evaluate(
 def evaluate(
     cables, ready, load, deviation, current, length, guess, gradient, hessian, states, slopes, work
 ):
-    """Gradient of the energy (minus the wrench) and stiffness at a deviation; returns energy.
+    """Gradient of the energy (minus the wrench) and stiffness at a deviation; returns the energy.
 
     Args:
         cables: (m, N_COLUMNS).
         ready: (m + 1, N_READY), prepared.
         load: (N_LOAD,).
         deviation: (7,) from the commanded pose.
-        current: (n, 7) joints as they stand, (0, 7) for a free platform.
+        current: (n, 7) current joints, (0, 7) for a free platform.
         length: the robot's length [m].
         guess: (m, 3) warm start of the catenaries.
         gradient: (d,) [N], filled.
@@ -250,8 +250,8 @@ def evaluate(
         work: (N_WORK + m, 6) scratch.
 
     Returns:
-        energy [J]; nan under a moment and where a law has none in closed form; inf where a
-        cable's own equations could not be solved.
+        energy [J]; nan under a moment and if a law has none in closed form; inf if a cable's own
+        equations could not be solved.
     """
     n, m = current.shape[0], cables.shape[0]
     if n == 0:
@@ -277,7 +277,7 @@ def evaluate_batch(
     cables, load, poses, screws, deviation, values, length,
     gradient, hessian, states, slopes, energy, guess,
 ):  # fmt: skip
-    """Wrench and stiffness at given deviations; all outputs are filled."""
+    """Gradient, stiffness and energy at given deviations; all outputs are filled."""
     m = cables.shape[1]
     work, ready = np.empty((N_WORK + m, 6)), np.zeros((m + 1, N_READY))
     current = np.zeros((screws.shape[1], 7))
@@ -293,18 +293,18 @@ def evaluate_batch(
 
 @jit_inner
 def has_moment(load):
-    """Whether an external moment acts: it has no potential."""
+    """Whether there is an external moment, which has no potential."""
     k = EXTERNAL_MOMENT
     return load[k] != 0.0 or load[k + 1] != 0.0 or load[k + 2] != 0.0
 
 
 @jit
 def add_skew(load, current, length, matrix):
-    """Add to the symmetric part of the stiffness what a constant moment skews it by.
+    """Add the skew part of the stiffness due to a constant moment to its symmetric part.
 
-    An axis a_j turns with those further out, which a step's rotation vector shares evenly:
+    An axis a_j rotates with the axes further out; a step's rotation vector shares that evenly:
     -M . (a_i x a_j)/2 in row j of column i, and the opposite in row i of column j. For a free
-    platform, whose axes are those of the base frame, that is -[M]x/2.
+    platform, whose axes are those of the base frame, this is -[M]x/2.
     """
     mx = 0.5 * load[EXTERNAL_MOMENT] / length**2
     my = 0.5 * load[EXTERNAL_MOMENT + 1] / length**2

@@ -1,4 +1,4 @@
-"""The tensions nearest to wanted ones that balance a load within limits, by their dual."""
+"""The tensions nearest to wanted ones that balance a load within limits, by the dual problem."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from seecr.compiled.algebra import cholesky, solve_factored
 from seecr.compiled.jit import jit_allocating, jit_inner
 
 FOUND, NONE, UNDECIDED = 0, 1, 2
-# Most steps, most halvings of one, what of a balance may be left relative to its load, and how
-# much a step is damped relative to what is left.
+# Most steps, most halvings of one, residual of the balance relative to its load, and damping of a
+# step relative to the residual.
 _STEPS, _HALVINGS, _LEFT, _DAMPING = 100, 40, 1e-13, 1e-9
 _NEARLY = 1e-9
-# Tensions beyond this many loads are none that anyone has.
+# Tensions beyond this many loads do not occur.
 _MOST_EVER = 1e6
-# A proof that nothing balances has to be clear of rounding by this part.
+# A proof that nothing balances must exceed rounding by this part.
 _PROVEN = 1e-10
 
 
 @jit_inner
 def _clipped(matrix, aim, low, high, dual, tension):
-    """tension = aim + A^T dual within limits; the part of the dual's value that hangs on it."""
+    """tension = aim + A^T dual within limits; returns the part of the dual's value due to it."""
     d, m = matrix.shape
     value = 0.0
     for i in range(m):
@@ -35,7 +35,7 @@ def _clipped(matrix, aim, low, high, dual, tension):
 
 @jit_inner
 def _unbalanced(matrix, load, tension, left):
-    """left = A tension - load; the largest of it."""
+    """left = A tension - load; returns its largest component."""
     d, m = matrix.shape
     most = 0.0
     for k in range(d):
@@ -74,7 +74,7 @@ def _newton_step(matrix, low, high, tension, left, damping, step):
 
 @jit_inner
 def _take_up(matrix, low, high, step, tension):
-    """A^T step to the tensions inside their limits, which they keep."""
+    """Apply A^T step to the tensions that are inside their limits, and keep them there."""
     for i in range(matrix.shape[1]):
         if low[i] < tension[i] < high[i]:
             change = 0.0
@@ -102,12 +102,12 @@ def _none_balance(matrix, load, low, high, most_ever, dual):
 
 @jit_allocating
 def project(matrix, load, aim, low, high, tension):
-    """min |tension - aim|^2 with A tension = load, low <= tension <= high; whether there are any.
+    """min |tension - aim|^2 with A tension = load, low <= tension <= high; returns the outcome.
 
     A semismooth Newton method on the dual, whose gradient A clip(aim + A^T dual) - load is
     piecewise linear (Qi and Sun 1993; for projections on polyhedra Qi and Sun 2006): it ends
     after finitely many steps, most often two or three. Returns FOUND, NONE with a proof by
-    Farkas' lemma, or UNDECIDED where tensions are so many times the load that steps creep.
+    Farkas' lemma, or UNDECIDED if tensions are so many times the load that convergence is slow.
 
     Args:
         matrix: (d, m). load: (d,). aim, low, high: (m,). tension: (m,), filled.
@@ -123,7 +123,7 @@ def project(matrix, load, aim, low, high, tension):
     most = _unbalanced(matrix, load, tension, left)
     for _ in range(_STEPS):
         if most <= _NEARLY * scale:
-            # rounding of a long dual is left: the cables inside their limits take that up
+            # with a long dual, rounding remains: the cables inside their limits take it up
             for _ in range(3):
                 if most <= _LEFT * scale:
                     break
@@ -145,7 +145,7 @@ def project(matrix, load, aim, low, high, tension):
                 work += load[k] * tried[k]
             new = _clipped(matrix, aim, low, high, tried, tension) - work
             most = _unbalanced(matrix, load, tension, left)
-            # near the answer the dual's value is rounding, and what is left decides
+            # near the solution the dual's value is rounding, and the residual decides
             if new <= value + 1e-4 * part * descent or most < 0.5 * before:
                 break
             part *= 0.5

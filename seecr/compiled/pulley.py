@@ -1,4 +1,4 @@
-"""Straight cables over their swivelling pulleys: how long they are and where they leave."""
+"""Straight cables over swivelling pulleys: their length, and where they leave the pulley."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from seecr.compiled.jit import jit, jit_allocating, jit_inner
 
 @jit
 def pulley_geometry(across, rise, radius):
-    """Length and leaving direction of a straight cable over its swivelling pulley.
+    """Length and direction of a straight cable over its swivelling pulley.
 
-    In the pulley's own vertical plane, seen from the exit point A: the anchor is ``across``
+    In the pulley's own vertical plane, seen from the exit point A, the anchor point is ``across``
     [m] away horizontally and ``rise`` [m] above (negative: below). The cable enters at A from
-    below, runs over the top, and leaves along the tangent at the angle psi, measured at the
-    centre from the horizontal direction upwards.
+    below, runs over the top, and leaves along the tangent at the angle psi, measured at the centre
+    from the horizontal direction upwards.
 
     Returns:
         total length (arc and free part), free length, and the direction from the pulley to the
-        anchor, (sin psi, -cos psi).
+        anchor point, (sin psi, -cos psi).
     """
     dx, dz = across - radius, rise
     distance = math.sqrt(dx * dx + dz * dz)
@@ -33,7 +33,7 @@ def pulley_geometry(across, rise, radius):
 
 @jit
 def geometric_length(row, anchor, up):
-    """Length [m] from A over the pulley to the anchor (3,), for a straight cable."""
+    """Length [m] of a straight cable from A over the pulley to the anchor point (3,)."""
     dx, dy, dz = anchor[0] - row[0], anchor[1] - row[1], anchor[2] - row[2]
     if row[RADIUS] == 0.0:
         return math.sqrt(dx * dx + dy * dy + dz * dz)
@@ -44,7 +44,7 @@ def geometric_length(row, anchor, up):
 
 @jit_inner
 def length_in_plane(row, across, rise):
-    """Straight length over the pulley from the plane's coordinates [m]."""
+    """Straight length over the pulley, from the plane's coordinates [m]."""
     if row[RADIUS] == 0.0:
         return math.sqrt(across * across + rise * rise)
     return pulley_geometry(across, rise, row[RADIUS])[0]
@@ -52,7 +52,7 @@ def length_in_plane(row, across, rise):
 
 @jit_allocating
 def lengths_at(poses, anchors, exits, radii, up, out):
-    """Straight lengths over the pulleys (n, m) [m] of cables at poses (n, 7)."""
+    """Straight lengths (n, m) [m] of cables over the pulleys, at poses (n, 7)."""
     row, anchor = np.zeros(N_COLUMNS), np.empty(3)
     for i in range(exits.shape[0]):
         row[EXIT], row[EXIT + 1], row[EXIT + 2] = exits[i, 0], exits[i, 1], exits[i, 2]

@@ -29,7 +29,7 @@ def quaternion_product(a, b, c, d, w, x, y, z):
 
 @jit
 def turned(x, y, z, a, b, c, d):
-    """exp(rotation vector) times a quaternion, of unit length."""
+    """exp(rotation vector) times a quaternion, normalised."""
     angle = math.sqrt(x * x + y * y + z * z)
     half = 0.5 * angle
     s = 0.5 if half < 1e-8 else math.sin(half) / angle

@@ -1,10 +1,10 @@
-"""The smallest eigenvalue of small symmetric matrices, and one direction that has it.
+"""The smallest eigenvalue of small symmetric matrices, and an eigenvector of it.
 
 Householder's reflections make the matrix tridiagonal, Laguerre's steps on its characteristic
-polynomial find the eigenvalue from below, and inverse iteration with the matrix itself the
-direction (Wilkinson, The Algebraic Eigenvalue Problem, 5.29, 7.26 and 5.54): a fifth of the time
-of all eigenvectors. As exact as those, to rounding of the largest entry, whether the eigenvalue is
-repeated, negative or zero.
+polynomial find the eigenvalue from below, and inverse iteration with the matrix itself finds the
+eigenvector (Wilkinson, The Algebraic Eigenvalue Problem, 5.29, 7.26 and 5.54). This takes a fifth
+of the time of all eigenvectors, and is as exact, to rounding of the largest entry, whether the
+eigenvalue is repeated, negative or zero.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ import numpy as np
 from seecr.compiled.algebra import cholesky, norm, solve_factored
 from seecr.compiled.jit import jit_allocating, jit_inner
 
-# Of matrices whose largest entry is 1: what rounding leaves of nothing, and how far below the
-# smallest eigenvalue a factor still exists.
+# For matrices whose largest entry is 1: the rounding of zero, and how far below the smallest
+# eigenvalue the first shift for a Cholesky factor is.
 _ROUNDING, _BELOW = 2e-16, 1e-15
-# Entries so nearly the largest are as large: the first of them is to be positive.
+# Entries this close to the largest count as equal to it; the first of them is made positive.
 _AS_LARGE = 1.0 - 1e-6
 
 
 @jit_inner
 def _make_tridiagonal(a, diagonal, beside, v, p):
-    """Diagonal (n,) and what stands beside it (n - 1, then 0); the lower triangle is spent."""
+    """Diagonal (n,) and subdiagonal (n - 1, then 0); the lower triangle is overwritten."""
     n = a.shape[0]
     for k in range(n - 2):
         size = 0.0
@@ -61,15 +61,15 @@ def _make_tridiagonal(a, diagonal, beside, v, p):
 
 @jit_inner
 def _sums(diagonal, beside, at):
-    """Sums of 1/(lambda - at) and of its square over the eigenvalues; 0 where one lies below.
+    """Sums of 1/(lambda - at) and of its square over the eigenvalues; 0 if one lies below ``at``.
 
-    By the pivots of the matrix less ``at``, whose product is the characteristic polynomial, and
-    their first two derivatives.
+    They follow from the pivots of the matrix minus ``at``, whose product is the characteristic
+    polynomial, and from the pivots' first two derivatives.
     """
     one, two = 0.0, 0.0
     square, inverse, slope, bend = 0.0, 0.0, 0.0, 0.0
     for i in range(diagonal.shape[0]):
-        # of the pivot before: slope and bend are over its size
+        # of the pivot before: slope and bend are divided by it
         part = square * inverse
         pivot = diagonal[i] - at - part
         if not pivot > 0.0:
@@ -87,7 +87,7 @@ def _sums(diagonal, beside, at):
 def _smallest(diagonal, beside):
     """The smallest eigenvalue of a tridiagonal matrix with entries of size 1.
 
-    Laguerre's steps from below never pass it; one that rounding lets pass is halved.
+    Laguerre's steps from below never pass it; a step that passes it by rounding is halved.
     """
     n, low = diagonal.shape[0], np.inf
     for i in range(n):
@@ -112,7 +112,7 @@ def _smallest(diagonal, beside):
 
 @jit_inner
 def _softest(matrix, scaled, factor, work, direction):
-    """Smallest eigenvalue of a matrix, its lower triangle read; fills the direction (n,)."""
+    """Smallest eigenvalue of a matrix, from its lower triangle; fills the direction (n,)."""
     n, top = matrix.shape[0], 0.0
     finite = True
     for i in range(n):
@@ -133,7 +133,7 @@ def _softest(matrix, scaled, factor, work, direction):
     while not cholesky(scaled, below - least, factor):
         below *= 2.0
     for k in range(n):
-        # of no pattern that a direction could be square to
+        # irregular, so that no eigenvector is orthogonal to it
         x[k] = 1.0 / (k + 1.618)
     for _ in range(3):
         solve_factored(factor, x, direction)
@@ -151,13 +151,13 @@ def _softest(matrix, scaled, factor, work, direction):
 
 @jit_allocating
 def softest_batch(matrices, values, directions):
-    """Of symmetric matrices (n, d, d), their lower triangles: smallest eigenvalues, directions.
+    """Smallest eigenvalues and eigenvectors of symmetric matrices (n, d, d), from lower triangles.
 
     Args:
         matrices: only read.
-        values: (n,), filled; nan where an entry is no number.
-        directions: (n, d), filled: of length 1, the largest part of it positive; of an eigenvalue
-            that is repeated, any of those that have it.
+        values: (n,), filled; nan if an entry is not finite.
+        directions: (n, d), filled: of unit length, with a positive largest component; for a
+            repeated eigenvalue, any of its eigenvectors.
     """
     d = matrices.shape[1]
     scaled, factor, work = np.empty((d, d)), np.empty((d, d)), np.empty((4, d))

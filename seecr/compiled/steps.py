@@ -1,4 +1,4 @@
-"""The steps of a descent: Newton's, those away from saddles, and what tells where one stands."""
+"""The steps of a descent: Newton's, those away from saddles, and tests of a stationary point."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from seecr.compiled.rotation import turned
 
 @jit
 def residual_size(gradient):
-    """Largest of force and (torque / length): the norms of the wrench's halves [N]."""
+    """The larger of force and torque over length [N]; for joints the norm of the gradient."""
     if gradient.shape[0] != 6:
         return norm(gradient)
     force = gradient[0] ** 2 + gradient[1] ** 2 + gradient[2] ** 2
@@ -34,7 +34,7 @@ def residual_size(gradient):
 
 @jit_inner
 def advance(deviation, values, step, length, screws, pose, trial, trial_values, current):
-    """The state one step on."""
+    """The state after one step."""
     if screws.shape[0] == 0:
         for k in range(3):
             trial[k] = deviation[k] + step[k]
@@ -50,9 +50,9 @@ def advance(deviation, values, step, length, screws, pose, trial, trial_values, 
 
 @jit_inner
 def newton_step(gradient, hessian, shift, radius, load, current, length, factor, step):
-    """Solve (H + shift I) step = -gradient, shift the least that makes H definite.
+    """Solve (H + shift I) step = -gradient, with a shift that makes H positive definite.
 
-    A moment skews the stiffness: the step takes that in, and still does positive work.
+    A moment makes the stiffness asymmetric; the step includes that, and still does positive work.
     """
     n = step.shape[0]
     if not cholesky(hessian, shift, factor):
@@ -79,10 +79,10 @@ def newton_step(gradient, hessian, shift, radius, load, current, length, factor,
 
 @jit_allocating
 def mirrored_step(gradient, hessian, radius, step):
-    """Newton's step with every stiffness taken by size: from saddles away, elsewhere on.
+    """Newton step with the absolute value of each eigenvalue: it leads away from saddles.
 
-    Where the force has no part along a direction that is unstable, the shift that this direction
-    needs would only shorten the step in all others.
+    If the gradient has no component along an unstable direction, the shift for that direction would
+    only shorten the step in all others.
     """
     eigenvalues, vectors = np.linalg.eigh(hessian)
     n = step.shape[0]
@@ -104,7 +104,7 @@ def mirrored_step(gradient, hessian, radius, step):
 
 @jit_allocating
 def escape(hessian, top, radius, step):
-    """Softest direction, as a step; UNSTABLE where it is downhill, SINGULAR where it is flat."""
+    """Step along the softest direction; UNSTABLE if it is downhill, SINGULAR if it is flat."""
     eigenvalues, vectors = np.linalg.eigh(hessian)
     for k in range(step.shape[0]):
         step[k] = 0.1 * radius * vectors[k, 0]
@@ -121,7 +121,7 @@ def is_idle(states, i, scale):
 def holds_without_idle(cables, load, pose, deviation, length, guess, states, scale, space):
     """Whether the equilibrium is stable without the cables whose tension is mere rounding.
 
-    A cable that is exactly as long as its rest length resists on one side only.
+    A cable that is exactly as long as its rest length has stiffness on one side only.
     """
     idle = False
     for i in range(cables.shape[0]):
@@ -145,7 +145,7 @@ def holds_without_idle(cables, load, pose, deviation, length, guess, states, sca
 
 @jit_inner
 def turns_about_moment(load, current, length, step):
-    """Full turns about the axis of the external moment that a step makes."""
+    """Turns about the axis of the external moment that a step makes."""
     mx, my, mz = load[EXTERNAL_MOMENT], load[EXTERNAL_MOMENT + 1], load[EXTERNAL_MOMENT + 2]
     turn_by = 0.0
     if current.shape[0] == 0:

@@ -1,7 +1,7 @@
-"""Says that compiling takes long, where somebody wants to hear it: else it is a minute of silence.
+"""Reports that compiling takes long, if a caller asks for it; else it is a minute of silence.
 
-Numba compiles what its cache on disk does not hold. It tells of each function that it compiles and
-of none that it finds there, so that nothing has to be guessed about the cache.
+Numba compiles what its cache on disk does not hold. It notifies of each function that it compiles
+and of none from the cache, so the state of the cache need not be guessed.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ __all__ = ["Watch", "begins", "ends", "tell_compiling"]
 
 Say = Callable[[], None]
 
-# Compiling that takes no longer than this is not worth a line [s].
+# Compiling that takes no longer than this is not reported [s].
 _PATIENCE = 2.0
 
 
 class Watch:
-    """Calls ``say`` once, in this process, when compiling has gone on for a while.
+    """Calls ``say`` once in this process, when compiling has gone on for a while.
 
     Args:
-        say: what is called, in a thread of its own.
-        patience: [s] how long it may go on before.
+        say: the function to call, in a thread of its own.
+        patience: [s] how long compiling may go on before that.
     """
 
     def __init__(self, say: Say, patience: float = _PATIENCE) -> None:
@@ -32,7 +32,7 @@ class Watch:
         self._timer: Timer | None = None
 
     def begins(self) -> None:
-        """A function begins to be compiled; others may begin before it ends."""
+        """Compilation of a function begins; others may begin before it ends."""
         with self._lock:
             self._depth += 1
             if self._timer is None and not self._said and os.getpid() == self._process:
@@ -41,7 +41,7 @@ class Watch:
                 self._timer.start()
 
     def ends(self) -> None:
-        """A function is compiled."""
+        """Compilation of a function has ended."""
         with self._lock:
             self._depth -= 1
 
@@ -57,18 +57,18 @@ _watch: Watch | None = None
 
 
 def tell_compiling(say: Say) -> None:
-    """From now on ``say`` is called, once, where compiling takes long."""
+    """From now on call ``say``, once, if compiling takes long."""
     global _watch
     _watch = Watch(say)
 
 
 def begins() -> None:
-    """Whoever is to be told is told of a function that begins to be compiled."""
+    """Pass on that compilation of a function begins."""
     if _watch is not None:
         _watch.begins()
 
 
 def ends() -> None:
-    """And of one that is."""
+    """Pass on that compilation of a function has ended."""
     if _watch is not None:
         _watch.ends()

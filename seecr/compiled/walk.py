@@ -1,4 +1,4 @@
-"""Rows that depend on those before: waypoints solved in order, the cables' state carried."""
+"""Rows that depend on the rows before: waypoints solved in order, with the cables' history."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ def walk_in_order(
 ):  # fmt: skip
     """Solve waypoints in order, each from the one before; all outputs are filled.
 
-    One that is not solved ends its run: where the way to a row is not known, nothing is. The
-    others of the run count as stalled; searching for each of them took up to ``limit`` steps.
+    A waypoint that is not solved ends its run, since the path to later rows is then unknown. The
+    later ones count as stalled; searching for each would take up to ``limit`` steps.
 
     Args:
         cables: (N, m, N_COLUMNS); the columns OF_THE_PAST are filled.
         fresh: (N,) waypoints that start a run. elapsed: (N,) [s] since the one before.
-        The others are those of solve_batch.
+        Other arguments are those of solve_batch.
     """
     n, m = cables.shape[0], cables.shape[1]
     softened = np.empty_like(cables[0])
@@ -58,7 +58,7 @@ def walk_in_order(
             start[3] = 1.0
             first[:] = 0.0
         else:
-            # as far from its command as it was before
+            # the start deviates from its command as much as the last equilibrium did
             copy_vector(deviation[k - 1], start)
             copy_vector(values[k - 1], first)
         for i in range(m):
@@ -83,11 +83,12 @@ def walk_in_order(
 def _pull_side(
     table, load, part, pose, screws, deviation, values, length, guess, elapsed, fresh, side, space
 ):
-    """What the cables of one side pull, a part of a step from where the walk came to rest.
+    """Tensions and gradient of one side, at a small displacement from the equilibrium.
 
     Args:
-        table, load: of that side. part: (d,) [m].
-        side: rows with their past, what they kept, tensions, gradient; all but kept are filled.
+        table, load: of that side. part: (d,) [m] the displacement.
+        side: rows with their history, the history kept, tensions, gradient; all but the second are
+            filled.
     """
     rows, kept, pulls, gradient = side
     advance(deviation, values, part, length, screws, pose, space[12], space[13], space[1])
@@ -106,11 +107,12 @@ def _keep_side(
     table, load, part, more, slopes, pose, screws, deviation, values, length, guess, fresh, side,
     space,
 ):  # fmt: skip
-    """Keep what the cables of one side need for the next row, where that side is.
+    """Store the history that the next row needs of one side's cables, at that side's equilibrium.
 
     Args:
-        part: (d,) [m] of that from where the walk came to rest. more: from where it pulled.
-        side: as that left it; tensions are brought there.
+        part: (d,) [m] displacement of that side from the equilibrium. more: (d,) [m] the part of it
+            since the tensions were computed.
+        side: as _pull_side left it; tensions are updated.
     """
     rows, kept, pulls, _gradient = side
     placed = False
@@ -139,20 +141,20 @@ def change_on_the_way(
     plus, minus, plus_load, minus_load, poses, screws, deviation, values, slopes, length, guess,
     inverse, fresh, elapsed, solved, step, tension,
 ):  # fmt: skip
-    """How the rests of a walk differ between tables that differ little; nothing is solved.
+    """Difference of a path's equilibria between slightly different tables; nothing is solved.
 
-    Forward through the rows: at each the two sides start from what their cables kept, the wrench
-    by which they differ there moves the platform by the implicit function theorem, and each side
-    keeps what its cables come to where it then is. The wrench is asked where the walk came to
-    rest; where the platform stands still, as far apart as at the row before: there no cable turns
-    round on either side, and the stiffness holds.
+    It is carried forward through the rows. At each row the two sides start from their cables'
+    history; the difference of their wrenches moves the platform by the implicit function theorem;
+    and each side stores its cables' history where it then is. The wrench is evaluated at the
+    equilibrium; if the platform stands still, at the displacement of the row before, where no cable
+    reverses on either side and the stiffness holds.
 
     Args:
-        plus, minus: (N, m, N_COLUMNS), the columns OF_THE_PAST do not count.
-        deviation, values: (N, 7), (N, d) where the walk between them came to rest.
-        slopes, inverse: (N, m, d), (N, d, d) of the tensions, of the stiffness there.
-        solved: (N,) rows of the walk; others end their run, and do not change.
-        step: (N, d) [m] in the loop's coordinates, of plus less minus, filled.
+        plus, minus: (N, m, N_COLUMNS), the columns OF_THE_PAST are ignored.
+        deviation, values: (N, 7), (N, d) equilibria of the path between the two.
+        slopes, inverse: (N, m, d) of the tensions, (N, d, d) inverse of the stiffness there.
+        solved: (N,) rows with an equilibrium; others end their run and get zero changes.
+        step: (N, d) [m] in the loop's coordinates, of plus minus minus, filled.
         tension: (N, m) [N], the same, filled.
     """
     n, m, d = plus.shape[0], plus.shape[1], step.shape[1]
@@ -195,6 +197,6 @@ def change_on_the_way(
             tension[k, i] = ahead[2][i] - behind[2][i]
             lost = lost or not np.isfinite(tension[k, i])
         if lost:
-            # a cable's own equations: nothing is known from here on
+            # a cable's own equations failed: nothing is known from here on
             step[k] = 0.0
             tension[k] = 0.0

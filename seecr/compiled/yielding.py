@@ -1,13 +1,13 @@
-"""An exit point that yields upwards by another amount than sideways, compiled.
+"""An exit point whose compliance upwards differs from that sideways, compiled.
 
 A frame moves its exit points by C p under the pull p = -force of a cable on its anchor point,
-C = c (I - z z^T) + c_up z z^T with the vertical z. The part that is alike in all directions, c p,
-is along the cable and lengthens it by c T (column COMPLIANCE, in series with all else). What is
-left lifts the exit point by s = (c_up - c) z.p, one unknown per cable:
+C = c (I - z z^T) + c_up z z^T with the vertical z. The isotropic part, c p, is along the cable and
+lengthens it by c T (column COMPLIANCE, in series with all else). The remainder lifts the exit point
+by s = (c_up - c) z.p, one unknown per cable:
 
     s - (c_up - c) z . p(move - s z) = 0,
 
-where p(move) is the pull of the cable from an exit point that has not been lifted. Its slope
+where p(move) is the pull of the cable from an exit point that is not lifted. The slope
 1 + (c_up - c) z.K z is positive, since K, with c in series, is no stiffer than 1/c.
 """
 
@@ -24,14 +24,14 @@ def along(up, vector):
 
 @jit_inner
 def lowered(move, lift, up, out):
-    """``out`` = how far the anchor point has moved as seen from the lifted exit point."""
+    """``out`` = displacement of the anchor point as seen from the lifted exit point."""
     for k in range(3):
         out[k] = move[k] - lift * up[k]
 
 
 @jit_inner
 def lift_slope(more, up, stiffness):
-    """Slope of the equation of the lift."""
+    """Slope of the equation for the lift."""
     total = 0.0
     for i in range(3):
         total += up[i] * along(up, stiffness[i])

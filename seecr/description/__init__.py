@@ -1,1 +1,1 @@
-"""The robot: its points, cables and joints as numbers, from MJCF, and which robot it is."""
+"""The robot as numbers: points, cables and joints, read from MJCF, and its fingerprint."""

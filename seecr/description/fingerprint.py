@@ -1,4 +1,4 @@
-"""Which robot a model or a diagnosis is of, written so that a person sees what differs."""
+"""Which robot a model or a diagnosis belongs to, written so that a person sees what differs."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ if TYPE_CHECKING:
 
 __all__ = ["check_robot", "fingerprint"]
 
-# Points that moved by less than this part of the longest cable are where they were.
+# Points that differ by less than this part of the longest cable are the same.
 _SAME = 1e-6
 # What a change of the other numbers means for a model.
 _TWICE = "its effects may count twice; fit them again (crosscheck add --refit)"
 _POINTS = ("exit_points_m", "anchor_points_m", "reference_pose")
 _ANEW = "give the robot it was made for, or make it anew for this one"
 _NOTED = ("mass_kg", "ea_N", "rest_lengths_m", "centre_of_mass_m")
-# Digits kept: more than anybody measures, few enough to read.
+# Decimals kept: more than anybody measures, few enough to read.
 _DIGITS = 9
 # Characters of a wrong value that are shown.
 _SHOWN = 60
 
 
 def fingerprint(robot: Robot) -> tomlkit.items.Table:
-    """The table ``[robot]`` of a model, ``robot`` of a diagnosis."""
+    """The table ``[robot]`` of a model, or ``robot`` of a diagnosis."""
     table = tomlkit.table()
     table["name"] = robot.name
     table["cables"] = list(robot.cable_names)
@@ -61,7 +61,7 @@ def _toml(value: Any) -> Any:
 
 @dataclass(frozen=True)
 class _Said:
-    """What a file says of its robot, and on which lines."""
+    """What a file states about its robot, and on which lines."""
 
     path: Path
     table: Mapping[str, Any]
@@ -72,7 +72,7 @@ class _Said:
 
 
 def _nowhere(key: str) -> int | None:
-    """The line of a key in files that have none."""
+    """The line of a key in files without lines."""
     return None
 
 
@@ -87,16 +87,16 @@ def check_robot(
 
     Args:
         path: the file.
-        table: its ``[robot]``; None where a person left it out, which is their business.
-        robot: the one it is to be used for.
-        changed: what it means that mass, stiffness and the like have changed.
+        table: its ``[robot]``; None if the file has none, which is allowed.
+        robot: the one that it is to be used for.
+        changed: what it means if mass, stiffness and the like have changed.
         line_of: the line of a key, for errors, in a file that has lines.
 
     Returns:
         notes about mass, stiffness and the like that have changed since.
 
     Raises:
-        InputFileError: another number of cables, points elsewhere, or no numbers.
+        InputFileError: another number of cables, points elsewhere, or values that are not numbers.
     """
     if table is None:
         return (f"{path} does not say which robot it was made for",)
@@ -137,7 +137,7 @@ def _check_cables(path: Path, table: Mapping[str, Any], robot: Robot) -> None:
 
 
 def _apart(said: _Said, key: str, own: Mapping[str, Any]) -> Any:
-    """How far each row of numbers is from the robot's, (k,); 0 where the file has none."""
+    """Distance of each row of numbers from the robot's, (k,); 0 if the file has none."""
     here = np.atleast_1d(np.asarray(own[key], float))
     if key not in said.table:
         return np.zeros(len(here))
@@ -151,7 +151,7 @@ def _apart(said: _Said, key: str, own: Mapping[str, Any]) -> Any:
 
 
 def _numbers(value: Any) -> Any:
-    """As an array; None where they are none, or not finite."""
+    """An array; None if the value is not finite numbers."""
     try:
         array = np.atleast_1d(np.asarray(value, float))
     except (TypeError, ValueError):
@@ -160,7 +160,7 @@ def _numbers(value: Any) -> Any:
 
 
 def _cut(text: str) -> str:
-    """The beginning of what may be long."""
+    """The beginning of a text that may be long."""
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]} ..."
 
 

@@ -1,4 +1,4 @@
-"""What callers give for a robot: one that was loaded, or where to load it from."""
+"""Robots as callers give them: loaded, or as a path or name to load from."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ GivenRobot: TypeAlias = Robot | str | Path
 
 
 def robot_of(given: GivenRobot) -> Robot:
-    """The robot, read if need be.
+    """The robot, loaded if a path or name is given.
 
     Raises:
-        RobotError: no such file, or no cable robot in it.
-        InputError: neither a robot nor where one is.
+        RobotError: there is no such file, or it holds no cable robot.
+        InputError: neither a robot nor a path or name.
     """
     if isinstance(given, Robot):
         return given

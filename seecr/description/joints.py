@@ -1,4 +1,4 @@
-"""Platforms on slide and hinge joints: joint values of poses, and poses of joint values."""
+"""Platforms on slide and hinge joints: from joint values to poses, and back."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from seecr.pose import (
     quat_rotate,
 )
 
-# A commanded pose may miss the joints' manifold by this, relative to the robot's length.
+# Allowed distance of a commanded pose from what the joints reach [robot's length, or rad].
 _OFF_MANIFOLD = 1e-6
 
 
 def pose_of_values(robot: Robot, values: Array) -> tuple[Array, Array]:
-    """Poses (n, 7) and joints as they stand there (n, d, 7) for joint values (n, d) [m, rad].
+    """Poses (n, 7), and the joints there (n, d, 7), for joint values (n, d) [m, rad].
 
-    A joint is a row of kind (0 slide, 1 hinge), axis and point in the base frame. The first
-    joint is the outermost, as in MJCF (product of exponentials from the reference pose).
+    A joint is a row of kind (0 slide, 1 hinge), axis and point in the base frame. The first joint
+    is the outermost, as in MJCF (product of exponentials from the reference pose).
     """
     values = np.atleast_2d(np.asarray(values, float))
     n = len(values)
     turn = np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
-    shift = np.zeros((n, 3))  # x -> turn(x - o) + o + shift, o the reference position
+    shift = np.zeros((n, 3))  # x -> turn(x - o) + o + shift, with o the reference position
     origin = robot.reference_pose[:3]
     screws = np.zeros((n, len(robot.joints), 7))
     for j, joint in enumerate(robot.joints):
@@ -50,7 +50,7 @@ def values_of_pose(robot: Robot, poses: Array) -> tuple[Array, Array]:
     """Joint values (n, d) that bring the platform to poses (n, 7), and the joints there.
 
     Raises:
-        InputError: a pose that the joints cannot reach.
+        InputError: the joints cannot reach a pose.
     """
     poses = np.atleast_2d(np.asarray(poses, float))
     values = _nearest(robot, poses)
@@ -74,7 +74,7 @@ def _nearest(robot: Robot, poses: Array) -> Array:
         step = np.einsum("nkd,nd->nk", np.linalg.pinv(columns), miss)
         values = values + step
         size = float(np.max(np.abs(step) / (1.0 + np.abs(values)), initial=0.0))
-        # so near to the end steps that do not fall are rounding
+        # this close to convergence, steps that do not shrink are rounding
         if size < 1e-14 or 0.5 * before <= size < 1e-12:
             break
         before = size
@@ -82,7 +82,7 @@ def _nearest(robot: Robot, poses: Array) -> Array:
 
 
 def _off_joints(robot: Robot, poses: Array, reached: Array) -> tuple[int, str] | None:
-    """The row that is furthest off what the joints can reach, and by how much; None if none is."""
+    """The row farthest from what the joints can reach, and its distance; None if none is."""
     miss = np.abs(pose_difference(poses, reached)) / np.repeat([robot.length, 1.0], 3)
     if not np.any(miss > _OFF_MANIFOLD):
         return None
@@ -92,9 +92,9 @@ def _off_joints(robot: Robot, poses: Array, reached: Array) -> tuple[int, str] |
 
 
 def off_joints(robot: Robot, poses: Array) -> tuple[int, str] | None:
-    """The row of poses (n, 7) that is furthest off what the joints can reach, and by how much.
+    """The row of poses (n, 7) that is farthest from what the joints can reach, and its distance.
 
-    None where all can be reached; a platform with a free joint reaches all.
+    None if all can be reached; a platform with a free joint reaches all.
     """
     if not robot.joints:
         return None
@@ -102,7 +102,7 @@ def off_joints(robot: Robot, poses: Array) -> tuple[int, str] | None:
 
 
 def motion_columns(screws: Array, position: Array) -> Array:
-    """Change of poses at positions (n, 3) by their joint values, (n, 6, d); screws (n, d, 7)."""
+    """Derivatives (n, 6, d) of poses at positions (n, 3) by joint values; screws are (n, d, 7)."""
     axis, point, hinge = screws[..., 1:4], screws[..., 4:7], screws[..., :1]
     linear = np.where(hinge == 1.0, cross(axis, position[:, None] - point), axis)
     return np.swapaxes(np.concatenate([linear, axis * hinge], axis=-1), 1, 2)

@@ -1,4 +1,4 @@
-"""Read a robot from MJCF: MuJoCo compiles the model, we take its numbers and nothing else."""
+"""Read a robot from MJCF: MuJoCo compiles the model, and only its numbers are used."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from seecr.pose import Array, quat_rotate, quat_to_matrix
 if TYPE_CHECKING:
     import mujoco
 
-# A value of numbers one of which is none: MuJoCo warns of it, and writes a log, before it refuses.
+# An attribute whose numbers include a nan: MuJoCo would warn and write a log before refusing it.
 _NO_NUMBER = re.compile(
     rb"""\b(?!name\b)\w+\s*=\s*["'](?:[-+.\deE\s]*\s)?[-+]?nan\b[-+.\deE\sna]*["']""", re.IGNORECASE
 )
@@ -28,10 +28,10 @@ _EXPECTED = "expected the robot as MJCF, XML that begins with <mujoco"
 def load_robot(path: str | Path) -> Robot:
     """Read the cable robot in an MJCF file.
 
-    One moving body with a free joint or with slide and hinge joints; each cable a spatial
-    tendon through two sites, one fixed to the world (the exit point) and one on the body (the
-    anchor point), with ``springlength="0 l0"`` and a stiffness. Mass, centre of mass and
-    gravity are those of the compiled model.
+    The file has one moving body with a free joint or with slide and hinge joints. Each cable is a
+    spatial tendon through two sites, one fixed to the world (the exit point A_i) and one on the
+    body (the anchor point B_i), with ``springlength="0 l0"`` and a stiffness. Mass, centre of mass
+    and gravity are those of the compiled model.
 
     Args:
         path: the MJCF file, or the name of a shipped robot.
@@ -76,7 +76,7 @@ def load_robot(path: str | Path) -> Robot:
 
 
 def _check_lengths(robot: Robot, path: Path) -> None:
-    """That rest lengths are of the frame's size."""
+    """Check that no rest length is far larger than the frame."""
     for name, length in zip(robot.cable_names, robot.rest_lengths, strict=True):
         if length > ABSURD * robot.reach:
             raise RobotError(
@@ -105,7 +105,7 @@ def _compile(path: Path) -> mujoco.MjModel:
 
 
 def not_mjcf(path: Path) -> str:
-    """What a file is instead of XML, which MuJoCo would say in a parser's words; else nothing."""
+    """What a file is if it is not XML (MuJoCo's own message would be a parser's); else ""."""
     data = read_bytes(path, _EXPECTED)
     begins = data.removeprefix(b"\xef\xbb\xbf").lstrip()
     kind = no_text(data)
@@ -124,7 +124,7 @@ def not_mjcf(path: Path) -> str:
 
 
 def _check_names(model: mujoco.MjModel, path: Path) -> None:
-    """That every name is text: MuJoCo keeps bytes, and reads names from them only when asked."""
+    """Check that names are UTF-8: MuJoCo keeps bytes, and decodes names only when they are used."""
     for name in model.names.split(b"\0"):
         try:
             name.decode("utf-8")
@@ -173,7 +173,7 @@ def _moving_body(model: mujoco.MjModel, path: Path) -> int:
 
 
 def _refuse_other_forces(model: mujoco.MjModel, body: int, path: Path) -> None:
-    """What would shift the platform at rest and is not read here: better no answer."""
+    """Refuse what would change the equilibrium but is not read here."""
     if model.body_gravcomp[body] != 0:
         raise RobotError(
             f"{path}: body {_body_name(model, body)} has gravcomp "

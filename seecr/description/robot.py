@@ -1,4 +1,4 @@
-"""The robot as numbers: points, cables, load, and how the platform may move."""
+"""The robot as numbers: points, cables, load, and the platform's degrees of freedom."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ IDENTITY_POSE = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """One slide or hinge joint of a platform that may not move freely.
+    """A slide or hinge joint of a platform that is not free.
 
     Attributes:
         kind: ``"slide"`` or ``"hinge"``.
         name: as in the MJCF.
         axis: (3,) unit vector in the base frame at the reference pose.
-        point: (3,) [m] a point of the axis, base frame at the reference pose.
+        point: (3,) [m] a point on the axis, base frame at the reference pose.
     """
 
     kind: str
@@ -40,7 +40,7 @@ class Robot:
     """A platform on elastic cables. Arrays are read-only; use ``dataclasses.replace``.
 
     Attributes:
-        name: what people call it.
+        name: of the robot, for people.
         exit_points: A_i in the base frame, (m, 3) [m].
         anchor_points: B_i in the platform frame, (m, 3) [m].
         ea: k_c = E S of each cable, (m,) [N] (paper, eq 10).
@@ -48,12 +48,12 @@ class Robot:
         mass: of the platform [kg].
         centre_of_mass: in the platform frame, (3,) [m].
         gravity: (3,) [m/s^2] in the base frame.
-        reference_pose: (7,) where the winches were zeroed.
+        reference_pose: (7,) at which the winches were zeroed.
         joints: in the order of the chain; empty for a free platform.
         cable_names: m names.
         source: the file it was read from.
-        inertia: of the platform about its centre of mass, in its frame, (3, 3) [kg m^2]; zero where
-            nobody said. No rest depends on it.
+        inertia: of the platform about its centre of mass, in its frame, (3, 3) [kg m^2]; zero if
+            unknown. It affects no equilibrium.
     """
 
     name: str
@@ -131,22 +131,22 @@ class Robot:
 
     @property
     def n_dof(self) -> int:
-        """Degrees of freedom of the platform: 6 when free, else one per joint."""
+        """Degrees of freedom of the platform: 6 if free, else one per joint."""
         return len(self.joints) or 6
 
     @cached_property
     def hinges(self) -> NDArray[np.bool_]:
-        """(d,) which coordinates of the platform turn it: hinges; the last three when free."""
+        """(d,) whether each coordinate is a rotation; the last three of a free platform are."""
         if not self.joints:
             return np.repeat([False, True], 3)
         return np.array([joint.kind == "hinge" for joint in self.joints])
 
     @property
     def up(self) -> Array:
-        """Unit vector (3,) against gravity; base z where there is none.
+        """Unit vector (3,) against gravity; base z if there is none.
 
-        It is the axis on which pulleys swivel. The frame carries the pulleys, so a tilt of
-        gravity against the frame does not turn it.
+        Pulleys swivel about this axis. They are carried by the frame, so the effect of a tilted
+        gravity does not change it.
         """
         g = np.linalg.norm(self.gravity)
         return -self.gravity / g if g > 0 else np.array([0.0, 0.0, 1.0])
@@ -158,22 +158,23 @@ class Robot:
 
     @property
     def usual_load(self) -> float:
-        """What cables pull about [N]: the weight; without one what stretches them by 0.1 %."""
+        """Typical cable force [N]: the weight, or without one the force at a strain of 0.1 %."""
         return self.weight if self.weight > 0.0 else 1e-3 * float(np.mean(self.ea))
 
     @cached_property
     def length(self) -> float:
-        """The robot's own length [m]: it weighs newton-metres against newtons.
+        """The robot's characteristic length [m], which makes torques comparable with forces.
 
-        Half the largest distance of two anchor points, so that a torque of (weight x length)
-        is what the cables can balance by moving the weight from one anchor to another; a
-        platform with one anchor point takes a hundredth of its longest cable instead.
+        It is half the largest distance of two anchor points: cables can balance a torque of weight
+        times length by moving the weight from one anchor point to another. It is at least a
+        hundredth of the largest distance from the reference position to an exit point, which
+        matters for a platform with one anchor point.
         """
         b = self.anchor_points
         reach = 0.5 * float(np.max(np.linalg.norm(b[:, None] - b[None], axis=-1)))
         exits = self.exit_points - self.reference_pose[:3]
         floor = 0.01 * float(np.max(np.linalg.norm(exits, axis=-1)))
-        # one exit point, and the platform's origin on it
+        # if all exit points are at the reference position, a hundredth of the longest cable
         longest = float(np.max(self.nominal_lengths(self.reference_pose[None])))
         return max(reach, floor) or 0.01 * longest
 
@@ -194,11 +195,11 @@ class Robot:
         return np.asarray(np.linalg.norm(self.exit_points - anchors, axis=-1))
 
     def commanded_lengths(self, poses: Array) -> Array:
-        """Rest lengths the winches pay out for commanded poses (n, 7), as (n, m) [m].
+        """Rest lengths that the winches pay out for commanded poses (n, 7), as (n, m) [m].
 
-        The rest lengths at the reference pose, moved by the difference of straight lengths.
-        Where the MJCF's rest lengths are the straight lengths at the reference pose, as in
-        the paper (step 3), these are the straight lengths at the commanded pose.
+        They are the rest lengths at the reference pose plus the difference of straight lengths. If
+        the MJCF's rest lengths are the straight lengths at the reference pose, as in the paper
+        (step 3), they are the straight lengths at the commanded pose.
         """
         offset = self.rest_lengths - self.reference_lengths
         return self.nominal_lengths(poses) + offset

@@ -19,7 +19,7 @@ the Vectran (section IV). The fishing line, 0.4 mm of nylon at 1.5 to 3 GPa, has
 """
 
 _HERE = Path(__file__).resolve().parents[1]
-# inside the package when installed from a wheel, beside it in a checkout or an editable install
+# inside the package if installed from a wheel, beside it in a checkout or an editable install
 _PLACES = (_HERE / "models", _HERE.parent / "models")
 
 
@@ -36,7 +36,7 @@ def model_path(name: str) -> Path:
         name: as in ``models/<name>/<name>.xml``, for example ``"demobot_cogiro"``.
 
     Raises:
-        InputError: no robot of that name; the message lists those there are, nearest first.
+        InputError: there is no robot of that name; the message lists the names, nearest first.
     """
     if str(name) in model_names():
         files = (place / name / f"{name}.xml" for place in _PLACES)
@@ -45,10 +45,10 @@ def model_path(name: str) -> Path:
 
 
 def robot_file(given: str | Path) -> Path:
-    """The MJCF file that is meant: a path, or the name of a shipped robot where no such file is.
+    """The MJCF file for a path, or for the name of a shipped robot if there is no such file.
 
     Raises:
-        InputError: neither, and without a file's ending; the message lists the names, nearest
+        InputError: neither, and without a file extension; the message lists the names, nearest
             first.
     """
     path = path_of(given, "an MJCF file, or the name of a shipped robot")

@@ -1,1 +1,1 @@
-"""Where the platform comes to rest: one pose, all of them, and the ways between them."""
+"""Equilibria: how they are found, how they go along a trajectory, and how high passes are."""

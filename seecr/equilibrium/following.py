@@ -1,9 +1,10 @@
-"""Trajectories followed: where the reference pose leads along the commanded way, and its jumps.
+"""Equilibria followed along a trajectory from the reference pose, and where the platform jumps.
 
-A rest moves smoothly with what the winches pay out until it ends, in a fold or where a cable goes
-slack; there the platform jumps to another. From waypoint to waypoint the rest is continued, by
-steps that are halved until it moves as its stiffness says (Allgower and Georg, Introduction to
-Numerical Continuation Methods, 2003, chapter 2); what moves far however small the step is a jump.
+An equilibrium moves smoothly with the rest lengths until it ceases to exist, in a fold or where a
+cable goes slack; there the platform jumps to another one. The equilibrium is continued from
+waypoint to waypoint. A step is halved until the equilibrium moves as its stiffness predicts
+(Allgower and Georg, Introduction to Numerical Continuation Methods, 2003, chapter 2); if the
+platform moves far however small the step is, that is a jump.
 """
 
 from __future__ import annotations
@@ -30,34 +31,37 @@ from seecr.units import joules
 
 __all__ = ["Jump", "follow_commands", "moved", "step_between"]
 
-# Between waypoints the command moves by less than this [of the length].
+# Largest motion of the command between two waypoints, as a part of the robot's length.
 _WAY = 0.05
-# Smooth is where the rest moves with its command but for the first, or but for the second where the
-# stiffness foretells that within the third; the least part of a waypoint's step that is tried.
+# A step is smooth if the platform moves with its command to within the first number (times the
+# robot's length), or to within the second if the stiffness predicts that motion to within the third
+# (relative). The last number is the smallest part of the step to a waypoint that is tried.
 _SMALL, _LARGE, _FORETOLD, _LEAST = 0.005, 0.05, 0.2, 2.0**-20
-# Damping of rotations against translations with which a jump's landing is tried; the first counts.
+# Damping of rotations relative to translations with which the landing of a jump is computed. The
+# result with the first one is used, the others show whether it is certain.
 _DAMPINGS = (1.0, 0.1, 10.0)
-# Of the flow after a fold: longest step [of the length], end [of the load], steps at most.
+# Flow after a fold: longest step [robot's length], residual at which it ends [load], most steps.
 _FLOW, _STILL, _STEPS = 0.05, 1e-6, 2000
-# Of a ridge: what is none [of the largest stiffness], and the touch that ends it [of the length].
+# Ridge: curvature that counts as flat [largest stiffness], and the push off it [robot's length].
 _FLAT, _TOUCH = 1e-10, 1e-3
 
 
 SetupOf = Callable[[Commands, NDArray[np.integer]], Setup]
-"""From waypoints and the row (N,) that each belongs to, to their setup."""
+"""Function of N waypoints and the row (N,) that each belongs to; returns their setup."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Jump(Result):
-    """Where a rest ends on the commanded way.
+    """A point on the commanded path where the equilibrium that was followed ceases to exist.
 
     Attributes:
-        command: (7,) the commanded pose at which it ends.
-        before: (7,) where the platform rests last.
-        after: (7,) where it comes to rest then; NaN where nothing holds it.
-        energy: [J] set free by it.
-        certain: whether it lands there with rotations damped a tenth, once and ten times as much
-            as translations over the robot's length; inertia is not looked at.
+        command: (7,) commanded pose at that point.
+        before: (7,) last pose of the equilibrium that was followed.
+        after: (7,) pose where the platform comes to rest afterwards; NaN if nothing holds it.
+        energy: [J] released by the jump; infinite if nothing holds the platform, NaN if there is no
+            potential energy.
+        certain: whether the platform lands there with rotations damped a tenth, once and ten times
+            as much as translations, over the robot's length. Inertia is not considered.
     """
 
     command: Array
@@ -68,11 +72,11 @@ class Jump(Result):
 
     @property
     def size(self) -> Array:
-        """(6,) [m, rad] from before to after."""
+        """(6,) [m, rad] displacement and rotation vector from ``before`` to ``after``."""
         return pose_difference(self.after, self.before)
 
     def as_json(self) -> Record:
-        """One of a row's ``jumps`` in ``sweep.json``."""
+        """One entry of a row's ``jumps`` in ``sweep.json``."""
         return {
             "command": self.command,
             "before": self.before,
@@ -83,7 +87,7 @@ class Jump(Result):
 
     @property
     def words(self) -> str:
-        """How far it jumps and what that sets free."""
+        """A sentence: how far the platform jumps and how much energy that releases."""
         if not np.isfinite(self.after).all():
             return "its rest ends, and nothing holds it then"
         moved, turned = np.linalg.norm(self.size[:3]), np.linalg.norm(self.size[3:])
@@ -95,12 +99,12 @@ class Jump(Result):
         )
 
     def lines(self) -> list[str]:
-        """Where it is commanded to, and its words."""
+        """One line: the commanded position and ``words``."""
         place = ", ".join(f"{value:.4g}" for value in self.command[:3])
         return [f"at command ({place}) m: {self.words}"]
 
     def records(self) -> Sequence[Record]:
-        """One row: the command, the platform before and after, and what is set free."""
+        """One row: the command, the pose before and after, and the energy released."""
         poses = (("command_{}", self.command), ("before_{}", self.before), ("after_{}", self.after))
         record: Record = {}
         for pattern, pose in poses:
@@ -109,16 +113,16 @@ class Jump(Result):
 
 
 def follow_commands(robot: Robot, commands: Commands, setup_of: SetupOf) -> Solution:
-    """Follow each run from the reference pose along the commanded way.
+    """Follow the equilibrium of each run from the reference pose along the commanded path.
 
     Args:
         robot: as described.
         commands: n rows.
-        setup_of: from waypoints and the row (N,) that each belongs to, to their setup.
+        setup_of: returns the setup of N waypoints, given these and the row (N,) of each.
 
     Returns:
-        a :class:`seecr.Solution` with ``jumps``; a row after one without any rest is solved from
-        its own command, as without following.
+        a :class:`seecr.Solution` with ``jumps``. If the platform finds no equilibrium after a jump,
+        the waypoint is solved from its own command, as without following.
     """
     path = path_of(robot, commands, waypoints=_WAY)
     tables = assemble(setup_of(path.commands, path.source))
@@ -139,7 +143,7 @@ def follow_commands(robot: Robot, commands: Commands, setup_of: SetupOf) -> Solu
 
 @dataclass(frozen=True, eq=False)
 class _Way:
-    """Waypoints as tables (N), and how the rest goes from one to the next."""
+    """N waypoints as tables, and the continuation from one to the next."""
 
     robot: Robot
     path: Path
@@ -147,18 +151,18 @@ class _Way:
     setup_of: SetupOf
 
     def afresh(self, k: int) -> batch.Evaluation:
-        """From the command at waypoint k."""
+        """Solve waypoint k from its command."""
         return batch.descend(self._at(k), threads=1)
 
     def on(self, k: int, state: batch.Evaluation, jumps: list[Jump]) -> batch.Evaluation:
-        """From the rest at waypoint k - 1 to that at k."""
+        """Continue the equilibrium at waypoint k - 1 to waypoint k."""
         pose = batch.platform_poses(self._at(k - 1), state.deviation)
         along = self._along(k)
         done, size = 0.0, 1.0
         while done < 1.0:
             size = min(size, 1.0 - done)
             trial = self._between(k, done + size)
-            # as far from its command as it was before
+            # the start deviates from its command as much as the last equilibrium did
             start = moved(self.robot, pose, size * along)
             found = self._descended(trial, start, state.guess)
             if not self._smooth(trial, start, found):
@@ -173,10 +177,10 @@ class _Way:
         return state
 
     def _between(self, k: int, part: float) -> Tables:
-        """The tables at a part of the step to waypoint k.
+        """The tables at a fraction of the step to waypoint k.
 
-        On the commanded way itself: a chord of the lengths, a few micrometres off, may lead past
-        a fold on its other side.
+        They are on the commanded path itself: linear interpolation of the rest lengths is off by a
+        few micrometres, which may lead past the other side of a fold.
         """
         row, last, now = np.array([k]), self._at(k - 1), self._at(k)
         if part == 1.0:
@@ -188,7 +192,7 @@ class _Way:
             lengths = (1.0 - part) * before.lengths + part * told.lengths
         told = replace(told, pose=pose, lengths=lengths)
         out = assemble(self.setup_of(told, self.path.source[row]))
-        # another load comes bit by bit
+        # load and scale are interpolated, so that a change of the load comes in gradually
         load, scale = ((1.0 - part) * a + part * b for a, b in (
             (last.load, now.load), (last.scale, now.scale),
         ))  # fmt: skip
@@ -223,7 +227,7 @@ class _Way:
     def _landed(
         self, trial: Tables, pose: Array, guess: Array, jumps: list[Jump]
     ) -> batch.Evaluation:
-        """Where the platform comes to from a pose that holds it no more."""
+        """Where the platform comes to rest after a pose that is no longer an equilibrium."""
         ends = []
         for damping in _DAMPINGS:
             there = _flow(self.robot, trial, pose, damping)
@@ -251,7 +255,7 @@ def evaluated(robot: Robot, tables: Tables, poses: Array) -> batch.Evaluation:
 
 
 def moved(robot: Robot, poses: Array, step: Array) -> Array:
-    """Poses (n, 7) after steps (n, d) [m], rotations times the robot's length."""
+    """Poses (n, 7) after steps (n, d) [m]; rotations in a step are times the robot's length."""
     change = step * np.where(robot.hinges, 1.0 / robot.length, 1.0)
     if not robot.joints:
         return pose_add(poses, change)
@@ -259,7 +263,7 @@ def moved(robot: Robot, poses: Array, step: Array) -> Array:
 
 
 def step_between(robot: Robot, poses: Array, before: Array) -> Array:
-    """Steps (n, d) [m] that take poses (n, 7) to others, rotations times the robot's length."""
+    """Steps (n, d) [m] from ``before`` to ``poses`` (n, 7), rotations times the robot's length."""
     unit = np.where(robot.hinges, robot.length, 1.0)
     if not robot.joints:
         return pose_difference(poses, before) * unit
@@ -267,27 +271,26 @@ def step_between(robot: Robot, poses: Array, before: Array) -> Array:
 
 
 def _flow(robot: Robot, tables: Tables, pose: Array, damping: float) -> Array:
-    """Down the energy as an overdamped platform goes, to where it stands still, (1, 7).
+    """Follow an overdamped platform down its energy until it stands still, (1, 7).
 
-    Linearly implicit steps of the flow: where the energy is steep they are short, in the end they
-    are Newton's.
+    The steps are linearly implicit: short where the energy is steep, Newton steps in the end.
     """
     weight = np.where(robot.hinges, damping, 1.0)
     for _ in range(_STEPS):
         at = evaluated(robot, tables, pose)
         if not np.isfinite(at.gradient).all():
             break
-        # in units in which the damping is one
+        # scaled so that the damping is the identity
         root = 1.0 / np.sqrt(weight)
         values, vectors = np.linalg.eigh(at.hessian[0] * root[:, None] * root[None, :])
         slope = vectors.T @ (at.gradient[0] * root)
         if at.residual[0] < _STILL:
             if values[0] > -_FLAT * values[-1]:
                 break
-            # balanced on a ridge: the slightest touch makes it leave
+            # balanced on a ridge: any disturbance makes the platform leave it
             pose = moved(robot, pose, _TOUCH * robot.length * (root * vectors[:, 0])[None])
             continue
-        # 1/time of the step: soft or falling directions must not outrun the steep ones
+        # the inverse of the time step: soft and unstable directions must not outrun the stiff ones
         pace = max(2.0 * max(-float(values[0]), 0.0), 1e-9 * float(values[-1]))
         while True:
             step = -root * (vectors @ (slope / (values + pace)))
@@ -299,7 +302,7 @@ def _flow(robot: Robot, tables: Tables, pose: Array, damping: float) -> Array:
 
 
 def apart_from(robot: Robot, pose: Array, other: Array) -> float:
-    """How far two poses (1, 7) are apart [m], rotations times the robot's length."""
+    """Distance of two poses (1, 7) [m]; rotations count times the robot's length."""
     return float(np.linalg.norm(step_between(robot, pose, other)))
 
 

@@ -1,4 +1,4 @@
-"""All stable equilibria of one command: where else it could rest with the same lengths."""
+"""All stable equilibria of one command: where else the platform could rest."""
 
 from __future__ import annotations
 
@@ -25,39 +25,40 @@ from seecr.statics.starts import commanded_poses
 if TYPE_CHECKING:
     from seecr.prediction.model import GivenEffects
 
-# Starts at a time, and at most.
+# Starts per batch, and most starts in all.
 _PART, _MOST = 256, 8192
-# Starts go on while one in fewer than so many may lead to a rest that nobody has met.
+# Starts go on until fewer than one in so many is likely to lead to a new equilibrium.
 _RARE = 2000
-# Starts fill boxes about the command from this part of the robot's size to all of it: of one large
-# box half the volume lies beyond four fifths of its reach, and its middle is hardly tried.
+# Starts fill boxes about the command, from this part of the robot's size up to all of it. In a
+# single large box, half the volume lies beyond four fifths of its reach, and its centre is hardly
+# tried.
 _NEAREST = 0.2
-# Poses nearer than this [of the length] are one equilibrium.
+# Poses closer than this, in parts of the robot's length, are one equilibrium.
 _ALIKE = 1e-5
 
 
 def equilibria(
     robot: GivenRobot, pose: ArrayLike, *, effects: GivenEffects = (), most: int = _MOST
 ) -> Solution:
-    """The stable equilibria that one command has, by energy, the lowest first.
+    """The stable equilibria of one command, lowest energy first.
 
-    Descents from starts near and far, turned in every way (Sobol; Shoemake 1992 for rotations),
-    until a next one is unlikely to lead to an equilibrium that nobody has met: that chance is
-    about the part of the descents that led where no other did (Good, Biometrika 40, 1953). They
-    end where that, one more counted, is below 1 in 2000. Whether the platform can get from one
-    to another is not asked.
+    Descents start near and far from the command, in all orientations (Sobol; Shoemake 1992 for
+    rotations), until another one is unlikely to find a new equilibrium. The probability of that is
+    about the part of the descents whose equilibrium no other descent led to (Good, Biometrika 40,
+    1953). The search ends when this part, with one more counted, is below 1 in 2000. It does not
+    ask whether the platform can get from one equilibrium to another.
 
     Args:
         robot: as described, or its MJCF.
-        pose: (7,) commanded.
-        effects: a model, its file, or effects with values, none of them with a memory.
-        most: starts, at most.
+        pose: (7,) commanded pose.
+        effects: a model, its file, or effects with values; none of them may have a history.
+        most: largest number of starts.
 
     Returns:
-        a :class:`Solution` with one row for each; the command's own search may lead to any.
+        a :class:`Solution` with one row per equilibrium; :func:`seecr.solve` may find any of them.
 
     Raises:
-        InputError: more than one pose, effects with a memory or a law of their own.
+        InputError: more than one pose, or effects with a history or a cable law of their own.
     """
     robot, command = robot_of(robot), commanded_poses(pose)
     if len(command) != 1:
@@ -82,12 +83,12 @@ def equilibria(
 def other_rests(
     found: Solution, repeated: Callable[[int, int], Setup], most: int = _MOST
 ) -> tuple[Solution, ...]:
-    """The other stable equilibria of each of n commands, by energy; none of one without rest.
+    """The other stable equilibria of each of n commands, lowest energy first.
 
     Args:
-        found: where each of them rests.
+        found: the equilibrium found for each command.
         repeated: (i, k) to a setup of k rows, all of them command i.
-        most: starts for each, at most.
+        most: largest number of starts per command.
     """
     out = []
     for i in range(len(found)):
@@ -102,7 +103,7 @@ def other_rests(
 
 
 def _all_rests(own: Solution, repeated: Callable[[int], Setup], most: int) -> Solution:
-    """All stable equilibria of one command, from where its own search led."""
+    """All stable equilibria of one command; ``own`` is the one that its own search found."""
     robot, command = own.robot, own.command
     from scipy.stats import qmc  # takes a second to import
 
@@ -126,9 +127,9 @@ def _all_rests(own: Solution, repeated: Callable[[int], Setup], most: int) -> So
 
 
 def _told_apart(robot: Robot, rests: Array, known: Array) -> tuple[NDArray[np.intp], list[int]]:
-    """Which equilibrium each of n rests (n, 7) is, and which of the rests are new ones.
+    """Which equilibrium each of n poses (n, 7) is, and which of them are the first of a new one.
 
-    Those that are known come first, then the new ones in their order.
+    The known equilibria are numbered first, then the new ones in their order.
     """
     which, new = np.full(len(rests), -1), list[int]()
     for k in range(len(known)):
@@ -140,15 +141,15 @@ def _told_apart(robot: Robot, rests: Array, known: Array) -> tuple[NDArray[np.in
 
 
 def _alike(robot: Robot, poses: Array, one: Array) -> NDArray[np.bool_]:
-    """Which of n poses (n, 7) are the same rest as one (7,)."""
+    """Which of n poses (n, 7) are the same equilibrium as ``one`` (7,)."""
     apart = pose_difference(poses, one) * np.repeat([1.0, robot.length], 3)
     return np.asarray(np.linalg.norm(apart, axis=1) < _ALIKE * robot.length)
 
 
 def _spread(robot: Robot, command: Array, unit: Array) -> Array:
-    """Starts (n, 7) from numbers (n, d + 1) in [0, 1): about the command, turned in every way.
+    """Starts (n, 7) about the command in all orientations, from numbers (n, d + 1) in [0, 1).
 
-    The last number says how far about; near and far alike, so its logarithm is spread evenly.
+    The last number is the size of the box, spread evenly in its logarithm from near to far.
     """
     points = np.concatenate([robot.exit_points, command[None, :3]])
     size = 0.5 * float(np.max(np.ptp(points, axis=0))) * _NEAREST ** unit[:, -1:]

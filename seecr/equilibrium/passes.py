@@ -1,8 +1,9 @@
-"""Between two equilibria of one command: how high the lowest way from one to the other goes.
+"""Barriers: the height of the lowest pass between two equilibria of one command.
 
-The way of least energy by the string method (E, Ren and Vanden-Eijnden, J. Chem. Phys. 126, 164103,
-2007), its images moved across the way by Newton's steps; its highest point made exact by following
-the one falling direction (Cerjan and Miller, J. Chem. Phys. 75, 1981).
+The path of least energy is found by the string method (E, Ren and Vanden-Eijnden, J. Chem. Phys.
+126, 164103, 2007), with Newton steps of its images across the path. From its highest image the
+saddle is found by following the one direction of negative curvature uphill (Cerjan and Miller, J.
+Chem. Phys. 75, 1981).
 """
 
 from __future__ import annotations
@@ -23,29 +24,31 @@ from seecr.units import joules
 
 __all__ = ["Barrier", "barriers"]
 
-# Images on the way, rounds, and what across the way ends them [of the load].
+# Images on the path, most rounds, and the gradient across the path at which they end [load].
 _IMAGES, _ROUNDS, _ACROSS = 33, 300, 1e-3
-# Steps to the saddle at most; the longest, and the softest stiffness, over length and load.
+# Most steps to the saddle, the longest [length], and the softest stiffness [load over length].
 _STEPS, _LONGEST, _SOFTEST = 200, 0.1, 1e-2
-# Poses nearer than this [of the length] are one equilibrium.
+# Poses closer than this, in parts of the robot's length, are one equilibrium.
 _ALIKE = 1e-5
-# Turned by more than this [rad] the platform hangs twisted among its cables.
+# A platform that is turned by more than this [rad] hangs twisted among its cables.
 TWISTED = 0.5 * np.pi
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Barrier(Result):
-    """What is between one equilibrium and another.
+    """The pass between one equilibrium and another.
 
     Attributes:
-        energy: [J] that it takes to get over, from the first. NaN, and with it ``back`` and
-            ``pose``, where there is no energy: under a moment, or where a law has none.
-        back: [J] from the other.
+        energy: [J] needed to get over it from the first equilibrium. NaN, like ``back`` and
+            ``pose``, if there is no potential energy: under a moment, or with a cable law that has
+                none.
+        back: [J] needed from the other equilibrium.
         pose: (7,) at the top.
-        exact: whether the top is a saddle: balanced, with one falling direction. Else it is the
-            highest point of the way that was found, and the lowest way may be lower.
-        twisted: whether the other is turned by more than a right angle from the first: pushes lead
-            back and forth no more, cables lie across each other.
+        exact: whether the top is a saddle: an equilibrium with one direction of negative curvature.
+            Otherwise it is the highest point of the path that was found, and a lower path may
+            exist.
+        twisted: whether the other equilibrium is turned by more than a right angle from the first:
+            its cables cross each other, and pushes do not lead back and forth.
     """
 
     energy: float
@@ -55,7 +58,7 @@ class Barrier(Result):
     twisted: bool
 
     def as_json(self) -> Record:
-        """One of ``barriers`` in ``pose.json``."""
+        """One entry of ``barriers`` in ``pose.json``."""
         return {
             "energy_J": self.energy,
             "back_J": self.back,
@@ -66,7 +69,7 @@ class Barrier(Result):
 
     @property
     def words(self) -> str:
-        """Whether pushes lead to the other, and what it takes."""
+        """A sentence: whether pushes lead to the other equilibrium, and the energy it takes."""
         least = "" if self.exact else "at most "
         twisted = "twisted" if self.twisted else "reachable"
         if not np.isfinite(self.energy):
@@ -74,16 +77,16 @@ class Barrier(Result):
                 f"{twisted}; what it takes to get there has no number: this load or law has no "
                 "energy"
             )
-        # the top of a way that was not made exact may be its end, but for rounding
+        # if the saddle was not found, the top may be the end of the path but for rounding
         back = joules(self.back) if self.back > 1e-12 * self.energy else "next to nothing"
         return f"{twisted}, {least}{joules(self.energy)} to get there, {back} back"
 
     def lines(self) -> list[str]:
-        """Its words."""
+        """One line: ``words``."""
         return [self.words]
 
     def records(self) -> Sequence[Record]:
-        """One row: energies and the pose at the top."""
+        """One row: the energies and the pose at the top."""
         return [
             {
                 "energy_J": float(self.energy),
@@ -96,16 +99,16 @@ class Barrier(Result):
 
 
 def barriers(solution: Solution, others: Solution, i: int = 0) -> tuple[Barrier, ...]:
-    """From where a command rests to each of its other equilibria.
+    """The barriers from the equilibrium of a command to each of its other equilibria.
 
     Args:
-        solution: where commands rest.
-        others: other equilibria of command i, as of :func:`seecr.equilibria`; from the one where
-            it rests to itself it takes nothing.
+        solution: the equilibria of the commands.
+        others: the equilibria of command i, as :func:`seecr.equilibria` returns them. If the one in
+            ``solution`` is among them, its barrier is zero.
         i: which of the commands.
 
     Raises:
-        InputError: equilibria of another command or robot, or no rest to start from.
+        InputError: the equilibria belong to another command or robot, or a row is not at rest.
     """
     lengths = solution.rest_lengths[i]
     if others.robot.n_cables != len(lengths) or not np.allclose(others.rest_lengths, lengths):
@@ -136,7 +139,7 @@ def _barrier(one: Solution, other: Solution) -> Barrier:
 
 
 def _string(one: Solution, other: Solution) -> Array:
-    """Images (k, 7) on the way of least energy, the two equilibria at its ends."""
+    """Images (k, 7) on the path of least energy between two equilibria, which are its ends."""
     robot, many = one.robot, take(one.tables, np.zeros(_IMAGES, int))
     softest = _SOFTEST * float(many.scale[0]) / robot.length
     whole = step_between(robot, other.pose, one.pose)
@@ -162,7 +165,7 @@ def _string(one: Solution, other: Solution) -> Array:
 
 
 def _evenly(one: Solution, images: Array) -> Array:
-    """The same way with its images at even distances."""
+    """The same path with evenly spaced images."""
     steps = step_between(one.robot, images[1:], images[:-1])
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))])
     aim = np.linspace(0.0, along[-1], len(images))[1:-1]
@@ -174,7 +177,10 @@ def _evenly(one: Solution, images: Array) -> Array:
 
 
 def _saddle(one: Solution, tables: Tables, pose: Array) -> tuple[Array, bool]:
-    """The saddle (1, 7) that is reached from near it: up the softest way, down all others."""
+    """The saddle (1, 7) near a pose, and whether it was found.
+
+    Newton steps go uphill along the softest direction and downhill along all others.
+    """
     robot = one.robot
     softest = _SOFTEST * float(tables.scale[0]) / robot.length
     for _ in range(_STEPS):

@@ -1,4 +1,4 @@
-"""The paper's own search: SciPy's fsolve and least_squares from its first guess (steps 4-10)."""
+"""The paper's own search: SciPy's fsolve and least_squares from its first guess (steps 4 to 10)."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from seecr.pose import Array, quat_from_rotvec, quat_multiply, transform_points
 from seecr.statics import batch
 from seecr.statics.tables import Tables, assemble, take
 
-# Not an outcome of the compiled loop: SciPy said that it failed.
+# Not an outcome of the compiled loop: SciPy reported that it failed.
 GAVE_UP = 100
 
 
 def first_guess(setup: Setup) -> Array:
-    """How far [m] the platform first falls, (n,): m g l_vmean / k_c (step 4).
+    """How far [m] the platform falls at first, (n,): m g l_vmean / k_c (step 4).
 
-    l_vmean is the mean vertical extent of the cables; the paper prints their sum and calls it
-    the mean.
+    l_vmean is the mean vertical extent of the cables. The paper prints their sum and calls it the
+    mean.
     """
     up = setup.robot.up
     poses = setup.commands.pose
@@ -74,7 +74,7 @@ def solve_with_scipy(
         _place(one, point, base, x)
         found.deviation[i], found.values[i] = point.deviation[0], point.values[0]
         found.count[i] = counter[0]
-        # what balances is an answer, though SciPy may say that it could not come nearer
+        # a pose that balances is an answer, even if SciPy reports that it could not get closer
         outcome = _judge(one, point)
         found.outcome[i] = outcome if ok or outcome != STALLED else GAVE_UP
     return found
@@ -82,7 +82,7 @@ def solve_with_scipy(
 
 def _search(method: str, residual, x0: Array, limit: int) -> tuple[bool, Array]:  # type: ignore[no-untyped-def]
     with warnings.catch_warnings():
-        # MINPACK warns about slow progress; its flag says the same and is what we report
+        # MINPACK warns about slow progress; its flag says the same, and that is what we report
         warnings.simplefilter("ignore", RuntimeWarning)
         if method == "fsolve":
             x, _info, flag, _text = optimize.fsolve(
@@ -96,7 +96,7 @@ def _search(method: str, residual, x0: Array, limit: int) -> tuple[bool, Array]:
 
 
 def _falling(tables: Tables, i: int, fall: Array) -> Array:
-    """The fall as a change of the unknowns: of the joints that can follow it."""
+    """The fall as a change of the unknowns: of those joints that can follow it."""
     x = np.zeros(tables.n_dof)
     if tables.screws.shape[1] == 0:
         x[:3] = fall
@@ -117,7 +117,7 @@ def _place(tables: Tables, point: batch.Evaluation, base: Array, x: Array) -> No
 
 
 def _judge(one: Tables, point: batch.Evaluation) -> int:
-    """What the point that SciPy calls a solution is, from its residual and stiffness."""
+    """The outcome at the point that SciPy returned, from its residual and stiffness."""
     at = batch.evaluate(one, point)
     point.deviation[0] = at.deviation[0]
     if not at.residual[0] < TOLERANCE:

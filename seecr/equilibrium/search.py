@@ -1,4 +1,4 @@
-"""From a setup to certified answers, by the compiled descent or by the paper's searches."""
+"""From a setup to certified equilibria, by the compiled descent or by the paper's own searches."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def solve_setup(
     max_iterations: int = 400,
     threads: int | None = None,
 ) -> Solution:
-    """Like :func:`seecr.solve`, for a setup that effects may have edited; without its history."""
+    """Like :func:`seecr.solve`, for a setup as effects left it; its history is ignored."""
     tables = assemble(setup)
     first, values = start_of(setup.robot, tables, start)
     if method == "newton":

@@ -1,4 +1,4 @@
-"""Where the platform comes to rest: ``solve`` for a batch of commands."""
+"""``solve``: the equilibrium of the platform for a batch of commands."""
 
 from __future__ import annotations
 
@@ -46,36 +46,37 @@ def solve(
     others: bool = False,
     follow: bool = False,
 ) -> Solution:
-    """Find where the platform rests (paper, section III-B) for a batch of commands.
+    """Find where the platform comes to rest (paper, section III-B) for a batch of commands.
 
     Args:
         robot: from :func:`seecr.load_robot`, its MJCF, or made by hand.
-        poses: (n, 7) or (7,) commanded poses; the winches pay out the straight lengths there
-            (eqs 1, 2). Or :class:`seecr.Commands` with runs, times, lengths.
-        rest_lengths: (n, m) or (m,) [m] instead of, or beside, the poses: then the poses are
-            only where the search starts; by default it starts where these lengths lead the plain
-            robot from its reference pose.
-        effects: what the robot has beyond the paper's plain one: a model, its file, or effects
-            with values. Where one has history, rows are solved in order.
-        method: ``"newton"`` follows the energy downhill, compiled; ``"fsolve"`` and
-            ``"least_squares"`` are the paper's own, on SciPy with its first guess (step 4).
+        poses: (n, 7) or (7,) commanded poses; the winches pay out the straight lengths from A_i to
+            B_i at these poses (eqs 1, 2). Or :class:`seecr.Commands` with runs, times or lengths.
+        rest_lengths: (n, m) or (m,) [m] absolute lengths instead of poses. Poses given as well are
+            only where the search starts; by default it starts at the poses whose straight lengths
+            fit these best, found from the reference pose.
+        effects: how the robot differs from the paper's model: a model, its file, or effects with
+            values. If one has a history, rows are solved in order.
+        method: ``"newton"`` is the compiled Newton descent on the potential energy; ``"fsolve"``
+            and ``"least_squares"`` are the paper's own searches, by SciPy from its first guess
+            (step 4).
         wrench: (6,) or (n, 6) external force [N] at the platform origin and moment [N m].
         gravity: (3,) [m/s^2] instead of the robot's.
         start: (n, 7) poses to start from instead of the commanded ones.
-        max_iterations: most evaluations of the wrench, per pose and stage of stiffness.
-        threads: one per processor by default.
-        others: look for the other stable equilibria of each command too, a tenth of a second or
-            more for each; they are then the solution's ``others``.
-        follow: go from the reference pose along the commanded way, run by run, from rest to rest,
-            instead of searching from each command; where a rest ends on the way, and where the
-            platform jumps to, are the solution's ``jumps``.
+        max_iterations: most evaluations of the wrench per pose, and per stage of the stiffness.
+        threads: number of threads; one per processor by default.
+        others: also look for the other stable equilibria of each command, which takes a tenth of a
+            second or more per command; the solution has them as ``others``.
+        follow: follow the equilibrium of each run from the reference pose along the commanded path,
+            instead of searching from each command. Where it ceases to exist on the way, and where
+            the platform then comes to rest, is in the solution's ``jumps``.
 
     Returns:
-        a :class:`Solution`; look at ``status`` or ``converged`` before using a pose.
+        a :class:`Solution`; check ``status`` or ``converged`` before using a pose.
 
     Raises:
-        InputError: shapes, values that are not finite, an unknown method, arguments that do not
-            go together or are something else.
+        InputError: wrong shapes or types, values that are not finite, an unknown method, or
+            arguments that exclude each other.
     """
     if method not in METHODS:
         raise InputError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
@@ -115,7 +116,7 @@ def solve(
         if len(starts) != len(commands):
             raise InputError(f"start must have {counted(len(commands), 'pose')}, got {len(starts)}")
     elif method == "newton" and not follow:
-        # rows of a batch have nothing to do with each other: each is a way of its own
+        # rows of a batch are independent: each is a run of its own
         apart = (
             commands
             if isinstance(poses, Commands)

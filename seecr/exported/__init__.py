@@ -1,1 +1,1 @@
-"""A calibrated robot as MJCF, and what of its model MJCF cannot say."""
+"""A calibrated robot as MJCF, and the parts of its model that MJCF cannot express."""

@@ -1,11 +1,10 @@
-"""MJCF for MuJoCo alone: what of a cable takes bodies and springs of its own.
+"""MJCF for MuJoCo alone: cables that need bodies and springs of their own.
 
 A cable starts behind its exit point A and ends on the platform:
-
     winch on a spring - (sheave | exit point on springs) - chain of point masses - anchor point
 
-each part where an effect asks for it. A sheave has a groove, which no geometry of MuJoCo's has:
-it is turned to where its cable goes at one pose, so that the file is of that pose.
+with each part only if an effect needs it. MuJoCo has no swivelling sheave with a groove: sheaves
+face their cables at one pose, so that the file is for that pose.
 """
 
 from __future__ import annotations
@@ -25,14 +24,15 @@ from seecr.pose import Array, transform_points
 from seecr.statics.solution import Solution
 
 SEGMENTS = 24
-"""Of a cable with weight. At the pose of the file they hang as the catenary does, elsewhere
-nearly."""
+"""Springs of a cable with weight. At the pose of the file they hang exactly as the catenary does,
+elsewhere nearly so.
+"""
 
-# Mass of what carries exit points and winches over the platform's: gravcomp takes its weight away.
+# Mass of carriers of exit points and winches [platform's mass]; gravcomp removes its weight.
 _SMALL = 0.01
-# A cable whose way across is a smaller part of it goes straight up.
+# A cable whose horizontal extent is a smaller part of its length goes straight up or down.
 _ABOVE = 1e-12
-# Turns a cylinder's axis, z, to y: across the sheave's plane.
+# Turns a cylinder's axis from z to y, normal to the sheave's plane.
 _ACROSS = "0.7071067811865476 -0.7071067811865476 0 0"
 
 
@@ -41,7 +41,7 @@ def bodies_text(setup: Setup, solution: Solution, comment: str) -> str:
 
     Args:
         setup: one row, as the effects left it.
-        solution: of it; the platform's rest is the keyframe ``rest``.
+        solution: of it; the platform's equilibrium is the keyframe ``rest``.
         comment: a sentence at the top.
     """
     robot = _described(setup)
@@ -62,7 +62,7 @@ def bodies_text(setup: Setup, solution: Solution, comment: str) -> str:
 
 
 def _described(setup: Setup) -> Robot:
-    """The robot with the numbers that its description has a place for."""
+    """The robot with the edited quantities that its description can hold."""
     return replace(
         setup.robot, exit_points=setup.exit_points, anchor_points=setup.anchor_points,
         ea=setup.ea, mass=setup.mass, centre_of_mass=setup.centre_of_mass, gravity=setup.gravity,
@@ -70,7 +70,7 @@ def _described(setup: Setup) -> Robot:
 
 
 def _push(root: ET.Element, world: ET.Element, body: ET.Element, wrench: Array) -> None:
-    """A constant wrench (6,) at the platform's origin, in the base frame's directions."""
+    """A constant wrench (6,) at the platform's origin, in the directions of the base frame."""
     if not np.any(wrench):
         return
     ET.SubElement(world, "site", name="base")
@@ -82,7 +82,7 @@ def _push(root: ET.Element, world: ET.Element, body: ET.Element, wrench: Array) 
 
 
 class _Cable:
-    """One cable of the file, from its winch to its anchor point (3,) [m] at rest."""
+    """One cable of the file, from its winch to its anchor point (3,) [m] at the equilibrium."""
 
     def __init__(self, setup: Setup, solution: Solution, i: int, end: Array) -> None:
         self.i, self.end, self.robot = i, end, setup.robot
@@ -115,10 +115,11 @@ class _Cable:
             self._hang(float(setup.cable_weight[i]), *solution.evaluation.guess[0, i])
 
     def _hang(self, weight: float, flat: float, steep: float, free: float) -> None:
-        """As a chain, by its weight [N/m], pull on the anchor point [N] and free length [m]."""
+        """Make it a chain: weight [N/m], pull on the anchor point [N], free length [m]."""
         self.pull = flat * self._ahead() - (steep + self.weight) * self.up
         if self.yields:
-            # the catenary has it paid out, here the exit point itself comes nearer
+            # the catenary adds the exit point's motion to its length; here the exit point itself
+            # moves
             free -= self.sideways * self.tension / (1.0 + self.tension / self.ea)
         away = self.end - self.exit - self._given_way()
         span = np.array([away @ self._ahead(), away @ self.up])
@@ -129,18 +130,18 @@ class _Cable:
         self.exit = self.exit + self._by(self.chain.beside)
 
     def _by(self, way: Array) -> Array:
-        """(3,) of (across, up) in the cable's vertical plane."""
+        """Base-frame vector (3,) of (across, up) in the cable's vertical plane."""
         return np.asarray(way[0] * self._ahead() + way[1] * self.up)
 
     def _given_way(self) -> Array:
-        """How far the exit point has moved, (3,) [m]."""
+        """Displacement of the exit point, (3,) [m]."""
         moved = np.zeros(3)
         for axis, by in self.yields:
             moved += by * float(self.pull @ axis) * axis
         return moved
 
     def write(self, world: ET.Element, body: ET.Element, tendons: ET.Element) -> list[float]:
-        """Write it; returns where its joints are at rest."""
+        """Write the cable; returns the equilibrium values of its joints."""
         carrier = self._exit(world)
         nodes = [] if self.chain is None else self._chain(self.chain, world, body, carrier)
         points = [*nodes, f"anchor{self.i + 1}"]
@@ -157,7 +158,7 @@ class _Cable:
         return self.at_rest
 
     def _spring_of_cable(self, j: int) -> tuple[float, float]:
-        """Lengths [m] of the j-th spring from the exit point: that which stretches, and at rest."""
+        """Unstretched and rest length [m] of the j-th spring from the exit point."""
         if self.chain is None:
             return self.length, self.length + self.tail
         own, way, strain = self.free / SEGMENTS, self.chain.length[j], self.chain.strain[j]
@@ -168,7 +169,7 @@ class _Cable:
         return own, way - own * strain
 
     def _carrier(self, parent: ET.Element, name: str, place: Array) -> ET.Element:
-        """A body of next to no mass that springs hold, and no gravity."""
+        """A body of small mass, held by springs, without weight."""
         body = ET.SubElement(parent, "body", name=name, pos=numbers(place), gravcomp="1")
         turning = 1e-3 * self.small * self.robot.length**2
         ET.SubElement(
@@ -178,14 +179,14 @@ class _Cable:
         return body
 
     def _spring(self, body: ET.Element, axis: Array, compliance: float, pull: float) -> None:
-        """A spring along an axis, and where it rests under a pull [N]."""
+        """Add a spring along an axis, and its equilibrium value under a pull [N]."""
         ET.SubElement(
             body, "joint", type="slide", axis=numbers(axis), stiffness=numbers(1.0 / compliance)
         )
         self.at_rest.append(compliance * pull)
 
     def _exit(self, world: ET.Element) -> ET.Element:
-        """Exit point, winch and sheave, each on what holds it; returns what holds the first."""
+        """Write exit point, winch and sheave; returns the body that holds the first."""
         number, parent, place = self.i + 1, world, self.exit
         if self.yields:
             parent, place = self._carrier(world, f"frame{number}", place), np.zeros(3)
@@ -216,13 +217,13 @@ class _Cable:
             wheel, "geom", name=f"sheave{number}", type="cylinder", size=numbers(r, 0.2 * r),
             pos=numbers(r, 0.0, 0.0), quat=_ACROSS, contype="0", conaffinity="0", mass="0",
         )  # fmt: skip
-        # over the top: seen from the centre, between the normals to the two tangents
+        # on top: as seen from the centre, between the normals of the two tangents
         lean = 0.9 * np.arctan2(r, self.tail)
         side = [r + 2.0 * r * np.sin(lean), 0.0, 2.0 * r * np.cos(lean)]
         ET.SubElement(wheel, "site", name=f"over{number}", pos=numbers(side))
 
     def _ahead(self) -> Array:
-        """Where the sheave is turned to, (3,): to the anchor point; anywhere, if that is above."""
+        """Horizontal direction (3,) to the anchor point; arbitrary if there is none."""
         across = np.linalg.svd(self.up[None])[2][1]
         way = self.end - self.exit
         ahead = way - (way @ self.up) * self.up
@@ -230,7 +231,7 @@ class _Cable:
         return np.asarray(ahead / size if size > _ABOVE * np.linalg.norm(way) else across)
 
     def _behind(self) -> list[tuple[str, dict[str, str]]]:
-        """What the cable goes through up to where it leaves."""
+        """The path of the cable up to the point where it leaves."""
         number = self.i + 1
         winch = [("site", {"site": f"winch{number}"})] if self.tail > 0.0 else []
         if self.radius > 0.0:
@@ -240,7 +241,7 @@ class _Cable:
     def _chain(
         self, chain: HangingChain, world: ET.Element, body: ET.Element, carrier: ET.Element
     ) -> list[str]:
-        """Point masses between springs and at their ends; names of the sites between."""
+        """Write point masses between springs and at the ends; returns the sites between."""
         start = self.exit - self._by(chain.beside) + self._given_way()
         names = []
         for j, place in enumerate(chain.places, start=1):

@@ -1,4 +1,4 @@
-"""A robot with its model as MJCF: the description, and a file for MuJoCo alone where that lacks."""
+"""A robot with its model as MJCF: its description, and a file for MuJoCo alone if needed."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from seecr.statics.starts import commanded_poses
 if TYPE_CHECKING:
     from seecr.prediction.model import GivenEffects
 
-# Directions whose sine is smaller are one.
+# Directions whose sine is smaller count as equal.
 _ALONG = 1e-12
 
 
@@ -38,15 +38,15 @@ class Export(Result):
     """A robot's MJCF.
 
     Attributes:
-        robot: with what a description can say of its model; rest lengths are those really paid
-            out at the reference pose.
+        robot: with the part of its model that a description can hold; rest lengths are those
+            actually paid out at the reference pose.
         text: its MJCF, which :func:`seecr.load_robot` reads.
         mujoco_text: for MuJoCo alone, at the commanded pose: with pulleys, sag and the like. None
-            where ``text`` has all there is.
-        solution: where the platform rests in that file, its keyframe; None without one.
-        plain, bodies, lengths: names of the effects in ``text``, in ``mujoco_text`` besides, and
-            in the rest lengths of both.
-        nowhere: names of those in neither, and why.
+            if ``text`` is complete.
+        solution: the equilibrium in that file, its keyframe; None without one.
+        plain, bodies, lengths: names of the effects in ``text``, of those added in
+            ``mujoco_text``, and of those in the rest lengths of both.
+        nowhere: names of the effects in neither, and why.
     """
 
     robot: Robot
@@ -60,7 +60,7 @@ class Export(Result):
 
     @property
     def leans(self) -> bool:
-        """Whether cables hang along gravity in the file, and in seecr along another vertical."""
+        """Whether the file's cables hang along gravity, but seecr's along another vertical."""
         if self.solution is None or "cable_weight" not in self.bodies:
             return False
         load = self.solution.tables.load[0]
@@ -69,11 +69,11 @@ class Export(Result):
         return bool(np.linalg.norm(across) > _ALONG * np.linalg.norm(weight))
 
     def lines(self, name: str = "the file", mujoco_name: str = "the file for MuJoCo") -> list[str]:
-        """What is in which file, and what is in none."""
+        """Which effects are in which file, and which are in none."""
         return list(self._lines(name, mujoco_name))
 
     def records(self) -> list[Record]:
-        """One row per effect: which file has it, and why none does."""
+        """One row per effect: which file has it, or why none does."""
         places = (
             ("the file", self.plain),
             ("the file for MuJoCo", self.bodies),
@@ -86,7 +86,7 @@ class Export(Result):
         ]
 
     def as_json(self) -> dict[str, Any]:
-        """Where each effect is, the rest lengths at the reference pose, and the rest exported."""
+        """Where each effect is, the rest lengths at the reference pose, the equilibrium."""
         return {
             "robot": self.robot.name,
             "plain": self.plain,
@@ -121,17 +121,21 @@ class Export(Result):
 
 
 def export(robot: GivenRobot, effects: GivenEffects = (), at: ArrayLike | None = None) -> Export:
-    """A robot with its model as MJCF, as far as MJCF can say it.
+    """A robot with its model as MJCF, as far as MJCF can express it.
 
-    Given the same rest lengths, MuJoCo comes to rest where :func:`seecr.solve` says.
+    Given the same rest lengths, MuJoCo comes to rest where :func:`seecr.solve` does.
 
     Args:
         robot: as described, or its MJCF.
         effects: a model, its file, or effects with values.
-        at: (7,) command that the file for MuJoCo alone is of; the reference pose by default.
+        at: (7,) command for which the file for MuJoCo alone is made; the reference pose by default.
+
+    Returns:
+        the texts, and which effects are in which of them.
 
     Raises:
-        InputError: a pose that is none, or one where the platform has no rest.
+        InputError: not one pose.
+        NoRestError: the platform has no stable equilibrium there.
     """
     robot = robot_of(robot)
     said = expressed(robot, effects_of(effects, robot))

@@ -1,4 +1,4 @@
-"""Which effects of a model an MJCF file can express, found from what each of them edits."""
+"""Which effects of a model an MJCF file can express, found from the quantities that they edit."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from seecr.effects.checked import edit_setup
 from seecr.effects.setup import QUANTITIES, History, plain_setup
 from seecr.prediction.experiment import senses
 
-# What a robot's description says itself, and what bodies and springs beyond it say.
+# Quantities that a robot's description holds, and those that need more bodies and springs.
 _PLAIN = frozenset(("exit_points", "anchor_points", "ea", "mass", "centre_of_mass", "gravity"))
 _BODIES = frozenset(
     ("pulley_radius", "quadratic", "cubic", "winch_side", "compliance", "lift", "cable_weight",
@@ -31,13 +31,13 @@ LIFTED_SHEAVE = "with pulleys the frame has to yield alike in all directions"
 
 @dataclass(frozen=True)
 class Expressed:
-    """Effects by where they can be said; those at their null values nowhere.
+    """Effects by where they can be expressed; those at their null values are in none.
 
     Attributes:
         plain: in a robot's description, which :func:`seecr.load_robot` reads.
         bodies: in a file for MuJoCo alone.
-        lengths: in the rest lengths that are given.
-        nowhere: (effect, why not).
+        lengths: in the rest lengths.
+        nowhere: (effect, reason).
     """
 
     plain: tuple[Effect, ...]
@@ -47,7 +47,7 @@ class Expressed:
 
 
 def expressed(robot: Robot, effects: Sequence[Effect]) -> Expressed:
-    """Sort effects by what MJCF can say of them."""
+    """Sort effects by where MJCF can express them."""
     plain: list[Effect] = []
     bodies: list[Effect] = []
     lengths: list[Effect] = []
@@ -74,8 +74,8 @@ def expressed(robot: Robot, effects: Sequence[Effect]) -> Expressed:
 
 
 def _edits(robot: Robot, effect: Effect) -> tuple[set[str], bool]:
-    """Names of the quantities that an effect changes, and whether it adds a law."""
-    # the second pose is for effects that are silent at the first
+    """Names of the quantities that an effect changes, and whether it adds a cable law."""
+    # some effects change nothing at the reference pose; hence a second pose
     poses = np.stack([robot.reference_pose, robot.reference_pose])
     poses[1, :3] += 0.3 * robot.length
     commands = Commands(poses, temperature=np.array([20.0, 35.0]))

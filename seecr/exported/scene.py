@@ -1,4 +1,4 @@
-"""MJCF of one platform on cables, as an XML tree: numbers with all their digits."""
+"""MJCF of a platform on cables as an XML tree, with all digits of numbers."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _PLATFORM_COLOUR, _CABLE_COLOUR = "0.13 0.35 0.62 1", "0.10 0.12 0.14 1"
 
 
 def numbers(*values: ArrayLike) -> str:
-    """Numbers as MJCF has them, none rounded."""
+    """Numbers as MJCF text, without rounding."""
     flat = np.concatenate([np.atleast_1d(np.asarray(value, float)) for value in values])
     return " ".join(repr(float(value) + 0.0) for value in flat)
 
@@ -23,8 +23,8 @@ def numbers(*values: ArrayLike) -> str:
 def scene(robot: Robot, comment: str) -> tuple[ET.Element, ET.Element, ET.Element]:
     """The root of a file, with its ``worldbody`` and the platform's body in it.
 
-    The platform stands at the reference pose, with its joints, mass and anchor points; sites are
-    named ``exit1`` and ``anchor1`` and on. Exit points and cables are left to the caller.
+    The platform is at the reference pose, with its joints, mass and anchor points. Sites are named
+    ``exit1``, ``anchor1`` and so on. Exit points and cables are left to the caller.
 
     Args:
         robot: what to write.
@@ -48,7 +48,7 @@ def scene(robot: Robot, comment: str) -> tuple[ET.Element, ET.Element, ET.Elemen
 
 
 def extent_up(robot: Robot) -> Array:
-    """Up (3,) [m], by as much as the exit points are apart."""
+    """Upward vector (3,) [m], as long as the extent of the exit points."""
     return float(np.linalg.norm(np.ptp(robot.exit_points, axis=0))) * robot.up
 
 
@@ -65,7 +65,7 @@ def _platform(world: ET.Element, robot: Robot) -> ET.Element:
             pos=numbers(quat_rotate(back, joint.point - place)),
         )  # fmt: skip
     turning = robot.inertia
-    if not np.any(turning):  # nobody said: MuJoCo needs some
+    if not np.any(turning):  # unknown, but MuJoCo needs one
         turning = robot.mass * robot.length**2 * np.eye(3)
     six = turning[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     ET.SubElement(
@@ -84,7 +84,7 @@ def _platform(world: ET.Element, robot: Robot) -> ET.Element:
 
 
 def dot(robot: Robot) -> str:
-    """Size of sites that are only looks."""
+    """Size of sites, which only matters for the picture."""
     return numbers(0.05 * robot.length)
 
 
@@ -96,14 +96,15 @@ def cable(
     stiffness: Sequence[float],
     width: float,
 ) -> None:
-    """One spring that pulls and never pushes.
+    """A spring that pulls and never pushes.
 
     Args:
         tendons: the file's ``tendon``.
         name: of the cable.
         path: elements that it goes through, with their attributes.
         rest: its rest length [m].
-        stiffness: [N/m], and of the square and cube of its stretch where it is curved.
+        stiffness: [N/m], and the coefficients of the square and cube of its stretch if it is
+            curved.
         width: of its picture [m].
     """
     spatial = ET.SubElement(
@@ -115,13 +116,13 @@ def cable(
 
 
 def text_of(root: ET.Element) -> str:
-    """The file."""
+    """The file's text."""
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
 
 
 def plain_text(robot: Robot, comment: str) -> str:
-    """A robot's description, which :func:`seecr.load_robot` reads back to the last digit or two."""
+    """A robot's description, which :func:`seecr.load_robot` reads back to within a digit or two."""
     root, world, _ = scene(robot, comment)
     for i, point in enumerate(robot.exit_points, start=1):
         ET.SubElement(world, "site", name=f"exit{i}", pos=numbers(point), size=dot(robot))

@@ -1,1 +1,1 @@
-"""What holds a platform at a given pose: tensions within limits, and rest lengths."""
+"""Tensions within limits and rest lengths that hold a platform at a given pose."""

@@ -1,7 +1,7 @@
-"""Balance of platforms at given poses, linear in the cables' tensions about some rest lengths.
+"""The balance of platforms at given poses, linearised in the tensions about some rest lengths.
 
-A tau = load holds exactly for tensions near those that the cables have with these lengths; a pull
-whose direction depends on its size (sag, yielding exit points) bends it further off.
+A tau = load is exact for tensions near those that the cables have with these lengths. Farther away
+it is not, if the direction of a pull depends on its size (sag, yielding exit points).
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from seecr.pose import Array
 from seecr.statics import batch
 from seecr.statics.tables import Tables
 
-# Step of a rest length for its derivative, relative to the robot's length.
+# Step of a rest length for finite differences [robot's length].
 _STEP = 1e-5
-# Rounds to how tight a cable hangs.
+# Newton steps to the tightness of a cable.
 _TIGHTNESS = 60
 
 
 @dataclass(eq=False)
 class Rates:
-    """How cables answer at n poses.
+    """Derivatives of the cables' forces at n poses.
 
     Attributes:
-        by_tension: (n, d, m) gradient by each cable's tension, torques over a length; zero of
-            cables that do not pull.
+        by_tension: (n, d, m) gradient by each cable's tension, torques over the robot's length;
+            zero for cables without tension.
         by_length: (n, m) [N/m] tension by rest length.
         pull: (n, d, m) [N/m] gradient by rest length.
     """
@@ -38,13 +38,13 @@ class Rates:
     pull: Array
 
     def load(self, at: batch.Evaluation) -> Array:
-        """What tensions have to make, (n, d) [N], by an evaluation with these rates."""
+        """The load (n, d) [N] to be balanced, at an evaluation with these derivatives."""
         made = np.einsum("ndm,nm->nd", self.by_tension, at.states[..., TENSION])
         return np.asarray(made - at.gradient)
 
 
 def rates_of(tables: Tables, at: batch.Evaluation) -> Rates:
-    """The rates of tables at an evaluation of them."""
+    """The derivatives for tables at an evaluation of them."""
     step = _STEP * tables.length
     force, tension = batch.change_by_cable(tables, tables.lengthened(-step), at)
     pulls = np.broadcast_to(tension[:, None, :] != 0.0, force.shape)
@@ -67,27 +67,28 @@ def here(tables: Tables) -> batch.Evaluation:
 
 
 def first_tensions(tables: Tables, low: Array) -> Array:
-    """Tensions (n, m) [N] to begin with: each cable's part of the load, or ``low``."""
+    """Tensions (n, m) [N] to start with: each cable's share of the load, or ``low`` if larger."""
     return np.asarray(np.maximum(low, tables.scale[:, None] / tables.cables.shape[1]))
 
 
 def next_rest(tables: Tables, rest: Array, by_length: Array, now: Array, wanted: Array) -> Array:
-    """Rest lengths (n, m) [m] that bring tensions from ``now`` near to ``wanted``, (n, m) [N].
+    """Rest lengths (n, m) [m] that bring tensions ``now`` near to ``wanted``, (n, m) [N].
 
-    Not finite where a cable has no slope. At most by half and twice a length.
+    They are not finite if a tension does not depend on the length. A length changes by a factor of
+    2 at most.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
-        # a plain cable's tension is linear in 1/l0: the slope over the step is exact
+        # the tension of a plain cable is linear in 1/l0, so the slope over the step is exact
         slope = -by_length * rest * (rest - _STEP * tables.length)
         inverse = 1.0 / rest + (wanted - now) / slope * _hanging(tables, now, wanted)
         return np.asarray(rest / np.clip(inverse * rest, 0.5, 2.0))
 
 
 def _hanging(tables: Tables, now: Array, wanted: Array) -> Array:
-    """(n, m) by what Newton's steps change for cables that hang; one for those without weight.
+    """Factors (n, m) on Newton's steps for cables with weight; one for cables without.
 
-    A parabola's strain is T/EA - (w l)^2/(24 T^2) (Irvine 1981, section 1.2): how much more or
-    less of it lies between two tensions than its slope at the first says.
+    The strain of a parabola is T/EA - (w l)^2/(24 T^2) (Irvine 1981, section 1.2). The factor is
+    its difference between two tensions over that of its tangent at the first.
     """
     law, heavy = tables.cables, (tables.cables[..., WEIGHT] * bridged_lengths(tables)) ** 2
     some = (heavy > 0.0) & (now > 0.0) & (wanted > 0.0)
@@ -98,10 +99,10 @@ def _hanging(tables: Tables, now: Array, wanted: Array) -> Array:
 
 
 def loose_rest(tables: Tables, size: Array) -> tuple[Array, Array]:
-    """Rest lengths (n, m) [m] of cables with weight by how tight they hang, ``size`` (n, m) [N].
+    """Rest lengths (n, m) [m] of cables with weight, by their tightness ``size`` (n, m) [N].
 
-    The measure is the pull with which a shallow parabola has that length. Other than the tension,
-    which grows again where cables hang far through, it goes on falling as they get longer.
+    Tightness is the tension at which a shallow parabola would have that length. Unlike the tension,
+    which increases again when a cable hangs far down, it always falls as the cable gets longer.
 
     Returns:
         the lengths and their derivatives [m/N].
@@ -116,9 +117,10 @@ def loose_rest(tables: Tables, size: Array) -> tuple[Array, Array]:
 
 
 def tightness(tables: Tables, rest: Array) -> Array:
-    """The measure (n, m) [N] of :func:`loose_rest` that rest lengths (n, m) [m] have.
+    """The tightness (n, m) [N], see :func:`loose_rest`, of cables with rest lengths (n, m) [m].
 
-    For cables about as tight as their weight, or tighter: by Newton's method from there.
+    Newton's method starts at the cable's weight, and is for cables about as tight as that or
+    tighter.
     """
     weight = tables.cables[..., WEIGHT] * bridged_lengths(tables)
     size = np.where(weight > 0.0, weight, 1.0)
@@ -129,15 +131,15 @@ def tightness(tables: Tables, rest: Array) -> Array:
 
 
 def bends(tables: Tables) -> bool:
-    """Whether balance is not linear in tensions: some pull's direction depends on its size."""
+    """Whether the balance is nonlinear in the tensions: cables have weight or exit points lift."""
     return bool(np.any(tables.cables[..., WEIGHT]) or np.any(tables.cables[..., LIFT]))
 
 
 def balance_of(tables: Tables, low: Array, about: Array | None = None) -> tuple[Array, Array]:
     """Balance A tau = load at the poses of tables: (n, d, m) and (n, d) [N], torques over length.
 
-    Linear in the tensions from those given, (n, m) [N], or from where the cables just pull. That
-    matters where a pull's direction depends on its size only.
+    It is linearised at the tensions ``about``, (n, m) [N], by default :func:`first_tensions`. That
+    only matters if the direction of a pull depends on its size.
     """
     now = with_rest(
         tables, rest_for(tables, first_tensions(tables, low) if about is None else about)

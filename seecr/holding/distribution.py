@@ -1,4 +1,4 @@
-"""Tensions that balance a load within limits, as near to wanted ones as they can be."""
+"""Tensions within limits that balance a load, as near to wanted ones as possible."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from seecr.errors import InputError
 from seecr.pose import LARGEST, Array, all_finite
 from seecr.threads import in_parts
 
-# Part of the load that may stay unbalanced: rounding of the tensions found.
+# Part of the load that may stay unbalanced, by rounding of the tensions.
 _BALANCED = 1e-9
 AIMS = ("minimum", "middle")
-"""Names of wanted tensions: as little as possible, the middle of the limits."""
+"""Names of wanted tensions: as small as possible, or the middle of the limits."""
 
 
 def tension_limits(robot: Robot, lowest: ArrayLike, highest: ArrayLike) -> tuple[Array, Array]:
     """Limits of each cable's tension, (m,) [N] each.
 
     Raises:
-        InputError: a wrong shape, or limits that leave nothing between them.
+        InputError: a wrong shape, or limits that contradict each other.
     """
     m = robot.n_cables
     bounds = []
@@ -44,11 +44,11 @@ def tension_limits(robot: Robot, lowest: ArrayLike, highest: ArrayLike) -> tuple
 
 
 def wanted_tensions(aim: str | ArrayLike, low: Array, high: Array) -> Array:
-    """The tensions (m,) or (n, m) [N] that an aim means.
+    """The tensions (m,) or (n, m) [N] of an aim.
 
     Raises:
-        InputError: an unknown name, a wrong shape, the middle of limits that are not there, or
-            tensions that are not between them.
+        InputError: an unknown name, a wrong shape, the middle of limits that are not finite, or
+            tensions outside the limits.
     """
     if isinstance(aim, str):
         if aim not in AIMS:
@@ -77,14 +77,14 @@ def wanted_tensions(aim: str | ArrayLike, low: Array, high: Array) -> Array:
 def distribute(
     matrices: Array, loads: Array, aim: Array, low: Array, high: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Tensions nearest to wanted ones, in the sense of least squares, that balance loads.
+    """Tensions nearest to wanted ones, by least squares, that balance loads.
 
     Args:
-        matrices: (n, d, m). loads: (n, d), what the tensions have to make.
+        matrices: (n, d, m). loads: (n, d), to be balanced: A tau = load.
         aim, low, high: (m,) or (n, m) [N].
 
     Returns:
-        (n, m) [N] and (n,) whether there are any: where not, they come near to balance.
+        (n, m) [N], and (n,) whether they balance; otherwise they come near to balance.
     """
     from seecr.compiled.projection import FOUND, UNDECIDED, project_batch  # slow to import
 
@@ -110,8 +110,8 @@ def distribute(
 def balanced(matrix: Array, load: Array, low: Array, high: Array) -> tuple[Array, float]:
     """Tensions (m,) within limits that come nearest to balance, and |A tau - load| / |load|.
 
-    By non-negative least squares. An upper bound is one more equation, tau_i + spare_i = high_i
-    with spare_i >= 0.
+    They are found by non-negative least squares. An upper bound is one more equation,
+    tau_i + spare_i = high_i with spare_i >= 0.
 
     Args:
         matrix: (d, m). load: (d,). low, high: (m,) [N].

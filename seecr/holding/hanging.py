@@ -1,6 +1,7 @@
-"""Cables that hang: the tension each needs at least, and how long they are about for a tension.
+"""Cables with weight: their least tensions, and approximate lengths for given tensions.
 
-Lengths are those of catenaries that do not stretch, stretched: Newton's method begins here.
+The lengths are those of inextensible catenaries, then stretched: starting values for Newton's
+method.
 """
 
 from __future__ import annotations
@@ -11,24 +12,24 @@ from seecr.compiled.columns import ANCHOR, EA, EXIT, GAP, REST, UP, WEIGHT
 from seecr.pose import Array, quat_to_matrix
 from seecr.statics.tables import Tables
 
-# Least of the mean tension, in weights of the cable, and the most bend that are looked at.
+# Least mean tension [weight of the cable], and the largest bend of a catenary, that are considered.
 _LEAST, _MOST_BENT = 0.8, 1.0
-# Newton's steps to a bend.
+# Newton steps to a bend.
 _ROUNDS = 5
 
 
 def bridged_lengths(tables: Tables) -> Array:
-    """(n, m) [m] lengths of straight cables without strain at the poses of tables."""
+    """(n, m) [m] lengths of straight, unstrained cables at the poses of tables."""
     return np.asarray(tables.cables[..., REST] + tables.cables[..., GAP])
 
 
 def least_of_heavy(tables: Tables) -> Array:
-    """(n, m) [N] tensions that cables with weight are not asked to go below. Zero of others.
+    """(n, m) [N] tensions that cables with weight are not asked to go below; zero for others.
 
-    In the middle it is what the cable weighs: a catenary that sags by about a seventh of its span.
-    At the exit point half of what it weighs is more where that lies straight above the anchor
-    point, half of it less where it lies below. There are no catenaries with less than some three
-    quarters of that in the middle.
+    The tension in the middle is then the cable's weight, as of a catenary that sags by about a
+    seventh of its span. At the exit point it is larger by half the weight if that is straight above
+    the anchor point, and smaller by half if it is straight below. No catenary has less than about
+    three quarters of that in the middle.
     """
     weight = _weights(tables)
     if not weight.any():
@@ -42,26 +43,26 @@ def _weights(tables: Tables) -> Array:
 
 
 def rest_for(tables: Tables, tensions: Array) -> Array:
-    """(n, m) [m] rest lengths with which cables have about these tensions (n, m) [N]."""
+    """(n, m) [m] rest lengths with which cables have approximately these tensions (n, m) [N]."""
     bridged, weight = bridged_lengths(tables), _weights(tables)
     if not weight.any():
         return np.asarray(bridged / (1.0 + tensions / tables.cables[..., EA]))
     rise = _rises(tables)
-    # the tension at the exit point carries what hangs below it
+    # the tension at the exit point includes the weight that hangs below it
     mean = tensions - 0.5 * weight * rise
     arcs = _arcs(0.5 * weight / np.maximum(mean, np.maximum(_LEAST * weight, 1e-300)), rise)
     return np.asarray(bridged * arcs / (1.0 + np.maximum(mean, 0.0) / tables.cables[..., EA]))
 
 
 def _arcs(light: Array, rise: Array) -> Array:
-    """Lengths of catenaries over the ways that they bridge.
+    """Lengths of catenaries over the straight distances that they span.
 
-    With the bend g = w x/(2 H), over spans x and rises z, l^2 = z^2 + (x sinh(g)/g)^2, and the mean
+    With the bend g = w x/(2 H), for spans x and rises z, l^2 = z^2 + (x sinh(g)/g)^2, and the mean
     of the tensions at both ends is w l coth(g)/2 (Irvine 1981, section 1.2): one equation for g.
 
     Args:
         light: half of the weight over the mean tension.
-        rise: over the way bridged.
+        rise: over the straight distance.
     """
     flat = 1.0 - rise**2
     bend = np.clip(light, 1e-6, _MOST_BENT)
@@ -75,7 +76,7 @@ def _arcs(light: Array, rise: Array) -> Array:
 
 
 def _bent(bend: Array, rise: Array, flat: Array) -> tuple[Array, Array, Array, Array]:
-    """Arcs over ways, g coth(g), and the rates of both by g."""
+    """Arc over distance, g coth(g), and the derivatives of both by g."""
     sinh = np.sinh(bend)
     longer, over = sinh / bend, bend * np.cosh(bend) / sinh
     arc = np.sqrt(rise**2 + flat * longer**2)
@@ -84,7 +85,7 @@ def _bent(bend: Array, rise: Array, flat: Array) -> tuple[Array, Array, Array, A
 
 
 def _rises(tables: Tables) -> Array:
-    """(n, m) how far exit points lie above anchor points, over the way between them."""
+    """(n, m) height of exit points above anchor points, over the distance between them."""
     turn = quat_to_matrix(tables.poses[:, 3:])
     anchors = tables.cables[..., ANCHOR : ANCHOR + 3] @ np.swapaxes(turn, 1, 2)
     ways = tables.cables[..., EXIT : EXIT + 3] - tables.poses[:, None, :3] - anchors

@@ -1,12 +1,12 @@
-"""The tensions farthest inside their limits that hold platforms, where pulls bend with their size.
+"""Tensions farthest inside their limits that hold platforms, for a nonlinear balance.
 
-A linear program finds them where balance is linear in the tensions. Where it is not, each round
-takes balance about the tensions that the last one found, and solves again (sequential linear
-programming): at the end balance holds exactly at the tensions found.
+If the balance is linear in the tensions, a linear program finds them. If not, each round linearises
+it at the tensions of the last round and solves again (sequential linear programming); at the end
+the balance is exact at the tensions found.
 
-A cable with weight never has no tension. The less it is to pull, the longer it hangs, and below
-about its own weight its tension says nothing any more: there a measure takes its place that goes on
-falling with the length.
+A cable with weight always has some tension. The less it is to pull, the longer it hangs, and below
+about its own weight the tension does not determine the length any more. There its tightness takes
+the place of the tension: it falls whenever the length grows. Such cables are called loose.
 """
 
 from __future__ import annotations
@@ -36,36 +36,36 @@ from seecr.statics import batch
 from seecr.statics.tables import Tables, take
 from seecr.threads import in_parts
 
-# Rounds at most, from which on steps are halved, and what ends them [of load].
+# Most rounds, the round from which steps are halved, and the change that ends them [load].
 _ROUNDS, _HALVED, _ENOUGH = 14, 7, 1e-10
-# Balance is taken where every cable pulls at least this part of its share of the load.
+# The balance is linearised where each cable pulls at least this part of its share of the load.
 _PULLS = 1e-3
-# Part of the load that may stay unbalanced where the matrix has no inverse.
+# Part of the load that may stay unbalanced if the matrix is singular.
 _BALANCED = 1e-9
-# How tight a cable hangs at least [of its weight]: it is half as long again as its way then.
+# Least tightness [weight]: the cable is then half as long again as its span.
 _LOOSEST = 12.0**-0.5
-# Hanging loosely gains less than this many weights of a cable.
+# Letting cables hang loosely gains less than this many of their weights.
 _GAINED = 2.0
-# Rounds with cables that hang loosely, balance [of load] at the end, what tensions may be off.
+# Rounds with loose cables, residual at their end [load], and allowed error of tensions [load].
 _NEWTON, _EXACT, _OFF = 30, 1e-12, 1e-9
-# Attempts with fewer and fewer of them.
+# Attempts, each with fewer loose cables.
 _AGAIN = 4
 
 
 @dataclass(eq=False)
 class Inside:
-    """Tensions farthest inside their limits, of n poses.
+    """Tensions farthest inside their limits, for n poses.
 
     Attributes:
-        margins: (n,) [N] how far; below zero where limits have to be passed; infinite where cables
-            can be tightened without end; minus infinity where nothing balances. Zero where a pose
-            is held with cables that hang loosely alone.
-        tensions: (n, m) [N], NaN where they have no end or nothing balances.
-        rest: (n, m) [m] lengths about which balance was taken: those of the tensions, where these
-            are within the limits.
-        matrices, loads: (n, d, m), (n, d) [N] balance there, torques over a length.
-        low, high: (n, m) [N] the limits: cables that do not hang loosely pull what they weigh.
-        loose: (n,) bool, held by ``rest``, with cables that pull less than they weigh.
+        margins: (n,) [N] how far; negative if limits are exceeded; infinite if cables can be
+            tightened without limit; minus infinity if nothing balances the load. Zero if a pose
+            can only be held with loose cables.
+        tensions: (n, m) [N], NaN if they are unlimited or nothing balances the load.
+        rest: (n, m) [m] lengths at which the balance was linearised: those of the tensions, if
+            these are within the limits.
+        matrices, loads: (n, d, m), (n, d) [N] balance there, torques over the robot's length.
+        low, high: (n, m) [N] the limits; a cable that is not loose pulls at least its weight.
+        loose: (n,) bool, the pose is held by ``rest``, with cables that pull less than they weigh.
     """
 
     margins: Array
@@ -79,9 +79,9 @@ class Inside:
 
 
 def limits_of(tables: Tables, low: Array, high: Array) -> tuple[Array, Array]:
-    """Limits (n, m) [N] of tensions, from those asked for, (m,) or (n, m): none below its weight.
+    """Limits (n, m) [N] of tensions from the given (m,) or (n, m), raised to what a cable weighs.
 
-    Nothing is between them where a cable may not pull as much as it weighs.
+    They contradict each other if a cable may not pull as much as it weighs.
     """
     shape = tables.cables.shape[:2]
     least = np.maximum(np.broadcast_to(low, shape), least_of_heavy(tables))
@@ -89,13 +89,14 @@ def limits_of(tables: Tables, low: Array, high: Array) -> tuple[Array, Array]:
 
 
 def farthest_inside(tables: Tables, low: Array, high: Array, hopeless: float = np.inf) -> Inside:
-    """The tensions that stay farthest inside limits, exactly where pulls bend, too.
+    """The tensions that stay farthest inside limits; exact even if the balance is nonlinear.
 
     Args:
-        tables: of n poses, whose own rest lengths do not matter; as many cables as freedoms.
+        tables: of n poses, whose own rest lengths do not matter; at least as many cables as degrees
+            of freedom.
         low, high: (m,) or (n, m) [N].
-        hopeless: rows that are, after a round of their own, farther outside than this part of the
-            load are left at that.
+        hopeless: give up on rows whose margin is below minus this part of the load, from the second
+            round on.
     """
     out = _tightened(tables, *limits_of(tables, low, high), hopeless)
     weighs = least_of_heavy(tables)
@@ -111,14 +112,14 @@ def farthest_inside(tables: Tables, low: Array, high: Array, hopeless: float = n
 def balances(
     tables: Tables, low: Array, high: Array
 ) -> Iterator[tuple[Array, Array, Array, Array]]:
-    """Of each pose the balance that its tensions come nearest to, for a reason why they do not.
+    """For each pose, the balance that its tensions come nearest to, to explain why it is not held.
 
     Args:
         tables: of n poses.
-        low, high: (m,) limits that are asked for [N].
+        low, high: (m,) limits asked for [N].
 
     Yields:
-        matrix (d, m), load (d,) [N], and limits (m,) [N] of those that do not hang loosely.
+        matrix (d, m), load (d,) [N], and limits (m,) [N] of cables that are not loose.
     """
     if tables.cables.shape[1] >= tables.n_dof and bends(tables):
         found = farthest_inside(tables, low, high)
@@ -129,7 +130,7 @@ def balances(
 
 
 def _tightened(tables: Tables, least: Array, most: Array, hopeless: float) -> Inside:
-    """See :func:`farthest_inside`; with limits (n, m) that no cable passes by hanging loosely."""
+    """See :func:`farthest_inside`; with limits (n, m), and without loose cables."""
     n, m = tables.cables.shape[:2]
     pulls = np.maximum(least, _PULLS * tables.scale[:, None] / m)
     first = rest_for(tables, first_tensions(tables, least))
@@ -167,13 +168,13 @@ def _tightened(tables: Tables, least: Array, most: Array, hopeless: float) -> In
 
 @dataclass(eq=False)
 class _Line:
-    """Balance of n poses, linear in one value per cable: its tension, or how tight it hangs.
+    """The balance of n poses, linear in each cable's tension, or tightness if it is loose.
 
     Attributes:
-        tables: with the rest lengths about which it is linear.
-        value: (n, m) [N] there. loose: (n, m) bool, it is how tight the cable hangs.
-        tension: (n, m) [N]; by_length: (n, m) [N/m] of it by the rest length.
-        matrix, load: (n, d, m), (n, d) [N] matrix value = load.
+        tables: with the rest lengths at which it is linearised.
+        value: (n, m) [N] there. loose: (n, m) bool, the value is the tightness.
+        tension: (n, m) [N]; by_length: (n, m) [N/m] its derivative by the rest length.
+        matrix, load: (n, d, m), (n, d) [N]: matrix value = load.
     """
 
     tables: Tables
@@ -195,12 +196,12 @@ class _Line:
 
 
 def _line_about(tables: Tables, at: batch.Evaluation, size: Array) -> _Line:
-    """Balance about an evaluation.
+    """The balance linearised at an evaluation.
 
     Args:
         tables: of n poses.
         at: an evaluation of them.
-        size: (n, m) [N] how tight cables hang that may do so loosely, NaN of all others.
+        size: (n, m) [N] tightness of cables that may be loose, NaN for all others.
     """
     rates, loose, tension = rates_of(tables, at), ~np.isnan(size), at.states[..., TENSION]
     value = np.where(loose, size, tension)
@@ -214,14 +215,14 @@ def _loosen(
     out: Inside, rows: NDArray[np.intp], tables: Tables, loose: NDArray[np.bool_], low: Array,
     high: Array,
 ) -> None:  # fmt: skip
-    """Hold rows with cables that hang loosely, where that holds them.
+    """Hold rows with loose cables, if that is possible.
 
-    By Newton's method with the least change of all cables, from the tensions farthest inside.
+    Newton's method with the least change of all cables starts from the tensions farthest inside.
 
     Args:
-        out: filled in there.
+        out: the results to be filled in.
         rows: (k,) of it; tables: of these.
-        loose: (k, m) cables that may, low, high: (k, m) [N] the tensions that are asked for.
+        loose: (k, m) cables that may be loose. low, high: (k, m) [N] limits asked for.
     """
     weight = tables.cables[..., WEIGHT] * bridged_lengths(tables)
     least, first = np.where(loose, _LOOSEST * weight, out.low[rows]), out.rest[rows]
@@ -234,7 +235,7 @@ def _loosen(
         to = rows[left[fine]]
         out.margins[to], out.loose[to] = 0.0, True
         out.rest[to], out.tensions[to] = rest[fine], tension[fine]
-        # once more, with those that pulled too little as tight as they have to be
+        # try again: cables that pulled too little get the tightness of their lower limit
         under &= loose[left] & ~fine[:, None]
         again = under.any(axis=1)
         left, under = left[again], under[again]
@@ -275,7 +276,7 @@ def _hang(
 def innermost(
     matrices: Array, loads: Array, low: Array, high: Array, scale: Array
 ) -> tuple[Array, Array]:
-    """Margins (n,) and tensions (n, m) [N] of balances A tau = load, as :class:`Inside` has them.
+    """Margins (n,) and tensions (n, m) [N] of the balance A tau = load, as in :class:`Inside`.
 
     Args:
         matrices: (n, d, m), loads: (n, d) [N]. low, high: (n, m) [N]. scale: (n,) [N].
@@ -300,7 +301,7 @@ def innermost(
 
 
 def _by_search(matrix: Array, load: Array, low: Array, high: Array) -> tuple[float, Array]:
-    """The same of one pose where W has no inverse: no margin if a search finds tensions."""
+    """The same for one pose with a singular W: margin zero if a search finds tensions."""
     if np.all(high >= low) and np.isfinite(matrix).all() and np.isfinite(load).all():
         tensions, left = balanced(matrix, load, low, high)
         if left < _BALANCED:
@@ -309,7 +310,7 @@ def _by_search(matrix: Array, load: Array, low: Array, high: Array) -> tuple[flo
 
 
 def raised(tables: Tables, low: Array, high: Array) -> Array:
-    """(n, m) [N] lower limits: no length takes a hanging cable's tension to nothing."""
+    """(n, m) [N] lower limits, raised to the least tension of cables with weight."""
     floor = least_of_heavy(tables)
     return np.where(floor < high, np.maximum(low, floor), low)
 
@@ -317,15 +318,15 @@ def raised(tables: Tables, low: Array, high: Array) -> Array:
 def counted_balance(
     tables: Tables, low: Array, high: Array, about: Array | None = None
 ) -> tuple[Array, Array]:
-    """:func:`balance_of` for tensions counted so that hanging cables have the limits, too.
+    """Like :func:`balance_of`, for tensions scaled so that limits are the same at all poses.
 
-    Counted tensions go from ``low`` to ``high`` where those go from what such a cable needs, which
-    changes with the pose, to ``high``; those of others are as they are.
+    The scaled tension goes from ``low`` to ``high`` as the tension of a cable with weight goes from
+    its least value, which changes with the pose, to ``high``. Other tensions are not scaled.
 
     Args:
         tables: of n poses.
         low, high: (m,) limits [N].
-        about: (n, m) counted, or None for tensions that come nearest to balance.
+        about: (n, m) scaled, or None for tensions that come nearest to balance.
     """
     least = raised(tables, low, high)
     if not np.any(least > low):

@@ -1,9 +1,9 @@
-"""Rest lengths that hold platforms at given poses: the elastic statics, the other way round.
+"""Rest lengths that hold platforms at given poses: the elastic statics, inverted.
 
-At a given pose the tensions follow from balance, W tau = -w (paper, eq 3), as near to wanted ones
-as limits allow, and rest lengths from each cable's law, l0 = l/(1 + tau/(E S)) for a plain one.
-Where a pull's direction depends on its size (sag, yielding exit points), Newton's method brings
-both together, with the law's own derivatives.
+At a given pose the tensions follow from the balance, W tau = -w (paper, eq 3), as near to wanted
+ones as the limits allow, and rest lengths follow from each cable's law, l0 = l/(1 + tau/(E S)) for
+a plain one. If the direction of a pull depends on its size (sag, yielding exit points), Newton's
+method solves both together, with the derivatives of the cable's law.
 """
 
 from __future__ import annotations
@@ -22,21 +22,21 @@ from seecr.pose import Array
 from seecr.statics import batch
 from seecr.statics.tables import Tables, take
 
-# Rounds of Newton's method; balance to this part of the load ends them.
+# Most rounds of Newton's method, and the residual that ends them [load].
 _ROUNDS, _BALANCED = 40, 1e-12
-# Where no tensions balance, as linearised, what lacks at least is to fall by this factor.
+# If no tensions balance the linearised system, its residual must fall by this factor to go on.
 _NEARS = 0.5
-# Rounds for whether a pose is firm, asked of many.
+# Rounds for whether a pose is firm, which is asked for many poses.
 _FEW = 14
-# A slack cable is this much longer than the way it bridges: it needs a margin, not a value.
+# A slack cable is longer than its span by this part, to keep it slack.
 _MARGIN = 2e-3
-# A stiffness below this part of the largest is none.
+# A stiffness below this part of the largest counts as zero.
 _FIRM = 1e-12
-# Below this part of the load a tension is none.
+# A tension below this part of the load counts as zero.
 _NONE = 1e-9
-# Parts of the way from an aim to the tensions farthest inside, at which a pose is tried once more.
+# Fractions from the aim to the tensions farthest inside, with which a pose is tried again.
 _PARTS = (0.0, 0.5, 0.75, 0.9, 1.0)
-# Limits without an end are so many loads apart; a pose this part of the load outside is left.
+# Unlimited tensions are cut off at so many loads; rows this part of the load outside are given up.
 _TIGHT, _HOPELESS = 30.0, 0.1
 
 
@@ -61,7 +61,7 @@ class Held:
         return Held(self.rest[rows], self.tensions[rows], self.strains[rows], self.fine[rows])
 
     def put(self, rows: NDArray[np.intp], other: Held) -> None:
-        """Put rows of another in their place."""
+        """Overwrite rows with those of another."""
         self.rest[rows], self.tensions[rows] = other.rest, other.tensions
         self.strains[rows], self.fine[rows] = other.strains, other.fine
 
@@ -71,9 +71,10 @@ def hold(tables: Tables, aim: Array, low: Array, high: Array, rounds: int = _ROU
 
     Args:
         tables: of n poses, whose own rest lengths do not matter.
-        aim: (n, m) tensions wanted [N].
-        low, high: (m,) limits [N]; no cable hangs with less tension than it weighs.
-        rounds: at most, of Newton's method.
+        aim: (n, m) wanted tensions [N].
+        low, high: (m,) limits [N]. Cables with weight pull at least about what they weigh, unless
+            the pose can only be held with less.
+        rounds: most rounds of Newton's method.
     """
     least, most = limits_of(tables, low, high)
     out = _hold(tables, aim, least, most, rounds, rest_for(tables, first_tensions(tables, least)))
@@ -87,12 +88,12 @@ def _from_inside(
     out: Held, rows: NDArray[np.intp], tables: Tables, aim: Array, rounds: int,
     low: Array, limits: tuple[Array, Array],
 ) -> None:  # fmt: skip
-    """Hold rows from tensions farthest inside the limits, where these bend on the way to others.
+    """Hold rows from the tensions farthest inside the limits, if the balance is nonlinear.
 
-    The aim comes to those tensions, which hold, as far as it has to.
+    The aim is moved towards those tensions, which hold the pose, as far as necessary.
     """
     least, most = limits
-    # without an end, far enough for every cable to be tight
+    # unlimited tensions are cut off where every cable is tight
     end = np.minimum(most, least + _TIGHT * tables.scale[:, None])
     start = farthest_inside(take(tables, rows), low, end[rows], _HOPELESS)
     _put_loose(out, rows[start.loose], take(tables, rows[start.loose]), start)
@@ -108,7 +109,7 @@ def _from_inside(
 
 
 def _put_loose(out: Held, rows: NDArray[np.intp], tables: Tables, start: Inside) -> None:
-    """Put rows that are held with cables that hang loosely: as tight as they can."""
+    """Put rows that are held with loose cables into the results."""
     if len(rows):
         now = with_rest(tables, start.rest[start.loose])
         at = batch.evaluate(now, here(now), threads=None)
@@ -117,7 +118,7 @@ def _put_loose(out: Held, rows: NDArray[np.intp], tables: Tables, start: Inside)
 
 
 def _hold(tables: Tables, aim: Array, least: Array, most: Array, rounds: int, rest: Array) -> Held:
-    """See :func:`hold`, with limits (n, m) and rest lengths (n, m) [m] to start from."""
+    """See :func:`hold`; with limits (n, m), and rest lengths (n, m) [m] to start from."""
     n, m = tables.cables.shape[:2]
     out = Held(rest.copy(), np.zeros((n, m)), np.zeros((n, m)), np.zeros(n, dtype=bool))
     rows, known, wanted = np.arange(n), None, out.tensions
@@ -134,7 +135,7 @@ def _hold(tables: Tables, aim: Array, least: Array, most: Array, rounds: int, re
             break
         rates = rates_of(now, at)
         if known is not None:
-            # a cable that is just slack has no rates: those of when it pulled are near
+            # a cable that has just gone slack has no derivatives: those of when it pulled are near
             idle = rates.by_length >= 0.0
             rates.by_tension = np.where(idle[:, None, :], known.by_tension[rows], rates.by_tension)
             rates.by_length = np.where(idle, known.by_length[rows], rates.by_length)
@@ -145,7 +146,7 @@ def _hold(tables: Tables, aim: Array, least: Array, most: Array, rounds: int, re
         wanted, possible = distribute(rates.by_tension, load, aim[rows], least[rows], most[rows])
         tensions = at.states[..., TENSION]
         longer = next_rest(now, out.rest[rows], rates.by_length, tensions, wanted)
-        # tensions that come near may balance where pulls are as those make them
+        # even tensions that only come near may balance, once the directions of pulls follow them
         before, lack = short[rows], np.einsum("ndm,nm->nd", rates.by_tension, wanted) - load
         short[rows] = np.abs(lack).max(axis=1)
         nears = possible | (short[rows] < _NEARS * before)
@@ -153,7 +154,7 @@ def _hold(tables: Tables, aim: Array, least: Array, most: Array, rounds: int, re
         out.rest[rows[going]] = longer[going]
         rows, wanted = rows[going], wanted[going]
     out.tensions, out.strains = start.states[..., TENSION], start.states[..., STRAIN]
-    # rounding may keep a row that is in balance to nine digits from the last ones
+    # rounding may keep a row that balances to nine digits from balancing to the last
     out.fine |= (start.residual < 1e-10) & _within(out.tensions, least, most, tables.scale)
     slack = (out.tensions <= _NONE * tables.scale[:, None]) & (least <= 0.0)
     longer = (1.0 + _MARGIN) * bridged_lengths(tables)
@@ -162,9 +163,9 @@ def _hold(tables: Tables, aim: Array, least: Array, most: Array, rounds: int, re
 
 
 def holds_firmly(tables: Tables, aim: Array, low: Array, high: Array) -> NDArray[np.bool_]:
-    """(n,) whether poses can be held, as :func:`hold` does, and are stable with those lengths.
+    """(n,) whether poses can be held, as by :func:`hold`, and are stable with those lengths.
 
-    All eigenvalues of the stiffness are above rounding of the largest.
+    Stable means that all eigenvalues of the stiffness exceed the rounding of the largest.
     """
     found = hold(tables, aim, low, high, _FEW)
     now = with_rest(tables, found.rest)

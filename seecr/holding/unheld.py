@@ -1,7 +1,7 @@
-"""Why a pose cannot be held: which cables would have to pull less, or more, than they may.
+"""Why a pose cannot be held: which tensions would have to be beyond their limits.
 
-Balance A tau = load with the limits of tensions let go where that takes least, in newtons
-altogether: a linear program, whose solution lets go of few cables (HiGHS, by SciPy).
+The limits in the balance A tau = load are exceeded by as little as possible, in newtons summed over
+the cables: a linear program, whose solution exceeds few limits (HiGHS, by SciPy).
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ import numpy as np
 from seecr.counted import counted
 from seecr.pose import Array
 
-# What is let go by less than this part of the load is rounding.
+# A limit exceeded by less than this part of the load is rounding.
 _ROUNDING = 1e-7
-# Cables named in a sentence.
+# Most cables named in a sentence.
 _MOST = 3
 
 
@@ -27,13 +27,13 @@ def why_not_held(
     names: Sequence[str],
     weighs: Array | float = 0.0,
 ) -> str:
-    """A sentence on one pose.
+    """A sentence about one pose.
 
     Args:
         matrix: (d, m) balance, load: (d,) [N], torques over a length.
         low, high: (m,) limits of the tensions [N].
         names: of the m cables.
-        weighs: (m,) [N] what each cable weighs, where that is its lowest limit.
+        weighs: (m,) [N] least tension due to each cable's weight, where that is the lower limit.
     """
     if np.any(low > high):
         k = int(np.argmax(low - high))
@@ -78,13 +78,13 @@ def _of_cable(name: str, beyond: float, low: float, high: float, of_weight: bool
 
 
 def _least_beyond(matrix: Array, load: Array, low: Array, high: Array) -> Array | None:
-    """(m,) [N] by how much tensions are above the limits, or below; None where that is no help."""
+    """(m,) [N] tensions above the upper or below the lower limits; None if nothing balances."""
     from scipy.optimize import linprog
 
     m, scale = matrix.shape[1], max(float(np.abs(load).max()), 1e-300)
     eye, zero = np.eye(m), np.zeros((m, m))
     bounded = np.isfinite(high)
-    # unknowns: tensions, what they are below and above the limits
+    # unknowns: tensions, and how far they are below and above the limits
     above = np.concatenate([eye, zero, -eye], axis=1)[bounded]
     below = np.concatenate([-eye, -eye, zero], axis=1)
     found = linprog(

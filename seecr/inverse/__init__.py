@@ -1,4 +1,4 @@
-"""Commands that correct: what to tell the winches so that the platform comes to wanted poses."""
+"""Corrected commands: lengths to command so that the platform comes to rest at wanted poses."""
 
 from __future__ import annotations
 

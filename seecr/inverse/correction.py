@@ -1,4 +1,4 @@
-"""Commands that correct: what to tell the winches so that the platform comes to wanted poses."""
+"""Corrected commands: lengths to command so that the platform comes to rest at wanted poses."""
 
 from __future__ import annotations
 
@@ -33,33 +33,36 @@ if TYPE_CHECKING:
     from seecr.prediction.model import GivenEffects
 
 PREFERENCES = ("pose", "position")
-"""What may give way at a pose that cannot be held: both, or the orientation alone."""
+"""What may change at a pose that cannot be held: position and orientation, or the orientation
+alone.
+"""
 
-# Rounds of history, or of users' laws, and by how much a pose may be missed at the end [of length].
+# Rounds for history or users' laws, and the error of the pose at which they end [robot's length].
 _ROUNDS, _MISSED = 40, 1e-10
-# A pose that is missed by less than this [m, and rad over the length] has been reached.
+# A pose counts as reached if it is missed by less than this [m, and rad times the length].
 _REACHED = 1e-6
-# Poses whose reason is told.
+# Number of poses whose reason is printed.
 _NAMED = 5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Correction(Result):
-    """What to tell the winches for n wanted poses.
+    """Lengths to command for n wanted poses.
 
     Attributes:
         wanted: (n, 7).
-        aimed: (n, 7) the wanted poses where they can be held, else the nearest that can.
-        lengths: (n, m) [m] to tell the winches, counted as the plain robot counts.
-        held: (n,) bool, the wanted pose can be held by tensions within the limits.
-        found: (n,) bool, there is an answer: lengths for the wanted pose or the nearest.
-        settled: (n,) bool, what is aimed at is the wanted pose itself, or meets the first-order
-            conditions of a local minimum (Karush, Kuhn and Tucker) and the platform stays there.
-            Among those the nearest of many searches is taken.
-        why_not: (n,) sentences, why a wanted pose cannot be held; "" where it can.
-        solution: where the platform rests with these lengths, certified.
-        commands: the lengths as commands that every function takes, with the runs, times,
-            temperatures and loads they are for.
+        aimed: (n, 7) the wanted poses if they can be held, else the nearest that can.
+        lengths: (n, m) [m] to command, as told lengths: at the reference pose they are the rest
+            lengths of the description.
+        held: (n,) bool, tensions within the limits can hold the wanted pose.
+        found: (n,) bool, there are lengths for the wanted pose or for the nearest that can be held.
+        settled: (n,) bool, ``aimed`` is the wanted pose itself, or meets the first-order conditions
+            of a local minimum (Karush, Kuhn and Tucker) and the platform stays there. Of the local
+            minima of many searches the nearest is taken.
+        why_not: (n,) sentences, why a wanted pose cannot be held; "" if it can.
+        solution: the certified equilibrium with these lengths.
+        commands: the lengths as commands that every function accepts, with the runs, times,
+            temperatures and loads that they are for.
     """
 
     robot: Robot
@@ -75,21 +78,21 @@ class Correction(Result):
 
     @property
     def left(self) -> Array:
-        """(n, 6) [m, rad] from the wanted pose to where the platform rests."""
+        """(n, 6) [m, rad] from the wanted pose to the platform's equilibrium."""
         return pose_difference(self.solution.pose, self.wanted)
 
     @property
     def stays(self) -> NDArray[np.bool_]:
-        """(n,) bool, the platform rests at what is aimed at, stably, to within a micrometre."""
+        """(n,) bool, the platform is at rest within a micrometre of ``aimed``, and stable."""
         return self.found & _rests_at(self.aimed, self.solution)
 
     @property
     def reached(self) -> NDArray[np.bool_]:
-        """(n,) bool, the platform rests at the wanted pose, stably, to within a micrometre."""
+        """(n,) bool, the platform is at rest within a micrometre of the wanted pose, and stable."""
         return self.held & self.stays
 
     def lines(self) -> list[str]:
-        """How many poses are reached, what is left, and what cannot be held."""
+        """How many poses are reached, the remaining errors, and which poses cannot be held."""
         n, left = len(self.wanted), self.left
         at, lost = self.reached, ~self.held
         out = [f"{self.robot.name}: {int(at.sum())} of {counted(n, 'pose')} reached"]
@@ -122,7 +125,7 @@ class Correction(Result):
         return out
 
     def place(self, row: int) -> str:
-        """A row in words: "line 24" of its file, "pose 3", counted from 0, without one."""
+        """The name of a row: "line 24" of its file, or "pose 3", counted from 0, without a file."""
         return rows_words([row], self.commands.line)
 
     def _reasons(self) -> list[str]:
@@ -133,7 +136,7 @@ class Correction(Result):
         return [*named_rows, f"  and {more} more, see why_not"] if more > 0 else named_rows
 
     def records(self) -> list[Record]:
-        """One row per pose: wanted, lengths, what is left, tensions."""
+        """One row per pose: wanted pose, lengths, remaining error, tensions."""
         cables, left = self.robot.cable_names, self.left
         moved = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
         return [
@@ -193,25 +196,30 @@ def correct(
     aim: str | ArrayLike = "minimum",
     prefer: str = "pose",
 ) -> Correction:
-    """Lengths to tell the winches so that the platform comes to rest at wanted poses.
+    """Lengths to command so that the platform comes to rest at wanted poses.
 
-    Elasticity and all effects are taken into account; what more cables than freedoms leave free
-    goes to tensions as near to ``aim`` as the limits allow. Where a pose cannot be held, the
-    nearest one that can is aimed at.
+    Elasticity and all effects are taken into account. With more cables than degrees of freedom,
+    the tensions are as near to ``aim`` as the limits allow. If a pose cannot be held, the nearest
+    one that can is used instead.
 
     Args:
         robot: as described, or its MJCF.
         poses: (n, 7) wanted, or :class:`seecr.Commands` with runs and times, for effects that
             depend on them.
         effects: a model, its file, or effects with values.
-        lowest: (m,) or one [N], not negative. A cable that may have none gets a margin.
+        lowest: (m,) or one [N], not negative. A cable with zero tension is made a little longer
+            than its span.
         highest: (m,) or one [N]; infinite for none.
         aim: "minimum", "middle" (of the limits), or tensions (m,) or (n, m) [N].
-        prefer: "pose": least position^2 + (length x rotation)^2; "position": only the
-            orientation gives way.
+        prefer: what is nearest to a pose that cannot be held. "pose" minimises
+            position^2 + (length x rotation)^2; "position" changes only the orientation, if that
+            suffices.
+
+    Returns:
+        the lengths and what they lead to; check ``reached`` before using a row.
 
     Raises:
-        InputError: shapes, limits that leave nothing, an unknown aim or preference.
+        InputError: wrong shapes, limits that contradict each other, an unknown aim or preference.
     """
     if prefer not in PREFERENCES:
         raise InputError(f"prefer must be one of {', '.join(PREFERENCES)}, got {prefer!r}")
@@ -222,10 +230,10 @@ def correct(
 def held_in_place(
     robot: Robot, poses: Array, effects: GivenEffects, lowest: ArrayLike, highest: ArrayLike
 ) -> NDArray[np.bool_]:
-    """(n,) whether positions can be held at some orientation by tensions within the limits.
+    """(n,) whether positions can be held in some orientation by tensions within the limits.
 
-    As :func:`correct` with ``prefer="position"`` says it, but any orientation will do, and nothing
-    is sought at other positions: for maps.
+    Like :func:`correct` with ``prefer="position"``, but any orientation will do, and no other
+    positions are tried: for maps.
     """
     return _search_of(robot, poses, effects, lowest, highest, "minimum").held_in_place()
 
@@ -238,7 +246,7 @@ def _search_of(
     highest: ArrayLike,
     aim: str | ArrayLike,
 ) -> _Search:
-    """One search, its arguments checked."""
+    """A search with checked arguments."""
     given = poses if isinstance(poses, Commands) else Commands(commanded_poses(poses))
     if given.lengths is not None:
         raise InputError("correct needs wanted poses (n, 7); got lengths")
@@ -286,7 +294,7 @@ class _Search:
         )  # fmt: skip
 
     def held_in_place(self) -> NDArray[np.bool_]:
-        """(n,) whether some orientation is held, and stays, at each position."""
+        """(n,) whether each position can be held, and is stable, in some orientation."""
         held, tables = self._held(self.given)
         aimed, lost = self.given.pose.copy(), np.flatnonzero(~held.fine)
         if len(lost):
@@ -298,7 +306,7 @@ class _Search:
         return there.fine & _rests_at(aimed, solution)
 
     def _why_not(self, lost: NDArray[np.intp], tables: Tables) -> tuple[str, ...]:
-        """(n,) sentences; "" of rows that can be held."""
+        """(n,) sentences; "" for rows that can be held."""
         out, limits = [""] * len(self.given), self.limits
         if len(lost) == 0:
             return tuple(out)
@@ -310,7 +318,7 @@ class _Search:
         return tuple(out)
 
     def _tables(self, commands: Commands) -> Tables:
-        """Tables at the poses of commands; what is paid out does not matter."""
+        """Tables at the commanded poses; their rest lengths do not matter."""
         plain = self.robot.commanded_lengths(commands.pose)
         trial = replace(commands, lengths=plain, told=True)
         return assemble(Experiment(self.robot, trial).setup(self.effects))
@@ -321,7 +329,7 @@ class _Search:
         return hold(tables, limits.aim, limits.low, limits.high), tables
 
     def _reaching(self, rows: NDArray[np.intp], scale: Array, *, fix_position: bool) -> Reaching:
-        """The problem of the nearest poses of some rows."""
+        """The problem of the nearest poses for some rows."""
         limits = self.limits
 
         def balance(
@@ -352,7 +360,7 @@ class _Search:
         return best
 
     def _lengths(self, commands: Commands, held: Held) -> tuple[Array, Prediction]:
-        """Lengths to tell for rest lengths that hold, and what comes of them."""
+        """Told lengths that pay out the rest lengths of ``held``, and the prediction with them."""
         for _ in range(_ROUNDS):
             told = told_lengths(self.robot, commands, self.effects, held.rest)
             trial = replace(commands, lengths=told, told=True)
@@ -367,14 +375,14 @@ class _Search:
 
 
 def _rests_at(poses: Array, solution: Solution) -> NDArray[np.bool_]:
-    """(n,) whether the platform rests at poses (n, 7), to within a micrometre."""
+    """(n,) whether the platform is at rest at poses (n, 7), to within a micrometre."""
     size = np.where(np.arange(6) < 3, 1.0, solution.robot.length)
     off = np.abs(pose_difference(solution.pose, poses) * size).max(axis=1)
     return np.asarray(solution.converged & (off < _REACHED))
 
 
 def _without(solution: Solution, rows: NDArray[np.bool_]) -> Solution:
-    """The solution without numbers where there is nothing to solve."""
+    """The solution with NaN in rows for which there are no lengths."""
     if not np.any(rows):
         return solution
     kept = ~rows[:, None]

@@ -1,4 +1,4 @@
-"""What to tell winches so that they pay out what is wanted: their laws, the other way round."""
+"""Lengths to command so that the winches pay out given lengths: the winch laws, inverted."""
 
 from __future__ import annotations
 
@@ -14,27 +14,28 @@ from seecr.effects.base import Effect
 from seecr.pose import Array
 from seecr.prediction.experiment import Experiment
 
-# A drum out of true lets a round come this much nearer or better; gains and offsets need one.
+# Most iterations; eccentric drums need several, gains and offsets one.
 _ROUNDS = 60
 
 
 def told_lengths(robot: Robot, commands: Commands, effects: Sequence[Effect], paid: Array) -> Array:
-    """Lengths to tell the winches for rest lengths that they are to pay out.
+    """Lengths to command so that the winches pay out given rest lengths.
 
     Args:
         robot: as described.
-        commands: of n rows; its lengths are where the search starts.
+        commands: of n rows, for their runs, times and temperatures; their lengths are ignored.
         effects: of the winches, among others.
         paid: (n, m) [m] rest lengths wanted.
 
     Returns:
-        (n, m) [m], counted as the plain robot counts (``Commands.told``).
+        (n, m) [m] told lengths (``Commands.told``): at the reference pose, those of the plain
+        robot.
     """
     told, last = paid.copy(), np.inf
     for _ in range(_ROUNDS):
         trial = replace(commands, lengths=told, told=True, passed=None)
         setup = Experiment(robot, trial).setup(effects)
-        # what is paid out at no turn of the winch, then what each turn adds
+        # the length without any turn of the winch, then what its turning adds
         pretension = robot.rest_lengths - robot.reference_lengths
         zero = setup.geometric_lengths(setup.zero_pose[None]) + pretension
         turned = paid / setup.length_factor - zero - setup.extra_length
@@ -51,10 +52,10 @@ def told_lengths(robot: Robot, commands: Commands, effects: Sequence[Effect], pa
 
 
 def unplay(wanted: Array, starts: NDArray[np.bool_], half_width: Array) -> Array:
-    """Inputs (n, m) of the play operator whose outputs are those wanted (n, m).
+    """Inputs (n, m) of the play operator whose outputs are the given (n, m).
 
     The inverse of play is a jump at each reversal (Krejci and Kuhnen, IEE Proceedings 148, 2001).
-    Where an output stays, the input stays in the middle of its play.
+    While an output is constant, so is its input.
 
     Args:
         starts: (n,) rows before which input and output were zero.

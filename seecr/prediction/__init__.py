@@ -1,1 +1,1 @@
-"""What a robot with effects would read, how that changes with them, and how sure it is."""
+"""Predicted readings of a robot with effects, their sensitivities and their uncertainty."""

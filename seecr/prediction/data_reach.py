@@ -1,4 +1,4 @@
-"""How far the data reach that a model's values were fitted to, and what lies beyond them."""
+"""The range of the data that a model was fitted to, and what lies beyond it."""
 
 from __future__ import annotations
 
@@ -17,21 +17,22 @@ if TYPE_CHECKING:
     from seecr.prediction.cells import Where
 
 TABLE = "fitted_to"
-"""The table of a model that holds it."""
+"""The table of a model that holds the range."""
 
 _POSITION, _TENSION = "position_m", "tension_N"
-# Beyond is a tension of so many times the largest, and a position outside the box of the data by
-# this part of its diagonal, or of a robot's length where all were at about one place.
+# Beyond the data is a tension of so many times the largest one, and a position outside the box of
+# the data by this part of its diagonal, or of the robot's length if all data are at about one
+# place.
 _TENSE, _OUTSIDE, _SPOT = 1.2, 0.1, 0.02
 _DIGITS = 4
 
 
 @dataclass(frozen=True, eq=False)
 class DataReach:
-    """Where the platform was in the data, and how its cables pulled, as the model has it.
+    """The range of positions and tensions in the data, as the model predicts them.
 
     Attributes:
-        low, high: (3,) [m] corners of the box of its positions, base frame.
+        low, high: (3,) [m] corners of the box of the positions, base frame.
         least, largest: [N] of all tensions.
     """
 
@@ -42,7 +43,7 @@ class DataReach:
 
     @classmethod
     def of(cls, positions: Array, tensions: Array) -> DataReach | None:
-        """That of positions (n, 3) [m] and tensions (n, m) [N]; None of no rows."""
+        """The range of positions (n, 3) [m] and tensions (n, m) [N]; None if there are no rows."""
         if len(positions) == 0:
             return None
         ends = positions.min(axis=0), positions.max(axis=0)
@@ -50,10 +51,10 @@ class DataReach:
 
     @classmethod
     def read(cls, where: Where, document: Mapping[str, Any]) -> DataReach | None:
-        """That of a model's document; None where it says nothing.
+        """The range in a model's document; None if it states none.
 
         Raises:
-            InputFileError: no numbers, or corners that are none.
+            InputFileError: values that are not numbers, or corners in the wrong order.
         """
         table = document.get(TABLE)
         if table is None:
@@ -73,7 +74,7 @@ class DataReach:
         return cls(low, high, float(least), float(largest))
 
     def as_toml(self) -> tomlkit.items.Table:
-        """The table of a model."""
+        """The table of a model that holds the range."""
         table = tomlkit.table()
         table.add(tomlkit.comment("Where the platform was in the data, and how its cables pulled."))
         corners, pulls = np.stack([self.low, self.high]), np.array([self.least, self.largest])
@@ -82,7 +83,7 @@ class DataReach:
         return table
 
     def outside(self, positions: ArrayLike, length: float) -> NDArray[np.float64]:
-        """How far (n,) [m] positions (n, 3) are outside the box; 0 near it.
+        """Distance (n,) [m] of positions (n, 3) from the box; 0 inside the box and near it.
 
         Args:
             positions: [m], base frame; NaN counts as inside.
@@ -95,10 +96,10 @@ class DataReach:
         return np.where(away > near, away, 0.0)
 
     def beyond(self, positions: Array, tensions: Array, length: float) -> tuple[str, ...]:
-        """A sentence about the rows beyond the data, if there are any.
+        """A sentence about the rows beyond the data; an empty tuple if there are none.
 
         Args:
-            positions: (n, 3) [m] where the platform rests.
+            positions: (n, 3) [m] where the platform is at rest.
             tensions: (n, m) [N] there.
             length: of the robot [m].
         """
@@ -124,6 +125,6 @@ class DataReach:
 
 
 def _rounded(values: Array) -> Array:
-    """To some digits of how far they are apart: a base frame may be far from the robot."""
+    """Values rounded to some digits of their spread: a base frame may be far from the robot."""
     apart = float(np.ptp(values, axis=0).max()) or float(np.abs(values).max()) or 1.0
     return np.asarray(np.round(values, _DIGITS - int(np.ceil(np.log10(apart)))) + 0.0)

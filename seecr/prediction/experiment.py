@@ -1,4 +1,4 @@
-"""A robot, its commands and its effects: what would be read, row by row."""
+"""A robot, its commands and its effects: predicted readings, row by row."""
 
 from __future__ import annotations
 
@@ -31,26 +31,26 @@ from seecr.statics.tables import Tables, assemble, relengthened, take
 if TYPE_CHECKING:
     from seecr.prediction.model import GivenEffects
 
-# Rounds of linearising users' laws about the strains found with them.
+# Rounds of linearising users' cable laws at the strains of the last round.
 _LAW_ROUNDS = 30
 _LIMIT = 400
-# Of more rows than this, and than a quarter of all, so many are tried first.
+# If more rows than this, and than a quarter of all, are unsolved, only so many are tried first.
 _MANY, _SAMPLE = 16, 4
 
 
 @dataclass(eq=False, repr=False)
 class Prediction(Result):
-    """Solved rows and what the sensors would report of them.
+    """Solved rows, and the readings that the sensors would report.
 
-    It prints as a few lines, and ``to_frame`` gives one row per command: what would be read.
+    It prints as a few lines, and ``to_frame`` gives one row of readings per command.
 
     Attributes:
-        setup: as the effects left it, of the rows asked for.
-        tables, found: of the rows asked for.
-        readings: what would be read.
+        setup: as the effects left it, for the n rows.
+        tables, found: the problem and its solution, for the n rows.
+        readings: what the sensors would report.
         has_history: whether rows depend on the rows before.
         sensors: effects that edit the readings.
-        walk: where all N waypoints of the way came to rest, once it was walked.
+        walk: the equilibria at all N waypoints, if the path was solved in order.
         solved: (n,) bool, a stable equilibrium was found.
     """
 
@@ -69,19 +69,19 @@ class Prediction(Result):
 
     @property
     def singular(self) -> NDArray[np.bool_]:
-        """(n,) rows at rest that are free to move along some direction."""
+        """(n,) rows in equilibrium at which the platform is free to move along some direction."""
         return np.asarray(self.found.outcome == SINGULAR)
 
     @property
     def pose(self) -> Array:
-        """(n, 7) where the platform rests."""
+        """(n, 7) equilibrium pose of the platform."""
         if "pose" not in self.kept:
             self.kept["pose"] = batch.platform_poses(self.tables, self.found.deviation)
         return self.kept["pose"]
 
     @property
     def slack(self) -> NDArray[np.bool_]:
-        """(n, m) cables that are slack, as :func:`seecr.statics.batch.is_slack` has it."""
+        """(n, m) slack cables, as :func:`seecr.statics.batch.is_slack` defines them."""
         return batch.is_slack(self.tables, self.found)
 
     @property
@@ -90,9 +90,9 @@ class Prediction(Result):
         return self.found.states[..., TENSION]
 
     def with_rows(self, other: Prediction, rows: NDArray[np.bool_]) -> Prediction:
-        """The same with some rows (n,) of another that differs in length errors alone.
+        """The same with some rows (n,) of another prediction that differs only in length errors.
 
-        Rows that depend on the rows before cannot be exchanged one by one: both have none.
+        Neither may have a history: rows that depend on the rows before cannot be exchanged.
         """
 
         def mixed(one: Array, two: Array) -> Array:
@@ -113,11 +113,11 @@ class Prediction(Result):
         )
 
     def lines(self) -> list[str]:
-        """As a solution's: how many rows came to rest, and where."""
+        """How many rows came to rest, and where, as for a solution."""
         return self.solution().lines()
 
     def records(self) -> list[Record]:
-        """What would be read, one row per command."""
+        """The readings, one row per command."""
         cables, read = self.setup.robot.cable_names, self.readings
         poses = np.concatenate([read.position, read.quat_wxyz], axis=1)
         return [
@@ -136,12 +136,12 @@ class Prediction(Result):
 
 @dataclass(eq=False)
 class Experiment:
-    """A robot and what it was told; predicts its readings under any effects.
+    """A robot and its commands; predicts the readings under any effects.
 
     Attributes:
         robot: as described.
         commands: n rows.
-        length_errors: (n, m) [m] by which each row's rest lengths differ from what was commanded:
+        length_errors: (n, m) [m] by which each row's rest lengths differ from the commanded ones:
             noise of the winches, not an effect.
     """
 
@@ -149,7 +149,7 @@ class Experiment:
     commands: Commands
     length_errors: Array | None = None
     _path: list[Path] = field(default_factory=list, repr=False)
-    # by identity of the commands: a setup holds them, so that no other takes their place
+    # keyed by the identity of the commands, which the setup keeps alive, so that no id is reused
     _plain: dict[int, Setup] = field(default_factory=dict, repr=False)
     _edits: dict[int, Edits] = field(default_factory=dict, repr=False)
     _led: list[Array | None] = field(default_factory=list, repr=False)
@@ -170,13 +170,13 @@ class Experiment:
         """The setup as the effects leave it."""
         setup = self._edits_of(self.commands if commands is None else commands).by(effects)
         if np.any(setup.backlash):
-            # what the winches did on the way to the rows counts too
+            # backlash also depends on what the winches did on the way to the rows
             path = self.path
             setup.commands = path.given_turning if commands is None else path.turning
         return setup
 
     def _edits_of(self, commands: Commands) -> Edits:
-        """What effects make of the setup of commands: fits ask for that thousands of times."""
+        """Edits of effects to the setup of commands, cached: fits need them thousands of times."""
         if id(commands) not in self._edits:
             if id(commands) not in self._plain:
                 self._plain[id(commands)] = plain_setup(self.robot, commands)
@@ -188,12 +188,12 @@ class Experiment:
         return self._edits[id(commands)]
 
     def predict(self, effects: Sequence[Effect] = (), near: Prediction | None = None) -> Prediction:
-        """Solve all rows and read the sensors.
+        """Solve all rows and compute what the sensors would report.
 
         Args:
             effects: in the order in which they act.
-            near: a prediction to start from, of effects a little different; the search starts
-                at the commanded poses without one.
+            near: a prediction with slightly different effects to start from; by default the search
+                starts at the commanded poses.
         """
         setup = self.setup(effects)
         if setup.has_history:
@@ -212,7 +212,7 @@ class Experiment:
     ) -> Prediction:
         """The same prediction with some rows solved again from given poses (k, 7).
 
-        Where a robot has several stable equilibria, the start decides which one is found.
+        If a robot has several stable equilibria, the start decides which one is found.
         """
         tables = take(at.tables, rows)
         start, values = start_of(self.robot, tables, poses)
@@ -259,20 +259,20 @@ class Experiment:
 
         start = None if near is None else near.found
         if near is not None and _differ_in_length(setup, near.setup):
-            # what fits of noisy lengths ask for three times of four
+            # three of four calls in fits of noisy lengths come here
             tables = relengthened(near.tables, setup)
             return tables, run(tables, start)
         return _with_laws(setup, run, start)
 
     @property
     def _first(self) -> Array | None:
-        """Poses (n, 7) from which rows are searched where lengths are commanded; found once."""
+        """Poses (n, 7) at which searches start if lengths are commanded; computed once."""
         if not self._led:
             self._led.append(led(self.robot, self.commands))
         return self._led[0]
 
     def walk(self, effects: Sequence[Effect]) -> tuple[Tables, batch.Evaluation]:
-        """Solve all waypoints of the way in order, each from the one before."""
+        """Solve all waypoints of the path in order, each from the one before."""
         path = self.path
         setup = self.setup(effects, path.commands)
         return _with_laws(setup, lambda tables, _start: batch.walk(tables, path, _LIMIT), None)
@@ -282,7 +282,7 @@ class Experiment:
         tables, whole = self.walk(effects)
         rows = take(tables, path.rows)
         found = batch.take_evaluation(whole, path.rows)
-        # a waypoint that was not solved spoils the rows of its run from there on
+        # if a waypoint was not solved, the later rows of its run are not valid
         for k in path.source[~whole.at_rest]:
             run = path.commands.run
             assert run is not None
@@ -308,18 +308,18 @@ def predict(
     commands: Commands | ArrayLike,
     model: GivenEffects = (),
 ) -> Prediction:
-    """Where a robot with effects comes to rest, and what its sensors would report.
+    """Predict where a robot with effects comes to rest, and what its sensors would report.
 
     Args:
         robot: as described, or its MJCF.
-        commands: commanded poses (n, 7), or :class:`seecr.Commands` with runs, times, lengths.
+        commands: commanded poses (n, 7), or :class:`seecr.Commands` with runs, times or lengths.
         model: from :func:`seecr.load_model`, its file, or effects with values; none by default.
 
     Returns:
-        a :class:`Prediction`; look at ``solved`` before using a row.
+        a :class:`Prediction`; check ``solved`` before using a row.
 
     Raises:
-        InputError: poses, a robot or effects that are none.
+        InputError: poses, robot or effects of a wrong type or shape.
 
     Example:
         ``seecr.predict(robot, poses, [seecr.Term.of(robot, "pulley_radius", radius_m=0.01)])``
@@ -331,11 +331,11 @@ def predict(
 
 
 def effects_of(given: GivenEffects, robot: Robot) -> list[Effect]:
-    """The effects of a model or of its file, of terms with values, or as they are.
+    """The effects of a model, of its file, of terms with values, or effects as they are.
 
     Raises:
-        InputFileError: no such file, or no model of this robot in it.
-        InputError: something else than effects with values.
+        InputFileError: there is no such file, or it holds no model of this robot.
+        InputError: something other than effects with values.
     """
     from seecr.prediction.model import effects_given  # takes a while to import
 
@@ -362,7 +362,7 @@ def senses(effect: type[Effect]) -> bool:
 
 
 def _differ_in_length(one: Setup, other: Setup) -> bool:
-    """Whether two setups differ in lengths beyond the same commands at most."""
+    """Whether two setups of the same commands differ in ``extra_length`` at most."""
     alike = one.robot is other.robot and one.commands is other.commands
     return alike and not (one.laws or other.laws) and one.differs(other) <= {"extra_length"}
 
@@ -370,10 +370,10 @@ def _differ_in_length(one: Setup, other: Setup) -> bool:
 def _among(
     found: batch.Evaluation, solve: Callable[[NDArray[np.intp]], batch.Evaluation]
 ) -> batch.Evaluation:
-    """Solve what is not solved yet.
+    """Solve the rows that are not solved yet.
 
-    Where that is most rows, a few are tried first: with values under which no pose holds (a step
-    of a fit that went too far) the solver would try every row to its limit.
+    If these are most rows, a few are tried first: with values under which no pose can be held (a
+    step of a fit that went too far), the solver would try every row up to its limit.
     """
     lost = found.outcome != CONVERGED
     rows = np.flatnonzero(lost)
@@ -394,7 +394,7 @@ def _with_laws(
     run: Callable[[Tables, batch.Evaluation | None], batch.Evaluation],
     start: batch.Evaluation | None,
 ) -> tuple[Tables, batch.Evaluation]:
-    """Solve, and where users' laws are in play linearise them at the strains found, again."""
+    """Solve; users' cable laws are linearised at the strains found, repeatedly until these stay."""
     strains = None
     if setup.laws and start is not None:
         strains = start.states[..., STRAIN]

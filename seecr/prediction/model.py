@@ -1,29 +1,29 @@
-"""A model: a robot plus the effects added to it, in a TOML file that people keep in git.
+"""A model: a robot and the effects added to it, in a TOML file to be kept under version control.
 
     format = 1
-    [robot]                      # whose model it is, to notice when it is used for another
+    [robot]                      # fingerprint: notices use of the model for another robot
     [[effect]]                   # in the order of adding
     name = "pulley_radius"
     fixed = true                 # optional: none of its values is ever fitted
     [effect.parameters]
     radius_m = { value = 0.0099, stderr = 0.0001, unit = "m", at_bound = false }
     [effect.provenance]          # data file, date, version, who or what put it there
-    [effect.before]              # rms errors without it, with it, and on runs left out
+    [effect.before]              # rms errors without it, with it, and on held-out runs
     [effect.after]
     [effect.held_out]
-    [fit]                        # how the errors of these values go together
-    [fitted_to]                  # how far those data reach: places and tensions
+    [fit]                        # correlations of the errors of these values
+    [fitted_to]                  # range of those data: positions and tensions
 
-An effect that is another for each file or run, such as a tracker that is set up anew, says
-``per_file = true`` or ``per_run = true``. Its own values stand in tables named after those,
-``[effect.of."monday/measured.csv"]``; those under ``parameters`` are what a further file or run is
-expected to have, as far as these differ, and may be left out.
+An effect whose values differ between files or runs, such as a tracker that is set up anew, says
+``per_file = true`` or ``per_run = true``. The values for each are in tables named after them,
+``[effect.of."monday/measured.csv"]``. Those under ``parameters`` are what is expected for a further
+file or run, and may be left out.
 
-``stderr = "unseen"`` stands for a parameter that the data do not see. A person may write a model
-by hand: name, parameters and values are all that is needed. What a person knows beside the data
-stands with the parameter (:mod:`seecr.prediction.cells`): ``fixed = true`` holds its value in every
-fit, ``known = { value = 0.03, stderr = 0.0005 }`` is a reading in every fit. A key without the
-component's number or axis (``shift_m``, ``gain``) says the same of all components.
+``stderr = "unseen"`` marks a parameter that the data do not determine. A model may be written by
+hand: effect names, parameters and values suffice. Knowledge from outside the data is stated with
+the parameter (:mod:`seecr.prediction.cells`): ``fixed = true`` holds its value in every fit,
+``known = { value = 0.03, stderr = 0.0005 }`` counts as a reading in every fit. A key without the
+component's number or axis (``shift_m``, ``gain``) applies to all components.
 """
 
 from __future__ import annotations
@@ -57,12 +57,13 @@ if TYPE_CHECKING:
     from seecr.statics.solution import Solution
 
 FORMAT = 1
-"""Of the file; raised when a key changes its meaning or goes."""
+"""Version of the file format; raised when a key changes its meaning or is removed."""
 
 _EXPECTED = "expected a model as crosscheck add writes it"
 CALIBRATION, FIT = "calibration", "fit"
-"""Tables about all values at once: what a calibration was worth, and how the errors of the last
-fit go together (:mod:`seecr.prediction.uncertainty`)."""
+"""Tables about all values at once: the quality of a calibration, and the correlations of the last
+fit (:mod:`seecr.prediction.uncertainty`).
+"""
 
 _TABLES = ("format", "robot", "effect", CALIBRATION, FIT, TABLE)
 
@@ -75,13 +76,14 @@ class Model(Result):
 
     Attributes:
         terms: the effects with their values.
-        stderr: standard errors (p,) of each effect's parameters by its name; inf where unseen,
-            NaN where the file gives none.
-        document: the file's text as a tree, comments included.
+        stderr: standard errors (p,) of each effect's parameters, by its name; inf if unseen, NaN if
+            the file states none.
+        document: the file as a TOML tree, comments included.
         notes: sentences about what has changed since the model was made.
         path: the file.
-        reach: how far the data reach that the values were fitted to, if the file says so.
-        written: the effects with the values that the document has: ``terms`` may be replaced.
+        reach: the range of the data that the values were fitted to, if the file states it.
+        written: the effects with the values that the document has; they differ from ``terms`` if
+            those were replaced.
     """
 
     terms: Terms
@@ -106,10 +108,10 @@ class Model(Result):
         return np.asarray(self.stderr.get(name, np.full(len(self.terms[name].layout), np.nan)))
 
     def beyond(self, solution: Solution) -> tuple[str, ...]:
-        """A sentence about the rows at rest that are beyond the data, if there are any.
+        """A sentence about the equilibria beyond the data; an empty tuple if there are none.
 
         Args:
-            solution: as :func:`seecr.solve` gives it with this model.
+            solution: as :func:`seecr.solve` returns it with this model.
         """
         if self.reach is None:
             return ()
@@ -118,7 +120,7 @@ class Model(Result):
         return self.reach.beyond(places, tensions, solution.robot.length)
 
     def lines(self) -> list[str]:
-        """Whose model it is, and the effects with their first few values."""
+        """The robot's name, and each effect with its first few values."""
         table = self.document.get("robot")
         robot = table.get("name", "a robot") if isinstance(table, Mapping) else "a robot"
         count = counted(len(self.names), "effect")
@@ -130,9 +132,9 @@ class Model(Result):
         ]  # fmt: skip
 
     def records(self) -> list[Record]:
-        """One row per parameter: its value and standard error, None where there is none.
+        """One row per parameter: value and standard error, None if the latter is unknown.
 
-        ``of`` names the file or run where it has values of its own for each.
+        ``of`` names the file or run if the effect has values of its own for each.
         """
         return [
             {
@@ -149,7 +151,7 @@ class Model(Result):
         ]
 
     def _tables(self, name: str) -> list[tuple[str, Array, Array]]:
-        """Values and errors of an effect, and those for files or runs by their names."""
+        """Values and standard errors of an effect, then those for each file or run by name."""
         term = self.terms[name]
         own = {} if term.own is None else term.own.values
         tables = [(of, one.vector, one.stderr) for of, one in own.items()]
@@ -157,7 +159,7 @@ class Model(Result):
 
 
 def _shown(term: Term, stderr: Array, most: int = 3) -> str:
-    """Values of an effect for people, the first few."""
+    """The first few values of an effect, as text."""
     parts = [
         f"{key} = {value:.6g}"
         + (" (fixed)" if fixed else f" +- {error:.2g}" if math.isfinite(error) else "")
@@ -179,11 +181,11 @@ GivenEffects: TypeAlias = Model | Iterable[Term | Effect] | str | Path
 def effects_given(
     given: GivenEffects, robot: Robot
 ) -> tuple[tuple[Term | Effect, ...], tuple[str, ...]]:
-    """Effects of a model, of its file, or as they are; and what is to be told of the model.
+    """Effects of a model, of its file, or as they are; and the model's notes.
 
     Raises:
-        InputFileError: no such file, or no model of this robot in it.
-        InputError: something else than effects with values.
+        InputFileError: there is no such file, or it holds no model of this robot.
+        InputError: something other than effects with values.
     """
     if isinstance(given, Model | str | Path):
         model = model_given(given, robot)
@@ -196,7 +198,7 @@ def effects_given(
 
 
 def no_effects(got: object) -> InputError:
-    """The error about something given in the place of effects with values."""
+    """The error about an argument that is not effects with values."""
     what = repr(got) if isinstance(got, str) else type(got).__name__
     return InputError(
         "expected a model, its path, or a list of effects with their values, as "
@@ -205,11 +207,11 @@ def no_effects(got: object) -> InputError:
 
 
 def model_given(given: Model | str | Path, robot: Robot) -> Model:
-    """The model, read if need be.
+    """The model, read from its file if a path is given.
 
     Raises:
-        InputFileError: no such file, or no model of this robot in it.
-        InputError: no model.
+        InputFileError: there is no such file, or it holds no model of this robot.
+        InputError: neither a model nor a path.
     """
     if isinstance(given, Model):
         return given
@@ -219,7 +221,7 @@ def model_given(given: Model | str | Path, robot: Robot) -> Model:
 
 
 def new_model(robot: GivenRobot) -> Model:
-    """A model without effects of a robot, or of that in an MJCF: the seed's plain SEECR."""
+    """A model without effects for a robot, or for the robot in an MJCF: the paper's plain SEECR."""
     robot = robot_of(robot)
     document = tomlkit.document()
     document.add(tomlkit.comment("Effects that this robot has beyond plain SEECR, in the order"))
@@ -230,15 +232,15 @@ def new_model(robot: GivenRobot) -> Model:
 
 
 def load_model(path: str | Path, robot: GivenRobot) -> Model:
-    """Read a model for a robot.
+    """Read the model of a robot.
 
     Args:
         path: the TOML file.
-        robot: that it must have been made for, or its MJCF.
+        robot: the robot that the model must have been made for, or its MJCF.
 
     Raises:
-        InputFileError: no such file, no TOML, made for another robot, an effect or parameter
-            that is unknown, missing, given twice, no number or out of bounds.
+        InputFileError: there is no such file, it is not TOML, it was made for another robot, or an
+            effect or parameter is unknown, missing, given twice, not a number or out of bounds.
     """
     path, robot = path_of(path, "a model"), robot_of(robot)
     toml, document = read_document(path)
@@ -258,19 +260,19 @@ def load_model(path: str | Path, robot: GivenRobot) -> Model:
 
 
 def read_document(path: Path, expected: str = _EXPECTED) -> tuple[Toml, TOMLDocument]:
-    """A model's file, of whatever robot: its text, and the tree that is written as it was read.
+    """Read a model's file, whatever robot it is for: its text, and a tree that keeps the layout.
 
     Args:
         path: the file.
         expected: what it should be, for the error.
 
     Raises:
-        InputFileError: no such file, no TOML, or no model.
+        InputFileError: there is no such file, it is not TOML, or it is not a model.
     """
     toml = read_toml(path, expected)
     try:
         document = tomlkit.parse(toml.text)
-    except TOMLKitError as error:  # TOML that only this parser does not take
+    except TOMLKitError as error:  # valid TOML that this parser alone rejects
         raise toml.error(f"cannot be kept with its comments: {error}; {expected}") from None
     if not document:
         raise toml.error(f"is empty; {expected}")
@@ -279,7 +281,7 @@ def read_document(path: Path, expected: str = _EXPECTED) -> tuple[Toml, TOMLDocu
 
 
 def _check_tables(where: Where, document: Mapping[str, Any], expected: str) -> None:
-    """Tables of other names are the user's own; a misspelt one must not be passed over."""
+    """Refuse misspelt tables and unknown formats; tables of other names are the user's own."""
     for name in document:
         near = difflib.get_close_matches(name.lower(), _TABLES, cutoff=0.7)
         if name not in _TABLES and near:
@@ -303,7 +305,7 @@ def _effect_tables(where: Where, document: Mapping[str, Any]) -> Sequence[Mappin
 
 
 def _check_once(where: Where, tables: Sequence[Mapping[str, Any]]) -> None:
-    """Each effect once: said before what a table lacks, which the other one may have."""
+    """Refuse effects listed twice, before missing keys are reported that the other table has."""
     names = [table.get("name") for table in tables]
     for k, name in enumerate(names):
         if isinstance(name, str) and name in names[:k]:
@@ -311,7 +313,7 @@ def _check_once(where: Where, tables: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _migrate(where: Where, document: Mapping[str, Any]) -> list[str]:
-    """Put parameters that had another name when the model was written under those of today."""
+    """Rename parameters that had another name when the model was written."""
     notes = []
     for table in _effect_tables(where, document):
         given, name = table.get("parameters"), table.get("name")

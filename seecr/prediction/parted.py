@@ -1,7 +1,7 @@
 """Effects with values of their own for each file or run: rows are solved part by part.
 
-Files and runs keep apart whatever the effects: no row depends on one of another part. What is
-found of the parts is put together as if it were of one.
+No row depends on one of another file or run, whatever the effects. The results of the parts are
+joined as if there were only one.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from seecr.statics.tables import Tables
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """Rows whose effects have the same values.
+    """Rows for which the effects have the same values.
 
     Attributes:
-        rows: their numbers. names: of their "file" and "run". experiment: of these alone.
+        rows: (k,) their indices. names: those of their "file" and "run". experiment: of these rows.
     """
 
     rows: NDArray[np.intp]
@@ -35,11 +35,11 @@ class Part:
     experiment: Experiment
 
     def effects(self, effects: Sequence[Effect]) -> list[Effect]:
-        """The effects as they are in these rows."""
+        """The effects with their values for these rows."""
         return [e.at(self.names[e.kind]) if isinstance(e, Apart) else e for e in effects]
 
     def terms(self, terms: Terms) -> tuple[Terms, NDArray[np.intp]]:
-        """The terms as they are here, and which parameter of all each of theirs is; -1: none."""
+        """The terms with their values here, and each parameter's index among all, -1 for none."""
         here: list[Term] = []
         places: list[NDArray[np.intp]] = []
         for term in terms:
@@ -58,7 +58,7 @@ class Part:
 
 @dataclass(eq=False, repr=False)
 class PartedPrediction(Prediction):
-    """A prediction whose ``parts`` were solved each for itself; ``rows`` has those of each."""
+    """A prediction whose ``parts`` were solved separately; ``rows`` has the row indices of each."""
 
     parts: tuple[Prediction, ...] = ()
     rows: tuple[NDArray[np.intp], ...] = ()
@@ -72,7 +72,7 @@ class PartedPrediction(Prediction):
 
 @dataclass(eq=False)
 class Parted(Experiment):
-    """An experiment that knows which rows go together."""
+    """An experiment that knows which rows share the values of effects."""
 
     _parts: dict[tuple[str, ...], list[Part]] = field(default_factory=dict, repr=False)
 
@@ -81,7 +81,7 @@ class Parted(Experiment):
         return Parted(*same, _led=self._led, _parts=self._parts)
 
     def parts(self, effects: Sequence[Effect]) -> list[Part]:
-        """The rows that go together under some effects; none where all do."""
+        """The groups of rows that share values under some effects; empty if all rows do."""
         kinds = tuple(sorted({e.kind for e in effects if isinstance(e, Apart)}))
         if not kinds or any(kind not in self.commands.parts for kind in kinds):
             return []
@@ -99,7 +99,7 @@ class Parted(Experiment):
         ]
 
     def _together(self, kinds: Sequence[str]) -> list[tuple[dict[str, str], NDArray[np.intp]]]:
-        """Names of files and runs, and the rows that have them, in the order of the rows."""
+        """Names of files and runs, and the rows that belong to them, in the order of the rows."""
         columns = [self.commands.parts[kind].tolist() for kind in kinds]
         rows: dict[tuple[str, ...], list[int]] = {}
         for k, names in enumerate(zip(*columns, strict=True)):
@@ -110,7 +110,7 @@ class Parted(Experiment):
         parts = self.parts(effects)
         if not parts:
             return super().predict(effects, near)
-        # of rows that go together otherwise it is no help
+        # a prediction that is divided into other parts is no help
         nearby = near.parts if near is not None and _is_of(near, parts) else (None,) * len(parts)
         found = [
             part.experiment.predict(part.effects(effects), at)
@@ -158,7 +158,7 @@ class Parted(Experiment):
 
 
 def _is_of(at: Prediction, parts: Sequence[Part]) -> TypeGuard[PartedPrediction]:
-    """Whether a prediction was solved part by part, of the same rows each."""
+    """Whether a prediction was solved part by part, with the same rows in each."""
     return (
         isinstance(at, PartedPrediction)
         and len(at.rows) == len(parts)
@@ -167,7 +167,7 @@ def _is_of(at: Prediction, parts: Sequence[Part]) -> TypeGuard[PartedPrediction]
 
 
 def _tables(parts: Sequence[Tables], order: NDArray[np.intp]) -> Tables:
-    """Tables one below the other, in an order of their rows."""
+    """Tables stacked, in a given order of their rows."""
     first = parts[0]
 
     def rows(name: str) -> Array:
@@ -180,7 +180,7 @@ def _tables(parts: Sequence[Tables], order: NDArray[np.intp]) -> Tables:
 
 
 def rates_by_length(at: Prediction) -> Array:
-    """As :func:`.sensitivity.read_by_length`, part by part where effects are taken apart."""
+    """Like :func:`.sensitivity.read_by_length`, but part by part if the prediction has parts."""
     if not isinstance(at, PartedPrediction):
         return read_by_length(at)
     n, m = at.tensions.shape
@@ -197,7 +197,7 @@ def rates(
     columns: Sequence[int] = (),
     frozen: bool = False,
 ) -> Array:
-    """As :func:`.sensitivity.sensitivities`, part by part where effects are taken apart."""
+    """Like :func:`.sensitivity.sensitivities`, but part by part if effects differ between rows."""
     parts = experiment.parts(terms.effects) if isinstance(experiment, Parted) else []
     if not parts:
         return sensitivities(experiment, terms, at, columns, frozen)

@@ -1,4 +1,4 @@
-"""Between where a platform is and what its tracker reads."""
+"""From the platform's pose to what its tracker reads, and back."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ if TYPE_CHECKING:
 
 __all__ = ["placed", "tracked"]
 
-# Rounds until a pose is read as wanted, and how nearly [m, rad].
+# Most rounds of the search for a pose, and how exactly it must be read as wanted [m, rad].
 _ROUNDS, _READ = 50, 1e-12
 
 
 def tracked(robot: GivenRobot, commands: Commands, effects: GivenEffects) -> Array:
-    """Poses (n, 7) that the tracker of a model reads of platforms at the commanded poses."""
+    """Poses (n, 7) that a model's tracker reads when the platform is at the commanded poses."""
     robot = robot_of(robot)
     return _tracked(robot, commands, effects_of(effects, robot))
 
 
 def placed(robot: GivenRobot, commands: Commands, effects: GivenEffects) -> Commands:
-    """Commands at whose poses the tracker of a model reads those of ``commands``.
+    """Commands at whose poses a model's tracker reads the poses of ``commands``.
 
-    How a calibration shares an error between the tracker and the robot hardly matters to what is
-    read, and much to where the platform is taken to be.
+    How a calibration shares an error between tracker and robot hardly matters for what is read, but
+    matters much for where the platform is taken to be.
 
     Raises:
         InputError: no pose is read so.

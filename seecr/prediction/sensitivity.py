@@ -1,10 +1,10 @@
-"""How readings change with the effects' parameters, by the implicit function theorem.
+"""Sensitivities of the readings to the effects' parameters, by the implicit function theorem.
 
-At a solved pose the wrench w(q, theta) is zero; so dq/d theta = -K^-1 dg/d theta with g = -w the
-gradient of the energy and K its stiffness. One factorisation of K serves all parameters. dg/d
-theta comes from differencing the effects' edits at the fixed pose: nothing is solved again.
-Where rows depend on the rows before, so does g: what the cables keep is differentiated forward
-along the way, and nothing is solved there either.
+At a solved pose the wrench w(q, theta) is zero, so dq/dtheta = -K^-1 dg/dtheta, with g = -w the
+gradient of the energy and K its stiffness. One factorisation of K serves all parameters.
+dg/dtheta is a finite difference of the effects' edits at the fixed pose: nothing is solved again.
+If rows depend on the rows before, g does too: the history of the cables is then differentiated
+forward along the path, and nothing is solved there either.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from seecr.statics import batch
 from seecr.statics.tables import Tables, assemble
 from seecr.threads import run_parts
 
-# Differencing step of a way, in plausible sizes of a parameter: a cable that is barely taut where
-# the platform rests is slack a little beside it.
+# Step of finite differences along a path, in plausible sizes of a parameter. It is small because a
+# cable that is barely taut at the equilibrium is slack close to it.
 _WAY = 1e-5
-# Differencing step of what the sensors make of a pose: rad, or part of a length or tension.
+# Step for the sensors' reading of a pose: [rad], or a relative change of a length or tension.
 _READ = 1e-5
 
 
@@ -42,30 +42,30 @@ def sensitivities(
     columns: Sequence[int] = (),
     frozen: bool = False,
 ) -> Array:
-    """Derivative of the readings by the terms' parameters.
+    """Derivatives of the readings with respect to the terms' parameters.
 
     Args:
         experiment: robot and commands.
         terms: effects with values.
         at: the prediction with those values.
-        columns: which parameters (counted through all terms); all by default.
-        frozen: take the history of each row as given, where the model has history: quick, and
+        columns: indices of the parameters, counted through all terms; all by default.
+        frozen: keep the history of each row constant, if the model has one. This is quick, and
             good enough to see which effects could matter, but not to fit them.
 
     Returns:
-        (n, 6 + m, p): position [m], rotation vector [rad], tensions [N], by each parameter.
+        (n, 6 + m, p): position [m], rotation vector [rad] and tensions [N], by each parameter.
     """
     wanted = list(columns) if len(columns) else list(range(len(terms)))
     out = np.zeros((*_shape(at), len(wanted)))
     by_wrench = _ByWrench(experiment, at, terms)
     if at.has_history and not frozen:
         shifts = [shifted(terms, term, k, _WAY) for term, k in positions(terms, wanted)]
-        _ = by_wrench.way  # made once, for all threads
+        _ = by_wrench.way  # computed once, for all threads
 
         def run(part: slice) -> None:
             out[..., part.start] = by_wrench.column(shifts[part.start], along=True)
 
-        # a way cannot be parted where creep goes by one clock: the parameters can
+        # with creep, rows that share a clock cannot be separated; parameters can
         run_parts(run, [slice(c, c + 1) for c in range(len(wanted))])
         return out
     todo = {position: c for c, position in enumerate(positions(terms, wanted))}
@@ -79,7 +79,7 @@ def sensitivities(
 
 
 def length_sensitivities(at: Prediction) -> Array:
-    """Derivative of pose and tensions by each cable's rest length, (n, 6 + m, m)."""
+    """Derivatives of pose and tensions with respect to each cable's rest length, (n, 6 + m, m)."""
     return _kept(at, "by_length", _by_length)
 
 
@@ -91,24 +91,24 @@ def _by_length(at: Prediction) -> Array:
 
 
 def read_by_length(at: Prediction) -> Array:
-    """Derivative of what the sensors read by errors of each cable's rest length, (n, 6 + m, m).
+    """Derivatives of the readings with respect to errors of the rest lengths, (n, 6 + m, m).
 
-    Errors that reach beyond what hysteresis and friction hold: at a row's very end, where its
-    cables are stuck, a micrometre more moves nothing, and a millimetre all.
+    They are for errors that exceed what hysteresis and friction hold. Within that, where the cables
+    stick at the end of a row's motion, a micrometre more moves nothing, and a millimetre all.
     """
     change = length_sensitivities(_sliding(at) if at.has_history else at)
     return rates_of_reading(at, at.sensors) @ change if _alters(at) else change
 
 
 def _sliding(at: Prediction) -> Prediction:
-    """The same poses without what holds the cables there; nothing is solved."""
+    """The same poses without hysteresis and friction; nothing is solved."""
     tables = at.tables.sliding()
     found = batch.evaluate(tables, at.found)
     return replace(at, tables=tables, found=found, kept={"pose": at.pose})
 
 
 def _alters(at: Prediction) -> bool:
-    """Whether the sensors report anything else than what is there."""
+    """Whether the sensors report anything other than the true pose and tensions."""
     read, pose = at.readings, at.pose
     there = (pose[:, :3], pose[:, 3:], at.tensions)
     seen = (read.position, read.quat_wxyz, read.tensions)
@@ -116,12 +116,12 @@ def _alters(at: Prediction) -> bool:
 
 
 def rates_of_reading(at: Prediction, sensors: Sequence[Effect]) -> Array:
-    """Derivative of the readings by pose and tensions, (n, 6 + m, 6 + m)."""
+    """Derivatives of the readings with respect to pose and tensions, (n, 6 + m, 6 + m)."""
     step = np.full(_shape(at)[1], _READ)
     step[:3] *= at.tables.length
     step[6:] *= max(1.0, float(np.max(np.abs(at.tensions))))
     each = np.diag(step)
-    # our own sensors look at a row's readings alone: all steps are rows of one batch
+    # built-in sensor effects treat each row by itself, so all steps can be rows of one batch
     together = all(is_built_in(type(effect)) for effect in sensors)
     parts = [each] if together else [one[None] for one in each]
     rates = np.concatenate([_read_apart(at, sensors, part) for part in parts], axis=2)
@@ -129,7 +129,7 @@ def rates_of_reading(at: Prediction, sensors: Sequence[Effect]) -> Array:
 
 
 def _read_apart(at: Prediction, sensors: Sequence[Effect], steps: Array) -> Array:
-    """Half of what steps (k, 6 + m) ahead and back change of the readings, (n, 6 + m, k)."""
+    """Half the difference of readings after steps (k, 6 + m) forward and back, (n, 6 + m, k)."""
     n, width = _shape(at)
     k = len(steps)
     change = np.repeat(steps, n, axis=0)
@@ -148,7 +148,7 @@ def _shape(at: Prediction) -> tuple[int, int]:
 
 @dataclass(eq=False)
 class _ByWrench:
-    """Columns of the sensitivity at one prediction without history."""
+    """Columns of the sensitivity at one prediction."""
 
     experiment: Experiment
     at: Prediction
@@ -161,7 +161,7 @@ class _ByWrench:
 
     @cached_property
     def read_rates(self) -> Array:
-        """Derivative of the readings by pose and tensions, (n, 6 + m, 6 + m)."""
+        """Derivatives of the readings with respect to pose and tensions, (n, 6 + m, 6 + m)."""
         own = [(t.name, *t.vector.tolist()) for t in self.terms if senses(t.layout.effect)]
         return _kept(self.at, f"read_rates {own}", lambda at: rates_of_reading(at, self.sensing))
 
@@ -175,13 +175,13 @@ class _ByWrench:
 
     @cached_property
     def way(self) -> _Way:
-        """The way through the rows, for what depends on the rows before."""
+        """The path through the rows, for effects with history."""
         return _Way.of(self.experiment, self.at, self.terms)
 
     def column(self, shift: Shift, along: bool = False) -> Array:
-        """Derivative of the readings (n, 6 + m) by the shifted parameter.
+        """Derivative of the readings (n, 6 + m) with respect to the shifted parameter.
 
-        ``along`` the way; where that is not asked, of effects with history alone.
+        It is computed along the path if ``along`` is set; otherwise only for effects with history.
         """
         n, width = _shape(self.at)
         change = np.zeros((n, width))
@@ -196,7 +196,7 @@ class _ByWrench:
         return (self.read_rates @ change[..., None])[..., 0] if self.sensing else change
 
     def block(self, shift: Shift) -> Array | None:
-        """Derivatives (n, 6 + m, m) by what each cable has of its own, shifted together."""
+        """Derivatives (n, 6 + m, m) by a per-cable parameter, shifted for all cables together."""
         if shift.sensing:
             return None
         sides = self._sides(shift)
@@ -235,7 +235,7 @@ class _ByWrench:
 
 
 def _kept(at: Prediction, name: str, make: Callable[[Prediction], Array]) -> Array:
-    """What many effects ask of one prediction, computed once."""
+    """A result that many effects need of one prediction, computed once."""
     if name not in at.kept:
         at.kept[name] = make(at)
     return at.kept[name]
@@ -250,7 +250,7 @@ def _response(at: Prediction, plus: Tables, minus: Tables, apart: float, inverse
 
 
 def _response_by_cable(at: Prediction, plus: Tables, minus: Tables, apart: Any) -> Array:
-    """The same (n, 6 + m, m) where each cable was changed, by the change of each."""
+    """The same (n, 6 + m, m) for tables in which every cable was changed, by the change of each."""
     force, own = batch.change_by_cable(plus, minus, at.found)
     step = -_kept(at, "inverse", _inverse_stiffness) @ (force / apart)
     out = np.concatenate([motion_of(at) @ step, at.found.slopes @ step], axis=1)
@@ -260,7 +260,7 @@ def _response_by_cable(at: Prediction, plus: Tables, minus: Tables, apart: Any) 
 
 
 def motion_of(at: Prediction) -> Array:
-    """Displacement and rotation vector (n, 6, d) by steps in the loop's coordinates."""
+    """Displacement and rotation vector (n, 6, d) per step in the compiled loop's coordinates."""
     return _kept(at, "motion", _motion_columns)
 
 
@@ -278,9 +278,9 @@ def _motion_at(tables: Tables, found: batch.Evaluation) -> Array:
 
 
 def with_inverse(at: Prediction, inverse: Array) -> Prediction:
-    """The prediction, whose rows answer forces by another inverse of their stiffness (n, d, d).
+    """The prediction with another inverse of its rows' stiffness (n, d, d).
 
-    Such as a damped one, where the rows are at poses that are no equilibria.
+    An example is a damped inverse, if the rows are at poses that are no equilibria.
     """
     return replace(at, kept={"inverse": inverse})
 
@@ -290,11 +290,11 @@ def _inverse_stiffness(at: Prediction) -> Array:
 
 
 def _inverse_of(tables: Tables, found: batch.Evaluation) -> Array:
-    """Inverse of the stiffness of each row; of what is stiff, where a row is singular."""
+    """Inverse of the stiffness of each row; the pseudo-inverse for rows that are not solved."""
     stiffness = batch.stiffness(tables, found)
     whole = np.where(np.isfinite(stiffness), stiffness, 0.0)
     solved = found.solved
-    # a stable row's stiffness is far from singular, and inverting takes a fifth of the time
+    # a stable row's stiffness is far from singular, and an inverse takes a fifth of the time
     if solved.all():
         return np.asarray(np.linalg.inv(whole))
     out = np.empty_like(whole)
@@ -305,12 +305,12 @@ def _inverse_of(tables: Tables, found: batch.Evaluation) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Way:
-    """The way through the rows of a prediction: N waypoints, walked and not walked again.
+    """The N waypoints of a prediction's path, solved once and not again.
 
     Attributes:
         experiment: robot and commands.
-        tables, found: of the waypoints; the columns of the past are not filled.
-        inverse: (N, d, d) of the stiffness there. motion: (N, 6, d), see motion_of; (1, 6, d) where
+        tables, found: of the waypoints; the columns of the history are not filled.
+        inverse: (N, d, d) of the stiffness there. motion: (N, 6, d), see motion_of, or (1, 6, d) if
             it is the same everywhere.
     """
 
@@ -328,7 +328,7 @@ class _Way:
         return cls(experiment, tables, found, _inverse_of(tables, found), _motion_at(tables, found))
 
     def change(self, shift: Shift) -> Array:
-        """Derivative of pose and tensions (n, 6 + m) by the shifted parameter."""
+        """Derivative of pose and tensions (n, 6 + m) with respect to the shifted parameter."""
         path = self.experiment.path
         ahead = self.experiment.setup(shift.plus.effects, path.commands)
         behind = self.experiment.setup(shift.minus.effects, path.commands)
@@ -340,9 +340,9 @@ class _Way:
 
 
 def _walk_of(experiment: Experiment, at: Prediction, terms: Terms) -> batch.Evaluation:
-    """Where the waypoints come to rest with the terms, kept where the rows do as at the prediction.
+    """The equilibria at the waypoints under the terms; kept, if the rows do not change from ``at``.
 
-    An effect at its null may have a shape that matters: cable behind the exit point.
+    An effect at its null value may have a shape that matters: cable behind the exit point.
     """
     setup = experiment.setup(terms.effects)
     other = at.setup.differs(setup)
@@ -354,7 +354,7 @@ def _walk_of(experiment: Experiment, at: Prediction, terms: Terms) -> batch.Eval
 
 
 def readings_difference(a: Readings, b: Readings) -> Array:
-    """Readings a less b, (n, 6 + m): position, rotation vector from b to a, tensions."""
+    """Readings a minus b, (n, 6 + m): position, rotation vector from b to a, tensions."""
     turn = quat_multiply(a.quat_wxyz, quat_conjugate(b.quat_wxyz))
     return np.concatenate(
         [a.position - b.position, rotvec_from_quat(turn), a.tensions - b.tensions], axis=1

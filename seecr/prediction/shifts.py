@@ -1,4 +1,4 @@
-"""Terms with a parameter shifted up and down: what derivatives are differenced from."""
+"""Terms with a parameter shifted up and down, for finite differences."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from seecr.effects.terms import Term, Terms
 from seecr.pose import Array
 from seecr.statics.tables import Tables, assemble, reassembled
 
-# Steps, in plausible sizes of a parameter.
+# Steps of central and one-sided differences, in plausible sizes of a parameter.
 _CENTRAL, _ONE_SIDED = 1e-4, 1e-5
 
-# Quantities that reach the statics through the rest lengths alone.
+# Quantities that affect the statics only through the rest lengths.
 _PAID_OUT = {name for name, item in QUANTITIES.items() if item.paid_out}
-# Quantities whose change reaches a row through the rows before it as well.
+# Quantities that also affect a row through the rows before it.
 _OF_HISTORY = {name for name, item in QUANTITIES.items() if item.history is not History.NONE}
-# Quantities that mean nothing where nothing has history.
+# Quantities that have no effect if no effect has a history.
 OF_SHAPE = {name for name, item in QUANTITIES.items() if item.history is History.SHAPES}
 
 
 @dataclass(frozen=True, eq=False)
 class Shift:
-    """Terms with a parameter shifted up and down, or several of one effect together.
+    """Terms with a parameter, or several of one effect together, shifted up and down.
 
-    ``apart`` is by how much plus and minus differ, a number or one for each of several.
+    ``apart`` is the difference between plus and minus: one number, or one for each parameter.
     """
 
     plus: Terms
@@ -52,7 +52,7 @@ class Shift:
 
 @dataclass(frozen=True, eq=False)
 class Sides:
-    """Setups with a parameter shifted up and down, and the names of what differs between them."""
+    """Setups with a parameter shifted up and down, and the names of the quantities that differ."""
 
     plus: Setup
     minus: Setup
@@ -60,20 +60,20 @@ class Sides:
 
     @property
     def of_history(self) -> bool:
-        """Whether what differs reaches a row through the rows before it as well."""
+        """Whether the difference also affects a row through the rows before it."""
         return not self.differing.isdisjoint(_OF_HISTORY)
 
     @property
     def of_lengths(self) -> bool:
-        """Whether the cables are longer or shorter, and nothing else."""
+        """Whether only the cables' lengths differ."""
         return self.differing <= _PAID_OUT and not (self.plus.laws or self.minus.laws)
 
     def longer(self, apart: Any) -> Array:
-        """Rest lengths (n, m) of plus less those of minus, per unit of ``apart``."""
+        """Rest lengths (n, m) of plus minus those of minus, per unit of ``apart``."""
         return np.asarray((self.plus.rest_lengths() - self.minus.rest_lengths()) / apart)
 
     def tables(self, base: Tables, strains: Array) -> tuple[Tables, Tables]:
-        """Of both, as those of neither shift with what differs; strains are for users' laws."""
+        """Tables of both sides, from ``base`` without a shift; the strains are for users' laws."""
         both = (self.plus, self.minus)
         if self.plus.laws or self.minus.laws:
             ahead, behind = (assemble(one, strains).with_past(base) for one in both)
@@ -83,11 +83,11 @@ class Sides:
 
 
 def shifted(terms: Terms, term: Term, k: Any, part: float | None = None) -> Shift:
-    """Shift parameter ``k`` (or those of an index array, together) of one of the terms."""
+    """Shift parameter ``k`` of a term (or, with an index array, several together)."""
     layout, value = term.layout, term.vector[k]
     lower, upper = layout.lower[k], layout.upper[k]
-    # a time constant, a radius: what counts is by which part of itself it changes; finely, since
-    # a drum of this radius may have turned many times, but above what a walk leaves unsolved
+    # a time constant or radius counts by its relative change. The step is small, since a drum of
+    # this radius may have turned many times, but above the residual of a solved path
     relative = layout.shape[k] & (lower > 0.0)
     size = np.where(relative, value * (0.1 if part is None else 1.0), layout.scale[k])
     step = (_CENTRAL if part is None else part) * size
@@ -105,7 +105,7 @@ def shifted(terms: Terms, term: Term, k: Any, part: float | None = None) -> Shif
 
 
 def positions(terms: Terms, wanted: list[int]) -> list[tuple[Term, int]]:
-    """Whose parameters are wanted, and which of the term's own each is."""
+    """The term of each wanted parameter, and its index in that term."""
     every = [(term, k) for term in terms for k in range(len(term.layout))]
     return [every[c] for c in wanted]
 
@@ -113,10 +113,10 @@ def positions(terms: Terms, wanted: list[int]) -> list[tuple[Term, int]]:
 def blocks_of_cables(
     terms: Terms, todo: Container[tuple[Term, int]]
 ) -> list[tuple[Term, NDArray[np.intp]]]:
-    """Parameters that every cable has one of: they are shifted together.
+    """Groups of parameters with one per cable, which can be shifted together.
 
-    What each does is told apart by the cable it does it to. Of built-in effects alone: nothing
-    says that a user's effect leaves the other cables as they are.
+    The effect of each is told apart by the cable that it acts on. This holds for built-in effects
+    only: a user's effect may change other cables too.
     """
     return [
         (term, group)

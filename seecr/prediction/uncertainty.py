@@ -1,4 +1,4 @@
-"""How far a calibrated model's predictions may be off, by the covariance that it keeps."""
+"""The uncertainty of a calibrated model's predictions, from the covariance that it keeps."""
 
 from __future__ import annotations
 
@@ -25,27 +25,28 @@ from seecr.statics.starts import commanded_poses
 from seecr.units import short
 
 PARAMETERS, STDERR, CORRELATION = "parameters", "stderr", "correlation"
-"""Of the table that keeps them: labels, their standard errors in full, and rows up to the diagonal.
-"""
+"""Keys of the table: labels, their standard errors with all digits, and rows up to the diagonal."""
 
-# An eigenvalue of a correlation this far below zero is no rounding of its digits; files of earlier
-# versions have six.
+# An eigenvalue of a correlation matrix this far below zero is not due to rounding of its digits;
+# files of earlier versions have six digits.
 _ROUNDED = 1e-3
-# A value's own standard error has three digits; where it is another, somebody wrote that.
+# A value's own standard error has three digits; if it differs by more, somebody has edited it.
 _SAME = 0.01
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Spread(Result):
-    """One standard deviation of where n commands lead, by what the model does not know.
+    """Standard deviations of the poses of n commands, due to the uncertainty of the model's values.
 
-    To first order in the parameters, as the covariance itself is. NaN where a row has no rest.
+    They are to first order in the parameters, like the covariance itself; NaN for a row without
+    equilibrium.
 
     Attributes:
         position: (n, 3) [m]; rotation: (n, 3) [rad], rotation vector in the base frame.
-        tensions: (n, m) [N]; 0 of a slack cable.
-        seen: (n, 6) [m, rad] the same of what the tracker would read. Where it stands against the
-            base frame is often all that a calibration does not know, and moves both together.
+        tensions: (n, m) [N]; 0 for a slack cable.
+        seen: (n, 6) [m, rad] the same for what the tracker would read. Often a calibration
+            leaves only the tracker's pose in the base frame open: platform and tracker then move
+            together, and this is small.
     """
 
     position: Array
@@ -54,7 +55,7 @@ class Spread(Result):
     seen: Array
 
     def lines(self) -> list[str]:
-        """The largest of all rows, of what is there and of what the tracker would read."""
+        """The largest of all rows, of the platform itself and of what the tracker would read."""
         n, rests = len(self.position), ~np.isnan(self.position[:, 0])
         head = f"{counted(n, 'command')}, at rest at {int(rests.sum())}"
         if not rests.any():
@@ -93,14 +94,15 @@ def _longest(vectors: Array) -> float:
 
 
 def covariance_of(model: Model) -> Array | None:
-    """Covariance (p, p) of a model's values, each in its own unit; None where it keeps none.
+    """Covariance (p, p) of a model's values, each in its own unit; None if the model keeps none.
 
-    The correlations of ``[fit]``, or of ``[calibration]``, times the standard errors that stand
-    with the values, in full where these are the same. What was written into the model later goes
-    with nothing else.
+    The correlations of ``[fit]``, or else of ``[calibration]``, are multiplied by the standard
+    errors stated with the values. These are used with all digits where ``[fit]`` or
+    ``[calibration]`` has them. Values that were added to the model later are uncorrelated with the
+    others.
 
     Raises:
-        InputFileError: correlations that are none.
+        InputFileError: the table holds no valid correlations.
     """
     kept_in = _kept_in(model)
     if kept_in is None or not model.names:
@@ -120,7 +122,7 @@ def covariance_of(model: Model) -> Array | None:
 
 
 def _names(model: Model, title: str, given: object) -> list[str]:
-    """Labels of the values whose correlations are kept; those of effects that are gone may stay."""
+    """Labels of the values whose correlations are kept; effects since removed may be among them."""
     names = [str(name) for name in given] if isinstance(given, list) else []
     for k, label in enumerate(names):
         effect, _dot, key = label.partition(".")
@@ -147,10 +149,10 @@ def _kept_in(model: Model) -> tuple[str, Mapping[str, Any]] | None:
 def _in_full(
     model: Model, short: Array, table: Mapping[str, Any], which: NDArray[np.intp]
 ) -> Array:
-    """Standard errors with all their digits where a table has them, and they are the same.
+    """Standard errors with all digits from a table, where they agree with the short ones.
 
-    Combinations of values may be known a hundred times better than each: three digits of errors
-    would tell them wrong.
+    Combinations of values may be known a hundred times better than each value; three digits of the
+    errors would not be enough for them.
     """
     if STDERR not in table:
         return short
@@ -176,12 +178,12 @@ def _in_full(
 
 
 def moving_covariance(model: Model) -> tuple[Terms, Array] | None:
-    """The effects that move the platform, all but sensors', with the covariance (p, p) of theirs.
+    """The terms that move the platform (all but the sensors'), and their covariance (p, p).
 
-    None where the model keeps no covariance.
+    None if the model keeps no covariance.
 
     Raises:
-        InputFileError: correlations that are none.
+        InputFileError: the table holds no valid correlations.
     """
     whole = covariance_of(model)
     if whole is None:
@@ -192,7 +194,7 @@ def moving_covariance(model: Model) -> tuple[Terms, Array] | None:
 
 
 def _correlations(model: Model, names: list[str], rows: object) -> Array:
-    """The whole (k, k) from rows that end at the diagonal."""
+    """The full matrix (k, k), from rows that end at the diagonal."""
     out = np.eye(len(names))
     try:
         for k, row in enumerate(rows):  # type: ignore[arg-type, var-annotated]
@@ -212,7 +214,7 @@ def _correlations(model: Model, names: list[str], rows: object) -> Array:
 
 
 def _file_of(model: Model) -> Where:
-    """The file as it is, for the line of a mistake: reading has changed the document."""
+    """The file as on disk, to find the line of a mistake: reading has changed the document."""
     if model.path is None:
         return Where(Path("the model"), model.document.as_string())
     return Where(model.path, read_text(model.path, "expected a model"))
@@ -221,7 +223,7 @@ def _file_of(model: Model) -> Where:
 def spread_of(
     robot: GivenRobot, commands: Commands | ArrayLike, model: Model | str | Path
 ) -> Spread | None:
-    """How far poses and tensions may be off; None where the model keeps no covariance.
+    """Standard deviations of poses and tensions; None if the model keeps no covariance.
 
     Args:
         robot: as described, or its MJCF.
@@ -229,7 +231,7 @@ def spread_of(
         model: as ``crosscheck calibrate``, ``add`` or ``diagnose`` write it, or its file.
 
     Raises:
-        InputFileError: correlations in the model that are none.
+        InputFileError: the model holds no valid correlations.
     """
     robot = robot_of(robot)
     model = model_given(model, robot)
@@ -247,7 +249,7 @@ def spread_of(
 
 
 def _spread(experiment: Experiment, terms: Terms, covariance: Array) -> Array:
-    """Standard deviation (n, 6 + m) of readings, by the covariance (p, p) of the terms."""
+    """Standard deviations (n, 6 + m) of readings, from the covariance (p, p) of the terms."""
     at = experiment.predict(terms.effects)
     out = np.zeros((len(experiment.commands), 6 + experiment.robot.n_cables))
     if len(terms):

@@ -1,4 +1,4 @@
-"""Colours of the recordings, told apart also by readers who see fewer of them."""
+"""Colours of the recordings, distinguishable also with colour blindness."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from seecr.pose import Array
 Rgba = tuple[int, int, int, int]
 Colours = NDArray[np.uint8]
 
-# Okabe and Ito (2008), "Color Universal Design", whose pairs stay apart for every common kind of
-# colour blindness; their black is left out, as the viewer's plots are dark.
+# Okabe and Ito (2008), "Color Universal Design", whose colours can be told apart with every common
+# kind of colour blindness; black is left out, as the viewer's plots are dark.
 SKY, ORANGE = (86, 180, 233, 255), (230, 159, 0, 255)
 GREEN, YELLOW = (0, 158, 115, 255), (240, 228, 66, 255)
 BLUE, VERMILION = (50, 120, 200, 255), (213, 94, 0, 255)
@@ -25,7 +25,7 @@ FRAME: Rgba = (120, 126, 134, 255)
 SLACK: Rgba = (165, 165, 165, 255)
 
 # Viridis (van der Walt and Smith, 2015) at 0.25, 0.35 ... 0.95, 1: even steps of lightness, so that
-# it reads the same in grey. Its darkest quarter is left out on a dark ground.
+# it also works in grey. Its darkest quarter is left out on a dark background.
 _VIRIDIS = np.array(
     [
         [59, 82, 139],
@@ -52,7 +52,7 @@ def scale_colours(values: Array, top: float) -> Colours:
 
 
 def cable_colours(count: int) -> Colours:
-    """One colour per cable, (count, 4): as few as eight come from Okabe and Ito."""
+    """One colour per cable, (count, 4): from Okabe and Ito for up to eight cables."""
     if count <= len(SERIES):
         return np.array(SERIES[:count], dtype=np.uint8)
     return scale_colours(np.arange(count, dtype=float), max(count - 1.0, 1.0))

@@ -15,24 +15,24 @@ from seecr.recording import shapes
 from seecr.recording.legends import Legend
 from seecr.recording.stream import POSE
 
-# Half the viewer's vertical field of view [rad], and the part of it that is filled.
+# Half the viewer's vertical field of view [rad], and the part of it to be filled.
 _HALF_VIEW, _FILL = np.deg2rad(27.5), 0.88
 _AIMING_ROUNDS = 8
 # Width over height of the left column in a window of 1920 by 1080 points.
 COLUMN_ASPECT = 0.82
 # One lane over the height of a column in a window of 1080 points.
 _LANE_HEIGHT = 0.0405
-# Poses a second when playing.
+# Poses per second when playing.
 _FPS = 4.0
 GROUND = (24, 27, 33)
 
 
 def eye(robot: Robot, low: Array, high: Array, aspect: float) -> rrb.EyeControls3D:
-    """Where to look from: the wide side, from above and from one side, as near as all fits.
+    """A camera towards the wide side, from above and one side, as near as everything fits.
 
     Args:
-        robot: tells which way is down.
-        low: (3,) corner of what is to be seen [m].
+        robot: for its vertical.
+        low: (3,) corner of the visible box [m].
         high: (3,) the opposite corner [m].
         aspect: width over height of the view.
     """
@@ -64,7 +64,7 @@ def _aim(low: Array, high: Array, gaze: Array, up: Array, aspect: float) -> tupl
         flat = np.stack([right, above]) @ (corners - target).T
         depth = distance - gaze @ (corners - target).T
         seen = flat / depth
-        # near corners look larger: the middle of the picture is not the middle of the box
+        # near corners look larger: the centre of the picture is not the centre of the box
         centre = (seen.max(axis=1) + seen.min(axis=1)) / 2.0 * distance
         target = target + centre @ np.stack([right, above])
         flat = np.stack([right, above]) @ (corners - target).T
@@ -75,7 +75,7 @@ def _aim(low: Array, high: Array, gaze: Array, up: Array, aspect: float) -> tupl
 def scene_view(
     robot: Robot, low: Array, high: Array, name: str, aspect: float
 ) -> rrb.Spatial3DView:
-    """The 3D view of one robot, about so much wider than high."""
+    """The 3D view of one robot; ``aspect`` is its approximate width over height."""
     names, _words = shapes.cable_labels(robot, low, high)
     return rrb.Spatial3DView(
         origin=scenes.ROOT,
@@ -107,11 +107,11 @@ def _floor(robot: Robot, low: Array, high: Array) -> rrb.LineGrid3D:
 def plot(
     name: str, contents: Sequence[str], legend: Legend, *, listed: bool = True
 ) -> rrb.TimeSeriesView:
-    """One plot with its legend inside.
+    """A plot with its legend inside.
 
     Args:
         name, contents: of the view.
-        legend: where it goes, and the range of values.
+        legend: its place, and the range of values.
         listed: whether there is a legend.
     """
     axis = None if legend.values is None else rrb.ScalarAxis(range=legend.values)
@@ -145,7 +145,7 @@ def legend(entity: str) -> rrb.Spatial2DView:
 
 
 def lanes_share(count: int) -> float:
-    """Height of lanes over the height of a column: all of up to ten cables, then a scroll bar."""
+    """Height of lanes over that of a column: all lanes of up to ten cables, then a scroll bar."""
     return min(_LANE_HEIGHT * (count + 1.2), 0.5)
 
 
@@ -156,13 +156,13 @@ def blueprint(
     timeline: tuple[str, float] = (POSE, 1.0),
     poses_a_second: float = _FPS,
 ) -> rrb.Blueprint:
-    """Views, with the timeline over poses first and nothing else in the way.
+    """The layout of views, opened at a timeline, without other panels.
 
     Args:
         root: the views.
-        playback_speed: of timelines in seconds, over real time.
-        timeline: that it opens with, and how much of it lies between two poses.
-        poses_a_second: when playing a timeline that counts.
+        playback_speed: of timelines in seconds, relative to real time.
+        timeline: the one that it opens with, and its step between two poses.
+        poses_a_second: when playing a timeline of numbers.
     """
     return rrb.Blueprint(
         root,

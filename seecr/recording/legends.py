@@ -1,4 +1,4 @@
-"""Where the legend of a plot covers no curve: the viewer puts it into a corner of the plot."""
+"""Legends that cover no curve: the viewer puts a legend into a corner of the plot."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import rerun.blueprint as rrb
 
 from seecr.pose import Array
 
-# Of the viewer's legend, in points of a window of 1920 by 1080: height of a name, of what is around
-# them, width of a letter and of what is around a name.
+# Size of the viewer's legend, in points of a window of 1920 by 1080: height of a name and of the
+# margins, width of a letter and of the rest beside a name.
 _NAME, _AROUND, _LETTER, _ASIDE = 23.0, 8.0, 6.0, 42.0
-# An axis is made longer by no more than this for a legend: the curves would be flat.
+# An axis is extended by no more than this factor for a legend: curves would become flat.
 _LONGER = 2.0
-# The viewer leaves so much of the axis free at both ends.
+# Part of the axis that the viewer leaves free at both ends.
 _MARGIN = 0.04
 _CORNERS = (
     rrb.Corner2D.RightTop, rrb.Corner2D.LeftTop, rrb.Corner2D.RightBottom, rrb.Corner2D.LeftBottom,
@@ -24,10 +24,10 @@ _CORNERS = (
 
 @dataclass(frozen=True)
 class Legend:
-    """Where it goes.
+    """The place of a legend.
 
     Attributes:
-        corner: of the plot. values: the axis' range, None for the viewer's choice.
+        corner: of the plot. values: the range of the axis, None for the viewer's choice.
         fits: whether it covers nothing.
     """
 
@@ -37,10 +37,10 @@ class Legend:
 
 
 def legend_of(curves: Sequence[Array], names: Sequence[str], size: tuple[float, float]) -> Legend:
-    """The corner in which a legend covers nothing, with a longer axis where that takes one.
+    """The corner in which a legend covers no curve, with a longer axis if necessary.
 
     Args:
-        curves: (n, k) of each timeline, over times that are about evenly spaced.
+        curves: (n, k) for each timeline, at times that are roughly evenly spaced.
         names: in the legend. size: of the plot, in points of a window of 1920 by 1080.
     """
     known = [values for values in curves if np.isfinite(values).any()]
@@ -56,7 +56,7 @@ def legend_of(curves: Sequence[Array], names: Sequence[str], size: tuple[float, 
         left = corner in (rrb.Corner2D.LeftTop, rrb.Corner2D.LeftBottom)
         top = corner in (rrb.Corner2D.RightTop, rrb.Corner2D.LeftTop)
         reach = max(_reach(values, low, high, wide, left=left, top=top) for values in known)
-        # the legend takes the part ``tall`` of an axis so long
+        # the legend takes the part ``tall`` of an axis of this length
         longer = max(reach / (1.0 - tall), span) / span
         if longer < taken:
             best, taken = corner, longer
@@ -71,7 +71,7 @@ def legend_of(curves: Sequence[Array], names: Sequence[str], size: tuple[float, 
 
 
 def _reach(values: Array, low: float, high: float, wide: float, *, left: bool, top: bool) -> float:
-    """How far curves come towards a corner, from the axis' other end."""
+    """How far curves extend towards a corner, from the other end of the axis."""
     count = int(np.ceil(wide * (len(values) - 1))) + 1
     near = values[:count] if left else values[-count:]
     near = near[np.isfinite(near)]

@@ -14,12 +14,12 @@ from seecr.recording.stream import Index, Recording
 
 MM, DEG = 1e3, 180.0 / np.pi
 TRANSLATIONS, TURNS = ("dx", "dy", "dz"), ("about x", "about y", "about z")
-# Logarithms of exact agreement are drawn here.
+# Logarithms of zero are drawn here.
 _NOTHING = 1e-18
 
 _Marker = rr.components.MarkerShape
 TAUT, SLACK, DIFFER, NONE = "taut", "slack", "differs", "no answer"
-# Of a cable's own colour: white words on it stay readable, bright dots stand out from it.
+# Factor on a cable's own colour: white words on it are readable, bright dots stand out.
 _DIM = 0.55
 _GREY: Rgba = (70, 72, 76, 255)
 _BLACK: Rgba = (20, 20, 20, 255)
@@ -36,11 +36,10 @@ def line_by_runs(
     recording: Recording, entity: str, index: Index, values: Array, starts: NDArray[np.bool_],
     name: str, colour: Rgba, width: float,
 ) -> None:  # fmt: skip
-    """Draw numbers (n,) as a line that does not join a run to the next.
+    """Draw numbers (n,) as a line that is interrupted between runs.
 
-    Every other run is on a second line of the same name: the viewer breaks lines where nothing is,
-    and its legend names both once.
-
+    Every other run is on a second line of the same name: the viewer interrupts lines at gaps, and
+    its legend shows the common name once.
     Args:
         recording: where. entity: what. index: the timelines. values: (n,).
         starts: (n,) bool, first rows of runs. name, colour, width: of the line.
@@ -53,7 +52,7 @@ def line_by_runs(
 
 
 def as_dots(recording: Recording, entity: str, name: str, colour: Rgba, size: float) -> None:
-    """Draw a series as dots, so that a line under it remains to be seen."""
+    """Draw a series as dots, so that a line under it remains visible."""
     style = rr.SeriesPoints(
         names=name, colors=[colour], markers=[_Marker.Circle], marker_sizes=[size]
     )
@@ -61,7 +60,7 @@ def as_dots(recording: Recording, entity: str, name: str, colour: Rgba, size: fl
 
 
 def as_crosses(recording: Recording, entity: str, name: str, colour: Rgba, size: float) -> None:
-    """Draw a series as faint crosses, whose arms show whether a dot is over or under them."""
+    """Draw a series as faint crosses, whose arms show above or below a dot."""
     style = rr.SeriesPoints(
         names=name, colors=[_dim(colour)], markers=[_Marker.Plus], marker_sizes=[size]
     )
@@ -82,18 +81,18 @@ def deviation(poses: Array, command: Array) -> dict[str, Array]:
 
 
 def log10(values: Array) -> Array:
-    """Decimal logarithms, with exact agreement at the bottom instead of at minus infinity."""
+    """Decimal logarithms, with zero at a lower end instead of at minus infinity."""
     return np.log10(np.maximum(np.abs(values), _NOTHING))
 
 
 def lane_states(
     slack: NDArray[np.bool_], differs: NDArray[np.bool_], known: NDArray[np.bool_]
 ) -> NDArray[np.object_]:
-    """Words (k, m) of each cable: taut, slack, differs between the physics, no answer.
+    """Words (k, m) for each cable: taut, slack, differs between the two physics, no answer.
 
     Args:
         slack: (k, m).
-        differs: (k, m) where the two physics do not agree about it.
+        differs: (k, m) where the two physics disagree.
         known: (k,) whether there is an answer.
     """
     words = np.where(slack, SLACK, TAUT).astype(object)
@@ -114,7 +113,7 @@ def lane_style(recording: Recording, entity: str, colour: Rgba) -> None:
 
 
 def state_colours(recording: Recording, entity: str, shades: dict[str, Rgba]) -> None:
-    """Words of a lane with their colours."""
+    """The colours of a lane's words."""
     style = rr.StateConfiguration(
         values=list(shades), labels=list(shades), colors=list(shades.values())
     )

@@ -1,6 +1,6 @@
-"""The 3D view and the strip under it that says what its colours mean.
+"""The 3D view and the legend of its colours below it.
 
-Frame, platforms and cables, at every pose and at every instant of a settling.
+It shows frame, platforms and cables, at every pose and at every instant of a settling.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from seecr.recording.shapes import States
 from seecr.recording.stream import Index, Recording
 
 ROOT, LEGEND = "scene", "legend"
-# Radii of lines over the robot's size.
+# Radii of lines, relative to the robot's size.
 _FRAME, _TAUT, _LOOSE, _EDGE, _PATH = 0.0045, 0.0022, 0.0011, 0.0018, 0.0008
 _SLICES = 48
 # The strip is 100 wide and 10 high; y points down.
@@ -33,7 +33,7 @@ class Scene:
     """Draws one robot into a recording.
 
     Attributes:
-        size: of what is to be seen [m]; all widths are parts of it.
+        size: of the visible box [m]; all widths are relative to it.
         top: tension [N] at the end of the colour scale.
     """
 
@@ -44,7 +44,7 @@ class Scene:
         self.box = shapes.platform_box(robot, self.size)
 
     def surroundings(self) -> None:
-        """What does not move: the axes' convention, the frame, the exit points by cables' names."""
+        """Draw what does not move: axes, frame, and exit points with the names of cables."""
         robot, record = self.robot, self.recording
         record.always(ROOT, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
         record.always(
@@ -70,7 +70,7 @@ class Scene:
         record.always(f"{ROOT}/cable_names", words)
 
     def axes(self) -> None:
-        """Numbers in metres where the edges of the frame end that leave its lowest corner."""
+        """Numbers in metres at the ends of the frame's three edges from its lowest corner."""
         ends = np.where(np.eye(3, dtype=bool), self.high, self.low)
         words = [
             f"{axis} {end[k]:.3g} m" for k, (axis, end) in enumerate(zip("xyz", ends, strict=True))
@@ -83,7 +83,7 @@ class Scene:
         self.recording.always(f"{ROOT}/axes", numbers)
 
     def path(self, name: str, poses: Array, colour: Rgba) -> None:
-        """The line along which the platform's origin goes."""
+        """Draw the path of the platform's origin."""
         points = poses[np.isfinite(poses).all(axis=1), :3]
         line = rr.LineStrips3D([points], radii=_PATH * self.size, colors=colour)
         self.recording.always(f"{ROOT}/{name}/path", line)
@@ -91,7 +91,7 @@ class Scene:
     def platform(
         self, name: str, index: Index, poses: Array, colour: Rgba, *, solid: bool = False
     ) -> None:
-        """The platform as a box: solid, or only its edges so that others show through."""
+        """Draw the platform as a box: solid, or only its edges so that others show through."""
         seen = np.isfinite(poses).all(axis=1)
         k, box = int(seen.sum()), self.box
         fill = rr.components.FillMode.Solid if solid else rr.components.FillMode.MajorWireframe
@@ -106,7 +106,7 @@ class Scene:
         self.recording.always(entity, style)
 
     def anchors(self, name: str, index: Index, poses: Array, colour: Rgba) -> None:
-        """Anchor points as dots, which also shows a platform that is a bar or a point."""
+        """Draw anchor points as dots, which also shows a platform that is a bar or a point."""
         seen = np.isfinite(poses).all(axis=1)
         points = transform_points(poses[seen], self.robot.anchor_points).reshape(-1, 3)
         columns = rr.Points3D.columns(positions=points)
@@ -116,7 +116,7 @@ class Scene:
         self.recording.always(entity, style)
 
     def cables(self, name: str, index: Index, states: States) -> None:
-        """Taut cables as thick lines coloured by tension, slack ones dashed, grey, sagging."""
+        """Draw taut cables as thick lines coloured by tension, slack ones dashed and grey."""
         known = states.known
         poses = np.where(known[:, None], states.pose, self.robot.reference_pose)
         self._taut(f"{ROOT}/{name}/cables/taut", index, states, poses)
@@ -140,7 +140,7 @@ class Scene:
 
 
 def write_legend(recording: Recording, top: float, who: Mapping[str, Rgba] = PHYSICS) -> None:
-    """The tension scale from 0 to ``top`` [N], and whose colour is whose, slack cables first."""
+    """The tension scale from 0 to ``top`` [N], and the colours of slack cables and platforms."""
     write_scale(recording, top)
     places = [(px, _BAR[2]) for px in _PLACES[: 1 + len(who)]]
     names, shades_of = ["slack", *who], [colours.SLACK, *who.values()]
@@ -154,7 +154,7 @@ def write_legend(recording: Recording, top: float, who: Mapping[str, Rgba] = PHY
 
 
 def write_scale(recording: Recording, top: float, words: str = "") -> None:
-    """The scale of colours from 0 to ``top`` [N], and words on what it is of."""
+    """The colour scale from 0 to ``top`` [N], and words on what it means."""
     left, right, y = _BAR
     x = np.linspace(left, right, _SLICES + 1)
     pieces = [np.array([[x[i], y], [x[i + 1], y]]) for i in range(_SLICES)]

@@ -1,4 +1,4 @@
-"""What one physics says the robot does, and where things are then in the 3D view."""
+"""A robot's states from one of the physics, and the positions of its parts in the 3D view."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from seecr.pose import Array, quat_rotate, transform_points
 
 # Slack cables are drawn as this many dashes of this many points.
 _DASHES, _DASH_POINTS = 12, 3
-# A cable paid out far too long is drawn sagging by no more than this part of its span.
+# A cable that is far too long is drawn with a sag of no more than this part of its span.
 _DEEPEST = 0.35
-# Thickness of what has none, over the platform's largest side.
+# Thickness of a flat platform, relative to its largest side.
 _FLAT = 0.12
-# Names of exit points that are nearer than this, over the robot's size, would overlap.
+# Exit points closer than this, relative to the robot's size, share a label; else labels overlap.
 _NEAR = 0.1
-# What is nearer than the middle by more than this, over the robot's size, is in front; how far
-# names are lifted there.
+# Points nearer than the centre by more than the first number, relative to the robot's size, are in
+# front; their labels are raised by the second.
 _BEFORE, _LIFT = 0.05, 0.08
 
 
@@ -42,7 +42,7 @@ class States:
 
     @property
     def known(self) -> NDArray[np.bool_]:
-        """Which rows have an answer, (k,)."""
+        """Whether each row has an answer, (k,)."""
         return np.asarray(np.isfinite(self.pose).all(axis=1))
 
 
@@ -77,7 +77,7 @@ def platform_box(robot: Robot, size: float) -> Box:
 
 
 def extent(robot: Robot, poses: Array) -> tuple[Array, Array]:
-    """Corners (3,), (3,) [m] of what is to be seen: exit points and the platform's poses."""
+    """Corners (3,), (3,) [m] of the visible box: exit points and the platform's poses."""
     seen = poses[np.isfinite(poses).all(axis=-1)]
     anchors = transform_points(seen, robot.anchor_points).reshape(-1, 3)
     points = np.concatenate([robot.exit_points, anchors, seen[:, :3]])
@@ -85,10 +85,10 @@ def extent(robot: Robot, poses: Array) -> tuple[Array, Array]:
 
 
 def front(robot: Robot, low: Array, high: Array) -> tuple[Array, Array]:
-    """Directions (3,) along the wide side of what is to be seen, and towards who looks at it.
+    """Directions (3,) along the wide side of the visible box, and towards the viewer.
 
     Args:
-        robot: tells which way is down. low, high: (3,) corners of what is to be seen [m].
+        robot: for its vertical. low, high: (3,) corners of the visible box [m].
     """
     span = high - low
     across = np.eye(3)[int(np.argmax(span - np.abs(robot.up) * span))]
@@ -97,12 +97,13 @@ def front(robot: Robot, low: Array, high: Array) -> tuple[Array, Array]:
 
 
 def cable_labels(robot: Robot, low: Array, high: Array) -> tuple[Array, list[str]]:
-    """Where names of cables stand (k, 3) [m]: one for exit points that are near to each other.
+    """Positions (k, 3) [m] and texts of cables' labels, one for exit points close to each other.
 
-    The viewer hangs them under their points; those in front stand above, clear of those behind.
+    The viewer draws labels below their points. Those in front are raised above them, clear of those
+    behind.
 
     Args:
-        robot: the robot. low, high: (3,) corners of what is to be seen [m].
+        robot: the robot. low, high: (3,) corners of the visible box [m].
     """
     points, size = robot.exit_points, float(np.linalg.norm(high - low))
     groups: list[list[int]] = []
@@ -146,10 +147,10 @@ def taut_strips(robot: Robot, poses: Array, slack: NDArray[np.bool_]) -> list[Ar
 def slack_strips(
     robot: Robot, poses: Array, slack: NDArray[np.bool_], rest_lengths: Array
 ) -> list[Array]:
-    """Dashes of the cables that hang loose, pose by pose; a fixed number per cable.
+    """Dashes of the slack cables, pose by pose; a fixed number per cable.
 
-    A loose cable has no weight in the statics, hence no shape of its own: drawn is the shallow
-    parabola of its length, whose sag s over a span d is l0 = d + 8 s^2 / (3 d).
+    A slack cable has no weight in the statics, and thus no shape of its own. It is drawn as the
+    shallow parabola of its length, whose sag s over a span d follows from l0 = d + 8 s^2 / (3 d).
 
     Args:
         robot: the robot.
@@ -170,11 +171,11 @@ def slack_strips(
 
 
 def dashes_per_cable() -> int:
-    """How many strips :func:`slack_strips` makes of one cable."""
+    """The number of strips that :func:`slack_strips` makes of one cable."""
     return _DASHES
 
 
 def _dash_grid() -> Array:
-    """Places along a cable, 0 to 1, of the dashes' points, (dashes, points)."""
+    """Fractions along a cable, 0 to 1, of the dashes' points, (dashes, points)."""
     begin = np.arange(_DASHES) / (_DASHES - 0.4)
     return begin[:, None] + np.linspace(0.0, 0.6 / (_DASHES - 0.4), _DASH_POINTS)

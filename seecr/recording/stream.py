@@ -1,4 +1,4 @@
-"""One recording file: written beside its place, put there when complete."""
+"""One recording file: written beside its target, and renamed when complete."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from seecr.pose import Array
 
 POSE, SETTLING, MODEL_STEP = "pose", "settling_time", "model_step"
 Index: TypeAlias = rr.TimeColumn | Sequence[rr.TimeColumn]
-# Places on a timeline are off by less than this part of a step.
+# Positions on a timeline are rounded by less than this part of a step.
 _ROUNDED = 0.03
 
 
 class Recording:
-    """A recording being written; errors of the data raise instead of being logged.
+    """A recording being written; errors in the data are raised instead of logged.
 
     Attributes:
         stream: Rerun's.
@@ -33,16 +33,16 @@ class Recording:
         self.stream = stream
 
     def always(self, entity: str, *archetypes: Any) -> None:
-        """Something that holds at every time."""
+        """Log something that holds at every time."""
         self.stream.log(entity, *archetypes, static=True, strict=True)
 
     def rows(self, entity: str, index: Index, columns: Iterable[Any]) -> None:
-        """Rows over timelines, sent as columns: faster and smaller than row by row."""
+        """Log rows over timelines, sent as columns: faster and smaller than row by row."""
         timelines = [index] if isinstance(index, rr.TimeColumn) else index
         self.stream.send_columns(entity, timelines, columns, strict=True)
 
     def scalars(self, entity: str, index: Index, values: ArrayLike) -> None:
-        """Numbers (n,), or (n, k) of k lines, over timelines, in double precision."""
+        """Log numbers (n,), or (n, k) for k lines, over timelines, in double precision."""
         numbers = np.asarray(values, dtype=float)
         columns = rr.Scalars.columns(scalars=numbers.ravel())
         several = numbers.ndim > 1
@@ -56,10 +56,10 @@ def pose_index(count: int) -> rr.TimeColumn:
 
 
 def sweep_index(poses: Array) -> list[rr.TimeColumn]:
-    """Timelines over commanded poses (n, 7): their number; of a line along an axis the place too.
+    """Timelines over commanded poses (n, 7): numbers, and positions of a line along an axis.
 
-    Rerun's plots are over whole numbers: the place is in millimetres, or in micrometres where
-    these would tell too little. The timeline to open is the last one.
+    Rerun's timelines are whole numbers: the position is in millimetres, or in micrometres if these
+    are not fine enough. The timeline to open is the last one.
     """
     index = [pose_index(len(poses))]
     moves = np.ptp(poses[:, :3], axis=0) if len(poses) > 1 else np.zeros(3)
@@ -77,7 +77,7 @@ def sweep_index(poses: Array) -> list[rr.TimeColumn]:
 
 
 def opening(index: Sequence[rr.TimeColumn]) -> tuple[str, float]:
-    """The timeline that a recording opens with, and how much of it lies between two poses."""
+    """The timeline that a recording opens with, and its step between two poses."""
     steps = np.abs(np.diff(index[-1].as_arrow_array().to_numpy(zero_copy_only=False)))
     return str(index[-1].timeline_name()), float(np.median(steps)) if len(steps) else 1.0
 
@@ -93,8 +93,8 @@ def recording_file(path: str | Path, name: str, blueprint: rrb.Blueprint) -> Ite
 
     Args:
         path: the ``.rrd`` file.
-        name: what the viewer calls the recording; it is its identity too, so that a newer one of
-            the same case takes its place in the viewer.
+        name: the recording's name in the viewer; it is also its identity, so that a newer recording
+            of the same case replaces it there.
         blueprint: the layout, embedded.
 
     Raises:
@@ -103,7 +103,7 @@ def recording_file(path: str | Path, name: str, blueprint: rrb.Blueprint) -> Ite
     stream = rr.RecordingStream(_application(name), recording_id=name)
     with written(Path(path), failure="cannot write the recording") as (partial,):
         try:
-            partial.touch()  # Rerun reports a folder that cannot be written only in its log
+            partial.touch()  # Rerun reports a folder that is not writable only in its log
             stream.save(partial, default_blueprint=blueprint)
             stream.send_recording_name(name)
             yield Recording(stream)
@@ -113,7 +113,7 @@ def recording_file(path: str | Path, name: str, blueprint: rrb.Blueprint) -> Ite
 
 
 def _application(name: str) -> str:
-    """An application of its own for each recording, in letters that Rerun takes as they are.
+    """An application ID for each recording, in characters that Rerun accepts.
 
     The viewer keeps one layout per application, and several recordings may be open together.
     """

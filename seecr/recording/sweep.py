@@ -1,4 +1,4 @@
-"""The recording of a sweep: command and platform at rest, cables by tension, plots, lanes."""
+"""The recording of a sweep: commands and equilibria, cables by tension, plots, lanes."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from seecr.statics.solution import Solution
 
 __all__ = ["write_sweep_recording"]
 
-# Of a plot, in points of a window of 1920 by 1080.
+# Width of a plot, in points of a window of 1920 by 1080.
 _WIDTH = 850.0
 _LANES, _AWAY, _TURN, _PULL = "lanes", "plot/deviation", "plot/rotation", "plot/tension"
 
@@ -94,7 +94,7 @@ def _component_view(
 
 
 def _tension_view(solution: Solution, size: tuple[float, float]) -> rrb.TimeSeriesView:
-    """Tensions, one curve of those that lie on each other; lanes have the same colours."""
+    """Tensions, one curve for those that coincide; lanes have the same colours."""
     names = solution.robot.cable_names
     said = _said(names, alike([solution.tensions]))
     legend = legend_of([solution.tensions], list(said.values()), size)
@@ -106,7 +106,7 @@ def _tension_view(solution: Solution, size: tuple[float, float]) -> rrb.TimeSeri
 
 
 def _said(names: Sequence[str], groups: list[list[int]]) -> dict[int, str]:
-    """By the number of the first cable of each group: the names of all of them."""
+    """For the first cable of each group, the names of all of them."""
     return {group[0]: joined([names[k] for k in group]) for group in groups}
 
 

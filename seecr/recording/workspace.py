@@ -16,19 +16,19 @@ from seecr.workspace.grid import Workspace
 
 __all__ = ["write_map_recording"]
 
-# More points than these no viewer turns smoothly.
+# Viewers do not turn more points than these smoothly.
 _MOST = 200_000
-# A place is unsure where the probability that it can be held is between these.
+# A pose is unsure if the probability that it can be held is between these.
 _SURELY_NOT, _SURELY = 0.05, 0.95
 
 
 def write_map_recording(found: Workspace, path: str | Path, edge: Array | None = None) -> None:
-    """Write the robot and the places at which its platform can be held.
+    """Write the robot and the positions at which its platform can be held.
 
     Args:
         found: the workspace.
         path: the ``.rrd`` file.
-        edge: (k, 7) poses at the edge of what can be held.
+        edge: (k, 7) poses at the edge of the workspace.
 
     Raises:
         InputFileError: the file cannot be written.
@@ -67,7 +67,7 @@ def write_map_recording(found: Workspace, path: str | Path, edge: Array | None =
 
 
 def _unsure(found: Workspace, radius: float) -> rr.Points3D:
-    """Places of which the model does not know for sure whether they can be held."""
+    """Positions for which the model leaves open whether they can be held."""
     assert found.chance is not None
     unsure = (found.chance > _SURELY_NOT) & (found.chance < _SURELY)
     places = np.stack(np.meshgrid(*found.axes, indexing="ij"), axis=-1)[unsure]

@@ -1,4 +1,4 @@
-"""Commands written so that they are read again as they were given."""
+"""Commands written so that reading the file gives the same commands."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _WRENCH = [
 
 
 def load_columns(loads: Loads | None) -> dict[str, list[float]]:
-    """Known loads as columns, none without."""
+    """Known loads as columns; none without loads."""
     if loads is None:
         return {}
     columns = {"payload_kg": loads.mass, **dict(zip(_WRENCH, loads.wrench.T, strict=True))}
@@ -26,11 +26,11 @@ def load_columns(loads: Loads | None) -> dict[str, list[float]]:
 
 
 def toml_beside(told: bool, commands: Commands) -> str:
-    """What says how lengths are meant and where runs begin; nothing where that is as usual.
+    """The TOML that states how lengths are meant and where runs begin; empty for the defaults.
 
     Args:
-        told: the lengths are those that winches are told.
-        commands: whose rows say where they stand at the beginning.
+        told: whether the lengths are told lengths.
+        commands: for where their runs begin.
     """
     lines = []
     if told:

@@ -1,4 +1,4 @@
-"""The files of a correction: commands that are read again, and what they lead to."""
+"""The files of a correction: commands that can be read again, and their results."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from seecr.result import COORDINATES
 __all__ = ["chance_lines", "corrected_csv", "corrected_toml"]
 
 _WANT = [f"want_{name}" for name in COORDINATES]
-# Below this a reader should look.
+# A probability below this deserves attention.
 _LIKELY = 0.95
 
 
 def corrected_csv(found: Correction, wanted: CommandFile) -> str:
-    """The poses wanted and the lengths to tell, one row per pose that has an answer.
+    """The wanted poses and the lengths to command, one row per pose with an answer.
 
-    Numbers have all their digits: a length rounded to a micrometre misses by as much.
+    Numbers have all their digits: a length rounded to a micrometre is off by as much.
 
     Args:
         found: the correction.
-        wanted: the list that it is of: its runs, times, temperatures and loads go along.
+        wanted: the list that it is for, whose runs, times, temperatures and loads are kept.
     """
     given, n = wanted.commands, len(wanted.commands)
     columns: dict[str, Any] = {}
@@ -45,12 +45,12 @@ def corrected_csv(found: Correction, wanted: CommandFile) -> str:
 
 
 def corrected_toml(wanted: CommandFile) -> str:
-    """What says how the lengths are meant."""
+    """The TOML that states how the lengths are meant."""
     return toml_beside(True, wanted.commands)
 
 
 def chance_lines(found: Correction, kept: Array | None) -> Iterator[str]:
-    """How likely tensions stay within their limits, where the model says so.
+    """The probability that tensions stay within their limits, if the model has a covariance.
 
     Args:
         found: the correction.

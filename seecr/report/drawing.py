@@ -1,4 +1,4 @@
-"""Axes for figures: labels with units, colours that everybody tells apart."""
+"""Axes for figures: labels with units, and colours that everybody can tell apart."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def figure(path: Path, rows: int = 1, columns: int = 1, **options: Any) -> Itera
     """Axes (rows, columns) of a figure that is written to a file when the block ends.
 
     Args:
-        path: the file; its ending says of what kind: png, svg, pdf.
+        path: the file; its extension selects the kind: png, svg, pdf.
         rows, columns: of axes.
         options: of ``matplotlib.pyplot.subplots``.
     """

@@ -1,4 +1,4 @@
-"""The figure of a map: slices through it, one row of panels for each thing that it knows."""
+"""The figure of a map: slices through it, with one row of panels for each quantity."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from seecr.workspace.grid import Workspace
 
 __all__ = ["map_figure"]
 
-# Of the edge of what can be held.
+# Colour of the edge of the workspace.
 _EDGE = COLOURS[4]
-# Of that with a probability: white with a rim, which is seen on all colours and by everybody.
+# Dots of the edge at a probability: white with a rim, visible on all colours.
 _LIKELY: dict[str, Any] = {
     "markersize": 4.0, "markerfacecolor": "white", "markeredgecolor": "black",
     "markeredgewidth": 0.6,
 }  # fmt: skip
-# Whether poses can be held, where margins have no numbers.
+# Colours for poses that cannot and can be held, if margins have no numbers.
 _NO, _YES = "#D9D9D9", COLOURS[0]
-# A grid of more than this [m] is told in metres.
+# A grid larger than this [m] is labelled in metres.
 _LARGE = 5.0
 # Letters of a title that fit into an inch.
 _LETTERS = 13
-# Margins grow without end towards the height of the exit points: so many times what half of the
-# poses have is the end of their colours.
+# Margins grow without limit towards the height of the exit points: their colours end at so many
+# times the median.
 _OUTSTANDING = 4.0
-# What is moved or turned by less [mm, deg] is not: colours up to there would show rounding.
+# Smaller motions [mm, deg] count as zero: colours up to there would show rounding.
 _STILL = 1e-6
 
 
@@ -45,20 +45,20 @@ def map_figure(
     edge: Array | None = None,
     at_least: float | None = None,
 ) -> None:
-    """Slices of a workspace: what can be held, slack cables, deviation and tilt at rest.
+    """Slices of a workspace: margins, slack cables, and deviation and rotation in equilibrium.
 
-    Where the map has probabilities, they come second.
+    If the map has probabilities, they come second.
 
     Args:
         path: the file.
         found: the workspace, with two or three axes of more than one value.
-        most: slices drawn; they lie across the last axis, or that with one value. The title says
-            of how many.
-        edge: (k, 7) poses at the edge of what can be held; those in a slice are dots on it.
-        at_least: the probability with which these can be held, if it is the edge of that.
+        most: most slices drawn; they are normal to the last axis, or to the one with a single
+            value. The title states how many there are in all.
+        edge: (k, 7) poses at the edge of the workspace; those in a slice are drawn as dots.
+        at_least: the probability to which that edge belongs, if any.
 
     Raises:
-        InputError: a grid that goes along fewer than two axes.
+        InputError: a grid with fewer than two axes of more than one value.
     """
     cut = _cut(found, most)
     panels = [_held_panel]
@@ -91,10 +91,10 @@ class _Cut:
 
     Attributes:
         found: the map.
-        across, wide, high: the axis that slices lie across, and those of their panels.
-        picked: (k,) where on the first of these they are.
-        slices: numbers of the poses of each.
-        unit, per_metre: in which they are drawn.
+        across, wide, high: the axis normal to the slices, and those of their panels.
+        picked: (k,) indices of the slices along the first of these.
+        slices: indices of the poses of each.
+        unit, per_metre: for the axes.
     """
 
     found: Workspace
@@ -108,14 +108,14 @@ class _Cut:
 
     @property
     def poses(self) -> NDArray[np.intp]:
-        """Numbers of all poses that are drawn."""
+        """Indices of all poses that are drawn."""
         return np.concatenate([number.ravel() for number in self.slices])
 
     def inside(self) -> list[Array]:
-        """Margins of each slice, as far as a line at zero between them takes them.
+        """Margins of each slice, for the contour at zero between them.
 
-        An infinite one says nothing of where between two poses the line goes: it stands for one
-        like others.
+        An infinite margin does not say where between two poses the contour is; it is replaced by a
+        typical value.
         """
         found = self.found
         inside = np.where(found.feasible, np.maximum(found.margin, 0.0), found.margin).ravel()
@@ -125,7 +125,7 @@ class _Cut:
         return [inside[one] for one in self.slices]
 
     def with_dots(self, edge: Array) -> list[NDArray[np.bool_]]:
-        """Which of the edge's poses lie in each slice: those between two poses of it."""
+        """Whether each pose of the edge lies in each slice, that is, between two poses of it."""
         axis = self.found.axes[self.across]
         near = 1e-9 * max(float(np.ptp(axis)), 1e-9)
         return [np.abs(edge[:, self.across] - axis[k]) <= near for k in self.picked]
@@ -146,7 +146,7 @@ def _cut(found: Workspace, most: int) -> _Cut:
 
 
 def _words(cut: _Cut, edge: Array | None, at_least: float | None) -> Iterator[str]:
-    """What is not drawn, and what colours and dots mean that no bar explains."""
+    """What is not drawn, and the colours and dots that no colour bar explains."""
     shown, whole = len(cut.picked), len(cut.found.axes[cut.across])
     if shown < whole:
         yield f"{shown} of {whole} values of {'xyz'[cut.across]}"
@@ -160,7 +160,7 @@ def _words(cut: _Cut, edge: Array | None, at_least: float | None) -> Iterator[st
 
 
 def _white(cut: _Cut) -> Iterator[str]:
-    """What cells without a colour are, where there are any."""
+    """The meaning of cells without a colour, if there are any."""
     found, shown, why = cut.found, cut.poses, []
     if not _yes_or_no(found) and not found.feasible.ravel()[shown].all():
         why.append("cannot be held (margin)")
@@ -171,7 +171,7 @@ def _white(cut: _Cut) -> Iterator[str]:
 
 
 def _without_end(cut: _Cut) -> Iterator[str]:
-    """What margins are that no bar of numbers can have, where there are any."""
+    """The meaning of margins beyond the colour bar, if there are any."""
     margin = cut.found.margin.ravel()[cut.poses]
     if not np.isposinf(margin).any():
         return
@@ -184,10 +184,10 @@ def _without_end(cut: _Cut) -> Iterator[str]:
 
 
 def _yes_or_no(found: Workspace) -> bool:
-    """Whether margins say no more than that poses can be held.
+    """Whether margins only tell that poses can be held or not.
 
-    Those of robots with fewer cables than freedoms are 0; all are infinite where cables can be
-    tightened without end everywhere.
+    Those of robots with fewer cables than degrees of freedom are 0; and all are infinite if cables
+    can be tightened without limit everywhere.
     """
     held = found.margin[found.feasible]
     few = found.robot.n_cables < found.robot.n_dof
@@ -195,7 +195,7 @@ def _yes_or_no(found: Workspace) -> bool:
 
 
 def _dots(axes: Any, cut: _Cut, edge: Array, at_least: float | None) -> None:
-    """The edge's places (k, 7) on every panel of their slice."""
+    """Draw the edge's poses (k, 7) on every panel of their slice."""
     look = {"color": _EDGE, "markersize": 2.5} if at_least is None else _LIKELY
     places = cut.per_metre * edge[:, [cut.wide, cut.high]]
     for row in axes:
@@ -224,7 +224,7 @@ def _bar_of(panel: Any, found: Workspace) -> dict[str, Any]:
 
 
 def _held_panel(cut: _Cut, row: Any) -> Any:
-    """The margin where poses can be held, with the workspace's boundary."""
+    """The margin where poses can be held, with the edge of the workspace."""
     found = cut.found
     if _yes_or_no(found):
         from matplotlib.colors import ListedColormap
@@ -232,13 +232,13 @@ def _held_panel(cut: _Cut, row: Any) -> Any:
         held = found.feasible.astype(float)
         return _colours(cut, row, held, -0.5, 1.5, ListedColormap([_NO, _YES]))
     top = _top_margin(found)
-    # cells of no number have no colour
+    # cells with NaN have no colour
     margin = np.where(np.isposinf(found.margin), 2.0 * top, found.margin)
     return _colours(cut, row, np.where(found.feasible, margin, np.nan), 0.0, top)
 
 
 def _top_margin(found: Workspace) -> float:
-    """Where the bar of margins ends."""
+    """Upper end of the colour bar of margins."""
     held = found.margin[found.feasible]
     finite = held[np.isfinite(held)]
     half = float(np.median(finite)) if len(finite) else 0.0
@@ -246,7 +246,7 @@ def _top_margin(found: Workspace) -> float:
 
 
 def _chance_panel(cut: _Cut, row: Any) -> Any:
-    """The probability that a pose can be held, with the boundary of the model's own values."""
+    """The probability that a pose can be held, with the edge for the model's own values."""
     assert cut.found.chance is not None
     return _colours(cut, row, cut.found.chance.astype(float), 0.0, 1.0, "cividis")
 
@@ -272,10 +272,9 @@ def _turn_panel(cut: _Cut, row: Any) -> Any:
 
 
 def _end(found: Workspace, values: Array) -> float:
-    """Where colours of how far off it rests end: at what poses have that can be held.
+    """Upper end of the colours of a deviation, from poses that can be held.
 
-    Poses outside of the workspace fall by a hundred times that, and all others would be of one
-    colour.
+    Poses outside the workspace fall a hundred times as far, and would make all others one colour.
     """
     for some in (values[found.feasible], values):
         known = some[np.isfinite(some)]
@@ -292,13 +291,13 @@ def _top(values: Array) -> float:
 def _colours(
     cut: _Cut, row: Any, values: Array, low: float, high: float, colours: Any = None
 ) -> Any:  # fmt: skip
-    """Coloured cells of each slice, with the workspace's boundary over them."""
+    """Coloured cells of each slice, with the edge of the workspace on top."""
     x, y = (cut.per_metre * cut.found.axes[k] for k in (cut.wide, cut.high))
     shown = None
     for ax, one, inside in zip(row, cut.slices, cut.inside(), strict=True):
         shown = ax.pcolormesh(
             x, y, values.ravel()[one].T, vmin=low, vmax=high, cmap=colours, shading="nearest",
-            rasterized=True,  # else lines show between the cells of an SVG
+            rasterized=True,  # otherwise lines show between the cells of an SVG
         )  # fmt: skip
         if _has_edge(inside):
             ax.contour(x, y, inside.T, levels=[0.0], colors=_EDGE, linewidths=1.2)
@@ -308,5 +307,5 @@ def _colours(
 
 
 def _has_edge(inside: Array) -> bool:
-    """Whether margins of a slice have an edge between them: of robots with few cables none has."""
+    """Whether the margins of a slice change sign; those of robots with few cables never do."""
     return bool(inside.min() < 0.0 < inside.max())

@@ -1,4 +1,4 @@
-"""What is told of a workspace, and the file of its arrays."""
+"""Sentences about a workspace, and the file of its arrays."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["beyond_line", "edge_line", "likely_lines", "softest_line", "write_ar
 
 
 def likely_lines(found: Workspace, at_least: float | None) -> Iterator[str]:
-    """How much of the grid can be held with a probability of at least that."""
+    """How much of the grid can be held with at least a given probability."""
     if at_least is not None:
         likely = found.likely(at_least)
         yield (
@@ -29,7 +29,7 @@ def likely_lines(found: Workspace, at_least: float | None) -> Iterator[str]:
 
 
 def beyond_line(found: Workspace, reach: DataReach | None) -> Iterator[str]:
-    """How much of what can be held is far from the data that the model was fitted to."""
+    """How much of the workspace is far from the data that the model was fitted to."""
     if reach is None:
         return
     places = np.stack(np.meshgrid(*found.axes, indexing="ij"), axis=-1)[found.feasible]
@@ -43,7 +43,7 @@ def beyond_line(found: Workspace, reach: DataReach | None) -> Iterator[str]:
 
 
 def softest_line(found: Workspace) -> Iterator[str]:
-    """Where the elastic robot is softest of all poses that can be held, and in which direction."""
+    """The softest pose of those that can be held, and the direction in which it is soft."""
     at = found.softest_at
     if at is not None:
         place = " ".join(f"{1e3 * axis[k]:.4g}" for axis, k in zip(found.axes, at, strict=True))
@@ -52,14 +52,14 @@ def softest_line(found: Workspace) -> Iterator[str]:
 
 
 def edge_line(edge: Array, tolerance: float) -> str:
-    """How many places of the edge there are, and how well they are known."""
+    """The number of poses on the edge, and how accurately they are known."""
     if len(edge) == 0:
         return "no edge: all poses of the grid can be held"
     return f"its edge, to {tolerance:g} m: {counted(len(edge), 'place')}"
 
 
 def write_arrays(path: Path, found: Workspace, edge: Array | None = None) -> None:
-    """``map.npz``: axes, what holds at the poses, (nx, ny, nz) each, and the edge's (k, 7)."""
+    """``map.npz``: axes, results at the poses, (nx, ny, nz) each, and the edge's poses (k, 7)."""
     x, y, z = found.axes
     with written(path) as (part,), part.open("wb") as file:
         more: dict[str, Any] = {}

@@ -22,15 +22,15 @@ __all__ = ["SweepRows"]
 
 @dataclass(frozen=True, eq=False)
 class SweepRows:
-    """Answers of n commands as files have them, one row per command, SI units.
+    """Results for n commands as written to files, one row per command, SI units.
 
     Attributes:
         solution: of n commands.
-        lengths: (n, m) [m] that were commanded instead of poses.
-        wanted: whether poses were wanted with these lengths; deviations are from them.
+        lengths: (n, m) [m] commanded instead of poses.
+        wanted: whether these lengths were for wanted poses; deviations are from these.
         more: further values of each row, by name.
-        spread: one standard deviation of poses and tensions, where the model says so.
-        loads: that were carried, if they are known.
+        spread: standard deviations of poses and tensions, if the model has a covariance.
+        loads: known loads, if any.
     """
 
     solution: Solution
@@ -73,7 +73,7 @@ class SweepRows:
         return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
     def csv_text(self) -> str:
-        """``sweep.csv``; with ``sweep.toml`` its commands are read again as they were given.
+        """``sweep.csv``; with ``sweep.toml`` it can be read as the same commands.
 
         Numbers have all their digits; cells without a number are empty.
         """
@@ -115,7 +115,7 @@ class SweepRows:
 
 
 def _named(pattern: str, names: Sequence[str], values: Array) -> dict[str, Sequence[Any]]:
-    """Columns of a table (n, k) under the pattern's name of each."""
+    """Columns of a table (n, k), with names from the pattern."""
     columns = zip(names, values.T.tolist(), strict=True)
     return {pattern.format(name): column for name, column in columns}
 

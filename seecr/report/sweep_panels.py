@@ -1,4 +1,4 @@
-"""The figure of a sweep: what is off, tensions and slack cables, along its commands."""
+"""The figure of a sweep: deviations, tensions and slack cables along its commands."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from seecr.statics.solution import Solution
 
 __all__ = ["sweep_figure"]
 
-# What says which pose it is, where no coordinate does.
+# Labels of the horizontal axis if no coordinate serves.
 _NUMBERS = ("line of the file", "pose, counted from 0")
-# More cables than colours are told apart by dashes, and so are curves that lie on each other.
+# With more cables than colours, and where curves coincide, dashes distinguish them.
 _DASHES = ("-", "--", ":", "-.")
-# Beyond so many cables a legend says nothing.
+# With more cables than this a legend is useless.
 _MOST_NAMED = 24
 _BAND: dict[str, Any] = {"alpha": 0.2, "linewidth": 0.8}
 
@@ -41,10 +41,9 @@ def sweep_figure(
         path: the file.
         solution: of the sweep.
         commanded: whether poses were commanded, and not lengths.
-        wanted: whether they are what lengths were told for.
-        runs: (n,) what poses that follow on each other have in common; lines break where another
-            begins. Default: all do.
-        spread: one standard deviation of poses and tensions: bands about them.
+        wanted: whether these poses are wanted ones that lengths were commanded for.
+        runs: (n,) run of each pose; lines are interrupted between runs. Default: one run.
+        spread: standard deviations of poses and tensions, drawn as bands.
     """
     at, label = _along(solution, commanded, "wanted" if wanted else "commanded")
     mark: dict[str, Any] = {"marker": "o", "markersize": 2.5, "linewidth": 1.1}
@@ -65,7 +64,7 @@ def sweep_figure(
 
 
 def _along(solution: Solution, commanded: bool, word: str) -> tuple[Array, str]:
-    """What to draw over: the coordinate that the sweep goes along, else the file's line."""
+    """The horizontal axis: the coordinate along which the sweep goes, else the line of the file."""
     if commanded and len(solution) > 1:
         steps = np.diff(solution.command, axis=0)
         moves = [k for k in range(7) if np.any(np.abs(steps[:, k]) > 1e-12)]
@@ -79,14 +78,14 @@ def _along(solution: Solution, commanded: bool, word: str) -> tuple[Array, str]:
 
 @dataclass(frozen=True, eq=False)
 class _Sweep:
-    """What is drawn, along what, and how.
+    """The data of a sweep, and how they are drawn.
 
     Attributes:
         solution: of n commands.
-        spread: of the same, where the model says so.
-        at: (n,) where each is drawn.
+        spread: of the same, if the model has a covariance.
+        at: (n,) horizontal positions.
         starts: (k,) rows at which another run begins.
-        mark: how lines and points look.
+        mark: style of lines and points.
     """
 
     solution: Solution
@@ -96,21 +95,21 @@ class _Sweep:
     mark: dict[str, Any]
 
     def line(self, ax: Any, values: Array, *how: str, **more: Any) -> None:
-        """Points (n,) with lines between those of one run."""
+        """Draw points (n,), with lines within each run."""
         ax.plot(self._between(), self._broken(values), *how, **self.mark, **more)
 
     def band(self, ax: Any, values: Array, stderr: Array, least: float, colour: str) -> None:
-        """One standard deviation to either side of values (n,), as far as they can be so small."""
+        """Draw one standard deviation on either side of values (n,), but not below ``least``."""
         edges = np.maximum(values - stderr, np.minimum(values, least)), values + stderr
         ax.fill_between(self._between(), *map(self._broken, edges), color=colour, zorder=1, **_BAND)
 
     def _between(self) -> Array:
-        """Where to draw, with a place for each break: half way."""
+        """Horizontal positions, with one half way for each break."""
         half = 0.5 * (self.at[self.starts - 1] + self.at[self.starts])
         return np.insert(self.at, self.starts, half)
 
     def _broken(self, values: Array) -> Array:
-        """Nothing at each break: lines end there."""
+        """Values with NaN at each break, which interrupts lines."""
         return np.insert(np.asarray(values, float), self.starts, np.nan)
 
 
@@ -144,10 +143,10 @@ def _curves(
     ax: Any, whole: _Sweep, values: Array, stderr: Array | None, names: Sequence[str],
     least: float = -np.inf,
 ) -> None:  # fmt: skip
-    """Each column of values (n, k) by its name, with its band if there are errors (n, k).
+    """Each column of values (n, k) with its name, and its band if there are errors (n, k).
 
-    Those that lie on each other are drawn once, with all names, where their bands do so too;
-    where these differ, all are there, and dashes let those below be seen.
+    Columns that coincide, with their bands, are drawn once with all names. If only the bands
+    differ, all are drawn, with dashes that let the lower ones show.
     """
     below = [group.index(k) for k in range(len(names)) for group in alike([values]) if k in group]
     for first, *others in alike([values] if stderr is None else [values, stderr]):
@@ -161,12 +160,12 @@ def _curves(
 
 
 def _legend(ax: Any, **more: Any) -> None:
-    """Beside the axes, where it covers nothing."""
+    """A legend beside the axes, where it covers nothing."""
     ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8, **more)
 
 
 def _name_band(ax: Any) -> None:
-    """What bands are, in the legend of the first axes: they are of all colours."""
+    """Add the meaning of bands to the legend of the first axes, since bands have all colours."""
     from matplotlib.patches import Patch
 
     handles, _names = ax.get_legend_handles_labels()

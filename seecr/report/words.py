@@ -1,4 +1,4 @@
-"""Where a platform rests, in words: pose, cables, stiffness."""
+"""An equilibrium in words: pose, cables, stiffness."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ __all__ = [
     "sweep_lines",
 ]
 
-# A part of a direction below this is not worth a word.
+# A component of a direction below this is not mentioned.
 _PART = 0.1
-# Part of the weight that shows how soft a pose is.
+# Part of the weight that is used to show how soft a pose is.
 _NUDGE = 0.01
 # Decimals of millimetres and degrees beyond which a deviation is rounding.
 _DECIMALS = 9
@@ -40,13 +40,13 @@ _DECIMALS = 9
 def pose_lines(
     solution: Solution, i: int = 0, commanded: bool = True, spread: Spread | None = None
 ) -> Iterator[str]:
-    """Where pose i rests and how far that is from its command.
+    """The equilibrium of pose i, and how far it is from its command.
 
     Args:
-        solution: the answers.
-        i: which of them.
+        solution: the solution.
+        i: index of the pose.
         commanded: whether a pose was commanded, and not lengths.
-        spread: how far the answers may be off, where the model says so.
+        spread: standard deviations, if the model has a covariance.
     """
     yield f"{solution.robot.name}: {solution.sentence(i)}"
     pose, away = solution.pose[i], solution.deviation[i]
@@ -95,12 +95,12 @@ def _off(values: Array) -> str:
 
 
 def _known(values: Array, errors: Array) -> str:
-    """Three numbers with the digits that their standard errors leave them."""
+    """Three numbers with as many digits as their standard errors justify."""
     return ", ".join(with_error(*pair)[0] for pair in zip(values + 0.0, errors, strict=True))
 
 
 def cable_lines(solution: Solution, i: int = 0, spread: Spread | None = None) -> Iterator[str]:
-    """One line per cable: tension and how far that may be off, rest length, whether it is slack."""
+    """One line per cable: tension with its standard deviation, rest length, whether it is slack."""
     robot = solution.robot
     wide = max(len("cable"), *(len(name) for name in robot.cable_names))
     off = "" if spread is None else "      ± [N]"
@@ -110,14 +110,14 @@ def cable_lines(solution: Solution, i: int = 0, spread: Spread | None = None) ->
         tension, rest = solution.tensions[i, k] + 0.0, solution.rest_lengths[i, k]
         shown, off = f"{tension:.4f}", ""
         if spread is not None:
-            known = solution.slack[i, k]  # nothing, and that for sure to first order
+            known = solution.slack[i, k]  # zero, and certain to first order
             shown, error = (shown, "") if known else with_error(tension, spread.tensions[i, k])
             off = f"  {error:>9}"
         yield f"{name:<{wide}}  {shown:>11}{off}  {rest:15.6f}{slack}"
 
 
 def stiffness_lines(solution: Solution, i: int = 0) -> Iterator[str]:
-    """How stiff pose i is where it is softest, and how it vibrates."""
+    """The softest direction of pose i, with its stiffness, and the frequencies of vibrations."""
     soft, way = solution.smallest_eigenvalue[i], softest_words(solution, i)
     if solution.status[i] is Status.SINGULAR:
         yield f"free to {way}"
@@ -133,7 +133,7 @@ def stiffness_lines(solution: Solution, i: int = 0) -> Iterator[str]:
 
 
 def _nudged(solution: Solution, i: int) -> str:
-    """What a hundredth of the weight does where pose i is softest."""
+    """The motion that a hundredth of the weight causes in the softest direction of pose i."""
     robot = solution.robot
     soft = solution.smallest_eigenvalue[i]
     if robot.weight == 0.0 or not soft > 0.0:
@@ -153,7 +153,7 @@ def _metre(robot: Robot) -> Array:
 
 
 def softest_words(solution: Solution, i: int = 0) -> str:
-    """The direction in which pose i is softest, such as "turn about y"."""
+    """The softest direction of pose i, such as "turn about y"."""
     return direction_words(solution.robot, solution.softest_direction[i])
 
 
@@ -174,7 +174,7 @@ def direction_words(robot: Robot, direction: Array) -> str:
 
 
 def _joint_words(robot: Robot, direction: Array) -> str:
-    """The same of a platform on joints: along slides, about hinges."""
+    """The same for a platform on joints: along slides, about hinges."""
     words = []
     for verb, kind, metre in (("move along", "slide", 1.0), ("turn about", "hinge", robot.length)):
         names = [
@@ -214,7 +214,7 @@ def midline_lines(solution: Solution, i: int = 0) -> Iterator[str]:
 
 
 def elsewhere(solution: Solution, others: Solution, i: int = 0) -> NDArray[np.intp]:
-    """Which of some equilibria are others than where command i rests."""
+    """Indices of the equilibria that differ from that of command i."""
     gaps = pose_difference(others.pose, np.repeat(solution.pose[i : i + 1], len(others), axis=0))
     apart = np.linalg.norm(gaps[:, :3], axis=1) / solution.robot.length
     return np.flatnonzero(np.maximum(apart, np.linalg.norm(gaps[:, 3:], axis=1)) > 1e-6)
@@ -223,12 +223,12 @@ def elsewhere(solution: Solution, others: Solution, i: int = 0) -> NDArray[np.in
 def other_lines(
     solution: Solution, others: Solution | None, passes: Sequence[Barrier] = (), i: int = 0
 ) -> Iterator[str]:
-    """Where else the platform could rest; by how much its energy would be higher there.
+    """Where else the platform could rest, and the difference in energy.
 
     Args:
-        solution: where it rests.
+        solution: the equilibria found.
         others: the equilibria of command i.
-        passes: what is between it and each that is elsewhere, where somebody looked.
+        passes: barriers to each of the other equilibria, if they were computed.
         i: which command.
     """
     if others is None:
@@ -251,12 +251,12 @@ def other_lines(
 
 
 def _more_energy(more: float) -> str:
-    """A moment from outside and a law of a user have no energy."""
+    """The difference in energy, if there is one: moments and users' laws have no energy."""
     return f"{joules(more, '+.4g')}, " if np.isfinite(more) else ""
 
 
 def jump_lines(solution: Solution) -> Iterator[str]:
-    """Where the platform jumps on the way that was followed."""
+    """Where the platform jumps on the path that was followed."""
     if solution.jumps is None:
         return
     if not any(solution.jumps):
@@ -295,5 +295,5 @@ def _three(values: Array, form: str) -> str:
 
 
 def at_rest(solution: Solution) -> bool:
-    """Whether every pose is one of those counted as at rest: where nothing can move freely."""
+    """Whether every pose is at rest in a stable equilibrium."""
     return bool(solution.converged.all())

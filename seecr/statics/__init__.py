@@ -1,1 +1,1 @@
-"""The compiled loop on tables of a setup: where platforms rest, and how sure that is."""
+"""Batch calls on the compiled loop, and certified solutions."""

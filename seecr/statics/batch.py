@@ -1,4 +1,4 @@
-"""What the compiled loop says of tables: where platforms rest, and what holds at given poses."""
+"""Batch calls on the compiled loop: descents to equilibria, and evaluations at given poses."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ from seecr.threads import in_parts, run_parts
 
 @dataclass(eq=False)
 class Evaluation:
-    """What the loop fills: one row per pose."""
+    """The results of the compiled loop, one row per pose."""
 
     outcome: NDArray[np.int64]
     count: NDArray[np.int64]
@@ -51,7 +51,7 @@ class Evaluation:
     states: Array  # (n, m, N_STATE)
     slopes: Array  # (n, m, d)
     deviation: Array  # (n, 7)
-    values: Array  # (n, d) joint values less the commanded ones, hinges times length
+    values: Array  # (n, d) joint values minus the commanded ones, hinges times the robot's length
     guess: Array  # (n, m, 3) catenaries
     energy: Array
 
@@ -62,7 +62,7 @@ class Evaluation:
 
     @property
     def at_rest(self) -> NDArray[np.bool_]:
-        """(n,) rows at rest, those among them that are free to move along some direction."""
+        """(n,) rows in equilibrium, including those that are free to move along some direction."""
         return np.asarray((self.outcome == CONVERGED) | (self.outcome == SINGULAR))
 
     @classmethod
@@ -93,13 +93,13 @@ def descend(
     staged: bool | None = None,
     guess: Array | None = None,
 ) -> Evaluation:
-    """Bring every pose to rest; ``start`` (n, 7) are deviations, none by default.
+    """Newton descent of all poses to equilibria; ``start`` (n, 7) are deviations, none by default.
 
-    ``guess`` (n, m, 3) are the catenaries of the start, where there are any.
+    ``guess`` (n, m, 3) are the catenaries at the start, if known.
 
-    Stiff robots that do not get there are made stiff in stages, from soft (``staged=True``
-    starts with that, ``False`` never does it). A soft robot can leave for another equilibrium,
-    so the stages are for those alone that need them.
+    Stiff robots whose descent does not converge are solved again with a stiffness that is raised in
+    stages. ``staged=True`` does so from the start, ``False`` never. A soft robot may change to
+    another equilibrium, so stages are used only where they are needed.
     """
     if staged is None:
         out = descend(tables, start, limit, threads, start_values, False, guess)
@@ -158,8 +158,8 @@ def evaluate(tables: Tables, at: Evaluation, threads: int | None = 1) -> Evaluat
 def walk(tables: Tables, path: Path, limit: int) -> Evaluation:
     """Solve the waypoints of a path in order, each from the one before.
 
-    Fills the columns of the past in ``tables``. Runs are independent, but for creep, which goes
-    by the clock through all that were timed by the same.
+    Fills the history columns in ``tables``. Runs are independent, except with creep, which
+    continues through all runs that share a clock.
     """
     n, m = tables.cables.shape[:2]
     out = Evaluation.empty(n, m, tables.n_dof)
@@ -179,7 +179,7 @@ def walk(tables: Tables, path: Path, limit: int) -> Evaluation:
 
 
 def _apart(path: Path, *tables: Tables) -> list[slice]:
-    """Waypoints that nothing of those before goes with."""
+    """Groups of waypoints that do not depend on the waypoints of other groups."""
     creeps = any(np.any(one.cables[..., CREEP_PART]) for one in tables)
     starts = np.flatnonzero(path.new_clock if creeps else path.fresh).tolist()
     return [slice(a, b) for a, b in pairwise([*starts, len(path.source)])]
@@ -188,12 +188,12 @@ def _apart(path: Path, *tables: Tables) -> list[slice]:
 def change_of_walk(
     plus: Tables, minus: Tables, path: Path, at: Evaluation, inverse: Array
 ) -> tuple[Array, Array]:
-    """Steps (N, d) [m] and tensions (N, m) of a walk under ``plus`` less those under ``minus``.
+    """Steps (N, d) [m] and tensions (N, m) of a path under ``plus`` minus those under ``minus``.
 
     Args:
         plus, minus: tables of the N waypoints.
-        path: their way.
-        at: where a walk between the two came to rest; nothing is solved.
+        path: the path.
+        at: equilibria on the path between the two; nothing is solved.
         inverse: (N, d, d) [m/N] of the stiffness there.
     """
     n, m = plus.cables.shape[:2]
@@ -210,7 +210,7 @@ def change_of_walk(
 
 
 def change(plus: Tables, minus: Tables, at: Evaluation) -> tuple[Array, Array]:
-    """Gradient (n, d) [N] and tensions (n, m) [N] of ``plus`` less those of ``minus``.
+    """Gradient (n, d) [N] and tensions (n, m) [N] of ``plus`` minus those of ``minus``.
 
     Args:
         plus, minus: tables of the same poses.
@@ -233,8 +233,8 @@ def change(plus: Tables, minus: Tables, at: Evaluation) -> tuple[Array, Array]:
 def change_by_cable(plus: Tables, minus: Tables, at: Evaluation) -> tuple[Array, Array]:
     """The same cable by cable: gradient (n, d, m) [N] and each cable's own tension (n, m).
 
-    For tables in which every cable was changed, to have the derivatives by what each cable has
-    of its own at once. The load is taken to be the same in both.
+    It is for tables in which every cable was changed, to get the derivatives by a per-cable
+    parameter in one call. The load is taken to be the same in both.
     """
     n, m = plus.cables.shape[:2]
     gradient, tension = np.empty((n, m, plus.n_dof)), np.empty((n, m))
@@ -251,7 +251,7 @@ def change_by_cable(plus: Tables, minus: Tables, at: Evaluation) -> tuple[Array,
 
 
 def _solved(gradient: Array, tension: Array, failed: Array) -> tuple[Array, Array]:
-    """Nothing changes where a cable's own equations could not be solved beside the pose."""
+    """Zero change for rows in which a cable's equations could not be solved beside the pose."""
     lost = np.isnan(failed).any(axis=1)
     gradient[lost], tension[lost] = 0.0, 0.0
     return gradient, tension
@@ -268,17 +268,17 @@ def without_idle(tables: Tables, at: Evaluation) -> Evaluation:
 
 
 def is_slack(tables: Tables, at: Evaluation) -> NDArray[np.bool_]:
-    """Slack cables, (n, m): those longer than the way they bridge, and those that pull nothing.
+    """Slack cables, (n, m): those longer than their span, and those without tension.
 
-    A heavy cable that is longer than its way hangs through and pulls by its weight alone. A
-    tension below what rounding leaves of the load is none.
+    A heavy cable that is longer than its span sags and pulls by its weight alone. A tension below
+    the rounding of the load counts as zero.
     """
     nothing = at.states[..., TENSION] < IDLE * tables.scale[:, None]
     return np.asarray((at.states[..., SLACK] > 0.5) | nothing)
 
 
 def joints_at_rest(tables: Tables, at: Evaluation) -> Array:
-    """The joints (n, d, 7) as they stand at the joint values of ``at``."""
+    """Axes and points of the joints (n, d, 7) at the joint values of ``at``."""
     out = np.empty_like(tables.screws)
     if tables.screws.shape[1]:
         place = np.empty(7)
@@ -289,7 +289,8 @@ def joints_at_rest(tables: Tables, at: Evaluation) -> Array:
 def stiffness(tables: Tables, at: Evaluation) -> Array:
     """Minus the derivative of the wrench, (n, d, d) [N/m] in scaled coordinates.
 
-    A constant moment, which has no potential, skews it; ``at.hessian`` is its symmetric part.
+    A constant moment, which has no potential, makes it asymmetric; ``at.hessian`` is its symmetric
+    part.
     """
     first = EXTERNAL_MOMENT
     rows = np.flatnonzero(np.any(tables.load[:, first : first + 3], axis=1))
@@ -302,7 +303,10 @@ def stiffness(tables: Tables, at: Evaluation) -> Array:
 
 
 def residual_size(gradient: Array) -> Array:
-    """Largest of force and torque over length, (n,) [N], of gradients (n, d)."""
+    """The larger of force and torque over length, (n,) [N], of gradients (n, d).
+
+    For platforms on joints it is the norm of the gradient.
+    """
     if gradient.shape[1] == 6:
         halves = np.linalg.norm(gradient.reshape(-1, 2, 3), axis=2)
         return np.asarray(halves.max(axis=1))
@@ -315,13 +319,13 @@ def take_evaluation(whole: Evaluation, rows: NDArray[np.integer]) -> Evaluation:
 
 
 def put_evaluation(whole: Evaluation, rows: NDArray[np.integer], part: Evaluation) -> None:
-    """Put rows into an evaluation."""
+    """Overwrite rows of an evaluation."""
     for f in fields(Evaluation):
         getattr(whole, f.name)[rows] = getattr(part, f.name)
 
 
 def platform_poses(tables: Tables, deviation: Array) -> Array:
-    """Poses (n, 7) of deviations (n, 7) from the commanded ones."""
+    """Poses (n, 7) from deviations (n, 7) from the commanded ones."""
     quat = quat_multiply(deviation[:, 3:], tables.poses[:, 3:])
     quat = quat / np.linalg.norm(quat, axis=1, keepdims=True)
     return np.concatenate([tables.poses[:, :3] + deviation[:, :3], quat], axis=1)

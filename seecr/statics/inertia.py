@@ -1,4 +1,4 @@
-"""The platform's inertia in the coordinates of its stiffness."""
+"""The platform's mass matrix in the coordinates of its stiffness."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from seecr.statics.tables import Tables
 def mass_matrices(robot: Robot, tables: Tables, poses: Array) -> Array:
     """Mass matrices (n, d, d) of the platform at poses (n, 7).
 
-    Of a free platform by translation of its origin and rotation, base frame [kg, kg m; kg m,
-    kg m^2]; else by its joints. Mass and centre are those of the rows, with what effects and known
-    payloads make of them; a payload turns as a point would, and cables have no mass.
+    For a free platform by translation of its origin and rotation, base frame [kg, kg m; kg m,
+    kg m^2]; else by its joints. Mass and centre of mass are those of the rows, with effects and
+    known payloads. A payload counts as a point mass, and cables have no mass.
 
     Raises:
-        InputError: nobody said what the platform's inertia is.
+        InputError: the platform's inertia is not known.
     """
     if not np.any(robot.inertia):
         raise InputError(f"robot {robot.name}: its inertia is not known; expected Robot.inertia")

@@ -1,10 +1,10 @@
-"""Where commanded lengths put the platform: the poses from which their equilibria are searched.
+"""The poses of commanded lengths: where the search for their equilibria starts.
 
-Lengths alone do not say where the platform is. From the reference pose, metres away, the way
-downhill may end in another equilibrium than the one that the robot comes to: a fully constrained
-platform rests twisted by 90 degrees there. So the pose whose straight lengths fit the commanded
-ones best is found first (forward kinematics by least squares: Levenberg and Marquardt's damped
-steps), from the reference pose and, where it fits badly, from poses of rows with similar lengths.
+Lengths alone do not state where the platform is. From the reference pose, metres away, the descent
+may end in another equilibrium than the robot's: a fully constrained platform comes to rest twisted
+by 90 degrees there. So the pose whose straight lengths fit the commanded ones best is found first
+(forward kinematics by least squares, with Levenberg and Marquardt's damped steps). It is searched
+from the reference pose and, if the fit is bad, from poses of rows with similar lengths.
 """
 
 from __future__ import annotations
@@ -17,22 +17,24 @@ from seecr.description.joints import motion_columns, pose_of_values, values_of_p
 from seecr.description.robot import Robot
 from seecr.pose import Array, cross, pose_add, quat_rotate
 
-# Steps at most; damping at first, and what it is divided and multiplied by.
+# Most steps; the first damping, and the factors by which it is divided and multiplied.
 _STEPS, _DAMPING, _LESS, _MORE = 60, 1e-3, 5.0, 4.0
-# Of any damping the least, beside squares of order 1: fewer cables than freedoms leave some free.
+# Least damping, relative to squares of order 1: with fewer cables than freedoms some are
+# undetermined.
 _LEAST = 1e-9
-# An anchor point this near to its exit point [of the robot's length] has no direction.
+# An anchor point this close to its exit point [robot's length] has no direction.
 _POINT = 1e-9
-# A step that takes away less than this part of the squares is the last.
+# A step that reduces the squares by less than this part is the last.
 _END = 1e-9
-# Rows with similar lengths that may help, rounds, and how much better another fit has to be.
+# Rows with similar lengths that are tried, rounds, and the factor by which another fit must be
+# better.
 _NEAR, _ROUNDS, _BETTER = 8, 8, 0.5
 
 
 def led(robot: Robot, commands: Commands) -> Array | None:
     """Poses (n, 7) whose straight lengths fit the commanded ones best.
 
-    None where poses are commanded, or where a search is to start from others than the reference.
+    None if poses are commanded, or if a search is to start from poses other than the reference.
     """
     if commands.lengths is None or np.any(commands.pose != robot.reference_pose):
         return None
@@ -51,7 +53,7 @@ def led(robot: Robot, commands: Commands) -> Array | None:
 
 
 def _helped(lengths: Array, pose: Array, misfit: Array) -> tuple[NDArray[np.intp], Array]:
-    """Rows one of whose neighbours fits much better, and the pose (k, 7) of that neighbour."""
+    """Rows with a neighbour that fits much better, and that neighbour's pose (k, 7)."""
     from scipy.spatial import cKDTree  # takes a while to import
 
     count = min(_NEAR + 1, len(lengths))
@@ -99,7 +101,7 @@ def _fitted(robot: Robot, lengths: Array, start: Array) -> tuple[Array, Array]:
 
 
 def _misfits(robot: Robot, lengths: Array, at: Array, scale: Array) -> tuple[Array, Array]:
-    """Straight lengths less the given ones (n, m) [m], and rates (n, m, d) by scaled steps."""
+    """Straight lengths minus the given ones (n, m) [m], and rates (n, m, d) by scaled steps."""
     free = not robot.joints
     pose, screws = (at, None) if free else pose_of_values(robot, at)
     arm = quat_rotate(pose[:, None, 3:], robot.anchor_points)

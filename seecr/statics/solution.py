@@ -1,4 +1,4 @@
-"""The answers to a batch of poses: where the platform rests, and whether that is certain."""
+"""Certified solutions of a batch of poses."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 class Status(Enum):
-    """What became of a pose; the value is the sentence a user reads."""
+    """How the solve of a pose ended; the value is the sentence that users read."""
 
     CONVERGED = "at rest: forces balance to 1e-9 of the load and the equilibrium is stable"
     UNSTABLE = "balanced but unstable: the platform would leave this pose at the slightest touch"
@@ -71,31 +71,32 @@ _NO_FREQUENCY = 1e-12
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Solution(Result):
-    """Answers of n poses, each with the certificate recomputed from the answer itself.
+    """Solutions for n poses, each with a certificate recomputed from the result itself.
 
     It prints as a few lines, and ``to_frame`` gives one row per pose.
 
     Attributes:
-        robot: that was solved.
+        robot: the robot that was solved.
         tables: the problem, from which everything can be recomputed.
+        evaluation: wrench, stiffness and cable states at the solution.
         command: (n, 7) commanded poses.
-        pose: (n, 7) where the platform rests.
-        deviation: (n, 6) [m, rad] pose less command: displacement and rotation vector, base
+        pose: (n, 7) equilibrium poses.
+        deviation: (n, 6) [m, rad] pose minus command: displacement and rotation vector, base
             frame. It carries more digits than the difference of the two poses.
         tensions: (n, m) [N] at the exit point.
-        slack: (n, m) bool, as :func:`seecr.statics.batch.is_slack` has it.
+        slack: (n, m) bool, as :func:`seecr.statics.batch.is_slack` defines it.
         rest_lengths: (n, m) [m].
         iterations: (n,) evaluations of the wrench.
-        residual: (n,) unbalanced force, and torque over the robot's length, relative to the
-            load; recomputed at the returned deviation.
-        energy: (n,) [J] elastic energy less the work of the load since the commanded pose, and of
-            the cables' weight since it hung straight there; nan under a moment from outside,
-            for laws that are not linear, and for cables with weight over pulleys, which have none
-            (the effect ``cable_weight`` says why).
+        residual: (n,) unbalanced force, or torque over the robot's length if larger, relative to
+            the load; recomputed at the returned deviation.
+        energy: (n,) [J] elastic energy minus the work of the load since the commanded pose, and of
+            the cables' weight since they hung straight there. NaN if there is no potential: under
+            an external moment, with hysteresis, exit friction or a user's cable law, and with cable
+            weight over pulleys (the effect ``cable_weight`` says why).
         status: (n,) of :class:`Status`.
-        others: the other stable equilibria of each command, where they were asked for.
-        jumps: on the way to each command, where it was followed.
-        line: (n,) of the file that commands were read from; None where there is none.
+        others: the other stable equilibria of each command, if they were asked for.
+        jumps: the jumps on the path to each command, if it was followed.
+        line: (n,) line of each command in its file; None without a file.
     """
 
     robot: Robot
@@ -120,31 +121,31 @@ class Solution(Result):
 
     @property
     def converged(self) -> NDArray[np.bool_]:
-        """Where the answer is a stable equilibrium, (n,)."""
+        """(n,) bool, the pose is a stable equilibrium."""
         return np.array([s is Status.CONVERGED for s in self.status], dtype=bool)
 
     @cached_property
     def stiffness(self) -> Array:
-        """Minus the derivative of the wrench by the pose, (n, d, d).
+        """Minus the derivative of the wrench with respect to the pose, (n, d, d).
 
-        For a free platform [N/m, N/rad; N m/m, N m/rad], by translation and rotation vector
-        in the base frame; else by the joints. An external moment, which has no potential,
-        takes its symmetry.
+        For a free platform [N/m, N/rad; N m/m, N m/rad], by translation and rotation vector in the
+        base frame; else by the joints. An external moment, which has no potential, makes it
+        asymmetric.
         """
         unit = self._units()
         return batch.stiffness(self.tables, self.evaluation) * unit[:, None] * unit[None, :]
 
     @cached_property
     def modes(self) -> tuple[Array, Array]:
-        """Frequencies (n, d) [Hz] of small vibrations, rising, and their shapes (n, d, d).
+        """Frequencies (n, d) [Hz] of small vibrations, ascending, and their shapes (n, d, d).
 
-        Of the platform's inertia on the stiffness of massless cables without damping; zero along
-        directions that nothing resists, NaN where the platform would leave, or has no rest.
-        ``shapes[i, :, k]`` [m, rad] is the motion of ``frequencies[i, k]``, in the coordinates of
-        :attr:`stiffness`.
+        They are those of the platform's inertia on massless cables without damping: zero along
+        directions without stiffness, NaN where the stiffness is negative or there is no
+        equilibrium. ``shapes[i, :, k]`` [m, rad] is the motion of ``frequencies[i, k]``, in the
+        coordinates of :attr:`stiffness`.
 
         Raises:
-            InputError: nobody said what the platform's inertia is.
+            InputError: the platform's inertia is not known.
         """
         frequencies = np.full(self.stiffness.shape[:2], np.nan)
         shapes = np.full(self.stiffness.shape, np.nan)
@@ -153,7 +154,7 @@ class Solution(Result):
         if len(rows) == 0:
             return frequencies, shapes
         mass = mass_matrices(self.robot, take(self.tables, rows), self.pose[rows])
-        # K v = w^2 M v, made symmetric by the mass matrix's own factor
+        # K v = w^2 M v, made symmetric by the Cholesky factor of the mass matrix
         half = np.linalg.inv(np.linalg.cholesky(mass))
         stiffness = self.stiffness[rows]
         stiffness = 0.5 * (stiffness + stiffness.swapaxes(1, 2))
@@ -167,11 +168,11 @@ class Solution(Result):
 
     @property
     def frequencies(self) -> Array:
-        """Of small vibrations, (n, d) [Hz], rising; see :attr:`modes`."""
+        """Frequencies of small vibrations, (n, d) [Hz], in ascending order; see :attr:`modes`."""
         return self.modes[0]
 
     def rows(self, index: ArrayLike) -> Solution:
-        """Some rows: numbers or a mask (n,)."""
+        """Some rows, by index or by a mask (n,)."""
         at = np.arange(len(self))[np.asarray(index)]
         values: dict[str, Any] = {name: getattr(self, name)[at] for name in _PER_ROW}
         values["tables"] = take(self.tables, at)
@@ -184,13 +185,13 @@ class Solution(Result):
 
     @cached_property
     def _softest(self) -> tuple[Array, Array]:
-        """Smallest eigenvalue of the scaled stiffness (n,), and a direction of it (n, d)."""
+        """Smallest eigenvalue of the scaled stiffness (n,), and its eigenvector (n, d)."""
         from seecr.compiled.softest import softest_batch  # takes a while to import
 
         hessian = self.evaluation.hessian
         rows = np.flatnonzero(self.status == Status.SINGULAR)
         if len(rows):
-            # a cable that is just as long as its rest length resists on one side only
+            # a cable that is exactly as long as its rest length has stiffness on one side only
             there = batch.take_evaluation(self.evaluation, rows)
             hessian = hessian.copy()
             hessian[rows] = batch.without_idle(take(self.tables, rows), there).hessian
@@ -204,20 +205,20 @@ class Solution(Result):
 
     @property
     def smallest_eigenvalue(self) -> Array:
-        """Of the stiffness, (n,) [N/m], rotations scaled by the robot's length."""
+        """Smallest eigenvalue of the stiffness, (n,) [N/m], rotations times the robot's length."""
         return self._softest[0]
 
     @property
     def softest_direction(self) -> Array:
-        """Eigenvector of the smallest eigenvalue, (n, d) [m, rad], a unit step of it.
+        """Eigenvector of the smallest eigenvalue, (n, d) [m, rad].
 
-        Its largest component (rotations by the robot's length) is positive. Where the stiffness is
-        not known, NaN.
+        It has unit length and a positive largest component, with rotations times the robot's
+        length. NaN if the stiffness is not known.
         """
         return self._softest[1] / self._units()
 
     def _units(self) -> Array:
-        """Robot's length for rotations, 1 for translations, (d,)."""
+        """The robot's length for rotations, 1 for translations, (d,)."""
         return np.where(self.robot.hinges, self.robot.length, 1.0)
 
     def lines(self, commanded: bool = True) -> list[str]:
@@ -238,7 +239,7 @@ class Solution(Result):
         if commanded:
             away = np.linalg.norm(self.deviation[:, :3], axis=1)
             turned = np.degrees(np.linalg.norm(self.deviation[:, 3:], axis=1))
-            # both at once, as distances are: rounding must not say which of two is further
+            # combined into one distance, so that rounding does not decide which pose is furthest
             apart = np.hypot(away, self.robot.length * np.radians(turned))
             k = int(known[np.argmax(apart[known])])
             out.append(
@@ -271,7 +272,7 @@ class Solution(Result):
         ]
 
     def as_json(self) -> Record:
-        """``seecr`` of a case in ``results.json``: the answers of all poses, by quantity."""
+        """``seecr`` of a case in ``results.json``: the results of all poses, by quantity."""
         return {
             "pose": self.pose,
             "deviation": self.deviation,
@@ -284,11 +285,11 @@ class Solution(Result):
         }
 
     def place(self, *rows: int) -> str:
-        """Rows in words: "line 24" of their file, "pose 3", counted from 0, without one."""
+        """The names of rows: "line 24" of a file, or "pose 3", counted from 0, without one."""
         return rows_words(rows, self.line)
 
     def sentence(self, i: int) -> str:
-        """What became of pose i, with the direction where it is singular or unstable."""
+        """The status of pose i, with the softest direction if it is singular or unstable."""
         status = self.status[i]
         if status not in (Status.SINGULAR, Status.UNSTABLE):
             return str(status.value)
@@ -303,7 +304,7 @@ class Solution(Result):
 
 
 def certify(robot: Robot, tables: Tables, found: batch.Evaluation) -> Solution:
-    """Recompute wrench, stiffness and energy at the answer, and say what it is worth."""
+    """Recompute wrench, stiffness and energy at the result, and derive its status."""
     check = batch.evaluate(tables, found, threads=None)
     check.count = found.count
     status = np.full(len(found.outcome), Status.GAVE_UP, dtype=object)
@@ -311,7 +312,7 @@ def certify(robot: Robot, tables: Tables, found: batch.Evaluation) -> Solution:
         status[found.outcome == outcome] = words
     balanced = check.residual < TOLERANCE
     status[(status == Status.CONVERGED) & ~balanced] = Status.STALLED
-    # not found's own: a search in joint values alone leaves its deviations unplaced
+    # not the deviations in ``found``: SciPy's search on joints leaves these at zero
     moved = check.deviation
     turn = np.where(moved[:, 3:4] < 0, -1.0, 1.0) * moved[:, 3:]
     lost = np.isin(found.outcome, (FALLING, CABLE_LAW, SPINNING))
@@ -333,7 +334,7 @@ def certify(robot: Robot, tables: Tables, found: batch.Evaluation) -> Solution:
 
 
 def _blank(values: Array, rows: NDArray[np.bool_]) -> Array:
-    """No number where there is no answer."""
+    """NaN in rows without a result."""
     values = values.copy()
     values[rows] = np.nan
     return values

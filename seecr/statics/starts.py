@@ -1,4 +1,4 @@
-"""Poses as callers give them: those that are commanded, and those where a search starts."""
+"""Poses given by callers: commanded poses, and poses at which a search starts."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def start_of(
 
 
 def commanded_poses(values: ArrayLike, name: str = "poses") -> Array:
-    """Poses (n, 7) with unit quaternions, checked; ``name`` is what an error calls them."""
+    """Checked poses (n, 7) with unit quaternions; ``name`` is for errors."""
     array = np.atleast_2d(finite(values, name))
     if array.ndim != 2 or array.shape[1] != 7:
         raise InputError(f"{name} must be (n, 7), x y z qw qx qy qz, got {np.shape(values)}")

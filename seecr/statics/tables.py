@@ -31,35 +31,35 @@ from seecr.pose import Array
 
 @dataclass(eq=False)
 class Tables:
-    """The problem of n poses as the compiled loop reads it."""
+    """The problem of n poses in the form that the compiled loop reads."""
 
     cables: Array  # (n, m, N_COLUMNS)
     load: Array  # (n, N_LOAD)
     poses: Array  # (n, 7) commanded
     screws: Array  # (n, d, 7) joints at the commanded pose; (n, 0, 7) for a free platform
     length: float
-    scale: Array  # (n,) [N] that residuals are measured against
-    reach: Array  # (n,) [m] deviations beyond this are a fall
+    scale: Array  # (n,) [N] load that residuals are measured against
+    reach: Array  # (n,) [m] a larger deviation counts as a fall
     n_dof: int
 
     def __len__(self) -> int:
         return len(self.poses)
 
     def lengthened(self, by: float) -> Tables:
-        """The same with every cable longer by a length [m]."""
+        """The same tables with every cable longer by a length [m]."""
         cables = self.cables.copy()
         cables[..., REST] += by
         cables[..., GAP] -= by
         return replace(self, cables=cables)
 
     def sliding(self) -> Tables:
-        """The same without what holds cables on small ways: hysteresis, friction at exit points."""
+        """The same tables without hysteresis and friction at the exit points, which hold cables."""
         cables = self.cables.copy()
         cables[..., [HYSTERESIS, FRICTION]] = 0.0
         return replace(self, cables=cables)
 
     def with_past(self, other: Tables) -> Tables:
-        """The same with what is left of the rows before as other tables have it."""
+        """The same tables with the history columns of others."""
         cables, past = self.cables.copy(), list(OF_THE_PAST)
         cables[..., past] = other.cables[..., past]
         return replace(self, cables=cables)
@@ -74,14 +74,14 @@ def _screws_of(robot: Robot, poses_bytes: bytes, n: int) -> Array:
 
 
 def assemble(setup: Setup, strains: Array | None = None) -> Tables:
-    """The tables of a setup. Columns of the past are left at their null.
+    """The tables of a setup; history columns are at their null values.
 
     Args:
         setup: n rows.
-        strains: (n, m) about which users' laws are linearised; zero by default.
+        strains: (n, m) at which users' cable laws are linearised; zero by default.
     """
     robot = setup.robot
-    poses = np.array(setup.commands.pose, order="C")  # of our own: see seecr.compiled.jit
+    poses = np.array(setup.commands.pose, order="C")  # a copy: see seecr.compiled.jit
     n, m = len(poses), robot.n_cables
     cables, load = np.zeros((n, m, N_COLUMNS)), np.zeros((n, N_LOAD))
     _write(setup, QUANTITIES, cables, load, blank=True)
@@ -100,24 +100,24 @@ def assemble(setup: Setup, strains: Array | None = None) -> Tables:
 
 
 def relengthened(tables: Tables, setup: Setup) -> Tables:
-    """The tables of a setup, from those of another that differs in lengths beyond the command."""
+    """The tables of a setup, from those of another that differs only in ``extra_length``."""
     cables = tables.cables.copy()
     _write(setup, {"extra_length"}, cables, tables.load)
     return replace(tables, cables=cables, reach=_reach(cables))
 
 
 def reassembled(tables: Tables, setup: Setup, names: Collection[str]) -> Tables:
-    """Tables with some of their quantities as in a setup of the same rows, without users' laws.
+    """Tables with some quantities taken from a setup of the same rows; users' laws are left out.
 
-    What is left of the rows before stays, and so does what a search measures against
-    (``scale``, ``reach``): they are for differences at rest.
+    The history columns are kept, and so are the scales of a search (``scale``, ``reach``): the
+    result is for differences at an equilibrium.
     """
     cables, load = tables.cables.copy(), tables.load.copy()
     _write(setup, names, cables, load)
     return replace(tables, cables=cables, load=load)
 
 
-# Quantities that go into more than their own column: into lengths, into weight and vertical.
+# Quantities that also affect other columns: rest lengths and gaps, weight and vertical.
 _OF_LENGTHS = {"exit_points", "anchor_points", "pulley_radius"} | {
     name for name, item in QUANTITIES.items() if item.paid_out
 }
@@ -127,9 +127,9 @@ _OF_LOAD = {"mass", "centre_of_mass", "gravity", "pulley_radius", "lift"}
 def _write(
     setup: Setup, names: Collection[str], cables: Array, load: Array, *, blank: bool = False
 ) -> None:
-    """Write some quantities, and what is made of them, where the compiled loop reads it.
+    """Write some quantities, and what follows from them, to where the compiled loop reads them.
 
-    In tables that are ``blank`` the zeros are there already, most of them for nothing.
+    In ``blank`` tables zeros are not written, since they are there already.
     """
     for name in names:
         item = QUANTITIES[name]
@@ -153,7 +153,7 @@ def _write(
 
 
 def _linearise(setup: Setup, strains: Array, cables: Array) -> None:
-    """Tangents of the users' laws at the given strains (Newton's method does the rest)."""
+    """Add the tangents of users' laws at the given strains; Newton's method does the rest."""
     step = 1e-6 * (1e-3 + np.abs(strains))
     for law in setup.laws:
         slope = (law(strains + step) - law(strains - step)) / (2.0 * step)
@@ -162,7 +162,11 @@ def _linearise(setup: Setup, strains: Array, cables: Array) -> None:
 
 
 def _hanging(setup: Setup) -> Array:
-    """Vertical of the planes in which cables hang: gravity's, or that of pulleys and frame."""
+    """The vertical of the planes in which cables hang.
+
+    It is opposite to gravity, or the frame's vertical if there are pulleys or exit points that
+    lift.
+    """
     g = np.linalg.norm(setup.gravity)
     if g == 0.0 or np.any(setup.pulley_radius) or np.any(setup.lift):
         return setup.robot.up
@@ -170,17 +174,17 @@ def _hanging(setup: Setup) -> Array:
 
 
 def _reach(cables: Array) -> Array:
-    """(n,) [m] deviations beyond this are a fall."""
+    """(n,) [m] a larger deviation counts as a fall."""
     rest, gap = cables[..., REST], cables[..., GAP]
     return np.asarray(3.0 * (rest.max(axis=1) + np.abs(gap).max(axis=1)))
 
 
 def _load_scale(setup: Setup) -> Array:
-    """Load [N] of each pose: weight, external force and moment over the robot's length."""
+    """Load [N] of each pose: weight, external force, and moment over the robot's length."""
     force = np.linalg.norm(setup.wrench[:, :3], axis=1)
     moment = np.linalg.norm(setup.wrench[:, 3:], axis=1) / setup.robot.length
     scale = setup.weight() + force + moment
-    # nothing loads the platform: measure against what a strain of 1e-3 would pull
+    # an unloaded platform is measured against the force at a strain of 1e-3
     return np.where(scale > 0.0, scale, 1e-3 * float(np.max(setup.ea)))
 
 

@@ -1,4 +1,4 @@
-"""Where a robot can hold its platform: single poses, whole grids of them, edges and chances."""
+"""The poses that a robot can hold: single poses, whole grids, edges and probabilities."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Probabilities by what a calibrated model does not know: that poses hold, and tensions keep."""
+"""Probabilities that poses are held and tensions stay within limits, from a model's covariance."""
 
 from __future__ import annotations
 
@@ -29,10 +29,11 @@ from seecr.workspace.zones import load_scale, margins_from
 
 __all__ = ["asked_chance", "held_chance", "kept_chance", "margins_with"]
 
-# Draws of the parameters: for tensions, which follow linearly; for poses, first and at most. Where
-# the first all agree, and are this many standard deviations from the limit, the rest is left out.
+# Number of draws of the parameters: for tensions, which are linear in them; for poses, first and at
+# most. If the first draws all agree, and lie this many standard deviations from the limit, the rest
+# is left out.
 _LINEAR, _FIRST, _DRAWS, _SURE = 4096, 16, 256, 6.0
-# Rows at a time.
+# Rows per batch.
 _PART = 64
 _HOLDS_NONE = (
     "{} has fewer cables than freedoms: it holds no poses; expected a map without probabilities"
@@ -52,19 +53,19 @@ def kept_chance(
     lowest: ArrayLike = 0.0,
     highest: ArrayLike = np.inf,
 ) -> Array | None:
-    """The probability that all tensions stay within limits, with what the model does not know.
+    """The probability that all tensions stay within limits, given the uncertainty of the model.
 
-    Tensions to first order in the parameters. A cable that pulls and would go slack leaves a limit
-    of zero; one that is slack stays so.
+    Tensions are to first order in the parameters. A taut cable that would go slack violates a limit
+    of zero; a slack cable stays slack.
 
     Args:
         robot: as described, or its MJCF.
-        commands: n rows, such as those of a correction; NaN in lengths where there are none.
+        commands: n rows, such as those of a correction; NaN lengths mark rows without any.
         model: as ``crosscheck calibrate`` writes it, or its file.
         lowest, highest: (m,) or one [N].
 
     Returns:
-        (n,), NaN where a row has no rest; None where the model keeps no covariance.
+        (n,), NaN for a row without equilibrium; None if the model keeps no covariance.
     """
     robot = robot_of(robot)
     known = moving_covariance(model_given(model, robot))
@@ -104,11 +105,11 @@ def held_chance(
     highest: ArrayLike = np.inf,
     wrenches: ArrayLike | None = None,
 ) -> Array | None:
-    """The probability that poses can be held within limits, with what the model does not know.
+    """The probability that poses can be held within limits, given the uncertainty of the model.
 
-    The part of 256 models drawn from its covariance that hold them; of 16, where these are all far
-    on one side. No value is drawn beyond its bounds; a model with which a cable's equations have no
-    answer holds nothing.
+    It is the part of 256 models, drawn from the covariance, that can hold the pose; of 16 models if
+    these are all far on one side. Values are clipped to their bounds. A model with which a cable's
+    equations have no solution holds nothing.
 
     Args:
         robot: as described, or its MJCF.
@@ -117,10 +118,10 @@ def held_chance(
         lowest, highest, wrenches: as in :func:`seecr.tension_margin`.
 
     Returns:
-        (n,); None where the model keeps no covariance.
+        (n,); None if the model keeps no covariance.
 
     Raises:
-        InputError: fewer cables than freedoms.
+        InputError: the robot has fewer cables than degrees of freedom.
     """
     robot = robot_of(robot)
     known = moving_covariance(model_given(model, robot))
@@ -139,7 +140,7 @@ def held_chance(
 
     first = held(places, vectors[:_FIRST])
     out = np.asarray((first >= edge).mean(axis=0))
-    # limits of no end, or poses out of all reach, are far from any
+    # infinite limits, or poses out of reach, are far from any edge
     finite = np.where(np.isfinite(first), first, np.nan)
     far: NDArray[np.bool_] = np.asarray(~np.isfinite(first).all(axis=0))
     mean, spread = finite[:, ~far].mean(axis=0), finite[:, ~far].std(axis=0)
@@ -153,10 +154,10 @@ def held_chance(
 
 
 def check_chance(robot: Robot, model: GivenEffects) -> None:
-    """That a robot's poses can have probabilities, before hours are spent on them.
+    """Check that poses can have probabilities, before hours are spent on them.
 
     Raises:
-        InputError: fewer cables than freedoms, or something else than a model with a covariance.
+        InputError: fewer cables than degrees of freedom, or not a model with a covariance.
     """
     if robot.n_cables < robot.n_dof:
         raise InputError(_HOLDS_NONE.format(robot.name))
@@ -168,10 +169,10 @@ def asked_chance(
     robot: Robot, poses: Array, model: GivenEffects, lowest: ArrayLike, highest: ArrayLike,
     wrenches: ArrayLike | None,
 ) -> Array:  # fmt: skip
-    """As :func:`held_chance`, of what has to be a model with a covariance.
+    """Like :func:`held_chance`, but a model with a covariance is required.
 
     Raises:
-        InputError: it is none.
+        InputError: it is not one.
     """
     found = None
     if isinstance(model, Model):
@@ -189,7 +190,7 @@ def margins_with(
     highest: ArrayLike = np.inf,
     wrenches: ArrayLike | None = None,
 ) -> Array:
-    """Margins (n,) [N] as :func:`seecr.tension_margin`, of a robot with effects at poses (n, 7).
+    """Margins (n,) [N] like :func:`seecr.tension_margin`, of a robot with effects at poses (n, 7).
 
     Raises:
         InputError: a set of wrenches for a robot on joints.
@@ -204,7 +205,7 @@ def margins_with(
         every = [farthest_inside(_pushed(tables, one), low, high).margins for one in some]
         return np.asarray(np.min(every, axis=0))
     matrices, load = balance_of(tables, low)
-    # of -W tau = w: the signs are those of the gradient
+    # load of -W tau = w: the signs are those of the gradient
     loads = load[:, None]
     if wrenches is not None:
         loads = loads + some * np.where(robot.hinges, 1.0 / robot.length, 1.0)
@@ -212,7 +213,7 @@ def margins_with(
 
 
 def _pushed(tables: Tables, wrench: Array) -> Tables:
-    """The same with one more external wrench (6,) [N, N m] at the platform's origin."""
+    """The same tables with an additional external wrench (6,) [N, N m] at the platform's origin."""
     load = tables.load.copy()
     load[:, EXTERNAL_FORCE : EXTERNAL_FORCE + 3] += wrench[:3]
     load[:, EXTERNAL_MOMENT : EXTERNAL_MOMENT + 3] += wrench[3:]
@@ -222,14 +223,14 @@ def _pushed(tables: Tables, wrench: Array) -> Tables:
 def _drawn(terms: Terms, covariance: Array, count: int) -> Array:
     """Evenly spread draws (count, p) of a normal distribution about the terms' values, in bounds.
 
-    A value beyond its bound is put on it, as a fit to such data would have: many effects begin at
-    a bound, where they are absent, and draws that all are inside by chance are as good as never.
+    A value beyond its bound is set to the bound, as a fit to such data would do. Rejecting it is no
+    alternative: many effects are absent at a bound, and hardly any draw is within all bounds.
     """
     own = terms.vector
     if len(own) == 0:
         return np.zeros((count, 0))
-    # a coefficient of the cubic stretch is off by 10^5 and a point by 10^-4 m: of their covariance
-    # as it stands rounding leaves nothing of the point's
+    # scaled to unit variances: a coefficient of the cubic stretch is off by 10^5 and a point by
+    # 10^-4 m, and rounding would leave nothing of the point's part
     error = np.sqrt(np.diag(covariance))
     unit = np.where(error > 0.0, error, 1.0)
     values, vectors = np.linalg.eigh(covariance / unit / unit[:, None])

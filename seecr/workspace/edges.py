@@ -1,4 +1,4 @@
-"""The edge of a workspace, along straight ways that lead out of it."""
+"""The edge of a workspace, along straight lines that lead out of it."""
 
 from __future__ import annotations
 
@@ -28,25 +28,25 @@ def boundary(
     effects: GivenEffects = (),
     at_least: float | None = None,
 ) -> Array:
-    """Where the ways from poses that can be held to poses that cannot leave the workspace.
+    """Points on the workspace's edge, between poses that can be held and poses that cannot.
 
-    By bisection on straight ways of the position.
+    They are found by bisection along the straight line between the two positions.
 
     Args:
         robot: as described, or its MJCF.
-        inside, outside: (n, 7) poses, of the same orientation in each row.
-        tolerance: [m] within which the boundary is found.
+        inside, outside: (n, 7) poses, with the same orientation in each row.
+        tolerance: [m] within which the edge is found.
         lowest, highest, wrenches: as in :func:`seecr.tension_margin`.
-        effects: of the robot, besides.
-        at_least: take for held what is held with this probability, by what a model that keeps its
-            covariance does not know; without it, what is held with the model's own values.
+        effects: effects of the robot: a model, its file, or effects with values.
+        at_least: count poses as held if their probability is at least this, given the uncertainty
+            of a model with a covariance; by default, those that the model's own values hold.
 
     Returns:
-        (n, 7), the last poses found that can be held; of no ways none.
+        (n, 7) the last poses found that can be held.
 
     Raises:
-        InputError: a pose that is not on the side it is said to be; a tolerance that is none; a
-            probability asked of something without a covariance.
+        InputError: a pose is on the wrong side, the tolerance is not positive, or a probability is
+            asked for without a covariance.
     """
     robot = robot_of(robot)
     if not 0.0 < tolerance < np.inf:

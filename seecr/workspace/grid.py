@@ -1,4 +1,4 @@
-"""What holds at the poses of a grid, as arrays: shares, sizes, the edges between cells."""
+"""A workspace on a grid of poses, as arrays: margins, sizes, and the edges between cells."""
 
 from __future__ import annotations
 
@@ -16,31 +16,31 @@ from seecr.workspace.margins import is_held
 
 __all__ = ["NEVER", "Workspace"]
 
-# Slack cables of a pose at which the elastic robot does not come to rest.
+# Marks the number of slack cables at a pose where the elastic robot does not come to rest.
 NEVER = -1
 _FREEDOMS = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Workspace(Result):
-    """What holds at the poses of a grid, (nx, ny, nz) each, of one orientation.
+    """The workspace on a grid of positions with one orientation; arrays are (nx, ny, nz).
 
     Attributes:
         robot: as described.
         axes: the grid's x, y and z [m].
         orientation: (4,) quaternion of all poses.
-        margin: [N] how far inside their limits all tensions can stay; below zero where the pose
-            cannot be held. For robots with fewer cables than freedoms zero where the position
-            can be held in some orientation, and minus infinity where not.
-        deviation: (..., 3) [m] from the command to where the elastic robot rests; NaN where it
-            does not; float32.
+        margin: [N] how far inside their limits all tensions can stay; negative if the pose cannot
+            be held. For robots with fewer cables than degrees of freedom it is zero if the position
+            can be held in some orientation, and minus infinity if not.
+        deviation: (..., 3) [m] from the command to the elastic robot's equilibrium; NaN if it has
+            none; float32.
         rotation: (..., 3) [rad] likewise.
-        slack: number of slack cables; -1 where it does not rest.
-        stiffness: [N/m] smallest eigenvalue, rotations by the robot's length.
-        softest: (..., d) [m, rad] the direction of it, :attr:`Solution.softest_direction`; float32.
-        chance: the probability that the pose can be held, by what the model does not know; float32;
-            None where the model keeps no covariance, or there is none.
-        elastic: whether it was asked where the elastic robot comes to rest.
+        slack: number of slack cables; -1 if there is no equilibrium.
+        stiffness: [N/m] smallest eigenvalue, with rotations times the robot's length.
+        softest: (..., d) [m, rad] its direction, :attr:`Solution.softest_direction`; float32.
+        chance: the probability that the pose can be held, given the uncertainty of the model;
+            float32; None if it was not asked for.
+        elastic: whether the equilibria of the elastic robot were computed.
     """
 
     robot: Robot
@@ -56,10 +56,10 @@ class Workspace(Result):
     elastic: bool = True
 
     def likely(self, at_least: float) -> NDArray[np.bool_]:
-        """Where the pose can be held with a probability of at least that.
+        """The poses that can be held with at least a given probability.
 
         Raises:
-            InputError: a map without probabilities, or a number that is none.
+            InputError: the map has no probabilities, or the number is not a probability.
         """
         if not 0.0 < at_least <= 1.0:
             raise InputError(f"a probability must be above 0 and at most 1, got {at_least:g}")
@@ -69,7 +69,7 @@ class Workspace(Result):
 
     @property
     def feasible(self) -> NDArray[np.bool_]:
-        """Where the pose can be held by tensions within the limits."""
+        """The poses that tensions within the limits can hold."""
         return is_held(self.robot, self.margin)
 
     def crossings(self, poses: NDArray[np.bool_]) -> tuple[Array, Array]:
@@ -79,7 +79,7 @@ class Workspace(Result):
             poses: (nx, ny, nz) bool, such as ``feasible`` or ``likely(0.95)``.
 
         Returns:
-            (k, 7) those that are, and (k, 7) those that are not: what :func:`boundary` takes.
+            (k, 7) those that are, and (k, 7) those that are not: the arguments of :func:`boundary`.
         """
         number, inside = np.arange(poses.size).reshape(poses.shape), poses.ravel()
         pairs = np.concatenate([
@@ -96,20 +96,21 @@ class Workspace(Result):
 
     @property
     def rests(self) -> NDArray[np.bool_]:
-        """Where the elastic robot comes to rest, if the elastic map was asked for."""
+        """The poses at which the elastic robot comes to rest, if that was computed."""
         return np.asarray(self.slack != NEVER)
 
     @property
     def cell(self) -> float:
-        """Size of a cell of the grid: [m^3], or [m^2] or [m] where an axis has one value."""
+        """Size of a cell of the grid: [m^3], or [m^2] or [m] if some axes have a single value."""
         steps = [np.ptp(axis) / (len(axis) - 1) for axis in self.axes if len(axis) > 1]
         return float(np.prod(steps))
 
     @property
     def shares(self) -> Array:
-        """(nx, ny, nz) size of the grid's box that each pose stands for, [m^3], [m^2] or [m].
+        """(nx, ny, nz) size of each pose's part of the grid's box, [m^3], [m^2] or [m].
 
-        Half a cell at the ends of an axis: all of them together are the box between the ends.
+        It is half a cell at the ends of an axis, so that all of them add up to the box between the
+        ends.
         """
         along = []
         for axis in self.axes:
@@ -118,19 +119,19 @@ class Workspace(Result):
         return np.asarray(np.einsum("i,j,k->ijk", *along))
 
     def size(self, poses: NDArray[np.bool_]) -> float:
-        """Size of the part of the grid's box that some poses (nx, ny, nz) stand for."""
+        """Size of the part of the grid's box that belongs to some poses (nx, ny, nz)."""
         return float(self.shares[poses].sum())
 
     @property
     def softest_at(self) -> tuple[int, ...] | None:
-        """Where of the grid the elastic robot is softest of all poses that can be held."""
+        """Index of the pose with the smallest stiffness among those that can be held."""
         stiffness = np.where(self.feasible & self.rests, self.stiffness, np.nan)
         if not np.isfinite(stiffness).any():
             return None
         return tuple(map(int, np.unravel_index(np.nanargmin(stiffness), stiffness.shape)))
 
     def size_words(self, poses: NDArray[np.bool_]) -> str:
-        """The size of some poses (nx, ny, nz) of the grid, for people."""
+        """The size of some poses (nx, ny, nz) of the grid, as text."""
         along = sum(len(axis) > 1 for axis in self.axes)
         unit = {1: " m", 2: " m^2", 3: " m^3"}.get(along)
         return "" if unit is None else f", {self.size(poses):.4g}{unit}"
@@ -181,10 +182,10 @@ class Workspace(Result):
         return [dict(zip(listed, row, strict=True)) for row in zip(*listed.values(), strict=True)]
 
     def as_json(self, at_least: float | None = None) -> Record:
-        """``map.json``: how much of the grid can be held, and the worst of the elastic robot there.
+        """``map.json``: how much can be held, and the elastic robot's largest errors there.
 
         Args:
-            at_least: a probability with which poses are to be held, of a map that has them.
+            at_least: also report the poses held with at least this probability.
         """
         likely = None
         if at_least is not None:

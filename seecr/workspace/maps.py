@@ -1,6 +1,6 @@
-"""Workspaces on grids: where a platform can be held, and where an elastic robot really comes to.
+"""Workspaces on grids: where a platform can be held, and where the elastic robot comes to rest.
 
-Grids are gone through in parts, so that a million poses need no more memory than their answers.
+Grids are processed in parts, so that memory for a million poses is that of the results.
 """
 
 from __future__ import annotations
@@ -32,17 +32,17 @@ Progress = Callable[[int], None]
 
 __all__ = ["default_axes", "workspace_map"]
 
-# Poses at a time.
+# Poses per part.
 _PART = 5_000
-# Default grid: values along an axis on which something can change.
+# Values of the default grid along an axis with an extent; fewer for robots with too few cables.
 _VALUES, _FEW = 33, 13
 
 
 def default_axes(robot: GivenRobot, values: int | None = None) -> tuple[Array, Array, Array]:
-    """A grid between the exit points, as far below the reference pose as they are above it."""
+    """A grid over the exit points, down to as far below the reference pose as they are above it."""
     robot = robot_of(robot)
     if values is None:
-        # robots with too few cables are solved for their orientation, which takes a while
+        # robots with too few cables are solved for their orientation, which is slow
         values = _VALUES if robot.n_cables >= robot.n_dof else _FEW
     points = np.concatenate([robot.exit_points, robot.reference_pose[None, :3]])
     low, high = points.min(axis=0), points.max(axis=0)
@@ -76,20 +76,23 @@ def workspace_map(
         robot: as described, or its MJCF.
         x, y, z: (nx,), (ny,), (nz,) or numbers [m].
         orientation: (4,) quaternion of all poses; that of the reference pose by default.
-        lowest, highest: (m,) or one [N], limits of the tensions for what can be held.
-        wrenches: (k, 6) set of external wrenches that it must be held under, each of them.
-        effects: of the robot, besides; where the elastic robot is solved none may have a memory of
-            rows before, since poses of a grid are in no order. With a model that
-            keeps its covariance, and as many cables as freedoms, each pose has its ``chance`` too,
-            if asked for.
-        elastic: whether to solve where the elastic robot comes to rest.
-        chance: whether to find how likely each pose can be held; takes a millisecond or so per
-            pose near the edge.
+        lowest, highest: (m,) or one [N], limits of the tensions for poses that can be held.
+        wrenches: (k, 6) external wrenches [N, N m]; a pose must be held under each of them.
+        effects: effects of the robot: a model, its file, or effects with values. None may have a
+            history if ``elastic`` is set or there are fewer cables than degrees of freedom, since
+            the poses of a grid are in no order.
+        elastic: whether to solve for the elastic robot's equilibrium at each pose.
+        chance: whether to compute the probability that each pose can be held. That needs a model
+            with a covariance and no fewer cables than degrees of freedom, and takes a millisecond
+            or so per pose near the edge.
         progress: called as poses are done.
 
+    Returns:
+        margins and equilibria at all poses of the grid.
+
     Raises:
-        InputError: an axis without values, an orientation that the joints do not allow; effects
-            with a memory; a chance asked of something without a covariance.
+        InputError: an axis without values, an orientation that the joints do not allow, effects
+            with a history, or probabilities asked for without a covariance.
     """
     robot = robot_of(robot)
     effects = read_once(effects, robot)
@@ -132,7 +135,7 @@ def workspace_map(
 
 
 def _refuse_memory(robot: Robot, effects: GivenEffects) -> None:
-    """Refuse what would go along the grid from pose to pose, and come out by the grid's order."""
+    """Refuse effects with history: their results would depend on the order of the grid."""
     home = Commands(robot.reference_pose[None])
     acting = effects_of(effects, robot)
     if Experiment(robot, home).setup(acting).has_history:
@@ -146,7 +149,7 @@ def _refuse_memory(robot: Robot, effects: GivenEffects) -> None:
 def _run_telling(
     fill: Callable[[slice], None], parts: list[slice], progress: Progress | None
 ) -> None:
-    """Fill all parts in several threads; the caller's tells of what is done, in any of them."""
+    """Fill all parts in several threads; the calling thread reports progress for all of them."""
     if progress is None:
         return run_parts(fill, parts)
     here, done = threading.current_thread(), SimpleQueue[int]()

@@ -1,4 +1,4 @@
-"""Margins of a robot with effects at given poses, and which of them mean that a pose is held."""
+"""Margins of a robot with effects at given poses, and whether they mean that a pose is held."""
 
 from __future__ import annotations
 
@@ -21,7 +21,10 @@ def margins_at(
     robot: Robot, poses: Array, lowest: ArrayLike, highest: ArrayLike,
     wrenches: ArrayLike | None, effects: GivenEffects,
 ) -> Array:  # fmt: skip
-    """Margins (n,) [N]; of robots with too few cables by position, the orientation solved."""
+    """Margins (n,) [N]; robots with too few cables are solved for the orientation.
+
+    Their margins are 0 if the position can be held, else minus infinity.
+    """
     acting = effects_of(effects, robot)
     if robot.n_cables >= robot.n_dof:
         if acting:
@@ -36,10 +39,10 @@ def margins_at(
 
 
 def is_held(robot: Robot, margin: Array) -> NDArray[np.bool_]:
-    """Whether margins [N] are those of poses that can be held, but for rounding."""
+    """Whether margins [N] mean that a pose can be held, to within rounding."""
     return np.asarray(margin >= -1e-9 * load_scale(robot))
 
 
 def read_once(effects: GivenEffects, robot: Robot) -> GivenEffects:
-    """The same, a model read from its file: every part of a map asks for it."""
+    """The same effects, but a model's file is read: every part of a map needs it."""
     return model_given(effects, robot) if isinstance(effects, str | Path) else effects

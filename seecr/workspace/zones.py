@@ -1,8 +1,9 @@
 """Where a robot can hold its platform, and where its cables go slack.
 
-The static-feasible workspace (SFW) are the poses at which tensions that only pull balance the
-load (paper, eq 3, Figs 10 and 11). Elastic cables do not change it: it asks what tensions could
-do at a pose, not whether the platform comes to rest there when the winches are told to.
+The static-feasible workspace (SFW) is the set of poses at which non-negative tensions balance the
+load (paper, eq 3, Figs 10 and 11). The elasticity of the cables does not change it: the SFW is
+about the tensions that are possible at a pose, not about whether the platform comes to rest there
+when it is commanded to.
 """
 
 from __future__ import annotations
@@ -26,9 +27,9 @@ from seecr.result import Record, Result
 from seecr.statics.solution import Solution
 from seecr.threads import in_parts
 
-# Part of the load that may stay unbalanced: rounding of the tensions found.
+# Part of the load that may stay unbalanced, by rounding of the tensions.
 _BALANCED = 1e-9
-# Directions in which W is weaker than this part of its strongest are none of its own.
+# Singular values of W below this part of the largest count as zero.
 _SINGULAR = 1e-9
 
 
@@ -39,7 +40,7 @@ class Zone(Result):
     Attributes:
         first: index of its first pose.
         last: index of its last pose.
-        slack: number of slack cables; None where there is no answer to count in.
+        slack: number of slack cables; None where the solve did not converge.
     """
 
     first: int
@@ -47,7 +48,7 @@ class Zone(Result):
     slack: int | None
 
     def lines(self) -> list[str]:
-        """Which poses, and how many cables are slack there."""
+        """One line: which poses, and how many cables are slack there."""
         one, last = self.first == self.last, self.last
         poses = f"pose {last}" if one else f"poses {self.first} to {last}"
         count = "no answer" if self.slack is None else counted(self.slack, "slack cable")
@@ -70,7 +71,7 @@ def feasible(
 
     Args:
         robot: as described, or its MJCF; its mass, centre of mass and gravity are the load.
-        poses: (n, 7) or (7,), where the platform really is.
+        poses: (n, 7) or (7,), actual poses of the platform.
         wrench: (6,) or (n, 6) external force [N] at the platform origin and moment [N m].
         lowest: (m,) or one [N], not negative.
         highest: (m,) or one [N]; infinite for none.
@@ -92,23 +93,24 @@ def tension_margin(
     lowest: ArrayLike = 0.0,
     highest: ArrayLike = np.inf,
 ) -> Array:
-    """How far inside their bounds all tensions can stay that balance the load [N].
+    """How far inside their bounds all tensions that balance the load can stay [N].
 
-    Exact: the largest t with lowest + t <= tau <= highest - t and W tau + w_e = 0; below zero
-    where the load cannot be balanced. Infinite where cables can be tightened without end.
+    It is exact: the largest t with lowest + t <= tau <= highest - t and W tau + w_e = 0. It is
+    negative if tensions within bounds cannot balance the load, and infinite if cables can be
+    tightened without limit.
 
     Args:
         robot: as described, or its MJCF; its mass, centre of mass and gravity are the load.
-        poses: (n, 7) or (7,), where the platform really is.
+        poses: (n, 7) or (7,), actual poses of the platform.
         wrench: (6,) or (n, 6) external force [N] at the platform origin and moment [N m].
-        wrenches: (k, 6) instead: a set of which each must be balanced, and so can all between
-            them; the least margin counts.
+        wrenches: (k, 6) a set of wrenches, each in addition to ``wrench``; the smallest margin
+            counts. All wrenches in their convex hull can then be balanced as well.
         lowest: (m,) or one [N], not negative.
         highest: (m,) or one [N]; infinite for none.
 
     Returns:
-        (n,) [N]; minus infinity where W has no inverse, or too few cables, and the load is out
-        of what the cables can pull.
+        (n,) [N]; minus infinity if W is singular or there are too few cables, and no tensions
+        within bounds balance the load.
     """
     from seecr.compiled.margin import margins_at  # takes a while to import
 
@@ -141,10 +143,11 @@ def tension_margin(
 
 
 def margins_from(matrices: Array, loads: Array, low: Array, high: Array, scale: float) -> Array:
-    """Margins (n,) [N] of balances A tau = load, (n, d, m) and for each of a set (n, k, d).
+    """Margins (n,) [N] of the balance A tau = load, for matrices (n, d, m) and loads (n, k, d).
 
     Args:
-        matrices, loads: [N], torques over the robot's length.
+        matrices, loads: [N], torques over the robot's length; the smallest margin of k loads
+            counts.
         low, high: (m,) [N].
         scale: [N] load that rounding is measured against.
     """
@@ -163,14 +166,14 @@ def margins_from(matrices: Array, loads: Array, low: Array, high: Array, scale: 
 
 
 def load_scale(robot: Robot) -> float:
-    """Load [N] that rounding is measured against: the weight, or a thousandth of E S."""
+    """Load [N] that rounding is measured against: the weight, else a thousandth of E S."""
     return robot.weight or 1e-3 * float(np.max(robot.ea))
 
 
 def _loads(
     robot: Robot, poses: Array, wrench: ArrayLike | None, wrenches: ArrayLike | None
 ) -> tuple[Array, Array]:
-    """Equations of balance for every wrench of a set: (n, d, m) and (n, k, d)."""
+    """Matrix (n, d, m) and loads (n, k, d) of the balance under each of k wrenches."""
     matrix, load = balance_equations(robot, poses, wrench)
     if wrenches is None:
         return np.array(matrix, order="C"), load[:, None]
@@ -180,10 +183,10 @@ def _loads(
 
 
 def _by_rank(matrices: Array, loads: Array, low: Array, high: Array, scale: float) -> Array:
-    """Margins (n,) where W has no inverse: what it can balance at all, in its own directions.
+    """Margins (n,) where W is singular: the balance is reduced to the range of W.
 
-    None where the load is out of these, or a cable's equations have no answer, which leaves
-    numbers that are not finite.
+    Minus infinity if the load is outside that range, or if numbers are not finite because a cable's
+    equations have no solution.
     """
     from seecr.compiled.margin import margins_of  # takes a while to import
 
@@ -241,7 +244,7 @@ def wrench_matrix(robot: Robot, poses: ArrayLike) -> Array:
     anchors = transform_points(places, robot.anchor_points)
     cables = robot.exit_points - anchors
     size = np.linalg.norm(cables, axis=-1, keepdims=True)
-    # a cable without a length has no direction to pull in
+    # a cable of zero length has no direction
     unit = cables / np.where(size > 0.0, size, np.inf)
     moment = np.cross(anchors - places[:, None, :3], unit)
     return np.swapaxes(np.concatenate([unit, moment], axis=-1), 1, 2)
@@ -250,7 +253,7 @@ def wrench_matrix(robot: Robot, poses: ArrayLike) -> Array:
 def balance_equations(
     robot: Robot, poses: Array, wrench: ArrayLike | None = None
 ) -> tuple[Array, Array]:
-    """Equations of balance W tau = load, (n, d, m) and (n, d), torques over the length."""
+    """The balance W tau = load, (n, d, m) and (n, d), with torques over the robot's length."""
     n = len(poses)
     outer = np.zeros(6) if wrench is None else _wrench(wrench, n)
     weight = robot.mass * robot.gravity
@@ -260,7 +263,7 @@ def balance_equations(
     if not robot.joints:
         unit = np.where(robot.hinges, 1.0 / robot.length, 1.0)
         return matrix * unit[:, None], -load * unit
-    # the joints take up what they do not move along: only work on their motions must vanish
+    # joints carry the wrench that does no work along their motions; only the rest must be balanced
     columns = motion_columns(values_of_pose(robot, poses)[1], poses[:, :3])
     columns = columns * np.where(robot.hinges, 1.0 / robot.length, 1.0)
     along = np.swapaxes(columns, 1, 2)

@@ -1,4 +1,4 @@
-"""The nearest poses that tensions within limits can hold, where wanted ones cannot be held."""
+"""The nearest poses that tensions within limits can hold, for wanted poses that cannot be held."""
 
 from __future__ import annotations
 

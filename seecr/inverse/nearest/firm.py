@@ -1,9 +1,10 @@
-"""Nearest poses at which the platform stays, where searches end at those where it would not.
+"""Nearest poses that are stable, for rows whose searches end at unstable ones.
 
-Balance knows nothing of stability, nor all of heavy cables: many ends of searches may lie where the
-platform would leave, and pass by a farther one where it stays. So here every pose is checked first,
-exactly: starts are taken as far to the wanted pose as the platform stays, searches begin there, and
-the best goes on at random, which needs no rates of what ends a stable region.
+The balance says nothing about stability, and not everything about heavy cables. Many searches may
+therefore end where the platform would leave, and miss a farther pose where it stays. So here each
+pose is first checked exactly: starts are moved as far towards the wanted pose as the platform
+stays, searches begin there, and the best is improved by random tries, which need no derivatives of
+the border of stability. Poses where the platform stays are called firm.
 """
 
 from __future__ import annotations
@@ -18,16 +19,16 @@ from seecr.inverse.nearest.screen import spread, toward
 from seecr.inverse.nearest.seeds import Candidates, about_wanted, from_sample
 from seecr.pose import Array
 
-# Searches of a row; every so-many-th candidate is checked exactly, which takes long with sag.
+# Searches per row; every so-many-th candidate is checked exactly, which is slow with sag.
 _SEARCHES, _EVERY = 1, 3
-# Parts of the ways from where searches end.
+# Fractions of the straight lines from the ends of searches.
 _PARTS = 0.5 ** np.arange(16)
-# Rounds at random, tries of each, the first spread [of the distance], its factors, the way inward.
+# Random tries: rounds, tries per round, first spread [of the distance], its factors, pull inward.
 _ROUNDS, _TRIES, _SPREAD, _WIDER, _NARROWER, _PULL = 16, 32, 0.1, 1.5, 0.6, 0.5
 
 
 def part_of(problem: Reaching, rows: Rows) -> Reaching:
-    """The problem of some of its rows."""
+    """The problem for some of its rows."""
     return replace(
         problem, wanted=problem.wanted[rows],
         values=None if problem.values is None else problem.values[rows],
@@ -38,11 +39,11 @@ def part_of(problem: Reaching, rows: Rows) -> Reaching:
 
 
 def firm_ends(problem: Reaching, poses: Array, ends: Array) -> Candidates:
-    """Poses where the platform stays, near the wanted ones.
+    """Firm poses near the wanted ones.
 
     Args:
-        poses: (k, 7) a sample of what can be held.
-        ends: (n, d) [m] away from the wanted poses where searches ended, but it would not stay.
+        poses: (k, 7) a sample of poses that can be held.
+        ends: (n, d) [m] displacements from the wanted poses to unstable ends of searches.
     """
     first = from_sample(problem, poses).and_more(about_wanted(problem))
     firm = _firm_of(problem, Candidates(first.away[::_EVERY], first.rows[::_EVERY]))
@@ -55,7 +56,7 @@ def firm_ends(problem: Reaching, poses: Array, ends: Array) -> Candidates:
 
 
 def _out_to(problem: Reaching, firm: Candidates, ends: Array) -> Candidates:
-    """Where the platform stays on straight ways from ends (n, d) home, and to the nearest firm."""
+    """Firm poses on straight lines from ends (n, d) to the reference and the nearest firm poses."""
     n, near = len(ends), ends.copy()
     home = problem.to(np.tile(problem.robot.reference_pose, (n, 1)), np.arange(n))
     best, rows = nearest_of(firm)
@@ -68,22 +69,23 @@ def _out_to(problem: Reaching, firm: Candidates, ends: Array) -> Candidates:
 
 
 def _firm_of(problem: Reaching, some: Candidates) -> Candidates:
-    """Those at which the platform stays."""
+    """Those of the candidates that are firm."""
     firm = problem.firm(some.away, some.rows)
     return Candidates(some.away[firm], some.rows[firm])
 
 
 def nearest_of(some: Candidates) -> tuple[Array, Rows]:
-    """The nearest (k, d) of each row that has any, and those rows (k,)."""
+    """The nearest candidate (k, d) of each row that has any, and those rows (k,)."""
     order = np.lexsort((np.linalg.norm(some.away, axis=1), some.rows))
     rows, place = np.unique(some.rows[order], return_index=True)
     return some.away[order[place]], rows
 
 
 def at_random(problem: Reaching, away: Array, rows: Rows) -> Array:
-    """Nearer poses (k, d) at which the platform stays, about those of rows (k,) that do.
+    """Nearer firm poses (k, d), found about the firm poses of rows (k,).
 
-    Each round takes the nearest of some drawn about the best; rounds that gain widen the spread.
+    Each round takes the nearest of some random draws about the best; rounds that gain widen the
+    spread, others narrow it.
     """
     random, best = np.random.default_rng(5), away.copy()
     wide, shape = np.full((len(rows), 1, 1), _SPREAD), (len(rows), _TRIES)

@@ -1,7 +1,7 @@
-"""Positions that some orientation holds, for robots with fewer cables than freedoms.
+"""Positions that can be held in some orientation, for robots with fewer cables than freedoms.
 
-Where the platform comes to at a position changes little from one to the next. So a few positions
-are searched in earnest, and the others from their answers; any orientation will do.
+The orientation that holds changes little from one position to the next. So a full search is made
+for a few positions, and the others start from their results; any orientation will do.
 """
 
 from __future__ import annotations
@@ -15,15 +15,14 @@ from seecr.inverse.nearest.problem import Reaching, Rows
 from seecr.inverse.nearest.search import Best, any_that_stays
 from seecr.pose import Array
 
-# Answers of the nearest positions that are tried, and how many are searched at once in earnest.
+# Nearest positions whose results are tried, and how many full searches are made at once.
 _NEIGHBOURS, _AT_ONCE = 3, 8
 
 
 def poses_in_place(problem: Reaching) -> Array:
-    """Poses (n, 7) at wanted positions at which the platform is held, and stays, if some are found.
-
+    """Stable poses (n, 7) at the wanted positions, if any are found.
     Args:
-        problem: of which positions may not change.
+        problem: one in which positions may not change.
     """
     best, rows = Best.none(problem), np.arange(len(problem.wanted))
     _try_all(best, np.zeros((len(rows), len(problem.free))), rows)
@@ -40,17 +39,17 @@ def poses_in_place(problem: Reaching) -> Array:
 
 
 def _try_all(best: Best, away: Array, rows: Rows) -> None:
-    """Keep what comes to balance from ways (k, d) of rows."""
+    """Keep what reaches balance from displacements (k, d) of rows."""
     best.keep(tightened(best.problem, best.problem.start(away, rows)))
 
 
 def _apart(rows: Rows) -> Rows:
-    """A few of them, far from one another in their order."""
+    """A few of the rows, evenly spread in their order."""
     return rows[np.unique(np.linspace(0, len(rows) - 1, _AT_ONCE).round().astype(np.intp))]
 
 
 def _from_neighbours(best: Best, rows: Rows, fresh: Rows) -> Rows:
-    """Try answers at the nearest positions, of fresh ones; those that came of them are fresh."""
+    """Try the results at the nearest fresh positions; returns the rows that were solved by it."""
     problem, place = best.problem, best.problem.wanted[:, :3]
     near = cKDTree(place[fresh]).query(place[rows], k=min(_NEIGHBOURS, len(fresh)))[1]
     near = near.reshape(len(rows), -1)

@@ -1,9 +1,9 @@
-"""From poses that are held to local minima of the way to wanted ones: Newton's method with bounds.
+"""From poses that are held to the nearest such poses: Newton's method with bounds.
 
-Sequential quadratic programs in two parts (Byrd, Gould, Nocedal and Waltz 2004): a projection on
-the linearised balance says which tensions go to their limits, and a step of Newton's method on
-those, curvature of the balance included, says how far to go. Far outside, curvature is all: the
-projections alone go to and fro.
+It is sequential quadratic programming in two parts (Byrd, Gould, Nocedal and Waltz 2004). A
+projection onto the linearised balance decides which tensions go to their limits. A Newton step on
+those, with the curvature of the balance, decides how far to go. Far from the wanted pose the
+curvature dominates: the projections alone oscillate.
 """
 
 from __future__ import annotations
@@ -17,24 +17,24 @@ from seecr.inverse.nearest.newton import goal
 from seecr.inverse.nearest.problem import Curved, Reaching, Spots
 from seecr.pose import Array
 
-# Balance that an answer has [of load], and a step over the length that ends a search.
+# Residual of the balance at a solution [load], and the step that ends a search [robot's length].
 TIGHT, ENOUGH = 1e-9, 1e-7
-# Balance to rounding [of load].
+# Residual that is mere rounding [load].
 _EXACT = 1e-13
-# Most steps, how often each goes back to balance, and what may be left of that [of load].
+# Most steps, corrections back to balance after each, and the residual allowed after these [load].
 _STEPS, _RESTORED, _LOOSE = 60, 3, 1e-3
-# Damping: least of the first, its factor, the least it rises from, what is none, and the most.
+# Damping: least first value, factor, value from which it rises, value taken as zero, largest.
 _FIRST, _FACTOR, _RISE, _NONE, _MOST = 1.0, 5.0, 0.1, 1e-3, 1e8
-# A search ends where so many steps gain less than this part.
+# A search ends if so many steps gain less than this part.
 _PATIENCE, _GAIN = 6, 1e-5
-# After a number of steps, those farther than so many times the best of their row end.
+# After so many steps, searches farther away than this many times their row's best are dropped.
 _RACE = {8: 1.3, 14: 1.05, 20: 1.02, 30: 1.005}
-# Rounds back to balance with new rates each, the longest step of one over the length.
+# Newton steps back to balance, and the longest of them [robot's length].
 _BACK, _LONGEST = 12, 2.0
 
 
 def inward(problem: Reaching, start: Spots) -> Spots:
-    """Go on from poses that are held: each to where it gets no nearer, the slow as far as it is."""
+    """Continue from poses that are held until they get no nearer; slow searches stop earlier."""
     race = _Race.begun(problem, start)
     for number in range(_STEPS):
         if len(race.still) == 0:
@@ -47,13 +47,13 @@ def inward(problem: Reaching, start: Spots) -> Spots:
 
 @dataclass(eq=False)
 class _Race:
-    """Searches, those of a row against one another.
+    """Searches in parallel; those of one row compete.
 
     Attributes:
-        now: where they are, nearly in balance. held: the last places that are held.
-        damping: (k,) beside one, which the way weighs. rose: (k,) bool, it just did.
-        mark, idle: (k,) [m] when it last came nearer, (k,) steps since.
-        still: those that go on.
+        now: current points, nearly in balance. held: last points that are in balance.
+        damping: (k,) relative to the distance, which has weight one. rose: (k,) bool, it just rose.
+        mark, idle: (k,) [m] distance when a search last gained, (k,) steps since then.
+        still: the searches that go on.
     """
 
     problem: Reaching
@@ -68,7 +68,7 @@ class _Race:
     @classmethod
     def begun(cls, problem: Reaching, start: Spots) -> _Race:
         k, size = len(start.rows), start.size()
-        # the farther away, the more balance bends over a way
+        # the balance curves more over a longer distance
         damping = np.maximum(_FIRST, 0.5 * size / problem.robot.length)
         return cls(
             problem, start.copy(), start.copy(), damping, np.zeros(k, dtype=bool), size,
@@ -76,7 +76,7 @@ class _Race:
         )  # fmt: skip
 
     def step(self) -> None:
-        """One step of those that go on, taken where way and balance together come out less."""
+        """One step of the searches that go on, if distance and residual together decrease."""
         problem, still = self.problem, self.still
         here = self.now.only(still)
         scale = problem.scale[here.rows]
@@ -103,7 +103,7 @@ class _Race:
         self.still = still[~done]
 
     def _damp(self, better: NDArray[np.bool_]) -> None:
-        """More where a step was not taken; less where one was, and the one before, too."""
+        """More damping after a rejected step, less after two accepted ones."""
         some = self.still
         less = self.damping[some] / np.where(self.rose[some], 1.0, _FACTOR)
         more = np.maximum(_FACTOR * self.damping[some], _RISE)
@@ -117,13 +117,13 @@ class _Race:
         self.idle[some] = np.where(gained, 0, self.idle[some] + 1)
 
     def drop(self, most: float) -> None:
-        """Those end that are so much farther than the best of their row."""
+        """End searches that are so much farther away than the best of their row."""
         size, best = self.now.size(), np.full(len(self.problem.wanted), np.inf)
         np.minimum.at(best, self.now.rows, size)
         self.still = self.still[(size <= most * best[self.now.rows])[self.still]]
 
     def ended(self) -> Spots:
-        """What is held: the last places that were, or what the ends are brought back to."""
+        """The last points in balance, or the current ones if they can be balanced."""
         loose = np.flatnonzero((self.now.left > TIGHT) & (self.now.size() < self.held.size()))
         back = restored(self.problem, self.now.only(loose))
         better = (back.left <= TIGHT) & (back.size() < self.held.size()[loose])
@@ -132,7 +132,7 @@ class _Race:
 
 
 def _back(problem: Reaching, at: Curved, start: Spots) -> tuple[Spots, Array]:
-    """Back to balance with the rates of before: where, and (k,) all that is left [N]."""
+    """Points balanced again with the derivatives ``at`` the start, and residuals (k,) [N]."""
     away, pulls, rows = start.away, start.tensions, start.rows
     for _ in range(_RESTORED):
         matrix, load = problem.at(away, rows, pulls)
@@ -144,9 +144,10 @@ def _back(problem: Reaching, at: Curved, start: Spots) -> tuple[Spots, Array]:
 
 
 def to_rounding(problem: Reaching, ends: Spots) -> Spots:
-    """Ends of searches, balanced to rounding where there are fewer cables than freedoms.
+    """Ends of searches, balanced to rounding if there are fewer cables than degrees of freedom.
 
-    No tensions make up for what the pose of such a robot lacks: it is held as it is, or not.
+    Tensions of such a robot cannot make up for an error of the pose: it is held exactly or not at
+    all.
     """
     if ends.tensions.shape[1] >= ends.away.shape[1]:
         return ends
@@ -157,10 +158,10 @@ def to_rounding(problem: Reaching, ends: Spots) -> Spots:
 
 
 def restored(problem: Reaching, start: Spots, enough: float = 0.1 * TIGHT) -> Spots:
-    """Where searches that are not in balance come to it, by Newton's method; some may not.
+    """Points brought to balance by Newton's method; this may fail for some.
 
     Args:
-        enough: what may be left [of load].
+        enough: allowed residual [load].
     """
     out, still = start.copy(), np.arange(len(start.rows))
     for _ in range(_BACK):
@@ -184,7 +185,7 @@ def restored(problem: Reaching, start: Spots, enough: float = 0.1 * TIGHT) -> Sp
 
 
 def tightened(problem: Reaching, start: Spots) -> Spots:
-    """Those that are in balance, and those that come to it."""
+    """The points in balance, including those that can be brought to it."""
     loose = np.flatnonzero(start.left > TIGHT)
     if len(loose):
         start = start.copy()

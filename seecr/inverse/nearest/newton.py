@@ -8,18 +8,18 @@ from numpy.typing import NDArray
 from seecr.inverse.nearest.problem import Curved, Reaching, Spots
 from seecr.pose import Array
 
-# Where rates leave the price of balance open, the least is taken: relative to their squares.
+# Regularisation of the multipliers where they are not unique, relative to the squared matrix.
 _OPEN = 1e-13
 
 
 def goal(
     problem: Reaching, at: Curved, here: Spots, damping: Array
 ) -> tuple[Spots, Array, NDArray[np.bool_]]:
-    """Where to go, the price (k, d) [m^2/N] of balance, whether there is a way.
+    """The point to step to, the multipliers (k, d) [m^2/N] of the balance, whether there is one.
 
     Args:
-        at: balance about ``here``.
-        damping: (k,) of steps, beside one, which the way to the wanted pose weighs.
+        at: the balance about ``here``.
+        damping: (k,) of steps, relative to the distance to the wanted pose, which has weight one.
     """
     part, rows = (damping / (1.0 + damping))[:, None], here.rows
     near = (part * here.away, here.tensions)
@@ -40,7 +40,7 @@ def goal(
 def _price(
     problem: Reaching, at: Curved, pull: Array, idle: NDArray[np.bool_], here: Spots
 ) -> Array:
-    """(k, d) Lagrange's multipliers: turn^T price = -pull, and nothing for idle tensions."""
+    """(k, d) Lagrange multipliers: turn^T price = -pull, no force on tensions within limits."""
     unit = (problem.scale[here.rows] / problem.robot.length)[:, None, None]
     taut, turn = at.matrix * idle[:, None] * unit, at.turn * (problem.free > 0.0)
     square = turn @ np.swapaxes(turn, 1, 2) + taut @ np.swapaxes(taut, 1, 2)
@@ -58,7 +58,7 @@ def _newton(
     idle: NDArray[np.bool_],
     damping: Array,
 ) -> tuple[Array, Array]:
-    """Step of way (k, d) and of tensions (k, m); those at limits change as given."""  # fmt: skip
+    """Step of the displacement (k, d) and of tensions (k, m); those at limits change as given."""
     (k, d), m = here.away.shape, change.shape[1]
     unit, weight = problem.unit(here.rows), (1.0 + damping)[:, None, None]
     own, mixed = at.bends(price)
@@ -72,7 +72,7 @@ def _newton(
     rates = np.concatenate([at.turn, at.matrix / unit[:, None]], axis=2)
     table[:, d + m :, both], table[:, both, d + m :] = rates, np.swapaxes(rates, 1, 2)
     right[:, way], right[:, d + m :] = -here.away, -at.left
-    # what stays at a limit has an equation of its own
+    # tensions at a limit have an equation of their own
     given = np.concatenate([np.zeros((k, d)), change * unit], axis=1)
     right[:, both] = np.where(free, right[:, both], given)
     table[:, both] *= free[..., None]
@@ -83,7 +83,7 @@ def _newton(
 
 
 def _solved(tables: Array, right: Array) -> Array:
-    """Solutions (k, n) of k systems, their rows scaled; NaN where one has none."""
+    """Solutions (k, n) of k linear systems with scaled rows; NaN if a system is singular."""
     size = np.abs(tables).max(axis=2, keepdims=True)
     size = np.where(size > 0.0, size, 1.0)
     try:

@@ -1,4 +1,4 @@
-"""Balance about poses: what the search for the nearest pose that can be held knows of a robot."""
+"""The balance about poses, as the search for the nearest pose that can be held needs it."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ Rows = NDArray[np.intp]
 
 
 class Balance(Protocol):
-    """Balance at poses (k, 7) of some rows, which may come again: matrices (k, d, m), loads (k, d).
+    """The balance at poses (k, 7) of some rows: matrices (k, d, m) and loads (k, d).
 
-    Linear in the tensions from ``about`` (k, m), where pulls of heavy cables depend on it; by
-    default from such that come near to balance.
+    It is linearised in the tensions at ``about`` (k, m), which matters for heavy cables; by default
+    at tensions that come near to balance. A row may occur several times.
     """
 
     def __call__(
@@ -30,32 +30,34 @@ class Balance(Protocol):
 
 
 Stays = Callable[[Array, Rows], NDArray[np.bool_]]
-"""Whether the platform stays at poses (k, 7) of some rows with the rest lengths that hold them."""
+"""Whether the platform is stable at poses (k, 7) of some rows, with the lengths that hold it there.
+"""
 
-# A pose this near to the limit is held with something to spare: tensions, relative to the load.
+# Tensions of a pose this close to the limit still have some margin [load].
 _INSIDE = 1e-6
-# Weight of a tension of one load, as a displacement over the robot's length: next to none.
+# Weight of a tension of one load, as a displacement [robot's length]: hardly any.
 _WEIGHT = 1e-3
-# Difference for derivatives, over the length.
+# Step of finite differences [robot's length].
 _DIFFERENCE = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
 class Reaching:
-    """Wanted poses (n, 7) and what holds there; ``away`` (k, d) is how far poses are off them [m].
+    """The search for the poses nearest to wanted ones (n, 7) that can be held.
 
-    Rows say whose wanted pose each of k poses belongs to; a row may come again.
+    ``away`` (k, d) is the displacement of poses from the wanted ones [m]; ``rows`` (k,) says which
+    wanted pose each of them belongs to. A row may occur several times.
     """
 
     robot: Robot
     wanted: Array
-    values: Array | None  # (n, d) of the joints at the wanted poses, None of a free platform
+    values: Array | None  # (n, d) joint values at the wanted poses, None for a free platform
     balance: Balance
     stays: Stays
     least: Array  # (n, m) [N]
     most: Array  # (n, m) [N]
     scale: Array  # (n,) [N] load
-    free: Array  # (d,) how far each coordinate may go from its wanted value: none, or infinitely
+    free: Array  # (d,) how far each coordinate may go from its wanted value: 0 or infinity
 
     @classmethod
     def within(
@@ -72,8 +74,8 @@ class Reaching:
         """The problem of wanted poses (n, 7).
 
         Args:
-            limits: (m,) least and largest tensions [N]. scale: (n,) [N] load.
-            fix_position: the position is kept, only the orientation gives way.
+            limits: (m,) smallest and largest tensions [N]. scale: (n,) [N] load.
+            fix_position: keep the position and change only the orientation.
         """
         low, high = limits
         inside = _INSIDE * scale[:, None]
@@ -91,32 +93,32 @@ class Reaching:
         return not np.all(self.robot.hinges | (self.free > 0.0))
 
     def placed(self, away: Array, rows: Rows) -> Array:
-        """Poses (k, 7) so far from the wanted ones of rows."""
+        """Poses (k, 7) with displacements ``away`` from the wanted ones of rows."""
         change = away * np.where(self.robot.hinges, 1.0 / self.robot.length, 1.0)
         if self.values is None:
             return pose_add(self.wanted[rows], change)
         return pose_of_values(self.robot, self.values[rows] + change)[0]
 
     def to(self, poses: Array, rows: Rows) -> Array:
-        """(k, d) how far poses (k, 7) are from the wanted ones of rows."""
+        """(k, d) displacements of poses (k, 7) from the wanted ones of rows."""
         if self.values is None:
             change = pose_difference(poses, self.wanted[rows])
         else:
             change = values_of_pose(self.robot, poses)[0] - self.values[rows]
-            shorter = np.mod(change + np.pi, 2.0 * np.pi) - np.pi  # either way about a hinge
+            shorter = np.mod(change + np.pi, 2.0 * np.pi) - np.pi  # the shorter way about a hinge
             change = np.where(self.robot.hinges, shorter, change)
         return change * np.where(self.robot.hinges, self.robot.length, 1.0)
 
     def at(self, away: Array, rows: Rows, about: Array | None = None) -> tuple[Array, Array]:
-        """Balance (k, d, m) and (k, d) there, linear in the tensions from those about (k, m)."""
+        """Balance (k, d, m) and (k, d) there, linearised in the tensions ``about`` (k, m)."""
         return self.balance(self.placed(away, rows), rows, about)
 
     def held(self, away: Array, rows: Rows) -> NDArray[np.bool_]:
-        """Whether the poses so far from those of rows can be held."""
+        """Whether the poses with these displacements can be held."""
         return self.holds(self.placed(away, rows), rows)
 
     def firm(self, away: Array, rows: Rows) -> NDArray[np.bool_]:
-        """Whether the platform stays at the poses so far from those of rows, checked exactly."""
+        """Whether the platform is held and stable at these displacements, checked exactly."""
         out = self.held(away, rows)
         some = np.flatnonzero(out)
         if len(some):
@@ -124,41 +126,41 @@ class Reaching:
         return out
 
     def rests(self, away: Array, rows: Rows) -> NDArray[np.bool_]:
-        """The same of poses that are in balance, or nearly."""
+        """Whether the platform is stable, at poses that are in balance or nearly so."""
         return self.stays(self.placed(away, rows), rows)
 
     def holds(self, poses: Array, rows: Rows) -> NDArray[np.bool_]:
-        """Whether poses (k, 7) can be held with the loads of rows."""
+        """Whether poses (k, 7) can be held under the loads of rows."""
         if len(rows) == 0:
             return np.zeros(0, dtype=bool)
         least = self.least[rows]
         return distribute(*self.balance(poses, rows), least, least, self.most[rows])[1]
 
     def lack(self, away: Array, rows: Rows) -> tuple[Array, NDArray[np.bool_]]:
-        """(k,) what lacks of balance about there [of load], roughly; and whether nothing does."""
+        """(k,) approximate residual of the balance [load]; and whether the pose can be held."""
         least, (matrix, load) = self.least[rows], self.at(away, rows)
         tensions, held = distribute(matrix, load, least, least, self.most[rows])
         left = np.abs(np.einsum("ndm,nm->nd", matrix, tensions) - load).max(axis=1)
         return left / self.scale[rows], held
 
     def allowed(self, away: Array) -> Array:
-        """The same without what may not change."""
+        """Displacements with zeros for coordinates that may not change."""
         return np.where(self.free > 0.0, away, 0.0)
 
     def start(self, away: Array, rows: Rows) -> Spots:
-        """Where searches begin, held or not, with the tensions that come nearest to balance."""
+        """Starting points, held or not, with the tensions that come nearest to balance."""
         if len(rows) == 0:
             return Spots(away, rows, np.empty((0, self.least.shape[1])), np.empty(0))
         each = zip(rows, *self.at(away, rows), strict=True)
         found = [balanced(a, load, self.least[i], self.most[i]) for i, a, load in each]
         tensions = np.array([one for one, _ in found]).reshape(len(rows), self.least.shape[1])
-        # with pulls as these tensions make them
+        # the balance linearised at these tensions
         matrix, load = self.at(away, rows, tensions)
         left = np.abs(np.einsum("ndm,nm->nd", matrix, tensions) - load).max(axis=1)
         return Spots(away, rows, tensions, left / self.scale[rows])
 
     def unit(self, rows: Rows) -> Array:
-        """(k, 1) [m/N] that tensions weigh beside ways."""
+        """(k, 1) [m/N] weight of tensions relative to displacements."""
         return np.asarray((_WEIGHT * self.robot.length / self.scale[rows])[:, None])
 
     def project(
@@ -170,15 +172,15 @@ class Reaching:
         near: tuple[Array, Array],
         rows: Rows,
     ) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """Tensions and ways nearest to ``near`` that balance as linearised about ``away``.
+        """Tensions and displacements nearest to ``near`` in balance as linearised about ``away``.
 
         Args:
-            matrix: (k, d, m), load: (k, d) there. turn: (k, d, d) [N/m] rates of what is out of
-                balance by the way.
+            matrix: (k, d, m), load: (k, d) there. turn: (k, d, d) [N/m] derivative of the residual
+                with respect to the displacement.
 
         Returns:
-            Ways (k, d), tensions (k, m), (k,) whether there are any.
-        """  # fmt: skip
+            Displacements (k, d), tensions (k, m), and (k,) whether there are any.
+        """
         unit, m = self.unit(rows), matrix.shape[2]
         whole = np.concatenate([matrix / unit[:, None], turn], axis=2)
         ends = np.broadcast_to(self.free, away.shape)
@@ -191,10 +193,10 @@ class Reaching:
 
 @dataclass(frozen=True, eq=False)
 class Spots:
-    """Where k searches are.
+    """The points of k searches.
 
     Attributes:
-        away: (k, d) [m]. rows: (k,). tensions: (k, m) [N]. left: (k,) out of balance [of load].
+        away: (k, d) [m]. rows: (k,). tensions: (k, m) [N]. left: (k,) residual [load].
     """
 
     away: Array
@@ -203,7 +205,7 @@ class Spots:
     left: Array
 
     def size(self) -> Array:
-        """(k,) [m] from the wanted poses."""
+        """(k,) [m] distance from the wanted poses."""
         return np.asarray(np.linalg.norm(self.away, axis=1))
 
     def only(self, some: NDArray[np.intp] | NDArray[np.bool_]) -> Spots:
@@ -213,7 +215,7 @@ class Spots:
         return self.only(self.left <= most)
 
     def put(self, some: NDArray[np.intp], other: Spots) -> None:
-        """Others in the places of some, in place."""
+        """Overwrite some points in place."""
         self.away[some], self.tensions[some] = other.away, other.tensions
         self.left[some] = other.left
 
@@ -223,11 +225,11 @@ class Spots:
 
 @dataclass(frozen=True, eq=False)
 class Curved:
-    """Balance about k poses to second order, with the tensions of a search.
+    """The balance about k poses to second order, at the tensions of a search.
 
     Attributes:
-        matrix: (k, d, m). load, left: (k, d) [N], what is out of balance.
-        turn: (k, d, d) [N/m] rates of that by the way.
+        matrix: (k, d, m). load, left: (k, d) [N]; left is the residual.
+        turn: (k, d, d) [N/m] derivative of the residual with respect to the displacement.
     """
 
     matrix: Array
@@ -240,7 +242,7 @@ class Curved:
 
     @classmethod
     def about(cls, problem: Reaching, away: Array, tensions: Array, rows: Rows) -> Curved:
-        """By differences: to both sides along each coordinate, and along each two of them."""
+        """By finite differences: central along each coordinate, and one step along each pair."""
         (k, d), step = away.shape, _DIFFERENCE * problem.robot.length
         eye, (i, j) = np.eye(d), np.triu_indices(d, 1)
         sides = step * np.concatenate([np.zeros((1, d)), eye, -eye, eye[i] + eye[j]])
@@ -256,7 +258,7 @@ class Curved:
         return cls(matrix[:, 0], load[:, 0], left[:, 0], turn, left, matrix, step)
 
     def bends(self, dual: Array) -> tuple[Array, Array]:
-        """Second derivatives of dual . left: (k, d, d) by the way, (k, d, m) by it and tensions."""
+        """Second derivatives of dual . left: (k, d, d) and, mixed with tensions, (k, d, m)."""
         d = self.load.shape[1]
         value = np.einsum("nsd,nd->ns", self._all, dual)
         first, plus, minus = value[:, :1], value[:, 1 : 1 + d], value[:, 1 + d : 1 + 2 * d]

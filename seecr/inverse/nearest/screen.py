@@ -1,4 +1,4 @@
-"""Which of many candidates searches begin at: the nearest that are held, each turned otherwise."""
+"""Starting points among many candidates: the nearest held ones that differ in rotation."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from seecr.inverse.nearest.problem import Reaching, Rows, Spots
 from seecr.inverse.nearest.seeds import Candidates
 from seecr.pose import Array
 
-# Halvings of the way to the wanted poses; after some only the nearer half goes on, but not fewer.
+# Bisections towards the wanted poses; after some only the nearer half goes on, but no fewer.
 _HALVINGS, _FEWER, _KEPT = 7, (2, 4), 120
-# Where few are held, the starts are of so many times as many that lack least.
+# If few are held, starts are taken from this many times as many with the smallest residuals.
 _LEAST = 8
-# How far apart in orientation [rad] starts are to be, but not by more than the nearest's distance
-# over the length; where not enough are: a half, a quarter.
+# Least difference in rotation [rad] between starts, but at most the nearest's distance over the
+# length. If that leaves too few, a half and then a quarter of it is enough.
 _APART = (0.7, 0.35, 0.175)
 
 
 def screened(problem: Reaching, candidates: Candidates, most: int) -> Spots:
-    """Poses that are held, as far on the way to the wanted ones as they are: ``most`` of a row."""
+    """Held poses as near to the wanted ones as straight lines lead: ``most`` per row."""
     held = problem.held(candidates.away, candidates.rows)
     back = _brought_back(problem, candidates, held, most)
     away = np.concatenate([candidates.away[held], back.away])
@@ -35,11 +35,11 @@ def screened(problem: Reaching, candidates: Candidates, most: int) -> Spots:
 def _brought_back(
     problem: Reaching, candidates: Candidates, held: NDArray[np.bool_], most: int
 ) -> Spots:
-    """Where few candidates of a row are held, as with fewer cables than freedoms: some near others.
+    """Poses brought to balance near candidates, for rows of which few candidates are held.
 
-    Of those that lack least such that are apart, and every so-many-th of a row's, as they were
-    drawn: all over.
-    """  # fmt: skip
+    This occurs with fewer cables than degrees of freedom. Tried are those with small residuals that
+    differ in rotation, and an even selection of all.
+    """
     many = np.bincount(candidates.rows[held], minlength=len(problem.wanted))
     chosen: list[int] = []
     for row in np.flatnonzero(many < most):
@@ -59,7 +59,7 @@ def toward(
     rows: Rows,
     fine: Callable[[Array, Rows], NDArray[np.bool_]],
 ) -> tuple[Array, Rows]:
-    """As far on straight ways to the wanted poses as is fine; half of them keep their turn."""
+    """As far on straight lines to the wanted poses as is fine; half of them keep their rotation."""
     inner, outer = np.zeros(len(rows)), np.ones(len(rows))
     turned = np.random.default_rng(4).random(len(rows)) < 0.5
     keeps = turned[:, None] & problem.robot.hinges & ~problem.robot.hinges.all()
@@ -77,7 +77,7 @@ def toward(
 
 
 def _nearer_half(size: Array, rows: Rows, n: int) -> Rows:
-    """Which of each row's are its nearer half, but not too few."""
+    """The nearer half of each row's points, but no fewer than a minimum."""
     order = np.lexsort((size, rows))
     many = np.bincount(rows, minlength=n)
     place = np.arange(len(rows)) - (np.cumsum(many) - many)[rows[order]]
@@ -85,13 +85,13 @@ def _nearer_half(size: Array, rows: Rows, n: int) -> Rows:
 
 
 def spread(problem: Reaching, away: Array, rows: Rows, most: int) -> list[int]:
-    """The nearest of each row that are turned otherwise than those before."""
+    """The nearest points of each row that differ in rotation from those before."""
     chosen, size = [], np.linalg.norm(away, axis=1)
     hinges, length = problem.robot.hinges, problem.robot.length
     for row in range(len(problem.wanted)):
         mine = np.flatnonzero(rows == row)
         mine = mine[np.argsort(size[mine])]
-        # what cannot turn is told apart by its place
+        # a platform that cannot turn is compared by position
         least = 1e-9 * length + size[mine[:1]].sum()
         unit = min(length, least) if hinges.any() else least
         place = (away[:, hinges] if hinges.any() else away) / unit

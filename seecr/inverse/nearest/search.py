@@ -1,11 +1,10 @@
-"""The nearest poses that can be held: many searches, of which the nearest answer is kept.
+"""The nearest poses that can be held: the best of many local searches.
 
-Least position^2 + (length x rotation)^2 subject to balance, W(q) tau = -w(q), and limits. What can
-be held is not convex, and turned platforms reach where level ones do not: there are many local
-minima, a few per cent apart. So searches begin at the wanted pose itself; where the ways from a
-sample of poses that are held end to be; and at other rows' answers, those turned by all angles.
-Where the nearest end is one at which the platform would not stay, see
-:mod:`seecr.inverse.nearest.firm`.
+Minimised is position^2 + (length x rotation)^2 subject to balance, W(q) tau = -w(q), and limits.
+The set of poses that can be held is not convex, and tilted platforms reach where level ones do not:
+there are many local minima, a few per cent apart. So searches begin at the wanted pose itself, at
+the ends of straight lines from a sample of held poses, and at the solutions of other rows, in many
+rotations. If the nearest end is unstable, see :mod:`seecr.inverse.nearest.firm`.
 """
 
 from __future__ import annotations
@@ -22,21 +21,21 @@ from seecr.inverse.nearest.screen import screened
 from seecr.inverse.nearest.seeds import Candidates, about_answers, about_wanted, from_sample, sample
 from seecr.pose import Array
 
-# Searches of each row from the sample, and from other rows' answers.
+# Searches per row from the sample, and from the solutions of other rows.
 _FIRST, _SHARED = 14, 4
-# Where a search ended nearer by this part, but the platform would not stay, firm poses are sought.
+# Firm poses are sought if a search ended nearer by this part, but at an unstable pose.
 _NEARER = 0.01
-# A step of this part of the way, and how much of it may come nearer at a local minimum.
+# Step towards the wanted pose [of the distance], and the part of it that a local minimum may gain.
 _PART, _FLAT = 1e-3, 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class Nearest:
-    """What was found for n wanted poses.
+    """Results for n wanted poses.
 
     Attributes:
-        poses: (n, 7). found: (n,) bool, there is one that can be held.
-        firm: (n,) bool, the platform stays there.
+        poses: (n, 7). found: (n,) bool, the pose can be held.
+        firm: (n,) bool, the platform is stable there.
         settled: (n,) bool, it meets the first-order conditions of a local minimum (Karush, Kuhn
             and Tucker): to first order no small change that can be held comes nearer.
     """
@@ -50,11 +49,11 @@ class Nearest:
 def nearest(problem: Reaching) -> Nearest:
     """The nearest poses that can be held, and whether any were found.
 
+    Stable poses are preferred to all others; if none was found, the nearest unstable one is kept.
+
     Args:
-        problem: the wanted poses, what holds there, and what may give way. Balance is linear in
-            the tensions here, from where cables just pull: of heavy ones it is not quite right.
-            Answers that stay go before all that do not; where none was found that stays, the
-            nearest of the others is kept.
+        problem: the wanted poses, their balance, and what may change. The balance is linearised in
+            the tensions, which is not exact for heavy cables.
     """
     best, rows = Best.none(problem), np.arange(len(problem.wanted))
     start = problem.start(np.zeros((len(rows), len(problem.free))), rows)
@@ -71,7 +70,7 @@ def nearest(problem: Reaching) -> Nearest:
 
 
 def any_that_stays(problem: Reaching) -> Best:
-    """Any poses at which the platform is held and stays, near or far, if some are found."""
+    """Any poses at which the platform is held and stable, near or far, if some are found."""
     best, poses = Best.none(problem), sample(problem)
     first = from_sample(problem, poses).and_more(about_wanted(problem))
     spots = screened(problem, first, _FIRST)
@@ -85,12 +84,12 @@ def any_that_stays(problem: Reaching) -> Best:
 
 @dataclass(frozen=True, eq=False)
 class Best:
-    """The nearest answers so far, changed in place.
+    """The best results so far, updated in place.
 
     Attributes:
         away: (n, d) [m] from the wanted poses. tensions: (n, m) [N].
-        found: (n,) bool. firm: (n,) bool, the platform stays there.
-        loose: (n, d) [m] the nearest at which it would not, infinitely far where there is none.
+        found: (n,) bool. firm: (n,) bool, the platform is stable there.
+        loose: (n, d) [m] the nearest unstable pose, infinite if there is none.
     """
 
     problem: Reaching
@@ -108,11 +107,11 @@ class Best:
         return cls(problem, away, tensions, np.zeros(n, dtype=bool), np.zeros(n, dtype=bool), loose)
 
     def search(self, candidates: Candidates, most: int) -> None:
-        """Searches from the best of candidates, ``most`` of each row."""
+        """Search from the best candidates, ``most`` of each row."""
         self.keep(inward(self.problem, screened(self.problem, candidates, most)))
 
     def keep(self, other: Spots) -> None:
-        """Take what is held and nearer, and what stays rather than what does not."""
+        """Take results that are nearer, and stable ones rather than unstable ones."""
         other = to_rounding(self.problem, other.only_tight(TIGHT))
         if len(other.rows) == 0:
             return
@@ -128,15 +127,15 @@ class Best:
                 self.loose[row] = other.away[i]
 
     def take(self, rows: Rows, other: Best) -> None:
-        """The answers of another, which is of these rows alone."""
+        """Copy the results of another search, which is for these rows only."""
         self.away[rows], self.tensions[rows] = other.away, other.tensions
         self.found[rows], self.firm[rows], self.loose[rows] = other.found, other.firm, other.loose
 
     def firm_ones(self, poses: Array) -> None:
-        """Where a search ended nearer, but the platform would not stay: the nearest that does.
+        """Where a search ended nearer but unstable: the nearest stable pose.
 
         Args:
-            poses: (k, 7) a sample of what can be held.
+            poses: (k, 7) a sample of poses that can be held.
         """
         size = np.where(self.firm, np.linalg.norm(self.away, axis=1), np.inf)
         end = np.linalg.norm(self.loose, axis=1)
@@ -155,9 +154,9 @@ class Best:
         self.firm[to] = True
 
     def settled(self) -> NDArray[np.bool_]:
-        """(n,) whether a small step towards the wanted poses is lost on the way back to balance.
+        """(n,) whether a small step towards the wanted pose is lost on the way back to balance.
 
-        The projected gradient: nothing but the conditions of Karush, Kuhn and Tucker.
+        This is the projected gradient, equivalent to the conditions of Karush, Kuhn and Tucker.
         """
         rows: Rows = np.flatnonzero(self.found)
         away, pulls, out = self.away[rows], self.tensions[rows], self.found.copy()

@@ -1,4 +1,4 @@
-"""Where searches for the nearest pose may begin: poses over the frame, and about others."""
+"""Starting points for the nearest pose: samples of the workspace, and rotations about others."""
 
 from __future__ import annotations
 
@@ -11,21 +11,22 @@ from seecr.description.robot import Robot
 from seecr.inverse.nearest.problem import Reaching, Rows
 from seecr.pose import Array, quat_from_rotvec
 
-# Poses tried over the frame; of those that are held, as many nearest and as many others per row.
+# Poses sampled over the workspace; of the held ones, so many nearest and other ones per row.
 _SAMPLE, _NEAR = 24000, 128
-# Turns tried where only the orientation gives way, and those looked at that are nearly held.
+# Rotations sampled if only the orientation may change, and how many that are nearly held are kept.
 _IN_PLACE, _NEARLY = 8000, 128
-# Turned poses about each wanted one, and about each answer, where as many others are tried.
+# Rotated poses about each wanted pose, and about each solution with as many solutions of other
+# rows.
 _TURNED, _ABOUT = 256, 64
-# Half of the sample is turned by less than this [rad], and poses move inward by up to this part.
+# Largest rotation of half of the sample [rad], and largest part by which poses move inward.
 _LEVEL, _INWARD = 1.0, 0.4
-# Answers are turned by up to so many times their distance over the length [rad].
+# Solutions are rotated by up to so many times their distance over the length [rad].
 _WIDEST = 4.0
 
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """Poses (k, d) away from the wanted ones of rows (k,), held or not."""
+    """Displacements (k, d) from the wanted poses of rows (k,), held or not."""
 
     away: Array
     rows: Rows
@@ -37,9 +38,9 @@ class Candidates:
 
 
 def sample(problem: Reaching) -> Array:
-    """Poses (k, 7) that can be held with the first row's load, and home, which may not be.
+    """The reference pose, and poses (k, 7) that can be held under the first row's load.
 
-    Home alone where positions are kept: none of the others is at a wanted one.
+    Only the reference pose if positions are kept, since the others are at other positions.
     """
     if problem.is_in_place:
         return problem.robot.reference_pose[None]
@@ -51,12 +52,12 @@ def sample(problem: Reaching) -> Array:
 
 
 def _box(robot: Robot) -> Array:
-    """(k, 3) points that the frame goes about."""
+    """(k, 3) points whose bounding box is sampled."""
     return np.concatenate([robot.exit_points, robot.reference_pose[None, :3]])
 
 
 def _turned(robot: Robot, random: np.random.Generator) -> Array:
-    """Poses of a free platform over the frame, half of them turned by all angles."""
+    """Poses of a free platform over the box, half of them in all orientations."""
     box, half = _box(robot), _SAMPLE // 2
     turn = random.normal(size=(_SAMPLE, 4))
     turn /= np.linalg.norm(turn, axis=1, keepdims=True)
@@ -67,7 +68,7 @@ def _turned(robot: Robot, random: np.random.Generator) -> Array:
 
 
 def _on_joints(robot: Robot, random: np.random.Generator) -> Array:
-    """Poses of a platform on joints: slides over the frame, hinges by all angles."""
+    """Poses of a platform on joints: slides over the box, hinges at all angles."""
     values, box = np.zeros((_SAMPLE, robot.n_dof)), _box(robot) - robot.reference_pose[:3]
     for i, joint in enumerate(robot.joints):
         along = box @ joint.axis
@@ -78,7 +79,7 @@ def _on_joints(robot: Robot, random: np.random.Generator) -> Array:
 
 
 def from_sample(problem: Reaching, poses: Array) -> Candidates:
-    """Home, the poses nearest to each wanted one, and as many of the others."""
+    """The reference pose, the poses nearest to each wanted one, and as many others."""
     random, out, rows = np.random.default_rng(1), [], []
     in_place = problem.is_in_place
     for row in range(len(problem.wanted)):
@@ -92,9 +93,9 @@ def from_sample(problem: Reaching, poses: Array) -> Candidates:
 
 
 def _in_place(problem: Reaching, row: int) -> Array:
-    """Home's turn, and of all turns of a wanted pose those that are held, or nearly (k, d).
+    """The reference orientation, and sampled ones at a position that are held or nearly so (k, d).
 
-    What is held may be less than a thousandth of all turns, and in parts.
+    The orientations that hold may be less than a thousandth of all, in separate parts.
     """
     robot, random = problem.robot, np.random.default_rng(6)
     rows = np.full(_IN_PLACE, row)
@@ -113,7 +114,7 @@ def _in_place(problem: Reaching, row: int) -> Array:
 
 
 def about_wanted(problem: Reaching) -> Candidates:
-    """The wanted poses, or what of the frame is nearest to them, turned."""
+    """Rotated poses about the wanted ones, or about the nearest point of the box."""
     n, box = len(problem.wanted), _box(problem.robot)
     middle = np.zeros((n, problem.robot.n_dof))
     if problem.values is None:
@@ -124,7 +125,7 @@ def about_wanted(problem: Reaching) -> Candidates:
 
 
 def about_answers(problem: Reaching, away: Array, rows: Rows) -> Candidates:
-    """Answers (n, d) of some rows: each one's own, turned, and the nearest of the others'."""
+    """For some rows: their own solutions (n, d), rotated, and the nearest of other rows."""
     poses, count = problem.placed(away[rows], rows), min(_ABOUT, len(rows))
     far = np.linalg.norm(away[rows], axis=1) / problem.robot.length
     widest = np.minimum(_WIDEST * far, np.pi)
@@ -145,10 +146,11 @@ def _about(
     count: int,
     random: np.random.Generator,
 ) -> Candidates:
-    """Poses (k, d) of rows, turned by up to ``widest`` (k,) and half of them moved inward.
+    """Poses (k, d) of rows, rotated by up to ``widest`` (k,), half of them moved inward.
 
-    More of them by little than by much; and two as they are and as home is.
-    """  # fmt: skip
+    Small rotations are more frequent than large ones. Two more keep the position, one of them with
+    the reference orientation.
+    """
     robot, hinges = problem.robot, problem.robot.hinges
     home = problem.to(np.tile(robot.reference_pose, (len(rows), 1)), rows)
     out = np.repeat(middle[:, None], count, axis=1)

@@ -1,4 +1,4 @@
-"""What a model's file says of its effects: of one parameter, of a whole table."""
+"""How a model's file states an effect and its parameters."""
 
 from __future__ import annotations
 

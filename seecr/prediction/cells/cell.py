@@ -1,4 +1,4 @@
-"""What a model's file says of one parameter, and the place of what is wrong with it.
+"""One parameter in a model's file, and the position of mistakes in the file.
 
 radius_m = 0.0099                                        # the value alone
 radius_m = { value = 0.0099, stderr = 0.0001, unit = "m", at_bound = false }
@@ -19,7 +19,7 @@ from seecr.effects.base import Layout
 from seecr.errors import InputFileError
 
 UNSEEN = "unseen"
-"""What stands in place of an infinite standard error."""
+"""Stands for an infinite standard error."""
 
 _WORDS = ("value", "stderr", "unit", "at_bound", "fixed", "known")
 _KNOWN = ("value", "stderr")
@@ -27,17 +27,17 @@ _KNOWN = ("value", "stderr")
 
 @dataclass(frozen=True)
 class Where:
-    """The file, to say where in it something is."""
+    """The file, for errors that name the line."""
 
     path: Path
     text: str
 
     def error(self, words: str, effect: int | None = None, key: str = "") -> InputFileError:
-        """An error at the line of a key, of the k-th effect where one is given."""
+        """An error at the line of a key, within the k-th effect if one is given."""
         return InputFileError.at(self.path, words, line=self.line(effect, key))
 
     def line(self, effect: int | None, key: str) -> int | None:
-        """The line of a key; that where its effect begins, if it has none."""
+        """The line of a key, or the line where its effect begins if the key is missing."""
         seen, found = -1, None
         for number, line in enumerate(self.text.splitlines(), start=1):
             bare = line.split("#")[0].strip().replace(" ", "")
@@ -60,9 +60,11 @@ class Cell:
     """One parameter.
 
     Attributes:
-        value, stderr: inf where the data do not see it, NaN where the file gives none.
-        fixed: never fitted.
-        known: measured independently, NaN where it was not; known_stderr: inf there.
+        value, stderr: the standard error is inf if the data do not see the parameter, NaN if the
+            file states none.
+        fixed: whether it is never fitted.
+        known: the value measured independently, else NaN; known_stderr: its standard error, else
+            inf.
     """
 
     value: float
@@ -73,10 +75,10 @@ class Cell:
 
 
 def cell_of(where: Where, k: int, layout: Layout, i: int, content: Any, fixed: bool) -> Cell:
-    """Parameter i of effect k of the file; ``fixed`` is what the effect says of all of its own.
+    """Read parameter i of effect k; ``fixed`` is what the effect states for all its parameters.
 
     Raises:
-        InputFileError: no number, out of bounds, another unit, a word that is unknown, ``known``
+        InputFileError: not a number, out of bounds, another unit, an unknown key, or ``known``
             without its standard error.
     """
     return _Reader(where, k, layout, i).read(content, fixed)
@@ -84,7 +86,7 @@ def cell_of(where: Where, k: int, layout: Layout, i: int, content: Any, fixed: b
 
 @dataclass(frozen=True)
 class _Reader:
-    """Reads the cell of one parameter; every error names effect, parameter and line."""
+    """Reads one parameter; every error names effect, parameter and line."""
 
     where: Where
     k: int
@@ -114,7 +116,7 @@ class _Reader:
                 )
 
     def _within(self, given: Any, what: str) -> float:
-        """A number that the parameter may have."""
+        """A number within the parameter's bounds."""
         value = number_of(given)
         if value is None:
             raise self.error(f"{what}expected a number, got {given!r}")
@@ -130,7 +132,7 @@ class _Reader:
         return fixed
 
     def _known(self, table: Mapping[str, Any], fixed: bool) -> tuple[float, float]:
-        """What was measured independently, with its standard error."""
+        """The independently measured value, with its standard error."""
         if "known" not in table:
             return math.nan, math.inf
         known = table["known"]
@@ -167,13 +169,13 @@ def _shown(known: Any) -> str:
 
 
 def nearest_first(word: str, words: Sequence[str]) -> str:
-    """Words in a line, the one that is most like another first."""
+    """Words in one line, the most similar first."""
     likeness = {w: difflib.SequenceMatcher(None, word.lower(), w).ratio() for w in words}
     return ", ".join(sorted(words, key=lambda w: -likeness[w]))
 
 
 def number_of(value: Any) -> float | None:
-    """A finite number, None where it is none."""
+    """A finite number, or None if the value is not one."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return None
     return float(value) if math.isfinite(value) else None

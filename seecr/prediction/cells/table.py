@@ -1,4 +1,4 @@
-"""What a model's file says of one effect."""
+"""One effect in a model's file."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def term_of(where: Where, k: int, table: Mapping[str, Any], robot: Robot) -> tup
     """Effect k of the file with its values, and their standard errors (p,).
 
     Raises:
-        InputFileError: an effect or parameter that is unknown, missing, no number or out of bounds.
+        InputFileError: an effect or parameter is unknown, missing, not a number or out of bounds.
     """
     layout = _layout(where, k, table, robot)
     kind = _kind(where, k, table, layout)
@@ -59,7 +59,7 @@ def _flag(where: Where, k: int, table: Mapping[str, Any], layout: Layout, key: s
 
 
 def _kind(where: Where, k: int, table: Mapping[str, Any], layout: Layout) -> str:
-    """What the effect has values of its own for: "file", "run" or, where all have the same, ""."""
+    """Whether the effect has values of its own for each "file" or "run", else ""."""
     said = [kind for kind in KINDS if _flag(where, k, table, layout, f"per_{kind}")]
     if len(said) > 1:
         text = "is both per_file and per_run; leave per_file out: each run has its own then"
@@ -85,7 +85,7 @@ def _own(
 
 
 def _values(where: Where, k: int, layout: Layout, given: Mapping[str, Any], fixed: bool) -> Values:
-    """What a table says of all parameters."""
+    """The values, standard errors and knowledge in a table of all parameters."""
     given = _spread(layout, given)
     _check_names(where, k, layout, given)
     names = enumerate(layout.names)
@@ -100,7 +100,7 @@ def _values(where: Where, k: int, layout: Layout, given: Mapping[str, Any], fixe
 
 
 def _layout(where: Where, k: int, table: Mapping[str, Any], robot: Robot) -> Layout:
-    """The effect that a table is of; other keys are the user's own, if they are not misspelt."""
+    """The layout of a table's effect; other keys are the user's own, unless misspelt."""
     name = table.get("name")
     if not isinstance(name, str):
         raise where.error(f'expected name = "..." of an effect, got {name!r}', k, "name")
@@ -115,9 +115,10 @@ def _layout(where: Where, k: int, table: Mapping[str, Any], robot: Robot) -> Lay
 
 
 def _spread(layout: Layout, given: Mapping[str, Any]) -> Mapping[str, Any]:
-    """What is said of a parameter as a whole, said of each of its components.
+    """Copy what is stated for a whole group of components to each of them.
 
-    In the file's tree itself where it is one, so that what is written has a place for each.
+    If the mapping is the file's own tree it is edited in place, so that each component has a place
+    to be written to.
     """
     for whole, parts in layout.groups.items():
         if whole in given and isinstance(given, MutableMapping):
@@ -128,7 +129,7 @@ def _spread(layout: Layout, given: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _both(own: Any, said: Any) -> Any:
-    """What a component says and what is said of all of its kind; its own word counts."""
+    """What is stated for a component and for its whole group together; the component's own wins."""
     if own is None:
         return copy.deepcopy(said)
     cells = [cell if isinstance(cell, Mapping) else {"value": cell} for cell in (said, own)]
