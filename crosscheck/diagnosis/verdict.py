@@ -34,6 +34,9 @@ from seecr.effects import catalogue
 from seecr.errors import InputError
 from seecr.pose import Array
 
+# In fewer readings than this (60 whole poses), noise of unknown size that is correlated looks like
+# structure.
+_FEW_READINGS = 360
 # Data that would not even show effects of so many plausible sizes show nothing.
 _BLIND = 10.0
 
@@ -74,8 +77,21 @@ def diagnose(
         found = weighed(_diagnosed(ready, said, progress), ready.problem, tolerance)
         if found.search is None:
             return found
+        if _may_be_noise(found, ready.problem):
+            rows = Refusal(Unfit.STRUCTURE_OR_NOISE, int(ready.problem.use.sum()))
+            base = found.search.steps[0].fit
+            return replace(no_verdict(ready.problem, base, found.notes, rows), sight=found.sight)
         others = thin.note_on_others(found.search.last.fit.terms, found.search.problem.sigma)
     return replace(found, notes=(*found.notes, *others))
+
+
+def _may_be_noise(found: Diagnosis, problem: Problem) -> bool:
+    """Whether unexplained structure may be autocorrelated noise whose size was not stated.
+
+    With few rows no statistic separates the two.
+    """
+    is_unknown = found.verdict is DiagnosisVerdict.UNKNOWN_EFFECT and not found.missing
+    return is_unknown and not kinds_stated(problem) and problem.n_readings < _FEW_READINGS
 
 
 Notes = tuple[str, ...]

@@ -110,6 +110,10 @@ class Unfit(Enum):
     BLIND = "noise of {noise} would hide every effect, at ten times its plausible size too"
     NOTHING_TO_TRY = "these data can show none of the effects to consider: {lacking}"
     UNSOLVED_MODEL = "rows could not be solved with the model's values"
+    STRUCTURE_OR_NOISE = (
+        "structure remains, but in only {rows}, whose noise nobody stated, it may as well be noise "
+        "that is correlated from row to row"
+    )
 
 
 _MORE_POSES = (
@@ -130,6 +134,9 @@ _REMEDIES = {
     "--sigma position=0.1mm), or measure with less",
     Unfit.NOTHING_TO_TRY: "record what they need, or let other effects be considered",
     Unfit.UNSOLVED_MODEL: "check the model's values and the robot's file",
+    Unfit.STRUCTURE_OR_NOISE: "state the noise ([sigma] beside the file, or --sigma "
+    "position=0.1mm): stay at one pose and read it for as long as the measurements took; or read "
+    "more poses, some of them twice",
 }
 
 
