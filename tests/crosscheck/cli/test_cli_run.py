@@ -210,7 +210,7 @@ def test_an_effect_without_rest_ends_3(tmp_path, monkeypatch):
     monkeypatch.setattr(effect_suite, "measure", restless)
     result = run("--case", EFFECT, "--jobs", "1", "--out", tmp_path)
     assert result.exit_code == 3
-    assert "no rest at 1 of 16 poses" in result.stdout
+    assert "no equilibrium at 1 of 16 poses" in result.stdout
 
 
 def test_effects_are_a_group_of_the_shipped_robots(tmp_path):

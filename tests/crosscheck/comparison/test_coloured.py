@@ -45,7 +45,7 @@ def test_noise_that_goes_together_is_noise_and_is_told() -> None:
     assert found.whiteness is not None and found.whiteness.structured
     assert found.is_noise
     assert found.coloured is not None and found.coloured.rho["position"] > 0.2
-    assert "correlated by" in found.sentence
+    assert "with a correlation of" in found.sentence
     assert found.as_json()["coloured_noise"]["rho"]["position"] > 0.2
 
 
