@@ -90,7 +90,7 @@ def _panel(axes: Axes, found: Diagnosis, stages: list[Stage], kind: Kind) -> Non
         reach = max(value, float(np.nanmax(runs, initial=0.0)))
         words = f"{short(value)} {kind.unit}"
         if row == len(stages) - 1 and value > _ABOVE * floor > 0 and not _is_noise(found):
-            words += "\nunexplained"
+            words += "\nnot explained"
         axes.annotate(
             words, (reach, row), xytext=(5, 0), textcoords="offset points", va="center",
             fontsize=8.5, color=INK,

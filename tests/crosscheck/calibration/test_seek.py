@@ -92,7 +92,7 @@ def test_what_a_set_leaves_is_asked_of_a_field(monkeypatch: pytest.MonkeyPatch) 
     none = replace(found.judgement, sure=())
     assert "No few effects" in explained(replace(found, judgement=none), []).sentence
     few = replace(none, more=False)
-    assert explained(replace(found, judgement=few), []).sentence.startswith("Few effects")
+    assert explained(replace(found, judgement=few), []).sentence.startswith("A few effects")
 
 
 def assert_a_model_by_itself(found: Sought) -> None:

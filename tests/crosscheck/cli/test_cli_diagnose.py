@@ -70,7 +70,7 @@ def test_want_of_data_ends_0_and_want_of_solutions_3(tmp_path: Path) -> None:
     write_measurements(still, far)
     result = run("diagnose", xml, still, *options)
     assert result.exit_code == 3
-    assert "there is no equilibrium" in json.loads(result.stdout)["sentence"]
+    assert "the model has no equilibrium at " in json.loads(result.stdout)["sentence"]
 
 
 def test_a_model_that_cannot_be_solved_gives_no_verdict_with_the_reason(

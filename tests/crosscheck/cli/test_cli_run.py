@@ -105,7 +105,7 @@ def test_what_of_the_users_mjcf_plays_no_part_is_told_once(tmp_path):
     arguments = ("--no-recordings", "--jobs", "1", "--out", tmp_path / "out")
     result = run("--robot", rough, *arguments, "--json")
     assert result.exit_code == 0
-    note = f"{rough}: switched off here: damping; the platform hangs on springs and gravity alone"
+    note = f"{rough}: switched off here: damping; only springs and gravity act on the platform"
     assert result.stderr.count("note: ") == 1 and note in result.stderr
     document = json.loads(result.stdout)
     assert len(document["notes"]) == 1 and document["notes"][0].startswith(note)

@@ -109,8 +109,8 @@ def test_one_row_or_rows_all_alike_are_compared(stiff: tuple[Path, Path], tmp_pa
 @pytest.mark.parametrize(
     ("option", "value", "said"),
     [
-        ("--clock", "nan", "nan is no finite number"),
-        ("--rest-for", "inf", "inf is no finite number"),
+        ("--clock", "nan", "nan is not a finite number"),
+        ("--rest-for", "inf", "inf is not a finite number"),
         ("--rest-for", "-1", "-1.0 is not in the range x>0"),
     ],
 )

@@ -105,4 +105,4 @@ def test_structure_is_a_verdict_only_where_it_matters() -> None:
     moved = replace(exact, position=exact.position + shift)
     found = diagnose(robot(), moved, only=few, tolerance=told)
     assert found.verdict is DiagnosisVerdict.NO_EFFECT_MISSING
-    assert "Structure that remains is too small to matter: " in found.sentence
+    assert "The structure that remains is too small to matter: " in found.sentence

@@ -142,7 +142,7 @@ def test_numbers_are_those_of_the_json() -> None:
 
 @pytest.mark.parametrize("name", ["nothing", "unknown"])
 def test_nothing_is_called_missing_that_is_not_sure(name: str) -> None:
-    assert "What is missing" not in page(name)
+    assert "Missing effects, in the order" not in page(name)
     assert "the missing effect is" not in text_of(page("pulleys")).lower()
 
 
@@ -154,11 +154,11 @@ def test_unknown_shows_where_structure_is_left() -> None:
     for row in found.where:
         assert str(row.against) in seen
         assert row.bins[0].label in seen or len(row.bins) == 1
-    assert "unexplained" in seen
+    assert "not explained" in seen
     # what was tried may be a part of the catalogue; inks are other ones on dark pages
     assert found.sentence.endswith("tried explains: an unknown effect is missing.")
-    assert "Black:" not in seen and "Bracket: the spread over these runs" in seen
-    assert "unexplained" not in text_of(page("pulleys"))
+    assert "Black:" not in seen and "Bracket: the range over these runs" in seen
+    assert "not explained" not in text_of(page("pulleys"))
 
 
 def test_what_was_found_but_is_not_sure_is_hatched() -> None:
@@ -218,8 +218,8 @@ def test_noise_that_was_assumed_and_noise_that_was_found_are_told_apart() -> Non
     seen = text_of(render(replace(found, floor=larger)))
     assert "assumed noise position 0.030 mm" in seen
     assert "estimated noise 0.540 mm" in seen
-    assert "what noise as it was found alone would give" in seen
-    assert "two standard deviations of noise as it was assumed" in seen
+    assert "the error that the estimated noise alone would give" in seen
+    assert "two standard deviations of the assumed noise" in seen
     assert not re.search("as found|as it was", text_of(page("pulleys")))
 
 
@@ -315,8 +315,8 @@ def test_rivals_are_named_and_framed() -> None:
     rival = Rival("exit_point_error", found.search.last.fit, 0.3)
     finding = replace(found.missing[0], rivals=(rival,))
     seen = text_of(render(replace(found, missing=(finding,))))
-    assert "These data cannot tell it from exit_point_error" in seen
-    assert seen.index("+ pulley_radius or exit_point_error") < seen.index("What is missing")
+    assert "Indistinguishable on these data from exit_point_error" in seen
+    assert seen.index("+ pulley_radius or exit_point_error") < seen.index("Missing effects")
 
 
 def test_a_bound_and_a_blind_parameter_are_flagged() -> None:
@@ -346,7 +346,7 @@ def test_checks_tell_noise_from_structure() -> None:
     good = {check.name: check.good for check in checks(diagnosis("pulleys"))}
     assert good["size of the residuals"] is True
     assert good["neighbouring rows"] is True
-    assert good["runs left out"] is True
+    assert good["held-out runs"] is True
     bad = {check.name: check.good for check in checks(diagnosis("unknown"))}
     assert bad["size of the residuals"] is False
     assert checks(diagnosis("none")) == []
@@ -413,7 +413,7 @@ def test_arrows_fit_the_region() -> None:
 
 @pytest.mark.parametrize(
     ("magnify", "words"),
-    [(1.0, "to scale"), (50.0, "50 times too long"), (0.5, "0.5 times as long as they are")],
+    [(1.0, "to scale"), (50.0, "at 50 times their length"), (0.5, "at 0.5 times their length")],
 )
 def test_arrows_say_how_long_they_are(magnify: float, words: str) -> None:
     assert drawn(magnify) == words
