@@ -93,9 +93,9 @@ def file_of(given: GivenRobot) -> Path:
     robot = robot_of(given)
     wanted = "expected one as seecr.load_robot reads it; seecr.export writes its MJCF"
     if robot.source is None:
-        raise InputError(f"robot {robot.name} was read from no file; {wanted}")
+        raise InputError(f"robot {robot.name} was not read from a file; {wanted}")
     if isinstance(given, Robot) and not _same_numbers(given, load_robot(robot.source)):
-        raise InputError(f"robot {robot.name} has other numbers than {robot.source}; {wanted}")
+        raise InputError(f"robot {robot.name} has different numbers from {robot.source}; {wanted}")
     return robot.source
 
 

@@ -75,8 +75,8 @@ class BarRest(Result):
         """One line: tilt, tensions, and stability."""
         first, second = self.tensions
         return [
-            f"tilted by {np.degrees(self.theta):.4g} deg, tensions {first:.4g} and {second:.4g} "
-            f"weights, {'stable' if self.stable else 'not stable'}"
+            f"tilted by {np.degrees(self.theta):.4g} deg, tensions of {first:.4g} and "
+            f"{second:.4g} times the weight, {'stable' if self.stable else 'not stable'}"
         ]
 
     def records(self) -> Sequence[Record]:

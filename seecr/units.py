@@ -101,7 +101,7 @@ def joules(energy: float, form: str = ".3g") -> str:
 def with_error(value: float, error: float, digits: int = 2) -> tuple[str, str]:
     """A value and its standard error, to so many digits of the error."""
     if not np.isfinite(error):
-        return short(value), "not seen"
+        return short(value), "undetermined"
     if error <= 0.0:
         return short(value, 6), "0"
     decimals = digits - 1 - int(np.floor(np.log10(error)))

@@ -50,7 +50,7 @@ def test_words_of_the_glossary_are_linked_where_a_page_first_uses_them(page: Pat
 
 
 def test_a_word_without_its_link_is_seen() -> None:
-    once = "On `runs left out`, and on [runs left\nout](glossary.md); runs left out."
+    once = "On `held-out runs`, and on [held-out\nruns](glossary.md); held-out runs."
     assert link_words.with_links(once.replace("[", "").replace("](glossary.md)", "")) == once
     assert link_words.with_links(once) == once
 

@@ -89,7 +89,7 @@ def add_effects(
     if wrong:
         raise no_effects(wrong[0])
     if not some:
-        raise CrosscheckError("no effects were given; there is nothing to add")
+        raise CrosscheckError("expected at least one effect to add, got none")
 
     def fitter(problem: Problem, terms: Terms, factor: Array) -> Fit:
         every = {term.name: term for term in (*terms, *some)}
@@ -125,11 +125,11 @@ def _added(
     progress("looking for outliers", 0.4)
     outliers = outlying_rows(problem, best.state)
     if outliers.any():
-        words = f"{data.lines_of(outliers)} left out: outliers, far off the others"
+        words = f"{data.lines_of(outliers)} left out as outliers"
         notes.append(words)
         problem = problem.without(outliers, words)
         best = fitter(problem, terms, factor)
-    progress("predicting runs left out", 0.6)
+    progress("predicting held-out runs", 0.6)
     # effects that are free in the data were fitted in advance: they are not in the model before
     before = terms.only(name for name in terms.names if name in had or name not in names)
     return weigh(problem, before, names, factor, best, notes, basis_of(model, robot))
@@ -145,7 +145,9 @@ def _apart(terms: Terms, layout: Layout, kind: str) -> Term:
 def _refuse(problem: Problem, layout: Layout) -> None:
     reason = next(c.why_not for c in candidates_for(problem) if c.name == layout.name)
     if reason is not None:
-        raise CrosscheckError(f"{problem.data.path} cannot carry {layout.name}: {reason.words}")
+        raise CrosscheckError(
+            f"{problem.data.path}: {layout.name} cannot be fitted to these data: {reason.words}"
+        )
 
 
 def _fitted(problem: Problem, terms: Terms, layout: Layout, factor: Array) -> Fit:
@@ -163,7 +165,7 @@ def _fitted(problem: Problem, terms: Terms, layout: Layout, factor: Array) -> Fi
         unsolved = reason is None or reason.why is Why.UNSOLVED
         kind = UnsolvedError if unsolved else CrosscheckError
         why = reason or fits[0].status.value
-        raise kind(f"{problem.data.path} cannot carry {layout.name}: {why}")
+        raise kind(f"{problem.data.path}: {layout.name} cannot be fitted to these data: {why}")
     return min(good, key=lambda found: found.chi2)
 
 

@@ -66,10 +66,10 @@ class Addition(Result):
 
     def lines(self) -> list[str]:
         """Errors without and with the effects, the values, and what speaks against them."""
-        worth = "pays" if self.pays else "does not pay"
+        worth = "improves the prediction" if self.pays else "does not improve the prediction"
         left = rms_words(self.held_out_before), rms_words(self.held_out)
         out = [
-            f"{self.name} {worth} on runs left out: {left[0]} before, {left[1]} with it",
+            f"{self.name} {worth} of held-out runs: {left[0]} before, {left[1]} with it",
             f"on all rows: {rms_words(self.before)} before, {rms_words(self.after)} with it",
         ]
         out += fitted_lines(self.fitted)

@@ -124,12 +124,12 @@ def _hollow(best: Fit, held: HeldOut) -> bool:
 def _refuse_unsettled(problem: Problem, names: Sequence[str], best: Fit, held: HeldOut) -> None:
     if best.settled and not _hollow(best, held):
         return
-    why = "ended in a hollow: runs left out are predicted better than it fits them"
+    why = "ended in a local minimum: held-out runs are predicted better than they are fitted"
     if not best.settled:
-        why = f"did not come to an end in {counted(best.iterations, 'step')}"
+        why = f"did not converge in {counted(best.iterations, 'step')}"
     raise UnsolvedError(
-        f"{problem.data.path}: the fit of {' + '.join(names)} {why}; nothing was added: look for "
-        "what else is missing with crosscheck diagnose, or fix values that are known in the model"
+        f"{problem.data.path}: the fit of {' + '.join(names)} {why}; nothing was added: find what "
+        "else is missing with crosscheck diagnose, or fix known values in the model"
     )
 
 
@@ -185,18 +185,21 @@ def _warnings(
         names = np.array(f.term.layout.names)
         unseen, stopped = ~np.isfinite(f.stderr), np.asarray(f.at_bound, bool)
         if stopped.any():
-            out.append(f"{f.term.name}: {some(names[stopped])} ended on a bound")
+            out.append(f"{f.term.name}: {some(names[stopped])} stopped at a bound")
         if (unseen & ~stopped).any():
-            out.append(f"{f.term.name}: {some(names[unseen & ~stopped])} not seen by these data")
+            out.append(
+                f"{f.term.name}: {some(names[unseen & ~stopped])} not determined by these data"
+            )
         if not f.term.is_possible(robot):
             out.append(
-                f"{f.term.name}: no robot can have these values, so something else acts like it"
+                f"{f.term.name}: no robot can have these values, so something else acts like this "
+                "effect"
             )
         size = np.abs(f.term.sizes)
         large = (size > _IMPLAUSIBLE) & ~f.term.layout.shape
         if large.any():
             out.append(
-                f"{f.term.name}: {some(names[large])} is up to {size[large].max():.3g} times a "
+                f"{f.term.name}: {some(names[large])} is up to {size[large].max():.3g} times its "
                 "plausible size: check it on the robot"
             )
     return out + _together(best, own)
@@ -207,8 +210,8 @@ def _widened(best: Fit, moved: Array, own: NDArray[np.bool_]) -> list[str]:
     if not np.any(own & (moved > best.stderr)):
         return []
     return [
-        "what is left is no noise: the standard errors hold by how much another missing effect "
-        "may move these values; crosscheck diagnose looks for it"
+        "the residuals are not noise: the standard errors include by how much another missing "
+        "effect may shift these values; crosscheck diagnose searches for it"
     ]
 
 
@@ -223,6 +226,9 @@ def _together(best: Fit, own: NDArray[np.bool_]) -> list[str]:
         if table[i, j] > _CORRELATED
     ]
     return [
-        f"{labels[i]} and {labels[j]} are hardly determined apart (correlation {c:.3f})"
+        (
+            f"{labels[i]} and {labels[j]} are strongly correlated ({c:.3f}): these data hardly "
+            "separate them"
+        )
         for c, i, j in sorted(pairs, reverse=True)[:_MOST_NAMED]
     ]

@@ -123,7 +123,7 @@ def fit_all_effects(
     far_off = outliers(setting.chain, joint.weight, problem.data.n_rows)
     problem = setting.problem.with_far_off(far_off)
     setting = replace(setting, problem=problem)
-    progress("predicting runs left out", 0.95)
+    progress("predicting held-out runs", 0.95)
     return Calibration(
         setting,
         joint,

@@ -73,14 +73,16 @@ class Calibrated(Result, JointErrors):
     def noise_lines(self) -> list[str]:
         """Lines about the estimated noise of each kind of reading, and about outliers."""
         out = [
-            f"noise of the {name}: {self.scale[name]:.2f} times the assumed one, correlation "
-            f"{self.rho[name]:.2f} along a run"
+            f"noise of the {name}: {self.scale[name]:.2f} times the assumed noise, with a "
+            f"correlation of {self.rho[name]:.2f} from row to row of a run"
             for name in self.scale
         ]
         if self.outliers:
             lines = ", ".join(map(str, self.outliers))
             count = plural(len(self.outliers), "line")
-            out.append(f"hardly counted, and not in these errors, as far off: {count} {lines}")
+            out.append(
+                f"outliers, given little weight and not included in these errors: {count} {lines}"
+            )
         return out
 
     def lines(self) -> list[str]:
@@ -88,7 +90,7 @@ class Calibrated(Result, JointErrors):
         out = [
             f"{counted(len(self.labels), 'parameter')} of {counted(len(self.fitted), 'effect')}: "
             f"{rms_words(self.before)} before, {rms_words(self.after)} after, "
-            f"{rms_words(self.held_out)} on runs left out (refitted linearly)",
+            f"{rms_words(self.held_out)} on held-out runs (refitted linearly)",
             *self.noise_lines(),
         ]
         return [*out, *(f"note: {note}" for note in self.notes)]

@@ -79,15 +79,15 @@ def fit_everything(
     before, joint = joint, with_rows_back(frozen, joint)
     back = joint
     if poor(joint):
-        progress("trying effects alone", 0.4)
+        progress("trying effects one by one", 0.4)
         firm = [a for a in at_once if a.name not in terms and a.name != TRACKER]
         joint = _from_alone(frozen, joint, start, terms, (wanted, firm))
-    progress("looking at effects with history", 0.6)
+    progress("trying effects with history", 0.6)
     wanted = [a for a in wanted if a.name not in joint.terms]
     looked = promising_beside(frozen, joint, wanted)
     added = [inside(one.term) for one in looked if one.gain > PAYS]
     if added:
-        progress(f"fitting {', '.join(t.name for t in added)} too", 0.7)
+        progress(f"also fitting {', '.join(t.name for t in added)}", 0.7)
         joint = _joined(frozen, joint, start.terms, added)
     if any(a.name in joint.terms for a in later):
         setting = frozen

@@ -22,32 +22,38 @@ from seecr.effects import Term, Terms, catalogue
 from seecr.effects.base import layout_of
 from seecr.pose import Array
 
-_MOVE = "move the tracker and read some poses again; what goes with it is the tracker's"
+_MOVE = (
+    "move the tracker and measure some poses again; an error that moves with it comes from the "
+    "tracker"
+)
 _FREE = (
-    "take hoses and leads off the platform, or hang them elsewhere, and read some poses again; "
-    "what goes with them is their pull"
+    "take hoses and leads off the platform, or hang them elsewhere, and measure some poses again; "
+    "an error that changes comes from their pull"
 )
 
 
 class Varying(StrEnum):
     """What may change smoothly without being an effect, in words, and how to find out about it."""
 
-    POSITION = "something smooth over the workspace in the position alone", _MOVE
-    ORIENTATION = "something smooth over the workspace in the orientation alone", _MOVE
+    POSITION = "something that varies smoothly over the workspace, in the position alone", _MOVE
+    ORIENTATION = (
+        ("something that varies smoothly over the workspace, in the orientation alone"),
+        _MOVE,
+    )
     TENSION = (
-        "something smooth over the workspace in the tension alone",
+        "something that varies smoothly over the workspace, in the tensions alone",
         "hang a known weight on each load cell, as it is mounted, at several angles of its cable",
     )
-    READINGS = "something smooth over the workspace in all readings", ""
+    READINGS = "something that varies smoothly over the workspace, in all readings", ""
     SESSION = (
-        "something smooth over the session in the position",
-        "read a target that stands still before, between and after the runs, and the first poses "
-        "once more at the end",
+        "something that varies smoothly over the session, in the position",
+        "read a stationary target before, between and after the runs, and measure the first poses "
+        "again at the end",
     )
-    FORCE = "a force on the platform that changes with the place", _FREE
+    FORCE = "a force on the platform that changes with its position", _FREE
     SPRING = "something that pulls the platform like a spring", _FREE
     LENGTHS = (
-        "lengths of the cables that change with the place",
+        "cable lengths that change with the position",
         "measure what each winch pays out, at several lengths and with the other winches elsewhere",
     )
 

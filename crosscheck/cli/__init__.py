@@ -6,15 +6,18 @@ from seecr.cli.group import group_of
 
 # Command, module in crosscheck.cli that holds it as `command`, and its line in --help.
 COMMANDS: dict[str, tuple[str, str]] = {
-    "run": ("run", "Settle every shipped robot in MuJoCo, solve it with SEECR, compare."),
-    "compare": ("compare", "Hold a model against measurements."),
-    "diagnose": ("diagnose", "Find which effects a model misses, from measurements."),
-    "plan": ("plan", "Before measuring: what planned poses will be able to show."),
+    "run": ("run", "Solve every shipped robot with SEECR, settle it in MuJoCo, and compare."),
+    "compare": ("compare", "Compare a model with measurements."),
+    "diagnose": ("diagnose", "Find from measurements which effects a model misses."),
+    "plan": ("plan", "Before measuring: which effects the planned poses can reveal."),
     "add": ("add", "Fit an effect to measurements and add it to a model."),
-    "calibrate": ("calibrate", "Fit all effects at once to measurements, for predicting."),
-    "import": ("importing", "Other people's recordings into measurements."),
-    "effects": ("effects", "The catalogue of effects, and how to check each by hand."),
-    "twin": ("twin", "Make measurements with a hidden effect, MuJoCo being the truth."),
+    "calibrate": (
+        "calibrate",
+        ("Fit all effects at once to measurements, for a model that predicts well."),
+    ),
+    "import": ("importing", "Convert recordings of other programs into measurements."),
+    "effects": ("effects", "List the catalogue of effects, and how to check each by hand."),
+    "twin": ("twin", "Make measurements with a hidden effect, with MuJoCo as the truth."),
 }
 
 

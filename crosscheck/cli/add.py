@@ -35,18 +35,24 @@ Examples:
     "--all-from",
     type=FILE,
     metavar="diagnosis.json",
-    help="Instead of EFFECT: all effects that this diagnosis lists, together.",
+    help="Instead of EFFECT: fit all effects that this diagnosis lists, together.",
 )
 @click.option(
-    "--model", type=FILE, required=True, metavar="M.toml", help="The model; made if need be."
+    "--model",
+    type=FILE,
+    required=True,
+    metavar="M.toml",
+    help="The model; created if it does not exist.",
 )
-@click.option("--refit", is_flag=True, help="Fit again an effect that the model has.")
+@click.option("--refit", is_flag=True, help="Refit an effect that the model already has.")
 @click.option(
     "--per",
     type=click.Choice(["file", "run"]),
-    help="Give EFFECT values of its own for each file or run.",
+    help="Give EFFECT separate values for each file or run.",
 )
-@click.option("--force", is_flag=True, help="Add it even if it does not predict any better.")
+@click.option(
+    "--force", is_flag=True, help="Add it even if it does not predict held-out runs better."
+)
 @sigma_option
 @click.option("--out", type=FILE, metavar="DIR", help="Folder for add.json.  [default: none]")
 @json_option
@@ -61,18 +67,18 @@ def command(
     out: Path | None,
     as_json: bool,
 ) -> int:
-    """Fit EFFECT to DATA.csv, together with the effects the model has, and add it to the model.
+    """Fit EFFECT to DATA.csv, together with the model's own effects, and add it to the model.
 
-    All effects of the model are fitted again, since what one explained may be the other's. The
-    model keeps values, standard errors, where they come from, and the errors before and after.
+    All effects of the model are refitted, because one may have absorbed what another causes. The
+    model keeps the values, their standard errors and origin, and the errors before and after.
 
-    An effect that does not predict runs left out of the fit any better is not added: more
-    parameters always fit better. Nor is one whose values are together no further from nothing
-    than their standard errors. --force adds it all the same.
+    An effect is not added if it does not improve the prediction of held-out runs: more parameters
+    always fit better. Nor is it added if all its values together differ from null by no more than
+    their standard errors. --force adds it anyway.
 
     \b
-    Exit status: 0 added, 1 not added since it does not pay, 2 bad input, 3 rows without an
-    equilibrium or a fit that does not come to an end.
+    Exit status: 0 added, 1 not added because it is not worth adding, 2 bad input, 3 rows without an
+    equilibrium or a fit that does not converge.
     """
     from crosscheck import add_effect, add_effects, load_measurements, save_model
     from crosscheck.measurements.stated import with_stated
@@ -85,7 +91,7 @@ def command(
     if effect is not None:
         effect_named(effect)
     elif per is not None:
-        raise click.UsageError("--per is of one EFFECT; leave out --all-from")
+        raise click.UsageError("--per applies to a single EFFECT; leave out --all-from")
     machine = load_robot(robot)
     listed, said = load_diagnosed(all_from, machine) if all_from is not None else ((), ())
     names = [effect] if effect is not None else [term.name for term in listed]
@@ -145,7 +151,7 @@ def _check_names(old: Model, effect: str, refit: bool, path: Path) -> None:
     from crosscheck import CrosscheckError
 
     if effect in old.names and not refit:
-        raise CrosscheckError(f"{path} has {effect} already; --refit fits it again")
+        raise CrosscheckError(f"{path} already has {effect}; --refit fits it again")
     if refit and effect not in old.names:
         has = ", ".join(old.names) or "none"
         raise CrosscheckError(

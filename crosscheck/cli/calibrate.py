@@ -12,7 +12,7 @@ from seecr.cli.options import FILE, json_option, made_by, progress_share
 
 
 @click.command(
-    short_help="Fit all effects at once: a model that predicts.",
+    short_help="Fit all effects at once, for a model that predicts well.",
     epilog="""\b
 Examples:
   crosscheck calibrate robot.xml measured.csv --model model.toml
@@ -22,12 +22,18 @@ Examples:
 @click.argument("robot", type=FILE, metavar="ROBOT.xml")
 @click.argument("data", type=FILE, nargs=-1, required=True, metavar="DATA.csv...")
 @click.option(
-    "--model", type=FILE, required=True, metavar="M.toml", help="The model; made if need be."
+    "--model",
+    type=FILE,
+    required=True,
+    metavar="M.toml",
+    help="The model; created if it does not exist.",
 )
 @only_option
 @exclude_option
 @sigma_option
-@click.option("--force", is_flag=True, help="Write it even if it does not predict any better.")
+@click.option(
+    "--force", is_flag=True, help="Write it even if it does not predict held-out runs better."
+)
 @click.option("--out", type=FILE, metavar="DIR", help="Folder for calibration.json.")
 @json_option
 def command(
@@ -41,15 +47,15 @@ def command(
     out: Path | None,
     as_json: bool,
 ) -> int:
-    """Fit every effect that DATA.csv can see, all together, and write the model.
+    """Fit all effects that DATA.csv can reveal, at once, and write the model.
 
-    Each parameter's plausible size is its prior: what the data hardly see stays near null. The
-    noise is taken as it is, its size and its correlation along the runs estimated. Such a model
-    is worth what it predicts; which of its effects are real is what diagnose says.
+    Each parameter's plausible size is the standard deviation of its prior: what the data hardly
+    determine stays near null. The size of the noise and its correlation along the runs are
+    estimated. Use such a model for its predictions; diagnose says which of its effects are real.
 
     \b
-    Exit status: 0 written, 1 not written since runs left out are not predicted any better, 2 bad
-    input, 3 rows without an equilibrium, or a fit that did not settle.
+    Exit status: 0 written, 1 not written because the prediction of held-out runs does not improve,
+    2 bad input, 3 rows without an equilibrium or a fit that does not converge.
     """
     from crosscheck import calibrate, load_measurements, save_model
     from crosscheck.files import json_text

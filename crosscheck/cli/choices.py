@@ -25,8 +25,8 @@ sigma_option = click.option(
     "sigmas",
     multiple=True,
     metavar="KIND=0.1mm",
-    help="Noise of a kind of reading: position, orientation, tension, or of the commanded length; "
-    "may be repeated, goes before [sigma] in the TOML.",
+    help="Noise of a kind of reading (position, orientation, tension) or of the commanded lengths "
+    "(length); may be repeated; overrides [sigma] in the TOML.",
 )
 """``--sigma position=0.1mm``, given to the command as ``sigmas``, a tuple of texts."""
 
@@ -35,7 +35,7 @@ only_option = click.option(
     multiple=True,
     callback=listed,
     metavar="EFFECT,...",
-    help="Consider these effects alone, beside those of the model; may be repeated.",
+    help="Consider only these effects, in addition to those of the model; may be repeated.",
 )
 """``--only EFFECT,...``, given to the command as ``only``, a tuple of names."""
 
@@ -53,14 +53,14 @@ tolerance_option = click.option(
     "tolerances",
     multiple=True,
     metavar="0.1mm",
-    help="What is left beyond noise counts as missing from this size on (rms, such as 0.1mm, "
-    "0.05deg or 1N); may be repeated.  [default: half the noise]",
+    help="Unexplained errors beyond the noise matter from this rms size on, such as 0.1mm, "
+    "0.05deg or 1N; may be repeated.  [default: half the noise]",
 )
 """``--tolerance 0.1mm``, given to the command as ``tolerances``, a tuple of texts."""
 
 
 figures_option = click.option(
-    "--figures", type=FILE, metavar="DIR", help="Keep the page's figures there, as SVG and PNG."
+    "--figures", type=FILE, metavar="DIR", help="Folder for the page's figures, as SVG and PNG."
 )
 """``--figures DIR``, given to the command as ``figures``; see :func:`figures_in`."""
 

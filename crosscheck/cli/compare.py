@@ -12,7 +12,7 @@ from seecr.cli.options import FILE, json_option, made_by, out_option, progress_s
 
 
 @click.command(
-    short_help="Hold a model against measurements.",
+    short_help="Compare a model with measurements.",
     epilog="""\b
 Examples:
   crosscheck compare robot.xml measured.csv
@@ -22,7 +22,7 @@ Examples:
 )
 @click.argument("robot", type=FILE, metavar="ROBOT.xml")
 @click.argument("data", type=FILE, nargs=-1, required=True, metavar="DATA.csv...")
-@click.option("--model", type=FILE, metavar="M.toml", help="The model; plain SEECR without.")
+@click.option("--model", type=FILE, metavar="M.toml", help="The model.  [default: plain SEECR]")
 @click.option("--max-position", metavar="0.5mm", help="Limit on the rms position error.")
 @click.option("--max-orientation", metavar="0.2deg", help="Limit on the rms orientation error.")
 @click.option("--max-tension", metavar="1N", help="Limit on the rms tension error.")
@@ -34,11 +34,11 @@ Examples:
     "limits_file",
     type=FILE,
     metavar="FILE.toml",
-    help='Limits from a file: max_position = "0.5mm" and so on; options go first.',
+    help='Limits from a file: max_position = "0.5mm" and so on; options override it.',
 )
 @sigma_option
 @figures_option
-@click.option("--no-recording", is_flag=True, help="Write no .rrd.")
+@click.option("--no-recording", is_flag=True, help="Do not write a recording (.rrd).")
 @out_option("crosscheck-comparison")
 @json_option
 def command(
@@ -53,15 +53,15 @@ def command(
     as_json: bool,
     **options: str | None,
 ) -> int:
-    """Show where a model is off, by how much, and whether what is left is noise.
+    """Show where a model is off, by how much, and whether the residuals are noise.
 
-    ROBOT.xml is the robot's MJCF, DATA.csv its measurements, with sigma in a TOML beside it.
-    Nothing is fitted: with the model's values as they are. Writes comparison.json,
+    ROBOT.xml is the robot's MJCF, DATA.csv its measurements; a TOML file beside it states the
+    noise. The model's values are used as they are, and nothing is fitted. Writes comparison.json,
     comparison.html and comparison.rrd.
 
     \b
-    Limits make it a gate for continuous integration: on the rms over all rows and components,
-    as in the tables, or on the worst row (the length of its error vector).
+    With limits the command is a gate for continuous integration: on the rms over all rows and
+    components, as in the tables, or on the worst row (the length of its error vector).
     Exit status: 0 all well, 1 a limit exceeded, 2 bad input, 3 rows without an equilibrium.
     """
     from crosscheck import compare, load_measurements

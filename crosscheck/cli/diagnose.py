@@ -29,23 +29,26 @@ if TYPE_CHECKING:
 )
 @click.argument("robot", type=FILE, metavar="ROBOT.xml")
 @click.argument("data", type=FILE, nargs=-1, required=True, metavar="DATA.csv...")
-@click.option("--model", type=FILE, metavar="M.toml", help="Effects the model has already.")
+@click.option("--model", type=FILE, metavar="M.toml", help="Effects that the model already has.")
 @only_option
 @exclude_option
 @sigma_option
 @tolerance_option
 @click.option(
-    "--model-out", type=FILE, metavar="M.toml", help="Write the model with what is missing added."
+    "--model-out",
+    type=FILE,
+    metavar="M.toml",
+    help="Write the model with the missing effects added.",
 )
 @click.option(
     "--fail-on",
     multiple=True,
     callback=listed,
     metavar="VERDICT,...",
-    help="End 1 where the verdict is one of these, such as unknown_effect,no_verdict.",
+    help="Exit with status 1 if the verdict is one of these, such as unknown_effect,no_verdict.",
 )
 @figures_option
-@click.option("--no-recording", is_flag=True, help="Write no .rrd.")
+@click.option("--no-recording", is_flag=True, help="Do not write a recording (.rrd).")
 @out_option("crosscheck-diagnosis")
 @json_option
 def command(
@@ -63,14 +66,14 @@ def command(
     out: Path,
     as_json: bool,
 ) -> int:
-    """Find which effects a model misses, in the order in which adding them pays.
+    """Find which effects a model misses, those that explain most first.
 
-    ROBOT.xml is the robot's MJCF, DATA.csv its measurements, with sigma in a TOML beside it.
-    Writes diagnosis.json, diagnosis.html and diagnosis.rrd.
+    ROBOT.xml is the robot's MJCF, DATA.csv its measurements; a TOML file beside it states the
+    noise. Writes diagnosis.json, diagnosis.html and diagnosis.rrd.
 
     \b
-    Exit status: 0 with a verdict, or none for want of data; 1 a verdict of --fail-on, 2 bad input,
-    3 rows without an equilibrium.
+    Exit status: 0 with a verdict, or without one for lack of data; 1 a verdict of --fail-on, 2 bad
+    input, 3 rows without an equilibrium.
     """
     from crosscheck import DiagnosisVerdict, Tolerance, diagnose, load_measurements
     from crosscheck.files import json_text, staged, write_text
@@ -127,10 +130,10 @@ def _keep(found: Diagnosis, own: Model, robot: Robot, measured: Measurements, pa
     from crosscheck.model import provenance_of, renewed, save_model, with_fit
 
     if found.refusal is not None:
-        return f"{path} not written: there is no verdict"
+        return f"{path} was not written: there is no verdict"
     if not found.missing:
         save_model(path, own)
-        return f"Written to {path}: the model as it stands, nothing is added"
+        return f"Written to {path}: the model as it was, with nothing added"
     names = [effect.effect for effect in found.missing]
     errors = {"before": found.before, "after": found.after, "held_out": found.held_out}
     source = provenance_of(measured.name, "crosscheck diagnose")

@@ -11,7 +11,7 @@ from seecr.cli.options import FILE, json_option, made_by
 
 
 @click.command(
-    short_help="The effects that a robot may have, and how to check each by hand.",
+    short_help="List the effects that a robot may have, and how to check each by hand.",
     epilog="""\b
 Examples:
   crosscheck effects
@@ -19,13 +19,17 @@ Examples:
 """,
 )
 @click.argument("name", required=False)
-@click.option("--robot", type=FILE, metavar="ROBOT.xml", help="Plausible sizes for this robot.")
+@click.option(
+    "--robot", type=FILE, metavar="ROBOT.xml", help="Show plausible sizes for this robot."
+)
 @json_option
 def command(name: str | None, robot: Path | None, as_json: bool) -> int:
-    """List the effects of the catalogue, or describe one: formula, parameters, how to check it.
+    """List the effects of the catalogue, or describe one: its formula, its parameters, and how to
+    check it.
 
-    Effects of your own packages are among them and marked. With a robot the plausible size of each
-    parameter is that for it; diagnose and calibrate take it as the prior's standard deviation.
+    Effects of your own packages are included and marked. With --robot, the plausible size of each
+    parameter for that robot is shown; diagnose and calibrate use it as the prior's standard
+    deviation.
     """
     from crosscheck.files import json_text
     from crosscheck.terminal import effect_record, print_effect, print_effects

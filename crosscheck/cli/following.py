@@ -89,7 +89,7 @@ def _using(given: Given, model: Path) -> str:
     if given.lengths:
         return following("seecr", "map", given.robot, "--model", model)
     line = following("seecr", "correct", given.robot, given.data[0], "--model", model)
-    return f"{line}  # the poses commanded there; or any CSV of poses that you want"
+    return f"{line}  # corrects the poses commanded there; any CSV of wanted poses will do"
 
 
 def after_fit(is_noise: bool, written: bool, given: Given) -> str:
@@ -103,4 +103,4 @@ def after_fit(is_noise: bool, written: bool, given: Given) -> str:
 def after_plan(robot: Path, poses: Path, sigmas: Sequence[str] = ()) -> str:
     """Once the poses have been measured."""
     line = following("crosscheck", "diagnose", robot, poses, *noise(sigmas))
-    return f"{line}  # once its poses are measured"
+    return f"{line}  # once these poses are measured"

@@ -12,7 +12,7 @@ from seecr.cli.options import FILE, finite, json_option, made_by, out_option, pr
 
 
 @click.command(
-    short_help="Other people's recordings into measurements.",
+    short_help="Convert recordings of other programs into measurements.",
     epilog="""\b
 Examples:
   crosscheck import motive take.csv --robot robot.xml --commands commands.csv --out case
@@ -23,7 +23,13 @@ Examples:
 )
 @click.argument("form", type=click.Choice(["motive", "vicon", "poses"]), metavar="FORMAT")
 @click.argument("files", type=FILE, nargs=-1, required=True, metavar="FILE...")
-@click.option("--robot", type=FILE, required=True, metavar="ROBOT.xml", help="Whose they are.")
+@click.option(
+    "--robot",
+    type=FILE,
+    required=True,
+    metavar="ROBOT.xml",
+    help="The program that wrote the recordings.",
+)
 @click.option(
     "--commands",
     "logs",
@@ -31,37 +37,39 @@ Examples:
     multiple=True,
     required=True,
     metavar="COMMANDS.csv",
-    help="What the robot was told, with t_s, or a row for each dwell; once for each FILE.",
+    help="Log of commands, with a column t_s or one row per dwell; once for each FILE.",
 )
-@click.option("--body", metavar="NAME", help="The rigid body, where there are several.")
-@click.option("--markers", metavar="A,B,C", help="Markers that make the body, three or more.")
+@click.option("--body", metavar="NAME", help="The rigid body, if there are several.")
+@click.option("--markers", metavar="A,B,C", help="Markers that form the body, three or more.")
 @click.option(
     "--shape",
     type=FILE,
     metavar="SHAPE.csv",
-    help="Where they sit in the platform's frame: name, x_mm, y_mm, z_mm.",
+    help="Marker positions in the platform's frame: columns name, x_mm, y_mm, z_mm.",
 )
 @click.option(
     "--point",
     "points",
     multiple=True,
     metavar="MARKER=X,Y,Z",
-    help="A marker (or its x,y,z in the tracker's frame) and its place in the base frame, in "
-    "metres, or a cable's name for its exit point; three or more align the frames.",
+    help="A marker (or its x,y,z in the tracker's frame) and its position in the base frame in "
+    "metres (or a cable's name, for its exit point); three or more align the frames.",
 )
-@click.option("--aligned", is_flag=True, help="The tracker's frame is the base frame already.")
+@click.option("--aligned", is_flag=True, help="The tracker's frame already is the base frame.")
 @click.option(
     "--target",
     metavar="X,Y,Z",
-    help="The body's origin in the platform's frame, in metres, its axes parallel to that.",
+    help="The body's origin in the platform's frame, in metres; the axes of both are parallel.",
 )
-@click.option("--up", type=click.Choice(["y", "z"]), help="What is up in FILE.  [Motive: y]")
-@click.option("--unit", metavar="mm", help="Of lengths in a log whose columns do not say.")
+@click.option("--up", type=click.Choice(["y", "z"]), help="The vertical axis in FILE.  [Motive: y]")
+@click.option(
+    "--unit", metavar="mm", help="Unit of lengths in a log whose columns do not state it."
+)
 @click.option(
     "--rotation",
     metavar="KIND",
-    help="What three numbers of a rotation mean: vector, "
-    "or Euler angles in order, xyz about fixed and XYZ about moving axes.",
+    help="What the three numbers of a rotation mean: vector, or the order of Euler angles, such "
+    "as xyz about fixed or XYZ about moving axes.",
 )
 @click.option(
     "--rest-for",
@@ -70,15 +78,17 @@ Examples:
     metavar="S",
     default=0.5,
     show_default=True,
-    help="A dwell takes so long at least.",
+    help="Minimum duration of a dwell.",
 )
-@click.option("--rest-speed", metavar="1mm/s", help="At rest is slower.  [default: by the noise]")
+@click.option(
+    "--rest-speed", metavar="1mm/s", help="Maximum speed at rest.  [default: from the noise]"
+)
 @click.option(
     "--clock",
     type=float,
     callback=finite,
     metavar="S",
-    help="What the tracker's clock shows more than that of the commands.  [default: found]",
+    help="How far the tracker's clock is ahead of that of the commands.  [default: estimated]",
 )
 @out_option("case")
 @json_option
@@ -91,13 +101,13 @@ def command(
     as_json: bool,
     **options: Any,
 ) -> int:
-    """Make a case folder of recordings: dwells found, averaged and given their commands.
+    """Make a case folder from recordings: find dwells, average them and assign their commands.
 
     FORMAT is motive (CSV exports of OptiTrack), vicon (of Nexus) or poses (a plain log with the
     columns t_s, x_mm, y_mm, z_mm, qw, qx, qy, qz). Units, axes and order come from the labels.
 
-    The tracker's frame is found roughly, from points that you name or from the commands. It has
-    then taken in a part of the error, so it stays free in every later fit (docs/formats.md).
+    The tracker's frame is aligned roughly, from points that you name or from the commands. It has
+    then absorbed a part of the error, so it stays free in every later fit (docs/formats.md).
 
     \b
     Writes into --out:

@@ -14,7 +14,7 @@ from seecr.cli.options import FILE, json_option, made_by, out_option, progress_s
 
 
 @click.command(
-    short_help="What planned poses will be able to show, or which to measure.",
+    short_help="Find which effects planned poses can reveal, or choose poses to measure.",
     epilog="""\b
 Examples:
   crosscheck plan robot.xml --rows 40
@@ -24,23 +24,38 @@ Examples:
 @click.argument("robot", type=FILE, metavar="ROBOT.xml")
 @click.argument("poses", type=FILE, metavar="[POSES.csv]", required=False)
 @click.option(
-    "--rows", type=click.IntRange(min=6), metavar="N", help="Choose so many poses, without a file."
+    "--rows",
+    type=click.IntRange(min=6),
+    metavar="N",
+    help="Choose this many poses instead of reading a file.",
 )
 @click.option(
     "--reads",
     multiple=True,
     callback=listed,
     metavar="KIND,...",
-    help="What will be read, of position, orientation and tension.  [default: position,"
-    "orientation, and tension where its noise is stated]",
+    help="What will be measured: position, orientation, tension.  [default: position,orientation, "
+    "and tension if its noise is stated]",
 )
 @sigma_option
-@click.option("--lowest", type=float, metavar="N", default=0.0, help="Tension of proposed poses.")
-@click.option("--highest", type=float, metavar="N", default=math.inf, help="The same, at most.")
+@click.option(
+    "--lowest",
+    type=float,
+    metavar="N",
+    default=0.0,
+    help="Lowest cable tension at proposed poses.",
+)
+@click.option(
+    "--highest",
+    type=float,
+    metavar="N",
+    default=math.inf,
+    help="Highest cable tension at proposed poses.",
+)
 @click.option(
     "--box",
     metavar="X0,Y0,Z0,X1,Y1,Z1",
-    help="Where poses are chosen [m].  [default: inside the exit points]",
+    help="Where to choose poses [m].  [default: inside the exit points]",
 )
 @figures_option
 @out_option("crosscheck-plan")
@@ -58,16 +73,16 @@ def command(
     out: Path,
     as_json: bool,
 ) -> int:
-    """Tell, before anyone measures, which effects poses would show and tell apart.
+    """Tell, before measuring, which effects the poses would reveal and distinguish.
 
-    POSES.csv holds commands as a file of measurements does; readings in it are ignored. With
-    --rows the poses are chosen: where the robot holds still within the tensions, and those that
-    together show and tell apart most effects. Noise comes from --sigma, from [sigma] in the TOML
-    beside POSES.csv, or is that of good sensors.
+    POSES.csv holds commands in the same format as a file of measurements; readings in it are
+    ignored. With --rows the poses are chosen: of those where the robot comes to rest within the
+    tension limits, those that together reveal and distinguish most effects. The noise comes from
+    --sigma, or from [sigma] in the TOML beside POSES.csv, or else is that of good sensors.
 
-    For each effect: the smallest size that would show; the smallest beside the effect that
-    imitates it best; what it could not be told from; and what to add: poses, a payload, way
-    points, tensions, the way back.
+    For each effect: the smallest visible size; the smallest size at which it can be named although
+    another effect imitates it; which effects it would be indistinguishable from. Then what to add:
+    poses, a payload, way points, tensions, the way back.
 
     \b
     Writes into --out:

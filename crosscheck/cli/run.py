@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 @click.command(
-    short_help="The cross-check suite.",
+    short_help="Run the cross-check suite.",
     epilog="""\b
 Examples:
   crosscheck run
@@ -39,32 +39,32 @@ Examples:
     "patterns",
     multiple=True,
     metavar="NAME",
-    help="Only this case; may be repeated, and a pattern such as 'cogiro-*'. See --list.",
+    help="Run only this case, or a pattern such as 'cogiro-*'; may be repeated. See --list.",
 )
-@click.option("--list", "list_only", is_flag=True, help="List the cases and end.")
+@click.option("--list", "list_only", is_flag=True, help="List the cases and exit.")
 @click.option(
     "--robot",
     type=FILE,
     metavar="FILE.xml",
-    help="Instead of the shipped robots: an MJCF of yours, along a sweep and at random poses.",
+    help="Instead of the shipped robots: your own MJCF, along a sweep and at random poses.",
 )
 @click.option(
     "--mujoco-robot",
     type=FILE,
     metavar="FILE.xml",
-    help="With --robot: another MJCF for MuJoCo to settle, to see what a difference does.",
+    help="With --robot: another MJCF for MuJoCo, to see what a difference between the two does.",
 )
 @click.option(
     "--thresholds",
     "thresholds_file",
     type=FILE,
     metavar="FILE.toml",
-    help="How far apart the two may be. Each run leaves the file it used among its results: "
-    "copy that and change it.",
+    help="TOML with the allowed differences. Each run saves the file it used with its results: "
+    "copy and edit that.",
 )
 @seed_option
 @jobs_option
-@click.option("--no-recordings", is_flag=True, help="Write no .rrd files.")
+@click.option("--no-recordings", is_flag=True, help="Do not write recordings (.rrd).")
 @out_option("crosscheck-results")
 @json_option
 def command(
@@ -79,19 +79,18 @@ def command(
     out: Path,
     as_json: bool,
 ) -> int:
-    """Solve each pose with SEECR, settle it in MuJoCo, and hold the two against thresholds.
+    """Solve each pose with SEECR, settle it in MuJoCo, and compare the difference with thresholds.
 
-    The shipped cases: DemoBot in the Cogiro and the parallel configuration, on Vectran and on
-    fishing line, along the paper's sweeps (x 0.17 to 0.63 m at z 0.1 and 0.2 m), turned on the
-    way, and at 200 random poses each; two tilted commands with which the parallel one rests at
-    either of two poses, each begun so that it comes to both; three planar robots; a DemoBot with
-    uneven cables, one with its centre of mass off; robots of other sizes and kinds, cogiro-large,
-    ipanema and camera, along a sweep and at random poses. After them the group 'effects': every
-    effect on both DemoBots, held against a robot in MuJoCo that really has it (--case effects runs
-    only these).
+    The shipped cases: DemoBot in the Cogiro and the parallel configuration, with Vectran cables and
+    with fishing line, along the paper's sweeps (x 0.17 to 0.63 m at z 0.1 and 0.2 m), turned on the
+    way, and at 200 random poses each; two tilted commands at which the parallel one can rest at two
+    poses, each started so that both are reached; three planar robots; a DemoBot with uneven cables
+    and one with its centre of mass off; robots of other sizes and kinds, cogiro-large, ipanema and
+    camera, along a sweep and at random poses. Then the group 'effects': every effect on both
+    DemoBots, compared with a robot in MuJoCo that really has it (--case effects runs only these).
 
     A pose where the platform is free to move, or has two stable equilibria that both physics
-    confirm, is a finding: it is listed, and fails its case where the thresholds' [findings] do
+    confirm, is a finding: it is listed, and fails its case only if the thresholds' [findings] do
     not allow it.
 
     \b

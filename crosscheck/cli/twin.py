@@ -34,23 +34,26 @@ Examples:
     "seed",
     type=click.IntRange(min=0),
     metavar="SEED",
-    help="Draws what is hidden, how large it is, and the noise. The same seed, the same case.",
+    help=(
+        "Seed from which the hidden effects, their sizes and the noise are drawn; the same seed "
+        "gives the same case."
+    ),
 )
 @click.option(
     "--effects",
     "count",
     type=click.IntRange(min=0),
     metavar="K",
-    help="How many effects to hide.  [default: none, one or two, as the seed has it]",
+    help="How many effects to hide.  [default: none, one or two, drawn from the seed]",
 )
 @click.option(
     "--effect",
     "names",
     multiple=True,
     metavar="NAME",
-    help="Hide this effect, only its size being drawn; may be repeated.",
+    help="Hide this effect; only its size is drawn. May be repeated.",
 )
-@click.option("--tensions", is_flag=True, help="Record tensions too.")
+@click.option("--tensions", is_flag=True, help="Also record tensions.")
 @click.option(
     "--poses",
     type=FILE,
@@ -79,13 +82,13 @@ def command(
     out: Path,
     as_json: bool,
 ) -> int:
-    """Measure a robot with MuJoCo as the truth, with effects that are not disclosed.
+    """Simulate measurements of a robot with hidden effects, with MuJoCo as the truth.
 
     The platform is commanded along sweeps to and fro, at two heights and across, and around a
-    tilted loop, 144 rows in all, scaled to the robot. MuJoCo brings it to rest at each; a tracker
-    with noise reads its pose. With --poses it goes your own way: rows of POSES.csv that alone have
-    no reading are way points; noise is that of the TOML beside it, or of --sigma, and another at
-    other poses.
+    tilted loop, 144 rows in all, scaled to the robot. MuJoCo brings it to rest at each row; a
+    tracker with noise reads its pose. With --poses it follows your own commands: rows of POSES.csv
+    without a reading are way points if other rows have one; the noise level is that of the TOML
+    beside it, or of --sigma, and other poses get other noise.
 
     \b
     Writes into --out:
@@ -100,7 +103,9 @@ def command(
     if robot is None or seed is None:
         raise click.UsageError("expected ROBOT.xml and --hide SEED, or --open FILE")
     if names and count is not None:
-        raise click.UsageError("--effect says how many there are: leave out --effects")
+        raise click.UsageError(
+            "--effect already sets how many effects are hidden; leave out --effects"
+        )
     from crosscheck import Sigma, load_commands, make_twin
     from crosscheck.measurements.stated import stated
 
@@ -126,7 +131,9 @@ def command(
 def _check_alone(*others: object) -> None:
     """That nothing is asked to be made beside what is opened."""
     if any(other is not None and other is not False and other != () for other in others):
-        raise click.UsageError("--open shows a case that is there: leave out all but --json")
+        raise click.UsageError(
+            "--open shows an existing case; leave out all other options but --json"
+        )
 
 
 def _tell(twin: Twin, out: Path, made: Made | None) -> None:
@@ -149,7 +156,7 @@ def _tell(twin: Twin, out: Path, made: Made | None) -> None:
         f"noise {', '.join(_noises(sigma))}"
     )
     click.echo(f"written to {out}: {', '.join(files)}")
-    click.echo(f"what was hidden: crosscheck twin --open {out}")
+    click.echo(f"to see what is hidden: crosscheck twin --open {out}")
     click.echo(following("crosscheck", "diagnose", out / "robot.xml", out / "measured.csv"))
 
 

@@ -47,11 +47,11 @@ class Coloured:
     def words(self) -> str:
         """The noise in a few words."""
         sizes = ", ".join(
-            f"{name} {self.scale[name]:.2f} times the assumed one"
-            + (f" and correlated by {rho:.2f} from row to row" if rho > 0.05 else "")
+            f"{name} {self.scale[name]:.2f} times the assumed noise"
+            + (f", with a correlation of {rho:.2f} from row to row" if rho > 0.05 else "")
             for name, rho in self.rho.items()
         )
-        return sizes + (f"; {counted(self.outliers, 'row')} far off" if self.outliers else "")
+        return sizes + (f"; {counted(self.outliers, 'outlier')}" if self.outliers else "")
 
 
 def coloured_noise(

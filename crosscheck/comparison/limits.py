@@ -103,7 +103,9 @@ def load_limits(path: str | Path) -> Limits:
         name = key.replace("-", "_")
         if name not in RULES:
             near = difflib.get_close_matches(name, RULES, n=len(RULES), cutoff=0.0)
-            raise toml.error(f"{key} is no limit; known, nearest first: {', '.join(near)}", key)
+            raise toml.error(
+                (f"{key} is not a limit; expected one of, nearest first: {', '.join(near)}"), key
+            )
         if not isinstance(value, str):
             example = EXAMPLE[RULES[name].kind.name]
             text = f'{key}: expected a text such as "{example}", got {value!r}'
@@ -151,7 +153,7 @@ def _check_measured(found: Comparison, name: str, kind: Kind) -> None:
     }
     if not read[kind.name]:
         raise CrosscheckError(
-            f"{option(name)}: {data.path} holds no {kind.name} readings; expected limits on what "
+            f"{option(name)}: {data.path} has no {kind.name} readings; expected limits on what "
             "was measured"
         )
 

@@ -120,7 +120,9 @@ def in_time(problem: Problem, table: Array) -> tuple[Abscissa | None, int]:
     if period is None or problem.data.t_s is None:
         return None, tried
     phase = 360.0 * (problem.data.t_s / period % 1.0)
-    return Abscissa(QuantityKind.TIME, f"time, again every {period:.3g} s", phase, "deg"), tried
+    return Abscissa(
+        QuantityKind.TIME, (f"time, with a period of {period:.3g} s"), phase, "deg"
+    ), tried
 
 
 def _period(problem: Problem, table: Array) -> tuple[float | None, int]:

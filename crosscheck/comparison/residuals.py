@@ -83,7 +83,7 @@ def _outliers(problem: Problem, state: State) -> list[str]:
     rows = outlying_rows(problem, state)
     if not rows.any():
         return []
-    return [f"{problem.data.lines_of(rows)}: far off all the others, outliers? (counted)"]
+    return [f"{problem.data.lines_of(rows)}: possible outliers (included in all errors)"]
 
 
 def _coordinates(problem: Problem, state: State) -> Iterator[Coordinate]:

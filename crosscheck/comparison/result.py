@@ -192,18 +192,18 @@ class Comparison(Result):
             return f"No verdict: {self.refusal}; {self.refusal.remedy}."
         if w.is_noise:
             stated = kinds_stated(self.problem) == kinds_read(self.problem)
-            times = f"{w.scale:.2f} times the {'stated' if stated else 'estimated'} one"
-            return f"Model and data agree: what is left is noise ({times})."
+            times = f"{w.scale:.2f} times the {'stated' if stated else 'estimated'} noise"
+            return f"Model and data agree: the residuals are noise ({times})."
         if self.coloured is not None:
-            return f"Model and data agree: what is left is noise ({self.coloured.words})."
+            return f"Model and data agree: the residuals are noise ({self.coloured.words})."
         size = f"the errors are {w.scale:.3g} times the noise"
         if not w.structured:
             return (
-                f"What is left looks random, but {size}: the noise is stated too small, or many "
-                "small effects are missing."
+                f"The residuals look random, but {size}: either the noise is stated too small, or "
+                "many small effects are missing."
             )
         goes = self._goes_with()
-        return f"The model misses something: {size}, and neighbouring rows agree in them{goes}."
+        return f"The model misses something: {size} and correlated between neighbouring rows{goes}."
 
     def _goes_with(self) -> str:
         strongest = next((a for a in self.associations if a.significant), None)
@@ -211,8 +211,8 @@ class Comparison(Result):
             return ""
         share = f"{100 * strongest.share:.0f} %"
         if strongest.kind is QuantityKind.EVERYWHERE:
-            return f"; {share} of their square is the same everywhere"
-        return f"; {share} of their variance goes with {strongest.against}"
+            return f"; {share} of their mean square is a constant offset"
+        return f"; {strongest.against} explains {share} of their variance"
 
     def lines(self) -> list[str]:
         """The errors by kind beside the noise, and the verdict."""

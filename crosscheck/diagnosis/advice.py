@@ -64,8 +64,8 @@ def check_of(term: Term, robot: Robot, stderr: Array | None = None) -> str:
     layout = term.layout
     if not term.is_possible(robot):
         return (
-            f"{measured_directly(layout.name)}: no robot can have what fits these data best, so "
-            "something else acts like it"
+            f"{measured_directly(layout.name)}: no robot can have the values that fit these data "
+            "best, so something else acts like this effect"
         )
     values: dict[str, Any] = {}
     errors = np.full(len(layout), np.inf) if stderr is None else stderr
@@ -107,14 +107,14 @@ def _errors_of_totals(term: Term, robot: Robot, errors: Array) -> dict[str, floa
 
 
 _CALIBRATE = (
-    "crosscheck calibrate writes the model with all effects, each as far as the data know it; "
-    "which of them it is, only checks by hand can say"
+    "crosscheck calibrate writes a model with all effects, each as well as the data determine it; "
+    "only checks by hand can say which effects are really there"
 )
 # Many small errors at once look like an unknown effect: no single one explains anything before the
 # others are in the model.
 _ALL_AT_ONCE = (
-    "if every tolerance of the robot may be a little off: crosscheck calibrate fits all effects at "
-    "once and says what that predicts on runs left out"
+    "if every tolerance of the robot may be a little off: crosscheck calibrate fits all effects "
+    "at once and reports the error on held-out runs"
 )
 
 
@@ -151,7 +151,7 @@ def measure_next(
             out.append(f"to find {seen}: {seen.advice}")
         out += [_to_find(where), _ALL_AT_ONCE]
     if verdict is DiagnosisVerdict.NO_EFFECT_MISSING:
-        out.append("nothing is missing; to see smaller effects, see crosscheck plan")
+        out.append("nothing is missing; to find smaller effects, use crosscheck plan")
     return list(dict.fromkeys(out))
 
 
@@ -159,7 +159,7 @@ def _to_decide(alternatives: Sequence[Names]) -> list[str]:
     """Checks by hand of effects that some of the sets have and not all; of all if it is one set."""
     every, always = frozenset().union(*alternatives), frozenset.intersection(*alternatives)
     return [
-        f"to find which effects it is: {measured_directly(name)} ({name})"
+        f"to find out which effects are missing: {measured_directly(name)} ({name})"
         for name in sorted(every - always or every)
     ]
 
@@ -172,13 +172,13 @@ def measured_directly(effect: str) -> str:
 def _to_separate(
     plan: Planned, options: Sequence[Extension], effect: MissingEffect, rival: Rival
 ) -> list[str]:
-    start = f"to tell {effect.effect} and {rival.name} apart:"
+    start = f"to tell {effect.effect} from {rival.name}:"
     direct = list(dict.fromkeys(measured_directly(n) for n in (effect.effect, rival.name)))
     ways = telling_apart(plan, options, effect.effect, rival.layout)[:_MOST_WAYS]
     if not ways:
         return [
-            f"{start} {' or '.join(direct)}; no further pose, payload or tension that was tried "
-            "here separates them"
+            f"{start} {' or '.join(direct)}; none of the further poses, payloads and tensions "
+            "tried here separates them"
         ]
     first, *others = (_words_of(way) for way in ways)
     return [f"{start} {direct[-1]}, or {first}", *(f"{start} {way}" for way in others)]
@@ -191,8 +191,8 @@ def _words_of(way: Suggestion) -> str:
         places = ", ".join(_place(pose) for pose in way.poses)
         words = f"add poses at {places}"
     return (
-        f"{words} (signal that separates them: now {gain.now:.2g}, then {gain.then:.2g}, needs "
-        f"{gain.needed:g})"
+        f"{words} (signal that separates them: {gain.now:.2g} now, {gain.then:.2g} then, "
+        f"{gain.needed:g} needed)"
     )
 
 
@@ -204,8 +204,9 @@ def _place(pose: Array) -> str:
 
 
 _PLACE = (
-    "measure more poses along it, closer together, and some of them again at the end; what stays "
-    "with the place is geometry or the tracker, what does not is time or motion"
+    "measure more poses along it, closer together, and some of them again at the end; an error "
+    "that stays with the place comes from geometry or the tracker, one that does not comes from "
+    "time or motion"
 )
 _RUN = "zero the winches and check the tracker before each run, and repeat the runs"
 _TIME = "stay at one pose and read it for as long as the measurements took"
@@ -220,6 +221,6 @@ _FIRST = {
 def _to_find(where: Sequence[Association]) -> str:
     again = "repeat the same poses forward, back and an hour later"
     if not where:
-        return f"{again}, to see what the error follows"
-    advice = _FIRST.get(where[0].kind, f"{again}, and look at it there")
-    return f"the unexplained error goes with {where[0].against}: {advice}"
+        return f"{again}, to see what the error depends on"
+    advice = _FIRST.get(where[0].kind, f"{again}, and see whether that changes")
+    return f"the unexplained error depends on {where[0].against}: {advice}"

@@ -56,10 +56,13 @@ class Chances:
         if self.imitated is not None:
             return ""
         if self.shown is None:
-            return "these data could not show an unknown effect of any size: the catalogue fits all"
+            return (
+                "these data could not reveal an unknown effect of any size: the effects of the "
+                "catalogue can fit everything"
+            )
         return (
-            f"an unknown effect that is smooth over the workspace would have shown from about "
-            f"{rms_words(self.shown)} rms on"
+            "an unknown effect that varies smoothly over the workspace would have been detected "
+            f"from about {rms_words(self.shown)} rms on"
         )
 
     def of(self, name: str) -> float:

@@ -43,8 +43,8 @@ from crosscheck.fit.words import rms_words
 _ALIKE = 0.3
 
 MORE = (
-    "what few effects leave is smooth over the workspace and no noise: all effects together take "
-    "it in, or one that is not among them would"
+    "the residuals of a few effects are smooth over the workspace and not noise: all effects "
+    "together absorb them, and so might an unknown effect"
 )
 
 
@@ -134,12 +134,16 @@ def _noise_notes(sought: Sought, chances: Chances) -> list[str]:
     for name, scale in together.scale.items():
         rho = together.rho[name]
         if abs(scale - 1.0) > OTHER or rho > _ALIKE:
-            alike = f", correlated by {rho:.2f} from row to row of a run" if rho > _ALIKE else ""
-            out.append(f"noise of the {name}: {scale:.2f} times the assumed one{alike}")
+            alike = (
+                (f", with a correlation of {rho:.2f} from row to row of a run")
+                if rho > _ALIKE
+                else ""
+            )
+            out.append(f"noise of the {name}: {scale:.2f} times the assumed noise{alike}")
     rows = sought.calibration.outliers
     if rows.any():
         lines = sought.calibration.setting.problem.data.lines_of(rows)
-        out.append(f"hardly counted, and not in these errors, as far from all others: {lines}")
+        out.append(f"outliers, given little weight and not included in these errors: {lines}")
     return out
 
 
@@ -160,7 +164,7 @@ def _sentence(
     if said.imitated is not None:
         known = " + ".join(sorted(said.imitated.replaced))
         left = (
-            f"likelier than {known}, which can imitate it, is an effect that is not among them: "
+            f"an unknown effect is more probable than {known}, which can imitate it: "
             f"{said.imitated.seen}"
         )
         return and_what_is_left(words_of(missing), left, tried)
@@ -171,22 +175,22 @@ def _sentence(
     assert together is not None
     if len(alternatives) > 1:
         return (
-            "Few effects explain the error, but these data leave open which: "
-            f"{either(alternatives)}. All {tried} that were tried, together, take it from "
-            f"{rms_words(together.before)} to {rms_words(together.held_out)} on runs left out."
+            "A few effects explain the error, but these data leave open which: "
+            f"{either(alternatives)}. All {tried} effects together reduce it from "
+            f"{rms_words(together.before)} to {rms_words(together.held_out)} on held-out runs."
         )
     if alternatives:
         some = probable_words(hints_of(chances, (), alternatives[0]))
         return (
-            f"Few effects explain the error, though not beyond doubt: {some}. All {tried} that "
-            f"were tried, together, take it from {rms_words(together.before)} to "
-            f"{rms_words(together.held_out)} on runs left out."
+            f"A few effects explain the error, though not with certainty: {some}. All {tried} "
+            f"effects together reduce it from {rms_words(together.before)} to "
+            f"{rms_words(together.held_out)} on held-out runs."
         )
     sure = ", ".join(m.effect for m in missing)
     return (
-        f"No few effects explain the error, but all {tried} that were tried together do: from "
-        f"{rms_words(together.before)} to {rms_words(together.held_out)} on runs left out. "
-        + (f"Sure among them: {sure}." if sure else "None of them is sure by itself.")
+        f"No few effects explain the error, but all {tried} together do: they reduce it from "
+        f"{rms_words(together.before)} to {rms_words(together.held_out)} on held-out runs. "
+        + (f"Certain among them: {sure}." if sure else "None of them is certain by itself.")
     )
 
 

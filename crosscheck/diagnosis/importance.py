@@ -34,7 +34,7 @@ def weighed(found: Diagnosis, problem: Problem, tolerance: Tolerance) -> Diagnos
     verdict = some if found.missing else none
     assert found.search is not None
     names = " and ".join(effect.effect for effect in found.missing)
-    start = f"Missing is {names}; structure" if names else "Structure"
+    start = f"Missing: {names}. The structure" if names else "The structure"
     return replace(
         found,
         verdict=verdict,

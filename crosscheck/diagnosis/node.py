@@ -91,7 +91,7 @@ def _screened(
     todo = [c for c in trials.candidates(trials.problem) if c.name not in node.names]
     out = []
     for k, c in enumerate(todo):
-        progress(f"looking at {c.name}", k / len(todo))
+        progress(f"trying {c.name}", k / len(todo))
         if c.why_not is None:
             c = screen(trials, node.fit, c.layout)
         if c.why_not is None and c.p > prune:

@@ -74,12 +74,12 @@ class MissingEffect(Result):
     def lines(self) -> list[str]:
         """Errors with it, values, what it cannot be told from, and how to check it."""
         left_out = rms_words(self.held_out_rms)
-        out = [f"+ {self.effect}: {rms_words(self.rms)} (on runs left out {left_out})"]
+        out = [f"+ {self.effect}: {rms_words(self.rms)} (on held-out runs {left_out})"]
         values = value_lines(self.layout, self.values, self.stderr, self.at_bound)
         out += [f"    {line}" for line in values]
         if self.rivals:
             names = ", ".join(rival.name for rival in self.rivals)
-            out.append(f"    cannot be told from: {names}")
+            out.append(f"    indistinguishable from: {names}")
         return [*out, f"    check: {self.check}"]
 
     def records(self) -> list[Record]:
@@ -186,11 +186,11 @@ class Diagnosis(Result):
         out = [] if self.sight is None else self.sight.lines()
         out.append(f"{self.verdict.value}: {self.sentence}")
         if self.refusal is None:
-            out.append(f"as it stands: {rms_words(self.before)}")
+            out.append(f"before: {rms_words(self.before)}")
             out += [line for found in self.missing for line in found.lines()]
             out.append(f"noise alone: {rms_words(self.floor)}")
         if self.left is not None:
-            out.append(f"left beyond noise: {self.left.words}")
+            out.append(f"error beyond the noise: {self.left.words}")
         out += [f"note: {note}" for note in self.notes]
         return [*out, *(f"measure next: {line}" for line in self.measure_next)]
 

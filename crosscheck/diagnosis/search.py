@@ -173,7 +173,7 @@ def _from_nearby(trials: Trials, nodes: Sequence[Node], progress: Progress) -> l
             terms = best.terms
             values = terms.vector + _AWAY * terms.scale * rng.normal(size=len(terms))
             near = terms.with_vector(np.clip(values, terms.lower, terms.upper))
-            progress("fitting again from values nearby", 0.5)
+            progress("fitting again from nearby values", 0.5)
             found = trials.refit(near, best.state, iterations=_AGAIN_ITERATIONS, quick=True)
             if found.valid and found.chi2 < best.chi2:
                 best = found

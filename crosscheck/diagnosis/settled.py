@@ -66,7 +66,7 @@ def _chances(found: Search, rivals: Mapping[str, Sequence[Rival]]) -> Chances:
 def _all_rivals(found: Search, told: Callable[[str], None]) -> dict[str, list[Rival]]:
     out = {}
     for name in found.found:
-        told(f"looking for what could be there instead of {name}")
+        told(f"looking for effects that could replace {name}")
         out[name] = rivals_of(found, name)
     return out
 

@@ -77,7 +77,7 @@ def stages_of(found: Diagnosis) -> list[Stage]:
         if step.added:
             label = f"+ {step.added}"
         else:
-            label = "the model as it stands" if found.search.base else "plain SEECR"
+            label = "the given model" if found.search.base else "plain SEECR"
         out.append(Stage(label, step.added, not step.added or step.added in listed, step))
     return out
 
@@ -124,7 +124,7 @@ def drawn(magnify: float) -> str:
     """The scale of the arrows, in words."""
     if magnify == 1.0:
         return "to scale"
-    return f"{magnify:g} times {'too long' if magnify > 1.0 else 'as long as they are'}"
+    return f"at {magnify:g} times their length"
 
 
 def floor_of(found: Diagnosis, kind: Kind) -> float:

@@ -49,7 +49,7 @@ def _without_outliers(found: Search, base: Fit, progress: Progress) -> tuple[Sea
     rows = outlying_rows(problem, state)
     if not rows.any():
         return found, ()
-    note = f"{problem.data.lines_of(rows)} left out: outliers, far from all the others"
+    note = f"{problem.data.lines_of(rows)} left out as outliers"
     cleaned = problem.without(rows, note)
     kept = ~rows[problem.row_of]
     if whiteness(cleaned, state.white[kept], found.last.evidence.parameters).structured:
@@ -61,5 +61,5 @@ def _without_outliers(found: Search, base: Fit, progress: Progress) -> tuple[Sea
     better = search(replace(found.trials, problem=cleaned), again, progress)
     if better.found != found.found:
         with_all = ", ".join(found.found) or "nothing"
-        note += f" (with them the search finds {with_all})"
+        note += f" (with them, the search finds {with_all})"
     return better, (note,)

@@ -79,7 +79,7 @@ def _is_warranted(found: Search, name: str) -> bool:
 
 def _sentence(missing: Sequence[MissingEffect], tried: int) -> str:
     if not missing:
-        return f"Structure remains that {none_of(tried)}: an effect that is not among them."
+        return f"Structure remains that {none_of(tried)}: an unknown effect is missing."
     left = "structure remains that no known effect explains"
     return and_what_is_left(words_of(missing), left, tried)
 

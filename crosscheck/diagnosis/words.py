@@ -38,9 +38,9 @@ def agreement(tried: int, hints: Mapping[str, float] | None = None) -> str:
             probabilities.
     """
     if not hints:
-        return f"Model and data agree: what is left is noise, and {none_of(tried)} any of it."
+        return f"Model and data agree: the residuals are noise, and {none_of(tried)} any of it."
     return (
-        f"Model and data agree: what is left is noise; of {counted(tried, 'effect')} tried "
+        f"Model and data agree: the residuals are noise; among {counted(tried, 'effect')} tried "
         f"there is a {_hint_of(hints)}."
     )
 
@@ -66,19 +66,19 @@ def hints_of(
 def size_notes(terms: Iterable[Term]) -> list[str]:
     """Notes about effects that only explain the data with implausibly large values."""
     return [
-        f"{term.name} would be {largest_size(term):.3g} times a plausible size, which hardly "
-        "happens: check it by hand before anything else, it may stand for what is not tried here"
+        f"{term.name} would be {largest_size(term):.3g} times its plausible size, which is very "
+        "unlikely: check it by hand first, as it may stand for an effect that was not tried"
         for term in terms
     ]
 
 
 def noise_left(hints: Mapping[str, float]) -> str:
     """Says that what was added leaves noise, with ``hints`` as for `agreement`."""
-    return f"what is left is noise{f', with a {_hint_of(hints)}' if hints else ''}"
+    return f"the remaining residuals are noise{f', with a {_hint_of(hints)}' if hints else ''}"
 
 
 def _hint_of(hints: Mapping[str, float]) -> str:
-    return f"hint of {probable_words(hints)}, too weak to be sure"
+    return f"hint of {probable_words(hints)}, too weak to be certain"
 
 
 def probable_words(hints: Mapping[str, float]) -> str:
@@ -108,10 +108,10 @@ def none_of(tried: int) -> str:
 
 def _words_of(effect: MissingEffect) -> str:
     names = ", ".join(rival.name for rival in effect.rivals)
-    alike = f" (or {names}, alike on these data)" if names else ""
+    alike = f" (or {names}, indistinguishable on these data)" if names else ""
     return (
         f"adding {effect.effect}{alike} removes {percent(effect.share)} of the unexplained error "
-        "on runs it was not fitted to"
+        "on held-out runs"
     )
 
 
@@ -128,8 +128,8 @@ def probability_name(found: Diagnosis) -> str:
 
 
 WITHIN = (
-    "Within the catalogue: how probable an effect is if what is missing is one of the catalogue's. "
-    "Here something remains that is none of them and may act like this one."
+    "Probabilities within the catalogue assume that what is missing is one of its effects. Here "
+    "something remains that is none of them and may act like this one."
 )
 """What is said about probabilities if structure remains."""
 

@@ -48,8 +48,8 @@ def _worse_than_commands(problem: Problem, raw: Array, rows: NDArray[np.bool_]) 
         return []
     return [
         f"The model is {short(1e3 * off)} mm from the measured positions, the commands themselves "
-        f"only {short(1e3 * plain)} mm (rms): is this the file of another robot, or does its "
-        "controller correct for elasticity already?"
+        f"are only {short(1e3 * plain)} mm from them (rms): is this the file of another robot, or "
+        "does the controller correct for elasticity already?"
     ]
 
 
@@ -64,6 +64,7 @@ def _other_tensions(problem: Problem, raw: Array) -> list[str]:
     if usual <= 0.0 or expected <= 0.0 or 1.0 / _OTHER_TENSION < usual / expected < _OTHER_TENSION:
         return []
     return [
-        f"Tensions of {short(usual)} N were read where the model expects {short(expected)} N "
-        "(rms): another unit, the file of another robot, or a pretension that the model has not?"
+        f"Tensions of {short(usual)} N were measured where the model expects {short(expected)} N "
+        "(rms): is it another unit, the file of another robot, or a pretension that the model "
+        "lacks?"
     ]

@@ -121,5 +121,5 @@ def _told(
         f"{parameter_name(key, unit)} {measured(v, e, unit)}" for key, unit, v, e, own in values
         if own or by_toml
     )  # fmt: skip
-    why = f" is free, as the TOML beside {problem.data.name} says, and" if by_toml else ""
+    why = f" is free, as stated in the TOML beside {problem.data.name}, and" if by_toml else ""
     return f"{name}{why} was fitted to these data first: {words}"

@@ -41,8 +41,8 @@ class FitStatus(Enum):
     """How a fit ended; the values of the enum are what people read."""
 
     SOLVED = "every row that counts was solved"
-    UNSOLVED_AT_START = "rows could not be solved at the start of the fit"
-    UNSOLVED_AT_VALUES = "rows could not be solved with the model's values"
+    UNSOLVED_AT_START = "some rows could not be solved at the start of the fit"
+    UNSOLVED_AT_VALUES = "some rows could not be solved with the model's values"
 
 
 @dataclass(frozen=True, eq=False)

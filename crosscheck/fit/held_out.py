@@ -67,7 +67,10 @@ def blocks_of(problem: Problem) -> list[NDArray[np.bool_]]:
 def blocks_note(problem: Problem) -> str:
     """A note that the blocks held out are not whole runs; "" if they are."""
     if problem.groups is not None:
-        return "cross-validation leaves out a part of each file or run, as they have own values"
+        return (
+            "cross-validation leaves out a part of each file or run, because each has values of "
+            "its own"
+        )
     if _enough_runs(problem):
         return ""
     runs = len(_runs(problem))

@@ -89,7 +89,7 @@ def _unknown(term: Term) -> Values:
 
 
 def _said(effect: str, kind: str, known: Sequence[str], new: Sequence[str]) -> str:
-    words = [f"{some(known)} as the model has them"] if known else []
+    words = [f"{some(known)} as in the model"] if known else []
     if new:
-        words.append(f"{some(new)} not known to the model, fitted to these data first")
-    return f"{effect} has values of its own for each {kind}: {'; '.join(words)}"
+        words.append(f"{some(new)} not in the model, so fitted to these data first")
+    return f"{effect} has separate values for each {kind}: {'; '.join(words)}"

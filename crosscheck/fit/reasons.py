@@ -16,32 +16,34 @@ from seecr.counted import counted
 class Why(Enum):
     """Why an effect is no candidate or was not chosen; the values are what people read."""
 
-    EXCLUDED = "not considered, as was asked for"
-    TOO_MANY_PARAMETERS = "{parameters}, but the data have {rows}"
-    NEEDS_POSES = "needs commanded poses, or lengths as told; these are absolute"
-    NEEDS_TIME = "needs the time of each row (t_s)"
-    NEEDS_TEMPERATURE = "needs temperature_C"
+    EXCLUDED = "excluded, as requested"
+    TOO_MANY_PARAMETERS = "has {parameters}, but the data have only {rows}"
+    NEEDS_POSES = "needs commanded poses or told lengths; these lengths are absolute"
+    NEEDS_TIME = "needs the time of each row, column t_s"
+    NEEDS_TEMPERATURE = "needs the temperature, column temperature_C"
     CONSTANT_TEMPERATURE = "the temperature never changed"
     NEEDS_TENSIONS = "needs measured tensions"
-    NOT_MOVED = "these commands do not move what it goes with"
-    UNSEEN = "these data do not show it: no reading moves by its plausible size"
-    IMPOSSIBLE = "would need what no robot can have"
-    UNSOLVED = "no fit: rows could not be solved with it"
-    CHANCE = "chance explains it (p {p:.2g})"
-    CHANCE_OVER_ALL = "chance explains it (p {p:.2g} over all tried)"
-    PROMISES_LESS = "promises less than others beside it"
+    NOT_MOVED = "these commands do not vary the quantity that it depends on"
+    UNSEEN = "not visible in these data: its plausible size moves no reading"
+    IMPOSSIBLE = "would need values that no robot can have"
+    UNSOLVED = "could not be fitted: some rows could not be solved with it"
+    CHANCE = "not significant (p = {p:.2g})"
+    CHANCE_OVER_ALL = "not significant (p = {p:.2g}, corrected for all effects tried)"
+    PROMISES_LESS = "promises to explain less than the others"
     EXPLAINS_LITTLE = "explains too little for its {parameters}"
-    NOT_PREDICTIVE = "does not predict runs left out any better"
-    EXPLAINED_BETTER = "explained better by {by}"
+    NOT_PREDICTIVE = "does not improve the prediction of held-out runs"
+    EXPLAINED_BETTER = "{by} explains the same better"
     NOT_NEEDED = "not needed"
-    ALIKE = "cannot be told from {by}, which is listed"
-    NOT_NEEDED_BESIDE = "not needed beside {by} (probability {p:.2g})"
-    CARRIES_LITTLE = "probable ({p:.2g}), but explains little beside {by}: not sure"
-    NOT_SURE = "probable ({p:.2g}), but not sure"
+    ALIKE = "indistinguishable from {by}, which is listed"
+    NOT_NEEDED_BESIDE = "not needed once {by} is in the model (probability {p:.2g})"
+    CARRIES_LITTLE = (
+        "probable ({p:.2g}) but not certain: it explains little once {by} is in the model"
+    )
+    NOT_SURE = "probable ({p:.2g}) but not certain"
     IMPROBABLE = "explains too little (probability {p:.2g})"
-    IMITATES = "not sure: its {parameters} can imitate much of what no effect explains"
-    MAY_IMITATE = "not sure: likelier it imitates what no effect explains"
-    EXPLAINS_PART = "explains a part, but structure remains: not sure"
+    IMITATES = "not certain: its {parameters} can imitate much of the unexplained error"
+    MAY_IMITATE = "not certain: more probably it imitates an unknown effect"
+    EXPLAINS_PART = "not certain: it explains a part, but structure remains"
 
 
 _LACKING = {
@@ -90,49 +92,52 @@ class Reason:
         )
 
     def __str__(self) -> str:
-        text = f"no candidate: {self.words}" if self.lacking else self.words
-        return f"beside {', '.join(self.beside)}: {text}" if self.beside else text
+        text = f"not a candidate: {self.words}" if self.lacking else self.words
+        return f"{text}, with {', '.join(self.beside)} in the model" if self.beside else text
 
 
 class Unfit(Enum):
     """Why measurements are not fit for a verdict; the values are what people read."""
 
-    NO_READINGS = "the data hold no readings"
-    NO_EQUILIBRIUM = "at {lost} of {rows} there is no equilibrium to compare with; see the notes"
-    FEW_READINGS = "only {readings} left"
-    FEW_POSES = "only {poses} measured, counting a pause once: too few to tell effects"
-    CONSTANT_COMMANDS = "all commands are the same: nothing tells effects apart"
-    FROZEN_READINGS = "all readings are the same though the commands differ"
-    CONTRADICTION = (
-        "readings contradict each other: lines {lines} have the same command and are far apart, "
-        "and they are not alone"
+    NO_READINGS = "the data contain no readings"
+    NO_EQUILIBRIUM = "the model has no equilibrium at {lost} of {rows}; see the notes"
+    FEW_READINGS = "only {readings} can be used"
+    FEW_POSES = (
+        "only {poses} measured (repeated readings at rest count once): too few to tell effects "
+        "apart"
     )
-    BLIND = "noise of {noise} would hide every effect, at ten times its plausible size too"
-    NOTHING_TO_TRY = "these data can show none of the effects to consider: {lacking}"
-    UNSOLVED_MODEL = "rows could not be solved with the model's values"
+    CONSTANT_COMMANDS = "all commands are the same, so effects cannot be told apart"
+    FROZEN_READINGS = "all readings are the same although the commands differ"
+    CONTRADICTION = (
+        "readings contradict each other: lines {lines} have the same command but readings far "
+        "apart, and so do others"
+    )
+    BLIND = "noise of {noise} would hide every effect, even at ten times its plausible size"
+    NOTHING_TO_TRY = "none of the effects considered is visible in these data: {lacking}"
+    UNSOLVED_MODEL = "some rows could not be solved with the model's values"
     STRUCTURE_OR_NOISE = (
-        "structure remains, but in only {rows}, whose noise nobody stated, it may as well be noise "
-        "that is correlated from row to row"
+        "structure remains, but with only {rows} and no stated noise it may as well be noise that "
+        "is correlated from row to row"
     )
 
 
 _MORE_POSES = (
-    "add poses spread over the workspace, tilted ones too, in three runs or more; crosscheck plan "
-    "says which show most"
+    "add poses spread over the workspace, some of them tilted, in three runs or more; crosscheck "
+    "plan says which poses reveal most"
 )
 _REMEDIES = {
-    Unfit.NO_READINGS: "add readings: positions, angles or tensions of each pose",
-    Unfit.NO_EQUILIBRIUM: "check the commands of the rows named in the notes, and the robot's file",
+    Unfit.NO_READINGS: "add readings of each pose: positions, angles or tensions",
+    Unfit.NO_EQUILIBRIUM: "check the robot's file and the commands of the rows named in the notes",
     Unfit.FEW_READINGS: _MORE_POSES,
     Unfit.FEW_POSES: _MORE_POSES,
     Unfit.CONSTANT_COMMANDS: _MORE_POSES,
     Unfit.FROZEN_READINGS: "check that the tracker followed the platform, and read the poses again",
-    Unfit.CONTRADICTION: "read these poses again, leave out the wrong rows, or, where the tracker "
-    "or the winches were set up anew in between, give each set-up a file of its own and "
+    Unfit.CONTRADICTION: "measure these poses again or remove the wrong rows; if the tracker or "
+    "the winches were set up anew in between, put each set-up into a file of its own and use "
     "crosscheck add tracker_frame (or another effect) --per file",
-    Unfit.BLIND: "state the noise as it is, in metres and radians ([sigma] beside the file, or "
-    "--sigma position=0.1mm), or measure with less",
-    Unfit.NOTHING_TO_TRY: "record what they need, or let other effects be considered",
+    Unfit.BLIND: "check the stated noise and its units ([sigma] in the TOML beside the file is in "
+    "metres and radians; or use --sigma position=0.1mm), or measure with less noise",
+    Unfit.NOTHING_TO_TRY: "record what they need, or consider other effects",
     Unfit.UNSOLVED_MODEL: "check the model's values and the robot's file",
     Unfit.STRUCTURE_OR_NOISE: "state the noise ([sigma] beside the file, or --sigma "
     "position=0.1mm): stay at one pose and read it for as long as the measurements took; or read "
@@ -188,10 +193,10 @@ class DiagnosisVerdict(StrEnum):
     """The verdict of a diagnosis, in the words of ``diagnosis.json``."""
 
     NO_EFFECT_MISSING = "no_effect_missing", "model and data agree"
-    EFFECTS_FOUND = "effects_found", "what is left after them is noise"
-    MANY_EFFECTS = "many_effects", "no few effects explain the error, all together do"
+    EFFECTS_FOUND = "effects_found", "with these effects the residuals are noise"
+    MANY_EFFECTS = "many_effects", "no few effects explain the error, but all together do"
     UNKNOWN_EFFECT = "unknown_effect", "structure remains that no known effect explains"
-    NO_VERDICT = "no_verdict", "the data or the solves are not fit for one"
+    NO_VERDICT = "no_verdict", "the data or the solves do not allow one"
 
     meaning: str
 
@@ -213,7 +218,9 @@ class DiagnosisVerdict(StrEnum):
             return by_word[word]
         every = list(by_word)
         near = difflib.get_close_matches(word, every, n=len(every), cutoff=0.0)
-        raise CrosscheckError(f"no verdict {word!r}; there are, nearest first: {', '.join(near)}")
+        raise CrosscheckError(
+            f"no verdict {word!r}; expected one of, nearest first: {', '.join(near)}"
+        )
 
     @property
     def heading(self) -> str:

@@ -67,9 +67,9 @@ class Thinned:
             return ()
         far = used & (size > _FAR * np.median(size[used]))
         rms = rms_words(rms_by_kind(problem.with_far_off(far), raw))
-        aside = f", {counted(int(far.sum()), 'row')} far off aside" if far.any() else ""
+        aside = f", except for {counted(int(far.sum()), 'outlier')}" if far.any() else ""
         count = counted(int(used.sum()), "other row")
-        return (f"{count}, which no fit has seen, predicted to {rms} rms{aside}",)
+        return (f"{count}, not used in any fit, predicted to {rms} rms{aside}",)
 
 
 def thinned(robot: Robot, data: Measurements, most: int = MOST) -> Thinned:
@@ -89,14 +89,14 @@ def thinned(robot: Robot, data: Measurements, most: int = MOST) -> Thinned:
     if turns.sum() <= most:
         last = np.append(place[1:] == 0, True)
         kept = (place % every == 0) | last | turns
-        what = f"one in {every} along each run, and those at which a cable turns round"
+        what = f"one in {every} along each run, and those where a cable changes direction"
     else:
         size = np.bincount(data.run_index)[data.run_index]
         kept = place < -(-size // every)
-        what = "the first of each run, as the poses are in no order"
+        what = "the first of each run, because the poses are in no order"
     note = (
-        f"{counted(int((kept & read).sum()), 'row')} of {int(read.sum())} are searched: {what}; "
-        "`add` fits all of them"
+        f"the search uses {counted(int((kept & read).sum()), 'row')} of {int(read.sum())}: "
+        f"{what}; `add` fits all of them"
     )
     return Thinned(robot, data, data.rows(kept).with_notes([note]), read & ~kept)
 

@@ -50,7 +50,9 @@ class Tolerance:
             kind, value = parse_kind("--tolerance", ("position", "orientation", "tension"), text)
             key = f"{kind}_{SI[kind]}"
             if key in values:
-                raise CrosscheckError(f"--tolerance {text}: another one for the {kind} was given")
+                raise CrosscheckError(
+                    f"--tolerance {text}: expected one for the {kind}, got two; leave one out"
+                )
             values[key] = value
         return cls(**values)
 
@@ -82,8 +84,8 @@ class LeftOver:
     @property
     def words(self) -> str:
         """The size and the limit, in a few words."""
-        matters = rms_words(self.limit) or "not stated, see --tolerance"
-        return f"{rms_words(self.size)} (what matters: {matters})"
+        matters = rms_words(self.limit) or "not stated, use --tolerance"
+        return f"{rms_words(self.size)} (tolerance: {matters})"
 
     def as_json(self) -> dict[str, Any]:
         """``left_over`` of ``diagnosis.json``, SI."""

@@ -42,7 +42,7 @@ def estimate_sigma(problem: Problem, at: Prediction) -> tuple[Problem, tuple[str
         mine = raw[:, kind.columns]
         found = {
             "differences between neighbouring rows": _differences(problem, mine),
-            "what no smooth function of the pose explains": _beside(problem, mine, shapes),
+            "the part that no smooth function of the pose explains": _beside(problem, mine, shapes),
         }
         sizes = {how: _size(rows) for how, rows in found.items() if rows is not None}
         best = _best(sizes)
@@ -52,8 +52,9 @@ def estimate_sigma(problem: Problem, at: Prediction) -> tuple[Problem, tuple[str
         how = f"estimated from {best} as {size}"
         if best is None:
             how = (
-                f"no run has the {_ROWS} rows that an estimate takes, so the errors themselves, "
-                f"{size}, count as noise; state it with --sigma {kind.sigma.rpartition('_')[0]}=..."
+                f"no run has the {_ROWS} rows that an estimate needs, so the errors themselves, "
+                f"{size}, are taken as noise; state it with --sigma "
+                f"{kind.sigma.rpartition('_')[0]}=..."
             )
         notes.append(f"{kind.sigma} is not stated: {how}")
     return problem.with_sigma(sigma), tuple(notes)
@@ -82,8 +83,9 @@ def overestimated(problem: Problem, left: Rms) -> list[str]:
         if getattr(problem.data.sigma, kind.sigma) is None and size and size < _TOO_LARGE * noise:
             name, words = kind.sigma.rpartition("_")[0], f"{kind.factor * size:.2g} {kind.unit}"
             out.append(
-                f"{kind.sigma} was estimated too large: no more than {words} rms are left; state "
-                f"the noise, as with --sigma {name}={words.replace(' ', '')}, and more will show"
+                f"{kind.sigma} was estimated too large: the residuals are only {words} rms; state "
+                f"the noise, as with --sigma {name}={words.replace(' ', '')}, and smaller effects "
+                "become visible"
             )
     return out
 

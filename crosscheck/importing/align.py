@@ -66,7 +66,7 @@ class Frames:
 def as_they_are(target: Array | None) -> Frames:
     """A tracker that already reads in the base frame."""
     shift = np.zeros(3) if target is None else target
-    return Frames(_NONE, np.zeros(3), _NONE, shift, "frames taken as they are", ())
+    return Frames(_NONE, np.zeros(3), _NONE, shift, "frames used as they are", ())
 
 
 def by_points(names: Sequence[str], there: Array, here: Array) -> Frames:
@@ -91,7 +91,9 @@ def by_points(names: Sequence[str], there: Array, here: Array) -> Frames:
             f"where the others put it, over {spread:.3g} m of all; check its coordinates in "
             "metres, and that both frames are right-handed"
         )
-    how = f"tracker's frame from {len(names)} points, which fit to {1e3 * np.max(left):.2g} mm"
+    how = (
+        f"tracker's frame aligned by {len(names)} points, which fit to {1e3 * np.max(left):.2g} mm"
+    )
     return Frames(turn, shift, _NONE, np.zeros(3), how, ("tracker_frame",))
 
 
@@ -131,7 +133,7 @@ def to_commands(position: Array, quat: Array | None, told: Array, target: Array 
         raise CrosscheckError(_ONE_LINE)
     how = (
         f"tracker's frame aligned to the commands of {counted(len(told), 'dwell')}: "
-        f"{1e3 * float(np.sqrt(np.mean(left**2))):.3g} mm rms are left"
+        f"{1e3 * float(np.sqrt(np.mean(left**2))):.3g} mm rms remain"
     )
     return with_target(replace(frames, how=how), quat, told, target)
 
@@ -151,7 +153,7 @@ def with_target(frames: Frames, quat: Array | None, told: Array, target: Array |
     angle = np.degrees(np.linalg.norm(rotvec_from_quat(turn)))
     how = (
         f"{frames.how}; the body's axes turned by {angle:.3g} deg into the platform's: {left:.2g} "
-        "deg rms are left"
+        "deg rms remain"
     )
     return replace(frames, target_turn=turn, how=how, free=free)
 

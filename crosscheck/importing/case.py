@@ -287,7 +287,10 @@ def _noise(measured: Measurements) -> str:
         parts.append(f"orientation {np.degrees(sigma.orientation_rad):.2g} deg")
     if sigma.tension_N:
         parts.append(f"tension {sigma.tension_N:.2g} N")
-    out = f"noise of the means, by the means of parts of each dwell: {', '.join(parts) or 'none'}"
+    out = (
+        "noise of the means, estimated from the means of parts of each dwell: "
+        f"{', '.join(parts) or 'none'}"
+    )
     hidden = ["position"] * (sigma.position_m is None)
     hidden += ["orientation"] * (sigma.orientation_rad is None and measured.quat_wxyz is not None)
     if not hidden:

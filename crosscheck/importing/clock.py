@@ -60,8 +60,9 @@ def find_clock(held: HeldCommands, told: Array, rests: Dwells) -> Clock:
     return Clock(
         shift,
         (
-            f"the tracker's clock shows {abs(shift):.3f} s {way} than that of the commands, by {n} "
-            f"commands with which the platform leaves its place (--clock {shift:.3f})",
+            f"the tracker's clock shows {abs(shift):.3f} s {way} than that of the commands, "
+            f"estimated from {n} commands at which the platform starts to move (--clock "
+            f"{shift:.3f})",
         ),
     )
 

@@ -83,7 +83,7 @@ class Logged:
             bodies={k: (quat_rotate(_UPRIGHT, p), turned(q)) for k, (p, q) in self.bodies.items()},
             markers={k: quat_rotate(_UPRIGHT, p) for k, p in self.markers.items()},
             up="z",
-            notes=(*self.notes, "Y is up in the file: turned by 90 deg about x, so that Z is"),
+            notes=(*self.notes, "Y is up in the file: turned by 90 deg about x, so that Z is up"),
         )
 
     def body(self, name: str | None) -> Stream:

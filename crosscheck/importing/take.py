@@ -106,14 +106,16 @@ def _told(take: Take) -> list[str]:
     ]
     none = int((take.number < 0).sum())
     rest = len(dwells) - len(used)
-    out += [f"{counted(none, 'held command')} without a dwell: gone through, not compared"] * (
-        none > 0
+    out += [
+        (f"{counted(none, 'held command')} without a dwell: passed without a reading, not compared")
+    ] * (none > 0)
+    shorter = (
+        f"{counted(rest, 'shorter dwell')} of the same commands, or outside all commands, left out"
     )
-    shorter = f"{counted(rest, 'shorter dwell')} of the same commands, or outside of all, left out"
     out += [shorter] * (rest > 0)
     if take.held.passed:
         passed = counted(take.held.passed, "set point")
-        out.append(f"{passed} on the way left out: the way counts as straight")
+        out.append(f"{passed} on the way left out: the way is taken as straight")
     return out
 
 

@@ -55,7 +55,7 @@ def _check_names(toml: Toml) -> None:
     known = ["sigma", "free", *CHOICES]
     for name in toml.content:
         if name in _SIGMAS:
-            raise toml.error(f"{name} stands outside [sigma]; put it under that", name)
+            raise toml.error(f"{name} is outside the table [sigma]; put it into that table", name)
         near = difflib.get_close_matches(name.lower(), known, n=1, cutoff=0.7)
         if name not in known and near:
             shown = "[{}]" if near[0] == "sigma" else "{}"

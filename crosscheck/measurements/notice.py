@@ -92,9 +92,9 @@ def _mean_spread(values: Array) -> float:
 def _other_unit(columns: Columns, k: int, read: float, told: float) -> InputFileError:
     column = columns.known[f"meas_{POSITION[k]}"]
     return columns.table.error(
-        f"positions were read over {read:.3g} m where {told:.3g} m were commanded; expected about "
-        f"the same; are these really {column.unit.suffix}? Name the columns by their unit, such as "
-        f"meas_{POSITION[k]}_{'mm' if read > told else 'm'}",
+        f"positions were measured over {read:.3g} m, but commanded over {told:.3g} m; expected "
+        f"about the same; are these really {column.unit.suffix}? Name the columns by their unit, "
+        f"such as meas_{POSITION[k]}_{'mm' if read > told else 'm'}",
         column=column.name,
     )
 
@@ -156,8 +156,8 @@ def _other_order(columns: Columns, robot: Robot, data: Measurements) -> list[str
         ):
             raise columns.table.error(
                 "every command turns the platform by more than 90 deg from the reference pose, "
-                "and read with the scalar last none by 45; expected the scalar first; give each "
-                "of cmd_qw cmd_qx cmd_qy cmd_qz its own numbers",
+                "but none by 45 deg if the scalar is taken as last; expected the scalar first; "
+                "put the right numbers into cmd_qw cmd_qx cmd_qy cmd_qz",
                 column="cmd_qw",
             )
     if data.quat_wxyz is None or "meas_qw" not in columns.known:
@@ -189,6 +189,6 @@ def twice(data: Measurements) -> list[str]:
     if not pairs:
         return []
     return [
-        f"Rows given twice, to the last digit: line {some(pairs, _MOST_LINES)}; they "
-        "count twice: take one of each out if it was read once."
+        f"Identical rows: line {some(pairs, _MOST_LINES)}; they count twice, so remove one of "
+        "each pair if it was measured only once."
     ]

@@ -133,7 +133,7 @@ def _load(columns: Columns, robot: Robot, sigma_path: str | Path | None) -> Meas
     tensions = columns.readings("tension", cables)
     beside = _beside(columns.table.path, sigma_path)
     if beside.told and lengths is None:
-        columns.notes.append('lengths = "told" says nothing here: the commands are poses.')
+        columns.notes.append('lengths = "told" has no effect here: the commands are poses.')
     data = Measurements(
         path=columns.table.path,
         n_cables=robot.n_cables,
@@ -171,4 +171,4 @@ def _way_points(data: Measurements) -> list[str]:
     if not 0 < silent < data.n_rows:
         return []
     rows = f"{counted(silent, 'row')} {'has' if silent == 1 else 'have'}"
-    return [f"{rows} a command but no reading: a way point, gone through and not compared."]
+    return [f"{rows} a command but no reading: a way point, which is not compared."]

@@ -46,6 +46,8 @@ def stated(sigma: Sigma, texts: Iterable[str]) -> Sigma:
             )
         key = f"{kind}_{SI[kind]}"
         if key in values:
-            raise CrosscheckError(f"--sigma {text}: another one for the {kind} was given")
+            raise CrosscheckError(
+                f"--sigma {text}: expected one for the {kind}, got two; leave one out"
+            )
         values[key] = parse_quantity(f"--sigma {kind}", kind, quantity, LEAST_NOISE)
     return replace(sigma, **values)

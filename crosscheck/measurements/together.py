@@ -87,15 +87,15 @@ def _check_alike(parts: Sequence[Measurements]) -> None:
         if _commanded_in(part) != _commanded_in(first):
             raise InputFileError.at(
                 part.path,
-                f"commands {_commanded_in(part)}, {first.path} {_commanded_in(first)}; expected "
-                "files that are commanded alike; give them one by one",
+                f"commands {_commanded_in(part)}, but {first.path} {_commanded_in(first)}; "
+                "expected files with the same kind of commands; use them one by one",
             )
 
 
 def _commanded_in(data: Measurements) -> str:
     if data.command_lengths is None:
         return "poses"
-    return "lengths as told" if data.told else "absolute lengths"
+    return "told lengths" if data.told else "absolute lengths"
 
 
 def _short_names(paths: Sequence[Path], least: int = 1) -> list[str]:

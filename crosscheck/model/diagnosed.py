@@ -62,7 +62,7 @@ def _check_robot(path: Path, document: Mapping[str, Any], robot: Robot) -> tuple
     if notes or now is None or now in read:
         return notes
     return (
-        f"{path} was made from another text than {robot.source} has now; cables, points, mass and "
+        f"{path} was made from a different text of {robot.source}; cables, points, mass and "
         "stiffness are the same",
     )
 

@@ -166,7 +166,9 @@ def _together() -> Any:
     """The table of correlations of the last fit."""
     table = tomlkit.table()
     table.trivia.indent = "\n"
-    table.add(tomlkit.comment("Errors of the values above in full, and how they go together."))
+    table.add(
+        tomlkit.comment("Standard errors of the values above in full, and their correlations.")
+    )
     return table
 
 

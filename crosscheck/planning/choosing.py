@@ -79,8 +79,8 @@ def choose_poses(
         found = 0 if plan is None else plan.problem.data.n_rows
     if plan is None or found < rows:
         raise CrosscheckError(
-            f"robot {robot.name} holds still at {found} of {counted(len(tried), 'pose')} "
-            f"that were tried; expected {rows} or more; ask for fewer --rows, wider "
+            f"robot {robot.name} can be held at {found} of {counted(len(tried), 'pose')} that "
+            f"were tried; expected {rows} or more; ask for fewer --rows, a wider range of "
             "tensions, or another --box"
         )
     progress("sensitivities", 0.2)

@@ -38,8 +38,8 @@ def _aside(plan: Planned, data: Measurements) -> Iterator[Extension]:
     there = Loads(np.full(n, mass), np.tile(place, (n, 1)), np.zeros((n, 6)))
     yield Extension(
         Adding.PAYLOAD_ASIDE,
-        f"repeat the poses with a known {mass:.2g} kg aside, at ({where}) m of the platform "
-        "(payload_kg, payload_x_m, payload_y_m, payload_z_m)",
+        f"repeat the poses with a known extra {mass:.2g} kg off the centre, at ({where}) m in the "
+        "platform's frame (payload_kg, payload_x_m, payload_y_m, payload_z_m)",
         like(plan, replace(data, loads=there, run=named_again(data))),
     )
 
@@ -63,7 +63,7 @@ def _way_points(plan: Planned, data: Measurements) -> Iterator[Extension]:
         angles_rad=np.full((2 * n, 3), np.nan),
         tensions=np.full((2 * n, data.n_cables), np.nan),
     )
-    words = "reach each pose again over a way point beyond it, so that it is come to from there"
+    words = "repeat each pose, now approached from a way point beyond it"
     yield Extension(Adding.WAY_POINTS, words, like(plan, gone_through))
 
 

@@ -67,7 +67,7 @@ def _payload(plan: Planned, data: Measurements) -> Iterator[Extension]:
     if robot.mass > 0:
         yield Extension(
             Adding.PAYLOAD,
-            f"repeat the poses with a known {PAYLOAD * robot.mass:.2g} kg more at the centre of "
+            f"repeat the poses with a known extra {PAYLOAD * robot.mass:.2g} kg at the centre of "
             "mass (payload_kg)",
             like(plan, replace(data, loads=_heavier(data, robot, PAYLOAD * robot.mass))),
         )

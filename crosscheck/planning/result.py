@@ -134,19 +134,20 @@ class Plan(Result):
         if not self.effects and not self.planned.unsolved.all():
             rows = self.planned.problem.data.n_rows
             return (
-                f"Nothing can be planned with so few rows ({rows}): an effect takes more rows than "
-                "it has parameters; add poses, or have them chosen with --rows 40."
+                f"Nothing can be planned with so few rows ({rows}): an effect needs more rows "
+                "than it has parameters; add poses, or have them chosen with --rows 40."
             )
         if not self.effects:
             return "Nothing can be planned: the model has no equilibrium at any of the rows."
         seen = [v for v in self.effects if v.visible]
         named = [v for v in seen if v.named]
         return (
-            f"Of {counted(len(self.effects), 'effect')}, {len(seen)} would show at a plausible "
-            f"size and {len(named)} of these could be named; {100 * POWER:.0f} % of such are "
-            f"found, with {100 * LEVEL:.0f} % false alarms over all. From {NAMED:g} times the "
-            "smallest size that shows on, a diagnosis names nine in ten, or what is alike on these "
-            "data."
+            f"Of {counted(len(self.effects), 'effect')}, {len(seen)} would be visible at a "
+            f"plausible size and {len(named)} of these could be named. An effect of the smallest "
+            f"visible size is found with a power of {100 * POWER:.0f} %, at a false-alarm rate of "
+            f"{100 * LEVEL:.0f} % over all effects; from {NAMED:g} times that size on, a "
+            "diagnosis names nine effects in ten, or an effect that these data cannot "
+            "distinguish from them."
         )
 
     def lines(self) -> list[str]:

@@ -51,14 +51,16 @@ class Sight:
         total = len(self.effects) + len(asked)
         seen = len(self.effects) - len(self.hidden)
         effects = f"{seen} of {counted(total, 'effect')}"
-        out = [f"These data would show {effects} if they had a plausible size."]
+        out = [f"In these data {effects} would be visible at a plausible size."]
         lacking = _by_reason(self.missing)
         if lacking or self.hidden:
-            small = [f"{', '.join(self.hidden)} (too small beside the noise)"] * bool(self.hidden)
-            out.append(f"They cannot show {'; '.join([*lacking, *small])}.")
+            small = [(f"{', '.join(self.hidden)} (too small compared with the noise)")] * bool(
+                self.hidden
+            )
+            out.append(f"Not visible: {'; '.join([*lacking, *small])}.")
         pairs = [f"{name} from {' or '.join(others[:3])}" for name, others in self.alike.items()]
         if pairs:
-            out.append(f"They could not tell {some(pairs, _MOST, '; ')}.")
+            out.append(f"The data could not distinguish {some(pairs, _MOST, '; ')}.")
         return out
 
     def as_json(self) -> dict[str, Any]:

@@ -12,13 +12,13 @@ def alike(found: Visible) -> str:
     names = [f"{name} (exactly)" for name in found.twins]
     names += [name for name, _left in found.confused]
     if not found.visible and not found.twins:
-        return "(a plausible size does not show)"
+        return "(not visible at a plausible size)"
     return some(names)
 
 
 def gain_words(gain: Gain) -> str:
     """What a measurement would gain, with numbers."""
-    numbers = f"(signal now {gain.now:.2g}, then {gain.then:.2g}, needs {gain.needed:.2g})"
+    numbers = f"(signal {gain.now:.2g} now, {gain.then:.2g} then, {gain.needed:.2g} needed)"
     if gain.other:
         return f"tells {gain.effect} from {gain.other} {numbers}"
-    return f"shows {gain.effect} {numbers}"
+    return f"makes {gain.effect} visible {numbers}"

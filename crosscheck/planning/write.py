@@ -47,7 +47,7 @@ def write_plan(plan: Plan, folder: str | Path, own: bool = True) -> tuple[str, .
 def remark_of(commands: Measurements) -> str:
     """Which lines, below the remark and the header, are way points; "" if none are."""
     lines = ", ".join(str(row + 3) for row in np.flatnonzero(~commands.read))
-    return lines and f"way points, gone through without a reading: lines {lines}"
+    return lines and f"way points, passed without a reading: lines {lines}"
 
 
 def _unread(data: Measurements) -> Measurements:

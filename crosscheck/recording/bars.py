@@ -37,7 +37,7 @@ def view(found: Diagnosis, stages: list[Stage]) -> rrb.Spatial2DView:
     assert found.search is not None
     height = _height(found, stages)
     return rrb.Spatial2DView(
-        name="rms error on runs left out, logarithmic; the line is the noise",
+        name="rms error on held-out runs, logarithmic; the line is the noise",
         origin=ROOT,
         background=rrb.Background(color=layout.GROUND),
         visual_bounds=rrb.VisualBounds2D(x_range=(0.0, 100.0), y_range=(-1.0, height)),

@@ -187,4 +187,4 @@ def _pose(found: Comparison, k: int) -> str:
         if found.problem.counted[k, c]
     ]
     rows.append(("moving", str(found.way.direction[k]), ""))
-    return head + "\n" + words.table(rows, ("measured less predicted", "", ""))
+    return head + "\n" + words.table(rows, ("measured minus predicted", "", ""))

@@ -164,7 +164,7 @@ def _plots(
     steps = rr.TimeColumn(MODEL_STEP, sequence=range(len(stages)))
     rms = [kind.factor * (stage.step.held_out.rms[kind.key] or 0.0) for stage in stages]
     recording.scalars(entity, steps, rms)
-    plots.as_line(recording, entity, "rms on runs left out", colours.SILVER, 2.0)
+    plots.as_line(recording, entity, "rms on held-out runs", colours.SILVER, 2.0)
 
 
 def _legend(stages: list[Stage], shown: Misfit, kind: Kind) -> Legend:

@@ -57,11 +57,11 @@ def model_words(found: Diagnosis, stages: list[Stage], k: int, shown: Misfit, wo
     if finding is not None:
         parts.append(_finding(finding))
     elif stage.added:
-        parts.append("Explains a part, but structure remains: not sure.\n")
+        parts.append("Not certain: it explains a part, but structure remains.\n")
     elif found.candidates and len(stages) == 1:
         parts.append(_candidates(found))
     line = int(shown.problem.data.line[worst])
-    parts.append(f"\nThe box is the worst pose, line {line} of the data.")
+    parts.append(f"\nThe box shows the worst pose, line {line} of the data.")
     return "\n".join(parts)
 
 
@@ -72,7 +72,7 @@ def _errors(found: Diagnosis, stage: Stage, shown: Misfit) -> str:
         values = (stage.step.held_out.rms[kind.key], fitted[kind.key], floor_of(found, kind))
         cells = [short(None if v is None else kind.factor * v) for v in values]
         rows.append((f"{kind.name} [{kind.unit}]", *cells))
-    return words.table(rows, ("rms error", "runs left out", "fitted to", "noise"))
+    return words.table(rows, ("rms error", "held-out runs", "fitted runs", "noise"))
 
 
 def _finding(finding: MissingEffect) -> str:
@@ -86,15 +86,15 @@ def _finding(finding: MissingEffect) -> str:
         spread = f"± {spread}" if np.isfinite(error) else spread
         rows.append((plain(parameter_name(name, unit)), f"{shown} {spread} {word}".strip()))
     lines = [
-        f"\nRemoves **{percent(finding.share)}** of the unexplained error on runs it was not "
-        f"fitted to: {plain(finding.title)}.\n",
+        f"\nRemoves **{percent(finding.share)}** of the unexplained error on held-out runs: "
+        f"{plain(finding.title)}.\n",
         words.table(rows[:_MOST_PARAMETERS], ("parameter", "value")),
     ]
     if len(rows) > _MOST_PARAMETERS:
         lines.append(f"\nand {len(rows) - _MOST_PARAMETERS} more in diagnosis.json")
     if finding.rivals:
         names = ", ".join(plain(rival.name) for rival in finding.rivals)
-        lines.append(f"\nCannot be told from: {names}.")
+        lines.append(f"\nIndistinguishable from: {names}.")
     lines.append(f"\n**Check:** {plain(finding.check)}.")
     return "\n".join(lines)
 
@@ -103,7 +103,7 @@ def _candidates(found: Diagnosis) -> str:
     rows = [
         (plain(row.effect), plain(str(row.why_not))) for row in found.candidates[:_MOST_CANDIDATES]
     ]
-    return "\n" + words.table(rows, ("tried", "why not"))
+    return "\n" + words.table(rows, ("tried", "why not listed"))
 
 
 def pose_words(stages: list[Stage], shown: Misfit, k: int) -> str:

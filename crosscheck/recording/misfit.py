@@ -215,6 +215,6 @@ def words_of(misfit: Misfit) -> str:
     if not misfit.magnify:
         return f"Dots are measured poses, coloured by their {kind.name} error {scale}."
     return (
-        f"Arrows at the measured poses point from what the model says to what was measured; they "
+        "Arrows at the measured poses point from the predicted to the measured position; they "
         f"are drawn **{drawn(misfit.magnify)}** and coloured {scale}."
     )

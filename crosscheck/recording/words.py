@@ -30,7 +30,7 @@ _SETTLING = """ The timeline `settling_time` (choose it at the bottom left) is M
 lets go of the platform at command {watched}, which comes to rest on SEECR's answer. Seconds are \
 simulated; the platform is stopped at each peak of its motion energy, so it swings less than a \
 real one would."""
-_NOTHING = "No pose whose differences mean anything: see the findings."
+_NOTHING = "No pose could be compared: see the findings."
 _LINES = "Lines are SEECR, dots MuJoCo."
 _CROSSES = "Crosses are SEECR, the dots on them MuJoCo."
 
@@ -43,8 +43,8 @@ def pose_heading(k: int, count: int) -> str:
 def unused(data: Measurements, k: int) -> str:
     """Why nothing is shown for a row that does not count."""
     if data.read[k]:
-        return "\nLeft out, see the notes."
-    return "\nA way point: gone through, not compared."
+        return "\nLeft out: see the notes."
+    return "\nA way point: passed without a reading, not compared."
 
 
 def read_me(
@@ -134,8 +134,8 @@ def instant(t_s: float, kinetic: float, distance: Array, slack: str) -> str:
     """
     rows = [
         ("from SEECR's answer", number(distance[0] * MM, "mm")),
-        ("turned from it by", number(distance[1] * DEG, "°")),
-        ("energy of motion", number(kinetic, "J")),
+        ("rotation from it", number(distance[1] * DEG, "°")),
+        ("kinetic energy", number(kinetic, "J")),
         ("slack cables", slack),
     ]
     return f"## Settling, {t_s:.3f} s\n" + table(rows)

@@ -119,7 +119,7 @@ def _of_readings(problem: Problem, raw: Array, change: Array, prediction: Predic
         rows = [f"{name} [{unit}]" for name, unit in zip(rows, units, strict=True)]
     unit = units[0] if len(set(units)) == 1 else ""
     level = sigma[kept] * factor[kept]
-    return Wall("Errors of what was read", rows, shown, part, level, unit,
+    return Wall("Errors of the readings", rows, shown, part, level, unit,
                 (abscissae + _time(problem))[:4])  # fmt: skip
 
 

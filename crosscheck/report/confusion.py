@@ -143,7 +143,7 @@ def draw_confusion(confusion: Confusion) -> str:
         axes.tick_params(length=0)
         for spine in axes.spines.values():
             spine.set_visible(False)
-        return image(figure, "What part of each effect another could imitate")
+        return image(figure, "How much of each effect another could imitate")
 
 
 def _words(part: float, count: int) -> str:

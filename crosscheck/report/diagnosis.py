@@ -89,11 +89,11 @@ def _of_search(found: Diagnosis) -> dict[str, Any]:
 
 def _unknown_facts(found: Diagnosis) -> list[tuple[str, str]]:
     """How large noise is if not as assumed, what is left, and what could not have been seen."""
-    out = [("noise as found", rms_words(found.floor))] if noise_is_other(found) else []
+    out = [("estimated noise", rms_words(found.floor))] if noise_is_other(found) else []
     if found.left is not None:
-        out.append(("left beyond noise", found.left.words))
+        out.append(("error beyond the noise", found.left.words))
     if found.chances is not None and found.chances.words:
         shown = found.chances.shown
         words = "at no size" if shown is None else f"from {rms_words(shown)} rms on"
-        out.append(("a smooth unknown effect shows", words))
+        out.append(("smooth unknown effect visible", words))
     return out

@@ -99,7 +99,7 @@ def _parameter(
     if bound:
         flags.append("at its bound")
     if not np.isfinite(error):
-        flags.append("not seen by these data")
+        flags.append("not determined by these data")
     if abs(size) > PLAUSIBLE:
         flags.append(f"{short(float(abs(size)), 2)} plausible sizes")
     return ParameterRow(

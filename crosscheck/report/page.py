@@ -66,5 +66,5 @@ def facts(problem: Problem, *, other_noise: bool = False) -> list[tuple[str, str
         ("rows", rows),
         ("runs", str(len(data.runs))),
         ("readings", str(problem.n_readings)),
-        ("noise as assumed" if other_noise else "noise", ", ".join(noise)),
+        ("assumed noise" if other_noise else "noise", ", ".join(noise)),
     ]

@@ -28,7 +28,7 @@ def plan_context(plan: Plan) -> dict[str, Any]:
         "page_title": f"Plan: {title_of(problem)}",
         "heading": f"Plan of {title_of(problem)}",
         "verdict": "plan",
-        "verdict_name": "What these poses would show",
+        "verdict_name": "What these poses can reveal",
         "verdict_meaning": "",
         "sentence": plan.sentence,
         "facts": facts(problem),
@@ -37,8 +37,8 @@ def plan_context(plan: Plan) -> dict[str, Any]:
         "suggestions": [_Added.of(item) for item in plan.suggestions if item.reached],
         "notes": [
             *(
-                f"line {line}: {cable} is about to go slack or taut; what is said of such poses "
-                "is less sure"
+                f"line {line}: {cable} is close to the limit between slack and taut; the plan is "
+                "less certain about such poses"
                 for line, cable in plan.slack
             ),
             *plan.notes,
@@ -74,10 +74,10 @@ def draw_sizes(effects: tuple[Visible, ...]) -> str:
         axes.set_yticks(place, [found.name for found in shown])
         axes.set_ylim(-0.7, len(shown) - 0.3)
         plain_log(axes)
-        axes.set_xlabel("smallest size, in plausible sizes (dotted: a plausible one)")
+        axes.set_xlabel("smallest visible size, in plausible sizes (dotted: 1)")
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
         grid(axes, "x")
-        return image(figure, "The smallest sizes that show")
+        return image(figure, "The smallest visible sizes")
 
 
 @dataclass(frozen=True)

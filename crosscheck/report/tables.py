@@ -44,13 +44,13 @@ def checks(found: Diagnosis) -> list[Check]:
     w = found.whiteness
     out = [
         Check(
-            "size of what is left", w.p > POOR_FIT,
-            f"χ² per reading {short(w.chi2 / w.dof)} (chance {chance(w.p)})",
+            "size of the residuals", w.p > POOR_FIT,
+            f"χ² per reading {short(w.chi2 / w.dof)} (p {chance(w.p)})",
         ),
         Check(
             "neighbouring rows", not w.structured,
-            f"agree by {short(max(w.lag_errors, w.neighbour_errors))} standard errors, "
-            f"noise by less than {STRUCTURED:g}",
+            f"their correlation is {short(max(w.lag_errors, w.neighbour_errors))} standard errors "
+            f"from zero; noise stays below {STRUCTURED:g}",
         ),
     ]  # fmt: skip
     return out + _of_effects(found)
@@ -63,8 +63,8 @@ def _of_effects(found: Diagnosis) -> list[Check]:
     if len(steps) == 1:
         smallest = min((c.p for c in steps[0].candidates if c.drop > 0), default=1.0)
         return [
-            Check("effects tried", None, f"{tried}; chance explains each of them "
-                  f"(smallest p over all {chance(min(1.0, tried * smallest))})")
+            Check("effects tried", None, f"{tried}; none is significant (smallest p, corrected "
+                f"for all of them: {chance(min(1.0, tried * smallest))})")
             if found.verdict is DiagnosisVerdict.NO_EFFECT_MISSING
             else Check("effects tried", None, str(tried))
         ]  # fmt: skip
@@ -74,10 +74,10 @@ def _of_effects(found: Diagnosis) -> list[Check]:
     bound = _at_bounds(steps[-1])
     return [
         Check("effects tried", None, str(tried)),
-        Check("chance", p < FALSE_ALARM, f"explains what was added with p {chance(p)}, over all "
-              "effects tried"),
-        Check("runs left out", better == blocks, f"{better} of {blocks} predicted better with "
-              "each effect added"),
+        Check("chance", p < FALSE_ALARM, f"explains the added effects with p {chance(p)}, "
+            "corrected for all effects tried"),
+        Check("held-out runs", better == blocks, "each added effect improves the prediction of "
+            f"{better} of {blocks}"),
         Check("sizes", worst < PLAUSIBLE and not bound, f"at most {short(worst, 2)} plausible "
               f"sizes ({largest})" + (f"; at its bound: {', '.join(bound)}" if bound else "")),
     ]  # fmt: skip

@@ -45,7 +45,7 @@ def waterfall(found: Diagnosis) -> str:
             _panel(axes, found, stages, kind)
         panels[0].set_yticks(range(len(stages)), [_label(stage, found) for stage in stages])
         panels[0].set_ylim(len(stages) - 0.45, -0.75)
-        return image(figure, "Errors on runs left out, model by model, against the noise")
+        return image(figure, "Errors on held-out runs, model by model, compared with the noise")
 
 
 def _label(stage: Stage, found: Diagnosis) -> str:
@@ -53,7 +53,7 @@ def _label(stage: Stage, found: Diagnosis) -> str:
     if rivals and rivals[0]:
         more = f" or {len(rivals[0])} more" if len(rivals[0]) > 1 else f"\nor {rivals[0][0].name}"
         return stage.label + more
-    return stage.label if stage.listed else f"{stage.label}\n(not sure)"
+    return stage.label if stage.listed else f"{stage.label}\n(not certain)"
 
 
 def _panel(axes: Axes, found: Diagnosis, stages: list[Stage], kind: Kind) -> None:
@@ -73,7 +73,7 @@ def _panel(axes: Axes, found: Diagnosis, stages: list[Stage], kind: Kind) -> Non
     axes.set_xlim(left, right)
     axes.axvspan(left, floor, color=NOISE, linewidth=0, zorder=0)
     axes.axvline(floor, color=GREY, linewidth=1.0, linestyle=(0, (3, 2)), zorder=1)
-    noise = "noise as found" if noise_is_other(found) else "noise"
+    noise = "estimated noise" if noise_is_other(found) else "noise"
     axes.annotate(
         f"{noise} {short(floor)}", (floor, -0.72), xytext=(3, -2), textcoords="offset points",
         color=GREY, fontsize=7.5, va="top",

@@ -173,8 +173,8 @@ def caption(problem: Problem, stage: Drawn) -> str:
     parts = []
     if magnify:
         parts.append(
-            f"Arrows: measured less predicted position at {_which(thinned(problem))}; an error of "
-            f"1 mm is an arrow of {magnify:g} mm."
+            f"Arrows: measured minus predicted position at {_which(thinned(problem))}; an error "
+            f"of 1 mm is drawn as an arrow of {magnify:g} mm."
         )
     if kind is not None:
         parts.append(f"Dots: the {kind.name} error.")

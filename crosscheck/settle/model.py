@@ -125,8 +125,8 @@ def switch_off(model: mujoco.MjModel) -> None:
 def ignored_note(name: str | Path, ignored: Sequence[str]) -> str:
     """A sentence about the :func:`hindrances` of a file."""
     return (
-        f"{name}: switched off here: {', '.join(ignored)}; the platform hangs on springs and "
-        "gravity alone, as statics has it"
+        f"{name}: switched off here: {', '.join(ignored)}; only springs and gravity act on the "
+        "platform, as in the statics"
     )
 
 

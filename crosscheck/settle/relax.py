@@ -53,10 +53,10 @@ class SettleStatus(Enum):
     """How a settling ended; the value is the sentence that people read."""
 
     SETTLED = "MuJoCo came to rest in a stable equilibrium"
-    DIVERGED = "MuJoCo's state became infinite or not a number, also with shorter time steps"
+    DIVERGED = "MuJoCo's state became infinite or not a number, even with shorter time steps"
     TIME_LIMIT = "MuJoCo had not come to rest after the allowed number of steps"
-    FELL = "nothing holds the platform: in MuJoCo it left by over ten times the robot's size"
-    UNSTABLE = "MuJoCo stopped on an unstable equilibrium again and again, though pushed off it"
+    FELL = "nothing holds the platform: in MuJoCo it moved away by over ten times the robot's size"
+    UNSTABLE = "MuJoCo repeatedly stopped at an unstable equilibrium, although pushed off it"
     POLISH_MOVED = "the polish left the equilibrium in which MuJoCo had come to rest"
     POLISH_STALLED = "the polish could not balance the forces down to rounding"
 

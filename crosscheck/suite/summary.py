@@ -34,8 +34,8 @@ def summary_md(run: Run, worst_pose: str) -> str:
 def _cases(run: Run, worst_pose: str) -> list[str]:
     parts = [
         _table(run),
-        "Largest differences between SEECR and MuJoCo over each case's poses; `settled` is MuJoCo "
-        "brought to rest by its own dynamics, `polished` and the tensions after Newton's method on "
+        "Largest differences between SEECR and MuJoCo over each case's poses. `settled`: MuJoCo "
+        "brought to rest by its own dynamics; `polished` and tensions: after Newton's method on "
         f"its inverse dynamics. Times are per pose, on one processor. {worst_pose}",
     ]
     parts += _section(run, "Failures", words.failures)

@@ -34,7 +34,7 @@ class Verdict(Enum):
 
     AGREES = "both rest at the same pose"
     NEUTRAL = "both agree, and the platform is free to move from one answer to the other"
-    BRANCH = "two stable equilibria: each physics stays in either"
+    BRANCH = "two stable equilibria: both physics confirm both"
     DIFFERS = "the answers are further apart than allowed"
     SEECR_UNSOLVED = "SEECR has no stable equilibrium to compare"
     MUJOCO_UNSOLVED = "MuJoCo has no settled pose to compare"

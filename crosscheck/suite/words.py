@@ -122,9 +122,8 @@ def worst_sentence(pair: tuple[CaseResult, Worst] | None) -> str:
         return "no pose could be compared"
     result, worst = pair
     return (
-        f"worst difference {worst.value:.2e} {_UNITS[worst.quantity]} "
-        f"({NAMES[worst.quantity]}), {_share(worst.ratio)} what is allowed, in "
-        f"{result.case.name} at pose {worst.pose}"
+        f"worst difference {worst.value:.2e} {_UNITS[worst.quantity]} ({NAMES[worst.quantity]}), "
+        f"{_share(worst.ratio)} the allowed one, in {result.case.name} at pose {worst.pose}"
     )
 
 
@@ -168,7 +167,7 @@ def widened(result: CaseResult) -> list[str]:
 def command(result: CaseResult, pose: int) -> str:
     """A commanded pose, position [m] and quaternion, and its start if that is elsewhere."""
     case = result.case
-    begun = "" if case.starts is None else f", begun at {_pose(case.starts[pose])}"
+    begun = "" if case.starts is None else f", started at {_pose(case.starts[pose])}"
     return f"{_pose(case.poses[pose])}{begun}"
 
 
@@ -228,7 +227,7 @@ def against_line(results: Sequence[EffectResult]) -> str:
     for result in results:
         kinds.setdefault(result.case.against, []).append(result.case.effect)
     return " ".join(
-        f"Held against {kind.value}: {', '.join(dict.fromkeys(names))}."
+        f"Checked against {kind.value}: {', '.join(dict.fromkeys(names))}."
         for kind, names in kinds.items()
     )
 
@@ -242,7 +241,9 @@ def effect_text(result: EffectResult) -> str:
         f"the effect moves a reading by {result.moved_m:.1e} m",
     ]
     if result.unsolved:
-        parts.append(f"no rest at {result.unsolved} of {counted(len(result.compared), 'pose')}")
+        parts.append(
+            f"no equilibrium at {result.unsolved} of {counted(len(result.compared), 'pose')}"
+        )
     return "; ".join(parts)
 
 

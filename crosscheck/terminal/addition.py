@@ -27,7 +27,7 @@ def print_addition(
     console.print(_table(found))
     for warning in found.warnings:
         say(console, f"warning: {warning}", "bold yellow")
-    left = "what is left is noise" if found.whiteness.is_noise else _left(found)
+    left = "the residuals are noise" if found.whiteness.is_noise else _left(found)
     say(console, f"With {found.name}, {left}.", "green" if found.whiteness.is_noise else "")
     if not found.pays:
         say(console, why_not(found), "bold yellow")
@@ -41,13 +41,13 @@ def why_not(found: Addition) -> str:
     if found.is_nothing:
         reason = _nothing(found)
     elif found.p >= FALSE_ALARM:
-        reason = f"chance explains what {found.name} explains (p {found.p:.2g})"
+        reason = f"what {found.name} explains is not significant (p = {found.p:.2g})"
     else:
         reason = (
-            f"{found.name} does not predict runs left out any better (chi2 of a block falls by "
-            f"{' ± '.join(with_error(mean, error))})"
+            f"{found.name} does not improve the prediction of held-out runs (chi2 of a block "
+            f"falls by {' ± '.join(with_error(mean, error))})"
         )
-    return f"{reason}: it does not pay; --force adds it all the same"
+    return f"{reason}: it is not worth adding; --force adds it anyway"
 
 
 def _nothing(found: Addition) -> str:
@@ -55,18 +55,21 @@ def _nothing(found: Addition) -> str:
     own = [one for one in found.fitted if one.term.name in found.names]
     errors = np.concatenate([one.stderr[~one.term.layout.shape] for one in own])
     if not (np.isfinite(errors) & (errors > 0.0)).any():
-        return f"{found.name} is not seen by these data: any value fits them as well"
+        return f"{found.name} is not determined by these data: any value fits them equally well"
     if found.from_nothing == 0.0:
-        return f"{found.name} comes out as nothing"
+        return f"{found.name} comes out at its null values"
     together = ", all values together" if len(errors) > 1 else ""
     return (
-        f"{found.name} is no further from nothing than its standard errors "
+        f"{found.name} differs from null by no more than its standard errors "
         f"({found.from_nothing:.2g} of them{together})"
     )
 
 
 def _left(found: Addition) -> str:
-    return f"what is left is {found.whiteness.scale:.3g} times the noise: crosscheck diagnose"
+    return (
+        f"the residuals are {found.whiteness.scale:.3g} times the noise: find what else is "
+        "missing with crosscheck diagnose"
+    )
 
 
 def _print_values(console: Console, fitted: Any) -> None:
@@ -81,7 +84,7 @@ def _table(found: Addition) -> Table:
     rows = (
         ("before", found.before, ""),
         (f"with {found.name}", found.after, "bold"),
-        ("before, on runs left out", found.held_out_before, "dim"),
-        (f"with {found.name}, on runs left out", found.held_out, ""),
+        ("before, on held-out runs", found.held_out_before, "dim"),
+        (f"with {found.name}, on held-out runs", found.held_out, ""),
     )
     return rms_table("rms error", rows)

@@ -15,8 +15,8 @@ from seecr.counted import counted
 # A value this many standard errors from null is sure.
 _SURE = 3.0
 _UNSURE = (
-    f"No effect is {_SURE:g} standard errors from nothing by itself: each can be stood in for by "
-    "others, and only together they predict; crosscheck diagnose says which are missing"
+    f"No single effect differs from null by {_SURE:g} standard errors: others can replace each of "
+    "them, and only together they predict; crosscheck diagnose finds which are missing"
 )
 
 
@@ -28,10 +28,10 @@ def print_calibration(
     rows = (
         ("before", found.before, ""),
         ("calibrated", found.after, "bold"),
-        ("calibrated, on runs left out", found.held_out, ""),
+        ("calibrated, on held-out runs", found.held_out, ""),
     )
     console.print(rms_table("rms error", rows))
-    table = table_of(["effect", "parameters", "largest in its standard errors"])
+    table = table_of(["effect", "parameters", "largest value in standard errors"])
     largest = [_largest(one) for one in found.fitted]
     for one, size in zip(found.fitted, largest, strict=True):
         cell = "-" if size is None else f"{size:.1f}"
@@ -42,10 +42,10 @@ def print_calibration(
     for line in found.noise_lines():
         say(console, line)
     if not found.settled:
-        say(console, "The fit did not settle: its values are not to be used.", "bold yellow")
+        say(console, "The fit did not converge: do not use its values.", "bold yellow")
     elif not found.pays:
         then = "" if written else ": not written; --force writes it"
-        say(console, f"Runs left out are not predicted any better{then}", "bold yellow")
+        say(console, f"The prediction of held-out runs does not improve{then}", "bold yellow")
     if written:
         parts = (
             f"{counted(len(found.fitted), 'effect')}, {counted(len(found.covariance), 'parameter')}"

@@ -51,7 +51,7 @@ def print_comparison(
 
 
 def _coordinates(found: Comparison) -> Table:
-    table = table_of(["measured less predicted", "bias", "rms", "max", "unit", "at line", "rows"])
+    table = table_of(["measured minus predicted", "bias", "rms", "max", "unit", "at line", "rows"])
     for row in found.coordinates:
         factor, unit = in_unit(row.unit)
         numbers = [f"{factor * value:.4g}" for value in (row.bias, row.rms, row.max)]
@@ -74,7 +74,7 @@ def _errors(found: Comparison) -> Table:
             for row in _biggest(groups):
                 _add(table, kinds, f"{title} {row.name}", row.rms, row.rows)
             if len(groups) > _MOST:
-                table.add_row(f"{len(groups) - _MOST} more, with smaller errors", style="dim")
+                table.add_row(f"{len(groups) - _MOST} more with smaller errors", style="dim")
     return table
 
 
@@ -94,16 +94,19 @@ def _add(
 def _print_associations(console: Console, found: Comparison) -> None:
     strong = [a for a in found.associations if a.significant]
     if not strong:
-        say(console, "The errors go with nothing that was tried: place, time, tension, travel ...")
+        say(
+            console,
+            ("The errors depend on nothing that was tested: position, time, tension, travel ..."),
+        )
         return
     for row in strong[:4]:
         factor, unit = in_unit(row.unit)
         steps = [(b.label, factor * b.mean) for b in row.bins if b.mean is not None]
         means = ", ".join(f"{mean:.3g} at {label}" for label, mean in steps[:6])
         share = f"{100 * row.share:.0f} %"
-        text = f"The errors go with {row.against} ({share} of their variance)"
+        text = f"Errors by {row.against}, which explains {share} of their variance"
         if row.kind is QuantityKind.EVERYWHERE:
-            text = f"The errors are the same everywhere ({share} of their square)"
+            text = f"The errors have a constant offset ({share} of their mean square)"
             means = f"{steps[0][1]:.3g}"
         say(console, f"{text}: {row.strongest} [{unit}] {means}")
 

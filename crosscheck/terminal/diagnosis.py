@@ -37,7 +37,7 @@ def print_diagnosis(found: Diagnosis, out: Path, console: Console | None = None)
     if found.verdict is not DiagnosisVerdict.NO_VERDICT:
         console.print(_way(found))
         if found.left is not None:
-            say(console, f"left beyond noise: {found.left.words}", "dim")
+            say(console, f"error beyond the noise: {found.left.words}", "dim")
         if found.chances is not None and found.chances.words:
             say(console, f"note: {found.chances.words}", "dim")
         for finding in found.missing:
@@ -51,10 +51,10 @@ def print_diagnosis(found: Diagnosis, out: Path, console: Console | None = None)
 
 
 def _way(found: Diagnosis) -> Table:
-    rows = [("as it stands", found.before, "")]
+    rows = [("before", found.before, "")]
     for finding in found.missing:
         rows.append((f"+ {finding.effect}", finding.rms, ""))
-        rows.append(("  on runs left out", finding.held_out_rms, "dim"))
+        rows.append(("  on held-out runs", finding.held_out_rms, "dim"))
     return rms_table("rms error", [*rows, ("noise alone", found.floor, "dim")])
 
 
@@ -67,7 +67,7 @@ def _print_finding(console: Console, finding: MissingEffect, probability: str) -
     )  # fmt: skip
     if finding.rivals:
         names = ", ".join(rival.name for rival in finding.rivals)
-        say(console, f"  cannot be told from: {names}")
+        say(console, f"  indistinguishable from: {names}")
     say(console, f"  check: {finding.check}")
 
 

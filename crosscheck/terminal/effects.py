@@ -75,7 +75,7 @@ def print_effects(effects: list[type[Effect]]) -> None:
 def print_effect(effect: type[Effect], robot: Robot | None) -> None:
     """One effect: formula, parameters, what it needs, how to check it by hand."""
     console = console_for(None)
-    own = "" if effect in BUILT_IN else ", of your own"
+    own = "" if effect in BUILT_IN else ", your own"
     say(console, f"{effect.name}: {effect.title} ({effect.place}{own})", "bold")
     for line in (inspect.getdoc(effect) or "").splitlines():
         say(console, line)
@@ -103,5 +103,5 @@ def _sizes_for(effect: type[Effect], robot: Robot) -> Iterator[str]:
         size, absent = factor * scale, factor * null
         words = f"absent at {absent:.4g}, plausible size {size:.3g} {unit}"
         if shape:
-            words = f"shapes the others, from {absent:.3g} {unit}"
+            words = f"modifies the others, starts at {absent:.3g} {unit}"
         yield f"{parameter_name(name, si)}: {words}".rstrip()

@@ -27,7 +27,7 @@ def print_plan(
     if plan.effects:
         console.print(_table(plan))
     for name, why in plan.missing.items():
-        say(console, f"{name}: not with these data: {why.words}", "dim")
+        say(console, f"{name}: not testable with these data: {why.words}", "dim")
     _print_slack(console, plan)
     say(console, plan.sentence, "bold")
     for suggestion in plan.suggestions:
@@ -38,7 +38,12 @@ def print_plan(
 
 def _table(plan: Plan) -> Table:
     table = Table(box=None, header_style="bold", pad_edge=False)
-    for head in ("effect", "smallest size that shows", "and can be named", "cannot be told from"):
+    for head in (
+        "effect",
+        "smallest visible size",
+        ("smallest size to name it"),
+        "indistinguishable from",
+    ):
         table.add_column(head)
     for found in plan.effects:
         named = "-" if found.twins else found.words(found.identifiable)
@@ -53,8 +58,8 @@ def _print_slack(console: Console, plan: Plan) -> None:
     lines = [f"line {line} ({cable})" for line, cable in plan.slack]
     say(
         console,
-        f"About to go slack or taut: {some(lines, _MOST_SLACK)}. Small errors change which cables "
-        "pull there, and what is said here of such poses is less sure.",
+        f"Close to the limit between slack and taut: {some(lines, _MOST_SLACK)}. At these poses "
+        "small errors change which cables are taut, so this plan is less certain about them.",
         "bold yellow",
     )
 

@@ -72,14 +72,16 @@ def choose(
         names = _drawn(robot, random, count, tensions)
         if want := _wanted(names, lacking):
             raise CrosscheckError(
-                f"what this seed hides needs {want}; expected commands that have them, or another "
-                "seed"
+                f"the effects that this seed hides need {want}; expected commands that have them, "
+                "or another seed"
             )
     for name in names:
         if want := _wanted([name], lacking):  # its error lists known effects
             raise CrosscheckError(f"effect {name}: needs {want}; expected commands that have them")
         if name not in TRUE_EFFECTS:
-            raise CrosscheckError(f"effect {name}: no truth with MuJoCo, so no twin can hide it")
+            raise CrosscheckError(
+                f"effect {name}: MuJoCo cannot simulate it, so no twin can hide it"
+            )
     if len(set(names)) != len(names):
         raise CrosscheckError(f"effects {', '.join(names)}: expected each at most once")
     drawn = [_with_numbers(layout_of(effect_named(name), robot), robot, random) for name in names]

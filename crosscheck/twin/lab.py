@@ -98,9 +98,9 @@ def key_of(case: Measurements) -> tuple[int, ...]:
 def lacking_in(case: Measurements) -> dict[str, str]:
     """Data needed by effects that the commands do not have, in words."""
     there = {
-        "time": (case.t_s is not None, "the time of each row (t_s)"),
-        "temperature": (case.temperature_C is not None, "temperature_C"),
-        "poses": (not case.absolute, "poses, or lengths as told"),
+        "time": (case.t_s is not None, "the time of each row, column t_s"),
+        "temperature": (case.temperature_C is not None, "the temperature, column temperature_C"),
+        "poses": (not case.absolute, "commanded poses or told lengths"),
     }
     return {need: words for need, (has, words) in there.items() if not has}
 

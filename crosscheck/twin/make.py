@@ -79,7 +79,7 @@ class Twin(Result):
 
     def lines(self) -> list[str]:
         """What was measured; not what is hidden."""
-        head = f"twin of {self.robot.name}, what it hides is in .hidden"
+        head = f"twin of {self.robot.name}; its hidden effects are in .hidden"
         return [head, *self.measured.lines(), *(f"note: {note}" for note in self.notes)]
 
     def records(self) -> Sequence[Record]:

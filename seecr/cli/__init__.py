@@ -7,10 +7,10 @@ from seecr.cli.group import group_of
 # Command, module in seecr.cli that holds it as `command`, and its line in --help.
 COMMANDS: dict[str, tuple[str, str]] = {
     "pose": ("pose", "Where the platform rests at one command, and how each cable pulls."),
-    "sweep": ("sweep", "The same for many commands: a line, a grid, a file."),
-    "map": ("workspace", "Workspaces: where the platform can be held, and where it comes to."),
-    "correct": ("correct", "What to tell the winches so that the platform comes to wanted poses."),
-    "export": ("export", "A calibrated robot as MJCF."),
+    "sweep": ("sweep", "The same for many commands: along a line, on a grid, or from a file."),
+    "map": ("workspace", "Workspace: where the platform can be held, and where it comes to rest."),
+    "correct": ("correct", "Find the commands that bring the platform to the wanted poses."),
+    "export": ("export", "Write a calibrated robot as MJCF."),
 }
 
 

@@ -48,12 +48,18 @@ class NumbersCommand(click.Command):
 def robot_options(function: F) -> F:
     """``ROBOT``, ``--cable`` and ``--model``, given as ``robot``, ``cable`` and ``model``."""
     function = click.option(
-        "--model", type=FILE, metavar="M.toml", help="The effects it has; plain SEECR without."
+        "--model",
+        type=FILE,
+        metavar="M.toml",
+        help="Model file with the robot's effects.  [default: plain SEECR]",
     )(function)
     function = click.option(
         "--cable",
         metavar="NAME|N",
-        help="k_c = E S of all cables instead of the file's: vectran, fishing, or a number [N].",
+        help=(
+            "k_c = E S of all cables, instead of that in the robot's file: vectran, fishing, or a "
+            "number [N]."
+        ),
     )(function)
     return click.argument("robot", type=FILE, metavar="ROBOT")(function)
 
@@ -61,7 +67,7 @@ def robot_options(function: F) -> F:
 def limit_options(function: F) -> F:
     """``--lowest`` and ``--highest``, given as ``lowest`` and ``highest`` [N], None without."""
     function = click.option(
-        "--highest", type=float, metavar="N", help="Largest tension of every cable [N]."
+        "--highest", type=float, metavar="N", help="Highest allowed tension of every cable [N]."
     )(function)
     return click.option(
         "--lowest",
@@ -69,7 +75,7 @@ def limit_options(function: F) -> F:
         default=0.0,
         show_default=True,
         metavar="N",
-        help="Least tension of every cable [N].",
+        help="Lowest allowed tension of every cable [N].",
     )(function)
 
 
@@ -94,13 +100,15 @@ def files_of_pictures(name: str) -> list[str]:
 
 def picture_options(function: F) -> F:
     """``--figure`` and ``--no-recording``, given as ``figure`` and ``no_recording``."""
-    function = click.option("--no-recording", is_flag=True, help="Write no .rrd.")(function)
+    function = click.option(
+        "--no-recording", is_flag=True, help="Do not write a recording (.rrd)."
+    )(function)
     return click.option(
         "--figure",
         type=click.Choice([*_FIGURES, "none"]),
         default="png",
         show_default=True,
-        help="Kind of the figure.",
+        help="File type of the figure.",
     )(function)
 
 
@@ -166,7 +174,7 @@ def _usual(model: Model) -> list[str]:
     """That values of no file or run in particular are used, where there are others."""
     own = [(term.name, term.own.kind) for term in model.terms if term.own is not None]
     return [
-        f"{name} has values of its own for each {kind}: those of no {kind} in particular are used"
+        f"{name} has separate values for each {kind}: the values for no particular {kind} are used"
         for name, kind in own
     ]
 
@@ -204,7 +212,7 @@ def check_places(places: ArrayLike, robot: Robot) -> None:
     if np.any(far):
         row, axis = np.argwhere(far)[0]
         raise InputError(
-            f"{'XYZ'[axis]}: expected metres, of the size of {robot.name}'s frame, "
+            f"{'XYZ'[axis]}: expected metres, in the range of {robot.name}'s frame, "
             f"{robot.reach:.3g} m across, got {array[row, axis]:g}"
         )
 

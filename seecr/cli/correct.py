@@ -29,7 +29,7 @@ _SEEN = 1e-6
 
 @click.command(
     cls=NumbersCommand,
-    short_help="What to tell the winches so that the platform comes to wanted poses.",
+    short_help="Find the commands that bring the platform to the wanted poses.",
     epilog="""\b
 Examples:
   seecr correct robot.xml poses.csv --model model.toml --out corrected
@@ -45,7 +45,10 @@ Examples:
     default="minimum",
     show_default=True,
     metavar="minimum|middle|N,N,...",
-    help="Where between the limits tensions should be, or tensions wanted: one, or one per cable.",
+    help=(
+        "Where tensions should be within their limits, or the wanted tensions: one, or one per "
+        "cable."
+    ),
 )
 @click.option(
     "--prefer",
@@ -57,7 +60,7 @@ Examples:
 @click.option(
     "--as-read",
     is_flag=True,
-    help="The poses are what the model's tracker is to read, not the platform in the base frame.",
+    help="Take the poses as what the model's tracker should read, not as poses in the base frame.",
 )
 @out_option("seecr-correction")
 @json_option
@@ -74,23 +77,25 @@ def command(
     out: Path,
     as_json: bool,
 ) -> int:
-    """Find what to tell the winches so that the platform comes to rest at the poses of a file.
+    """Find the commands that bring the platform to rest at the poses of a file.
 
-    ROBOT is an MJCF file or the name of a shipped robot, POSES.csv a list of commands: the poses
-    wanted. Elasticity and all effects of the model are taken into account; tensions stay within
-    the limits. A pose that cannot be held is replaced by the nearest one that can, and it is told
-    which cables would have to push, or pull more than they may. Where the model keeps a covariance,
-    correction.json says of each row how likely its tensions stay within the limits.
+    ROBOT is an MJCF file or the name of a shipped robot, POSES.csv a list of commands: the wanted
+    poses. Elasticity and all effects of the model are taken into account; tensions stay within the
+    limits. A pose that cannot be held is replaced by the nearest one that can, and the program says
+    which cables would have to push, or pull more than allowed. If the model has a covariance,
+    correction.json gives for each row the probability that its tensions stay within the limits.
 
-    Poses are those of the platform in the base frame. A calibration shares errors between robot and
-    tracker as it best can, and may leave the platform farther off there than it was; what is sure
-    is what the tracker will read. With --as-read the platform is brought to where the model's
-    tracker reads the poses of the file, and want_* are these places. Where the tracker is known to
-    read the platform in the base frame, calibrate with --exclude tracker_frame,tracker_target.
+    Poses are those of the platform in the base frame. A calibration divides errors between robot
+    and tracker as well as it can, and may leave the platform farther off in the base frame than
+    before; only what the tracker will read is certain. With --as-read the platform is brought to
+    where the model's tracker reads the poses of the file, and want_* are these places. If the
+    tracker is known to read the platform in the base frame, calibrate with --exclude
+    tracker_frame,tracker_target.
 
     Writes corrected.csv and corrected.toml, which every command reads as commands, and
-    correction.json. Poses without any answer are left out of corrected.csv; poses are told by
-    their line in POSES.csv. Where none has one, correction.json, which says why, is all.
+    correction.json. Poses without any answer are left out of corrected.csv; poses are named by
+    their line in POSES.csv. If no pose has an answer, only correction.json is written, which says
+    why.
 
     \b
     Exit status: 0 all poses reached, or some and the others replaced by the nearest, 2 bad input,
@@ -107,8 +112,8 @@ def command(
     if wanted.commands.lengths is not None:
         raise InputFileError.at(
             poses,
-            "holds rest lengths; expected the poses that are wanted, such as cmd_x_m cmd_y_m "
-            "cmd_z_m: lengths are what correct finds",
+            "contains rest lengths; expected the wanted poses, such as cmd_x_m cmd_y_m cmd_z_m: "
+            "lengths are what correct computes",
         )
     wanted, tracker = _as_tracked(machine, wanted, own, as_read)
     limits = float("inf") if highest is None else highest
@@ -186,8 +191,9 @@ def _as_tracked(
         at = placed(robot, commands, model)
         away = np.linalg.norm(at.pose[:, :3] - commands.pose[:, :3], axis=1).max()
         return replace(wanted, commands=at), [
-            f"as read: the platform is brought to up to {1e3 * away:.3g} mm beside the poses "
-            "wanted, where the model's tracker reads them; want_* are those places"
+            f"as read: the platform is brought to places up to {1e3 * away:.3g} mm from the "
+            "wanted poses, where the model's tracker reads the wanted poses; want_* are those "
+            "places"
         ]
     read = tracked(robot, commands, model)
     away = np.linalg.norm(read[:, :3] - commands.pose[:, :3], axis=1).max()
@@ -195,6 +201,6 @@ def _as_tracked(
         return wanted, []
     return wanted, [
         f"the model's tracker reads these poses up to {1e3 * away:.3g} mm off: the platform is "
-        "brought to them in the base frame, which a calibration by a tracker knows no better than "
-        "that; --as-read brings the readings to them"
+        "brought to them in the base frame, which a calibration with a tracker knows no better "
+        "than that; --as-read brings the readings to them"
     ]

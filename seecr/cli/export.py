@@ -19,7 +19,7 @@ from seecr.cli.options import FILE, json_option, made_by
 
 @click.command(
     cls=NumbersCommand,
-    short_help="A calibrated robot as MJCF.",
+    short_help="Write a calibrated robot as MJCF.",
     epilog="""\b
 Examples:
   seecr export robot.xml calibrated.xml --model model.toml
@@ -40,15 +40,16 @@ def command(
     folder: Path | None,
     as_json: bool,
 ) -> int:
-    """Write a robot with the effects of its model as MJCF, as far as MJCF can say them.
+    """Write a robot with the effects of its model as MJCF, as far as MJCF can express them.
 
-    OUT.xml is a robot's description, which every command reads: given the same rest lengths,
-    MuJoCo comes to rest in it where seecr says. Pulleys, sag and the like take bodies that a
-    description has not: with them comes OUT-mujoco.xml, for MuJoCo alone, at the pose X Y Z (the
-    reference pose without one), with the rest as its keyframe. What is in no file is said.
+    OUT.xml is a robot's description, which every command reads: given the same rest lengths, MuJoCo
+    brings it to rest where seecr predicts. Pulleys, sag and the like need bodies that a description
+    does not have: these go into OUT-mujoco.xml, for MuJoCo alone, at the pose X Y Z (by default the
+    reference pose), with the equilibrium as its keyframe. The program lists what is not in any
+    file.
 
     \b
-    Exit status: 0 all well, 2 bad input, 3 no rest at the pose to export at.
+    Exit status: 0 all well, 2 bad input, 3 no equilibrium at the pose to export at.
     """
     from seecr import InputError, export
     from seecr.files import check_writable, json_text, write_texts
@@ -60,13 +61,13 @@ def command(
     beside = out.with_name(f"{out.stem}-mujoco{out.suffix}")
     for file in (out, beside):
         if file.exists() and machine.source is not None and file.samefile(machine.source):
-            raise InputError(f"{file}: is the robot itself; expected another file to write")
+            raise InputError(f"{file}: is the robot's own file; expected another file to write")
     own = model_at(model, machine)
     found = export(machine, own or (), pose_of(coordinates, machine) if coordinates else None)
     if coordinates and found.mujoco_text is None:
         raise InputError(
-            f"X Y Z is the pose of {beside.name}, and what the model has needs no such file; leave "
-            "it out"
+            f"X Y Z is the pose for {beside.name}, and the model's effects need no such file; "
+            "leave it out"
         )
     check_writable(out)
     out.parent.mkdir(parents=True, exist_ok=True)

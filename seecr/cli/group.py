@@ -93,7 +93,10 @@ class LazyGroup(click.Group):
 
     def _tell_compiling(self) -> None:
         name = self.package.partition(".")[0]
-        click.echo(f"{name}: compiling the solver: the first time alone, up to a minute", err=True)
+        click.echo(
+            (f"{name}: compiling the solver, only this first time; it takes up to a minute"),
+            err=True,
+        )
 
     def _refuse(self, text: str, status: int = BAD_INPUT) -> int:
         click.echo(f"{self.package.partition('.')[0]}: {' '.join(text.split())}", err=True)

@@ -36,7 +36,10 @@ def out_option(default: str) -> Callable[[F], F]:
         default=default,
         show_default=True,
         metavar="DIR",
-        help="Folder for the results; made if it does not exist. Older results there are replaced.",
+        help=(
+            "Folder for the results; created if it does not exist. Older results there are "
+            "replaced."
+        ),
     )
 
 
@@ -53,7 +56,7 @@ jobs_option = click.option(
     type=click.IntRange(min=1),
     default=None,
     metavar="N",
-    help="How many at a time.  [default: one per processor]",
+    help="Number of parallel processes.  [default: one per processor]",
 )
 """``--jobs N``, given to the command as ``jobs``; None means :func:`seecr.threads.processors`."""
 
@@ -63,7 +66,7 @@ seed_option = click.option(
     default=0,
     show_default=True,
     metavar="N",
-    help="Of the random numbers.",
+    help="Seed of the random numbers.",
 )
 """``--seed N``, given to the command as ``seed``."""
 
@@ -148,5 +151,5 @@ def progress_share(text: str) -> Iterator[Callable[[str, float], None]]:
 def finite(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
     """A number as it is, as an option's callback; a usage error where it is none, or has no end."""
     if value is not None and not math.isfinite(value):
-        raise click.BadParameter(f"{value} is no finite number.", ctx, param)
+        raise click.BadParameter(f"{value} is not a finite number.", ctx, param)
     return value

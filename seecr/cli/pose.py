@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @click.command(
     cls=NumbersCommand,
-    short_help="Where the platform rests at one command.",
+    short_help="Compute where the platform rests at one command.",
     epilog="""\b
 Examples:
   seecr pose demobot_parallel 0.17 0.25 0.1
@@ -27,8 +27,8 @@ Examples:
 )
 @robot_options
 @click.argument("coordinates", nargs=-1, type=float, metavar="X Y Z [QW QX QY QZ]")
-@click.option("--alone", is_flag=True, help="Do not look for other equilibria.")
-@click.option("--out", type=FILE, metavar="DIR", help="Write pose.json there too.")
+@click.option("--alone", is_flag=True, help="Do not search for other equilibria.")
+@click.option("--out", type=FILE, metavar="DIR", help="Also write pose.json into this folder.")
 @json_option
 def command(
     robot: Path,
@@ -43,12 +43,12 @@ def command(
 
     ROBOT is an MJCF file or the name of a shipped robot. X Y Z are metres in the base frame, QW
     QX QY QZ a quaternion, scalar first; without one the orientation is that of the reference pose.
-    Other stable equilibria of the same command are looked for and listed by energy, with what it
-    takes to get there.
+    Other stable equilibria of the same command are searched for and listed by energy, with the
+    barrier in between.
 
     \b
-    Exit status: 0 at rest, 2 bad input, 3 no rest found, or a platform that
-    is free to move there.
+    Exit status: 0 at rest, 2 bad input, 3 no equilibrium found, or a platform that is free to move
+    there.
     """
     from seecr import barriers, equilibria, predict, solve, spread_of
     from seecr.files import json_text, staged, write_text

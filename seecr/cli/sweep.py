@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from seecr import Commands, Model, Robot, Solution
 
 
-_WANTED = "Lengths are commanded; what is off is told from the poses wanted, columns want_*."
+_WANTED = "Lengths are commanded; deviations are from the wanted poses, columns want_*."
 # Poses of --line.
 _COUNT = 24
 _COUNTED = "Poses are counted from 0, as the rows of sweep.json are."
@@ -42,7 +42,7 @@ _COUNTED = "Poses are counted from 0, as the rows of sweep.json are."
 
 @click.command(
     cls=NumbersCommand,
-    short_help="Where the platform rests at many commands.",
+    short_help="Compute where the platform rests at many commands.",
     epilog="""\b
 Examples:
   seecr sweep demobot_parallel --line 0.17 0.25 0.1 0.63 0.25 0.1
@@ -54,7 +54,7 @@ Examples:
 @robot_options
 @click.argument("poses", type=FILE, metavar="[POSES.csv]", required=False)
 @click.option(
-    "--line", nargs=6, type=float, metavar="X Y Z X Y Z", help="From a position to another [m]."
+    "--line", nargs=6, type=float, metavar="X Y Z X Y Z", help="From one position to another [m]."
 )
 @click.option(
     "--count",
@@ -66,18 +66,18 @@ Examples:
     "--grid",
     nargs=3,
     metavar="X Y Z",
-    help="Each FIRST:LAST:COUNT or one number [m]; z goes fastest.",
+    help="Each FIRST:LAST:COUNT or one number [m]; z varies fastest.",
 )
 @click.option(
     "--follow",
     is_flag=True,
-    help="Go from the reference pose along the commanded way, and tell where the platform jumps.",
+    help="Follow the commanded path from the reference pose, and report where the platform jumps.",
 )
 @click.option(
     "--method",
     type=click.Choice(["newton", "fsolve", "least_squares"]),
-    help="Tell how often a search evaluates the equations, and its time: the compiled one, or one "
-    "of the paper's two, from SciPy.",
+    help="Solve by this method, and report its time and how often it evaluates the equations: the "
+    "compiled one, or one of the paper's two, from SciPy.",
 )
 @turned_option("--line and --grid")
 @picture_options
@@ -98,19 +98,20 @@ def command(
 ) -> int:
     """Show where the platform comes to rest at each of many commands.
 
-    ROBOT is an MJCF file or the name of a shipped robot. POSES.csv holds commands as a file of
-    measurements does: cmd_x_m ... or length_1_m ..., with run, t_s and temperature_C for effects
-    that depend on them; or poses come from --line or --grid. Each command is solved for itself
-    unless --follow or a model with a memory has them solved along the way.
+    ROBOT is an MJCF file or the name of a shipped robot. POSES.csv holds commands in the same
+    format as a file of measurements: cmd_x_m ... or length_1_m ..., with run, t_s and temperature_C
+    for effects that depend on them. Or poses come from --line or --grid. Each command is solved by
+    itself, unless --follow or a model with history requires solving along the path.
 
-    Poses are told by their line in POSES.csv; those of --line and --grid count from 0.
+    Poses are named by their line in POSES.csv; those of --line and --grid are counted from 0.
 
-    Writes sweep.json, sweep.csv, a figure and sweep.rrd; and sweep.toml, where lengths are told
-    or runs begin at their first row, so that every command reads sweep.csv as these commands.
+    Writes sweep.json, sweep.csv, a figure and sweep.rrd. Also writes sweep.toml if lengths are told
+    lengths or runs begin at their first row, so that every command reads sweep.csv as these
+    commands.
 
     \b
-    Exit status: 0 all at rest, 2 bad input, 3 a pose without rest, or where the platform is free
-    to move.
+    Exit status: 0 all at rest, 2 bad input, 3 a pose without an equilibrium, or where the platform
+    is free to move.
     """
     from seecr import spread_of
     from seecr.files import json_text, staged, write_text
@@ -200,9 +201,10 @@ def _solved(
         return solve(robot, commands, effects=effects, follow=follow), None
     first = commands.rows(np.arange(1))
     if follow or predict(robot, first, effects).has_history:
-        beside = "--follow" if follow else "a model with a memory, which is solved along the way"
+        beside = "--follow" if follow else "a model with history, which is solved along the path"
         raise InputError(
-            f"--method tells of searches from each command by itself; got it beside {beside}"
+            f"--method needs every command to be solved by itself; got it together with {beside}; "
+            "leave one of them out"
         )
     # what is compiled or imported at the first call is no part of the search
     solve(robot, first, effects=effects, method=method)
@@ -226,11 +228,13 @@ def _commands(
         got = " and ".join([*(["POSES.csv"] if poses else []), *(f"--{w}" for w in ways)])
         raise InputError(f"expected one of POSES.csv, --line, --grid; got {got or 'none'}")
     if poses is not None and given["turned"]:
-        raise InputError(f"--turned is of --line and --grid; {poses} has its own orientations")
+        raise InputError(
+            f"--turned applies to --line and --grid; {poses} has its own orientations; leave it out"
+        )
     if given["count"] and not given["line"]:
         raise InputError(
-            f"--count is of --line, got it beside {poses or '--grid'}, which says how many poses "
-            "it has; leave it out"
+            f"--count applies to --line, got it together with {poses or '--grid'}, which sets the "
+            "number of poses; leave it out"
         )
     if poses is None:
         return Commands(_along(robot, given)), {}, (_COUNTED,), False

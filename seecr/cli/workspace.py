@@ -24,7 +24,7 @@ from seecr.cli.options import json_option, made_by, out_option, progress_bar
 @click.command(
     "map",
     cls=NumbersCommand,
-    short_help="Workspaces: where the platform can be held, and where it comes to.",
+    short_help="Draw the workspace: where the platform can be held, and where it comes to rest.",
     epilog="""\b
 Examples:
   seecr map demobot_cogiro
@@ -50,21 +50,21 @@ Examples:
     type=float,
     multiple=True,
     metavar="FX FY FZ MX MY MZ",
-    help="It must be held under this too [N, N m]; several times for a set.",
+    help="The platform must also be held under this wrench [N, N m]; may be repeated for a set.",
 )
 @click.option(
     "--at-least",
     type=click.FloatRange(0.0, 1.0, min_open=True),
     metavar="P",
-    help="Also where poses can be held with that probability, by the model's covariance.",
+    help="Also show where poses can be held with this probability, from the model's covariance.",
 )
 @click.option(
     "--edge",
     type=click.FloatRange(0.0, min_open=True),
     metavar="M",
-    help="Also the edge of what can be held, found to so many metres between poses of the grid.",
+    help="Also find the edge of the workspace, to this many metres, between poses of the grid.",
 )
-@click.option("--no-elastic", is_flag=True, help="Only what can be held; quicker.")
+@click.option("--no-elastic", is_flag=True, help="Only compute which poses can be held; faster.")
 @picture_options
 @out_option("seecr-map")
 @json_option
@@ -85,15 +85,16 @@ def command(
     out: Path,
     as_json: bool,
 ) -> int:
-    """Show on a grid where tensions within limits hold the platform, and where it really comes to.
+    """Show on a grid where tensions within limits hold the platform, and where it really comes to
+    rest.
 
     ROBOT is an MJCF file or the name of a shipped robot. The margin is how far inside their limits
-    all tensions can stay [N]; the elastic map says, at each command, how far off the platform
-    rests, how tilted, with how many slack cables, how stiff and in which direction softest.
-    Robots with fewer cables than freedoms are mapped by position, their orientation solved; their
-    margin is 0 where they can be held, and says no more. With --at-least and a calibrated model,
-    each pose has the probability that it can be held. The edge is that of what can be held, with
-    --at-least with that probability.
+    all tensions can stay [N]. The elastic map gives at each command the platform's deviation and
+    tilt, the number of slack cables, the stiffness and the softest direction. Robots with fewer
+    cables than degrees of freedom are mapped by position, and their orientation is solved for;
+    their margin is 0 wherever they can be held, and has no further meaning. With --at-least and a
+    calibrated model, each pose gets the probability that it can be held. The edge is that of the
+    poses that can be held, or with --at-least of those held with that probability.
 
     Writes map.npz, map.json, a figure of slices and map.rrd.
 

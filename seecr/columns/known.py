@@ -97,7 +97,7 @@ class Columns:
 
     def half_there(self, what: str, missing: Sequence[str], need: str) -> InputFileError:
         """The error about an incomplete group of columns."""
-        text = f"{what} columns half there; expected {need}, {' '.join(missing)} missing"
+        text = f"incomplete {what} columns: expected {need}, {' '.join(missing)} missing"
         return self.table.error(text + self.near_misses())
 
     def near_misses(self) -> str:
@@ -124,7 +124,7 @@ def know_columns(table: Table, n_cables: int) -> Columns:
             continue
         quantity, unit = found
         if quantity in known:
-            text = f"says the same as {known[quantity].name}; expected one of the two"
+            text = f"says the same as {known[quantity].name}; expected only one of the two"
             raise table.error(text, column=name)
         known[quantity] = Column(name, index, unit)
     meant = meant_by(unused, _absent(known, n_cables))
@@ -225,9 +225,13 @@ def _check_one_way(columns: Columns) -> None:
         quats, angles = columns.present(prefix, QUATERNION), columns.present(prefix, ANGLES)
         if quats and angles:
             a, b = (known[f"{prefix}_{p[0]}"].name for p in (quats, angles))
-            raise table.error(f"orientation twice, as {a} and as {b}; expected one of the two ways")
+            raise table.error(
+                f"the orientation is given twice, as {a} and as {b}; expected only one of the two"
+            )
     poses = columns.present("cmd", POSITION + QUATERNION + ANGLES)
     lengths = columns.cables("length")
     if poses and lengths:
         a, b = known[f"cmd_{poses[0]}"].name, known[f"length_{lengths[0]}"].name
-        raise table.error(f"commands twice, as {a} and as {b}; expected poses or lengths, not both")
+        raise table.error(
+            f"commands are given twice, as {a} and as {b}; expected poses or lengths, not both"
+        )

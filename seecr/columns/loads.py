@@ -64,6 +64,6 @@ def _centre(columns: Columns, mass: Array | None) -> Array | None:
         columns.refuse(
             blank[:, k] & ~blank.all(axis=1),
             f"payload_{part}",
-            lambda row: "centre half there; expected all three cells filled or all three empty",
+            lambda row: "incomplete centre; expected all three cells filled or all three empty",
         )
     return centre

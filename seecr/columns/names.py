@@ -68,8 +68,8 @@ def unused_note(names: Sequence[str], rotations: Sequence[str]) -> list[str]:
         verb = "is" if len(rotations) == 1 else "are"
         listed = " ".join(rotations)
         notes.append(
-            f"{word} {listed} {verb} not used, since roll, pitch and yaw have many meanings: here "
-            f"{OUR_ROTATIONS}."
+            f"{word} {listed} {verb} not used, because roll, pitch and yaw have several "
+            f"conventions: here {OUR_ROTATIONS}."
         )
     if names:
         notes.append(f"Not used: {', '.join(names)}.")

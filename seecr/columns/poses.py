@@ -138,7 +138,7 @@ def _quaternions(columns: Columns, prefix: str, *, blank_is_nan: bool) -> Array:
 
 
 def _check_whole(columns: Columns, prefix: str, blank: NDArray[np.bool_]) -> None:
-    text = "quaternion half there; expected all four cells filled or all four empty"
+    text = "incomplete quaternion; expected all four cells filled or all four empty"
     for k, part in enumerate(QUATERNION):
         alone = blank[:, k] & ~np.all(blank, axis=1)
         columns.refuse(alone, f"{prefix}_{part}", lambda row: text)

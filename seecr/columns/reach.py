@@ -51,8 +51,9 @@ def _refuse_another(columns: Columns, robot: Robot, poses: Array) -> None:
     off = off_joints(robot, poses)
     if off is not None:
         raise columns.table.error(
-            f"the commanded pose is off what the joints of robot {robot.name} can reach, by "
-            f"{off[1]}; expected a pose on the joints; are these the commands of another robot?",
+            f"the joints of robot {robot.name} cannot reach the commanded pose, it is off by "
+            f"{off[1]}; expected a pose that they can reach; are these the commands of another "
+            "robot?",
             row=off[0],
         )
     away = np.linalg.norm(poses[:, :3] - robot.reference_pose[:3], axis=1)

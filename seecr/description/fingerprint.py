@@ -21,9 +21,9 @@ __all__ = ["check_robot", "fingerprint"]
 # Points that differ by less than this part of the longest cable are the same.
 _SAME = 1e-6
 # What a change of the other numbers means for a model.
-_TWICE = "its effects may count twice; fit them again (crosscheck add --refit)"
+_TWICE = "its effects may be counted twice; refit them (crosscheck add --refit)"
 _POINTS = ("exit_points_m", "anchor_points_m", "reference_pose")
-_ANEW = "give the robot it was made for, or make it anew for this one"
+_ANEW = "use the robot it was made for, or make it again for this one"
 _NOTED = ("mass_kg", "ea_N", "rest_lengths_m", "centre_of_mass_m")
 # Decimals kept: more than anybody measures, few enough to read.
 _DIGITS = 9

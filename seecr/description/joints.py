@@ -58,8 +58,8 @@ def values_of_pose(robot: Robot, poses: Array) -> tuple[Array, Array]:
     off = _off_joints(robot, poses, reached)
     if off is not None:
         raise InputError(
-            f"robot {robot.name}: commanded pose {off[0]} is off what its joints can reach, by "
-            f"{off[1]}; expected a pose on the joints"
+            f"robot {robot.name}: its joints cannot reach commanded pose {off[0]}, it is off by "
+            f"{off[1]}; expected a pose that they can reach"
         )
     return values, screws
 

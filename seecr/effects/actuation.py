@@ -18,7 +18,7 @@ from seecr.pose import Array, pose_add
 class CableLengthOffset(Effect):
     """Each cable is longer than commanded by a constant: l0_i += offset_i.
 
-    A zero of the winch that was set wrong. Positive: more cable than commanded.
+    The zero of the winch was set wrong. Positive: more cable than commanded.
     """
 
     name: ClassVar[str] = "cable_length_offset"
@@ -70,7 +70,7 @@ class InitialPoseError(Effect):
 
 @dataclass(frozen=True, eq=False)
 class DrumGain(Effect):
-    """Winch i pays out more or less than it is told to: change_i -> (1 + gain_i) change_i.
+    """Winch i pays out more or less than commanded: change_i -> (1 + gain_i) change_i.
 
     Of the commanded change since the zero; of the whole length where absolute lengths are
     commanded. Positive: the drum is larger than assumed.
@@ -81,7 +81,7 @@ class DrumGain(Effect):
     title: ClassVar[str] = "drums larger or smaller than assumed"
     parent: ClassVar[str] = "length_scale"
     advice: ClassVar[str] = (
-        "measure each drum with a caliper: expect its diameter off by its gain, the largest "
+        "measure each drum with a caliper: expect its diameter to be off by its gain, the largest "
         "{largest:+.4f} ({which})"
     )
 
@@ -93,7 +93,7 @@ class DrumGain(Effect):
 
 @dataclass(frozen=True, eq=False)
 class LengthScale(Effect):
-    """All winches pay out more or less than told by one factor: change_i -> (1 + factor) change_i.
+    """All winches pay out too much by one factor: change_i -> (1 + factor) change_i.
 
     Drums of one lot that are all larger than assumed, a gear ratio, or a cable thickness that was
     left out. Contained in the gains of the drums, with one number. Positive: more cable.
@@ -103,7 +103,8 @@ class LengthScale(Effect):
     place: ClassVar[str] = "actuation"
     title: ClassVar[str] = "all drums larger or smaller by the same factor"
     advice: ClassVar[str] = (
-        "pay out ten turns of a drum along a tape: expect the length off by {factor:+.4f} of it"
+        "pay out ten turns of a drum along a tape: expect the length to be off by {factor:+.4f} "
+        "of itself"
     )
 
     factor: float = parameter("", 0.01, bounds=(-0.5, 1.0))
@@ -114,7 +115,7 @@ class LengthScale(Effect):
 
 @dataclass(frozen=True, eq=False)
 class DrumEccentricity(Effect):
-    """A drum that runs out of true adds a sine of its angle to the paid-out length.
+    """An eccentric drum adds a sine of its angle to the paid-out length.
 
     l0_i += sine_i sin(a) + cosine_i (cos(a) - 1), a = (commanded change)/radius; zero at the
     zero of the winch.
@@ -122,7 +123,7 @@ class DrumEccentricity(Effect):
 
     name: ClassVar[str] = "drum_eccentricity"
     place: ClassVar[str] = "actuation"
-    title: ClassVar[str] = "drums that run out of true"
+    title: ClassVar[str] = "eccentric drums"
     advice: ClassVar[str] = (
         "hold a dial gauge to each drum and turn it: expect the run-out found, the largest "
         "{largest:+.2f} mm ({which})"
@@ -179,7 +180,7 @@ class Backlash(Effect):
 
 @dataclass(frozen=True, eq=False)
 class ThermalExpansion(Effect):
-    """Cables grow with temperature: l0_i -> l0_i (1 + expansion (T - zero_temperature)).
+    """Cables expand with temperature: l0_i -> l0_i (1 + expansion (T - zero_temperature)).
 
     ``zero_temperature`` is that at which the winches were zeroed. Positive: longer when warm;
     aramids and other drawn fibres are negative.
@@ -187,7 +188,7 @@ class ThermalExpansion(Effect):
 
     name: ClassVar[str] = "thermal_expansion"
     place: ClassVar[str] = "actuation"
-    title: ClassVar[str] = "cables that grow with temperature"
+    title: ClassVar[str] = "cables that expand with temperature"
     needs: ClassVar[tuple[str, ...]] = ("temperature",)
     advice: ClassVar[str] = "repeat one pose at two temperatures and compare the platform's height"
 

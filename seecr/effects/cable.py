@@ -66,8 +66,8 @@ class CableStiffness(Effect):
     title: ClassVar[str] = "stiffness of each cable"
     parent: ClassVar[str] = "stiffness"
     advice: ClassVar[str] = (
-        "hang a known weight on each cable: expect the factors found, {largest:.3f} ({which}) "
-        "the furthest off: E S = {total:.4g} N, not {total_nominal:.4g}"
+        "hang a known weight on each cable: expect the factors found, the one furthest from 1 "
+        "being {largest:.3f} ({which}): E S = {total:.4g} N, not {total_nominal:.4g}"
     )
 
     factor: Array = parameter("", 0.2, null=1.0, bounds=(0.02, 50.0), size="cable")
@@ -177,7 +177,7 @@ class Hysteresis(Effect):
     place: ClassVar[str] = "cable"
     title: ClassVar[str] = "hysteresis of the cables"
     advice: ClassVar[str] = (
-        "load and unload one cable: expect the curves to part by twice {amplitude:.3f} N"
+        "load and unload one cable: expect the two curves to differ by twice {amplitude:.3f} N"
     )
 
     amplitude: float = parameter("N", lambda r: 0.1 * r.usual_load / r.n_cables, bounds=(0.0, 1e6))
@@ -210,7 +210,7 @@ class Creep(Effect):
     place: ClassVar[str] = "cable"
     title: ClassVar[str] = "cables that creep under load"
     needs: ClassVar[tuple[str, ...]] = ("time",)
-    advice: ClassVar[str] = "hold one pose under the tracker for an hour: expect it to sink"
+    advice: ClassVar[str] = "hold one pose for an hour and track it: expect it to sink"
 
     amount: float = parameter("", 0.2, bounds=(0.0, 100.0))
     time: float = parameter("s", 100.0, null=100.0, bounds=(1e-2, 1e9), shape=True)
@@ -243,8 +243,8 @@ class ExitFriction(Effect):
     title: ClassVar[str] = "friction at the exit points"
     parent: ClassVar[str] = "winch_side_length"
     advice: ClassVar[str] = (
-        "pull a cable to and fro over its exit point with a spring balance: expect the pulls "
-        "to differ by exp(2 x {friction:.3f})"
+        "pull a cable to and fro over its exit point with a spring balance: expect the two forces "
+        "to differ by the factor exp(2 x {friction:.3f})"
     )
 
     friction: float = parameter("", 0.1, bounds=(0.0, 5.0))

@@ -49,7 +49,7 @@ class ExitPointError(Effect):
 
     name: ClassVar[str] = "exit_point_error"
     place: ClassVar[str] = "geometry"
-    title: ClassVar[str] = "exit points off where the model has them"
+    title: ClassVar[str] = "misplaced exit points"
     advice: ClassVar[str] = (
         "survey the exit points with the tracker: expect the errors found, the largest "
         "{largest:+.1f} mm ({which}: {total:.1f} mm, not {total_nominal:.1f})"
@@ -73,7 +73,7 @@ class AnchorPointError(Effect):
 
     name: ClassVar[str] = "anchor_point_error"
     place: ClassVar[str] = "geometry"
-    title: ClassVar[str] = "anchor points off where the model has them"
+    title: ClassVar[str] = "misplaced anchor points"
     advice: ClassVar[str] = (
         "measure the platform's anchor points: expect the errors found, the largest "
         "{largest:+.1f} mm ({which}: {total:.1f} mm, not {total_nominal:.1f})"

@@ -80,7 +80,7 @@ class ExternalWrench(Effect):
     name: ClassVar[str] = "external_wrench"
     place: ClassVar[str] = "load"
     title: ClassVar[str] = "a constant force and moment on the platform"
-    advice: ClassVar[str] = "look for a hose or cable that pulls on the platform, and take it off"
+    advice: ClassVar[str] = "look for a hose or cable that pulls on the platform, and remove it"
 
     force: Array = parameter("N", lambda r: 0.03 * r.usual_load, size="vector")
     moment: Array = parameter("Nm", lambda r: 0.03 * r.usual_load * r.length, size="vector")

@@ -21,7 +21,7 @@ class TrackerFrame(Effect):
 
     name: ClassVar[str] = "tracker_frame"
     place: ClassVar[str] = "sensing"
-    title: ClassVar[str] = "the tracker's frame against the robot's"
+    title: ClassVar[str] = "the tracker's frame relative to the robot's"
     advice: ClassVar[str] = "register the tracker again on targets fixed to the frame"
 
     shift: Array = parameter("m", of_length(5e-3), size="vector")
@@ -45,7 +45,7 @@ class TrackerTarget(Effect):
 
     name: ClassVar[str] = "tracker_target"
     place: ClassVar[str] = "sensing"
-    title: ClassVar[str] = "the target's place on the platform"
+    title: ClassVar[str] = "the position of the target on the platform"
     advice: ClassVar[str] = "measure where the target sits on the platform"
 
     shift: Array = parameter("m", of_length(5e-3), size="vector")
@@ -61,7 +61,7 @@ class TrackerTarget(Effect):
 
 @dataclass(frozen=True, eq=False)
 class TrackerScale(Effect):
-    """The tracker's metre is off: reported position = factor x position.
+    """The tracker's scale is off: reported position = factor x position.
 
     Above 1: it reports too much.
     """

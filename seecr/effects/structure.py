@@ -29,7 +29,7 @@ class FrameCompliance(Effect):
 
     name: ClassVar[str] = "frame_compliance"
     place: ClassVar[str] = "structure"
-    title: ClassVar[str] = "a frame that yields under load"
+    title: ClassVar[str] = "a compliant frame"
     advice: ClassVar[str] = (
         "pull an exit point with a spring balance beside a dial gauge: expect {sideways:.4g} mm "
         "per newton sideways, {upwards:.4g} mm upwards"

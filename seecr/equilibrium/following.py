@@ -89,13 +89,13 @@ class Jump(Result):
     def words(self) -> str:
         """A sentence: how far the platform jumps and how much energy that releases."""
         if not np.isfinite(self.after).all():
-            return "its rest ends, and nothing holds it then"
+            return "its equilibrium ends, and nothing holds it after that"
         moved, turned = np.linalg.norm(self.size[:3]), np.linalg.norm(self.size[3:])
-        free = f", {joules(self.energy)} set free" if np.isfinite(self.energy) else ""
+        free = f", releasing {joules(self.energy)}" if np.isfinite(self.energy) else ""
         sure = "" if self.certain else "; where it lands depends on damping"
         return (
-            f"its rest ends and it jumps by {1e3 * moved:.4g} mm and {np.degrees(turned):.4g} deg"
-            f"{free}{sure}"
+            f"its equilibrium ends and it jumps by {1e3 * moved:.4g} mm and "
+            f"{np.degrees(turned):.4g} deg{free}{sure}"
         )
 
     def lines(self) -> list[str]:

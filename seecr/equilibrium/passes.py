@@ -73,10 +73,7 @@ class Barrier(Result):
         least = "" if self.exact else "at most "
         twisted = "twisted" if self.twisted else "reachable"
         if not np.isfinite(self.energy):
-            return (
-                f"{twisted}; what it takes to get there has no number: this load or law has no "
-                "energy"
-            )
+            return f"{twisted}; no barrier can be given: this load or law has no energy"
         # if the saddle was not found, the top may be the end of the path but for rounding
         back = joules(self.back) if self.back > 1e-12 * self.energy else "next to nothing"
         return f"{twisted}, {least}{joules(self.energy)} to get there, {back} back"

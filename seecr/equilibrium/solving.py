@@ -99,14 +99,14 @@ def solve(
     if setup.has_history or setup.laws:
         if follow:
             raise InputError(
-                "effects with a memory or with a law of their own are solved along the way anyhow; "
-                "expected no follow beside them"
+                "effects with history or with a law of their own are always solved along the "
+                "path; expected no follow with them"
             )
         if method != "newton" or start is not None or wrench is not None or others:
             raise InputError(
-                "effects with history or with a law of their own are solved along the way; "
-                "expected no other method, no start, no others, and external_wrench "
-                "among the effects instead of wrench"
+                "effects with history or with a law of their own are solved along the path; "
+                "expected no other method, no start, no others, and external_wrench among the "
+                "effects instead of wrench"
             )
         found = Experiment(robot, commands).predict(acting).solution()
         return replace(found, line=commands.line)
@@ -148,7 +148,7 @@ def _commands(
 ) -> Commands:
     if isinstance(poses, Commands):
         if lengths is not None:
-            raise InputError("commands have their own lengths; expected no rest_lengths beside")
+            raise InputError("commands have their own lengths; expected no rest_lengths with them")
         return poses
     if lengths is None:
         if poses is None:

@@ -100,7 +100,7 @@ class Export(Result):
     def _lines(self, name: str, mujoco_name: str) -> Iterator[str]:
         yield f"{name}: {', '.join(self.plain) or 'the robot as it was'}"
         if self.bodies:
-            yield f"{mujoco_name}, for MuJoCo alone: {', '.join(self.bodies)} too"
+            yield f"{mujoco_name}, for MuJoCo alone: also {', '.join(self.bodies)}"
         if "cable_weight" in self.bodies:
             yield (
                 f"  cables hang as {SEGMENTS} springs with masses between: as catenaries do at "
@@ -108,16 +108,16 @@ class Export(Result):
             )
         if self.leans:
             yield (
-                "  its cables hang along the tilted gravity, in seecr along the vertical of "
-                "their pulleys and frame: the rest differs by a part of the tilt"
+                "  its cables sag along the tilted gravity, in seecr along the vertical of their "
+                "pulleys and frame: the equilibrium differs by a part of the tilt"
             )
         if self.lengths:
             yield (
-                f"in the rest lengths of the reference pose, and nowhere else: "
-                f"{', '.join(self.lengths)}; elsewhere give the rest lengths that seecr tells"
+                f"only in the rest lengths of the reference pose: {', '.join(self.lengths)}; at "
+                "other poses use the rest lengths that seecr computes"
             )
         for effect, why in self.nowhere:
-            yield f"in no file: {effect}; {why}"
+            yield f"not in any file: {effect}; {why}"
 
 
 def export(robot: GivenRobot, effects: GivenEffects = (), at: ArrayLike | None = None) -> Export:

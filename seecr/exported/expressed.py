@@ -25,8 +25,8 @@ _PAST = frozenset(name for name, item in QUANTITIES.items() if item.history is n
 
 PAST = "it depends on the motion before"
 SENSED = "it changes what sensors read, not where the platform rests"
-LAW = "its cables pull by a law of its own"
-LIFTED_SHEAVE = "with pulleys the frame has to yield alike in all directions"
+LAW = "it has its own law for the cables"
+LIFTED_SHEAVE = "with pulleys, the frame must be equally compliant in all directions"
 
 
 @dataclass(frozen=True)

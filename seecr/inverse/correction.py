@@ -98,8 +98,8 @@ class Correction(Result):
         out = [f"{self.robot.name}: {int(at.sum())} of {counted(n, 'pose')} reached"]
         if np.any(at):
             out.append(
-                f"left there: {1e3 * np.linalg.norm(left[at, :3], axis=1).max():.2g} mm and "
-                f"{np.degrees(np.linalg.norm(left[at, 3:], axis=1).max()):.2g} deg at most"
+                f"remaining error: at most {1e3 * np.linalg.norm(left[at, :3], axis=1).max():.2g} "
+                f"mm and {np.degrees(np.linalg.norm(left[at, 3:], axis=1).max()):.2g} deg"
             )
             pulls = self.solution.tensions[at]
             out.append(f"tensions there {between(pulls.min(), pulls.max(), lead='from ')} N")
@@ -116,9 +116,12 @@ class Correction(Result):
             pulls = self.solution.tensions[near]
             out.append(f"tensions there {between(pulls.min(), pulls.max(), lead='from ')} N")
         for rows, text in (
-            (lost & ~self.found, "of them: no pose near was found that can be held"),
-            (near & ~self.settled, "of them may have nearer ones beside them"),
-            (self.found & ~self.stays, "balanced, but the platform does not rest there"),
+            (lost & ~self.found, "of them: no pose nearby was found that can be held"),
+            (near & ~self.settled, "of them: a nearer pose that can be held may exist"),
+            (
+                self.found & ~self.stays,
+                ("where forces balance but the platform does not come to rest"),
+            ),
         ):
             if np.any(rows):
                 out.append(f"{int(rows.sum())} {text}")

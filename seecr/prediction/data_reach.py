@@ -76,7 +76,7 @@ class DataReach:
     def as_toml(self) -> tomlkit.items.Table:
         """The table of a model that holds the range."""
         table = tomlkit.table()
-        table.add(tomlkit.comment("Where the platform was in the data, and how its cables pulled."))
+        table.add(tomlkit.comment("Where the platform was in the data, and its cable tensions."))
         corners, pulls = np.stack([self.low, self.high]), np.array([self.least, self.largest])
         table[_POSITION] = _rounded(corners).tolist()
         table[_TENSION] = _rounded(pulls).tolist()
@@ -112,15 +112,15 @@ class DataReach:
         parts = []
         if np.any(tense):
             parts.append(
-                f"tensions up to {pulls.max():.4g} N, where the data have "
+                f"tensions up to {pulls.max():.4g} N, whereas the data have "
                 f"{between(self.least, self.largest)} N"
             )
         if np.any(away > 0.0):
-            parts.append(f"up to {1e3 * away.max():.3g} mm outside the places of the data")
+            parts.append(f"up to {1e3 * away.max():.3g} mm outside the region of the data")
         which = "" if len(rows) == 1 else f" at {int(rows.sum())} of {counted(len(rows), 'pose')}"
         return (
-            f"beyond the data that the model was fitted to{which}: {', '.join(parts)}; what it "
-            "says there rests on its laws alone",
+            f"beyond the data that the model was fitted to{which}: {', '.join(parts)}; "
+            "predictions there are extrapolated",
         )
 
 

@@ -171,7 +171,9 @@ def _shown(term: Term, stderr: Array, most: int = 3) -> str:
     words = ", ".join([*parts[:most], *more])
     if term.own is None:
         return words
-    return f"of its own for each {term.own.kind}, {len(term.own.values)} known; elsewhere {words}"
+    return (
+        f"separate values for each {term.own.kind}, {len(term.own.values)} known; elsewhere {words}"
+    )
 
 
 GivenEffects: TypeAlias = Model | Iterable[Term | Effect] | str | Path
@@ -288,7 +290,7 @@ def _check_tables(where: Where, document: Mapping[str, Any], expected: str) -> N
             raise where.error(f"unknown {name}; expected {near[0]}", key=name)
     if document and not any(name in document for name in _TABLES):
         has = ", ".join(document)
-        raise where.error(f"is no model, it has {has}; {expected}, with tables [[effect]]")
+        raise where.error(f"is not a model, it has {has}; {expected}, with tables [[effect]]")
     version = document.get("format", FORMAT)
     if version != FORMAT:
         raise where.error(
@@ -324,5 +326,7 @@ def _migrate(where: Where, document: Mapping[str, Any]) -> list[str]:
                 cell = given.pop(old)
                 for key in now:
                     given.setdefault(key, copy.deepcopy(cell))
-                notes.append(f"effect {name}: {old} is read as {' and '.join(now)}, as it is now")
+                notes.append(
+                    f"effect {name}: {old} of an older version is read as {' and '.join(now)}"
+                )
     return notes

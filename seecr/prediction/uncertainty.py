@@ -70,7 +70,7 @@ class Spread(Result):
         )
         pulls = short(float(self.tensions[rests].max()), 2)
         return [
-            f"{head}; one standard deviation: up to {there}, {pulls} N; as the tracker reads it "
+            f"{head}; one standard deviation: up to {there}, {pulls} N; as read by the tracker: "
             f"{seen}"
         ]
 

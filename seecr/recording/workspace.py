@@ -49,8 +49,8 @@ def write_map_recording(found: Workspace, path: str | Path, edge: Array | None =
         scene = Scene(recording, robot, corners, top)
         scene.surroundings()
         scene.axes()
-        words = "tensions can stay so far inside their limits"
-        more = "" if found.chance is None else "; red: the model does not know for sure"
+        words = "how far inside their limits all tensions can stay"
+        more = "" if found.chance is None else "; red: the model is not certain"
         write_scale(recording, top, words + more)
         points = rr.Points3D(
             places,

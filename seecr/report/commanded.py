@@ -35,7 +35,7 @@ def toml_beside(told: bool, commands: Commands) -> str:
     lines = []
     if told:
         lines += [
-            "# length_i is what winch i is told, counted as the plain model counts",
+            "# length_i is the told length of winch i, in the plain model's terms",
             'lengths = "told"',
         ]
     if commands.stands is not None and commands.stands.any():

@@ -61,8 +61,8 @@ def chance_lines(found: Correction, kept: Array | None) -> Iterator[str]:
     worst = int(np.nanargmin(kept))
     many = int(np.sum(kept[np.isfinite(kept)] < _LIKELY))
     yield (
-        f"tensions stay within the limits with probability {np.nanmin(kept):.2f} at "
-        f"{found.place(worst)}, the least; below {_LIKELY:g} at {many} of {len(found.wanted)}"
+        f"tensions stay within the limits with a probability of at least {np.nanmin(kept):.2f}, "
+        f"lowest at {found.place(worst)}; below {_LIKELY:g} at {many} of {len(found.wanted)}"
     )
 
 

@@ -154,9 +154,9 @@ def _words(cut: _Cut, edge: Array | None, at_least: float | None) -> Iterator[st
     yield from _without_end(cut)
     dots = edge is not None and bool(np.any(cut.with_dots(edge)))
     if any(map(_has_edge, cut.inside())) or (dots and at_least is None):
-        yield "orange: the edge of what tensions within the limits can hold"
+        yield "orange: the edge of the poses that tensions within the limits can hold"
     if dots and at_least is not None:
-        yield f"white dots: the edge of what they hold with a probability of {at_least:g}"
+        yield f"white dots: the edge of the poses held with a probability of {at_least:g}"
 
 
 def _white(cut: _Cut) -> Iterator[str]:
@@ -176,11 +176,11 @@ def _without_end(cut: _Cut) -> Iterator[str]:
     if not np.isposinf(margin).any():
         return
     if _yes_or_no(cut.found):
-        yield "where it can be held, cables can be tightened without end"
+        yield "where the platform can be held, cables can be tightened without limit"
         return
     larger = np.isfinite(margin) & (margin > _top_margin(cut.found))
     also = "a larger margin, or " if larger.any() else ""
-    yield f"yellow, beyond the bar: {also}cables can be tightened without end"
+    yield f"yellow, beyond the bar: {also}cables can be tightened without limit"
 
 
 def _yes_or_no(found: Workspace) -> bool:
@@ -209,7 +209,7 @@ def _bar_of(panel: Any, found: Workspace) -> dict[str, Any]:
     words = {
         _held_panel: "tension margin [N]", _chance_panel: "probability",
         _slack_panel: "slack cables",
-        _away_panel: "off its command [mm]", _turn_panel: "turned [°]",
+        _away_panel: "off the command [mm]", _turn_panel: "turned [°]",
     }  # fmt: skip
     label = words[panel]
     more: dict[str, Any] = {"extend": "max"}

@@ -36,9 +36,9 @@ def beyond_line(found: Workspace, reach: DataReach | None) -> Iterator[str]:
     away = reach.outside(places, found.robot.length)
     if np.any(away > 0.0):
         yield (
-            f"the model was fitted to data elsewhere: {counted(int(np.sum(away > 0.0)), 'pose')} "
-            f"of those that can be held {'is' if np.sum(away > 0.0) == 1 else 'are'} up to "
-            f"{1e3 * away.max():.3g} mm outside its places"
+            "beyond the data that the model was fitted to: "
+            f"{counted(int(np.sum(away > 0.0)), 'pose')} of those that can be held "
+            f"{'is' if np.sum(away > 0.0) == 1 else 'are'} up to {1e3 * away.max():.3g} mm outside"
         )
 
 
@@ -48,14 +48,14 @@ def softest_line(found: Workspace) -> Iterator[str]:
     if at is not None:
         place = " ".join(f"{1e3 * axis[k]:.4g}" for axis, k in zip(found.axes, at, strict=True))
         way = direction_words(found.robot, found.softest[at])
-        yield f"softest of them at x y z {place} mm: {way}, {found.stiffness[at]:.4g} N/m"
+        yield f"softest of these at x y z {place} mm: {way}, {found.stiffness[at]:.4g} N/m"
 
 
 def edge_line(edge: Array, tolerance: float) -> str:
     """The number of poses on the edge, and how accurately they are known."""
     if len(edge) == 0:
-        return "no edge: all poses of the grid can be held"
-    return f"its edge, to {tolerance:g} m: {counted(len(edge), 'place')}"
+        return "no edge was found: all poses of the grid can be held"
+    return f"edge, to within {tolerance:g} m: {counted(len(edge), 'point')}"
 
 
 def write_arrays(path: Path, found: Workspace, edge: Array | None = None) -> None:

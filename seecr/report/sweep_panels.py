@@ -179,7 +179,7 @@ def _slack(ax: Any, whole: _Sweep) -> None:
     lost = ~solution.converged
     if np.any(lost):
         at = whole.at[lost]
-        ax.plot(at, np.zeros(int(lost.sum())), "x", color=COLOURS[4], label="no rest")
+        ax.plot(at, np.zeros(int(lost.sum())), "x", color=COLOURS[4], label="not at rest")
         _legend(ax)
     ax.set_ylabel("slack cables")
     ax.set_ylim(-0.3, solution.robot.n_cables + 0.3)

@@ -71,8 +71,8 @@ def pose_lines(
         )
         if np.linalg.norm(away[3:]) > TWISTED and not solution.robot.joints:
             yield (
-                "hangs twisted, more than a right angle from its command: another rest may be "
-                "where the way there leads (seecr sweep --follow)"
+                "hangs twisted, more than a right angle from its command: following the path "
+                "there may lead to another equilibrium (seecr sweep --follow)"
             )
     yield from stiffness_lines(solution, i)
     yield f"forces balance to {solution.residual[i]:.1g} of the load"
@@ -81,9 +81,9 @@ def pose_lines(
 def _spread_lines(spread: Spread, i: int) -> Iterator[str]:
     seen = spread.seen[i]
     own = np.concatenate([spread.position[i], spread.rotation[i]])
-    yield f"  {_off(own)}: one standard deviation, by what the model does not know"
+    yield f"  {_off(own)}: one standard deviation, from the uncertainty of the model"
     if not np.allclose(seen, own, rtol=0.01):
-        yield f"  {_off(seen)} as the tracker of the calibration would read it"
+        yield f"  {_off(seen)} as the calibration's tracker would read it"
 
 
 def _off(values: Array) -> str:
@@ -124,12 +124,12 @@ def stiffness_lines(solution: Solution, i: int = 0) -> Iterator[str]:
     elif solution.status[i] is Status.UNSTABLE:
         yield f"leaves this pose: {way}"
     else:
-        yield f"softest: {way}, {soft:.4g} N/m{_nudged(solution, i)}"
+        yield f"softest direction: {way}, {soft:.4g} N/m{_nudged(solution, i)}"
     frequencies, shapes = (part[i] for part in solution.modes)
     known = [f"{value:.4g}" for value in frequencies if np.isfinite(value)]
     if known:
         first = direction_words(solution.robot, shapes[:, 0])
-        yield f"vibrates at {', '.join(known)} Hz without damping; the lowest: {first}"
+        yield f"natural frequencies without damping: {', '.join(known)} Hz; lowest mode: {first}"
 
 
 def _nudged(solution: Solution, i: int) -> str:
@@ -145,7 +145,7 @@ def _nudged(solution: Solution, i: int) -> str:
     parts = [f"{1e3 * moved:.3g} mm"] if moved > _PART * whole else []
     if turned * robot.length > _PART * whole:
         parts.append(f"{np.degrees(turned):.3g} deg")
-    return f": a hundredth of the weight moves it {' and '.join(parts)}"
+    return f"; 1 % of the weight moves it by {' and '.join(parts)}"
 
 
 def _metre(robot: Robot) -> Array:
@@ -241,11 +241,11 @@ def other_lines(
         slack = [n for n, s in zip(solution.robot.cable_names, others.slack[k], strict=True) if s]
         line = (
             f"could also rest {1e3 * np.linalg.norm(gap[:3]):.4g} mm and "
-            f"{np.degrees(np.linalg.norm(gap[3:])):.4g} deg away, "
-            f"at {_three(1e3 * others.pose[k, :3], '.4g')} mm turned "
+            f"{np.degrees(np.linalg.norm(gap[3:])):.4g} deg away: at "
+            f"{_three(1e3 * others.pose[k, :3], '.4g')} mm, turned "
             f"{_three(np.degrees(rxyz_from_quat(others.pose[k, 3:])), '.4g')} deg, "
-            f"{_more_energy(others.energy[k] - solution.energy[i])}"
-            f"slack: {' '.join(slack) or 'none'}"
+            f"{_more_energy(others.energy[k] - solution.energy[i])}slack: "
+            f"{' '.join(slack) or 'none'}"
         )
         yield f"{line}; {passes[n].words}" if passes else line
 
@@ -260,7 +260,7 @@ def jump_lines(solution: Solution) -> Iterator[str]:
     if solution.jumps is None:
         return
     if not any(solution.jumps):
-        yield "followed from the reference pose: the platform jumps nowhere on the way"
+        yield "followed from the reference pose: the platform does not jump on the way"
     for i, jumps in enumerate(solution.jumps):
         for jump in jumps:
             command = _three(1e3 * jump.command[:3], ".1f")
@@ -284,8 +284,8 @@ def sweep_lines(
         )
         pulls = short(float(np.nanmax(spread.tensions)), 2)
         lines.append(
-            f"off by up to ± {position} mm and ± {turned} deg, ± {pulls} N: one standard "
-            "deviation, by what the model does not know"
+            f"uncertain by up to ± {position} mm, ± {turned} deg and ± {pulls} N: one standard "
+            "deviation, from the uncertainty of the model"
         )
     return lines
 

@@ -43,9 +43,9 @@ class Status(Enum):
     SINGULAR = "balanced, but free to move along at least one direction without resistance"
     STALLED = "not at rest: steps no longer reduce the forces, though they do not balance"
     FALLING = "no equilibrium found: the platform fell beyond the reach of its cables"
-    SPINNING = "no equilibrium found: the external moment turned the platform round and round"
+    SPINNING = "no equilibrium found: the external moment kept turning the platform"
     CABLE_LAW = "no answer: a cable's own equations have no solution at this pose"
-    ITERATIONS = "not at rest: the limit of iterations was reached before the forces balanced"
+    ITERATIONS = "not at rest: the iteration limit was reached before the forces balanced"
     GAVE_UP = "not at rest: SciPy's solver gave up before the forces balanced"
 
 
@@ -243,8 +243,8 @@ class Solution(Result):
             apart = np.hypot(away, self.robot.length * np.radians(turned))
             k = int(known[np.argmax(apart[known])])
             out.append(
-                f"furthest from its command: {self.place(k)}, by {1e3 * away[k]:.4g} mm "
-                f"and {turned[k]:.4g} deg"
+                f"largest deviation from the command: {self.place(k)}, {1e3 * away[k]:.4g} mm and "
+                f"{turned[k]:.4g} deg"
             )
         pulls, slack = self.tensions[known], self.slack[known].sum(axis=1)
         out.append(

@@ -36,12 +36,13 @@ _LINEAR, _FIRST, _DRAWS, _SURE = 4096, 16, 256, 6.0
 # Rows per batch.
 _PART = 64
 _HOLDS_NONE = (
-    "{} has fewer cables than freedoms: it holds no poses; expected a map without probabilities"
+    "{} has fewer cables than degrees of freedom, so it holds no poses; expected a map without "
+    "probabilities"
 )
 _NO_COVARIANCE = (
-    "how likely poses can be held is said by a model that keeps its covariance; expected a table "
-    "[calibration] or [fit], as crosscheck calibrate writes it, and add and diagnose where they "
-    "know it"
+    "probabilities need a model with its covariance; expected a table [calibration] or [fit], "
+    "which crosscheck calibrate always writes, and add and diagnose if the data determine every "
+    "value"
 )
 
 

@@ -143,22 +143,25 @@ class Workspace(Result):
         out = [f"{self.robot.name}: {held} of {counted(n, 'pose')} can be held{size}"]
         half = float(np.median(self.margin[self.feasible])) if held else 0.0
         if half == np.inf:
-            out.append("at half of them or more all cables can be tightened without end")
+            out.append("at half of them or more, all cables can be tightened without limit")
         elif half > 0.0:
-            out.append(
-                f"at half of them tensions can stay {half:.3g} N or more inside their limits"
-            )
+            out.append(f"median tension margin there: {half:.3g} N inside the limits")
         rests = self.rests
         if self.elastic:
             counts = self.slack[rests]
             parts = [f"{k} at {int(np.sum(counts == k))}" for k in np.unique(counts)]
             slack = f"; slack cables: {', '.join(parts)}" if parts else ""
-            out.append(f"elastic: at rest at {int(rests.sum())} of {counted(n, 'command')}{slack}")
+            out.append(
+                f"elastic robot: at rest at {int(rests.sum())} of {counted(n, 'command')}{slack}"
+            )
             where = rests & self.feasible
             if np.any(where):
                 away = 1e3 * np.linalg.norm(self.deviation[where], axis=-1).max()
                 turn = np.degrees(np.linalg.norm(self.rotation[where], axis=-1).max())
-                out.append(f"where poses can be held, up to {away:.4g} mm and {turn:.4g} deg off")
+                out.append(
+                    f"deviation from the command where poses can be held: up to {away:.4g} mm and "
+                    f"{turn:.4g} deg"
+                )
         return out
 
     def records(self) -> list[Record]:

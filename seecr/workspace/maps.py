@@ -141,8 +141,9 @@ def _refuse_memory(robot: Robot, effects: GivenEffects) -> None:
     if Experiment(robot, home).setup(acting).has_history:
         names = [one.name for one in acting if Experiment(robot, home).setup([one]).has_history]
         raise InputError(
-            f"a map's poses are in no order, and {', '.join(names)} would go by the rows before; "
-            "expected a model without them, or for what can be held alone no elastic map"
+            f"a map's poses are in no order, and {', '.join(names)} would depend on the rows "
+            "before; expected a model without them, or no elastic map (only which poses can be "
+            "held)"
         )
 
 

@@ -32,8 +32,8 @@ def margins_at(
         return tension_margin(robot, poses, lowest=lowest, highest=highest, wrenches=wrenches)
     if wrenches is not None:
         raise InputError(
-            f"{robot.name} has fewer cables than freedoms: it holds no set of wrenches; "
-            "expected none"
+            f"{robot.name} has fewer cables than degrees of freedom, so it holds no set of "
+            "wrenches; expected none"
         )
     return np.where(held_in_place(robot, poses, acting, lowest, highest), 0.0, -np.inf)
 

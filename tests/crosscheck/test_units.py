@@ -92,7 +92,7 @@ def test_short_numbers(value: float | None, text: str) -> None:
 
 @pytest.mark.parametrize(
     ("value", "error", "texts"),
-    [(10.00238, 0.005576, ("10.0024", "0.0056")), (1.3988, np.inf, ("1.40", "not seen")),
+    [(10.00238, 0.005576, ("10.0024", "0.0056")), (1.3988, np.inf, ("1.40", "undetermined")),
      (-1437.0, 210.0, ("−1437", "210")), (1.5, 0.0, ("1.50000", "0"))],
 )  # fmt: skip
 def test_values_show_two_digits_of_their_error(

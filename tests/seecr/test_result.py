@@ -33,9 +33,9 @@ def test_a_solution_prints_as_a_few_lines(solution: seecr.Solution) -> None:
     assert repr(solution) == str(solution) and len(lines) == 4
     assert lines[0] == "demobot_cogiro: 3 of 3 poses at rest"
     worst = int(np.argmax(np.linalg.norm(solution.deviation[:, :3], axis=1)))
-    assert lines[1].startswith(f"furthest from its command: pose {worst}, by ")
+    assert lines[1].startswith(f"largest deviation from the command: pose {worst}, ")
     size = 1e3 * np.linalg.norm(solution.deviation[worst, :3])
-    assert float(lines[1].split(" by ")[1].split()[0]) == pytest.approx(size, rel=1e-3)
+    assert float(lines[1].split(f"pose {worst}, ")[1].split()[0]) == pytest.approx(size, rel=1e-3)
     assert f"{solution.tensions.max():.4g} N" in lines[2]
     assert f"{solution.slack.sum(axis=1).max()} of 8" in lines[2]
 
@@ -126,18 +126,19 @@ def test_small_results_are_a_line_each_and_a_row_for_each_thing() -> None:
     off = np.array([[3e-4, 4e-4, 0.0], [np.nan] * 3])
     fall = seecr.Jump(up, up, np.full(7, np.nan), np.nan, certain=True)
     results: dict[str, Result] = {
-        "the file for MuJoCo, for MuJoCo alone: pulley_radius too": seecr.export(
+        "the file for MuJoCo, for MuJoCo alone: also pulley_radius": seecr.export(
             robot, [seecr.Term.of(robot, "pulley_radius", radius_m=0.01)]
         ),
         "2 commands, at rest at 1; one standard deviation: up to 0.50 mm and 0.029 deg, "
-        "0.00040 N; as the tracker reads it 0.50 mm and 0.029 deg": seecr.Spread(
+        "0.00040 N; as read by the tracker: 0.50 mm and 0.029 deg": seecr.Spread(
             off, off, off, np.hstack([off, off])
         ),
         "poses 3 to 5: 2 slack cables": seecr.Zone(3, 5, 2),
         "pose 3: no answer": seecr.Zone(3, 3, None),
         "reachable, 2 J to get there, 1 mJ back": seecr.Barrier(2.0, 1e-3, up, True, False),
-        "at command (0.4, 0.25, 0.1) m: its rest ends, and nothing holds it then": fall,
-        "tilted by 0 deg, tensions 0.5 and 0.5 weights, stable": seecr.BarRest(
+        "at command (0.4, 0.25, 0.1) m: its equilibrium ends, and nothing holds it after "
+        "that": fall,
+        "tilted by 0 deg, tensions of 0.5 and 0.5 times the weight, stable": seecr.BarRest(
             0.0, (0.5, 0.5), True
         ),
     }

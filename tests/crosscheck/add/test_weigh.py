@@ -63,7 +63,7 @@ def test_within_one_standard_error_is_as_likely_for_several_values_as_for_one() 
 def test_an_effect_that_is_nothing_is_not_worth_adding() -> None:
     found = add_effect(robot(), readings(), "tracker_scale")
     assert found.is_nothing and found.from_nothing < 1.0 and not found.pays
-    assert "no further from nothing than its standard errors" in why_not(found)
+    assert "differs from null by no more than its standard errors" in why_not(found)
     sure = add_effect(robot(), readings(radius_m=0.01), "pulley_radius")
     # and the model keeps how well it is known
     known = covariance_of(sure.model)
@@ -84,7 +84,9 @@ def test_errors_cover_what_another_missing_effect_does_to_a_value(
     alone = add_effect(parallel, data, "centre_of_mass")
     off = np.abs(alone.own.term.vector - centre.vector) / alone.own.stderr
     assert alone.pays and not alone.whiteness.is_noise and np.all(off < 2.0)
-    widened = "the standard errors hold by how much another missing effect may move these values"
+    widened = (
+        "the standard errors include by how much another missing effect may shift these values"
+    )
     assert any(widened in warning for warning in alone.warnings)
     monkeypatch.setattr(weigh, "moved_by_others", lambda _problem, best: np.zeros(len(best.terms)))
     blind = add_effect(parallel, data, "centre_of_mass")
@@ -105,7 +107,7 @@ def test_a_fit_that_did_not_end_is_never_a_number(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(crosscheck.add.fit, "_TIMES", 0)
     monkeypatch.setattr(weigh, "_HOLLOW", 0.0)
     start = [Term.of(robot(), "pulley_radius", radius_m=0.05)]
-    with pytest.raises(UnsolvedError, match="did not come to an end in 1 step; nothing was") as e:
+    with pytest.raises(UnsolvedError, match="did not converge in 1 step; nothing was") as e:
         add_effects(robot(), readings(radius_m=0.01), start)
     assert e.value.exit_status == 3
 
@@ -131,5 +133,5 @@ def test_several_effects_are_added_together() -> None:
     assert found.pays and found.names == ("pulley_radius", "stiffness")
     for one, truth in zip(found.fitted, Terms(hidden), strict=True):
         assert abs(one.term.vector[0] - truth.vector[0]) < 4.0 * one.stderr[0]
-    with pytest.raises(CrosscheckError, match="there is nothing to add"):
+    with pytest.raises(CrosscheckError, match="expected at least one effect to add, got none"):
         add_effects(robot(), data, [])

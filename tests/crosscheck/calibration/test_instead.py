@@ -100,7 +100,7 @@ def test_a_picture_that_widens_is_unknown_and_what_is_hidden_beside_it_named() -
     assert found.verdict is DiagnosisVerdict.UNKNOWN_EFFECT
     assert [missing.effect for missing in found.missing] == ["pulley_radius"]
     assert found.missing[0].values[0] == pytest.approx(0.006, rel=0.05)
-    assert f"an effect that is not among them: {Varying.POSITION}" in found.sentence and found.where
+    assert f", which can imitate it: {Varying.POSITION}" in found.sentence and found.where
     assert found.chances is not None and found.chances.field is not None
     assert found.chances.field > UNKNOWN and found.chances.shown is None
     assert found.chances.words == "" and found.chances.imitated is not None
@@ -129,7 +129,7 @@ def test_a_hose_is_unknown_and_what_is_hidden_beside_it_named() -> None:
     found = diagnose(ROBOT, data, only=FEW)
     assert found.verdict is DiagnosisVerdict.UNKNOWN_EFFECT
     assert [missing.effect for missing in found.missing] == ["pulley_radius"]
-    assert f"not among them: {Varying.SPRING}" in found.sentence
+    assert f", which can imitate it: {Varying.SPRING}" in found.sentence
     assert any("take hoses and leads off the platform" in line for line in found.measure_next)
 
 

@@ -92,7 +92,7 @@ def test_what_a_set_leaves_is_asked_of_a_field(monkeypatch: pytest.MonkeyPatch) 
     none = replace(found.judgement, sure=())
     assert "No few effects" in explained(replace(found, judgement=none), []).sentence
     few = replace(none, more=False)
-    assert explained(replace(found, judgement=few), []).sentence.startswith("Few effects")
+    assert explained(replace(found, judgement=few), []).sentence.startswith("A few effects")
 
 
 def assert_a_model_by_itself(found: Sought) -> None:
@@ -122,7 +122,7 @@ def assert_not_beyond_doubt(found: Sought) -> None:
     """As it is told where nothing else explains as well, and yet none is sure."""
     none = Judgement(DiagnosisVerdict.MANY_EFFECTS, (), 0.0)
     said = explained(replace(found, judgement=none), [])
-    start = "Few effects explain the error, though not beyond doubt: "
+    start = "A few effects explain the error, though not with certainty: "
     assert said.sentence.startswith(start) and not said.missing
     assert "gravity_tilt (" in said.sentence and "pulley_radius (" in said.sentence
     for name in ("gravity_tilt", "pulley_radius"):
@@ -141,7 +141,7 @@ def assert_shown_as_many(found: Sought) -> None:
     many = Judgement(DiagnosisVerdict.MANY_EFFECTS, ("gravity_tilt",), 0.0)
     said = explained(replace(found, judgement=many), [])
     assert said.sentence.startswith("No few effects explain the error, but all ")
-    assert said.sentence.endswith("Sure among them: gravity_tilt.")
+    assert said.sentence.endswith("Certain among them: gravity_tilt.")
     (listed,) = said.missing
     # beside all that are probable
     both = value_of(found, {"gravity_tilt", "pulley_radius"})

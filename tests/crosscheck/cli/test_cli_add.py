@@ -38,12 +38,12 @@ def test_added_one_after_the_other_the_error_falls_to_the_noise(both, tmp_path, 
     assert run("compare", *both, *gate, "--out", out).exit_code == 1
     first = add("pulley_radius", both, model)
     assert first.exit_code == 0
-    assert "before" in first.stdout and "on runs left out" in first.stdout
+    assert "before" in first.stdout and "on held-out runs" in first.stdout
     assert "crosscheck diagnose" in first.stdout  # something is still missing
     compared = ("compare", *both, "--model", model, *gate, "--out", out)
     assert run(*compared).exit_code == 1
     second = add("centre_of_mass", both, model)
-    assert second.exit_code == 0 and "what is left is noise" in second.stdout
+    assert second.exit_code == 0 and "the residuals are noise" in second.stdout
     assert run(*compared).exit_code == 0
     robot = load_robot(both[0])
     found = load_model(model, robot)
@@ -66,7 +66,7 @@ def test_an_effect_that_does_not_pay_is_not_written_unless_forced(both, tmp_path
     before = model.read_text()
     result = add("tracker_scale", both, model)
     assert result.exit_code == 1 and model.read_text() == before
-    assert "it does not pay; --force adds it all the same" in result.stdout
+    assert "it is not worth adding; --force adds it anyway" in result.stdout
     result = add("tracker_scale", both, model, "--force")
     assert result.exit_code == 0 and "tracker_scale" in model.read_text()
 
@@ -78,7 +78,7 @@ def test_what_is_there_already_is_only_fitted_again_when_asked(both, tmp_path):
     )
     assert not model.exists()
     add("pulley_radius", both, model)
-    assert "has pulley_radius already; --refit fits it again" in refused(
+    assert "already has pulley_radius; --refit fits it again" in refused(
         "add", "pulley_radius", *both, "--model", model
     )
     # somebody changed it by hand
@@ -117,14 +117,22 @@ def test_what_the_data_cannot_carry_is_refused(both, tmp_path):
     few = tmp_path / "few.csv"
     write_measurements(few, data.rows(slice(0, 10)))
     text = refused("add", "exit_point_error", xml, few, *model)
-    assert "few.csv cannot carry exit_point_error: 24 parameters, but the data have 10 rows" in text
+    assert (
+        "few.csv: exit_point_error cannot be fitted to these data: has 24 parameters, but the data "
+        "have only 10 rows" in text
+    )
     text = refused("add", "thermal_expansion", xml, both[1], *model)
-    assert "cannot carry thermal_expansion: needs temperature_C" in text
+    assert (
+        "thermal_expansion cannot be fitted to these data: needs the temperature, column "
+        "temperature_C" in text
+    )
     text = refused("add", "tension_scale", xml, both[1], *model)
-    assert "cannot carry tension_scale: needs measured tensions" in text
+    assert "tension_scale cannot be fitted to these data: needs measured tensions" in text
     timeless = tmp_path / "timeless.csv"
     write_measurements(timeless, replace(data, t_s=None))
-    assert "needs the time of each row (t_s)" in refused("add", "creep", xml, timeless, *model)
+    assert "needs the time of each row, column t_s" in refused(
+        "add", "creep", xml, timeless, *model
+    )
     still = tmp_path / "still.csv"
     write_measurements(still, data.rows(np.zeros(30, dtype=int)))
     text = refused("add", "stiffness", xml, still, *model)
@@ -158,7 +166,7 @@ def test_values_on_a_bound_are_warned_of():
     mirrored = replace(plain, position=2 * plain.position - bent.position)
     found = add_effect(robot, mirrored, "pulley_radius")
     assert found.own.at_bound[0] and not found.pays
-    assert any("radius_m ended on a bound" in w for w in found.warnings)
+    assert any("radius_m stopped at a bound" in w for w in found.warnings)
 
 
 def test_an_outlying_row_is_left_out_and_named():
@@ -167,7 +175,7 @@ def test_an_outlying_row_is_left_out_and_named():
     position = data.position.copy()
     position[20, 1] += 0.01
     found = add_effect(robot, replace(data, position=position), "stiffness")
-    assert any(f"line {data.line[20]} left out: outliers" in note for note in found.notes)
+    assert any(f"line {data.line[20]} left out as outliers" in note for note in found.notes)
     value, error = found.own.term.vector[0], found.own.stderr[0]
     assert abs(value - 1.4) < 4 * error and error < 0.05
 
@@ -177,4 +185,4 @@ def test_effects_that_go_together_are_named():
     data = measured(robot, [term(robot, "stiffness", factor=1.4)])
     found = add_effect(robot, data, "platform_mass", [term(robot, "stiffness", factor=1.4)])
     assert not found.pays  # mass and stiffness move a robot alike
-    assert any("hardly determined apart" in w or "not seen" in w for w in found.warnings)
+    assert any("hardly separate them" in w or "not determined" in w for w in found.warnings)

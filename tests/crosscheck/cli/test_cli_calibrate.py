@@ -41,7 +41,7 @@ def test_all_at_once_the_error_falls_to_the_noise_and_the_model_can_be_used(
     model = tmp_path / "model.toml"
     result = run("calibrate", *many, *FEW, "--model", model, "--out", tmp_path / "out")
     assert result.exit_code == 0, result.output
-    assert "on runs left out" in result.stdout and f"Written to {model}" in result.stdout
+    assert "on held-out runs" in result.stdout and f"Written to {model}" in result.stdout
     found = json.loads((tmp_path / "out" / "calibration.json").read_text())
     assert set(found["made"]["sha256"]) == {"robot.xml", "measured.csv", "measured.toml"}
     assert found["settled"] and found["improves_held_out"]
@@ -52,7 +52,7 @@ def test_all_at_once_the_error_falls_to_the_noise_and_the_model_can_be_used(
     radius = known.terms["pulley_radius"].vector[0], known.stderr["pulley_radius"][0]
     assert abs(radius[0] - 0.006) < 4 * radius[1] < 0.004
     again = run("compare", *many, "--model", model, "--no-recording", "--out", tmp_path / "cmp")
-    assert again.exit_code == 0 and "what is left is noise" in again.stdout
+    assert again.exit_code == 0 and "the residuals are noise" in again.stdout
     the_covariance_is_there(model)
     how_likely_poses_are_held(load_robot(many[0]), known)
     # from its own model on there is nothing more to gain: nothing is lost either
@@ -88,10 +88,10 @@ def test_where_nothing_is_gained_nothing_is_written(tmp_path: Path) -> None:
     model = tmp_path / "model.toml"
     result = run("calibrate", *files, *FEW, "--model", model)
     assert result.exit_code == 1 and not model.exists()
-    assert "Runs left out are not predicted any better: not written" in result.stdout
+    assert "The prediction of held-out runs does not improve: not written" in result.stdout
     forced = run("calibrate", *files, "--only", "platform_mass", "--model", model, "--force")
     assert forced.exit_code == 0 and model.exists()
-    assert "not predicted any better\n" in forced.stdout and "not written" not in forced.stdout
+    assert "does not improve\n" in forced.stdout and "not written" not in forced.stdout
 
 
 def test_data_that_cannot_carry_it_are_refused(many: tuple[Path, Path], tmp_path: Path) -> None:

@@ -52,7 +52,7 @@ def test_two_files_are_one_comparison_with_runs_that_keep_apart(stiff, tmp_path,
     result = compare(xml, first, second, "--max-position-worst", "1um", "--out", tmp_path / "out")
     assert result.exit_code == 1, result.output
     assert "run second.csv: along_low_fwd" in result.stdout
-    assert "Rows given twice" in result.stdout and "worst at line measured.csv " in result.stdout
+    assert "Identical rows" in result.stdout and "worst at line measured.csv " in result.stdout
     document = json.loads((tmp_path / "out" / "comparison.json").read_text())
     assert document["data"] == "measured.csv + second.csv" and document["rows"]["compared"] == 80
     assert "given twice; expected each file once" in refused("compare", xml, first, first)
@@ -83,7 +83,7 @@ def test_the_model_is_taken_up(stiff, tmp_path, unpaged):
     model.write_text('[[effect]]\nname = "stiffness"\nparameters.factor = 1.4\n')
     result = compare(*stiff, "--model", model, "--max-position", "0.05mm", "--out", tmp_path)
     assert result.exit_code == 0
-    assert "Model and data agree: what is left is noise" in result.stdout
+    assert "Model and data agree: the residuals are noise" in result.stdout
 
 
 def test_bad_limits_write_nothing(stiff, tmp_path):
@@ -93,7 +93,7 @@ def test_bad_limits_write_nothing(stiff, tmp_path):
     text = refused("compare", *stiff, "--max-orientation", "1mm", "--out", out)
     assert "got unit 'mm'" in text
     text = refused("compare", *stiff, "--max-tension", "1N", "--out", out)
-    assert "holds no tension readings" in text
+    assert "has no tension readings" in text
     assert not out.exists()
 
 

@@ -93,6 +93,8 @@ def test_what_is_asked_of_a_plan_wrongly_is_said(poses, tmp_path):
     for box in ("1,2", "0,0,0,1,1,inf"):
         assert "--box: expected X0,Y0" in refused("plan", poses[0], "--rows", 9, "--box", box, *out)
     far = refused("plan", poses[0], "--rows", 9, "--box", "0,0,0,1e300,1,1", *out)
-    assert "X: expected metres, of the size of" in far
+    assert "X: expected metres, in the range of" in far
     text = refused("plan", poses[0], "--rows", 9, "--highest", "0.1", *out)
-    assert "holds still at 0 of" in text and "ask for fewer --rows, wider tensions" in text
+    assert (
+        "can be held at 0 of" in text and "ask for fewer --rows, a wider range of tensions" in text
+    )

@@ -105,7 +105,7 @@ def test_what_of_the_users_mjcf_plays_no_part_is_told_once(tmp_path):
     arguments = ("--no-recordings", "--jobs", "1", "--out", tmp_path / "out")
     result = run("--robot", rough, *arguments, "--json")
     assert result.exit_code == 0
-    note = f"{rough}: switched off here: damping; the platform hangs on springs and gravity alone"
+    note = f"{rough}: switched off here: damping; only springs and gravity act on the platform"
     assert result.stderr.count("note: ") == 1 and note in result.stderr
     document = json.loads(result.stdout)
     assert len(document["notes"]) == 1 and document["notes"][0].startswith(note)
@@ -210,7 +210,7 @@ def test_an_effect_without_rest_ends_3(tmp_path, monkeypatch):
     monkeypatch.setattr(effect_suite, "measure", restless)
     result = run("--case", EFFECT, "--jobs", "1", "--out", tmp_path)
     assert result.exit_code == 3
-    assert "no rest at 1 of 16 poses" in result.stdout
+    assert "no equilibrium at 1 of 16 poses" in result.stdout
 
 
 def test_effects_are_a_group_of_the_shipped_robots(tmp_path):

@@ -102,8 +102,10 @@ def test_a_model_that_agrees_is_used_on_poses_or_mapped_where_none_are_known():
     noise = SimpleNamespace(is_noise=True, refusal=None)
     files = Path("r.xml"), [Path("a.csv"), Path("b.csv")], Path("m.toml")
     line = after_comparison(noise, Given(*files))
-    assert line.startswith("next: seecr correct r.xml a.csv --model m.toml  # the poses commanded")
-    assert "any CSV of poses that you want" in line
+    assert line.startswith(
+        "next: seecr correct r.xml a.csv --model m.toml  # corrects the poses commanded"
+    )
+    assert "any CSV of wanted poses will do" in line
     line = after_comparison(noise, Given(*files, lengths=True))
     assert line == "next: seecr map r.xml --model m.toml"
 
@@ -116,7 +118,7 @@ def test_a_model_that_agrees_is_used_on_poses_or_mapped_where_none_are_known():
         (0.00894, 8.5e-5, "rad", "0.5122 ± 0.0049 deg"),
         (1.4, 0.0234, "", "1.400 ± 0.023"),
         (0.01, 0.0, "m", "10 mm (fixed)"),
-        (0.01, float("inf"), "m", "10 mm not seen by these data"),
+        (0.01, float("inf"), "m", "10 mm (not determined by these data)"),
     ],
 )
 def test_digits_are_those_of_the_error(value, error, unit, words):

@@ -86,7 +86,7 @@ def test_what_cannot_be_written_is_told_before_the_fit(
 
 def test_a_toml_of_another_kind_is_no_model(stiff: tuple[Path, Path]) -> None:
     noise = stiff[1].with_suffix(".toml")
-    assert "is no model, it has sigma; expected a model as" in refused(
+    assert "is not a model, it has sigma; expected a model as" in refused(
         "compare", *stiff, "--model", noise
     )
 
@@ -109,8 +109,8 @@ def test_one_row_or_rows_all_alike_are_compared(stiff: tuple[Path, Path], tmp_pa
 @pytest.mark.parametrize(
     ("option", "value", "said"),
     [
-        ("--clock", "nan", "nan is no finite number"),
-        ("--rest-for", "inf", "inf is no finite number"),
+        ("--clock", "nan", "nan is not a finite number"),
+        ("--rest-for", "inf", "inf is not a finite number"),
         ("--rest-for", "-1", "-1.0 is not in the range x>0"),
     ],
 )
@@ -212,11 +212,11 @@ def test_what_else_had_no_effect(stiff: tuple[Path, Path], tmp_path: Path) -> No
         "compare", *stiff, "--limits", empty
     )
     twice = ("--sigma", "position=0.1mm", "--sigma", "position=1mm")
-    assert "--sigma position=1mm: another one for the position was given" in refused(
+    assert "--sigma position=1mm: expected one for the position, got two; leave one out" in refused(
         "compare", *stiff, *twice
     )
     for other in ((robot,), ("--hide", 3), ("--tensions",), ("--poses", data)):
-        assert "--open shows a case that is there: leave out all but --json" in refused(
+        assert "--open shows an existing case; leave out all other options but --json" in refused(
             "twin", "--open", tmp_path, *other
         )
 

@@ -45,7 +45,7 @@ def test_noise_that_goes_together_is_noise_and_is_told() -> None:
     assert found.whiteness is not None and found.whiteness.structured
     assert found.is_noise
     assert found.coloured is not None and found.coloured.rho["position"] > 0.2
-    assert "correlated by" in found.sentence
+    assert "with a correlation of" in found.sentence
     assert found.as_json()["coloured_noise"]["rho"]["position"] > 0.2
 
 
@@ -60,7 +60,7 @@ def test_a_few_rows_far_off_are_noise_unless_they_lie_side_by_side() -> None:
     apart[5::23] += 40 * SIGMA.position_m
     together[40 : 40 + len(apart[5::23])] += 40 * SIGMA.position_m
     assert compared(apart).is_noise
-    assert "rows far off" in compared(apart).sentence
+    assert " outliers)" in compared(apart).sentence
     assert not compared(together).is_noise
 
 

@@ -43,5 +43,5 @@ def test_a_limit_just_below_is_exceeded_and_one_just_above_holds(
 
 
 def test_a_limit_on_what_was_not_read_is_refused(found: Comparison) -> None:
-    with pytest.raises(CrosscheckError, match=r"--max-tension-worst: .* holds no tension readings"):
+    with pytest.raises(CrosscheckError, match=r"--max-tension-worst: .* has no tension readings"):
         check(Limits(max_tension_worst=1.0), found)

@@ -41,7 +41,7 @@ def off(robot, data):
 def test_the_true_model_leaves_noise(robot, data):
     found = compare(robot, data, [term(robot, "stiffness", factor=1.4)])
     assert found.is_noise and found.converged
-    assert found.sentence.startswith("Model and data agree: what is left is noise")
+    assert found.sentence.startswith("Model and data agree: the residuals are noise")
     assert found.rms["position_rms_m"] == pytest.approx(SIGMA.position_m, rel=0.15)
     assert all(a.p > SIGNIFICANT for a in found.associations)
 
@@ -96,7 +96,7 @@ def test_the_worst_row_is_named(robot, data):
     assert found.worst[0].row == 20 and found.worst[0].line == data.line[20]
     assert found.worst[0].errors["y [m]"] == pytest.approx(0.01, rel=0.1)
     assert found.worst[0].run == data.run[20]
-    assert any(f"line {data.line[20]}: far off" in note for note in found.notes)
+    assert any(f"line {data.line[20]}: possible outliers" in note for note in found.notes)
 
 
 FOLLOWS = {
@@ -247,7 +247,10 @@ def test_limits_from_a_file_and_the_command_line(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ('max_postion = "1mm"', "max_postion is no limit; known, nearest first: max_position,"),
+        (
+            'max_postion = "1mm"',
+            "max_postion is not a limit; expected one of, nearest first: max_position,",
+        ),
         ("max_position = 0.5", 'max_position: expected a text such as "0.5mm", got 0.5'),
         ('max_position = "1deg"', "limits.toml: line 1: --max-position: .*got unit 'deg'"),
         ("max_position = ", "is not TOML"),
@@ -275,7 +278,7 @@ def test_a_limit_says_by_how_much_and_where(off):
 
 
 def test_a_limit_on_what_was_not_measured_is_refused(off):
-    with pytest.raises(CrosscheckError, match="holds no tension readings"):
+    with pytest.raises(CrosscheckError, match="has no tension readings"):
         check(Limits(max_tension=1.0), off)
 
 

@@ -48,7 +48,7 @@ def test_the_unknown_is_looked_for_where_it_goes(
 ) -> None:
     for words in ("commanded z", "the run", "time", "anything"):
         line = advice(found, goes_with(kind, words))
-        assert line.startswith(f"the unexplained error goes with {words}: {expected}")
+        assert line.startswith(f"the unexplained error depends on {words}: {expected}")
 
 
 def test_what_shows_as_a_hose_is_taken_off_first(found: Search) -> None:
@@ -56,15 +56,15 @@ def test_what_shows_as_a_hose_is_taken_off_first(found: Search) -> None:
     first, *others = measure_next(found, [], unknown, (), seen=Varying.SPRING)
     assert first == (
         "to find something that pulls the platform like a spring: take hoses and leads off the "
-        "platform, or hang them elsewhere, and read some poses again; what goes with them is their "
-        "pull"
+        "platform, or hang them elsewhere, and measure some poses again; an error that changes "
+        "comes from their pull"
     )
     assert others == measure_next(found, [], unknown, (), seen=Varying.READINGS)
 
 
 def test_without_a_lead_the_same_poses_are_repeated(found: Search) -> None:
     assert advice(found) == (
-        "repeat the same poses forward, back and an hour later, to see what the error follows"
+        "repeat the same poses forward, back and an hour later, to see what the error depends on"
     )
 
 
@@ -74,7 +74,7 @@ def test_where_it_is_open_which_effects_it_is_what_is_not_common_is_checked_by_h
     either = [frozenset({"gravity_tilt", "stiffness"}), frozenset({"drum_gain", "stiffness"})]
     *checks, _calibrate = measure_next(found, [], DiagnosisVerdict.MANY_EFFECTS, (), either)
     assert checks == [
-        f"to find which effects it is: {measured_directly(name)} ({name})"
+        f"to find out which effects are missing: {measured_directly(name)} ({name})"
         for name in ("drum_gain", "gravity_tilt")
     ]
     *checks, _calibrate = measure_next(found, [], DiagnosisVerdict.MANY_EFFECTS, (), either[:1])
@@ -157,7 +157,7 @@ def test_nothing_impossible_is_ever_said(effect: str, values: dict[str, float]) 
     impossible = term(robot, effect, **values)
     words = check_of(impossible, robot)
     assert not impossible.is_possible(robot) and not any(c.isdigit() for c in words)
-    assert "no robot can have what fits these data best" in words
+    assert "no robot can have the values that fit these data best" in words
 
 
 def test_every_check_has_all_its_numbers() -> None:

@@ -90,7 +90,7 @@ def test_what_explains_only_with_a_size_that_hardly_happens_is_said_to() -> None
     found = crosscheck.diagnose(robot, data, only=["gravity_tilt", "stiffness", "pulley_radius"])
     assert [one.effect for one in found.missing] == ["gravity_tilt"]
     assert any(
-        note.startswith("gravity_tilt would be 51 times a plausible size") for note in found.notes
+        note.startswith("gravity_tilt would be 51 times its plausible size") for note in found.notes
     )
 
 

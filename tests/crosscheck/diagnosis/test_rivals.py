@@ -31,7 +31,7 @@ def test_equals_of_a_second_effect_are_looked_for_beside_the_first() -> None:
     equal = {"stiffness": "platform_mass", "platform_mass": "stiffness"}[second]
     # which takes a while, so that it is said
     for name in search.found:
-        assert f"looking for what could be there instead of {name}" in told
+        assert f"looking for effects that could replace {name}" in told
     first, *others = search.steps
     unsolved = tuple(replace(c, fit=None) if c.name == equal else c for c in first.candidates)
     node = replace(first.node, candidates=unsolved)

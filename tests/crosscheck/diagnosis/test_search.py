@@ -247,7 +247,7 @@ def test_progress_goes_from_nothing_to_the_whole() -> None:
     made = toy({"tracker_scale": 0.5, "drum_gain": 0.4}, NAMES)
     told: list[tuple[str, float]] = []
     search(made.trials, made.base, lambda text, part: told.append((text, part)))
-    assert told[0] == (f"round 1: looking at {NAMES[0]}", 0.0)
+    assert told[0] == (f"round 1: trying {NAMES[0]}", 0.0)
     assert all(0.0 <= part <= 1.0 for _text, part in told)
     assert any(text.startswith("round 2: fitting") for text, _part in told)
 

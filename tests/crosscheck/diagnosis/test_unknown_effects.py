@@ -100,7 +100,7 @@ def bumped_in_its_run(found: Diagnosis) -> None:
 
 def swaying_at_its_period(found: Diagnosis) -> None:
     strongest = found.where[0]
-    said = re.fullmatch(r"time, again every (.*) s", strongest.against)
+    said = re.fullmatch(r"time, with a period of (.*) s", strongest.against)
     assert said is not None
     assert float(said.group(1)) == pytest.approx(37.0, rel=0.02)
     assert strongest.p < 1e-10
@@ -108,7 +108,7 @@ def swaying_at_its_period(found: Diagnosis) -> None:
 
 def of_a_place_and_no_period(found: Diagnosis) -> None:
     """Though the commands go to and fro."""
-    assert not any("again every" in row.against for row in found.where)
+    assert not any("with a period of" in row.against for row in found.where)
 
 
 WHERE: dict[tuple[Change, str], Callable[[Diagnosis], None]] = {

@@ -31,7 +31,7 @@ def test_what_is_probable_but_not_sure_is_no_none_of_all() -> None:
     classes = ((("anchor_point_error", "exit_point_error"), 0.88), (("creep",), 0.3))
     nothing = Judgement(DiagnosisVerdict.NO_EFFECT_MISSING, (), 0.0)
     told = _sentence(nothing, [], 26, Chances({}, classes, None, None))
-    assert "a hint of anchor_point_error or exit_point_error (88 %), too weak to be sure" in told
+    assert "a hint of anchor_point_error or exit_point_error (88 %), too weak to be certain" in told
     assert "none of 26" not in told and "creep" not in told
     assert "none of 26 effects" in _sentence(nothing, [], 26, Chances({}, classes[1:], None, None))
 
@@ -42,10 +42,10 @@ def test_what_is_left_beside_what_was_found_may_hide_something() -> None:
     chances = Chances({}, classes, None, None)
     hints = hints_of(chances, ["tracker_frame"])
     assert noise_left(hints) == (
-        "what is left is noise, "
-        "with a hint of stiffness or platform_mass (78 %), too weak to be sure"
+        "the remaining residuals are noise, "
+        "with a hint of stiffness or platform_mass (78 %), too weak to be certain"
     )
-    assert noise_left({}) == "what is left is noise"
+    assert noise_left({}) == "the remaining residuals are noise"
     # what a search ended with is a hint at any probability, unless it or an equal is listed
     assert list(hints_of(chances, ["tracker_frame"], ["creep"])) == [
         "stiffness or platform_mass", "creep",
@@ -57,6 +57,7 @@ def test_what_imitates_something_unknown_is_told_with_where_that_shows() -> None
     imitated = Instead(9.0, frozenset({"length_scale", "creep"}), Varying.POSITION)
     said = Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, (), 0.0, imitated=imitated)
     assert _sentence(said, [], 26, Chances({}, (), None, None)) == (
-        "Likelier than creep + length_scale, which can imitate it, is an effect that is not among "
-        "them: something smooth over the workspace in the position alone. 26 effects were tried."
+        "An unknown effect is more probable than creep + length_scale, which can imitate it: "
+        "something that varies smoothly over the workspace, in the position alone. 26 effects were "
+        "tried."
     )

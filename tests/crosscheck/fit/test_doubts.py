@@ -36,8 +36,8 @@ def test_commands_off_the_joints_of_a_planar_robot(tmp_path):
     data = tmp_path / "measured.csv"
     write_measurements(data, measured(COGIRO, points=3))
     with pytest.raises(InputFileError, match=(
-        r"measured.csv: line \d+: the commanded pose is off what the joints of robot .* can reach, "
-        r"by .*; expected a pose on the joints; are these the commands of another robot\?"
+        r"measured.csv: line \d+: the joints of robot .* cannot reach the commanded pose, it is "
+        r"off by .*; expected a pose that they can reach; are these the commands of another robot\?"
     )):  # fmt: skip
         load_measurements(data, PLANAR)
     said = refused("compare", model_path("planar_vertical"), data, "--out", tmp_path / "out")
@@ -80,9 +80,9 @@ def test_degrees_in_a_column_of_radians(tmp_path):
 
 
 def test_a_model_worse_than_the_commands(cogiro):
-    assert "the commands themselves only" not in notes(COGIRO, cogiro)
+    assert "the commands themselves are only" not in notes(COGIRO, cogiro)
     obeyed = replace(cogiro, position=cogiro.command_pose[:, :3] + 1e-5, tensions=None)
-    assert "the commands themselves only 0.0100 mm (rms)" in notes(COGIRO, obeyed)
+    assert "the commands themselves are only 0.0100 mm from them (rms)" in notes(COGIRO, obeyed)
 
 
 def test_of_several_files_the_one_of_another_robot_is_named(cogiro):

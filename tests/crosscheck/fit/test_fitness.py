@@ -71,7 +71,10 @@ def test_effects_of_which_none_can_be_tried_carry_no_verdict(data: Measurements)
     untold = replace(data, tensions=none, tension_mask=~data.tension_mask)
     found = diagnose(robot(), untold, only="tension_scale")
     assert found.verdict is DiagnosisVerdict.NO_VERDICT and found.converged
-    assert "none of the effects to consider: tension_scale (needs measured" in found.sentence
+    assert (
+        "none of the effects considered is visible in these data: tension_scale (needs measured"
+        in found.sentence
+    )
     assert diagnose(robot(), data, only="tension_scale").refusal is None
 
 
@@ -92,7 +95,7 @@ def test_noise_that_hides_all_effects_carries_no_verdict(
     assert found.verdict is DiagnosisVerdict.NO_VERDICT and found.converged
     assert found.refusal is not None and found.refusal.unfit is Unfit.BLIND
     assert "noise of 30000 mm, 201 deg, 10000 N would hide every effect" in found.sentence
-    assert "state the noise as it is, in metres and radians" in found.measure_next[0]
+    assert "check the stated noise and its units" in found.measure_next[0]
     # one that some effects would show through, or that is no larger than what is there, is none
     for said in (data, replace(data, sigma=replace(data.sigma, position_m=1e-4))):
         with pytest.raises(Searched):
@@ -135,7 +138,7 @@ def test_readings_at_rest_that_are_far_apart_contradict_each_other(data: Measure
     found = diagnose(robot(), apart)
     assert found.verdict is DiagnosisVerdict.NO_VERDICT
     assert "readings contradict each other: lines " in found.sentence
-    assert "read these poses again" in found.measure_next[0]
+    assert "measure these poses again" in found.measure_next[0]
     # noise that nobody stated may be that large
     assert unfit(replace(apart, sigma=Sigma())) is None
 

@@ -37,7 +37,7 @@ def test_what_is_left_does_not_depend_on_where_the_tracker_stands():
     assert there.rms["position_rms_m"] == pytest.approx(at_home.rms["position_rms_m"], rel=0.02)
     assert not there.is_noise
     assert crosscheck.compare(ROBOT, far_away(mass), [mass]).is_noise
-    assert any("tracker_frame is free, as the TOML" in note for note in there.notes)
+    assert any("tracker_frame is free, as stated in the TOML" in note for note in there.notes)
 
 
 def test_free_values_are_told_with_errors_that_what_is_missing_widens():

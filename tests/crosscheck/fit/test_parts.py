@@ -62,7 +62,7 @@ def added(days):
 
 
 def test_frames_of_each_file_are_added_and_stay_apart(days, added):
-    assert "what is left is noise" in added[1]
+    assert "the residuals are noise" in added[1]
     document = tomlkit.parse((days / "model.toml").read_text(encoding="utf-8"))
     table = document["effect"][0]
     assert table["per_file"] is True and len(table["of"]) == 2
@@ -80,9 +80,9 @@ def test_frames_of_each_file_are_added_and_stay_apart(days, added):
 
 def test_a_day_that_the_model_has_not_seen_is_fitted_first_and_said(days, added, unpaged):
     known = run(days, "compare", "robot.xml", "monday.csv", "--no-recording")
-    assert "monday.csv as the model has them" in known and "fitted to these data" not in known
+    assert "monday.csv as in the model" in known and "fitted to these data" not in known
     new = run(days, "compare", "robot.xml", "wednesday.csv", "--no-recording")
-    assert "wednesday.csv not known to the model, fitted to these data first" in new
+    assert "wednesday.csv not in the model, so fitted to these data first" in new
     assert "Model and data agree" in new
     # without its frame the day is far off
     plain = crosscheck.compare(
@@ -190,4 +190,7 @@ def test_predictions_of_no_file_in_particular_say_so(days, added):
     ]
     found = CliRunner().invoke(seecr_main, args)
     assert found.exit_code == 0, found.output
-    assert "tracker_frame has values of its own for each file: those of no file" in found.output
+    assert (
+        "tracker_frame has separate values for each file: the values for no particular file"
+        in found.output
+    )

@@ -36,7 +36,7 @@ def test_what_is_not_fit_is_refused_with_the_reason(robot: Robot, data: Measurem
     assert nowhere.refusal is not None and nowhere.refusal.unfit is Unfit.NO_EQUILIBRIUM
     n = data.n_rows
     assert str(nowhere.refusal) == (
-        f"at {n} of {n} rows there is no equilibrium to compare with; see the notes"
+        f"the model has no equilibrium at {n} of {n} rows; see the notes"
     )
     assert nowhere.notes[0].startswith("lines 2, 3, 4, 5, 6, 7, 8, 9 and ")
     assert nowhere.notes[0].endswith("more left out: the platform is free to move there")
@@ -47,7 +47,7 @@ def test_what_is_not_fit_is_refused_with_the_reason(robot: Robot, data: Measurem
     assert none.refusal is not None and none.refusal.unfit is Unfit.NO_READINGS
     few = prepare(robot, replace(data, quat_wxyz=None).rows(slice(0, 1)), Terms())
     assert few.refusal == Refusal(Unfit.FEW_READINGS, rows=1, lost=0, readings=3)
-    assert str(few.refusal) == "only 3 readings left"
+    assert str(few.refusal) == "only 3 readings can be used"
 
 
 def test_the_exit_status_hangs_on_what_happened_and_on_no_word() -> None:
@@ -61,10 +61,12 @@ def test_every_reason_is_a_sentence_with_its_numbers() -> None:
     for why in Why:
         text = str(Reason(why, parameters=24, rows=10, p=0.25, by=("creep",)))
         assert text and "{" not in text
-        assert text.startswith("no candidate: ") == Reason(why).lacking
-    assert str(Reason(Why.CHANCE, p=3.7)) == "chance explains it (p 1)"
+        assert text.startswith("not a candidate: ") == Reason(why).lacking
+    assert str(Reason(Why.CHANCE, p=3.7)) == "not significant (p = 1)"
     late = Reason(Why.NOT_PREDICTIVE, beside=("pulley_radius", "creep"))
-    assert str(late) == ("beside pulley_radius, creep: does not predict runs left out any better")
+    assert str(late) == (
+        "does not improve the prediction of held-out runs, with pulley_radius, creep in the model"
+    )
     for unfit in Unfit:
         assert "{" not in str(Refusal(unfit, 10, 3, 5))
 

@@ -52,7 +52,7 @@ def test_rows_are_taken_evenly_in_each_run_and_the_others_are_those_left() -> No
     assert taken[::10].all() and taken[np.flatnonzero(np.diff(data.run_index))].all() and taken[-1]
     assert 120 <= found.data.n_rows < 200  # and where a cable turns round
     assert found.data.line.tolist() == data.line[taken].tolist()
-    assert "one in 10" in found.data.notes[-1] and "of 1200 are searched" in found.data.notes[-1]
+    assert "one in 10" in found.data.notes[-1] and " rows of 1200: " in found.data.notes[-1]
 
 
 def test_lengths_turn_round_at_rows_that_are_taken() -> None:
@@ -86,7 +86,7 @@ def test_the_others_are_predicted_to_the_noise_by_the_model_that_is_there_alone(
     found = thinned(ROBOT, stream(terms), 120)
     (well,) = found.note_on_others(terms, NOISE)
     (badly,) = found.note_on_others(PLAIN, NOISE)
-    assert "which no fit has seen, predicted to 0.1" in well and "far off" not in well
+    assert "not used in any fit, predicted to 0.1" in well and "outlier" not in well
     assert well != badly
 
 
@@ -97,7 +97,7 @@ def test_rows_far_off_are_no_part_of_what_is_told_of_the_others() -> None:
     (said,) = found.note_on_others(PLAIN, NOISE)
     far = found.others[1::100].sum()
     assert far > 8 and "predicted to 0.1" in said
-    assert said.endswith(f"{far} rows far off aside")
+    assert said.endswith(f", except for {far} outliers")
 
 
 @pytest.mark.slow
@@ -108,7 +108,7 @@ def test_a_diagnosis_of_some_rows_says_so(monkeypatch: pytest.MonkeyPatch) -> No
     twin = crosscheck.make_twin(ROBOT, seed=4, effects=["pulley_radius"])
     found = crosscheck.diagnose(ROBOT, twin.measured, only="pulley_radius")
     assert [one.effect for one in found.missing] == ["pulley_radius"]
-    assert any("are searched: one in 2" in note for note in found.notes)
-    assert "no fit has seen" in found.notes[-1]
+    assert any(note.startswith("the search uses ") and ": one in 2" in note for note in found.notes)
+    assert "not used in any fit" in found.notes[-1]
     made = crosscheck.calibrate(ROBOT, twin.measured, only="pulley_radius")
-    assert "no fit has seen" in made.notes[-1]
+    assert "not used in any fit" in made.notes[-1]

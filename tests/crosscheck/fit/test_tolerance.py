@@ -36,7 +36,7 @@ def test_tolerances_are_quantities_whose_unit_says_the_kind() -> None:
         (["0.1kg"], r"--tolerance: expected a number with its unit \(m, .*rad.*N.*got unit 'kg'"),
         (["0.1"], r"got no unit in '0.1'"),
         (["-1mm"], r"expected more than zero, got '-1mm'"),
-        (["1mm", "2mm"], r"--tolerance 2mm: another one for the position was given"),
+        (["1mm", "2mm"], r"--tolerance 2mm: expected one for the position, got two; leave one out"),
     ],
 )
 def test_what_is_no_tolerance_is_refused(texts: list[str], words: str) -> None:
@@ -77,7 +77,7 @@ def test_noise_that_nobody_stated_says_nothing_of_what_matters() -> None:
     told = left_over(rms(1.1e-4, 1.1e-3), NOISE, Tolerance(orientation_rad=1e-3), some)
     assert not told.undecided and not told.important
     nothing = left_over(rms(1.1e-4, 1.1e-3), NOISE, HALF_THE_NOISE, Sigma())
-    assert "not stated, see --tolerance" in nothing.words
+    assert "not stated, use --tolerance" in nothing.words
 
 
 @pytest.mark.slow
@@ -96,7 +96,7 @@ def test_structure_is_a_verdict_only_where_it_matters() -> None:
         shift = SIGMA.position_m * (0.3 * smooth + size * wave)
         found = diagnose(robot(), replace(exact, position=exact.position + shift), only=few)
         verdicts[size] = found.verdict
-        assert found.left is not None and any("left beyond noise" in x for x in found.lines())
+        assert found.left is not None and any("error beyond the noise" in x for x in found.lines())
         assert found.as_json()["left_over"]["important"] == (size > 1.0)
     assert verdicts[0.0] is DiagnosisVerdict.NO_EFFECT_MISSING
     assert verdicts[10.0] is DiagnosisVerdict.UNKNOWN_EFFECT
@@ -105,4 +105,4 @@ def test_structure_is_a_verdict_only_where_it_matters() -> None:
     moved = replace(exact, position=exact.position + shift)
     found = diagnose(robot(), moved, only=few, tolerance=told)
     assert found.verdict is DiagnosisVerdict.NO_EFFECT_MISSING
-    assert "Structure that remains is too small to matter: " in found.sentence
+    assert "The structure that remains is too small to matter: " in found.sentence

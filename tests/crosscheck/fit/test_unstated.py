@@ -43,8 +43,8 @@ def test_an_estimate_that_is_larger_than_all_that_is_left_is_told(robot: Robot) 
     left = {"position_rms_m": 0.4 * noise.position_m, "tension_rms_N": None,
             "orientation_rms_rad": 0.9 * noise.orientation_rad}  # fmt: skip
     (said,) = overestimated(problem, left)
-    assert said.startswith("position_m was estimated too large: no more than ")
-    assert "--sigma position=" in said and "mm rms are left" in said
+    assert said.startswith("position_m was estimated too large: the residuals are only ")
+    assert "--sigma position=" in said and "mm rms; state the noise" in said
     stated = replace(problem, data=replace(problem.data, sigma=noise))
     assert overestimated(stated, left) == []
 
@@ -56,8 +56,8 @@ def test_of_few_rows_no_noise_can_be_estimated_and_that_is_said(
     """Once it was said to come from differences between neighbours, of which there were none."""
     alone = replace(data.rows(np.arange(rows)), sigma=Sigma(orientation_rad=3.5e-4))
     (note,) = [n for n in prepare(robot, alone, Terms()).notes if "is not stated" in n]
-    assert note.startswith("position_m is not stated: no run has the 4 rows that an estimate takes")
-    assert note.endswith("mm, count as noise; state it with --sigma position=...")
+    assert note.startswith("position_m is not stated: no run has the 4 rows that an estimate needs")
+    assert note.endswith("mm, are taken as noise; state it with --sigma position=...")
 
 
 def in_no_order(robot: Robot, terms: Sequence[Term], rows: int) -> Measurements:
@@ -82,7 +82,9 @@ def test_poses_in_no_order_are_no_noise(robot: Robot, rows: int, most: float) ->
     """Differences of neighbours that are far apart hold the whole error of the model."""
     data = in_no_order(robot, [term(robot, "pulley_radius", radius_m=0.006)], rows)
     ready = prepare(robot, data, Terms())
-    assert all("from what no smooth function of the pose explains" in n for n in ready.notes[:2])
+    assert all(
+        "from the part that no smooth function of the pose explains" in n for n in ready.notes[:2]
+    )
     assert ready.problem.sigma.position_m < most * SIGMA.position_m
     assert ready.problem.sigma.orientation_rad < most * SIGMA.orientation_rad
 
@@ -93,7 +95,7 @@ def test_where_the_model_is_right_their_differences_are(robot: Robot) -> None:
     assert "estimated from differences" in ready.notes[0]
     assert ready.problem.sigma.position_m == pytest.approx(SIGMA.position_m, rel=0.3)
     found = crosscheck.compare(robot, data)
-    assert found.is_noise and found.sentence.endswith("times the estimated one).")
+    assert found.is_noise and found.sentence.endswith("times the estimated noise).")
 
 
 @pytest.mark.slow

@@ -172,7 +172,7 @@ def test_recordings_are_a_case_folder_in_one_call(made, commands, tmp_path):
     assert again.n_rows == found.measured.n_rows
     with pytest.raises(InputError, match=r"^form must be one of motive, vicon, poses, got 'csv'$"):
         crosscheck.import_case("csv", log, robot, commands)
-    with pytest.raises(InputError, match=r"has other numbers than .*\.xml"):
+    with pytest.raises(InputError, match=r"has different numbers from .*\.xml"):
         crosscheck.import_case("poses", log, ROBOT, commands, out=tmp_path / "other")
 
 
@@ -192,7 +192,7 @@ def test_what_commands_leave_open_and_orientations_leave_is_said(made, tmp_path)
     left = []
     for order in ("XYZ", "ZYX"):
         found = import_case("vicon", [file], ROBOT, [commands], ImportChoices(rotation=order))
-        left.append(float(re.search(r"platform's: (\S+) deg rms are left", str(found))[1]))
+        left.append(float(re.search(r"platform's: (\S+) deg rms remain", str(found))[1]))
         assert np.nanmin(found.measured.quat_wxyz[:, 0]) > 0.9
     assert left[0] < 0.7 * left[1]
     rows = [line.split(",")[:5] for line in commands.read_text().splitlines()]
@@ -303,7 +303,7 @@ def test_the_command_writes_a_case_and_names_the_next_one(made, commands, tmp_pa
     done = run("import", "motive", take, "--robot", xml, "--commands", commands, "--out", out)
     assert done.exit_code == 0, done.output
     assert f"next: crosscheck compare {out / 'robot.xml'} {out / 'measured.csv'}" in done.stdout
-    assert "24 dwells" in done.stdout and "are left" in done.stdout
+    assert "24 dwells" in done.stdout and "rms remain" in done.stdout
     data = crosscheck.load_measurements(out / "measured.csv", ROBOT)
     assert set(data.free) == {"tracker_frame", "tracker_target"}
     assert data.sigma.position_m is not None

@@ -46,7 +46,10 @@ def test_sigma_beside_the_data_or_named(csv_file, robot, tmp_path):
             "line 2: unknown key position_mm in .sigma.; known are position_m, ",
         ),
         ("[sigma]\norient_rad = 3\n", "known are orientation_rad, .*position_m"),
-        ("position_m = 3e-5\n", r"line 1: position_m stands outside \[sigma\]; put it under that"),
+        (
+            "position_m = 3e-5\n",
+            r"line 1: position_m is outside the table \[sigma\]; put it into that table",
+        ),
         ("[Sigmas]\nposition_m = 3e-5\n", r"line 1: unknown table \[Sigmas\]; expected \[sigma\]"),
         ("sigma = 3\n", r"line 1: sigma must be a table, \[sigma\]"),
     ],

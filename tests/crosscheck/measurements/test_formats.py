@@ -106,7 +106,7 @@ def test_way_points_are_kept_and_lists_of_commands_have_none(write: Write, robot
     data = load_measurements(write(POSE, "a,0,0,0,1", "a,0,0,1,", "a,0,1,0,2"), robot)
     assert data.read.tolist() == [True, False, True]
     assert data.notes[-1] == (
-        "1 row has a command but no reading: a way point, gone through and not compared."
+        "1 row has a command but no reading: a way point, which is not compared."
     )
     commands = load_commands(write(f"run,{CMD}", "a,0,0,0", "a,0,0,1"), robot)
     assert not commands.read.any() and commands.notes == (
@@ -134,7 +134,7 @@ name = "x"
     plain = load_measurements(write(header, "1,1,1,1,0"), robot)
     assert plain.absolute and not plain.stands.any()
     poses = load_measurements(write(POSE, "a,0,0,0,0", toml='lengths = "told"'), robot)
-    assert not poses.told and 'lengths = "told" says nothing here' in " ".join(poses.notes)
+    assert not poses.told and 'lengths = "told" has no effect here' in " ".join(poses.notes)
 
 
 def test_payloads_without_a_centre_hang_at_the_platforms_own(write: Write, robot: Robot):
@@ -183,8 +183,8 @@ def test_a_name_is_guessed_by_its_spelling_alone(write: Write, robot: Robot):
     assert "Column 'mes_y_m' is not used; did you mean meas_y_m?" in notes
     assert notes.count("did you mean") == 1
     assert (
-        "Columns meas_roll_deg meas_pitch_deg are not used, since roll, pitch and yaw have many "
-        "meanings: here a rotation is meas_rx_deg meas_ry_deg meas_rz_deg with "
+        "Columns meas_roll_deg meas_pitch_deg are not used, because roll, pitch and yaw have "
+        "several conventions: here a rotation is meas_rx_deg meas_ry_deg meas_rz_deg with "
         "R = Rx(rx) Ry(ry) Rz(rz), or the quaternion meas_qw meas_qx meas_qy meas_qz." in notes
     )
     assert "Not used: tension_A_N, operator." in notes
@@ -196,8 +196,8 @@ def test_rows_given_twice_are_said(write: Write, robot: Robot):
     rows = ["a,0,0,0,1.5", "a,0,0,1,1.5", "b,0,0,0,1.5", "b,0,0,1,"]
     notes = load_measurements(write(POSE, *rows, "c,0,0,1,"), robot).notes
     assert [note for note in notes if "twice" in note] == [
-        "Rows given twice, to the last digit: line 4 as 2; they count twice: take one of each out "
-        "if it was read once."
+        "Identical rows: line 4 as 2; they count twice, so remove one of each pair if it was "
+        "measured only once."
     ]
 
 
@@ -212,7 +212,9 @@ def test_millimetres_in_a_metre_column(write: Write, robot: Robot):
     notes = load_measurements(write(POSE, f"a,{5 * size},0,0,0"), robot).notes
     assert any("Line 2: a command" in note and "check its unit" in note for note in notes)
     rows = [f"a,{x},0,0,{1000 * x + 0.3}" for x in (0.0, 0.1, 0.2, 0.3)]
-    with pytest.raises(InputFileError, match=r"column meas_x_m: positions were read over .*_x_mm"):
+    with pytest.raises(
+        InputFileError, match=r"column meas_x_m: positions were measured over .*_x_mm"
+    ):
         load_measurements(write(POSE, *rows), robot)
 
 
@@ -260,15 +262,15 @@ REFUSED = {
     ),
     "half a centre": (
         [f"{LOADED},payload_x_m", "a,0,0,0,0,1,0"],
-        "payload columns half there; expected .*, payload_y_m payload_z_m missing",
+        "incomplete payload columns: expected .*, payload_y_m payload_z_m missing",
     ),
     "centre of nothing": (
         [f"{POSE},payload_x_m,payload_y_m,payload_z_m", "a,0,0,0,0,1,0,0"],
-        "payload columns half there; expected .*, payload_kg missing",
+        "incomplete payload columns: expected .*, payload_kg missing",
     ),
     "centre half filled": (
         [f"{LOADED},payload_x_m,payload_y_m,payload_z_m", "a,0,0,0,0,1,0,,0"],
-        "line 2, column payload_y_m: centre half there; expected all three cells filled or all",
+        "line 2, column payload_y_m: incomplete centre; expected all three cells filled or all",
     ),
     "moment in newtons": (
         [f"{POSE},moment_x_N", "a,0,0,0,0,1"],

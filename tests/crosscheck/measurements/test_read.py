@@ -76,7 +76,7 @@ def test_robot_on_an_arm_needs_the_coordinates_the_arm_sweeps(csv_file, robots):
     x, _, z = robots["arm"].reference_pose[:3]
     path = csv_file("run,cmd_x_m,cmd_z_m,meas_x_m", f"a,{x},{z},0.3")
     assert load_measurements(path, robots["arm"]).command_pose[0, 1] == 0.05
-    with pytest.raises(InputFileError, match="line 2: the commanded pose is off what the joints"):
+    with pytest.raises(InputFileError, match="line 2: the joints of robot small cannot reach"):
         load_measurements(csv_file("cmd_x_m,cmd_z_m,meas_x_m", f"{x},{z + 0.2},0"), robots["arm"])
     with pytest.raises(InputFileError, match="expected cmd_x_m cmd_z_m, cmd_z_m missing"):
         load_measurements(csv_file("cmd_x_m,meas_x_m", "0,0"), robots["arm"])
@@ -124,7 +124,7 @@ def test_row_without_readings_is_kept_and_said(csv_file, robot):
     assert not data.has_tension
     assert data.notes[1:] == (
         "Column tension_1_N is empty: not measured.",
-        "1 row has a command but no reading: a way point, gone through and not compared.",
+        "1 row has a command but no reading: a way point, which is not compared.",
     )
 
 

@@ -88,15 +88,16 @@ REFUSED = {
     ),
     "two units": (
         [CMD + ",meas_x_m,meas_x_mm", "0,0,0,0,0"],
-        "column meas_x_mm: says the same as meas_x_m; expected one of the two",
+        "column meas_x_mm: says the same as meas_x_m; expected only one of the two",
     ),
-    "orientation twice": (
+    "the orientation is given twice": (
         [QUAT + ",meas_rx_deg", "0,0,0,1,0,0,0,0"],
-        "orientation twice, as meas_qw and as meas_rx_deg; expected one of the two ways",
+        "the orientation is given twice, as meas_qw and as meas_rx_deg; expected only one of the "
+        "two",
     ),
-    "commands twice": (
+    "commands are given twice": (
         [LENGTHS + "," + POSE, "1,1,1,1,0,0,0,0"],
-        "commands twice, as cmd_x_m and as length_1_m; expected poses or lengths",
+        "commands are given twice, as cmd_x_m and as length_1_m; expected poses or lengths",
     ),
     "no command": (
         ["run,t_s,meas_x_m", "a,0,0"],
@@ -119,7 +120,7 @@ REFUSED = {
     ),
     "position half there": (
         ["cmd_x_m,cmd_z_m,meas_x_m", "0,0,0"],
-        "line 1: commanded pose columns half there; expected cmd_x_m cmd_y_m "
+        "line 1: incomplete commanded pose columns: expected cmd_x_m cmd_y_m "
         "cmd_z_m, cmd_y_m missing",
     ),
     "orientation without position": (
@@ -128,12 +129,12 @@ REFUSED = {
     ),
     "angles half there": (
         [CMD + ",cmd_rx_deg,meas_x_m", "0,0,0,0,0"],
-        "commanded pose columns half there; expected cmd_rx_deg cmd_ry_deg "
+        "incomplete commanded pose columns: expected cmd_rx_deg cmd_ry_deg "
         "cmd_rz_deg, cmd_ry_deg cmd_rz_deg missing",
     ),
     "commanded quaternion half there": (
         [CMD + ",cmd_qw,cmd_qx,meas_x_m", "0,0,0,1,0,0"],
-        "quaternion columns half there; expected all four or none, cmd_qy cmd_qz missing",
+        "incomplete quaternion columns: expected all four or none, cmd_qy cmd_qz missing",
     ),
     "measured quaternion half there": (
         [QUAT.removesuffix(",meas_qz"), "0,0,0,1,0,0"],
@@ -141,7 +142,7 @@ REFUSED = {
     ),
     "lengths half there": (
         ["length_1_m,length_2_m,length_3_m,meas_x_m", "1,1,1,0"],
-        "length columns half there; expected all 4 cables of the robot, length_4_m missing",
+        "incomplete length columns: expected all 4 cables of the robot, length_4_m missing",
     ),
     "misspelt half": (
         ["cmd_x_m,cmd_y_m,cmd_Z_m,meas_x_m", "0,0,0,0"],
@@ -220,7 +221,7 @@ REFUSED = {
     "zero quaternion": ([QUAT, "0,0,0,0,0,0,0"], "line 2, column meas_qw: .* with norm 0;"),
     "quaternion cells half there": (
         [QUAT, "0,0,0,1,0,,0"],
-        "line 2, column meas_qy: quaternion half there; expected all four cells "
+        "line 2, column meas_qy: incomplete quaternion; expected all four cells "
         "filled or all four empty",
     ),
     "time falls": (

@@ -81,7 +81,7 @@ def test_rows_count_by_the_noise_of_their_own_file(tmp_path: Path, robot: Robot)
     assert chi2[2] == pytest.approx(chi2[0] + chi2[1], rel=1e-9)
     assert chi2[0] == pytest.approx(100 * chi2[1], rel=1e-9)
     again = load_measurements(files, robot).notes
-    assert any("Rows given twice, to the last digit: line 1.csv 2 as 0.csv 2" in n for n in again)
+    assert any("Identical rows: line 1.csv 2 as 0.csv 2" in n for n in again)
 
 
 def test_orientations_meet_as_angles_where_one_file_has_only_these(tmp_path: Path, robot: Robot):
@@ -114,9 +114,11 @@ def test_files_that_do_not_go_together(tmp_path: Path, robot: Robot):
     empty = case(tmp_path, "d.csv", CMD, "a,0,0,0,0")
     with pytest.raises(InputFileError, match=r"a\.csv: is given twice; expected each file once"):
         load_measurements([poses, poses.parent / "." / "a.csv"], robot)
-    with pytest.raises(InputFileError, match=r"b\.csv: commands lengths as told, .*a\.csv poses;"):
+    with pytest.raises(InputFileError, match=r"b\.csv: commands told lengths, .*a\.csv poses;"):
         load_measurements([poses, told], robot)
-    with pytest.raises(InputFileError, match=r"c\.csv: commands absolute lengths, .*as told; exp"):
+    with pytest.raises(
+        InputFileError, match=r"c\.csv: commands absolute lengths, .*told lengths; exp"
+    ):
         load_measurements([told, lengths], robot)
     with pytest.raises(InputFileError, match=r"d\.csv: line 1: no measurement"):
         load_measurements([poses, empty], robot)

@@ -63,7 +63,7 @@ def test_a_file_that_moved_and_was_edited_is_the_same_robot(tmp_path: Path) -> N
     assert load_diagnosed(diagnosis(tmp_path), robot)[1] == ()
     moved.write_text(f"{COGIRO.read_text()}<!-- checked -->\n", encoding="utf-8")
     (note,) = load_diagnosed(diagnosis(tmp_path), robot)[1]
-    assert "was made from another text than" in note and "are the same" in note
+    assert "was made from a different text of" in note and "are the same" in note
 
 
 def test_other_numbers_and_a_diagnosis_that_says_nothing_are_noted(tmp_path: Path) -> None:

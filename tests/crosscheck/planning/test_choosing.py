@@ -127,10 +127,12 @@ def test_what_data_can_show_is_known_before_any_verdict(cogiro):
     data = measured(cogiro, points=3)
     seen = sight(cogiro, data)
     words = " ".join(seen.lines())
-    assert "thermal_expansion (needs temperature_C)" in words
+    assert "thermal_expansion (needs the temperature, column temperature_C)" in words
     assert "platform_mass" in seen.alike["stiffness"]
     blurred = sight(cogiro, replace(data, sigma=Sigma(position_m=0.05, orientation_rad=0.5)))
-    assert "stiffness" in blurred.hidden and "too small beside the noise" in blurred.lines()[1]
+    assert (
+        "stiffness" in blurred.hidden and "too small compared with the noise" in blurred.lines()[1]
+    )
 
 
 def test_what_is_free_is_no_candidate_and_hides_what_it_imitates(cogiro):
@@ -147,12 +149,12 @@ def test_a_diagnosis_begins_with_it(cogiro):
         cogiro, measured(cogiro, [term(cogiro, "pulley_radius", radius_m=0.01)], points=3),
         only=["pulley_radius", "stiffness", "platform_mass"],
     )  # fmt: skip
-    assert found.lines()[0].startswith("These data would show 3 of 3 effects")
+    assert found.lines()[0].startswith("In these data 3 of 3 effects would be visible")
     assert "stiffness" in found.as_json()["can_show"]["cannot_be_told_from"]
 
 
 def test_a_robot_that_holds_nowhere_is_told_and_a_box_keeps_poses_in(cogiro):
-    with pytest.raises(crosscheck.CrosscheckError, match="holds still at 0 of 432 poses"):
+    with pytest.raises(crosscheck.CrosscheckError, match="can be held at 0 of 432 poses"):
         choose_poses(cogiro, 10, limits=(0.0, 1e-6))
     box = np.array([[0.3, 0.0, 0.1], [0.5, 0.0, 0.2]])
     pose = choose_poses(PLANAR, 6, box=box).command_pose

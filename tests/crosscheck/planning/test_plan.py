@@ -140,9 +140,12 @@ def test_what_nobody_stated_is_assumed_and_said(robot, few):
 
 def test_what_the_commands_lack_is_said(robot, few):
     found = make_plan(robot, replace(few, t_s=None).rows(slice(0, 10)))
-    assert found.missing["creep"].words == "needs the time of each row (t_s)"
-    assert found.missing["thermal_expansion"].words == "needs temperature_C"
-    assert found.missing["exit_point_error"].words == "24 parameters, but the data have 10 rows"
+    assert found.missing["creep"].words == "needs the time of each row, column t_s"
+    assert found.missing["thermal_expansion"].words == "needs the temperature, column temperature_C"
+    assert (
+        found.missing["exit_point_error"].words
+        == "has 24 parameters, but the data have only 10 rows"
+    )
 
 
 def test_one_row_is_too_few_for_any_plan(robot, few):

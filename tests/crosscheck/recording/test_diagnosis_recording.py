@@ -91,7 +91,7 @@ def test_arrows_are_the_errors_so_many_times_too_long(
     sizes = [np.linalg.norm(vectors[k], axis=1).mean() for k in (0, 1)]
     assert sizes[1] < 0.1 * sizes[0]
     text = back.static("/text/verdict", "TextDocument:text")[0]
-    assert f"drawn **{shown.magnify:g} times too long**" in text
+    assert f"drawn **at {shown.magnify:g} times their length**" in text
 
 
 def test_maps_dim_as_the_error_falls(back: Readback, shown: Misfit) -> None:
@@ -188,7 +188,7 @@ def test_what_is_not_sure_is_said_so(found: Diagnosis, tmp_path: Path) -> None:
     write_diagnosis_recording(
         replace(found, missing=(), verdict=DiagnosisVerdict.UNKNOWN_EFFECT), path
     )
-    assert "not sure" in _steps(Readback(path))[1]
+    assert "Not certain" in _steps(Readback(path))[1]
 
 
 def test_no_verdict_is_words_alone(tmp_path: Path) -> None:

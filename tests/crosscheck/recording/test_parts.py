@@ -159,5 +159,5 @@ def test_a_workspace_has_numbers_at_its_edges_and_the_scale_of_its_margins(tmp_p
     chance = np.array([0.5, 1.0, 0.0, 0.9], dtype=np.float32).reshape(2, 2, 1)
     write_map_recording(replace(found, chance=chance), tmp_path / "chance.rrd")
     back = Readback(tmp_path / "chance.rrd")
-    assert "does not know for sure" in back.static("/legend/of", "Points2D:labels")[0]
+    assert "is not certain" in back.static("/legend/of", "Points2D:labels")[0]
     assert len(back.static("/scene/unsure", "Points3D:positions")) == 2

@@ -32,9 +32,11 @@ def test_a_word_is_linked_where_it_first_stands_in_each_section() -> None:
 
 
 def test_words_are_known_in_the_plural_with_numbers_and_by_their_other_names() -> None:
-    page = linked("<p>agree by 9 standard errors; two plausible sizes; on runs left out; p 0.1</p>")
+    page = linked(
+        "<p>9 standard errors from zero; two plausible sizes; on held-out runs; p 0.1</p>"
+    )
     said = re.findall(r"<a [^>]*>(.*?)</a>", page)
-    assert said == ["agree by 9 standard errors", "plausible sizes", "runs left out"]
+    assert said == ["9 standard errors from zero", "plausible sizes", "held-out runs"]
     assert linked("<p>unslackened, noise-free &amp; phase</p>").count("<a") == 0
 
 

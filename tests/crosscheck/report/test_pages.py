@@ -64,7 +64,7 @@ def test_a_plan_has_its_page(plan, pages):
     page = pages["plan"]
     seen = text_of(page)
     assert plan.sentence in seen and len(figures_of(page)) == 2 and needs_nothing_else(page)
-    assert f"; from {NAMED:g} times the smallest size that shows on" in seen
+    assert f"; from {NAMED:g} times the smallest visible size on" in seen
     for found in plan.effects:
         assert found.name in seen
     for item in plan.suggestions:

@@ -142,7 +142,7 @@ def test_numbers_are_those_of_the_json() -> None:
 
 @pytest.mark.parametrize("name", ["nothing", "unknown"])
 def test_nothing_is_called_missing_that_is_not_sure(name: str) -> None:
-    assert "What is missing" not in page(name)
+    assert "Missing effects, in the order" not in page(name)
     assert "the missing effect is" not in text_of(page("pulleys")).lower()
 
 
@@ -150,22 +150,22 @@ def test_unknown_shows_where_structure_is_left() -> None:
     found = diagnosis("unknown")
     seen = text_of(page("unknown"))
     assert found.where
-    assert "What the unexplained part goes with" in seen
+    assert "What the unexplained error depends on" in seen
     for row in found.where:
         assert str(row.against) in seen
         assert row.bins[0].label in seen or len(row.bins) == 1
     assert "not explained" in seen
     # what was tried may be a part of the catalogue; inks are other ones on dark pages
-    assert found.sentence.endswith("tried explains: an effect that is not among them.")
-    assert "Black:" not in seen and "Bracket: the spread over these runs" in seen
+    assert found.sentence.endswith("tried explains: an unknown effect is missing.")
+    assert "Black:" not in seen and "Bracket: the range over these runs" in seen
     assert "not explained" not in text_of(page("pulleys"))
 
 
 def test_what_was_found_but_is_not_sure_is_hatched() -> None:
     found = diagnosis("pulleys")
     unsure = replace(found, missing=(), verdict=DiagnosisVerdict.UNKNOWN_EFFECT)
-    assert "(not sure)" in text_of(waterfall(unsure))
-    assert "(not sure)" not in text_of(page("pulleys"))
+    assert "(not certain)" in text_of(waterfall(unsure))
+    assert "(not certain)" not in text_of(page("pulleys"))
     assert shown_stages(unsure)[1].added == ""
     assert shown_stages(found)[1].added == "pulley_radius"
 
@@ -216,10 +216,10 @@ def test_noise_that_was_assumed_and_noise_that_was_found_are_told_apart() -> Non
     found = diagnosis("pulleys")
     larger = {key: value and 18.0 * value for key, value in found.floor.items()}
     seen = text_of(render(replace(found, floor=larger)))
-    assert "noise as assumed position 0.030 mm" in seen
-    assert "noise as found 0.540 mm" in seen
-    assert "what noise as it was found alone would give" in seen
-    assert "two standard deviations of noise as it was assumed" in seen
+    assert "assumed noise position 0.030 mm" in seen
+    assert "estimated noise 0.540 mm" in seen
+    assert "the error that the estimated noise alone would give" in seen
+    assert "two standard deviations of the assumed noise" in seen
     assert not re.search("as found|as it was", text_of(page("pulleys")))
 
 
@@ -254,7 +254,7 @@ def test_partial_data_show_what_they_have() -> None:
     position = text_of(page("position_only"))
     assert "rms position error [mm]" in position
     assert "orientation error" not in position
-    assert "Errors of what was read" in position
+    assert "Errors of the readings" in position
     tension = text_of(page("tensions_only"))
     assert "Errors of tension [N]" in tension
     assert "position error" not in tension
@@ -315,16 +315,16 @@ def test_rivals_are_named_and_framed() -> None:
     rival = Rival("exit_point_error", found.search.last.fit, 0.3)
     finding = replace(found.missing[0], rivals=(rival,))
     seen = text_of(render(replace(found, missing=(finding,))))
-    assert "These data cannot tell it from exit_point_error" in seen
-    assert seen.index("+ pulley_radius or exit_point_error") < seen.index("What is missing")
+    assert "Indistinguishable on these data from exit_point_error" in seen
+    assert seen.index("+ pulley_radius or exit_point_error") < seen.index("Missing effects")
 
 
 def test_a_bound_and_a_blind_parameter_are_flagged() -> None:
     found = diagnosis("pulleys")
     finding = replace(found.missing[0], at_bound=np.array([True]), stderr=np.array([np.inf]))
     (row,) = finding_card(found, finding).parameters
-    assert row.flags == "at its bound, not seen by these data"
-    assert row.stderr == "not seen"
+    assert row.flags == "at its bound, not determined by these data"
+    assert row.stderr == "undetermined"
     assert "at its bound" not in text_of(page("pulleys"))
 
 
@@ -344,11 +344,11 @@ def test_correlated_parameters_go_by_the_names_that_tables_have() -> None:
 
 def test_checks_tell_noise_from_structure() -> None:
     good = {check.name: check.good for check in checks(diagnosis("pulleys"))}
-    assert good["size of what is left"] is True
+    assert good["size of the residuals"] is True
     assert good["neighbouring rows"] is True
-    assert good["runs left out"] is True
+    assert good["held-out runs"] is True
     bad = {check.name: check.good for check in checks(diagnosis("unknown"))}
-    assert bad["size of what is left"] is False
+    assert bad["size of the residuals"] is False
     assert checks(diagnosis("none")) == []
 
 
@@ -413,7 +413,7 @@ def test_arrows_fit_the_region() -> None:
 
 @pytest.mark.parametrize(
     ("magnify", "words"),
-    [(1.0, "to scale"), (50.0, "50 times too long"), (0.5, "0.5 times as long as they are")],
+    [(1.0, "to scale"), (50.0, "at 50 times their length"), (0.5, "at 0.5 times their length")],
 )
 def test_arrows_say_how_long_they_are(magnify: float, words: str) -> None:
     assert drawn(magnify) == words

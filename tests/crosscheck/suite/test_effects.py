@@ -81,8 +81,8 @@ def test_results_and_summary_say_what_stood_against_an_effect(good):
     other = replace(good, case=EffectCase(PARALLEL, "pulley_radius"))
     line = words.against_line([good, other])
     assert line == (
-        "Held against our own mathematics, written a second time: backlash. "
-        "Held against MuJoCo's own means: pulley_radius."
+        "Checked against our own mathematics, written a second time: backlash. "
+        "Checked against MuJoCo's own means: pulley_radius."
     )
     assert words.effect_cells(other)[-1] == "MuJoCo's own means"
 

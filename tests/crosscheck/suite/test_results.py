@@ -160,7 +160,7 @@ def test_summary_is_a_table_with_failures_below(good):
 
 def test_verdict_line_names_the_worst_difference(good):
     line = words.verdict_line(run_of(good, failed(good)))
-    assert "worst difference 1.00e-03 m (position), 1e+05 times what is allowed" in line
+    assert "worst difference 1.00e-03 m (position), 1e+05 times the allowed one" in line
     assert line.endswith("at pose 1.")
     everything = replace(good, verdict=np.full(3, Verdict.NEUTRAL, dtype=object))
     line = words.verdict_line(run_of(everything))

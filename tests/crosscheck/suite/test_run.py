@@ -166,7 +166,7 @@ def test_the_other_rest_of_a_tilted_command_does_not_pass(shipped, cable, side, 
     assert list(result.verdict) == [Verdict.BRANCH] * 2
     assert result.outcome is Outcome.DIFFER
     assert words.remarks(result) == "2 two equilibria (2 beyond limits)"
-    assert ", begun at (0.4 0.25 0.15; 1 0 0 0): two stable" in words.failures(result)[1]
+    assert ", started at (0.4 0.25 0.15; 1 0 0 0): two stable" in words.failures(result)[1]
 
 
 @pytest.mark.slow
@@ -449,7 +449,7 @@ def test_unsolved_poses_are_neither_passes_nor_differences(monkeypatch):
     monkeypatch.setattr(suite, "seecr_solve", hurried)
     result = run_case(case_of(PARALLEL, demobot_sweep(0.1, 2)), load_thresholds())
     assert list(result.verdict) == [Verdict.SEECR_UNSOLVED] * 2
-    assert "limit of iterations" in result.findings[0].text
+    assert "iteration limit" in result.findings[0].text
     assert result.outcome is Outcome.NOT_CONVERGED
     assert result.worst == {}
 

@@ -44,7 +44,7 @@ def test_a_comparison_ends_with_verdict_limits_and_files(found: Comparison) -> N
     lines = out.getvalue().splitlines()
     assert lines[-3:] == [found.sentence, "All limits hold.", "Results in here/"]
     assert sum(line.startswith("worst: line ") for line in lines) == 5
-    head = next(line for line in lines if line.startswith("measured less predicted"))
+    head = next(line for line in lines if line.startswith("measured minus predicted"))
     assert head.split()[-4:] == ["unit", "at", "line", "rows"]
     z = next(c for c in found.coordinates if c.name == "z")
     row = next(line.split() for line in lines if line.startswith("z "))
@@ -78,18 +78,24 @@ def test_an_addition_tells_values_errors_and_what_was_written() -> None:
     print_addition(added, Path("m.toml"), True, screen)
     text = out.getvalue()
     assert "  factor = 1.4 ± " in text or "  factor = 1.39" in text or "  factor = 1.40" in text
-    assert "With stiffness, what is left is noise." in text
+    assert "With stiffness, the residuals are noise." in text
     assert text.endswith("Written to m.toml: stiffness\n")
-    assert why_not(added).endswith("it does not pay; --force adds it all the same")
+    assert why_not(added).endswith("it is not worth adding; --force adds it anyway")
 
 
 @pytest.mark.parametrize(
     ("effect", "words"),
     [
-        ("nonlinear_elasticity", "nonlinear_elasticity is not seen by these data: any value fits"),
-        ("winch_side_length", "winch_side_length comes out as nothing: it does not pay; --force"),
-        ("platform_mass", r"standard errors \(0\.0\d+ of them\): it does not pay"),
-        ("drum_gain", r"errors \(0\.0\d+ of them, all values together\): it does"),
+        (
+            "nonlinear_elasticity",
+            "nonlinear_elasticity is not determined by these data: any value fits",
+        ),
+        (
+            "winch_side_length",
+            "winch_side_length comes out at its null values: it is not worth adding; --force",
+        ),
+        ("platform_mass", r"standard errors \(0\.0\d+ of them\): it is not worth adding"),
+        ("drum_gain", r"errors \(0\.0\d+ of them, all values together\): it is not worth"),
     ],
 )
 def test_what_is_nothing_says_in_which_way(effect: str, words: str) -> None:
@@ -111,7 +117,7 @@ def test_a_calibration_tells_of_every_effect_how_sure_it_is(sure: bool) -> None:
     sizes = {row[0]: row[2] for row in rows if len(row) == 3 and row[0] in names}
     assert len(sizes) == len(found.fitted) and "-" not in sizes.values()
     assert any(float(size) > 3.0 for size in sizes.values()) == sure
-    assert ("No effect is 3 standard errors from nothing" in out.getvalue()) != sure
+    assert ("No single effect differs from null by 3 standard errors" in out.getvalue()) != sure
 
 
 def test_a_diagnosis_begins_with_what_shows_and_then_its_verdict() -> None:
@@ -119,7 +125,7 @@ def test_a_diagnosis_begins_with_what_shows_and_then_its_verdict() -> None:
     found = made.pulleys()
     print_diagnosis(found, Path("here"), screen)
     lines = out.getvalue().splitlines()
-    assert lines[0].startswith("These data would show ")
+    assert lines[0].startswith("In these data ")
     lines = lines[len(found.sight.lines()) :]
     assert lines[0] == f"effects_found: {found.sentence}"
     assert any(line.startswith("pulley_radius: ") for line in lines)
@@ -134,7 +140,7 @@ def test_beside_something_unknown_probabilities_are_within_the_catalogue() -> No
         texts.append(out.getvalue())
     assert "(probability > 99 %)" in texts[0] and "within" not in texts[0]
     assert "(probability within the catalogue > 99 %)" in texts[1]
-    assert "note: Within the catalogue: how probable an effect is if what is missing" in texts[1]
+    assert "note: Probabilities within the catalogue assume that what is missing" in texts[1]
 
 
 def test_what_was_left_out_as_asked_is_not_told_again() -> None:

@@ -114,7 +114,9 @@ def test_a_seed_hides_the_same_whatever_its_commands_have():
         except CrosscheckError as error:
             refused += 1
             wanted = " and ".join(none[need] for need in none if need in needs)
-            assert str(error).startswith(f"what this seed hides needs {wanted}; expected commands")
+            assert str(error).startswith(
+                f"the effects that this seed hides need {wanted}; expected commands"
+            )
             assert not any(one.name in str(error) for one in own)
             continue
         assert [one.name for one in lacking] == [one.name for one in own] and not needs & set(none)
@@ -125,7 +127,7 @@ def test_a_seed_hides_the_same_whatever_its_commands_have():
 
 def test_commands_that_cannot_show_an_effect_hide_none_of_it(tmp_path):
     path = users_poses(tmp_path, way_points=False)
-    with pytest.raises(CrosscheckError, match="effect thermal_expansion: needs temperature_C; exp"):
+    with pytest.raises(CrosscheckError, match="needs the temperature, column temperature_C; exp"):
         make_twin(COGIRO, 1, effects=["thermal_expansion"], poses=path)
     path.write_text(path.read_text().replace("a,0,", "a,0,9"))  # 9 m to the side
     with pytest.raises(InputFileError, match="line 2, column cmd_x_mm: far outside the robot"):

@@ -126,7 +126,7 @@ def test_export_writes_a_description_and_what_mujoco_alone_reads(tmp_path: Path)
     result = run("export", "demobot_cogiro", out, "0.3", "0.2", "0.15", "--model", model)
     assert result.exit_code == 0
     assert result.stdout.splitlines()[1:] == [
-        "out.xml: stiffness", "out-mujoco.xml, for MuJoCo alone: pulley_radius too",
+        "out.xml: stiffness", "out-mujoco.xml, for MuJoCo alone: also pulley_radius",
         f"next: seecr pose {out} 0.3 0.2 0.15",
     ]  # fmt: skip
     np.testing.assert_allclose(load_robot(out).ea, 1.1 * robot.ea)
@@ -159,7 +159,7 @@ def test_negative_numbers_are_coordinates() -> None:
         ),
         (["pose", "demobot_cogiro", *PLACE, "--cable", "-1"], "--cable: expected vectran, fishing"),
         (["pose", "demobot_cogiro", *PLACE, "--model", "no.toml"], "no.toml: no such file"),
-        (["pose", "planar_vertical", "0.4", "0.1", "0.2"], "off what its joints can reach"),
+        (["pose", "planar_vertical", "0.4", "0.1", "0.2"], "its joints cannot reach"),
         (["sweep", "demobot_cogiro"], "expected one of POSES.csv, --line, --grid; got none"),
         (["sweep", "demobot_cogiro", "no.csv"], "no.csv: no such file; expected a CSV file in UTF"),
         (["sweep", "demobot_cogiro", "--grid", "0:1", "0", "0"], "--grid: expected FIRST:LAST:"),
@@ -196,7 +196,7 @@ def test_sweep_writes_its_files(tmp_path: Path) -> None:
     rows = json.loads((out / "again" / "sweep.json").read_text())["rows"]
     assert rows == [{"line": k, **row} for k, row in enumerate(document["rows"], start=2)]
     assert "Poses are counted from 0" in document["notes"][0]
-    assert re.search("furthest from its command: line [2-7], by", said.stdout)
+    assert re.search("largest deviation from the command: line [2-7], ", said.stdout)
 
 
 def test_an_older_result_in_the_same_folder_goes_and_nothing_else(tmp_path: Path) -> None:
@@ -230,7 +230,7 @@ def test_correct_writes_commands_that_every_command_reads(tmp_path: Path) -> Non
     assert document["reached"] == document["poses"] == 2
     again = ["sweep", "demobot_cogiro", tmp_path / "out" / "corrected.csv", "--model", model]
     told = run(*again, "--figure", "none", "--no-recording", "--out", tmp_path).output
-    assert "what is off is told from the poses wanted" in told and "furthest from" in told
+    assert "deviations are from the wanted poses" in told and "largest deviation from" in told
     said = run(*again, "--figure", "none", "--no-recording", "--out", tmp_path, "--json")
     rows = json.loads(said.stdout)["rows"]
     assert [row["run"] for row in rows] == ["a", "b"]
@@ -255,17 +255,20 @@ def test_map_writes_its_files_or_says_why_not(tmp_path: Path) -> None:
     places = json.loads((out / "map.json").read_text())["edge"]["places"]
     assert (
         edge.exit_code == 0
-        and f"its edge, to 0.001 m: {places} places" in edge.output
+        and f"edge, to within 0.001 m: {places} points" in edge.output
         and places > 20
     )
     assert np.load(out / "map.npz")["edge"].shape == (places, 7)
     none = run("map", "demobot_cogiro", *grid, "--edge", "0.001", "--no-elastic", "--out", out)
-    assert none.exit_code == 0 and "no edge: all poses of the grid can be held" in none.output
+    assert (
+        none.exit_code == 0
+        and "no edge was found: all poses of the grid can be held" in none.output
+    )
     assert "no figure" not in none.output
     line = run("map", "demobot_cogiro", "--grid", "0.3:0.5:3", "0.2", "0.1", "--out", out)
     assert "no figure: the grid has more than one value along fewer than two axes" in line.output
     soft = run("map", "demobot_cogiro", *grid, "--cable", "0.001", "--out", out)
-    assert "elastic: at rest at 0 of 6 commands" in soft.output
+    assert "elastic robot: at rest at 0 of 6 commands" in soft.output
     lost = run("map", "demobot_cogiro", *grid, "--lowest", "90", "--out", tmp_path / "lost")
     assert lost.exit_code == 2 and not (tmp_path / "lost").exists()
     assert "no pose of the grid can be held: no tensions from 90 to inf N" in lost.stderr
@@ -328,7 +331,7 @@ def test_answers_beyond_the_data_of_a_model_are_told(tmp_path: Path) -> None:
         (("correct", robot, poses, *quiet), f"{beyond} at 1 of 2 poses"),
         (
             ("map", robot, "--grid", "0.1:0.7:3", "0.25", "0.15", "--no-elastic", *quiet, *bare),
-            "data elsewhere: 2 poses of those that can be held are up to 200 mm outside its places",
+            f"{beyond}: 2 poses of those that can be held are up to 200 mm outside",
         ),
     ):
         assert words in run(*args).output
@@ -357,13 +360,16 @@ def test_a_search_tells_its_evaluations_when_it_is_asked_for(tmp_path: Path) -> 
     )
     together = run(*args, *bare, "--method", "newton", "--follow")
     assert together.exit_code == 2
-    assert "--method tells of searches from each command by itself; got it beside --follow" in (
+    assert "--method needs every command to be solved by itself; got it together with --follow" in (
         together.output
     )
     model = tmp_path / "m.toml"
     model.write_text('[[effect]]\nname = "backlash"\n[effect.parameters]\ngap_m = 0.001\n')
     remembered = run(*args, *bare, "--method", "newton", "--model", model)
-    assert remembered.exit_code == 2 and "got it beside a model with a memory" in remembered.output
+    assert (
+        remembered.exit_code == 2
+        and "got it together with a model with history" in remembered.output
+    )
 
 
 def test_told_lengths_and_loads_are_read_again_as_they_were_given(tmp_path: Path) -> None:

@@ -19,8 +19,8 @@ ROBOT = "planar_vertical"
     ("words", "said"),
     [
         ("pose demobot_parallel 400 250 100",
-         "X: expected metres, of the size of demobot_parallel's frame, 0.834 m across, got 400"),
-        ("pose demobot_parallel 0.4 0.25 nan", "Z: expected metres, of the size of"),
+         "X: expected metres, in the range of demobot_parallel's frame, 0.834 m across, got 400"),
+        ("pose demobot_parallel 0.4 0.25 nan", "Z: expected metres, in the range of"),
         ("pose demobot_parallel 1e300 0 1", "got 1e+300"),
         ("pose demobot_parallel 0.4 0.25 0.1 --cable 1e300",
          "--cable: expected vectran, fishing or k_c from 0.001 to 1e+12 N, got '1e300'"),
@@ -30,7 +30,7 @@ ROBOT = "planar_vertical"
         ("pose picture.xml 0 0 0", "picture.xml: is a PNG picture; expected the robot as MJCF"),
         ("pose empty.xml 0 0 0", "empty.xml: is empty; expected the robot as MJCF"),
         ("pose demobot_parallel 0.4 0.25 0.1 --model noise.toml",
-         "noise.toml: is no model, it has sigma; expected a model as crosscheck add writes it"),
+         "noise.toml: is not a model, it has sigma; expected a model as crosscheck add writes it"),
         ("pose demobot_parallel 0.4 0.25 0.1 --model here.csv",
          "; expected a model as crosscheck add writes it"),
         ("sweep demobot_parallel far.csv --out o",
@@ -47,7 +47,7 @@ ROBOT = "planar_vertical"
         ("sweep demobot_parallel --line 0.1 0.2 0.1 0.4 0.2 0.1 --count 100000000 --out o",
          "--count: expected at most 1e+07 poses, got 1.0e+08"),
         ("sweep demobot_parallel here.csv --turned 1 0 0 0 --out o",
-         "--turned is of --line and --grid; here.csv has its own orientations"),
+         "--turned applies to --line and --grid; here.csv has its own orientations"),
         ("map demobot_parallel --grid 200:300:3 0.25 0.1 --out o", "X: expected metres"),
         ("map demobot_parallel --lowest 50 --highest 1 --out o",
          "lowest at most 1e+30, got lowest 50 and highest 1"),
@@ -59,7 +59,7 @@ ROBOT = "planar_vertical"
          "0 <= lowest <= highest [N], lowest at most 1e+30, got lowest 1e+300 and highest inf"),
         ("correct demobot_parallel here.csv --lowest 1e300 --out o", "lowest at most 1e+30"),
         ("correct demobot_parallel told.csv --out o",
-         "told.csv: holds rest lengths; expected the poses that are wanted, such as cmd_x_m"),
+         "told.csv: contains rest lengths; expected the wanted poses, such as cmd_x_m"),
         ("pose demobot_parallel 0.4 0.25 0.1 --model empty.xml",
          "empty.xml: is empty; expected a model as crosscheck add writes it"),
         ("pose long.xml 0.4 0.25 0.1", "long.xml: tendon cable1 has rest length 1e+06 m; expected "
@@ -68,16 +68,18 @@ ROBOT = "planar_vertical"
          "stiffness x rest length holds a number that is not finite, or beyond 1e+30"),
         ("export demobot_parallel out.csv",
          "out.csv: expected the name of an MJCF file to write, such as out.xml"),
-        ("export own.xml own.xml", "own.xml: is the robot itself; expected another file to write"),
+        ("export own.xml own.xml",
+         "own.xml: is the robot's own file; expected another file to write"),
         ("export own.xml out.xml nan 0 1", "X: expected metres"),
         ("export own-mujoco.xml own.xml",
-         "own-mujoco.xml: is the robot itself; expected another file to write"),
-        ("export own.xml out.xml 0.4 0.25 0.1", "X Y Z is the pose of out-mujoco.xml, and what the "
-         "model has needs no such file; leave it out"),
+         "own-mujoco.xml: is the robot's own file; expected another file to write"),
+        ("export own.xml out.xml 0.4 0.25 0.1", "X Y Z is the pose for out-mujoco.xml, and the "
+         "model's effects need no such file; leave it out"),
         ("sweep demobot_parallel here.csv --count 5 --out o",
-         "--count is of --line, got it beside here.csv, which says how many poses it has"),
+         "--count applies to --line, got it together with here.csv, which sets the number of "
+         "poses; leave it out"),
         ("sweep demobot_parallel --grid 0:1:3 0.2 0.1 --count 5 --out o",
-         "--count is of --line, got it beside --grid"),
+         "--count applies to --line, got it together with --grid"),
         ("sweep demobot_parallel metres.csv --out o",
          "metres.csv: line 2, column cmd_x_mm: expected numbers of the size of the "
          "robot's frame, 0.834 m across, got at most 0.4 mm; are these really mm? Name the "
@@ -130,7 +132,7 @@ def test_a_platform_that_falls_is_told_without_vibrations() -> None:
         main, ["pose", ROBOT, "0.4", "0", "0.3", "--cable", "0.01", "--alone"]
     )
     assert result.exit_code == 3
-    assert "no equilibrium found" in result.stdout and "vibrates" not in result.stdout
+    assert "no equilibrium found" in result.stdout and "natural frequencies" not in result.stdout
 
 
 @pytest.mark.parametrize("words", ["pose demobot_parallel", "sweep demobot_parallel --count 1"])

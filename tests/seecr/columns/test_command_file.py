@@ -74,11 +74,12 @@ def test_the_toml_beside_says_what_lengths_mean_and_where_runs_start(
     ("text", "words"),
     [
         ("a,b\n1,2\n", "line 1: no command; expected columns cmd_x_m cmd_y_m cmd_z_m, or length_1"),
-        ("cmd_x_m,cmd_y_m\n1,2\n", "commanded pose columns half there; expected cmd_x_m cmd_y_m "
+        ("cmd_x_m,cmd_y_m\n1,2\n", "incomplete commanded pose columns: expected cmd_x_m cmd_y_m "
          "cmd_z_m, cmd_z_m missing"),
         ("want_x_m,want_y_m,cmd_x_m,cmd_y_m,cmd_z_m\n0,0,0,0,0\n",
-         "wanted pose columns half there; expected want_x_m want_y_m want_z_m, want_z_m missing"),
-        ("want_qw,want_rx_deg,cmd_x_m\n1,0,0\n", "orientation twice, as want_qw and as want_rx_d"),
+         "incomplete wanted pose columns: expected want_x_m want_y_m want_z_m, want_z_m missing"),
+        ("want_qw,want_rx_deg,cmd_x_m\n1,0,0\n",
+         "the orientation is given twice, as want_qw and as want_rx_d"),
         ("cmd_x_m,cmd_y_m,cmd_z_m\n1,2,nan\n", "line 2, column cmd_z_m: expected a number in "
          "every row, got 'nan'"),
         (f"{LENGTHS}\n" + ",".join(["-1"] * 8), "column length_1_mm: expected a length above zero"),

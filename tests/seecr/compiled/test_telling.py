@@ -81,5 +81,7 @@ telling.begins()
 time.sleep(0.5)
 """
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert run.stderr == "seecr: compiling the solver: the first time alone, up to a minute\n"
+    assert (
+        run.stderr == "seecr: compiling the solver, only this first time; it takes up to a minute\n"
+    )
     assert run.stdout.startswith("seecr, version")

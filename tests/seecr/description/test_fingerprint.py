@@ -48,7 +48,7 @@ def test_other_numbers_than_points_are_noted() -> None:
     heavier = replace(ROBOT, mass=1.25 * ROBOT.mass, ea=2.0 * ROBOT.ea)
     notes = check_robot(PATH, fingerprint(heavier), ROBOT)
     assert [key in note for key, note in zip(("mass_kg", "ea_N"), notes, strict=True)] == [True] * 2
-    assert all("its effects may count twice" in note for note in notes)
+    assert all("its effects may be counted twice" in note for note in notes)
 
 
 def test_a_table_of_another_kind_is_refused() -> None:

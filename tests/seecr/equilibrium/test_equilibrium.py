@@ -606,7 +606,7 @@ def test_bad_input_is_one_sentence(arguments: dict[str, Any], text: str) -> None
 
 
 def test_a_pose_off_the_joints_is_refused() -> None:
-    with pytest.raises(InputError, match="commanded pose 0 is off what its joints can reach"):
+    with pytest.raises(InputError, match="its joints cannot reach commanded pose 0"):
         solve(hung(joints=slide()), [0.1, 0, 0, 1, 0, 0, 0])
 
 
@@ -632,5 +632,5 @@ def test_effects_act_in_a_solve_as_in_a_prediction(cogiro):
 
 def test_what_history_does_not_go_with_is_said(cogiro):
     lag = Term.of(cogiro, "hysteresis", amplitude_N=0.05)
-    with pytest.raises(InputError, match=r"solved along the way; expected no other method"):
+    with pytest.raises(InputError, match=r"solved along the path; expected no other method"):
         solve(cogiro, cogiro.reference_pose, effects=[lag], method="fsolve")

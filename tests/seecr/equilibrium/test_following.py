@@ -107,7 +107,7 @@ def test_a_way_back_ends_where_it_began_and_lengths_are_followed_alike() -> None
     led = solve(robot, poses, follow=True)
     np.testing.assert_allclose(led.pose[2], led.pose[0], atol=1e-9)
     assert list(jump_lines(led)) == [
-        "followed from the reference pose: the platform jumps nowhere on the way"
+        "followed from the reference pose: the platform does not jump on the way"
     ]
     assert list(jump_lines(solve(robot, poses[0]))) == []
     told = solve(robot, rest_lengths=led.rest_lengths, follow=True)
@@ -119,5 +119,5 @@ def test_what_does_not_go_with_following_is_refused() -> None:
     with pytest.raises(InputError, match="expected no other method and no start"):
         solve(robot, robot.reference_pose, follow=True, method="fsolve")
     friction = [Term.of(robot, "hysteresis", amplitude_N=0.1)]
-    with pytest.raises(InputError, match="expected no follow beside them"):
+    with pytest.raises(InputError, match="expected no follow with them"):
         solve(robot, robot.reference_pose, follow=True, effects=friction)

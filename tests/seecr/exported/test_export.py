@@ -228,16 +228,18 @@ def test_what_mjcf_cannot_say_is_said() -> None:
     ).lines("robot.xml")
     assert lines == [
         "robot.xml: stiffness",
-        "in the rest lengths of the reference pose, and nowhere else: drum_gain, "
-        "drum_eccentricity, thermal_expansion; elsewhere give the rest lengths that seecr tells",
-        "in no file: backlash; it depends on the motion before",
-        "in no file: hysteresis; it depends on the motion before",
-        "in no file: tracker_target; it changes what sensors read, not where the platform rests",
+        "only in the rest lengths of the reference pose: drum_gain, "
+        "drum_eccentricity, thermal_expansion; at other poses use the rest lengths that seecr "
+        "computes",
+        "not in any file: backlash; it depends on the motion before",
+        "not in any file: hysteresis; it depends on the motion before",
+        "not in any file: tracker_target; it changes what sensors read, not where the platform "
+        "rests",
     ]
     both = [term(COGIRO, "pulley_radius", radius_m=0.01),
             term(COGIRO, "frame_compliance", sideways_m_per_N=1e-4)]  # fmt: skip
     assert export(COGIRO, both).nowhere == (
-        ("frame_compliance", "with pulleys the frame has to yield alike in all directions"),
+        ("frame_compliance", "with pulleys, the frame must be equally compliant in all directions"),
     )
 
 

@@ -192,7 +192,7 @@ def test_what_nothing_holds_has_no_numbers() -> None:
     robot = robot_named("demobot_cogiro")
     found = correct(robot, line(2), highest=0.4)  # eight of them are less than the weight
     assert not found.found.any() and np.isnan(found.lengths).all()
-    assert "2 of them: no pose near was found that can be held" in str(found)
+    assert "2 of them: no pose nearby was found that can be held" in str(found)
 
 
 @pytest.mark.slow

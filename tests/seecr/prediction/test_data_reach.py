@@ -64,15 +64,15 @@ def test_the_sentence_says_how_many_how_tense_and_how_far() -> None:
     near, pulls = np.array([[0.4, 0.25, 0.15]]), np.array([[0.3, 1.7]])
     assert REACH.beyond(near, pulls, LENGTH) == ()
     assert REACH.beyond(near, np.array([[0.3, 2.0]]), LENGTH) == (
-        "beyond the data that the model was fitted to: tensions up to 2 N, where the data have "
-        "0.2 to 1.5 N; what it says there rests on its laws alone",
+        "beyond the data that the model was fitted to: tensions up to 2 N, whereas the data have "
+        "0.2 to 1.5 N; predictions there are extrapolated",
     )
     (line,) = REACH.beyond(
         np.array([[0.4, 0.25, 0.15], [0.6, 0.25, 0.15], [np.nan] * 3]),
         np.array([[0.3, 1.7], [0.3, 2.5], [np.nan] * 2]), LENGTH,
     )  # fmt: skip
     assert "fitted to at 1 of 3 poses: tensions up to 2.5 N" in line
-    assert "up to 100 mm outside the places of the data" in line
+    assert "up to 100 mm outside the region of the data" in line
 
 
 def test_a_model_says_what_of_an_answer_is_beyond_its_data(tmp_path: Path, robot: Robot) -> None:
@@ -80,7 +80,7 @@ def test_a_model_says_what_of_an_answer_is_beyond_its_data(tmp_path: Path, robot
     inside, outside = ([x, 0.25, 0.15, 1, 0, 0, 0] for x in (0.4, 0.17))
     assert model.beyond(solve(robot, inside, effects=model)) == ()
     (line,) = model.beyond(solve(robot, [inside, outside], effects=model))
-    assert "at 1 of 2 poses" in line and "outside the places" in line
+    assert "at 1 of 2 poses" in line and "outside the region" in line
     # a row that is not at rest says nothing, however far it was when the search ended
     lost = solve(robot, [inside, outside], effects=model, max_iterations=1)
     assert not lost.converged.any() and model.beyond(lost) == ()

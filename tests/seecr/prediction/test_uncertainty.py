@@ -144,7 +144,9 @@ def test_it_is_printed_and_written(tmp_path: Path) -> None:
     found, spread = solve(ROBOT, POSES, effects=model), spread_of(ROBOT, POSES, model)
     assert spread is not None
     lines = list(pose_lines(found, spread=spread))
-    assert lines[2].startswith("  ± 0.00") and lines[2].endswith("by what the model does not know")
+    assert lines[2].startswith("  ± 0.00") and lines[2].endswith(
+        "from the uncertainty of the model"
+    )
     assert lines[3].startswith("  ± 10, ") and lines[3].endswith("would read it")
     head, first = list(cable_lines(found, spread=spread))[:2]
     value, error = with_error(found.tensions[0, 0], spread.tensions[0, 0])
@@ -154,7 +156,7 @@ def test_it_is_printed_and_written(tmp_path: Path) -> None:
     assert list(cable_lines(slack, spread=spread))[1].split()[1] == f"{found.tensions[0, 0]:.4f}"
     x, error = with_error(1e3 * found.pose[0, 0], 1e3 * spread.position[0, 0])
     assert f"rests at x y z {x}, " in lines[1] and f"± {error}" in lines[2]
-    assert sweep_lines(found, spread=spread)[-1].startswith("off by up to ± 0.")
+    assert sweep_lines(found, spread=spread)[-1].startswith("uncertain by up to ± 0.")
     rows = SweepRows(found, spread=spread)
     assert rows.as_json()[1]["position_stderr_m"].tolist() == spread.position[1].tolist()
     assert "pose_z_stderr_m" in rows.csv_text().splitlines()[0]

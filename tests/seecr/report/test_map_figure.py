@@ -84,7 +84,7 @@ def test_margins_without_numbers_are_drawn_as_yes_or_no(drawn: Drawn, name: str)
     assert bar.get_ylabel() == "can be held"
     assert [text.get_text() for text in bar.get_yticklabels()] == ["no", "yes"]
     assert len(set(cells(one))) == 2 and "white" not in title(one)
-    assert ("cables can be tightened without end" in title(one)) == (yes > 0.0)
+    assert ("cables can be tightened without limit" in title(one)) == (yes > 0.0)
 
 
 def few(no: float, yes: float) -> Workspace:
@@ -102,10 +102,12 @@ def test_the_edge_with_a_probability_is_told_from_that_without(drawn: Drawn) -> 
     own, other = (one.axes[0].lines[0].get_markerfacecolor() for one in (plain, likely))
     orange = to_hex(plain.axes[0].collections[1].get_edgecolor()[0])
     assert to_hex(own) == orange and other == "white"
-    assert "orange: the edge of what tensions" in title(plain) and "dots" not in title(plain)
-    assert "orange: the edge of what tensions" in title(likely)
+    assert "orange: the edge of the poses that tensions" in title(plain) and "dots" not in title(
+        plain
+    )
+    assert "orange: the edge of the poses that tensions" in title(likely)
     assert title(likely).endswith(
-        "white dots: the edge of what they hold with a probability of 0.95"
+        "white dots: the edge of the poses held with a probability of 0.95"
     )
     # an edge in none of the slices is not explained
     elsewhere = edge.copy()

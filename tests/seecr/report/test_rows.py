@@ -58,17 +58,17 @@ def test_rows_of_a_file_are_told_by_their_lines(tmp_path: Path) -> None:
     path.write_text("# mine\ncmd_x_m,cmd_z_m\n0.4,0.15\n\n0.5,0.25\n0.9,0.25\n")
     commands = read_commands(path, robot).commands
     found, wanted = solve(robot, commands), correct(robot, commands)
-    assert found.lines()[1].startswith("furthest from its command: line 6, by ")
-    assert found.rows([2, 1]).lines()[1].startswith("furthest from its command: line 6, by ")
+    assert found.lines()[1].startswith("largest deviation from the command: line 6, ")
+    assert found.rows([2, 1]).lines()[1].startswith("largest deviation from the command: line 6, ")
     lost = replace(found, status=np.array([Status.FALLING] * 3, dtype=object))
     assert lost.lines()[1].startswith("lines 3, 5, 6: no equilibrium found")
     assert any(line.startswith("  line 6: cable1 would have to push") for line in wanted.lines())
     (said,) = chance_lines(wanted, np.array([0.9, 0.2, 0.7]))
-    assert "with probability 0.20 at line 5, the least" in said
+    assert "with a probability of at least 0.20, lowest at line 5" in said
     assert [row["line"] for row in wanted.as_json()["rows"]] == [3, 5, 6]
     assert [row["line"] for row in SweepRows(found).as_json()] == [3, 5, 6]
     # without a file they count as they do in Python
-    assert "command: pose 2, by" in solve(robot, commands.pose).lines()[1]
+    assert "command: pose 2, " in solve(robot, commands.pose).lines()[1]
     assert "line" not in SweepRows(solve(robot, commands.pose)).as_json()[0]
 
 

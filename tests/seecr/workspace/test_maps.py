@@ -135,7 +135,7 @@ def test_margins_without_a_bound_are_infinite(tmp_path: Path) -> None:
                 for each in zip(*balance_equations(robot, poses), strict=True)]  # fmt: skip
     np.testing.assert_allclose(bounded, expected, rtol=1e-7)
     found = workspace_map(robot, axis, [0.0], axis, elastic=False)
-    assert "all cables can be tightened without end" in str(found)
+    assert "all cables can be tightened without limit" in str(found)
 
 
 def test_a_set_of_wrenches_has_the_least_margin() -> None:
@@ -421,7 +421,7 @@ def test_the_size_of_a_ball_is_that_of_a_ball() -> None:
 def test_effects_with_a_memory_have_no_elastic_map() -> None:
     robot = robot_named("demobot_cogiro")
     slow = [Term.of(robot, "hysteresis", amplitude_N=0.05)]
-    with pytest.raises(InputError, match="poses are in no order, and hysteresis would go by"):
+    with pytest.raises(InputError, match="poses are in no order, and hysteresis would depend on"):
         workspace_map(robot, [0.3, 0.4], 0.25, 0.1, effects=slow)
     held = workspace_map(robot, [0.3, 0.4], 0.25, 0.1, effects=slow, elastic=False)
     assert held.feasible.all()
