@@ -28,6 +28,8 @@ ROUNDS = 4
 _BESIDE = 6
 # Most rounds of challenges: a challenger that wins is challenged in turn.
 _CHALLENGES = 3
+# A set that is worse than the best by no more than this explains as much.
+_AS_MUCH = 12.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +105,7 @@ def compare_sets(
             break
         scores = exact.scores_about(other.joint)
         best = _searched(exact, scores, other.names, most)
-    idle = frozenset(n for n in best.names - always if does_nothing(setting, best, n))
+    idle = frozenset(n for n in best.names - always if _is_idle(exact, scores, best, n))
     return Found(exact.possible, best, scores, lambda names: exact.fit(scores, names), always, idle)
 
 
@@ -126,6 +128,18 @@ def _thinned(exact: Exact, scores: Scores, best: Refit) -> Refit:
             break
         best = better
     return best
+
+
+def _is_idle(exact: Exact, scores: Scores, best: Refit, name: str) -> bool:
+    """Whether a member moves nothing, and the set explains as much without it.
+
+    An effect with history that moves nothing may still decide in which equilibrium the platform
+    rests: its rows are walked to, not searched.
+    """
+    if not does_nothing(exact.setting, best, name):
+        return False
+    without = exact.fit(scores, best.names - {name})
+    return without is not None and without.score > best.score - _AS_MUCH
 
 
 def does_nothing(setting: Setting, best: Refit, name: str) -> bool:

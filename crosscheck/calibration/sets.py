@@ -115,7 +115,8 @@ class Scores:
         """The best sets met so far, at most ``within`` worse in score than the best of all."""
         scores = self.near | {names: s for names, (s, _w) in self.solved.items()}
         order = sorted(scores, key=lambda names: -scores[names])
-        return [n for n in order if scores[n] > scores[order[0]] - within][:count]
+        # at huge scores the difference is lost in rounding: the best is among them all the same
+        return [n for n in order if scores[n] >= scores[order[0]] - within][:count]
 
 
 def explore(scores: Scores, starts: Iterable[Names], moves: int = _MOVES) -> Names:

@@ -11,10 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from crosscheck.importing.logged import Logged
-from crosscheck.importing.rows import Block, FileRows, Row, check_body
+from crosscheck.importing.rows import Block, FileRows, Row, check_body, unit_quaternions
 from seecr.counted import counted
 from seecr.pose import Array
 
@@ -144,15 +142,6 @@ def _quaternions(
     if said.lower() != "quaternion" or len(given) != 4:
         text = f"expected Rotation Type Quaternion, got {said!r}; export it again with quaternions"
         raise block.rows.error(text, block.rows.first)
-    quat = block.numbers(given)
-    size = np.linalg.norm(quat, axis=1)
-    _check_size(block, size)
-    return np.asarray(quat / size[:, None])
-
-
-def _check_size(block: Block, size: Array) -> None:
-    wrong = np.flatnonzero(np.abs(size - 1.0) > 0.01)
-    if len(wrong):
-        k = int(wrong[0])
-        text = f"expected a quaternion of length 1, got {size[k]:.3g}; export it again"
-        raise block.rows.error(text, block.body[k])
+    return unit_quaternions(
+        block.numbers(given), lambda text, row: block.rows.error(text, block.body[row])
+    )

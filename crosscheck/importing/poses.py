@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from crosscheck.importing.logged import Logged
+from crosscheck.importing.rows import unit_quaternions
 from seecr.columns.table import Table, read_table, show
 from seecr.columns.times import began, times_of_day
 from seecr.errors import InputError
@@ -119,9 +120,7 @@ def _turns(table: Table, found: dict[str, tuple[int, str]]) -> Array | None:
             raise table.error(text)
     if "qw" in found:
         values = np.stack([table.numbers(found[n][0], blank_is_nan=True) for n in quat], axis=1)
-        size = np.linalg.norm(values, axis=1, keepdims=True)
-        size[size == 0.0] = np.nan  # how some trackers mark a body that was not seen
-        return np.asarray(values / size)
+        return unit_quaternions(values, lambda text, row: table.error(text, row=row, column="qw"))
     if "rx" not in found:
         return None
     units = of_columns("rad")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -48,7 +48,11 @@ class FileRows:
         mark = max(_SEPARATORS, key=head.count)
         reader = csv.reader((line.replace('"', "") if line.count('"') % 2 else line
                              for line in lines), delimiter=mark)  # fmt: skip
-        cells = [[cell.strip() for cell in row] for row in reader]
+        try:
+            cells = [[cell.strip() for cell in row] for row in reader]
+        except csv.Error as error:
+            text = f"cannot be split into cells: {error}; {expected}"
+            raise InputFileError.at(path, text, line=reader.line_num) from None
         if mark != ",":
             cells = [
                 [c.replace(",", ".") if _DECIMAL_COMMA.fullmatch(c) else c for c in row]
@@ -72,6 +76,25 @@ class FileRows:
         if any(name.startswith(("cmd_", "meas_")) for name in names):
             return "; these are columns of a log: crosscheck import poses"
         return taken_for(names)
+
+
+def unit_quaternions(values: Array, refuse: Callable[[str, int], InputFileError]) -> Array:
+    """Unit quaternions (n, 4) of what a file has; rows of zeros, as of a body not seen, are NaN.
+
+    Args:
+        values: (n, 4) as read, NaN if missing.
+        refuse: makes the error of a text and a row, counted from 0.
+
+    Raises:
+        InputFileError: a quaternion that is not of length 1.
+    """
+    size = np.linalg.norm(values, axis=1)
+    size[size == 0.0] = np.nan
+    wrong = np.flatnonzero(np.abs(size - 1.0) > 0.01)
+    if len(wrong):
+        k = int(wrong[0])
+        raise refuse(f"expected a quaternion of length 1, got {size[k]:.3g}; export it again", k)
+    return np.asarray(values / size[:, None])
 
 
 @dataclass(frozen=True, eq=False)

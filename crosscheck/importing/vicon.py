@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from crosscheck.importing.logged import Logged
-from crosscheck.importing.rows import Block, FileRows, check_body
+from crosscheck.importing.rows import Block, FileRows, check_body, unit_quaternions
 from seecr.columns.table import VICON
 from seecr.pose import Array
 from seecr.units import of_columns
@@ -141,7 +141,8 @@ def _lengths(one: _Found, columns: list[int]) -> Array:
 def _rotations(one: _Found, columns: dict[str, int], rotation: str | None) -> Array | None:
     if set(_QUATERNION) <= set(columns):
         quat = one.block.numbers([columns[axis] for axis in _QUATERNION])
-        return np.asarray(quat / np.linalg.norm(quat, axis=1, keepdims=True))
+        block = one.block
+        return unit_quaternions(quat, lambda text, row: block.rows.error(text, block.body[row]))
     if not set(_THREE) <= set(columns):
         return None
     if rotation is None:

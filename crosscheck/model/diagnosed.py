@@ -70,6 +70,8 @@ def _check_robot(path: Path, document: Mapping[str, Any], robot: Robot) -> tuple
 def _document(path: Path) -> Mapping[str, Any]:
     try:
         document = json.loads(read_text(path, _EXPECTED))
+    except RecursionError:
+        raise InputFileError.at(path, f"nests too deeply; {_EXPECTED}") from None
     except json.JSONDecodeError as error:
         text = f"is not JSON: {error.msg}; {_EXPECTED}"
         raise InputFileError.at(path, text, line=error.lineno) from None

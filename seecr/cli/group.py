@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import signal
 import sys
 from collections.abc import Callable, Mapping
 from importlib import import_module
@@ -19,8 +20,8 @@ CommandTable: TypeAlias = Mapping[str, tuple[str, str]]
 BAD_INPUT = 2
 ARGUMENTS = "seecr.arguments"
 """In a context's ``meta``: what the command line was called with, a list of words."""
-# As a shell counts what SIGINT and SIGPIPE end.
-_INTERRUPTED, _CUT_OFF = 130, 141
+# As a shell counts what SIGINT, SIGPIPE and SIGTERM end.
+_INTERRUPTED, _CUT_OFF, _ENDED = 130, 141, 143
 
 
 class LazyGroup(click.Group):
@@ -76,6 +77,7 @@ class LazyGroup(click.Group):
             return self._run(*args, **extra)
         if not args and extra.get("args") is None:  # as a program, not by Python
             tell_compiling(self._tell_compiling)
+            signal.signal(signal.SIGTERM, _end)
         try:
             status = self._run(*args, **extra)
         except click.ClickException as error:
@@ -134,6 +136,11 @@ def group_of(package: str, table: CommandTable) -> Callable[[Callable[..., Any]]
         return click.version_option(__version__, prog_name=name)(group)
 
     return decorate
+
+
+def _end(_signal: int, _frame: object) -> None:
+    """End as an error does, so that unfinished results are removed."""
+    raise SystemExit(_ENDED)
 
 
 def _refuse_empty(words: list[str], ctx: click.Context) -> None:

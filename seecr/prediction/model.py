@@ -101,7 +101,8 @@ class Model(Result):
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the effects, in the order of adding."""
-        return self.terms.names
+        added = [name for name in self.stderr if name in self.terms]
+        return (*added, *(name for name in self.terms.names if name not in self.stderr))
 
     def errors_of(self, name: str) -> Array:
         """Standard errors (p,) of an effect's parameters; NaN where nobody knows them."""
@@ -319,9 +320,11 @@ def _migrate(where: Where, document: Mapping[str, Any]) -> list[str]:
     notes = []
     for table in _effect_tables(where, document):
         given, name = table.get("parameters"), table.get("name")
-        if not isinstance(given, MutableMapping) or name not in catalogue():
+        if not isinstance(given, MutableMapping) or not isinstance(name, str):
             continue
-        for old, now in catalogue()[str(name)].renamed.items():
+        if name not in catalogue():
+            continue
+        for old, now in catalogue()[name].renamed.items():
             if old in given:
                 cell = given.pop(old)
                 for key in now:

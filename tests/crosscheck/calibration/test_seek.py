@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 from made_data import COGIRO, SIGMA, measured, term
@@ -67,7 +68,7 @@ def test_a_member_that_moves_nothing_is_known_and_not_listed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     tilt = "gravity_tilt"
-    monkeypatch.setattr(refits, "does_nothing", lambda _setting, _best, name: name == tilt)
+    monkeypatch.setattr(refits, "_is_idle", lambda _exact, _scores, _best, name: name == tilt)
     found = sought([
         term(ROBOT, "pulley_radius", radius_m=0.006), term(ROBOT, tilt, tilt_x_rad=0.03),
     ])  # fmt: skip
@@ -150,3 +151,20 @@ def assert_shown_as_many(found: Sought) -> None:
     assert pulley.why_not.why is Why.CARRIES_LITTLE and pulley.why_not.by == ("gravity_tilt",)
     assert pulley.why_not.p > 0.95
     assert any("crosscheck calibrate" in text for text in said.measure_next)
+
+
+@pytest.mark.parametrize("without, idle", [(-12.0, True), (-13.0, False), (None, False)])
+def test_a_member_is_idle_only_if_the_set_explains_as_much_without_it(
+    monkeypatch: pytest.MonkeyPatch, without: float | None, idle: bool
+) -> None:
+    """What has a history may move nothing, and yet decide in which rest the platform is."""
+    monkeypatch.setattr(refits, "does_nothing", lambda _setting, _best, name: name == "creep")
+    best = SimpleNamespace(names=frozenset({"creep", "drum_gain"}), score=0.0)
+
+    def fit(_scores: object, names: frozenset[str]) -> object:
+        assert names == {"drum_gain"}
+        return None if without is None else SimpleNamespace(score=without)
+
+    exact = SimpleNamespace(setting=None, fit=fit)
+    assert refits._is_idle(exact, None, best, "creep") is idle  # type: ignore[arg-type]
+    assert not refits._is_idle(exact, None, best, "drum_gain")  # type: ignore[arg-type]

@@ -247,3 +247,10 @@ def test_equals_may_cost_what_their_parameters_do(
     scores = {NONE: -50.0, frozenset({"a"}): 0.0, frozenset({"b"}): -loss}
     found = probabilities(scores, frozenset({"a"}), "ab", {"a": own, "b": other})
     assert (found.members[0] == ("a", "b")) is equal
+
+
+def test_the_best_set_is_among_the_best_at_any_size_of_score() -> None:
+    """A reading of -99999 m makes scores so large that a difference of 15 is lost in rounding."""
+    scores = Scores(toy(0, (1, 2, 6)), 8)
+    scores.solved = {NONE: (-1e21, {}), frozenset({"e1"}): (-2e21, {})}
+    assert scores.best(2, 15.0) == [NONE]

@@ -366,3 +366,19 @@ def test_interrupts_end_as_in_a_shell(monkeypatch):
     result = CliRunner().invoke(main, ["probe"])
     assert result.exit_code == 130
     assert result.stderr.strip() == "crosscheck: interrupted"
+
+
+@pytest.mark.slow
+def test_a_run_that_is_ended_leaves_nothing_unfinished(tmp_path: Path) -> None:
+    """As a scheduler ends it, with SIGTERM."""
+    out = tmp_path / "results"
+    words = ["crosscheck", "run", "--case", "parallel-vectran-z0.10", "--jobs", "1"]
+    called = f"import sys; sys.argv = {[*words, '--out', str(out)]!r}"
+    code = f"{called}; from crosscheck.cli import main; main()"
+    with subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE) as run:
+        while not list(tmp_path.glob("results/.unfinished-*")):
+            assert run.poll() is None
+            time.sleep(0.01)
+        run.terminate()
+        assert run.wait() == 143
+    assert not list(tmp_path.rglob("*.unfinished*")) and not list(tmp_path.rglob(".*"))

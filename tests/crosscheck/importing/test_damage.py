@@ -117,6 +117,14 @@ DAMAGE = {
         "poses", lambda x: [x[0].replace("qy", "spin"), *x[1:]],
         r"line 1: expected all of qw, qx, qy, qz or none, got no qy"
     ),
+    "a quaternion of another length": (
+        "poses", lambda x: cell(x, 9, 1 + x[0].split(",").index("qw"), "1000"),
+        r"line 9, column qw: expected a quaternion of length 1, got 1e\+03; export it again"
+    ),
+    "a cell without end": (
+        "motive", lambda x: [*x[:200], "1" * 140_000, *x[201:]],
+        r"line 201: cannot be split into cells: field larger than field limit"
+    ),
     "no unit in a log": (
         "poses", lambda x: [x[0].replace("y_m", "y"), *x[1:]],
         r"line 1, column y: expected a unit in the name of column y \(m, cm, mm, um\), got none; "

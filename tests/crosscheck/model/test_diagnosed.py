@@ -46,7 +46,7 @@ def test_its_own_diagnosis_is_read_without_a_word(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "other, words",
     [
-        ("planar_vertical", "planar_vertical with 4 cables; demobot_cogiro has 8; give the robot"),
+        ("planar_vertical", "planar_vertical with 4 cables; demobot_cogiro has 8; use the robot"),
         ("demobot_parallel", "demobot_parallel, not demobot_cogiro: the exit point of cable"),
     ],
 )
@@ -75,3 +75,11 @@ def test_other_numbers_and_a_diagnosis_that_says_nothing_are_noted(tmp_path: Pat
         (note,) = load_diagnosed(path, ROBOT)[1]
         assert note == f"{path} does not say which robot it was made for"
     assert "robot" not in json.loads(path.read_text())
+
+
+def test_a_file_that_nests_without_end_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "diagnosis.json"
+    path.write_text("[" * 200_000)
+    with pytest.raises(InputFileError, match="nests too deeply") as error:
+        load_diagnosed(path, ROBOT)
+    assert "\n" not in str(error.value)
