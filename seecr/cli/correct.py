@@ -79,7 +79,8 @@ def command(
     ROBOT is an MJCF file or the name of a shipped robot, POSES.csv a list of commands: the poses
     wanted. Elasticity and all effects of the model are taken into account; tensions stay within
     the limits. A pose that cannot be held is replaced by the nearest one that can, and it is told
-    which cables would have to push, or pull more than they may. Where the model keeps a covariance,
+    which cables would have to push, or pull more than they may; without --highest, the nearest of
+    those that strain no cable by more than 5 %. Where the model keeps a covariance,
     correction.json says of each row how likely its tensions stay within the limits.
 
     Poses are those of the platform in the base frame. A calibration shares errors between robot and

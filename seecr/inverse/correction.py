@@ -39,6 +39,9 @@ PREFERENCES = ("pose", "position")
 _ROUNDS, _MISSED = 40, 1e-10
 # A pose that is missed by less than this [m, and rad over the length] has been reached.
 _REACHED = 1e-6
+# Strain of a cable up to which the nearest poses are sought where no highest tension is given:
+# steel yields before, fibres tear. Without an end, poses near the edge take any tension.
+_STRAIN = 0.05
 # Poses whose reason is told.
 _NAMED = 5
 
@@ -60,6 +63,8 @@ class Correction(Result):
         solution: where the platform rests with these lengths, certified.
         commands: the lengths as commands that every function takes, with the runs, times,
             temperatures and loads they are for.
+        strain_limit: up to which strain of each cable the nearest poses were sought, because no
+            highest tension was given; None where all cables had one.
     """
 
     robot: Robot
@@ -72,6 +77,7 @@ class Correction(Result):
     solution: Solution
     commands: Commands
     why_not: tuple[str, ...]
+    strain_limit: float | None = None
 
     @property
     def left(self) -> Array:
@@ -112,6 +118,7 @@ class Correction(Result):
             )
             pulls = self.solution.tensions[near]
             out.append(f"tensions there {between(pulls.min(), pulls.max(), lead='from ')} N")
+        out += self._strain_lines(lost)
         for rows, text in (
             (lost & ~self.found, "of them: no pose near was found that can be held"),
             (near & ~self.settled, "of them may have nearer ones beside them"),
@@ -124,6 +131,24 @@ class Correction(Result):
     def place(self, row: int) -> str:
         """A row in words: "line 24" of its file, "pose 3", counted from 0, without one."""
         return rows_words([row], self.commands.line)
+
+    def _strain_lines(self, lost: NDArray[np.bool_]) -> list[str]:
+        """That strain bounds the nearest poses, and which answers strain cables beyond that."""
+        out = []
+        if self.strain_limit is not None and np.any(lost):
+            out.append(
+                "no highest tension was given: nearest poses are sought with cables strained by "
+                f"at most {100.0 * self.strain_limit:g} %"
+            )
+        strains = np.where(self.found, (self.solution.tensions / self.robot.ea).max(axis=1), 0.0)
+        beyond = strains > _STRAIN * (1.0 + 1e-6)
+        if np.any(beyond):
+            k = int(np.argmax(strains))
+            out.append(
+                f"{int(beyond.sum())} strain a cable by more than {100.0 * _STRAIN:g} %: up to "
+                f"{100.0 * strains[k]:.3g} % at {self.place(k)}; give a highest tension"
+            )
+        return out
 
     def _reasons(self) -> list[str]:
         """The first poses that cannot be held, each with the reason."""
@@ -197,7 +222,8 @@ def correct(
 
     Elasticity and all effects are taken into account; what more cables than freedoms leave free
     goes to tensions as near to ``aim`` as the limits allow. Where a pose cannot be held, the
-    nearest one that can is aimed at.
+    nearest one that can is aimed at; without a highest tension, the nearest of those that strain
+    no cable by more than 5 %.
 
     Args:
         robot: as described, or its MJCF.
@@ -256,6 +282,12 @@ class _Limits:
     low: Array
     high: Array
 
+    def strained(self, robot: Robot) -> _Limits:
+        """The same, and strains within theirs where no highest tension is given."""
+        most = _STRAIN * robot.ea
+        ends = np.isinf(self.high) & (self.low < most)
+        return replace(self, high=np.where(ends, most, self.high))
+
 
 @dataclass(frozen=True, eq=False)
 class _Search:
@@ -270,19 +302,24 @@ class _Search:
         held, tables = self._held(self.given)
         found, aimed, settled = held.fine.copy(), self.given.pose.copy(), held.fine.copy()
         lost = np.flatnonzero(~held.fine)
+        strained = self.limits.strained(self.robot)
+        high = np.where(held.fine[:, None], self.limits.high, strained.high)
         if len(lost):
-            best = self._nearest(lost, tables.scale, fix_position)
+            near = replace(self, limits=strained)
+            best = near._nearest(lost, tables.scale, fix_position)
             aimed[lost], found[lost], settled[lost] = best.poses, best.found, best.settled
         commands = replace(self.given, pose=aimed)
-        there = self._held(commands)[0] if len(lost) else held
+        mixed = replace(self, limits=replace(self.limits, high=high))
+        there = mixed._held(commands)[0] if len(lost) else held
         found &= there.fine
-        lengths, prediction = self._lengths(commands, there)
+        lengths, prediction = mixed._lengths(commands, there)
         lengths[~found] = np.nan
         solution = prediction.solution()
         return Correction(
             self.robot, self.given.pose, aimed, lengths, held.fine, found, settled & found,
             _without(solution, ~found), replace(commands, lengths=lengths, told=True),
             self._why_not(lost, tables),
+            _STRAIN if np.isinf(self.limits.high).any() else None,
         )  # fmt: skip
 
     def held_in_place(self) -> NDArray[np.bool_]:

@@ -258,3 +258,26 @@ def test_what_cannot_be_asked_is_said() -> None:
         correct(robot, Commands(line(), lengths=np.ones((12, 8))))
     with pytest.raises(InputError, match="aim must have 12 rows, got 3"):
         correct(robot, line(), aim=np.ones((3, 8)))
+
+
+def test_without_a_highest_tension_the_nearest_poses_strain_cables_by_5_percent() -> None:
+    """Poses beyond the edge were aimed at with 26 times the length of each cable."""
+    robot = robot_named("camera")
+    poses = np.tile(robot.reference_pose, (4, 1))
+    poses[:, 2] = 10.0, 24.9, 26.0, 40.0
+    poses[2, 0] = 90.0
+    found = correct(robot, poses)
+    strains = (found.solution.tensions / robot.ea).max(axis=1)
+    assert found.held.tolist() == [True, True, False, False] and found.stays.all()
+    assert strains[2:].max() <= 0.05 * (1.0 + 1e-9) and strains[2:].min() > 0.049
+    told = "\n".join(found.lines())
+    assert "nearest poses are sought with cables strained by at most 5 %" in told
+    # a pose that can be held is held, and it is said what that takes
+    assert strains[1] > 0.3 and "1 strain a cable by more than 5 %: up to 30.7 % at pose 1" in told
+    free = correct(robot, poses[:2])
+    assert np.array_equal(free.lengths, found.lengths[:2]) and free.strain_limit == 0.05
+    assert "nearest" not in "\n".join(free.lines())
+    # a highest tension that is given counts alone
+    given = correct(robot, poses[3], highest=0.1 * robot.ea[0])
+    assert given.solution.tensions.max() == pytest.approx(0.1 * robot.ea[0], rel=1e-3)
+    assert given.strain_limit is None and "no highest" not in "\n".join(given.lines())
