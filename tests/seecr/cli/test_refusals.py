@@ -36,6 +36,10 @@ ROBOT = "planar_vertical"
         ("sweep demobot_parallel far.csv --out o",
          "far.csv: line 2, column cmd_x_m: far outside the robot: expected numbers of the size of "
          "its frame, 0.834 m across, got 400 m; are these really m?"),
+        ("sweep demobot_parallel far_mm.csv --out o",
+         "far_mm.csv: line 2, column cmd_z_mm: far outside the robot: expected numbers of the size "
+         "of its frame, 0.834 m across, got 60000 mm; are these really mm? Name the column by its "
+         "unit, such as cmd_z_um"),
         ("sweep demobot_parallel huge.csv --out o",
          "huge.csv: line 2, column cmd_x_m: expected a number in every row, got '1e300', "
          "which is too large; numbers go from -1e30 to 1e30"),
@@ -100,6 +104,8 @@ def test_a_mistake_is_one_sentence(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "here.csv").write_text(CSV)
     (tmp_path / "far.csv").write_text(CSV.replace("0.4", "400"))
+    far_mm = CSV.replace("_m", "_mm").splitlines()[0] + "\nup,400,250,60000\n"
+    (tmp_path / "far_mm.csv").write_text(far_mm)
     names = ",".join(f"length_{i}_m" for i in range(1, 9))
     (tmp_path / "told.csv").write_text(f"{names}\n{','.join(['0.5'] * 8)}\n")
     (tmp_path / "lengths.csv").write_text((tmp_path / "told.csv").read_text().replace("_m", "_mm"))
