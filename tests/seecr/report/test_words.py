@@ -83,3 +83,18 @@ def test_the_furthest_is_so_by_position_and_orientation_at_once() -> None:
     off = np.array([[0.0, 0.0, 0.0, 0.0, 0.6, 0.0], [1e-15, 0.0, 0.0, 0.0, 0.1, 0.0]])
     line = replace(found, deviation=off).lines()[1]
     assert line.startswith("furthest from its command: pose 0, by ") and "34.38 deg" in line
+
+
+def test_the_largest_position_error_is_told_beside_the_largest_rotation() -> None:
+    """The pose that was turned most had hidden the one that was 30 mm off."""
+    robot = seecr.load_robot(model_path("demobot_parallel"))
+    found = seecr.solve(robot, np.tile(robot.reference_pose, (3, 1)))
+    off = np.zeros((3, 6))
+    off[0, 0], off[1, 4], off[2, 0] = 0.03, 0.6, 0.01
+    line = replace(found, deviation=off).lines()[1]
+    assert line == (
+        "furthest from its command: pose 0, by 30 mm (0 deg); most turned: pose 1, by 34.38 deg"
+    )
+    off[0, 4] = 0.7
+    line = replace(found, deviation=off).lines()[1]
+    assert line == "furthest from its command: pose 0, by 30 mm and 40.11 deg"
