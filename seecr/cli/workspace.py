@@ -91,9 +91,9 @@ def command(
     all tensions can stay [N]; the elastic map says, at each command, how far off the platform
     rests, how tilted, with how many slack cables, how stiff and in which direction softest.
     Robots with fewer cables than freedoms are mapped by position, their orientation solved; their
-    margin is 0 where they can be held, and says no more. With --at-least and a calibrated model,
-    each pose has the probability that it can be held. The edge is that of what can be held, with
-    --at-least with that probability.
+    margin is 0 where they can be held in some orientation in which they stay, and says no more.
+    With --at-least and a calibrated model, each pose has the probability that it can be held. The
+    edge is that of what can be held, with --at-least with that probability.
 
     Writes map.npz, map.json, a figure of slices and map.rrd.
 
@@ -107,6 +107,7 @@ def command(
     from seecr.files import json_text, staged, write_text
     from seecr.report.map_slices import map_figure
     from seecr.report.maps import beyond_line, edge_line, likely_lines, softest_line, write_arrays
+    from seecr.report.words import SAGS
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
@@ -157,6 +158,8 @@ def command(
         click.echo(text)
         return 0
     lines = [*found.lines(), *softest_line(found), *likely_lines(found, at_least)]
+    if found.elastic and own is not None and "cable_weight" in own.names:
+        lines.append(SAGS)
     if figure != "none" and not drawn:
         lines.append("no figure: the grid has more than one value along fewer than two axes")
     if places is not None and edge is not None:

@@ -10,7 +10,15 @@ import numpy as np
 import seecr
 from seecr.description.shipped import model_path
 from seecr.equilibrium.passes import Barrier
-from seecr.report.words import direction_words, other_lines, pose_lines
+from seecr.prediction.uncertainty import Spread
+from seecr.report.words import (
+    SAGS,
+    cable_lines,
+    direction_words,
+    other_lines,
+    pose_lines,
+    sweep_lines,
+)
 
 
 def test_rounding_is_no_turn() -> None:
@@ -98,3 +106,24 @@ def test_the_largest_position_error_is_told_beside_the_largest_rotation() -> Non
     off[0, 4] = 0.7
     line = replace(found, deviation=off).lines()[1]
     assert line == "furthest from its command: pose 0, by 30 mm and 40.11 deg"
+
+
+def test_what_slack_means_is_said_where_cables_have_weight() -> None:
+    """On a large robot cables that pull with 180 kN are longer than the straight line."""
+    robot = seecr.load_robot(model_path("cogiro_large"))
+    sag = seecr.load_model(model_path("cogiro_large").with_name("sag.toml"), robot)
+    pose = np.array([6.0, 4.0, 1.5, 1.0, 0.0, 0.0, 0.0])
+    heavy, light = seecr.solve(robot, pose, effects=sag), seecr.solve(robot, pose)
+    assert heavy.slack.any() and list(cable_lines(heavy))[-1] == SAGS
+    assert SAGS in sweep_lines(heavy)
+    assert SAGS not in [*cable_lines(light), *sweep_lines(light)]
+
+
+def test_a_pose_has_one_kind_of_minus() -> None:
+    """Numbers with errors had a typographic one, the others beside them a hyphen."""
+    robot = seecr.load_robot(model_path("cogiro_large"))
+    found = seecr.solve(robot, np.array([-3.0, -2.0, 1.5, 1.0, 0.0, 0.0, 0.0]))
+    off = np.full((1, 3), 1e-3)
+    spread = Spread(off, off, np.full((1, 8), 0.1), np.full((1, 6), 1e-3))
+    text = "\n".join(pose_lines(found, spread=spread))
+    assert "-" in text and "−" not in text
