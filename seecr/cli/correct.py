@@ -144,7 +144,13 @@ def command(
     then = following("seecr", "map", robot, *given)  # where there is something to hold
     if found.found.any():
         then = following("seecr", "sweep", robot, out / "corrected.csv", *given)
-    for line in [*notes, *found.lines(), *chance_lines(found, kept), f"Results in {out}/", then]:
+    for line in [
+        *notes,
+        *found.lines(),
+        *chance_lines(found, kept, aim == "minimum"),
+        f"Results in {out}/",
+        then,
+    ]:
         click.echo(line)
     return status
 

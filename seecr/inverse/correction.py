@@ -42,6 +42,8 @@ _REACHED = 1e-6
 # Strain of a cable up to which the nearest poses are sought where no highest tension is given:
 # steel yields before, fibres tear. Without an end, poses near the edge take any tension.
 _STRAIN = 0.05
+# Rotations below this [deg] are rounding.
+_TURNED = 1e-9
 # Poses whose reason is told.
 _NAMED = 5
 
@@ -102,7 +104,7 @@ class Correction(Result):
         if np.any(at):
             out.append(
                 f"left there: {1e3 * np.linalg.norm(left[at, :3], axis=1).max():.2g} mm and "
-                f"{np.degrees(np.linalg.norm(left[at, 3:], axis=1).max()):.2g} deg at most"
+                f"{_degrees(left[at, 3:]):.2g} deg at most"
             )
             pulls = self.solution.tensions[at]
             out.append(f"tensions there {between(pulls.min(), pulls.max(), lead='from ')} N")
@@ -114,7 +116,7 @@ class Correction(Result):
             out.append(
                 f"the nearest poses that can be held are up to "
                 f"{1e3 * np.linalg.norm(left[near, :3], axis=1).max():.4g} mm and "
-                f"{np.degrees(np.linalg.norm(left[near, 3:], axis=1).max()):.4g} deg away"
+                f"{_degrees(left[near, 3:]):.4g} deg away"
             )
             pulls = self.solution.tensions[near]
             out.append(f"tensions there {between(pulls.min(), pulls.max(), lead='from ')} N")
@@ -126,7 +128,16 @@ class Correction(Result):
         ):
             if np.any(rows):
                 out.append(f"{int(rows.sum())} {text}")
+        if np.any(self.found & ~self.stays) and self.robot.weight == 0.0 and self._idle:
+            out[-1] += (
+                ": without gravity, slack cables leave it free; give a lowest tension above 0"
+            )
         return out
+
+    @property
+    def _idle(self) -> bool:
+        """Whether a cable pulls nothing where the platform does not stay."""
+        return bool(self.solution.slack[self.found & ~self.stays].any())
 
     def place(self, row: int) -> str:
         """A row in words: "line 24" of its file, "pose 3", counted from 0, without one."""
@@ -401,6 +412,12 @@ class _Search:
                 break
             held, _ = self._held(commands, prediction)
         return told, prediction
+
+
+def _degrees(turned: Array) -> float:
+    """The largest of rotations (n, 3) [rad] in degrees; 0 where that is rounding."""
+    largest = float(np.degrees(np.linalg.norm(turned, axis=1).max()))
+    return 0.0 if largest < _TURNED else largest
 
 
 def _rests_at(poses: Array, solution: Solution) -> NDArray[np.bool_]:

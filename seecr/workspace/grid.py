@@ -31,7 +31,8 @@ class Workspace(Result):
         orientation: (4,) quaternion of all poses.
         margin: [N] how far inside their limits all tensions can stay; below zero where the pose
             cannot be held. For robots with fewer cables than freedoms zero where the position
-            can be held in some orientation, and minus infinity where not.
+            can be held in some orientation in which it stays, and minus infinity where
+            not.
         deviation: (..., 3) [m] from the command to where the elastic robot rests; NaN where it
             does not; float32.
         rotation: (..., 3) [rad] likewise.

@@ -139,7 +139,8 @@ def _refuse_memory(robot: Robot, effects: GivenEffects) -> None:
         names = [one.name for one in acting if Experiment(robot, home).setup([one]).has_history]
         raise InputError(
             f"a map's poses are in no order, and {', '.join(names)} would go by the rows before; "
-            "expected a model without them, or for what can be held alone no elastic map"
+            "expected a model without them, or for what can be held alone no elastic map "
+            "(--no-elastic, elastic=False)"
         )
 
 

@@ -24,6 +24,8 @@ ROBOT = "planar_vertical"
         ("pose demobot_parallel 1e300 0 1", "got 1e+300"),
         ("pose demobot_parallel 0.4 0.25 0.1 --cable 1e300",
          "--cable: expected vectran, fishing or k_c from 0.001 to 1e+12 N, got '1e300'"),
+        ("pose demobot_parallel 0.4 0.25 0.1 1 1 0 0",
+         "QW QX QY QZ: expected a unit quaternion, scalar first, got one of norm 1.414"),
         ("pose here.csv 0 0 0", "here.csv: begins with 'run,cmd_x_m,cmd_y_m,cmd_z_m', which is no "
          "XML; expected the robot as MJCF, XML that begins with <mujoco; the robot's file goes "
          "first"),
