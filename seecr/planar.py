@@ -100,14 +100,20 @@ def bar_equilibria(
         half_length: h [m], above zero.
 
     Raises:
-        InputError: wrong shapes, or a length that is not above zero.
+        InputError: wrong shapes, or a length that is not above zero, coinciding exit points.
     """
     if not (np.isfinite(half_length) and half_length > 0.0):
         raise InputError(f"half_length must be above zero [m], got {half_length:g}")
     place = np.asarray(position, float)
     if place.shape != (2,):
         raise InputError(f"position must be (2,), x y, got {place.shape}")
-    to_exit = _points(exit_points, 2) - place
+    exits = _points(exit_points, 2)
+    if np.array_equal(exits[0], exits[1]):
+        raise InputError(
+            "exit_points must be two places, got one for both cables: there the bar swings as a "
+            "pendulum, and tensions are not determined"
+        )
+    to_exit = exits - place
     found = []
     for theta in np.sort(_roots(to_exit, half_length)):
         tensions, stable = _balance(theta, to_exit, half_length)

@@ -193,6 +193,11 @@ def pose_of(coordinates: Sequence[float], robot: Robot) -> list[float]:
             f"expected X Y Z or X Y Z QW QX QY QZ, got {counted(len(coordinates), 'number')}"
         )
     check_places(coordinates[:3], robot)
+    norm = sum(part * part for part in coordinates[3:]) ** 0.5
+    if len(coordinates) == 7 and not abs(norm - 1.0) <= 1e-3:
+        raise InputError(
+            f"QW QX QY QZ: expected a unit quaternion, scalar first, got one of norm {norm:.4g}"
+        )
     return [*coordinates[:3], *(coordinates[3:] or robot.reference_pose[3:].tolist())]
 
 

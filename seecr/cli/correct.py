@@ -81,8 +81,9 @@ def command(
 
     ROBOT is an MJCF file or the name of a shipped robot, POSES.csv a list of commands: the wanted
     poses. Elasticity and all effects of the model are taken into account; tensions stay within the
-    limits. A pose that cannot be held is replaced by the nearest one that can, and the program says
-    which cables would have to push, or pull more than allowed. If the model has a covariance,
+    limits. A pose that cannot be held is replaced by the nearest one that can (without --highest,
+    the nearest of those that strain no cable by more than 5 %), and the program says which cables
+    would have to push, or pull more than allowed. If the model has a covariance,
     correction.json gives for each row the probability that its tensions stay within the limits.
 
     Poses are those of the platform in the base frame. A calibration divides errors between robot
@@ -148,7 +149,13 @@ def command(
     then = following("seecr", "map", robot, *given)  # where there is something to hold
     if found.found.any():
         then = following("seecr", "sweep", robot, out / "corrected.csv", *given)
-    for line in [*notes, *found.lines(), *chance_lines(found, kept), f"Results in {out}/", then]:
+    for line in [
+        *notes,
+        *found.lines(),
+        *chance_lines(found, kept, aim == "minimum"),
+        f"Results in {out}/",
+        then,
+    ]:
         click.echo(line)
     return status
 

@@ -92,7 +92,8 @@ def command(
     all tensions can stay [N]. The elastic map gives at each command the platform's deviation and
     tilt, the number of slack cables, the stiffness and the softest direction. Robots with fewer
     cables than degrees of freedom are mapped by position, and their orientation is solved for;
-    their margin is 0 wherever they can be held, and has no further meaning. With --at-least and a
+    their margin is 0 wherever they can be held in some orientation in which they stay, and has no
+    further meaning. With --at-least and a
     calibrated model, each pose gets the probability that it can be held. The edge is that of the
     poses that can be held, or with --at-least of those held with that probability.
 
@@ -108,6 +109,7 @@ def command(
     from seecr.files import json_text, staged, write_text
     from seecr.report.map_slices import map_figure
     from seecr.report.maps import beyond_line, edge_line, likely_lines, softest_line, write_arrays
+    from seecr.report.words import SAGS
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
@@ -158,6 +160,8 @@ def command(
         click.echo(text)
         return 0
     lines = [*found.lines(), *softest_line(found), *likely_lines(found, at_least)]
+    if found.elastic and own is not None and "cable_weight" in own.names:
+        lines.append(SAGS)
     if figure != "none" and not drawn:
         lines.append("no figure: the grid has more than one value along fewer than two axes")
     if places is not None and edge is not None:

@@ -8,11 +8,14 @@ from seecr.columns.known import POSITION, Columns
 from seecr.description.joints import off_joints
 from seecr.description.robot import ABSURD, Robot
 from seecr.pose import Array
+from seecr.units import of_columns
 
 # Number of commands from which their median is meaningful.
 _SEVERAL = 4
 # Numbers below this part of the frame are near its origin, and no cable is so short.
 _TINY = 0.01
+# Units that commands far outside may be in, the likeliest first.
+_LENGTHS = ("mm", "um")
 # A reference position this part of the frame from the origin is not near it.
 _OFF_ORIGIN = 0.1
 
@@ -67,14 +70,16 @@ def _refuse_another(columns: Columns, robot: Robot, poses: Array) -> None:
 
 
 def _refuse_far(columns: Columns, quantity: str, away: Array, reach: float) -> None:
-    unit, given = columns.known[quantity].unit.suffix, columns.numbers(quantity)
+    unit = columns.known[quantity].unit
+    given, named = columns.numbers(quantity) / unit.to_si(1.0), unit.suffix
+    smaller = [one for one in _LENGTHS if of_columns("m")[one].to_si(1.0) < unit.to_si(1.0)]
+    hint = f"? Name the column by its unit, such as {quantity}_{smaller[0]}" if smaller else "?"
     columns.refuse(
         away > ABSURD * reach,
         quantity,
         lambda row: (
             f"far outside the robot: expected numbers of the size of its frame, {reach:.3g} m "
-            f"across, got {given[row]:.4g} {unit}; are these really {unit}? Name the column by its "
-            f"unit, such as {quantity}_mm"
+            f"across, got {given[row]:.10g} {named}; are these really {named}{hint}"
         ),
     )
 

@@ -270,6 +270,15 @@ def step_between(robot: Robot, poses: Array, before: Array) -> Array:
     return (values_of_pose(robot, poses)[0] - values_of_pose(robot, before)[0]) * unit
 
 
+def rest_below(robot: Robot, tables: Tables, pose: Array) -> Array:
+    """Where an overdamped platform comes to rest from a pose (1, 7); NaN if nowhere."""
+    start, values = start_of(robot, tables, _flow(robot, tables, pose, 1.0))
+    found = batch.descend(tables, start, threads=1, start_values=values, staged=False)
+    return (
+        batch.platform_poses(tables, found.deviation) if _rests(found) else np.full((1, 7), np.nan)
+    )
+
+
 def _flow(robot: Robot, tables: Tables, pose: Array, damping: float) -> Array:
     """Follow an overdamped platform down its energy until it stands still, (1, 7).
 

@@ -1,9 +1,10 @@
 """Barriers: the height of the lowest pass between two equilibria of one command.
 
-The path of least energy is found by the string method (E, Ren and Vanden-Eijnden, J. Chem. Phys.
-126, 164103, 2007), with Newton steps of its images across the path. From its highest image the
-saddle is found by following the one direction of negative curvature uphill (Cerjan and Miller, J.
-Chem. Phys. 75, 1981).
+The way of least energy by the string method (E, Ren and Vanden-Eijnden, J. Chem. Phys. 126, 164103,
+2007), its images moved across the way by Newton's steps; its highest point made exact by following
+the one falling direction (Cerjan and Miller, J. Chem. Phys. 75, 1981). That may lead to the saddle
+between two other equilibria, so what it leads to is checked: it must be the highest point of a way
+from one to the other.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from seecr.compiled.outcomes import TOLERANCE
-from seecr.equilibrium.following import evaluated, moved, step_between
+from seecr.equilibrium.following import apart_from, evaluated, moved, rest_below, step_between
 from seecr.errors import InputError
 from seecr.pose import Array, pose_difference
 from seecr.result import COORDINATES, Record, Result, named
@@ -26,9 +27,17 @@ __all__ = ["Barrier", "barriers"]
 
 # Images on the path, most rounds, and the gradient across the path at which they end [load].
 _IMAGES, _ROUNDS, _ACROSS = 33, 300, 1e-3
-# Most steps to the saddle, the longest [length], and the softest stiffness [load over length].
-_STEPS, _LONGEST, _SOFTEST = 200, 0.1, 1e-2
-# Poses closer than this, in parts of the robot's length, are one equilibrium.
+# Longest steps of images [of the gap between them]; each is tried where the one before did not end.
+_PARTS = (0.5, 0.1)
+# Points between images at which the way's energy is looked at, at first and then about its highest.
+_FINE, _ZOOMS = 8, 3
+# Steps to the saddle at most; the longest, and the softest stiffness, over length and load.
+_STEPS, _LONGEST, _SOFTEST = 200, (0.1, 0.01), 1e-2
+# Energies alike but for rounding [of load times length, and of the energy].
+_ROUNDING = 1e-9
+# First step down from a saddle [of the length].
+_ASIDE = 1e-3
+# Poses nearer than this [of the length] are one equilibrium.
 _ALIKE = 1e-5
 # A platform that is turned by more than this [rad] hangs twisted among its cables.
 TWISTED = 0.5 * np.pi
@@ -44,11 +53,11 @@ class Barrier(Result):
                 none.
         back: [J] needed from the other equilibrium.
         pose: (7,) at the top.
-        exact: whether the top is a saddle: an equilibrium with one direction of negative curvature.
-            Otherwise it is the highest point of the path that was found, and a lower path may
-            exist.
-        twisted: whether the other equilibrium is turned by more than a right angle from the first:
-            its cables cross each other, and pushes do not lead back and forth.
+        exact: whether the top is a saddle (balanced, with one falling direction) from which ways
+            that only fall, or that stay below it, lead to both equilibria. Else it is the highest
+            point of the way that was found, and the lowest way may be lower.
+        twisted: whether the other is turned by more than a right angle from the first: pushes lead
+            back and forth no more, cables lie across each other.
     """
 
     energy: float
@@ -74,7 +83,7 @@ class Barrier(Result):
         twisted = "twisted" if self.twisted else "reachable"
         if not np.isfinite(self.energy):
             return f"{twisted}; no barrier can be given: this load or law has no energy"
-        # if the saddle was not found, the top may be the end of the path but for rounding
+        # the top of a path that was not made exact may be its end
         back = joules(self.back) if self.back > 1e-12 * self.energy else "next to nothing"
         return f"{twisted}, {least}{joules(self.energy)} to get there, {back} back"
 
@@ -124,19 +133,132 @@ def _barrier(one: Solution, other: Solution) -> Barrier:
     size = np.where(np.arange(6) < 3, 1.0 / robot.length, 1.0)
     if np.linalg.norm(size * pose_difference(other.pose, one.pose)) < _ALIKE:
         return Barrier(0.0, 0.0, one.pose[0], exact=True, twisted=False)
-    images = _string(one, other)
-    energies = evaluated(robot, take(tables, np.zeros(_IMAGES, int)), images).energy
-    top = images[[int(np.argmax(energies))]]
-    saddle, exact = _saddle(one, tables, top)
-    if exact:
-        top = saddle
+    way = _way(one, other)
+    top, exact = _top(one, tables, way)
     height = float(evaluated(robot, tables, top).energy[0])
     own, there = float(one.energy[0]), float(other.energy[0])
+    # the top is as high as both ends; only rounding puts it lower
+    height = max(height, own, there)
     return Barrier(height - own, height - there, top[0], exact, twisted)
 
 
-def _string(one: Solution, other: Solution) -> Array:
-    """Images (k, 7) on the path of least energy between two equilibria, which are its ends."""
+@dataclass(frozen=True, eq=False)
+class _Way:
+    """Poses (k, 7) from one equilibrium to another, and their energies (k,) [J]."""
+
+    poses: Array
+    energies: Array
+
+    @property
+    def highest(self) -> int:
+        return int(np.argmax(self.energies))
+
+
+def _way(one: Solution, other: Solution) -> _Way:
+    """The way of least energy, looked at closely; of ways that did not settle the lowest."""
+    ways = []
+    for part in _PARTS:
+        images, settled = _string(one, other, part)
+        ways.append(_closely(one, images))
+        if settled:
+            return ways[-1]
+    return min(ways, key=lambda way: float(way.energies.max()))
+
+
+def _closely(one: Solution, images: Array) -> _Way:
+    """Energies on the way through images (k, 7), and between those about its highest point."""
+    poses = _between(one, images)
+    way = _Way(poses, _energies(one, poses))
+    for _ in range(_ZOOMS):
+        k = way.highest
+        part = slice(max(k - 1, 0), k + 2)
+        poses = _between(one, way.poses[part])
+        ends = way.poses[: part.start], way.poses[part.stop :]
+        values = way.energies[: part.start], way.energies[part.stop :]
+        way = _Way(
+            np.concatenate([ends[0], poses, ends[1]]),
+            np.concatenate([values[0], _energies(one, poses), values[1]]),
+        )
+    return way
+
+
+def _between(one: Solution, poses: Array) -> Array:
+    """Poses (k, 7) with more of them on the straight lines between."""
+    steps = step_between(one.robot, poses[1:], poses[:-1])
+    parts = np.tile(np.arange(_FINE) / _FINE, len(steps))[:, None]
+    out = moved(one.robot, np.repeat(poses[:-1], _FINE, axis=0), parts * np.repeat(steps, _FINE, 0))
+    return np.concatenate([out, poses[-1:]])
+
+
+def _energies(one: Solution, poses: Array) -> Array:
+    many = take(one.tables, np.zeros(len(poses), int))
+    energies = evaluated(one.robot, many, poses).energy
+    # what has no energy is no way
+    return np.where(np.isfinite(energies), energies, np.inf)
+
+
+def _top(one: Solution, tables: Tables, way: _Way) -> tuple[Array, bool]:
+    """The saddle (1, 7) over which the way leads, and True; else its highest point."""
+    highest = way.poses[[way.highest]]
+    for longest in _LONGEST:
+        saddle, found = _saddle(one, tables, highest, longest)
+        if found and _joins(one, tables, saddle, way):
+            return saddle, True
+    return highest, False
+
+
+def _joins(one: Solution, tables: Tables, saddle: Array, way: _Way) -> bool:
+    """Whether a saddle (1, 7) is the highest point of a way between the ends.
+
+    Both sides of it fall to the ends, or to where points of the way fall to up to which it is
+    lower than the saddle.
+    """
+    height, energies = float(_energies(one, saddle)[0]), way.energies
+    rounding = _ROUNDING * (float(tables.scale[0]) * one.robot.length + abs(height))
+    if max(energies[0], energies[-1]) > height + rounding or energies.max() < height - rounding:
+        return False
+    higher = np.flatnonzero(energies > height + rounding)
+    # the last points from either end that are not higher
+    last = (higher[0] - 1, higher[-1] + 1) if len(higher) else (way.highest, way.highest)
+    feet = [_foot(one, tables, pose) for pose in _sides(one, tables, saddle)]
+    ends = [_feet_of(one, tables, way, k, end) for k, end in zip(last, (0, -1), strict=True)]
+    return any(
+        _among(one, first, ends[0]) and _among(one, second, ends[1])
+        for first, second in (feet, feet[::-1])
+    )
+
+
+def _sides(one: Solution, tables: Tables, saddle: Array) -> tuple[Array, Array]:
+    """Poses (1, 7) beside a saddle, on either side of it along its falling direction."""
+    direction = np.linalg.eigh(evaluated(one.robot, tables, saddle).hessian[0])[1][:, :1].T
+    step = _ASIDE * one.robot.length * direction
+    return moved(one.robot, saddle, step), moved(one.robot, saddle, -step)
+
+
+def _foot(one: Solution, tables: Tables, pose: Array) -> Array:
+    """Where a platform comes to rest that is let go at a pose (1, 7); NaN where it does not."""
+    return rest_below(one.robot, tables, pose)
+
+
+def _feet_of(one: Solution, tables: Tables, way: _Way, last: int, end: int) -> list[Array]:
+    """An end of the way, and where the last point falls to that it leads to from there."""
+    return [way.poses[[end]], _foot(one, tables, way.poses[[last]])]
+
+
+def _among(one: Solution, pose: Array, others: list[Array]) -> bool:
+    return any(apart_from(one.robot, pose, other) < _ALIKE * one.robot.length for other in others)
+
+
+def _string(one: Solution, other: Solution, longest: float) -> tuple[Array, bool]:
+    """Images (k, 7) on the way of least energy, the two equilibria at its ends.
+
+    Args:
+        one, other: the two equilibria.
+        longest: step of an image [of the gap between two].
+
+    Returns:
+        the images, and whether they came to rest across the way.
+    """
     robot, many = one.robot, take(one.tables, np.zeros(_IMAGES, int))
     softest = _SOFTEST * float(many.scale[0]) / robot.length
     whole = step_between(robot, other.pose, one.pose)
@@ -149,16 +271,16 @@ def _string(one: Solution, other: Solution) -> Array:
         across = np.eye(robot.n_dof) - way[:, :, None] * way[:, None, :]
         slope = np.einsum("nij,nj->ni", across, at.gradient[1:-1])
         if np.linalg.norm(slope, axis=1).max() < _ACROSS * many.scale[0]:
-            break
+            return images, True
         values, vectors = np.linalg.eigh(across @ at.hessian[1:-1] @ across)
         parts_of = np.einsum("nij,ni->nj", vectors, slope) / np.maximum(np.abs(values), softest)
         step = -np.einsum("nij,nj->ni", vectors, parts_of)
         gap = np.linalg.norm(step_between(robot, images[1:], images[:-1]), axis=1).mean()
         size = np.linalg.norm(step, axis=1, keepdims=True)
-        step *= np.minimum(1.0, 0.5 * gap / np.maximum(size, 1e-300))
+        step *= np.minimum(1.0, longest * gap / np.maximum(size, 1e-300))
         images[1:-1] = moved(robot, images[1:-1], step)
         images = _evenly(one, images)
-    return images
+    return images, False
 
 
 def _evenly(one: Solution, images: Array) -> Array:
@@ -173,11 +295,8 @@ def _evenly(one: Solution, images: Array) -> Array:
     return out
 
 
-def _saddle(one: Solution, tables: Tables, pose: Array) -> tuple[Array, bool]:
-    """The saddle (1, 7) near a pose, and whether it was found.
-
-    Newton steps go uphill along the softest direction and downhill along all others.
-    """
+def _saddle(one: Solution, tables: Tables, pose: Array, longest: float) -> tuple[Array, bool]:
+    """The saddle (1, 7) that is reached from near it: up the softest way, down all others."""
     robot = one.robot
     softest = _SOFTEST * float(tables.scale[0]) / robot.length
     for _ in range(_STEPS):
@@ -190,6 +309,6 @@ def _saddle(one: Solution, tables: Tables, pose: Array) -> tuple[Array, bool]:
         parts = vectors.T @ at.gradient[0] / np.maximum(np.abs(values), 1e-6 * softest)
         parts[0] = -parts[0]
         size = np.linalg.norm(parts)
-        parts *= min(1.0, _LONGEST * robot.length / size)
+        parts *= min(1.0, longest * robot.length / size)
         pose = moved(robot, pose, -(vectors @ parts)[None])
     return pose, False

@@ -37,7 +37,8 @@ def why_not_held(
     """
     if np.any(low > high):
         k = int(np.argmax(low - high))
-        return f"{_who(names[k])} weighs {low[k]:.3g} N, more than the {high[k]:.3g} N it may pull"
+        least, most = _newtons(low[k]), _newtons(high[k])
+        return f"{_who(names[k])} weighs {least}, more than the {most} it may pull"
     beyond = _least_beyond(matrix, load, low, high)
     if beyond is None:
         return "no pulls of the cables, however large, balance the load there"
@@ -58,6 +59,11 @@ def why_not_held(
     return "; ".join(said)
 
 
+def _newtons(force: float) -> str:
+    """A force as it is typed: 6000 N, not 6e+03 N."""
+    return f"{force:.3g} N" if abs(force) < 1e3 else f"{force:.0f} N"
+
+
 def _who(name: str) -> str:
     return name if "cable" in name.lower() else f"cable {name}"
 
@@ -65,16 +71,15 @@ def _who(name: str) -> str:
 def _of_cable(name: str, beyond: float, low: float, high: float, of_weight: bool) -> str:
     who = _who(name)
     if beyond > 0.0:
-        return f"{who} would have to pull {high + beyond:.3g} N, more than {high:.3g} N"
+        return f"{who} would have to pull {_newtons(high + beyond)}, more than {_newtons(high)}"
     pull = low + beyond
     if pull >= 0.0:
-        least = f"the {low:.3g} N that it weighs" if of_weight else f"{low:.3g} N"
-        return f"{who} would have to pull {pull:.3g} N, less than {least}"
+        least = f"the {_newtons(low)} that it weighs" if of_weight else f"{_newtons(low)}"
+        return f"{who} would have to pull {_newtons(pull)}, less than {least}"
     if low > 0.0 and not of_weight:
-        return (
-            f"{who} would have to push with {-pull:.3g} N for others to pull at least {low:.3g} N"
-        )
-    return f"{who} would have to push with {-pull:.3g} N"
+        push = _newtons(-pull)
+        return f"{who} would have to push with {push} for others to pull at least {_newtons(low)}"
+    return f"{who} would have to push with {_newtons(-pull)}"
 
 
 def _least_beyond(matrix: Array, load: Array, low: Array, high: Array) -> Array | None:

@@ -41,6 +41,11 @@ alone.
 _ROUNDS, _MISSED = 40, 1e-10
 # A pose counts as reached if it is missed by less than this [m, and rad times the length].
 _REACHED = 1e-6
+# Strain of a cable up to which the nearest poses are sought where no highest tension is given:
+# steel yields before, fibres tear. Without an end, poses near the edge take any tension.
+_STRAIN = 0.05
+# Rotations below this [deg] are rounding.
+_TURNED = 1e-9
 # Number of poses whose reason is printed.
 _NAMED = 5
 
@@ -63,6 +68,8 @@ class Correction(Result):
         solution: the certified equilibrium with these lengths.
         commands: the lengths as commands that every function accepts, with the runs, times,
             temperatures and loads that they are for.
+        strain_limit: strain of each cable up to which the nearest poses were sought, because no
+            highest tension was given; None if all cables had one.
     """
 
     robot: Robot
@@ -75,6 +82,7 @@ class Correction(Result):
     solution: Solution
     commands: Commands
     why_not: tuple[str, ...]
+    strain_limit: float | None = None
 
     @property
     def left(self) -> Array:
@@ -99,7 +107,7 @@ class Correction(Result):
         if np.any(at):
             out.append(
                 f"remaining error: at most {1e3 * np.linalg.norm(left[at, :3], axis=1).max():.2g} "
-                f"mm and {np.degrees(np.linalg.norm(left[at, 3:], axis=1).max()):.2g} deg"
+                f"mm and {_degrees(left[at, 3:]):.2g} deg"
             )
             pulls = self.solution.tensions[at]
             out.append(f"tensions there {between(pulls.min(), pulls.max(), lead='from ')} N")
@@ -111,10 +119,11 @@ class Correction(Result):
             out.append(
                 f"the nearest poses that can be held are up to "
                 f"{1e3 * np.linalg.norm(left[near, :3], axis=1).max():.4g} mm and "
-                f"{np.degrees(np.linalg.norm(left[near, 3:], axis=1).max()):.4g} deg away"
+                f"{_degrees(left[near, 3:]):.4g} deg away"
             )
             pulls = self.solution.tensions[near]
             out.append(f"tensions there {between(pulls.min(), pulls.max(), lead='from ')} N")
+        out += self._strain_lines(lost)
         for rows, text in (
             (lost & ~self.found, "of them: no pose nearby was found that can be held"),
             (near & ~self.settled, "of them: a nearer pose that can be held may exist"),
@@ -125,11 +134,38 @@ class Correction(Result):
         ):
             if np.any(rows):
                 out.append(f"{int(rows.sum())} {text}")
+        if np.any(self.found & ~self.stays) and self.robot.weight == 0.0 and self._idle:
+            out[-1] += (
+                ": without gravity, slack cables leave it free; give a lowest tension above 0"
+            )
         return out
+
+    @property
+    def _idle(self) -> bool:
+        """Whether a cable pulls nothing where the platform does not stay."""
+        return bool(self.solution.slack[self.found & ~self.stays].any())
 
     def place(self, row: int) -> str:
         """The name of a row: "line 24" of its file, or "pose 3", counted from 0, without a file."""
         return rows_words([row], self.commands.line)
+
+    def _strain_lines(self, lost: NDArray[np.bool_]) -> list[str]:
+        """That strain bounds the nearest poses, and which answers strain cables beyond that."""
+        out = []
+        if self.strain_limit is not None and np.any(lost):
+            out.append(
+                "no highest tension was given: nearest poses are sought with cables strained by "
+                f"at most {100.0 * self.strain_limit:g} %"
+            )
+        strains = np.where(self.found, (self.solution.tensions / self.robot.ea).max(axis=1), 0.0)
+        beyond = strains > _STRAIN * (1.0 + 1e-6)
+        if np.any(beyond):
+            k = int(np.argmax(strains))
+            out.append(
+                f"{int(beyond.sum())} strain a cable by more than {100.0 * _STRAIN:g} %: up to "
+                f"{100.0 * strains[k]:.3g} % at {self.place(k)}; give a highest tension"
+            )
+        return out
 
     def _reasons(self) -> list[str]:
         """The first poses that cannot be held, each with the reason."""
@@ -203,7 +239,8 @@ def correct(
 
     Elasticity and all effects are taken into account. With more cables than degrees of freedom,
     the tensions are as near to ``aim`` as the limits allow. If a pose cannot be held, the nearest
-    one that can is used instead.
+    one that can is used instead; without a highest tension, the nearest of those that strain no
+    cable by more than 5 %.
 
     Args:
         robot: as described, or its MJCF.
@@ -267,6 +304,12 @@ class _Limits:
     low: Array
     high: Array
 
+    def strained(self, robot: Robot) -> _Limits:
+        """The same, and strains within theirs where no highest tension is given."""
+        most = _STRAIN * robot.ea
+        ends = np.isinf(self.high) & (self.low < most)
+        return replace(self, high=np.where(ends, most, self.high))
+
 
 @dataclass(frozen=True, eq=False)
 class _Search:
@@ -281,19 +324,24 @@ class _Search:
         held, tables = self._held(self.given)
         found, aimed, settled = held.fine.copy(), self.given.pose.copy(), held.fine.copy()
         lost = np.flatnonzero(~held.fine)
+        strained = self.limits.strained(self.robot)
+        high = np.where(held.fine[:, None], self.limits.high, strained.high)
         if len(lost):
-            best = self._nearest(lost, tables.scale, fix_position)
+            near = replace(self, limits=strained)
+            best = near._nearest(lost, tables.scale, fix_position)
             aimed[lost], found[lost], settled[lost] = best.poses, best.found, best.settled
         commands = replace(self.given, pose=aimed)
-        there = self._held(commands)[0] if len(lost) else held
+        mixed = replace(self, limits=replace(self.limits, high=high))
+        there = mixed._held(commands)[0] if len(lost) else held
         found &= there.fine
-        lengths, prediction = self._lengths(commands, there)
+        lengths, prediction = mixed._lengths(commands, there)
         lengths[~found] = np.nan
         solution = prediction.solution()
         return Correction(
             self.robot, self.given.pose, aimed, lengths, held.fine, found, settled & found,
             _without(solution, ~found), replace(commands, lengths=lengths, told=True),
             self._why_not(lost, tables),
+            _STRAIN if np.isinf(self.limits.high).any() else None,
         )  # fmt: skip
 
     def held_in_place(self) -> NDArray[np.bool_]:
@@ -375,6 +423,12 @@ class _Search:
                 break
             held, _ = self._held(commands, prediction)
         return told, prediction
+
+
+def _degrees(turned: Array) -> float:
+    """The largest of rotations (n, 3) [rad] in degrees; 0 where that is rounding."""
+    largest = float(np.degrees(np.linalg.norm(turned, axis=1).max()))
+    return 0.0 if largest < _TURNED else largest
 
 
 def _rests_at(poses: Array, solution: Solution) -> NDArray[np.bool_]:

@@ -49,12 +49,13 @@ def corrected_toml(wanted: CommandFile) -> str:
     return toml_beside(True, wanted.commands)
 
 
-def chance_lines(found: Correction, kept: Array | None) -> Iterator[str]:
+def chance_lines(found: Correction, kept: Array | None, minimum: bool = False) -> Iterator[str]:
     """The probability that tensions stay within their limits, if the model has a covariance.
 
     Args:
         found: the correction.
         kept: (n,) probability of each row.
+        minimum: whether tensions were to be as small as possible.
     """
     if kept is None or not np.isfinite(kept).any():
         return
@@ -64,6 +65,11 @@ def chance_lines(found: Correction, kept: Array | None) -> Iterator[str]:
         f"tensions stay within the limits with a probability of at least {np.nanmin(kept):.2f}, "
         f"lowest at {found.place(worst)}; below {_LIKELY:g} at {many} of {len(found.wanted)}"
     )
+    if minimum and many:
+        yield (
+            "  --aim minimum puts a cable at its lowest tension, where it stays within the limits "
+            "with about 0.5; --aim middle keeps away from them"
+        )
 
 
 def _cell(value: Any) -> str:

@@ -7,12 +7,14 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from seecr.compiled.columns import WEIGHT
 from seecr.description.robot import Joint, Robot
 from seecr.equilibrium.passes import TWISTED, Barrier
 from seecr.planar import midline_point
 from seecr.pose import Array, pose_difference, rxyz_from_quat, transform_points
 from seecr.prediction.uncertainty import Spread
 from seecr.statics.solution import Solution, Status
+from seecr.statics.tables import Tables
 from seecr.units import joules, short, with_error
 
 __all__ = [
@@ -24,10 +26,17 @@ __all__ = [
     "midline_lines",
     "other_lines",
     "pose_lines",
+    "sag_lines",
     "softest_words",
     "stiffness_lines",
     "sweep_lines",
 ]
+
+SAGS = (
+    "slack: with cable weight that is longer than the straight line; such a cable sags, and may "
+    "still pull"
+)
+"""What "slack" means where cables have weight."""
 
 # A component of a direction below this is not mentioned.
 _PART = 0.1
@@ -96,7 +105,8 @@ def _off(values: Array) -> str:
 
 def _known(values: Array, errors: Array) -> str:
     """Three numbers with as many digits as their standard errors justify."""
-    return ", ".join(with_error(*pair)[0] for pair in zip(values + 0.0, errors, strict=True))
+    said = ", ".join(with_error(*pair)[0] for pair in zip(values + 0.0, errors, strict=True))
+    return said.replace("−", "-")  # as in all other numbers beside them
 
 
 def cable_lines(solution: Solution, i: int = 0, spread: Spread | None = None) -> Iterator[str]:
@@ -114,6 +124,14 @@ def cable_lines(solution: Solution, i: int = 0, spread: Spread | None = None) ->
             shown, error = (shown, "") if known else with_error(tension, spread.tensions[i, k])
             off = f"  {error:>9}"
         yield f"{name:<{wide}}  {shown:>11}{off}  {rest:15.6f}{slack}"
+    if solution.slack[i].any():
+        yield from sag_lines(solution.tables)
+
+
+def sag_lines(tables: Tables) -> Iterator[str]:
+    """What "slack" means where cables have weight."""
+    if np.any(tables.cables[..., WEIGHT] > 0.0):
+        yield SAGS
 
 
 def stiffness_lines(solution: Solution, i: int = 0) -> Iterator[str]:
@@ -277,6 +295,7 @@ def sweep_lines(
     if len(counts) and counts.max() > 0:
         parts = [f"{int(np.sum(counts == k))} with {k}" for k in np.unique(counts)]
         lines.append(f"poses by number of slack cables: {', '.join(parts)}")
+        lines += sag_lines(solution.tables)
     if spread is not None and len(counts):
         position, turned = (
             short(factor * float(np.nanmax(np.linalg.norm(part, axis=1))), 2)

@@ -67,6 +67,8 @@ _PER_ROW = (
 )  # fmt: skip
 # A squared frequency below this part of the largest is rounding.
 _NO_FREQUENCY = 1e-12
+# Errors [mm, deg] that differ by less than this, or by this part of them, are alike.
+_ALIKE = 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -237,15 +239,7 @@ class Solution(Result):
         if len(known) == 0:
             return out
         if commanded:
-            away = np.linalg.norm(self.deviation[:, :3], axis=1)
-            turned = np.degrees(np.linalg.norm(self.deviation[:, 3:], axis=1))
-            # combined into one distance, so that rounding does not decide which pose is furthest
-            apart = np.hypot(away, self.robot.length * np.radians(turned))
-            k = int(known[np.argmax(apart[known])])
-            out.append(
-                f"largest deviation from the command: {self.place(k)}, {1e3 * away[k]:.4g} mm and "
-                f"{turned[k]:.4g} deg"
-            )
+            out.append(self._furthest(known))
         pulls, slack = self.tensions[known], self.slack[known].sum(axis=1)
         out.append(
             f"tensions {between(pulls.min(), pulls.max(), lead='from ')} N; slack cables: "
@@ -253,6 +247,22 @@ class Solution(Result):
         )
         worst = float(np.max(self.residual[known]))
         return [*out, f"forces balance to {worst:.1g} of the load or better"]
+
+    def _furthest(self, known: NDArray[np.intp]) -> str:
+        """The largest position error and the largest rotation of some rows, with their poses."""
+        away = 1e3 * np.linalg.norm(self.deviation[known, :3], axis=1)
+        turned = np.degrees(np.linalg.norm(self.deviation[known, 3:], axis=1))
+        # rounding must not say which of two is further
+        first = np.flatnonzero(away >= away.max() * (1.0 - _ALIKE) - _ALIKE)
+        k = int(first[np.argmax(turned[first])])
+        by = f"largest deviation from the command: {self.place(known[k])}, {away[k]:.4g} mm"
+        if turned[k] >= turned.max() * (1.0 - _ALIKE) - _ALIKE:
+            return f"{by} and {turned[k]:.4g} deg"
+        t = int(np.argmax(turned))
+        return (
+            f"{by} ({turned[k]:.4g} deg); largest rotation: {self.place(known[t])}, "
+            f"{turned[t]:.4g} deg"
+        )
 
     def records(self) -> list[Record]:
         """One row per pose: command, pose, status, tensions and slack cables by name."""

@@ -142,8 +142,8 @@ def _refuse_memory(robot: Robot, effects: GivenEffects) -> None:
         names = [one.name for one in acting if Experiment(robot, home).setup([one]).has_history]
         raise InputError(
             f"a map's poses are in no order, and {', '.join(names)} would depend on the rows "
-            "before; expected a model without them, or no elastic map (only which poses can be "
-            "held)"
+            "before; expected a model without them, or no elastic map (only which poses can "
+            "be held: --no-elastic, elastic=False)"
         )
 
 

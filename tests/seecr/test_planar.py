@@ -341,3 +341,5 @@ def test_bars_without_length_are_refused() -> None:
         bar_equilibria([[0, 1], [1, 1]], [0.5, 0.5], 0.0)
     with pytest.raises(InputError, match=r"position must be \(2,\)"):
         bar_equilibria([[0, 1], [1, 1]], [[0.5, 0.5]], 0.1)
+    with pytest.raises(InputError, match="exit_points must be two places, got one"):
+        bar_equilibria([[1, 1], [1, 1]], [1.0, 0.5], 0.1)

@@ -24,6 +24,8 @@ ROBOT = "planar_vertical"
         ("pose demobot_parallel 1e300 0 1", "got 1e+300"),
         ("pose demobot_parallel 0.4 0.25 0.1 --cable 1e300",
          "--cable: expected vectran, fishing or k_c from 0.001 to 1e+12 N, got '1e300'"),
+        ("pose demobot_parallel 0.4 0.25 0.1 1 1 0 0",
+         "QW QX QY QZ: expected a unit quaternion, scalar first, got one of norm 1.414"),
         ("pose here.csv 0 0 0", "here.csv: begins with 'run,cmd_x_m,cmd_y_m,cmd_z_m', which is no "
          "XML; expected the robot as MJCF, XML that begins with <mujoco; the robot's file goes "
          "first"),
@@ -36,6 +38,10 @@ ROBOT = "planar_vertical"
         ("sweep demobot_parallel far.csv --out o",
          "far.csv: line 2, column cmd_x_m: far outside the robot: expected numbers of the size of "
          "its frame, 0.834 m across, got 400 m; are these really m?"),
+        ("sweep demobot_parallel far_mm.csv --out o",
+         "far_mm.csv: line 2, column cmd_z_mm: far outside the robot: expected numbers of the size "
+         "of its frame, 0.834 m across, got 60000 mm; are these really mm? Name the column by its "
+         "unit, such as cmd_z_um"),
         ("sweep demobot_parallel huge.csv --out o",
          "huge.csv: line 2, column cmd_x_m: expected a number in every row, got '1e300', "
          "which is too large; numbers go from -1e30 to 1e30"),
@@ -102,6 +108,8 @@ def test_a_mistake_is_one_sentence(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "here.csv").write_text(CSV)
     (tmp_path / "far.csv").write_text(CSV.replace("0.4", "400"))
+    far_mm = CSV.replace("_m", "_mm").splitlines()[0] + "\nup,400,250,60000\n"
+    (tmp_path / "far_mm.csv").write_text(far_mm)
     names = ",".join(f"length_{i}_m" for i in range(1, 9))
     (tmp_path / "told.csv").write_text(f"{names}\n{','.join(['0.5'] * 8)}\n")
     (tmp_path / "lengths.csv").write_text((tmp_path / "told.csv").read_text().replace("_m", "_mm"))

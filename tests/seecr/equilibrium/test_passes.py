@@ -15,6 +15,7 @@ from seecr.equilibrium.passes import barriers
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
 from seecr.pose import pose_difference, quat_from_rotvec
+from seecr.prediction.model import load_model
 from seecr.report.words import elsewhere, other_lines
 from seecr.statics.tables import take
 
@@ -111,3 +112,55 @@ def test_equilibria_of_something_else_are_refused() -> None:
     own, other = solve(robot, robot.reference_pose), solve(robot, [0.5, 0.25, 0.1, 1, 0, 0, 0])
     with pytest.raises(InputError, match="expected equilibria of one command, got other rest"):
         barriers(own, other)
+
+
+@pytest.mark.slow
+def test_no_barrier_is_lower_than_one_of_its_ends() -> None:
+    """A saddle between two other equilibria gave a way back of -794 J, and was called exact."""
+    robot = load_robot(model_path("cogiro_large"))
+    model = load_model(model_path("cogiro_large").with_name("sag.toml"), robot)
+    pose = np.array([3.0, 2.0, 1.5, 1.0, 0.0, 0.0, 0.0])
+    own, every = solve(robot, pose, effects=model), equilibria(robot, pose, effects=model)
+    (way,) = barriers(own, every.rows([-1]))
+    assert way.energy > 0.0 and way.back > 0.0
+    assert way.back == pytest.approx(way.energy + own.energy[0] - every.energy[-1], rel=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["demobot_cogiro", "ipanema", "cogiro_large"])
+def test_barriers_of_random_commands_are_as_high_as_both_ends(name: str) -> None:
+    robot, random = load_robot(model_path(name)), np.random.default_rng(5)
+    low, high = robot.exit_points.min(axis=0), robot.exit_points.max(axis=0)
+    seen = 0
+    for _ in range(4):
+        place = low + (0.15 + 0.7 * random.random(3)) * (high - low)
+        pose = np.concatenate([place, quat_from_rotvec(0.3 * random.normal(size=3))])
+        own, every = solve(robot, pose), equilibria(robot, pose, most=512)
+        if not own.converged[0]:
+            continue
+        others = every.rows(elsewhere(own, every))
+        for way, energy in zip(barriers(own, others), others.energy, strict=True):
+            seen += 1
+            assert way.energy >= 0.0 and way.back >= 0.0
+            top = evaluated(robot, own.tables, way.pose[None])
+            assert way.energy >= top.energy[0] - own.energy[0] >= -1e-6 * abs(energy)
+            assert not way.exact or top.residual[0] < 1e-9
+    assert seen > 0
+
+
+@pytest.mark.slow
+def test_a_saddle_that_joins_other_equilibria_is_not_called_the_top(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its highest point is reported instead: an upper bound."""
+    robot = load_robot(model_path("demobot_cogiro"))
+    pose = robot.reference_pose
+    turned = np.array([[0.4, 0.25, 0.15, *quat_from_rotvec(np.array([2.0, 0.0, 0.0]))]])
+    own, other = solve(robot, pose), solve(robot, pose, start=turned)
+    (way,) = barriers(own, other)
+    assert way.exact
+    # a saddle from which both sides lead to the first
+    monkeypatch.setattr(passes, "_sides", lambda *_: (own.pose, own.pose))
+    (bound,) = barriers(own, other)
+    assert not bound.exact and bound.energy >= way.energy * (1.0 - 1e-6)
+    assert bound.words.startswith("twisted, at most ")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -236,6 +237,8 @@ def test_a_load_that_no_pull_can_balance_is_told_as_such() -> None:
     assert short == "cable a would have to pull 1 N, more than 0.5 N"
     less = why_not_held(matrix, np.array([0.0, 2.0, 0.0]), np.array([1.5, 0.0]), high, names)
     assert less == "cable a would have to pull 1 N, less than 1.5 N"
+    large = why_not_held(matrix, np.array([0.0, 2e4, 0.0]), low, np.array([6000.0, 9e4]), names)
+    assert large == "cable a would have to pull 10000 N, more than 6000 N"
 
 
 def test_the_inverse_of_play_is_played_back() -> None:
@@ -258,3 +261,43 @@ def test_what_cannot_be_asked_is_said() -> None:
         correct(robot, Commands(line(), lengths=np.ones((12, 8))))
     with pytest.raises(InputError, match="aim must have 12 rows, got 3"):
         correct(robot, line(), aim=np.ones((3, 8)))
+
+
+def test_without_a_highest_tension_the_nearest_poses_strain_cables_by_5_percent() -> None:
+    """Poses beyond the edge were aimed at with 26 times the length of each cable."""
+    robot = robot_named("camera")
+    poses = np.tile(robot.reference_pose, (4, 1))
+    poses[:, 2] = 10.0, 24.9, 26.0, 40.0
+    poses[2, 0] = 90.0
+    found = correct(robot, poses)
+    strains = (found.solution.tensions / robot.ea).max(axis=1)
+    assert found.held.tolist() == [True, True, False, False] and found.stays.all()
+    assert strains[2:].max() <= 0.05 * (1.0 + 1e-9) and strains[2:].min() > 0.049
+    told = "\n".join(found.lines())
+    assert "nearest poses are sought with cables strained by at most 5 %" in told
+    # a pose that can be held is held, and it is said what that takes
+    assert strains[1] > 0.3 and "1 strain a cable by more than 5 %: up to 30.7 % at pose 1" in told
+    free = correct(robot, poses[:2])
+    assert np.array_equal(free.lengths, found.lengths[:2]) and free.strain_limit == 0.05
+    assert "nearest" not in "\n".join(free.lines())
+    # a highest tension that is given counts alone
+    given = correct(robot, poses[3], highest=0.1 * robot.ea[0])
+    assert given.solution.tensions.max() == pytest.approx(0.1 * robot.ea[0], rel=1e-3)
+    assert given.strain_limit is None and "no highest" not in "\n".join(given.lines())
+
+
+def test_without_gravity_slack_cables_are_named_as_what_leaves_the_platform_free() -> None:
+    robot = replace(robot_named("ipanema"), gravity=np.zeros(3))
+    found = correct(robot, robot.reference_pose)
+    assert not found.stays.any() and found.lines()[-1] == (
+        "1 balanced, but the platform does not rest there: without gravity, slack cables leave it "
+        "free; give a lowest tension above 0"
+    )
+    assert correct(robot, robot.reference_pose, lowest=1.0).reached.all()
+
+
+def test_rotations_that_are_rounding_are_printed_as_none() -> None:
+    robot = robot_named("camera")
+    found = correct(robot, robot.reference_pose + np.array([0, 0, 40.0, 0, 0, 0, 0]))
+    found.solution.pose[0, 4] = 1e-15
+    assert found.left[0, 3] > 0.0 and " mm and 0 deg away" in "\n".join(found.lines())

@@ -65,6 +65,9 @@ def test_rows_of_a_file_are_told_by_their_lines(tmp_path: Path) -> None:
     assert any(line.startswith("  line 6: cable1 would have to push") for line in wanted.lines())
     (said,) = chance_lines(wanted, np.array([0.9, 0.2, 0.7]))
     assert "with a probability of at least 0.20, lowest at line 5" in said
+    least = list(chance_lines(wanted, np.array([0.9, 0.2, 0.7]), minimum=True))
+    assert least[0] == said and "--aim middle" in least[1]
+    assert len(list(chance_lines(wanted, np.ones(3), minimum=True))) == 1
     assert [row["line"] for row in wanted.as_json()["rows"]] == [3, 5, 6]
     assert [row["line"] for row in SweepRows(found).as_json()] == [3, 5, 6]
     # without a file they count as they do in Python

@@ -10,7 +10,15 @@ import numpy as np
 import seecr
 from seecr.description.shipped import model_path
 from seecr.equilibrium.passes import Barrier
-from seecr.report.words import direction_words, other_lines, pose_lines
+from seecr.prediction.uncertainty import Spread
+from seecr.report.words import (
+    SAGS,
+    cable_lines,
+    direction_words,
+    other_lines,
+    pose_lines,
+    sweep_lines,
+)
 
 
 def test_rounding_is_no_turn() -> None:
@@ -83,3 +91,40 @@ def test_the_furthest_is_so_by_position_and_orientation_at_once() -> None:
     off = np.array([[0.0, 0.0, 0.0, 0.0, 0.6, 0.0], [1e-15, 0.0, 0.0, 0.0, 0.1, 0.0]])
     line = replace(found, deviation=off).lines()[1]
     assert line.startswith("largest deviation from the command: pose 0, ") and "34.38 deg" in line
+
+
+def test_the_largest_position_error_is_told_beside_the_largest_rotation() -> None:
+    """The pose that was turned most had hidden the one that was 30 mm off."""
+    robot = seecr.load_robot(model_path("demobot_parallel"))
+    found = seecr.solve(robot, np.tile(robot.reference_pose, (3, 1)))
+    off = np.zeros((3, 6))
+    off[0, 0], off[1, 4], off[2, 0] = 0.03, 0.6, 0.01
+    line = replace(found, deviation=off).lines()[1]
+    assert line == (
+        "largest deviation from the command: pose 0, 30 mm (0 deg); largest rotation: pose 1, "
+        "34.38 deg"
+    )
+    off[0, 4] = 0.7
+    line = replace(found, deviation=off).lines()[1]
+    assert line == "largest deviation from the command: pose 0, 30 mm and 40.11 deg"
+
+
+def test_what_slack_means_is_said_where_cables_have_weight() -> None:
+    """On a large robot cables that pull with 180 kN are longer than the straight line."""
+    robot = seecr.load_robot(model_path("cogiro_large"))
+    sag = seecr.load_model(model_path("cogiro_large").with_name("sag.toml"), robot)
+    pose = np.array([6.0, 4.0, 1.5, 1.0, 0.0, 0.0, 0.0])
+    heavy, light = seecr.solve(robot, pose, effects=sag), seecr.solve(robot, pose)
+    assert heavy.slack.any() and list(cable_lines(heavy))[-1] == SAGS
+    assert SAGS in sweep_lines(heavy)
+    assert SAGS not in [*cable_lines(light), *sweep_lines(light)]
+
+
+def test_a_pose_has_one_kind_of_minus() -> None:
+    """Numbers with errors had a typographic one, the others beside them a hyphen."""
+    robot = seecr.load_robot(model_path("cogiro_large"))
+    found = seecr.solve(robot, np.array([-3.0, -2.0, 1.5, 1.0, 0.0, 0.0, 0.0]))
+    off = np.full((1, 3), 1e-3)
+    spread = Spread(off, off, np.full((1, 8), 0.1), np.full((1, 6), 1e-3))
+    text = "\n".join(pose_lines(found, spread=spread))
+    assert "-" in text and "−" not in text
