@@ -96,7 +96,9 @@ def test_where_a_rest_ends_the_platform_jumps() -> None:
     settled = settler.settle(jump.before, robot.commanded_lengths(after[None])[0])
     assert np.abs(pose_difference(settled.pose, jump.after)).max() < 1e-4
     (line,) = jump_lines(led)
-    assert line.startswith("on the way to pose 1, at command 400.0, 250.0, 150.0 mm: its rest ends")
+    assert line.startswith(
+        "on the way to pose 1, at command 400.0, 250.0, 150.0 mm: its equilibrium ends"
+    )
     assert SweepRows(led).as_json()[1]["jumps"][0].as_json()["energy_J"] == jump.energy
 
 

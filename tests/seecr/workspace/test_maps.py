@@ -238,7 +238,7 @@ def test_colours_of_a_map_are_those_of_poses_that_can_be_held(
     bars = {ax.get_ylabel(): ax.get_ylim()[1] for ax in panels[4:]}
     away = 1e3 * np.linalg.norm(found.deviation, axis=-1)
     held = away[found.feasible]
-    assert np.quantile(held, 0.9) < bars["off its command [mm]"] <= held.max() < 0.2 * away.max()
+    assert np.quantile(held, 0.9) < bars["off the command [mm]"] <= held.max() < 0.2 * away.max()
     turned = np.degrees(np.linalg.norm(found.rotation, axis=-1))
     assert bars["turned [°]"] <= turned[found.feasible].max() < 0.2 * turned.max()
 
