@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from crosscheck.importing.dwells import Dwells
 from crosscheck.importing.join import HeldCommands, owners
+from seecr.counted import counted
 from seecr.pose import Array
 
 # Least number of rests that show a pattern.
@@ -61,7 +62,7 @@ def find_clock(held: HeldCommands, told: Array, rests: Dwells) -> Clock:
         shift,
         (
             f"the tracker's clock shows {abs(shift):.3f} s {way} than that of the commands, "
-            f"estimated from {n} commands at which the platform starts to move (--clock "
+            f"estimated from {counted(n, 'command')} at which the platform starts to move (--clock "
             f"{shift:.3f})",
         ),
     )

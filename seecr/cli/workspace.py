@@ -108,8 +108,14 @@ def command(
     from seecr.counted import counted
     from seecr.files import json_text, staged, write_text
     from seecr.report.map_slices import map_figure
-    from seecr.report.maps import beyond_line, edge_line, likely_lines, softest_line, write_arrays
-    from seecr.report.words import SAGS
+    from seecr.report.maps import (
+        beyond_line,
+        edge_line,
+        likely_lines,
+        sag_lines_of,
+        softest_line,
+        write_arrays,
+    )
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
@@ -160,8 +166,7 @@ def command(
         click.echo(text)
         return 0
     lines = [*found.lines(), *softest_line(found), *likely_lines(found, at_least)]
-    if found.elastic and own is not None and "cable_weight" in own.names:
-        lines.append(SAGS)
+    lines += sag_lines_of(found, own.names if own else ())
     if figure != "none" and not drawn:
         lines.append("no figure: the grid has more than one value along fewer than two axes")
     if places is not None and edge is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +12,12 @@ from seecr.counted import counted
 from seecr.files import written
 from seecr.pose import Array
 from seecr.prediction.data_reach import DataReach
-from seecr.report.words import direction_words
+from seecr.report.words import SAGS, direction_words
 from seecr.workspace.grid import Workspace
 
-__all__ = ["beyond_line", "edge_line", "likely_lines", "softest_line", "write_arrays"]
+__all__ = [
+    "beyond_line", "edge_line", "likely_lines", "sag_lines_of", "softest_line", "write_arrays",
+]  # fmt: skip
 
 
 def likely_lines(found: Workspace, at_least: float | None) -> Iterator[str]:
@@ -49,6 +51,12 @@ def softest_line(found: Workspace) -> Iterator[str]:
         place = " ".join(f"{1e3 * axis[k]:.4g}" for axis, k in zip(found.axes, at, strict=True))
         way = direction_words(found.robot, found.softest[at])
         yield f"softest of these at x y z {place} mm: {way}, {found.stiffness[at]:.4g} N/m"
+
+
+def sag_lines_of(found: Workspace, effects: Collection[str]) -> Iterator[str]:
+    """What "slack" means on an elastic map of a model with these effects, if cables have weight."""
+    if found.elastic and "cable_weight" in effects:
+        yield SAGS
 
 
 def edge_line(edge: Array, tolerance: float) -> str:
