@@ -90,7 +90,7 @@ class Calibrated(Result, JointErrors):
         out = [
             f"{counted(len(self.labels), 'parameter')} of {counted(len(self.fitted), 'effect')}: "
             f"{rms_words(self.before)} before, {rms_words(self.after)} after, "
-            f"{rms_words(self.held_out)} on held-out runs (refitted linearly)",
+            f"{rms_words(self.held_out)} on held-out runs",
             *self.noise_lines(),
         ]
         return [*out, *(f"note: {note}" for note in self.notes)]
