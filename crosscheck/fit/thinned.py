@@ -94,6 +94,11 @@ def thinned(robot: Robot, data: Measurements, most: int = MOST) -> Thinned:
         size = np.bincount(data.run_index)[data.run_index]
         kept = place < -(-size // every)
         what = "the first of each run, because the poses are in no order"
+    # each run keeps a row at least: of thousands of short runs some are left out whole
+    apart = -(-int(kept.sum()) // (2 * most))
+    if apart > 1:
+        kept &= data.run_index % apart == 0
+        what += f", of one run in {apart}"
     note = (
         f"the search uses {counted(int((kept & read).sum()), 'row')} of {int(read.sum())}: "
         f"{what}; `add` fits all of them"

@@ -81,6 +81,15 @@ def test_of_poses_in_no_order_the_first_of_each_run_are_taken() -> None:
     assert "in no order" in found.data.notes[-1]
 
 
+def test_of_many_short_runs_some_are_left_out_whole() -> None:
+    data = stream()
+    short = replace(data, run=np.char.add("run ", (np.arange(ROWS) // 2).astype(str)))
+    found = thinned(ROBOT, short, 100)
+    assert 100 <= found.data.n_rows <= 200
+    assert "of one run in 6" in found.data.notes[-1]
+    assert found.others.sum() + found.data.n_rows == ROWS
+
+
 def test_the_others_are_predicted_to_the_noise_by_the_model_that_is_there_alone() -> None:
     terms = Terms([Term.of(ROBOT, "pulley_radius", radius_m=0.02)])
     found = thinned(ROBOT, stream(terms), 120)
