@@ -35,8 +35,8 @@ from seecr.errors import InputError
 from seecr.pose import Array
 
 # In fewer readings than this (60 whole poses), noise of unknown size that is correlated looks like
-# structure.
-_FEW_READINGS = 360
+# structure, unless the error falls by this factor.
+_FEW_READINGS, _MOST_OF_IT = 360, 3.0
 # Data that would not even show effects of so many plausible sizes show nothing.
 _BLIND = 10.0
 
@@ -86,12 +86,17 @@ def diagnose(
 
 
 def _may_be_noise(found: Diagnosis, problem: Problem) -> bool:
-    """Whether unexplained structure may be autocorrelated noise whose size was not stated.
+    """Whether the structure that was found may be autocorrelated noise whose size was not stated.
 
-    With few rows no statistic separates the two.
+    With few rows no statistic separates the two, and effects of many parameters absorb a part of
+    such noise. Effects that remove most of the error are no noise.
     """
-    is_unknown = found.verdict is DiagnosisVerdict.UNKNOWN_EFFECT and not found.missing
-    return is_unknown and not kinds_stated(problem) and problem.n_readings < _FEW_READINGS
+    if kinds_stated(problem) or problem.n_readings >= _FEW_READINGS:
+        return False
+    if found.verdict is DiagnosisVerdict.NO_EFFECT_MISSING:
+        return False
+    pairs = [(was, found.after[key]) for key, was in found.before.items()]
+    return all(was < _MOST_OF_IT * now for was, now in pairs if was is not None and now is not None)
 
 
 Notes = tuple[str, ...]

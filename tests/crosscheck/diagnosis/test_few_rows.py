@@ -2,12 +2,15 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import crosscheck
 import seecr
+from crosscheck.diagnosis.verdict import _may_be_noise
+from crosscheck.fit.problem import Problem
 from crosscheck.fit.reasons import DiagnosisVerdict, Unfit
 from crosscheck.measurements.data import Measurements, Sigma
 from seecr.prediction.experiment import Experiment
@@ -47,3 +50,28 @@ def test_structure_in_few_rows_may_be_noise_that_nobody_stated() -> None:
     assert crosscheck.diagnose(ROBOT, stated, only=some).verdict is DiagnosisVerdict.UNKNOWN_EFFECT
     more = crosscheck.diagnose(ROBOT, drifting(140), only=some)
     assert more.verdict is not DiagnosisVerdict.NO_VERDICT
+
+
+@pytest.mark.parametrize(
+    "verdict, after_m, may_be",
+    [
+        (DiagnosisVerdict.EFFECTS_FOUND, 1.5e-4, True),
+        (DiagnosisVerdict.EFFECTS_FOUND, 0.5e-4, False),  # no noise falls to a quarter
+        (DiagnosisVerdict.UNKNOWN_EFFECT, 2.0e-4, True),
+        (DiagnosisVerdict.NO_EFFECT_MISSING, 2.0e-4, False),
+    ],
+)
+def test_a_name_in_few_rows_has_to_remove_most_of_the_error(
+    verdict: DiagnosisVerdict, after_m: float, may_be: bool
+) -> None:
+    """Of 16 null sets of 20 or 36 rows three had a name: many parameters absorb such noise."""
+    read = {"orientation_rms_rad": None, "tension_rms_N": None}
+    found = SimpleNamespace(
+        verdict=verdict, missing=("exit_point_error",),
+        before={"position_rms_m": 2e-4, **read}, after={"position_rms_m": after_m, **read},
+    )  # fmt: skip
+    data = drifting(20)
+    every = np.ones(20, dtype=bool)
+    assert _may_be_noise(found, Problem(ROBOT, data, data.sigma, every)) is may_be  # type: ignore[arg-type]
+    stated = replace(data, sigma=Sigma(position_m=NOISE_M))
+    assert not _may_be_noise(found, Problem(ROBOT, stated, stated.sigma, every))  # type: ignore[arg-type]
