@@ -55,6 +55,11 @@ def _weights(row: NDArray[np.int64], residual: Array, scale: float) -> Array:
 
 def outliers(chain: Chain, weight: Array, n_rows: int) -> NDArray[np.bool_]:
     """(n,) bool rows in which some kind of reading hardly counts."""
-    least = np.ones(n_rows)
-    np.minimum.at(least, chain.row, weight)
+    return np.asarray(outliers_by_kind(chain, weight, n_rows).any(axis=1))
+
+
+def outliers_by_kind(chain: Chain, weight: Array, n_rows: int) -> NDArray[np.bool_]:
+    """(n, 3) bool rows in which readings of each kind hardly count."""
+    least = np.ones((n_rows, len(KINDS)))
+    np.minimum.at(least, (chain.row, chain.kind), weight)
     return np.asarray(least < OUTLIER)

@@ -16,7 +16,7 @@ from scipy import stats
 
 from crosscheck.calibration.colour import Colour
 from crosscheck.calibration.joint import JointFit, Setting
-from crosscheck.calibration.robust import outliers
+from crosscheck.calibration.robust import outliers_by_kind
 from crosscheck.fit.noise import nearest_rows, next_rows, whiteness
 from crosscheck.fit.problem import KINDS
 
@@ -29,7 +29,8 @@ _HALF, _ERRORS = 2.0, 3.0
 # Estimates from differences of neighbouring rows are too small if noise is autocorrelated, so that
 # larger and more correlated noise is accepted.
 _ESTIMATED, _DRIFT = 5.0, 0.9
-# Outliers are never more than this part of the rows; p-value below which they lie side by side.
+# Outliers are never more than this part of the rows that a sensor reads; p-value below which they
+# lie side by side.
 _MOST, _CHANCE = 0.15, 1e-3
 
 
@@ -75,17 +76,26 @@ def most_together(rho: float, readings: int) -> float:
 
 
 def side_by_side(setting: Setting, joint: JointFit) -> bool:
-    """Whether outliers are too many, or neighbours of each other more often than by chance."""
-    problem = setting.problem
-    out = outliers(setting.chain, joint.weight, problem.data.n_rows)
-    used = int(problem.use.sum())
-    part = out.sum() / max(used, 1)
-    if part > _MOST:
+    """Whether outliers are too many, or neighbours of each other more often than by chance.
+
+    Each kind of reading is judged by itself: two sensors that fail now and then, each on its own,
+    make rows with an outlier about twice as frequent.
+    """
+    problem, chain = setting.problem, setting.chain
+    out = outliers_by_kind(chain, joint.weight, problem.data.n_rows)
+    kinds = np.unique(chain.kind)
+    read = np.zeros(out.shape, dtype=bool)
+    read[chain.row, chain.kind] = True
+    part = out.sum(axis=0) / np.maximum(read.sum(axis=0), 1)
+    if part.max() > _MOST:
         return True
     for pairs in (next_rows(problem), nearest_rows(problem)):
-        both = int((out[pairs[:, 0]] & out[pairs[:, 1]]).sum()) if len(pairs) else 0
-        if both and stats.poisson.sf(both - 1, len(pairs) * part**2) < _CHANCE:
-            return True
+        for k in kinds:
+            both = int((out[pairs[:, 0], k] & out[pairs[:, 1], k]).sum()) if len(pairs) else 0
+            if both and stats.poisson.sf(both - 1, len(pairs) * part[k] ** 2) < _CHANCE / len(
+                kinds
+            ):
+                return True
     return False
 
 

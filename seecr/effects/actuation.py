@@ -13,6 +13,9 @@ from seecr.effects.setup import Setup
 from seecr.effects.totals import Total
 from seecr.pose import Array, pose_add
 
+# Largest radius of a drum, as a part of the mean cable length.
+_LARGEST = 0.25
+
 
 @dataclass(frozen=True, eq=False)
 class CableLengthOffset(Effect):
@@ -118,7 +121,8 @@ class DrumEccentricity(Effect):
     """An eccentric drum adds a sine of its angle to the paid-out length.
 
     l0_i += sine_i sin(a) + cosine_i (cos(a) - 1), a = (commanded change)/radius; zero at the
-    zero of the winch.
+    zero of the winch. Radii up to a quarter of the mean cable length are considered: beyond, the
+    travel turns a drum so little that its sine acts like a gain.
     """
 
     name: ClassVar[str] = "drum_eccentricity"
@@ -132,7 +136,7 @@ class DrumEccentricity(Effect):
     sine: Array = parameter("m", of_length(1e-3), size="cable")
     cosine: Array = parameter("m", of_length(1e-3), size="cable")
     drum_radius: float = parameter(
-        "m", of_length(0.05), null=0.05, bounds=(of_length(1e-3), of_length(0.12)), shape=True
+        "m", of_length(0.05), null=0.05, bounds=(of_length(1e-3), of_length(_LARGEST)), shape=True
     )
 
     def edit_setup(self, setup: Setup) -> None:
@@ -152,7 +156,7 @@ class DrumEccentricity(Effect):
             return []
         # from half a turn over the whole travel to 40; a start is right to a seventh of a turn
         turns = np.arange(0.6, 40.0, 0.3)
-        largest = 0.12 * mean_length(setup.robot)
+        largest = _LARGEST * mean_length(setup.robot)
         radii = travel / (2 * np.pi * turns)
         return [{"drum_radius": float(r)} for r in radii[radii < largest]]
 

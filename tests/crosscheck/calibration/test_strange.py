@@ -8,9 +8,10 @@ from made_data import COGIRO, measured
 
 from crosscheck.calibration.colour import WHITE, Colour, chain_of
 from crosscheck.calibration.joint import Setting, settle
-from crosscheck.calibration.strange import goes_together, most_together, too_large
+from crosscheck.calibration.strange import goes_together, most_together, side_by_side, too_large
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.state import evaluate
+from seecr import pose as seecr_pose
 from seecr.description.mjcf import load_robot
 from seecr.effects import Terms
 
@@ -88,3 +89,24 @@ def test_residuals_that_agree_with_those_nearby_are_no_noise(pulled: bool) -> No
     setting = Setting(problem, factor, chain_of(problem))
     joint = settle(setting, evaluate(problem, Terms(), factor), np.zeros(0), WHITE)
     assert goes_together(setting, joint) is pulled
+
+
+@pytest.mark.parametrize(("together", "is_noise"), [(False, True), (True, False)])
+def test_outliers_of_two_sensors_in_different_rows_are_no_structure(
+    together: bool, is_noise: bool
+) -> None:
+    # each sensor fails in one row of eight: with an outlier of some sensor are 23 % of the rows
+    robot = load_robot(COGIRO)
+    data = measured(robot, points=10)
+    assert data.position is not None and data.quat_wxyz is not None
+    n = data.n_rows
+    rows = np.arange(n // 8) if together else np.arange(0, n, 8)
+    data.position[rows] += 5e-3
+    data.quat_wxyz[(rows + 4) % n] = seecr_pose.quat_multiply(
+        seecr_pose.quat_from_rotvec(np.array([0.05, 0.0, 0.0])), data.quat_wxyz[(rows + 4) % n]
+    )
+    problem = prepare(robot, data, Terms()).problem
+    factor = problem.noise(problem.experiment.predict(()))
+    setting = Setting(problem, factor, chain_of(problem))
+    joint = settle(setting, evaluate(problem, Terms(), factor), np.zeros(0), WHITE)
+    assert side_by_side(setting, joint) is not is_noise
