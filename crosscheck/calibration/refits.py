@@ -10,12 +10,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from crosscheck.calibration.catalogue import Catalogue
 from crosscheck.calibration.challenge import challenge
 from crosscheck.calibration.equals import EQUAL, are_equals
 from crosscheck.calibration.exact import FEW, HOLLOW, Exact, Refit
 from crosscheck.calibration.joint import JointFit, Setting
-from crosscheck.calibration.later import inside, promising_beside
+from crosscheck.calibration.later import amplitudes, inside, promising_beside
 from crosscheck.calibration.sets import Names, Scores, explore
 from crosscheck.fit.state import State
 from seecr.effects import Terms
@@ -131,11 +133,14 @@ def _thinned(exact: Exact, scores: Scores, best: Refit) -> Refit:
 
 
 def _is_idle(exact: Exact, scores: Scores, best: Refit, name: str) -> bool:
-    """Whether a member moves nothing, and the set explains as much without it.
+    """Whether a member is at null, or moves nothing and the set explains as much without it.
 
     An effect with history that moves nothing may still decide in which equilibrium the platform
-    rests: its rows are walked to, not searched.
+    rests: its rows are walked to, not searched. At null it is no effect all the same.
     """
+    own = next(term for term in best.joint.terms if term.name == name)
+    if not np.any(own.vector[amplitudes(own)] != own.layout.null[amplitudes(own)]):
+        return True
     if not does_nothing(exact.setting, best, name):
         return False
     without = exact.fit(scores, best.names - {name})

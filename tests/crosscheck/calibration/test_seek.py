@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from made_data import COGIRO, SIGMA, measured, term
 
@@ -17,7 +18,9 @@ from crosscheck.fit.prepare import prepare
 from crosscheck.fit.reasons import DiagnosisVerdict, Why
 from crosscheck.given import considered
 from seecr.description.mjcf import load_robot
-from seecr.effects import Term, Terms
+from seecr.effects import Term, Terms, layout_of
+from seecr.effects.actuation import DrumGain
+from seecr.effects.cable import Creep
 
 pytestmark = pytest.mark.slow
 
@@ -153,13 +156,21 @@ def assert_shown_as_many(found: Sought) -> None:
     assert any("crosscheck calibrate" in text for text in said.measure_next)
 
 
-@pytest.mark.parametrize("without, idle", [(-12.0, True), (-13.0, False), (None, False)])
-def test_a_member_is_idle_only_if_the_set_explains_as_much_without_it(
-    monkeypatch: pytest.MonkeyPatch, without: float | None, idle: bool
+@pytest.mark.parametrize(
+    ("amplitude", "without", "idle"),
+    [(1e-3, -12.0, True), (1e-3, -13.0, False), (1e-3, None, False), (0.0, -13.0, True)],
+)
+def test_a_member_is_idle_at_null_or_if_the_set_explains_as_much_without_it(
+    monkeypatch: pytest.MonkeyPatch, amplitude: float, without: float | None, idle: bool
 ) -> None:
     """What has a history may move nothing, and yet decide in which rest the platform is."""
     monkeypatch.setattr(refits, "does_nothing", lambda _setting, _best, name: name == "creep")
-    best = SimpleNamespace(names=frozenset({"creep", "drum_gain"}), score=0.0)
+    creep, gain = (layout_of(effect, ROBOT) for effect in (Creep, DrumGain))
+    moved = np.where(creep.shape, creep.null, creep.null + amplitude)
+    terms = Terms([Term(creep, moved), Term(gain, gain.null + 1e-3)])
+    best = SimpleNamespace(
+        names=frozenset({"creep", "drum_gain"}), score=0.0, joint=SimpleNamespace(terms=terms)
+    )
 
     def fit(_scores: object, names: frozenset[str]) -> object:
         assert names == {"drum_gain"}
