@@ -144,7 +144,8 @@ def screen(trials: Trials, base: Fit, layout: Layout) -> Candidate:
     if not starts.seen:
         return out.refused(Reason(Why.UNSEEN))
     drop = starts.gain
-    return replace(out, drop=drop, p=p_value(drop, starts.directions, False) * starts.shapes)
+    chance = p_value(drop, starts.directions, False) * starts.shapes
+    return replace(out, drop=drop, p=min(1.0, chance))
 
 
 def fit_candidate(
