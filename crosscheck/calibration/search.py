@@ -86,26 +86,34 @@ def seek(
     known = [k.name for k in kinds_read(problem) if getattr(stated, k.sigma) is not None]
     all_stated = len(known) == len(kinds_read(problem))
     odds = log_odds(setting, joint, all_stated)
-    strange = is_strange(setting, joint, known)
     surprise = float(np.max(whole.held_out.surprise, initial=0.0))
+    smooth = odds > UNKNOWN or surprise > SURPRISE
     catalogue = _catalogue(problem, terms, whole)
     plain = evaluate(problem, terms, setting.factor)
-    unknown = strange or odds > UNKNOWN or surprise > SURPRISE
-    most, rounds = (_REFITTED_UNKNOWN, 1) if unknown else (_REFITTED, ROUNDS)
     tried = 0
 
-    def told(text: str) -> None:
-        nonlocal tried
-        tried += 1
-        progress(f"trying {text}", 0.5 + 0.5 * tried / (tried + most))
+    def compared(unknown: bool, *more: Terms) -> Found:
+        most, rounds = (_REFITTED_UNKNOWN, 1) if unknown else (_REFITTED, ROUNDS)
 
-    found = compare_sets(setting, joint, catalogue, plain, told, most, rounds, given)
+        def told(text: str) -> None:
+            nonlocal tried
+            tried += 1
+            progress(f"trying {text}", 0.5 + 0.5 * tried / (tried + most))
+
+        return compare_sets(setting, joint, catalogue, plain, told, most, rounds, [*given, *more])
+
+    all_strange = is_strange(setting, joint, known)
+    found = compared(all_strange or smooth)
+    strange = is_strange(setting, found.best.joint, known)
+    if all_strange and not strange and not smooth:
+        # what few effects explain, all of them could: their fit ended in a local minimum
+        found = compared(False, found.best.joint.terms)
+        strange = is_strange(setting, found.best.joint, known)
     effects = [n for n in catalogue.names if n not in terms]
     sizes = {name: parameters_told(catalogue.start(name).layout) for name in effects}
     best = found.best
     instead = field_instead(setting, best.joint, best.widths, found.scores)
     classes = _classes(found, best.names, sizes)
-    strange = strange or is_strange(setting, best.joint, known)
     beside = log_odds(setting, best.joint, all_stated)
     said = judge(found, classes, odds, surprise, strange, _doubted(found), beside, instead)
     listed = found.always | set(said.sure)

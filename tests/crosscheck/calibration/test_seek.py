@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -65,6 +66,29 @@ def test_two_effects_are_named_and_a_field_makes_the_verdict_unknown() -> None:
     unknown = judge(found.found, found.classes, 20.0, 1.0)
     assert unknown.verdict is DiagnosisVerdict.UNKNOWN_EFFECT
     assert judge(found.found, found.classes, -5.0, 9.0).verdict is DiagnosisVerdict.UNKNOWN_EFFECT
+
+
+def test_structure_beside_all_effects_is_nothing_unknown_if_few_effects_leave_none(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The fit of all effects may have ended in a local minimum that few effects do not have."""
+    asked, compared = list[int](), list[int]()
+
+    def is_strange(_setting: Setting, joint: JointFit, _stated: object) -> bool:
+        asked.append(len(joint.terms.names))
+        return len(joint.terms.names) == len(FEW)
+
+    def compare_sets(*args: Any) -> refits.Found:
+        compared.append(args[5])
+        return refits.compare_sets(*args)
+
+    monkeypatch.setattr(search, "is_strange", is_strange)
+    monkeypatch.setattr(search, "compare_sets", compare_sets)
+    found = sought([term(ROBOT, "pulley_radius", radius_m=0.006)])
+    assert asked == [len(FEW), 1, 1]
+    assert compared == [4, 20]  # sets refitted: few at first, as if something unknown were there
+    assert found.judgement.verdict is DiagnosisVerdict.EFFECTS_FOUND
+    assert found.judgement.sure == ("pulley_radius",)
 
 
 def test_a_member_that_moves_nothing_is_known_and_not_listed(
