@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.calibration.all_effects import Calibration, fit_all_effects
-from crosscheck.calibration.search import Sought, seek
+from crosscheck.calibration.search import SetSearch, search_sets
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.problem import Problem, kinds_read, rms_by_kind
 from crosscheck.fit.state import State, evaluate
@@ -79,7 +79,7 @@ def line(name: str, answer: dict[str, Any], found: Calibration, folder: Path, sp
 
 
 def verdict_line(
-    name: str, answer: dict[str, Any], sought: Sought, folder: Path, spent: float
+    name: str, answer: dict[str, Any], sought: SetSearch, folder: Path, spent: float
 ) -> str:
     """What is said to be missing, beside what was hidden."""
     said = sought.judgement
@@ -119,7 +119,7 @@ def main() -> None:
         if ready.refusal:
             print(f"{name}: {ready.refusal}", flush=True)
             continue
-        sought = seek(ready.problem, data.sigma) if chosen.sets else None
+        sought = search_sets(ready.problem, data.sigma) if chosen.sets else None
         found = fit_all_effects(ready.problem) if sought is None else sought.calibration
         spent = time.process_time() - start
         if (folder / "validation.csv").exists():

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from crosscheck.calibration.gram import ColumnGroup, Gram, gram_of
+from crosscheck.calibration.joining import added_columns, amplitudes, amplitudes_at_null
 from crosscheck.calibration.joint import JointFit, Setting
-from crosscheck.calibration.later import added_columns, amplitudes, amplitudes_at_null
 from crosscheck.fit.evidence import WIDTHS
 from crosscheck.fit.known import known_readings
 from crosscheck.fit.registration import NAME as TRACKER

@@ -23,7 +23,7 @@ def are_equals(loss: float, own: int, other: int) -> bool:
     return loss < EQUAL + _ONE_MORE * more
 
 
-def parameters_told(layout: Layout) -> int:
+def parameters_counted(layout: Layout) -> int:
     """The number of parameters for :func:`are_equals`: 1 for a small effect that contains another.
 
     Friction at the exit point includes cable behind that point. Its second parameter is no excuse

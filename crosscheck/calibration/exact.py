@@ -10,8 +10,8 @@ import numpy as np
 from crosscheck.calibration.bounds import log_absent
 from crosscheck.calibration.catalogue import Catalogue, gram_about, widths_for
 from crosscheck.calibration.gram import ColumnGroup, Gram, averaged, best_widths, gram_of
+from crosscheck.calibration.joining import at_null
 from crosscheck.calibration.joint import JointFit, Setting, settle
-from crosscheck.calibration.later import at_null
 from crosscheck.calibration.linearised import Linear, groups_of, linearised
 from crosscheck.calibration.priors import SHAPES
 from crosscheck.calibration.sets import Names, Scores
@@ -24,7 +24,7 @@ from seecr.pose import Array
 _STEPS = 12
 # If a refit is worse than its linear evidence by this much, it may have ended in a local minimum,
 # and is repeated from other starting points.
-HOLLOW = 8.0
+LOCAL_MINIMUM = 8.0
 # Sets up to this size are tried from more starting points, and without each of their members.
 FEW = 5
 
@@ -54,7 +54,7 @@ class Exact:
     """Sets of effects fitted exactly, all with the same noise and weights.
 
     Attributes:
-        setting, joint, catalogue, plain, told: as in
+        setting, joint, catalogue, plain, report: as in
             :func:`crosscheck.calibration.refits.compare_sets`.
         given: further starting values of some sets.
         fitted: the fit of each set; None if it could not be solved.
@@ -64,7 +64,7 @@ class Exact:
     joint: JointFit
     catalogue: Catalogue
     plain: State
-    told: Callable[[str], None]
+    report: Callable[[str], None]
     given: Mapping[Names, Terms] = field(default_factory=dict)
     fitted: dict[Names, Refit | None] = field(default_factory=dict)
     _begun: dict[Names, set[Shapes]] = field(default_factory=dict)
@@ -132,10 +132,10 @@ class Exact:
         """
         shapes = tuple((name, scores.shapes.get(name)) for name in sorted(names))
         if names not in self.fitted:
-            self.told(" + ".join(sorted(names)) or "none")
+            self.report(" + ".join(sorted(names)) or "none")
             self._fit(scores, names)
         elif shapes not in self._begun.get(names, set()) and self._promises_more(scores, names):
-            self.told(" + ".join(sorted(names)))
+            self.report(" + ".join(sorted(names)))
             self.take(scores, _linear_terms(self.catalogue, scores, names))
         self._begun.setdefault(names, set()).add(shapes)
         return self.fitted[names]
@@ -144,7 +144,7 @@ class Exact:
         """Whether other shapes of its members may explain far more than the present fit."""
         own = self.fitted[names]
         other = names & scores.shapes.keys()
-        return bool(other) and (own is None or own.score < scores.score(names) - HOLLOW)
+        return bool(other) and (own is None or own.score < scores.score(names) - LOCAL_MINIMUM)
 
     def _fit(self, scores: Scores, names: Names) -> None:
         """Fit a set from its linear values, from given ones, and from null if that ends badly."""
@@ -154,7 +154,7 @@ class Exact:
         if names in self.given:
             self.take(scores, self.given[names])
         few = 0 < len(names - scores.always) <= FEW
-        if few and (best is None or best.score < linear - HOLLOW):
+        if few and (best is None or best.score < linear - LOCAL_MINIMUM):
             self.take(scores, Terms(_off_bound(self.catalogue.start(name)) for name in names))
 
     def _from(

@@ -16,7 +16,7 @@ import numpy as np
 
 from crosscheck.calibration.equals import SMALL
 from crosscheck.calibration.field import UNKNOWN
-from crosscheck.calibration.instead import NOT_ASKED, Instead
+from crosscheck.calibration.imitated import NOT_ASKED, Imitated
 from crosscheck.calibration.probability import Classes
 from crosscheck.calibration.refits import Found
 from crosscheck.calibration.sets import Names
@@ -62,7 +62,7 @@ class Judgement:
     undecided: float
     doubted: Names = NONE
     more: bool = False
-    imitated: Instead | None = None
+    imitated: Imitated | None = None
 
 
 def judge(
@@ -70,10 +70,10 @@ def judge(
     classes: Classes,
     field_odds: float,
     surprise: float,
-    strange: bool = False,
+    not_noise: bool = False,
     doubted: Names = NONE,
     beside: float = -np.inf,
-    instead: Instead = NOT_ASKED,
+    in_place: Imitated = NOT_ASKED,
 ) -> Judgement:
     """Decide on the verdict.
 
@@ -82,13 +82,13 @@ def judge(
         classes: probabilities of the classes of equivalent effects.
         field_odds: ln odds of a smooth field beside the whole catalogue.
         surprise: chi2 per reading of the worst held-out run over what the joint fit expects.
-        strange: whether what was taken for noise is not noise.
+        not_noise: whether what was taken for noise is not noise.
         doubted: members of the best set that are implausibly large.
         beside: ln odds of a smooth field beside the best set.
-        instead: a field in place of some members of the best set.
+        in_place: a field in place of some members of the best set.
     """
     best, undecided = found.best.names - found.always - found.idle, classes.undecided
-    unknown = strange or field_odds > UNKNOWN or surprise > SURPRISE
+    unknown = not_noise or field_odds > UNKNOWN or surprise > SURPRISE
     sure = sure_effects(found, classes, True)
     few = len(best) <= _FEW and undecided < (_OPEN_BESIDE if set(sure) == best else _OPEN)
     more = beside > UNKNOWN
@@ -99,12 +99,12 @@ def judge(
     if more:
         worth = worths(found)
         sure = tuple(name for name in carrying_most(found, worth, _MOST) if name in sure)
-    if instead.chance:
+    if in_place.chance:
         # of several members that stay, some may absorb what others explain
-        kept = carrying_most(found, instead.worth, _ALL)
+        kept = carrying_most(found, in_place.worth, _ALL)
         kept = tuple(name for name in kept if name not in doubted)
         if kept or not unknown:
-            return Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, kept, undecided, imitated=instead)
+            return Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, kept, undecided, imitated=in_place)
     if unknown:  # known effects imitate it: none of them is sure
         return Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, (), undecided)
     if not sure and not more and undecided < _OPEN and explained(found) < _OWED:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import special
 
 from crosscheck.calibration.equals import EQUAL, are_equals
-from crosscheck.calibration.exact import HOLLOW, Refit
+from crosscheck.calibration.exact import LOCAL_MINIMUM, Refit
 from crosscheck.calibration.refits import Found
 from crosscheck.calibration.sets import Names, Scores
 
@@ -92,7 +92,7 @@ def _larger(found: Found, refit: Refit) -> dict[Names, float]:
     """
     scores, best = found.scores, found.best
     off = (refit.score - scores.score(refit.names)) - (best.score - scores.score(best.names))
-    about = refit.names if off < HOLLOW else best.names
+    about = refit.names if off < LOCAL_MINIMUM else best.names
     base, out = scores.score(about) - scores.log_prior(about), dict[Names, float]()
     for names, score in scores.larger(about).items():
         larger = refit.names | names - about

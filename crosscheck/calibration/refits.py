@@ -15,9 +15,9 @@ import numpy as np
 from crosscheck.calibration.catalogue import Catalogue
 from crosscheck.calibration.challenge import challenge
 from crosscheck.calibration.equals import EQUAL, are_equals
-from crosscheck.calibration.exact import FEW, HOLLOW, Exact, Refit
+from crosscheck.calibration.exact import FEW, LOCAL_MINIMUM, Exact, Refit
+from crosscheck.calibration.joining import amplitudes, inside, promising_beside
 from crosscheck.calibration.joint import JointFit, Setting
-from crosscheck.calibration.later import amplitudes, inside, promising_beside
 from crosscheck.calibration.sets import Names, Scores, explore
 from crosscheck.fit.state import State
 from seecr.effects import Terms
@@ -65,7 +65,7 @@ def compare_sets(
     joint: JointFit,
     catalogue: Catalogue,
     plain: State,
-    told: Callable[[str], None] = lambda _text: None,
+    report: Callable[[str], None] = lambda _text: None,
     most: int = _REFITTED,
     rounds: int = ROUNDS,
     given: Iterable[Terms] = (),
@@ -77,7 +77,7 @@ def compare_sets(
         joint: the joint fit of all effects, about which the first linear model is.
         catalogue: effects that may be in a set.
         plain: the model as it stands; its effects are in every set.
-        told: called with each set that is fitted.
+        report: called with each set that is fitted.
         most: how many sets to refit about one linear model.
         rounds: most rounds of linearising the catalogue about the best set.
         given: sets that were found elsewhere, with their values there.
@@ -85,7 +85,7 @@ def compare_sets(
     always = frozenset(plain.terms.names)
     fixed = replace(setting, frozen=True, weight=joint.weight)
     known = {frozenset(terms.names): terms for terms in given}
-    exact = Exact(fixed, joint, catalogue, plain, told, known)
+    exact = Exact(fixed, joint, catalogue, plain, report, known)
     scores = exact.scores_about(joint)
     begin, best = frozenset(scores.gram.names) | always, exact.best_of(scores, [always, *known])
     for k in range(rounds):
@@ -169,7 +169,7 @@ def about_given(
     if last is None:
         return scores, best
     seen = scores.score(last.names) - scores.score(best.names)
-    if last.score - best.score < seen + HOLLOW:
+    if last.score - best.score < seen + LOCAL_MINIMUM:
         return scores, best
     near = exact.scores_about(last.joint, own_shapes=True)
     other = _searched(exact, near, last.names, _BESIDE)
@@ -241,10 +241,10 @@ def swapped(exact: Exact, scores: Scores, best: Refit) -> Refit:
         rest = exact.fit(scores, best.names - {name})
         if rest is None:
             continue
-        least = best.score - rest.score - HOLLOW
+        least = best.score - rest.score - LOCAL_MINIMUM
         absent = [layout for layout in shaped if layout.name not in best.names]
         for one in promising_beside(exact.setting, rest.joint, absent):
             if one.gain > max(least, 0.0):
-                exact.told(" + ".join(sorted(rest.names | {one.term.name})))
+                exact.report(" + ".join(sorted(rest.names | {one.term.name})))
                 exact.take(scores, Terms([*rest.joint.terms, inside(one.term)]))
     return exact.best_of(scores, [])

@@ -9,12 +9,14 @@ import numpy as np
 
 from crosscheck.calibration.all_effects import PLAIN, Calibration, fit_all_effects
 from crosscheck.calibration.catalogue import Catalogue
-from crosscheck.calibration.equals import parameters_told
+from crosscheck.calibration.detectable import detectable_size
+from crosscheck.calibration.equals import parameters_counted
 from crosscheck.calibration.field import UNKNOWN, log_odds
-from crosscheck.calibration.instead import field_instead
+from crosscheck.calibration.imitated import field_in_place
+from crosscheck.calibration.joining import layouts
 from crosscheck.calibration.judgement import SURPRISE, Judgement, judge
-from crosscheck.calibration.later import layouts
 from crosscheck.calibration.linearised import free_of
+from crosscheck.calibration.not_noise import is_not_noise
 from crosscheck.calibration.probability import (
     Classes,
     alike_beyond,
@@ -24,8 +26,6 @@ from crosscheck.calibration.probability import (
 from crosscheck.calibration.refits import ROUNDS, Found, compare_sets
 from crosscheck.calibration.sets import Names
 from crosscheck.calibration.stages import Progress
-from crosscheck.calibration.strange import is_strange
-from crosscheck.calibration.unseen import shown_from
 from crosscheck.fit.possible import can_be, hardly_happens
 from crosscheck.fit.problem import Problem, Rms, kinds_read
 from crosscheck.fit.reasons import DiagnosisVerdict
@@ -42,7 +42,7 @@ _SWAPPED = 6
 
 
 @dataclass(frozen=True, eq=False)
-class Sought:
+class SetSearch:
     """The effects that the data need.
 
     Attributes:
@@ -63,13 +63,13 @@ class Sought:
     judgement: Judgement
 
 
-def seek(
+def search_sets(
     problem: Problem,
     stated: Sigma,
     terms: Terms = PLAIN,
     progress: Progress = lambda _text, _part: None,
     given: Sequence[Terms] = (),
-) -> Sought:
+) -> SetSearch:
     """Fit all effects at once, then compare sets of effects.
 
     Args:
@@ -95,42 +95,45 @@ def seek(
     def compared(unknown: bool, *more: Terms) -> Found:
         most, rounds = (_REFITTED_UNKNOWN, 1) if unknown else (_REFITTED, ROUNDS)
 
-        def told(text: str) -> None:
+        def report(text: str) -> None:
             nonlocal tried
             tried += 1
             progress(f"trying {text}", 0.5 + 0.5 * tried / (tried + most))
 
-        return compare_sets(setting, joint, catalogue, plain, told, most, rounds, [*given, *more])
+        return compare_sets(setting, joint, catalogue, plain, report, most, rounds, [*given, *more])
 
-    all_strange = is_strange(setting, joint, known)
-    found = compared(all_strange or smooth)
-    strange = is_strange(setting, found.best.joint, known)
-    if all_strange and not strange and not smooth:
+    structure_beside_all = is_not_noise(setting, joint, known)
+    found = compared(structure_beside_all or smooth)
+    not_noise = is_not_noise(setting, found.best.joint, known)
+    if structure_beside_all and not not_noise and not smooth:
         # what few effects explain, all of them could: their fit ended in a local minimum
         found = compared(False, found.best.joint.terms)
-        strange = is_strange(setting, found.best.joint, known)
+        not_noise = is_not_noise(setting, found.best.joint, known)
     effects = [n for n in catalogue.names if n not in terms]
-    sizes = {name: parameters_told(catalogue.start(name).layout) for name in effects}
+    sizes = {name: parameters_counted(catalogue.start(name).layout) for name in effects}
     best = found.best
-    instead = field_instead(setting, best.joint, best.widths, found.scores)
+    in_place = field_in_place(setting, best.joint, best.widths, found.scores)
     classes = _classes(found, best.names, sizes)
     beside = log_odds(setting, best.joint, all_stated)
-    said = judge(found, classes, odds, surprise, strange, _doubted(found), beside, instead)
+    said = judge(found, classes, odds, surprise, not_noise, _doubted(found), beside, in_place)
     listed = found.always | set(said.sure)
     alone = found.refit(listed) if said.verdict is DiagnosisVerdict.EFFECTS_FOUND else None
     if alone is not None and listed != best.names:
         # find what is equivalent to the listed effects, not to members of a larger set
-        further = {**in_place(found, listed, classes, problem.robot, terms), listed: alone.score}
+        further = {
+            **with_equivalents(found, listed, classes, problem.robot, terms),
+            listed: alone.score,
+        }
         classes = _classes(found, listed, sizes, further)
     if said.imitated is not None:
-        odds = max(odds, instead.odds)
-        classes = classes.without(instead.replaced, instead.chance)
+        odds = max(odds, in_place.odds)
+        classes = classes.without(in_place.replaced, in_place.chance)
     free = free_of(joint)
     # no size is stated if something may have been absorbed: one of that size would have shown
-    shown = None if said.more or said.imitated else shown_from(
+    shown = None if said.more or said.imitated else detectable_size(
         setting, joint, joint.jacobian * free, joint.width * free
     )  # fmt: skip
-    return Sought(whole, found, catalogue, classes, odds, shown, said)
+    return SetSearch(whole, found, catalogue, classes, odds, shown, said)
 
 
 def _catalogue(problem: Problem, terms: Terms, whole: Calibration) -> Catalogue:
@@ -149,7 +152,7 @@ def _classes(
     Args:
         found: the compared sets. own: the set.
         sizes: of all effects, the number of parameters by
-            :func:`crosscheck.calibration.equals.parameters_told`.
+            :func:`crosscheck.calibration.equals.parameters_counted`.
         further: scores of further sets that were fitted.
     """
     scores, fitted = {**all_scores(found), **further}, {*found.refits, *further}
@@ -157,7 +160,7 @@ def _classes(
     return probabilities(scores, own, list(sizes), sizes, fitted, hints)
 
 
-def in_place(
+def with_equivalents(
     found: Found, listed: Names, classes: Classes, robot: Robot, stood: Terms
 ) -> dict[Names, float]:
     """Scores of the listed set with a member replaced by an equivalent, fitted exactly."""

@@ -7,15 +7,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from crosscheck.calibration.alone import fitted_alone
 from crosscheck.calibration.colour import WHITE, Colour
 from crosscheck.calibration.gram import best_widths, gram_of
+from crosscheck.calibration.joining import PAYS, at_null, inside, layouts, promising_beside
 from crosscheck.calibration.joint import JointFit, Setting, cost, settle, tempered
-from crosscheck.calibration.later import PAYS, at_null, inside, layouts, promising_beside
 from crosscheck.calibration.linearised import groups_of, linearised, unwhitened
 from crosscheck.calibration.priors import wider, widths_of
 from crosscheck.calibration.restricted import estimate, log_evidence
 from crosscheck.calibration.robust import LARGER, outliers
+from crosscheck.calibration.single_effects import fitted_alone
 from crosscheck.fit.registration import NAME as TRACKER
 from crosscheck.fit.registration import registered
 from crosscheck.fit.state import State, evaluate

@@ -16,9 +16,9 @@ import numpy as np
 from crosscheck.calibration.colour import WHITE, chain_of
 from crosscheck.calibration.field import UNKNOWN, log_odds
 from crosscheck.calibration.joint import JointFit, Setting
+from crosscheck.calibration.not_noise import is_not_noise
 from crosscheck.calibration.restricted import estimate
 from crosscheck.calibration.robust import outliers, row_weights
-from crosscheck.calibration.strange import is_strange
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.state import State
 from seecr.counted import counted
@@ -71,7 +71,7 @@ def coloured_noise(
     left = JointFit(state.of(Terms()), blank, none, colour, weight, settled=True)
     scale, rho = colour.by_kind(problem)
     larger = any(scale[name] > _LARGER for name in stated)
-    if larger or is_strange(setting, left, stated):
+    if larger or is_not_noise(setting, left, stated):
         return None
     if log_odds(setting, left, len(stated) == len(scale)) > UNKNOWN:
         return None

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from crosscheck.calibration.all_effects import JointErrors
-from crosscheck.calibration.instead import Instead
-from crosscheck.calibration.search import Sought
+from crosscheck.calibration.imitated import Imitated
+from crosscheck.calibration.search import SetSearch
 from crosscheck.fit.problem import Rms
 from crosscheck.fit.words import rms_words
 
@@ -45,7 +45,7 @@ class Chances:
     together: JointErrors | None
     shown: Rms | None = None
     further: Mapping[str, float] = dataclasses.field(default_factory=dict)
-    imitated: Instead | None = None
+    imitated: Imitated | None = None
 
     @property
     def words(self) -> str:
@@ -89,7 +89,7 @@ class Chances:
         }
 
 
-def chances_of(sought: Sought) -> Chances:
+def chances_of(sought: SetSearch) -> Chances:
     """The probabilities that follow from compared sets."""
     classes = sought.classes
     pairs = zip(classes.members, classes.probability, strict=True)

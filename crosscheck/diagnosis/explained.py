@@ -11,7 +11,7 @@ from crosscheck.calibration.alternatives import alternatives
 from crosscheck.calibration.equals import EQUAL
 from crosscheck.calibration.exact import Refit
 from crosscheck.calibration.judgement import Judgement
-from crosscheck.calibration.search import Sought
+from crosscheck.calibration.search import SetSearch
 from crosscheck.calibration.sets import Names
 from crosscheck.diagnosis.advice import check_of
 from crosscheck.diagnosis.chances import PROBABLE, Chances, chances_of
@@ -48,7 +48,7 @@ MORE = (
 )
 
 
-def explained(sought: Sought, notes: Sequence[str]) -> Diagnosis:
+def explained(sought: SetSearch, notes: Sequence[str]) -> Diagnosis:
     """The diagnosis by compared sets of effects that leave only noise."""
     verdict, imitated = sought.judgement.verdict, sought.judgement.imitated
     way = way_of(sought, frozenset(sought.judgement.sure))
@@ -71,7 +71,7 @@ def explained(sought: Sought, notes: Sequence[str]) -> Diagnosis:
     )
 
 
-def _missing(sought: Sought, way: Search, chances: Chances, name: str) -> MissingEffect:
+def _missing(sought: SetSearch, way: Search, chances: Chances, name: str) -> MissingEffect:
     best = way.last.fit
     if sought.judgement.verdict is not DiagnosisVerdict.EFFECTS_FOUND:
         # effects that are not sure are missing too, and with them in the model values are better;
@@ -93,7 +93,7 @@ def _missing(sought: Sought, way: Search, chances: Chances, name: str) -> Missin
     )
 
 
-def _rivals(sought: Sought, names: Names, name: str) -> list[Rival]:
+def _rivals(sought: SetSearch, names: Names, name: str) -> list[Rival]:
     """The other members of an effect's class, each with a fit of the model that has it instead."""
     found = sought.found
     members = next((m for m in sought.classes.members if name in m), (name,))
@@ -111,12 +111,12 @@ def _rivals(sought: Sought, names: Names, name: str) -> list[Rival]:
     return sorted(out, key=lambda r: r.loss)
 
 
-def _rival(sought: Sought, own: Refit, swapped: Refit, other: str) -> Rival:
+def _rival(sought: SetSearch, own: Refit, swapped: Refit, other: str) -> Rival:
     fit = fit_of(sought.calibration.setting, swapped.joint)
     return Rival(other, fit, own.score - swapped.score)
 
 
-def _floor(sought: Sought) -> Rms:
+def _floor(sought: SetSearch) -> Rms:
     """The rms errors of the noise at its estimated size."""
     setting, joint = sought.calibration.setting, sought.calibration.joint
     floor = noise_floor(setting.problem, joint.state)
@@ -127,7 +127,7 @@ def _floor(sought: Sought) -> Rms:
     }
 
 
-def _noise_notes(sought: Sought, chances: Chances) -> list[str]:
+def _noise_notes(sought: SetSearch, chances: Chances) -> list[str]:
     """Notes about noise that is not as stated, and about lines that hardly count."""
     out, together = [], chances.together
     assert together is not None
@@ -147,7 +147,7 @@ def _noise_notes(sought: Sought, chances: Chances) -> list[str]:
     return out
 
 
-def _size_notes(sought: Sought) -> list[str]:
+def _size_notes(sought: SetSearch) -> list[str]:
     terms = sought.found.best.joint.terms
     return size_notes(terms[name] for name in sorted(sought.judgement.doubted))
 

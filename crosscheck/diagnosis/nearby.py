@@ -12,15 +12,15 @@ import numpy as np
 
 from crosscheck.calibration.catalogue import Catalogue, catalogue_columns, gram_with
 from crosscheck.calibration.colour import WHITE, chain_of
-from crosscheck.calibration.equals import parameters_told
-from crosscheck.calibration.instead import Instead, field_instead
+from crosscheck.calibration.detectable import detectable_size
+from crosscheck.calibration.equals import parameters_counted
+from crosscheck.calibration.imitated import Imitated, field_in_place
+from crosscheck.calibration.joining import at_null, layouts, promising_beside
 from crosscheck.calibration.joint import JointFit, Setting, settle
-from crosscheck.calibration.later import at_null, layouts, promising_beside
 from crosscheck.calibration.priors import FLAT, widths_of
 from crosscheck.calibration.probability import alike_beyond, of_classes, with_hints
 from crosscheck.calibration.sets import Names, Scores, explore
 from crosscheck.calibration.shapes import prices_about
-from crosscheck.calibration.unseen import shown_from
 from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.search import Search
 from crosscheck.fit.problem import Rms
@@ -57,11 +57,11 @@ def chances_near(found: Search, alike: Mapping[str, Sequence[str]]) -> Chances:
     every |= _refitted(found, scores, names)
     none = _impossible(found)
     every = {some: score for some, score in every.items() if not some & none}
-    shown = shown_from(setting, joint, *_all_of(columns, len(joint.state.white)))
-    sizes = {name: parameters_told(catalogue.start(name).layout) for name in effects}
+    shown = detectable_size(setting, joint, *_all_of(columns, len(joint.state.white)))
+    sizes = {name: parameters_counted(catalogue.start(name).layout) for name in effects}
     hints = alike_beyond(scores, names, sizes)
-    instead = field_instead(setting, joint, scores.widths(names), scores)
-    return _with_equals(every, effects, alike, hints, shown, instead)
+    in_place = field_in_place(setting, joint, scores.widths(names), scores)
+    return _with_equals(every, effects, alike, hints, shown, in_place)
 
 
 def _impossible(found: Search) -> Names:
@@ -125,7 +125,7 @@ def _with_equals(
     alike: Mapping[str, Sequence[str]],
     hints: Sequence[tuple[str, ...]],
     shown: Rms | None,
-    instead: Instead,
+    in_place: Imitated,
 ) -> Chances:
     """Probabilities with the classes that refits found: members share that of their class."""
     classes = [(name, *others) for name, others in alike.items()]
@@ -133,7 +133,7 @@ def _with_equals(
     alone = [(name,) for name in effects if name not in known]
     beyond = with_hints(alone, hints)
     found = of_classes(scores, frozenset(alike), effects, [*classes, *beyond])
-    found = found.without(instead.replaced, instead.chance)
+    found = found.without(in_place.replaced, in_place.chance)
     pairs = dict(zip(found.members, found.probability, strict=True))
     effect = dict(found.effect)
     for members in classes:
@@ -144,5 +144,5 @@ def _with_equals(
         None,
         None,
         shown,
-        imitated=instead if instead.chance else None,
+        imitated=in_place if in_place.chance else None,
     )

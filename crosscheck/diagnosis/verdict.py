@@ -9,7 +9,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from crosscheck.calibration.judgement import SURE, too_large
-from crosscheck.calibration.search import seek
+from crosscheck.calibration.search import search_sets
 from crosscheck.diagnosis.chances import chances_of
 from crosscheck.diagnosis.explained import explained
 from crosscheck.diagnosis.importance import weighed
@@ -158,7 +158,7 @@ def _searched(
     # noise is autocorrelated, larger than stated (perhaps by a few outliers), or estimated from
     # what may be an effect. So all effects are fitted at once, and sets of them compared.
     way = [step.fit.terms for step in found.steps[1:]]
-    sought = seek(problem, problem.data.sigma, ready.terms, _part(progress, 0.5, 1.0), way)
+    sought = search_sets(problem, problem.data.sigma, ready.terms, _part(progress, 0.5, 1.0), way)
     said = sought.judgement
     if said.verdict is not DiagnosisVerdict.UNKNOWN_EFFECT or said.imitated is not None:
         return explained(sought, notes)

@@ -9,12 +9,12 @@ import numpy as np
 from crosscheck.calibration.all_effects import covariance
 from crosscheck.calibration.exact import Refit
 from crosscheck.calibration.gram import Gram
+from crosscheck.calibration.joining import amplitudes
 from crosscheck.calibration.joint import JointFit, Setting
-from crosscheck.calibration.later import amplitudes
 from crosscheck.calibration.leave_out import leave_out
 from crosscheck.calibration.linearised import free_of, linearised
 from crosscheck.calibration.refits import Found
-from crosscheck.calibration.search import Sought
+from crosscheck.calibration.search import SetSearch
 from crosscheck.calibration.sets import Names
 from crosscheck.diagnosis.node import Node
 from crosscheck.diagnosis.order import Step
@@ -32,7 +32,7 @@ from seecr.pose import Array
 _UNSEEN = 0.98
 
 
-def way_of(sought: Sought, names: Names) -> Search:
+def way_of(sought: SetSearch, names: Names) -> Search:
     """Steps to a set of effects, each adding the effect that explains most.
 
     Args:
@@ -90,7 +90,7 @@ def directions(setting: Setting, joint: JointFit) -> int:
     return int(np.sum(power > 1.0))
 
 
-def _tried(sought: Sought) -> list[Candidate]:
+def _tried(sought: SetSearch) -> list[Candidate]:
     """Every effect tried beside the model as it stands: its fit if there is one, or linearly."""
     found, setting = sought.found, sought.calibration.setting
     out = []
@@ -106,7 +106,7 @@ def _tried(sought: Sought) -> list[Candidate]:
     return out
 
 
-def _candidate(sought: Sought, c: Candidate) -> Candidate:
+def _candidate(sought: SetSearch, c: Candidate) -> Candidate:
     found, setting = sought.found, sought.calibration.setting
     names = found.always | {c.name}
     if names in found.refits:
@@ -128,7 +128,7 @@ def _candidate(sought: Sought, c: Candidate) -> Candidate:
     )
 
 
-def _needed(sought: Sought, name: str) -> Term:
+def _needed(sought: SetSearch, name: str) -> Term:
     """The values that an effect would need by itself, in the linear model."""
     term, group = sought.catalogue.start(name), sought.found.scores.gram.groups[name]
     solved = sought.found.scores.gram.solved({name: float(group.widths[-1])})

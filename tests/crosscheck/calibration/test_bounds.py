@@ -10,7 +10,7 @@ import pytest
 from scipy import integrate
 
 from crosscheck.calibration.bounds import log_absent
-from crosscheck.calibration.equals import parameters_told
+from crosscheck.calibration.equals import parameters_counted
 from crosscheck.calibration.linearised import Linear
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
@@ -73,4 +73,4 @@ def test_an_effect_that_is_nothing_altogether_may_have_any_width() -> None:
 def test_what_comes_with_another_is_no_excuse(name: str, count: int) -> None:
     """Of friction's two numbers one is the cable's; a gain a drum is eight all the same."""
     layout = layout_of(effect_named(name), load_robot(model_path("demobot_cogiro")))
-    assert parameters_told(layout) == count
+    assert parameters_counted(layout) == count

@@ -12,10 +12,10 @@ from made_data import COGIRO, SIGMA, measured, term
 from crosscheck.calibration import exact, refits, search, stages
 from crosscheck.calibration.catalogue import Catalogue
 from crosscheck.calibration.colour import WHITE, chain_of
+from crosscheck.calibration.joining import layouts
 from crosscheck.calibration.joint import JointFit, Setting, settle
-from crosscheck.calibration.later import layouts
 from crosscheck.calibration.priors import widths_of
-from crosscheck.calibration.search import seek
+from crosscheck.calibration.search import search_sets
 from crosscheck.calibration.sets import Names, Scores
 from crosscheck.calibration.stages import from_given
 from crosscheck.fit.prepare import prepare
@@ -107,7 +107,7 @@ def test_the_best_of_what_was_found_elsewhere_is_tried(
     monkeypatch.setattr(search, "compare_sets", compared)
     for given in ([HIDDEN.without("cable_weight"), HIDDEN], []):
         with pytest.raises(Compared):
-            seek(problem, SIGMA, given=given)
+            search_sets(problem, SIGMA, given=given)
     assert tried == [HIDDEN]
     # what was found elsewhere may have a history, and a walk for each parameter takes minutes
     assert len(taken_as_given) >= 2 and all(taken_as_given)
@@ -123,7 +123,7 @@ def test_sets_that_were_found_elsewhere_are_compared_from_their_values(
         exact, "_linear_terms", lambda catalogue, _scores, names: nulls(catalogue, names)
     )
     one = frozenset(HIDDEN.names)
-    without, with_ = (seek(problem, SIGMA, given=g).found.refit(one) for g in ([], [HIDDEN]))
+    without, with_ = (search_sets(problem, SIGMA, given=g).found.refit(one) for g in ([], [HIDDEN]))
     assert without is not None and with_ is not None
     assert with_.joint.terms["cable_weight"].vector[0] == pytest.approx(0.2, rel=0.05)
     assert with_.score > without.score + 100.0
@@ -145,7 +145,7 @@ def test_a_challenger_that_explains_more_is_the_best_set_and_challenged_in_turn(
         sets.fitted[winner] = replace(best, names=winner, score=best.score + 5.0)
 
     monkeypatch.setattr(refits, "challenge", challenger)
-    found = seek(problem, SIGMA).found
+    found = search_sets(problem, SIGMA).found
     first, *others = challenged
     assert first >= set(HIDDEN.names)
     assert others == [{"tracker_frame", "nonlinear_elasticity"}] * len(others) != []

@@ -14,11 +14,11 @@ from crosscheck.calibration import search
 from crosscheck.calibration.alternatives import alternatives
 from crosscheck.calibration.exact import Refit
 from crosscheck.calibration.gram import ColumnGroup, gram_of
-from crosscheck.calibration.instead import Instead
+from crosscheck.calibration.imitated import Imitated
 from crosscheck.calibration.judgement import Judgement, judge, too_large
 from crosscheck.calibration.probability import all_scores, probabilities
 from crosscheck.calibration.refits import Found
-from crosscheck.calibration.search import in_place
+from crosscheck.calibration.search import with_equivalents
 from crosscheck.calibration.sets import Names, Scores
 from crosscheck.fit.reasons import DiagnosisVerdict
 from seecr.effects import Terms
@@ -157,10 +157,10 @@ def test_a_field_beside_the_best_set_alone_makes_it_many() -> None:
 def test_a_field_in_the_place_of_members_is_something_unknown() -> None:
     found = found_of({"": -9000.0, "a": -30.0, "b": -8970.0, "ab": 0.0})
     classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
-    here = Instead(6.0, frozenset("b"), "", {"a": 800.0})
+    here = Imitated(6.0, frozenset("b"), "", {"a": 800.0})
 
-    def said(instead: Instead, of: Found = found, doubted: Names = frozenset()) -> Judgement:
-        return judge(of, classes, -5.0, 1.0, doubted=doubted, instead=instead)
+    def said(in_place: Imitated, of: Found = found, doubted: Names = frozenset()) -> Judgement:
+        return judge(of, classes, -5.0, 1.0, doubted=doubted, in_place=in_place)
 
     assert said(here).verdict is DiagnosisVerdict.UNKNOWN_EFFECT
     assert (said(here).sure, said(here).imitated) == (("a",), here)
@@ -174,9 +174,9 @@ def test_a_field_in_the_place_of_members_is_something_unknown() -> None:
     assert said(here, doubted=frozenset("a")).sure == ()
     assert said(replace(here, worth={"a": 800.0, "c": 1.0})).sure == ("a",)
     # where runs left out are off, too, nothing is said of what imitates what unless one is sure
-    far = judge(found, classes, -5.0, 9.0, instead=here)
+    far = judge(found, classes, -5.0, 9.0, in_place=here)
     assert (far.sure, far.imitated) == (("a",), here)
-    far = judge(found, classes, -5.0, 9.0, instead=replace(here, worth={"a": 20.0}))
+    far = judge(found, classes, -5.0, 9.0, in_place=replace(here, worth={"a": 20.0}))
     assert (far.verdict, far.sure) == (DiagnosisVerdict.UNKNOWN_EFFECT, ())
     assert far.imitated is None
 
@@ -241,13 +241,15 @@ def test_equals_in_a_larger_set_are_looked_for_in_what_is_listed(
     found = Found(refits, refits[frozenset("abg")], base.scores, refit)
     classes = probabilities(scores_of(refits), found.best.names, NAMES, fitted=refits)
     assert classes.members[0] == ("a", "c")
-    assert in_place(found, frozenset("ab"), classes, robot, Terms()) == {frozenset("cb"): -1.0}
+    assert with_equivalents(found, frozenset("ab"), classes, robot, Terms()) == {
+        frozenset("cb"): -1.0
+    }
     assert fitted == [frozenset("cb")]
     # what has no solution and what no robot can have says nothing
     unsolved = Found(refits, found.best, base.scores, lambda _names: None)
-    assert in_place(unsolved, frozenset("ab"), classes, robot, Terms()) == {}
+    assert with_equivalents(unsolved, frozenset("ab"), classes, robot, Terms()) == {}
     monkeypatch.setattr(search, "can_be", lambda *_: False)
-    assert in_place(found, frozenset("ab"), classes, robot, Terms()) == {}
+    assert with_equivalents(found, frozenset("ab"), classes, robot, Terms()) == {}
 
 
 def scores_of(refits: dict[Names, Refit]) -> dict[Names, float]:

@@ -12,8 +12,8 @@ from scipy import special
 from crosscheck.calibration.catalogue import Catalogue
 from crosscheck.calibration.colour import WHITE, chain_of
 from crosscheck.calibration.exact import Exact
+from crosscheck.calibration.joining import promising_beside
 from crosscheck.calibration.joint import Setting, settle
-from crosscheck.calibration.later import promising_beside
 from crosscheck.calibration.priors import widths_of
 from crosscheck.calibration.sets import Scores
 from crosscheck.fit.problem import Problem

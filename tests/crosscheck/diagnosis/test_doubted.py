@@ -11,7 +11,7 @@ import pytest
 from made_data import COGIRO, measured, term
 
 import crosscheck
-from crosscheck.calibration.instead import NOT_ASKED
+from crosscheck.calibration.imitated import NOT_ASKED
 from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.verdict import is_clear
 from crosscheck.fit.possible import hardly_happens

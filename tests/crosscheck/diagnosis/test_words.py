@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from crosscheck.calibration.instead import Instead
+from crosscheck.calibration.imitated import Imitated
 from crosscheck.calibration.judgement import Judgement
 from crosscheck.calibration.varying import Varying
 from crosscheck.diagnosis.chances import Chances
@@ -54,7 +54,7 @@ def test_what_is_left_beside_what_was_found_may_hide_something() -> None:
 
 
 def test_what_imitates_something_unknown_is_told_with_where_that_shows() -> None:
-    imitated = Instead(9.0, frozenset({"length_scale", "creep"}), Varying.POSITION)
+    imitated = Imitated(9.0, frozenset({"length_scale", "creep"}), Varying.POSITION)
     said = Judgement(DiagnosisVerdict.UNKNOWN_EFFECT, (), 0.0, imitated=imitated)
     assert _sentence(said, [], 26, Chances({}, (), None, None)) == (
         "An unknown effect is more probable than creep + length_scale, which can imitate it: "

@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 from written_pages import figures_of, text_of
 
-from crosscheck.calibration.instead import Instead
+from crosscheck.calibration.imitated import Imitated
 from crosscheck.diagnosis.result import Diagnosis, NotListed
 from crosscheck.diagnosis.steps import (
     by_block,
@@ -179,7 +179,7 @@ def test_beside_something_unknown_probabilities_are_within_the_catalogue() -> No
     assert WITHIN in seen and "probability within the catalogue" in seen
     # where something imitated was weighed, they are probabilities
     assert found.chances is not None
-    weighed = replace(found.chances, imitated=Instead(9.0, frozenset({"length_scale"})))
+    weighed = replace(found.chances, imitated=Imitated(9.0, frozenset({"length_scale"})))
     unknown = replace(found, verdict=DiagnosisVerdict.UNKNOWN_EFFECT, chances=weighed)
     assert "within the catalogue" not in text_of(render(unknown)).lower()
 

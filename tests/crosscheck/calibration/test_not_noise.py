@@ -8,7 +8,12 @@ from made_data import COGIRO, measured
 
 from crosscheck.calibration.colour import WHITE, Colour, chain_of
 from crosscheck.calibration.joint import Setting, settle
-from crosscheck.calibration.strange import goes_together, most_together, side_by_side, too_large
+from crosscheck.calibration.not_noise import (
+    is_correlated,
+    most_together,
+    outliers_cluster,
+    too_large,
+)
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.state import evaluate
 from seecr import pose as seecr_pose
@@ -88,7 +93,7 @@ def test_residuals_that_agree_with_those_nearby_are_no_noise(pulled: bool) -> No
     factor = problem.noise(problem.experiment.predict(()))
     setting = Setting(problem, factor, chain_of(problem))
     joint = settle(setting, evaluate(problem, Terms(), factor), np.zeros(0), WHITE)
-    assert goes_together(setting, joint) is pulled
+    assert is_correlated(setting, joint) is pulled
 
 
 @pytest.mark.parametrize(("together", "is_noise"), [(False, True), (True, False)])
@@ -109,4 +114,4 @@ def test_outliers_of_two_sensors_in_different_rows_are_no_structure(
     factor = problem.noise(problem.experiment.predict(()))
     setting = Setting(problem, factor, chain_of(problem))
     joint = settle(setting, evaluate(problem, Terms(), factor), np.zeros(0), WHITE)
-    assert side_by_side(setting, joint) is not is_noise
+    assert outliers_cluster(setting, joint) is not is_noise

@@ -9,10 +9,10 @@ import pytest
 from made_data import COGIRO, SIGMA, measured
 
 from crosscheck.calibration.colour import WHITE, chain_of
+from crosscheck.calibration.detectable import detectable_size
 from crosscheck.calibration.field import UNKNOWN, field_of, log_odds
 from crosscheck.calibration.joint import JointFit, Setting, settle
 from crosscheck.calibration.priors import widths_of
-from crosscheck.calibration.unseen import shown_from
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.state import evaluate
 from seecr.description.mjcf import load_robot
@@ -36,7 +36,7 @@ def joint_fit() -> tuple[Setting, JointFit]:
 @pytest.mark.slow
 def test_nine_in_ten_fields_of_that_size_are_seen_and_few_of_a_third() -> None:
     setting, joint = joint_fit()
-    size = shown_from(setting, joint, joint.jacobian, joint.width)
+    size = detectable_size(setting, joint, joint.jacobian, joint.width)
     assert size is not None
     shown = size["position_rms_m"]
     assert shown is not None and size["tension_rms_N"] is None
@@ -63,4 +63,4 @@ def test_nine_in_ten_fields_of_that_size_are_seen_and_few_of_a_third() -> None:
 def test_what_the_catalogue_fits_whole_hides_at_any_size() -> None:
     setting, joint = joint_fit()
     field = field_of(setting.problem, joint.state.prediction.pose[:, :3])
-    assert shown_from(setting, joint, field, np.full(field.shape[1], 1e4)) is None
+    assert detectable_size(setting, joint, field, np.full(field.shape[1], 1e4)) is None

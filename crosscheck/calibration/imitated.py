@@ -25,7 +25,7 @@ from crosscheck.calibration.varying import Varying, varying
 
 
 @dataclass(frozen=True, eq=False)
-class Instead:
+class Imitated:
     """A field in place of some members of a set.
 
     Attributes:
@@ -47,12 +47,12 @@ class Instead:
         return float(special.expit(self.odds - UNKNOWN)) if self.odds > UNKNOWN else 0.0
 
 
-NOT_ASKED = Instead(-np.inf, frozenset())
+NOT_ASKED = Imitated(-np.inf, frozenset())
 
 
-def field_instead(
+def field_in_place(
     setting: Setting, joint: JointFit, widths: Mapping[str, float], scores: Scores
-) -> Instead:
+) -> Imitated:
     """The members of a set that a field replaces best.
 
     Members that cost more evidence than they gain are dropped first. The others are dropped one
@@ -71,7 +71,7 @@ def field_instead(
         name = max(tried, key=lambda n: tried[n][0])
         rest, (total, seen) = rest - {name}, tried[name]
         if total - without > best.odds:
-            best = Instead(total - without, whole - rest, seen)
+            best = Imitated(total - without, whole - rest, seen)
     if not best.chance:
         return best
     rest, total = whole - best.replaced, without + best.odds

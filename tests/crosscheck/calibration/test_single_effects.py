@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from made_data import COGIRO, measured, term
 
-from crosscheck.calibration.alone import fitted_alone
 from crosscheck.calibration.colour import WHITE, chain_of
+from crosscheck.calibration.joining import layouts
 from crosscheck.calibration.joint import JointFit, Setting, settle
-from crosscheck.calibration.later import layouts
+from crosscheck.calibration.single_effects import fitted_alone
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.state import evaluate
 from seecr.description.mjcf import load_robot

@@ -14,11 +14,11 @@ from scipy import special, stats
 from crosscheck.calibration.colour import WHITE, chain_of
 from crosscheck.calibration.field import FIELD_WIDTHS, UNKNOWN, field_of
 from crosscheck.calibration.gram import ColumnGroup, gram_of
-from crosscheck.calibration.instead import NOT_ASKED, Instead, _Sets, _with_fields, field_instead
+from crosscheck.calibration.imitated import NOT_ASKED, Imitated, _Sets, _with_fields, field_in_place
 from crosscheck.calibration.joint import JointFit, Setting, settle
 from crosscheck.calibration.priors import widths_of
 from crosscheck.calibration.probability import Classes
-from crosscheck.calibration.search import seek
+from crosscheck.calibration.search import search_sets
 from crosscheck.calibration.sets import Scores, log_prior
 from crosscheck.calibration.varying import Varying, varying
 from crosscheck.diagnosis.verdict import diagnose
@@ -61,7 +61,7 @@ def averaged_density(y: Array, columns: Array, widths: tuple[float, ...]) -> flo
 def test_the_odds_are_those_of_the_covariances() -> None:
     setting, joint = fitted(term(ROBOT, "tracker_scale", factor=1.003))
     scores = Scores(gram_of(joint.jacobian, joint.state.white, {}), 26)
-    found = field_instead(setting, joint, {"tracker_scale": 0.3}, scores)
+    found = field_in_place(setting, joint, {"tracker_scale": 0.3}, scores)
     y = joint.state.white + joint.jacobian @ joint.z
     parts = varying(setting, joint)
     fields = [averaged_density(y, columns, FIELD_WIDTHS) for columns in parts.values()]
@@ -78,9 +78,9 @@ def test_of_a_model_nothing_is_replaced() -> None:
     scores = Scores(
         gram_of(joint.jacobian, joint.state.white, {}), 26, frozenset(joint.terms.names)
     )
-    assert field_instead(setting, joint, {}, scores) == NOT_ASKED
+    assert field_in_place(setting, joint, {}, scores) == NOT_ASKED
     setting, joint = fitted()
-    assert field_instead(setting, joint, {}, scores) == NOT_ASKED
+    assert field_in_place(setting, joint, {}, scores) == NOT_ASKED
 
 
 def widening(terms: list[Term], times: float) -> Measurements:
@@ -117,7 +117,7 @@ def test_what_steps_find_is_asked_too() -> None:
     data = widening([], 8.0)
     ready = prepare(ROBOT, data, Terms(), FEW)
     assert ready.refusal is None
-    sought = seek(ready.problem, SIGMA)
+    sought = search_sets(ready.problem, SIGMA)
     assert sought.judgement.imitated is not None and sought.judgement.sure == ()
     assert diagnose(ROBOT, data, only=FEW).verdict is DiagnosisVerdict.UNKNOWN_EFFECT
 
@@ -202,11 +202,11 @@ def toy(worthless: float = 0.0) -> tuple[_Sets, Array, Array]:
     return _Sets(gram, ["field"], Scores(gram, 26), chosen, dict.fromkeys(chosen, 0.0)), x, y
 
 
-def asked(sets: _Sets, monkeypatch: pytest.MonkeyPatch, **of: Any) -> Instead:
-    """`field_instead` of given sets."""
+def asked(sets: _Sets, monkeypatch: pytest.MonkeyPatch, **of: Any) -> Imitated:
+    """`field_in_place` of given sets."""
     monkeypatch.setattr(_Sets, "of", lambda *_: sets)
     joint = SimpleNamespace(terms=SimpleNamespace(names=tuple(sets.chosen)))
-    return field_instead(cast(Setting, None), cast(JointFit, joint), {}, sets.scores)
+    return field_in_place(cast(Setting, None), cast(JointFit, joint), {}, sets.scores)
 
 
 def test_what_it_replaces_and_what_the_others_are_worth_are_those_of_the_covariances(

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from crosscheck.calibration.joining import inside, promising_beside
 from crosscheck.calibration.joint import JointFit, Setting, settle
-from crosscheck.calibration.later import inside, promising_beside
 from crosscheck.calibration.priors import widths_of
 from crosscheck.fit.state import evaluate
 from seecr.effects import Term, Terms

@@ -13,7 +13,7 @@ from made_data import COGIRO, SIGMA, measured, term
 from crosscheck.calibration import refits, search
 from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.judgement import Judgement, judge
-from crosscheck.calibration.search import Sought, seek
+from crosscheck.calibration.search import SetSearch, search_sets
 from crosscheck.diagnosis.explained import MORE, explained
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.reasons import DiagnosisVerdict, Why
@@ -33,11 +33,11 @@ FEW = (
 )  # fmt: skip
 
 
-def sought(terms: list[Term]) -> Sought:
+def sought(terms: list[Term]) -> SetSearch:
     data = measured(ROBOT, terms, points=10)
     ready = prepare(ROBOT, data, Terms(), considered(FEW))
     assert ready.refusal is None
-    return seek(ready.problem, SIGMA)
+    return search_sets(ready.problem, SIGMA)
 
 
 def test_where_nothing_is_missing_nothing_is_named() -> None:
@@ -74,7 +74,7 @@ def test_structure_beside_all_effects_is_nothing_unknown_if_few_effects_leave_no
     """The fit of all effects may have ended in a local minimum that few effects do not have."""
     asked, compared = list[int](), list[int]()
 
-    def is_strange(_setting: Setting, joint: JointFit, _stated: object) -> bool:
+    def is_not_noise(_setting: Setting, joint: JointFit, _stated: object) -> bool:
         asked.append(len(joint.terms.names))
         return len(joint.terms.names) == len(FEW)
 
@@ -82,7 +82,7 @@ def test_structure_beside_all_effects_is_nothing_unknown_if_few_effects_leave_no
         compared.append(args[5])
         return refits.compare_sets(*args)
 
-    monkeypatch.setattr(search, "is_strange", is_strange)
+    monkeypatch.setattr(search, "is_not_noise", is_not_noise)
     monkeypatch.setattr(search, "compare_sets", compare_sets)
     found = sought([term(ROBOT, "pulley_radius", radius_m=0.006)])
     assert asked == [len(FEW), 1, 1]
@@ -123,7 +123,7 @@ def test_what_a_set_leaves_is_asked_of_a_field(monkeypatch: pytest.MonkeyPatch) 
     assert explained(replace(found, judgement=few), []).sentence.startswith("A few effects")
 
 
-def assert_a_model_by_itself(found: Sought) -> None:
+def assert_a_model_by_itself(found: SetSearch) -> None:
     """Of effects that are found alone the values are the best without those not listed."""
     one = Judgement(DiagnosisVerdict.EFFECTS_FOUND, ("gravity_tilt",), 0.0)
     (listed,) = explained(replace(found, judgement=one), []).missing
@@ -133,7 +133,7 @@ def assert_a_model_by_itself(found: Sought) -> None:
     assert listed.values != pytest.approx(both, rel=0.2)
 
 
-def assert_open_which(found: Sought) -> None:
+def assert_open_which(found: SetSearch) -> None:
     """As it is told where others explain as well, so that none is sure."""
     best = found.found.best
     pair = frozenset({"backlash", "drum_gain"})
@@ -146,7 +146,7 @@ def assert_open_which(found: Sought) -> None:
     assert any(line.endswith("(gravity_tilt)") for line in said.measure_next)
 
 
-def assert_not_beyond_doubt(found: Sought) -> None:
+def assert_not_beyond_doubt(found: SetSearch) -> None:
     """As it is told where nothing else explains as well, and yet none is sure."""
     none = Judgement(DiagnosisVerdict.MANY_EFFECTS, (), 0.0)
     said = explained(replace(found, judgement=none), [])
@@ -157,14 +157,14 @@ def assert_not_beyond_doubt(found: Sought) -> None:
         assert any(line.endswith(f"({name})") for line in said.measure_next)
 
 
-def value_of(found: Sought, names: set[str]) -> list[float]:
+def value_of(found: SetSearch, names: set[str]) -> list[float]:
     """The tilt in a model of some effects."""
     refit = found.found.refit(frozenset(names))
     assert refit is not None
     return list(refit.joint.terms["gravity_tilt"].vector)
 
 
-def assert_shown_as_many(found: Sought) -> None:
+def assert_shown_as_many(found: SetSearch) -> None:
     """As it is told where only one of the two effects carries enough to be sure of."""
     many = Judgement(DiagnosisVerdict.MANY_EFFECTS, ("gravity_tilt",), 0.0)
     said = explained(replace(found, judgement=many), [])

@@ -23,7 +23,7 @@ _DRAWN, _SEEN = 100, 0.9
 _SIZES = np.geomspace(0.03, 300.0, 81)
 
 
-def shown_from(setting: Setting, joint: JointFit, columns: Array, width: Array) -> Rms | None:
+def detectable_size(setting: Setting, joint: JointFit, columns: Array, width: Array) -> Rms | None:
     """The rms size, by kind of reading, from which on a smooth unknown effect is seen.
 
     Args:

@@ -34,7 +34,7 @@ _ESTIMATED, _DRIFT = 5.0, 0.9
 _MOST, _CHANCE = 0.15, 1e-3
 
 
-def is_strange(setting: Setting, joint: JointFit, stated: Collection[str]) -> bool:
+def is_not_noise(setting: Setting, joint: JointFit, stated: Collection[str]) -> bool:
     """Whether what a fit takes for noise is not noise.
 
     Args:
@@ -43,8 +43,8 @@ def is_strange(setting: Setting, joint: JointFit, stated: Collection[str]) -> bo
     """
     return (
         too_large(joint.colour, np.bincount(setting.chain.kind, minlength=len(KINDS)), stated)
-        or side_by_side(setting, joint)
-        or goes_together(setting, joint)
+        or outliers_cluster(setting, joint)
+        or is_correlated(setting, joint)
     )
 
 
@@ -75,7 +75,7 @@ def most_together(rho: float, readings: int) -> float:
     return max(_TOGETHER, float(_HALF * np.exp(_ERRORS * error)))
 
 
-def side_by_side(setting: Setting, joint: JointFit) -> bool:
+def outliers_cluster(setting: Setting, joint: JointFit) -> bool:
     """Whether outliers are too many, or neighbours of each other more often than by chance.
 
     Each kind of reading is judged by itself: two sensors that fail now and then, each on its own,
@@ -99,7 +99,7 @@ def side_by_side(setting: Setting, joint: JointFit) -> bool:
     return False
 
 
-def goes_together(setting: Setting, joint: JointFit) -> bool:
+def is_correlated(setting: Setting, joint: JointFit) -> bool:
     """Whether whitened residuals are still correlated with those nearby."""
     left = joint.whitened(setting.chain, joint.state.white)
     return whiteness(setting.problem, left, 0).structured
