@@ -145,6 +145,8 @@ def test_a_challenger_that_explains_more_is_the_best_set_and_challenged_in_turn(
         sets.fitted[winner] = replace(best, names=winner, score=best.score + 5.0)
 
     monkeypatch.setattr(refits, "challenge", challenger)
+    # the winner has the fit of another set, so that its members cannot be looked up in it
+    monkeypatch.setattr(refits, "_is_idle", lambda _exact, _scores, _best, _name: False)
     found = search_sets(problem, SIGMA).found
     first, *others = challenged
     assert first >= set(HIDDEN.names)
