@@ -62,6 +62,11 @@ class MissingEffect(Result):
         return self.layout.effect.title
 
     @property
+    def indistinguishable(self) -> tuple[str, ...]:
+        """Names of the rivals."""
+        return tuple(rival.name for rival in self.rivals)
+
+    @property
     def layout(self) -> Layout:
         """The parameters of the effect."""
         return self.term.layout
@@ -78,22 +83,21 @@ class MissingEffect(Result):
         values = value_lines(self.layout, self.values, self.stderr, self.at_bound)
         out += [f"    {line}" for line in values]
         if self.rivals:
-            names = ", ".join(rival.name for rival in self.rivals)
-            out.append(f"    indistinguishable from: {names}")
+            out.append(f"    indistinguishable from: {', '.join(self.indistinguishable)}")
         return [*out, f"    check: {self.check}"]
 
     def records(self) -> list[Record]:
         """A record for each of its parameters: value and standard error, SI."""
-        rivals = ", ".join(rival.name for rival in self.rivals)
+        rivals = ", ".join(self.indistinguishable)
         values = value_records(self.layout, self.values, self.stderr, self.at_bound)
-        return [{**record, "cannot_be_told_from": rivals} for record in values]
+        return [{**record, "indistinguishable": rivals} for record in values]
 
     def as_json(self) -> dict[str, Any]:
         """An item of ``missing``: SI, null where a number does not exist."""
         rows = zip(self.layout.names, self.values, self.stderr, self.at_bound, strict=True)
         return {
             "effect": self.effect,
-            "indistinguishable": [rival.name for rival in self.rivals],
+            "indistinguishable": list(self.indistinguishable),
             "parameters": {
                 name: {"value": value, "stderr": error, "at_bound": bool(bound)}
                 for name, value, error, bound in rows

@@ -107,7 +107,7 @@ def none_of(tried: int) -> str:
 
 
 def _words_of(effect: MissingEffect) -> str:
-    names = ", ".join(rival.name for rival in effect.rivals)
+    names = ", ".join(effect.indistinguishable)
     alike = f" (or {names}, indistinguishable on these data)" if names else ""
     return (
         f"adding {effect.effect}{alike} removes {percent(effect.share)} of the unexplained error "

@@ -66,7 +66,7 @@ def _print_finding(console: Console, finding: MissingEffect, probability: str) -
         _MOST_PARAMETERS, "diagnosis.json",
     )  # fmt: skip
     if finding.rivals:
-        names = ", ".join(rival.name for rival in finding.rivals)
+        names = ", ".join(finding.indistinguishable)
         say(console, f"  indistinguishable from: {names}")
     say(console, f"  check: {finding.check}")
 

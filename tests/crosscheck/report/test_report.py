@@ -314,6 +314,8 @@ def test_rivals_are_named_and_framed() -> None:
 
     rival = Rival("exit_point_error", found.search.last.fit, 0.3)
     finding = replace(found.missing[0], rivals=(rival,))
+    assert finding.indistinguishable == (rival.name,)
+    assert {row["indistinguishable"] for row in finding.records()} == {rival.name}
     seen = text_of(render(replace(found, missing=(finding,))))
     assert "Indistinguishable on these data from exit_point_error" in seen
     assert seen.index("+ pulley_radius or exit_point_error") < seen.index("Missing effects")
