@@ -29,6 +29,7 @@ from crosscheck.suite.run import Run, run_suite
 from crosscheck.suite.thresholds import load_thresholds
 from seecr.compiled import columns
 from seecr.description.shipped import model_path
+from seecr.effects import catalogue
 from seecr.equilibrium import search
 from seecr.pose import quat_conjugate, quat_from_rotvec, quat_multiply
 
@@ -406,7 +407,26 @@ EFFECT_FAULTS = {
     "tracker_scale": lambda e: replace(e, factor=1.0 / e.factor),
     "tension_scale": lambda e: replace(e, factor=1.001 * e.factor),
     "drum_gain": lambda e: replace(e, gain=0.0 * e.gain),
+    "length_scale": lambda e: replace(e, factor=1.001 * e.factor),
+    "cable_length_offset": lambda e: replace(e, offset=np.roll(e.offset, 1)),
+    "initial_pose_error": lambda e: replace(e, position=-e.position),
+    "drum_eccentricity": lambda e: replace(e, sine=e.cosine, cosine=e.sine),
+    "backlash": lambda e: replace(e, gap=1.01 * e.gap),
+    "thermal_expansion": lambda e: replace(e, zero_temperature=e.zero_temperature + 0.1),
+    "stiffness": lambda e: replace(e, factor=1.001 * e.factor),
+    "nonlinear_elasticity": lambda e: replace(e, cubic=0.0 * e.cubic),
+    "winch_side_length": lambda e: replace(e, length=1.001 * e.length),
+    "cable_weight": lambda e: replace(e, weight=1.001 * e.weight),
+    "hysteresis": lambda e: replace(e, stretch=1.01 * e.stretch),
+    "creep": lambda e: replace(e, time=1.01 * e.time),
+    "exit_friction": lambda e: replace(e, friction=1.01 * e.friction),
+    "anchor_point_error": lambda e: replace(e, error=np.roll(e.error, 3)),
+    "tracker_target": lambda e: replace(e, shift=1.001 * e.shift),
 }
+
+
+def test_every_effect_has_a_planted_error() -> None:
+    assert EFFECT_FAULTS.keys() == catalogue().keys()
 
 
 @pytest.mark.parametrize("name", EFFECT_FAULTS)
