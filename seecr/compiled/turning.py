@@ -349,3 +349,23 @@ def turn_batch(
                 copy_vector(state[1], best_values[r])
             if not farther:
                 break
+
+
+@jit_allocating
+def straight_balance_batch(cables, load, rows, poses, length, matrices, loads):
+    """The balance of free platforms on straight cables at k poses; fills the last two.
+
+    Args:
+        cables: (n, m, N_COLUMNS). load: (n, N_LOAD). rows: (k,) which of these each pose is for.
+        poses: (k, 7). length: [m].
+        matrices: (k, 6, m), loads: (k, 6) [N], torques over the length: matrix tau = load.
+    """
+    m, d = cables.shape[1], loads.shape[1]
+    space, place = make_turning_space(m, d, 0, 3), np.zeros(7)
+    place[3] = 1.0
+    for r in range(poses.shape[0]):
+        _balance(cables[rows[r]], load[rows[r]], poses[r], place, length, space)
+        for k in range(d):
+            loads[r, k] = space[4][k]
+            for i in range(m):
+                matrices[r, k, i] = space[3][i, k]

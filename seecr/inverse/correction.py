@@ -15,6 +15,7 @@ from seecr.description.given import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.effects.base import Effect
 from seecr.errors import InputError
+from seecr.holding.balance import is_straight, straight_balance
 from seecr.holding.distribution import tension_limits, wanted_tensions
 from seecr.holding.hanging import least_of_heavy
 from seecr.holding.inside import balances, counted_balance
@@ -382,11 +383,16 @@ class _Search:
 
     def _reaching(self, rows: NDArray[np.intp], scale: Array, *, fix_position: bool) -> Reaching:
         """The problem of the nearest poses for some rows."""
-        limits = self.limits
+        limits, mine = self.limits, self.given.rows(rows)
+        home = np.tile(self.robot.reference_pose, (len(rows), 1))
+        own = self._tables(mine)
+        straight = is_straight(own, self._tables(replace(mine, pose=home)))
 
         def balance(
             poses: Array, some: NDArray[np.intp], about: Array | None = None
         ) -> tuple[Array, Array]:
+            if straight:
+                return straight_balance(own, some, poses)
             part = replace(self.given.rows(rows[some]), pose=poses)
             return counted_balance(self._tables(part), limits.low, limits.high, about)
 
