@@ -9,7 +9,6 @@ and the others start from their results; any orientation will do.
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from seecr.compiled.columns import LIFT, RADIUS, WEIGHT
 from seecr.inverse.nearest.firm import part_of
@@ -62,6 +61,8 @@ def _apart(rows: Rows) -> Rows:
 
 def _from_neighbours(best: Best, rows: Rows, fresh: Rows) -> Rows:
     """Try the results at the nearest fresh positions; returns the rows that were solved by it."""
+    from scipy.spatial import cKDTree  # takes a while to import
+
     problem, place = best.problem, best.problem.wanted[:, :3]
     near = cKDTree(place[fresh]).query(place[rows], k=min(_NEIGHBOURS, len(fresh)))[1]
     near = near.reshape(len(rows), -1)

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from seecr.description.robot import Robot
 from seecr.pose import Array, quat_conjugate, quat_from_rotvec, quat_multiply
@@ -122,6 +121,8 @@ def _search_all(out: Turned, near: Rows, asked: NDArray[np.bool_], count: int) -
 
 def _neighbours(places: Array) -> Rows:
     """(n, k) the nearest other positions of each."""
+    from scipy.spatial import cKDTree  # takes a while to import
+
     count = min(_NEIGHBOURS + 1, len(places))
     near = cKDTree(places).query(places, k=count)[1].reshape(len(places), -1)
     return np.asarray(near[:, 1:], dtype=np.intp)
