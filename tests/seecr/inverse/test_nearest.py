@@ -10,6 +10,7 @@ from seecr.description.joints import pose_of_values
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.effects.cable import CableWeight
+from seecr.errors import InputError
 from seecr.inverse.correction import correct
 from seecr.inverse.nearest import search
 from seecr.inverse.nearest.problem import Curved, Reaching
@@ -199,3 +200,12 @@ def test_every_position_at_which_a_bar_can_rest_is_kept() -> None:
         found = correct(bar, [x, 0.0, z, 1.0, 0.0, 0.0, 0.0], prefer="position")
         assert len(roots) == 1 and found.stays.all()
         assert np.abs(found.solution.pose[0, :3] - [x, 0.0, z]).max() < 1e-9
+
+
+def test_a_pose_so_far_away_that_rounding_is_longer_than_the_robot_is_refused() -> None:
+    """Turned poses about it end in numbers that are none, of which no singular values are found."""
+    robot = load_robot(model_path("planar_vertical"))
+    pose = robot.reference_pose.copy()
+    pose[0] = 1e20
+    with pytest.raises(InputError, match=r"cannot reach commanded pose 0, it is off by"):
+        correct(robot, pose[None])
