@@ -14,6 +14,7 @@ from seecr.errors import InputError
 from seecr.inverse.correction import correct
 from seecr.inverse.nearest import search
 from seecr.inverse.nearest.problem import Curved, Reaching
+from seecr.inverse.nearest.screen import spread
 from seecr.planar import bar_equilibria
 from seecr.pose import pose_difference
 from seecr.prediction.model import load_model
@@ -209,3 +210,37 @@ def test_a_pose_so_far_away_that_rounding_is_longer_than_the_robot_is_refused() 
     pose[0] = 1e20
     with pytest.raises(InputError, match=r"cannot reach commanded pose 0, it is off by"):
         correct(robot, pose[None])
+
+
+def test_starts_are_the_nearest_that_differ_in_rotation() -> None:
+    """One after the other, each compared with all that were taken; rows know nothing of others."""
+    robot = load_robot(model_path("demobot_parallel"))
+    random, most = np.random.default_rng(2), 9
+    rows = random.permutation(np.repeat([0, 2], 60))
+    away = robot.length * random.normal(size=(len(rows), 6))
+    problem = Reaching.within(
+        robot, np.tile(robot.reference_pose, (3, 1)), none_balances, none_stays,
+        (np.zeros(8), np.ones(8)), np.ones(3),
+    )  # fmt: skip
+    expected = []
+    for row in (0, 2):
+        mine = sorted(np.flatnonzero(rows == row), key=lambda j: np.linalg.norm(away[j]))
+        taken: list[int] = []
+        for gap in (0.7, 0.35, 0.175):
+            for j in mine:
+                apart = [np.linalg.norm(away[j, 3:] - away[i, 3:]) for i in taken]
+                if len(taken) < most and all(one > gap * robot.length for one in apart):
+                    taken.append(int(j))
+        expected += taken
+    assert spread(problem, away, rows, most) == expected
+    # displacements without end belong to another row, and overflow nothing here
+    huge = np.concatenate([away, np.full((1, 6), 1e150)])
+    assert spread(problem, huge, np.append(rows, 1), most)[:most] == expected[:most]
+
+
+def none_balances(*_: object) -> tuple[np.ndarray, np.ndarray]:
+    raise AssertionError("nothing is balanced here")
+
+
+def none_stays(*_: object) -> np.ndarray:
+    raise AssertionError("nothing has to stay here")
