@@ -1,10 +1,10 @@
 """Barriers: the height of the lowest pass between two equilibria of one command.
 
-The way of least energy by the string method (E, Ren and Vanden-Eijnden, J. Chem. Phys. 126, 164103,
-2007), its images moved across the way by Newton's steps; its highest point made exact by following
-the one falling direction (Cerjan and Miller, J. Chem. Phys. 75, 1981). That may lead to the saddle
-between two other equilibria, so what it leads to is checked: it must be the highest point of a way
-from one to the other.
+The path of least energy by the string method (E, Ren and Vanden-Eijnden, J. Chem. Phys. 126,
+164103, 2007), its images moved across the path by Newton's steps; its highest point made exact by
+following the one falling direction (Cerjan and Miller, J. Chem. Phys. 75, 1981). That may lead to
+the saddle between two other equilibria, so what it leads to is checked: it must be the highest
+point of a path from one to the other.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ __all__ = ["Barrier", "barriers"]
 _IMAGES, _ROUNDS, _ACROSS = 33, 300, 1e-3
 # Longest steps of images [of the gap between them]; each is tried where the one before did not end.
 _PARTS = (0.5, 0.1)
-# Points between images at which the way's energy is looked at, at first and then about its highest.
+# Points between images at which the path's energy is computed, first and then about its highest.
 _FINE, _ZOOMS = 8, 3
 # Steps to the saddle at most; the longest, and the softest stiffness, over length and load.
 _STEPS, _LONGEST, _SOFTEST = 200, (0.1, 0.01), 1e-2
@@ -55,9 +55,9 @@ class Barrier(Result):
                 none.
         back: [J] needed from the other equilibrium.
         pose: (7,) at the top.
-        exact: whether the top is a saddle (balanced, with one falling direction) from which ways
+        exact: whether the top is a saddle (balanced, with one falling direction) from which paths
             that only fall, or that stay below it, lead to both equilibria. Else it is the highest
-            point of the way that was found, and the lowest way may be lower.
+            point of the path that was found, and the lowest path may be lower.
         twisted: whether the other is turned by more than a right angle from the first: pushes lead
             back and forth no more, cables lie across each other.
     """
@@ -124,11 +124,11 @@ def barriers(solution: Solution, others: Solution, i: int = 0) -> tuple[Barrier,
     if not (solution.converged[i] and others.converged.all()):
         raise InputError("barriers: expected equilibria, got a pose that is not at rest")
     one = solution.rows([i])
-    each = [_without_way(one, others.rows([k])) for k in range(len(others))]
+    each = [_known_without_path(one, others.rows([k])) for k in range(len(others))]
     open_ones = [k for k, known in enumerate(each) if known is None]
-    ways = iter(_ways(one, others.rows(open_ones))) if open_ones else iter(())
+    paths = iter(_paths(one, others.rows(open_ones))) if open_ones else iter(())
     return tuple(
-        _barrier(one, others.rows([k]), next(ways)) if known is None else known
+        _barrier(one, others.rows([k]), next(paths)) if known is None else known
         for k, known in enumerate(each)
     )
 
@@ -138,8 +138,8 @@ def _is_twisted(one: Solution, other: Solution) -> bool:
     return bool(turned > TWISTED)
 
 
-def _without_way(one: Solution, other: Solution) -> Barrier | None:
-    """The barrier if no way is needed to know it: without energies, and to the same equilibrium."""
+def _known_without_path(one: Solution, other: Solution) -> Barrier | None:
+    """The barrier if that needs no path: without energies, and to the same equilibrium."""
     if not (np.isfinite(one.energy[0]) and np.isfinite(other.energy[0])):
         nowhere, twisted = np.full(7, np.nan), _is_twisted(one, other)
         return Barrier(np.nan, np.nan, nowhere, exact=False, twisted=twisted)
@@ -149,9 +149,9 @@ def _without_way(one: Solution, other: Solution) -> Barrier | None:
     return None
 
 
-def _barrier(one: Solution, other: Solution, way: _Way) -> Barrier:
+def _barrier(one: Solution, other: Solution, path: _Path) -> Barrier:
     tables, robot = one.tables, one.robot
-    top, exact = _top(one, tables, way)
+    top, exact = _top(one, tables, path)
     height = float(evaluated(robot, tables, top).energy[0])
     own, there = float(one.energy[0]), float(other.energy[0])
     # the top is as high as both ends; only rounding puts it lower
@@ -160,7 +160,7 @@ def _barrier(one: Solution, other: Solution, way: _Way) -> Barrier:
 
 
 @dataclass(frozen=True, eq=False)
-class _Way:
+class _Path:
     """Poses (k, 7) from one equilibrium to another, and their energies (k,) [J]."""
 
     poses: Array
@@ -171,37 +171,37 @@ class _Way:
         return int(np.argmax(self.energies))
 
 
-def _ways(one: Solution, others: Solution) -> list[_Way]:
-    """Ways of least energy to b others, looked at closely; where none settled the lowest tried."""
-    out: list[_Way | None] = [None] * len(others)
+def _paths(one: Solution, others: Solution) -> list[_Path]:
+    """Paths of least energy to b others, looked at closely; where none settled the lowest tried."""
+    out: list[_Path | None] = [None] * len(others)
     left = list(range(len(others)))
     for part in _PARTS:
         every, settled = _strings(one, others.rows(left), part)
         for k, images, done in zip(left, every, settled, strict=True):
-            way, before = _closely(one, images), out[k]
-            lower = before is None or way.energies.max() < before.energies.max()
-            out[k] = way if done or lower else before
+            path, before = _closely(one, images), out[k]
+            lower = before is None or path.energies.max() < before.energies.max()
+            out[k] = path if done or lower else before
         left = [k for k, done in zip(left, settled, strict=True) if not done]
         if not left:
             break
-    return [way for way in out if way is not None]
+    return [path for path in out if path is not None]
 
 
-def _closely(one: Solution, images: Array) -> _Way:
-    """Energies on the way through images (k, 7), and between those about its highest point."""
+def _closely(one: Solution, images: Array) -> _Path:
+    """Energies on the path through images (k, 7), and between those about its highest point."""
     poses = _between(one, images)
-    way = _Way(poses, _energies(one, poses))
+    path = _Path(poses, _energies(one, poses))
     for _ in range(_ZOOMS):
-        k = way.highest
+        k = path.highest
         part = slice(max(k - 1, 0), k + 2)
-        poses = _between(one, way.poses[part])
-        ends = way.poses[: part.start], way.poses[part.stop :]
-        values = way.energies[: part.start], way.energies[part.stop :]
-        way = _Way(
+        poses = _between(one, path.poses[part])
+        ends = path.poses[: part.start], path.poses[part.stop :]
+        values = path.energies[: part.start], path.energies[part.stop :]
+        path = _Path(
             np.concatenate([ends[0], poses, ends[1]]),
             np.concatenate([values[0], _energies(one, poses), values[1]]),
         )
-    return way
+    return path
 
 
 def _between(one: Solution, poses: Array) -> Array:
@@ -215,39 +215,39 @@ def _between(one: Solution, poses: Array) -> Array:
 def _energies(one: Solution, poses: Array) -> Array:
     many = take(one.tables, np.zeros(len(poses), int))
     energies = evaluated(one.robot, many, poses).energy
-    # what has no energy is no way
+    # what has no energy is no path
     return np.where(np.isfinite(energies), energies, np.inf)
 
 
-def _top(one: Solution, tables: Tables, way: _Way) -> tuple[Array, bool]:
-    """The saddle (1, 7) over which the way leads, and True; else its highest point."""
-    highest = way.poses[[way.highest]]
+def _top(one: Solution, tables: Tables, path: _Path) -> tuple[Array, bool]:
+    """The saddle (1, 7) over which the path leads, and True; else its highest point."""
+    highest = path.poses[[path.highest]]
     for longest in _LONGEST:
         saddle, found = _saddle(one, tables, highest, longest)
-        if found and _joins(one, tables, saddle, way):
+        if found and _joins(one, tables, saddle, path):
             return saddle, True
     return highest, False
 
 
-def _joins(one: Solution, tables: Tables, saddle: Array, way: _Way) -> bool:
-    """Whether a saddle (1, 7) is the highest point of a way between the ends.
+def _joins(one: Solution, tables: Tables, saddle: Array, path: _Path) -> bool:
+    """Whether a saddle (1, 7) is the highest point of a path between the ends.
 
-    Both sides of it fall to the ends, or to where points of the way fall to up to which it is
+    Both sides of it fall to the ends, or to where points of the path fall to up to which it is
     lower than the saddle.
     """
-    height, energies = float(_energies(one, saddle)[0]), way.energies
+    height, energies = float(_energies(one, saddle)[0]), path.energies
     rounding = _ROUNDING * (float(tables.scale[0]) * one.robot.length + abs(height))
     if max(energies[0], energies[-1]) > height + rounding or energies.max() < height - rounding:
         return False
     higher = np.flatnonzero(energies > height + rounding)
     # the last points from either end that are not higher
-    last = (higher[0] - 1, higher[-1] + 1) if len(higher) else (way.highest, way.highest)
+    last = (higher[0] - 1, higher[-1] + 1) if len(higher) else (path.highest, path.highest)
     feet = [_foot(one, tables, pose) for pose in _sides(one, tables, saddle)]
-    ends = [[way.poses[[0]]], [way.poses[[-1]]]]
+    ends = [[path.poses[[0]]], [path.poses[[-1]]]]
     if _pair(one, feet, ends):
         return True
     for k, points in zip(last, ends, strict=True):
-        points.append(_foot(one, tables, way.poses[[k]]))
+        points.append(_foot(one, tables, path.poses[[k]]))
     return _pair(one, feet, ends)
 
 
@@ -276,14 +276,14 @@ def _among(one: Solution, pose: Array, others: list[Array]) -> bool:
 
 
 def _strings(one: Solution, others: Solution, longest: float) -> tuple[Array, NDArray[np.bool_]]:
-    """Images (b, k, 7) on the ways of least energy from one equilibrium to b others.
+    """Images (b, k, 7) on the paths of least energy from one equilibrium to b others.
 
     Args:
         one, others: the equilibria.
         longest: step of an image [of the gap between two].
 
     Returns:
-        the images, the equilibria at their ends, and (b,) whether they came to rest across the way.
+        the images, with the equilibria at their ends, and (b,) whether they settled.
     """
     robot, count = one.robot, len(others)
     whole = step_between(robot, others.pose, np.repeat(one.pose, count, axis=0))
@@ -300,16 +300,16 @@ def _strings(one: Solution, others: Solution, longest: float) -> tuple[Array, ND
 
 
 def _round(one: Solution, images: Array, longest: float) -> tuple[Array, NDArray[np.bool_]]:
-    """Images (b, k, 7) after a step across their ways, and which of these needed none."""
+    """Images (b, k, 7) after a step across their paths, and which of these needed none."""
     robot, (b, k) = one.robot, images.shape[:2]
     many = take(one.tables, np.zeros(b * k, int))
     softest = _SOFTEST * float(many.scale[0]) / robot.length
     at = evaluated(robot, many, images.reshape(-1, 7))
     gradient = at.gradient.reshape(b, k, -1)[:, 1:-1]
     hessian = at.hessian.reshape(b, k, *at.hessian.shape[1:])[:, 1:-1]
-    way = _steps(robot, images[:, 2:], images[:, :-2])
-    way /= np.linalg.norm(way, axis=2, keepdims=True)
-    across = np.eye(robot.n_dof) - way[..., :, None] * way[..., None, :]
+    along = _steps(robot, images[:, 2:], images[:, :-2])
+    along /= np.linalg.norm(along, axis=2, keepdims=True)
+    across = np.eye(robot.n_dof) - along[..., :, None] * along[..., None, :]
     slope = np.einsum("bnij,bnj->bni", across, gradient)
     settled = np.linalg.norm(slope, axis=2).max(axis=1) < _ACROSS * many.scale[0]
     values, vectors = np.linalg.eigh(across @ hessian @ across)
@@ -325,7 +325,7 @@ def _round(one: Solution, images: Array, longest: float) -> tuple[Array, NDArray
 
 
 def _evenly(robot: Robot, images: Array) -> Array:
-    """The same ways (b, k, 7) with evenly spaced images."""
+    """The same paths (b, k, 7) with evenly spaced images."""
     steps = _steps(robot, images[:, 1:], images[:, :-1])
     along = np.pad(np.cumsum(np.linalg.norm(steps, axis=2), axis=1), ((0, 0), (1, 0)))
     aim = np.linspace(0.0, along[:, -1], images.shape[1], axis=1)[:, 1:-1]
@@ -351,7 +351,7 @@ def _steps(robot: Robot, poses: Array, before: Array) -> Array:
 
 
 def _saddle(one: Solution, tables: Tables, pose: Array, longest: float) -> tuple[Array, bool]:
-    """The saddle (1, 7) that is reached from near it: up the softest way, down all others."""
+    """The saddle (1, 7) that is reached from near it: up the softest direction, down all others."""
     robot = one.robot
     softest = _SOFTEST * float(tables.scale[0]) / robot.length
     for _ in range(_STEPS):
