@@ -15,6 +15,9 @@ from seecr.pose import transform_points
 
 # Probabilities that a seed hides none, one and two effects.
 _SHARES = (0.2, 0.6, 0.2)
+# Only tensions show this effect, so it is drawn after all others, with this probability: the poses
+# of a seed are the same with and without tensions.
+_OF_TENSIONS, _ALSO = "tension_scale", 0.1
 # Range of sizes, in plausible sizes: for an effect with one number, and for each of several.
 _ONE, _SEVERAL = (1.0, 2.0), (0.5, 2.0)
 # A cable that softens as it stretches breaks in the end: these effects only stiffen.
@@ -60,16 +63,17 @@ def choose(
         random: of the twin's seed.
         names: these effects; None draws them.
         count: how many to draw; None draws that too.
-        tensions: whether tensions are recorded (otherwise their scale is no candidate).
+        tensions: whether tensions are recorded: then their scale may be hidden too, if ``names``
+            and ``count`` are not given. All else is drawn as without tensions.
         lacking: data needed by effects that the commands do not have, in words.
 
     Raises:
         CrosscheckError: an effect that MuJoCo has no truth for, more effects than there are, or
             effects that need data which the commands lack; those chosen by the seed are not named.
     """
-    lacking = lacking or {}
+    lacking, free = lacking or {}, names is None and count is None
     if names is None:
-        names = _drawn(robot, random, count, tensions)
+        names = _drawn(robot, random, count)
         if want := _wanted(names, lacking):
             raise CrosscheckError(
                 f"the effects that this seed hides need {want}; expected commands that have them, "
@@ -85,6 +89,8 @@ def choose(
     if len(set(names)) != len(names):
         raise CrosscheckError(f"effects {', '.join(names)}: expected each at most once")
     drawn = [_with_numbers(layout_of(effect_named(name), robot), robot, random) for name in names]
+    if tensions and free and random.random() < _ALSO:
+        drawn.append(_with_numbers(layout_of(effect_named(_OF_TENSIONS), robot), robot, random))
     return [_alike_both_ways(one) if "pulley_radius" in names else one for one in drawn]
 
 
@@ -101,9 +107,9 @@ def _wanted(names: Sequence[str], lacking: Mapping[str, str]) -> str:
     return " and ".join(words for need, words in lacking.items() if need in needs)
 
 
-def _drawn(robot: Robot, random: Generator, count: int | None, tensions: bool) -> list[str]:
-    without = set() if tensions else {"tension_scale"}
-    without |= {*CONTAINED} | (set() if _room_for_sheaves(robot) else {"pulley_radius"})
+def _drawn(robot: Robot, random: Generator, count: int | None) -> list[str]:
+    without = {_OF_TENSIONS, *CONTAINED}
+    without |= set() if _room_for_sheaves(robot) else {"pulley_radius"}
     known = [name for name in TRUE_EFFECTS if name not in without]
     if count is None:
         count = int(random.choice(len(_SHARES), p=_SHARES))

@@ -158,15 +158,20 @@ def sweeps(robot: Robot, points: int, extent: float, seed: int) -> Measurements:
 def _made_visible(
     lab: Lab, case: Measurements, hidden: Term, plain: Truth, sigma: Sigma
 ) -> tuple[Term, Truth] | None:
-    """The effect, enlarged if the noise would hide it; None if MuJoCo does not come to rest."""
-    best = None
+    """The effect, enlarged if the noise would hide it; None if MuJoCo does not come to rest.
+
+    What counts is how poses move, also if tensions are read, so that these change nothing; unless
+    the effect moves only tensions.
+    """
+    best, of_poses = None, replace(sigma, tension_N=None)
     for factor in _ENLARGED:
         one = times(hidden, factor)
         truth = lab.measure(case, [one.effect()], "with effects")
         if not _mostly(truth.at_rest & plain.at_rest):
             break
         best = one, truth
-        if Moves.of(truth, plain, sigma).max > _VISIBLE:
+        moves = Moves.of(truth, plain, of_poses)
+        if (moves if moves.max > 0.0 else Moves.of(truth, plain, sigma)).max > _VISIBLE:
             break
     return best
 

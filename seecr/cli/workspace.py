@@ -92,10 +92,9 @@ def command(
     all tensions can stay [N]. The elastic map gives at each command the platform's deviation and
     tilt, the number of slack cables, the stiffness and the softest direction. Robots with fewer
     cables than degrees of freedom are mapped by position, and their orientation is solved for;
-    their margin is 0 wherever they can be held in some orientation in which they stay, and has no
-    further meaning. With --at-least and a
-    calibrated model, each pose gets the probability that it can be held. The edge is that of the
-    poses that can be held, or with --at-least of those held with that probability.
+    their margin is that of the best orientation found in which the platform stays. With --at-least
+    and a calibrated model, each pose gets the probability that it can be held. The edge is that of
+    the poses that can be held, or with --at-least of those held with that probability.
 
     Writes map.npz, map.json, a figure of slices and map.rrd.
 

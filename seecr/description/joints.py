@@ -71,6 +71,8 @@ def _nearest(robot: Robot, poses: Array) -> Array:
         reached, screws = pose_of_values(robot, values)
         miss = pose_difference(poses, reached)
         columns = motion_columns(screws, reached[:, :3])
+        if not (np.isfinite(columns).all() and np.isfinite(miss).all()):
+            break  # so far away that rounding is longer than the robot
         step = np.einsum("nkd,nd->nk", np.linalg.pinv(columns), miss)
         values = values + step
         size = float(np.max(np.abs(step) / (1.0 + np.abs(values)), initial=0.0))
@@ -84,6 +86,7 @@ def _nearest(robot: Robot, poses: Array) -> Array:
 def _off_joints(robot: Robot, poses: Array, reached: Array) -> tuple[int, str] | None:
     """The row farthest from what the joints can reach, and its distance; None if none is."""
     miss = np.abs(pose_difference(poses, reached)) / np.repeat([robot.length, 1.0], 3)
+    miss = np.where(np.isnan(miss), np.inf, miss)
     if not np.any(miss > _OFF_MANIFOLD):
         return None
     row, part = np.unravel_index(np.argmax(miss), miss.shape)

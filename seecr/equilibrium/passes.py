@@ -1,10 +1,10 @@
 """Barriers: the height of the lowest pass between two equilibria of one command.
 
-The way of least energy by the string method (E, Ren and Vanden-Eijnden, J. Chem. Phys. 126, 164103,
-2007), its images moved across the way by Newton's steps; its highest point made exact by following
-the one falling direction (Cerjan and Miller, J. Chem. Phys. 75, 1981). That may lead to the saddle
-between two other equilibria, so what it leads to is checked: it must be the highest point of a way
-from one to the other.
+The path of least energy by the string method (E, Ren and Vanden-Eijnden, J. Chem. Phys. 126,
+164103, 2007), its images moved across the path by Newton's steps; its highest point made exact by
+following the one falling direction (Cerjan and Miller, J. Chem. Phys. 75, 1981). That may lead to
+the saddle between two other equilibria, so what it leads to is checked: it must be the highest
+point of a path from one to the other.
 """
 
 from __future__ import annotations
@@ -13,8 +13,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seecr.compiled.outcomes import TOLERANCE
+from seecr.description.robot import Robot
 from seecr.equilibrium.following import apart_from, evaluated, moved, rest_below, step_between
 from seecr.errors import InputError
 from seecr.pose import Array, pose_difference
@@ -29,7 +31,7 @@ __all__ = ["Barrier", "barriers"]
 _IMAGES, _ROUNDS, _ACROSS = 33, 300, 1e-3
 # Longest steps of images [of the gap between them]; each is tried where the one before did not end.
 _PARTS = (0.5, 0.1)
-# Points between images at which the way's energy is looked at, at first and then about its highest.
+# Points between images at which the path's energy is computed, first and then about its highest.
 _FINE, _ZOOMS = 8, 3
 # Steps to the saddle at most; the longest, and the softest stiffness, over length and load.
 _STEPS, _LONGEST, _SOFTEST = 200, (0.1, 0.01), 1e-2
@@ -53,9 +55,9 @@ class Barrier(Result):
                 none.
         back: [J] needed from the other equilibrium.
         pose: (7,) at the top.
-        exact: whether the top is a saddle (balanced, with one falling direction) from which ways
+        exact: whether the top is a saddle (balanced, with one falling direction) from which paths
             that only fall, or that stay below it, lead to both equilibria. Else it is the highest
-            point of the way that was found, and the lowest way may be lower.
+            point of the path that was found, and the lowest path may be lower.
         twisted: whether the other is turned by more than a right angle from the first: pushes lead
             back and forth no more, cables lie across each other.
     """
@@ -121,29 +123,44 @@ def barriers(solution: Solution, others: Solution, i: int = 0) -> tuple[Barrier,
         raise InputError("barriers: expected equilibria of one command, got other rest lengths")
     if not (solution.converged[i] and others.converged.all()):
         raise InputError("barriers: expected equilibria, got a pose that is not at rest")
-    return tuple(_barrier(solution.rows([i]), others.rows([k])) for k in range(len(others)))
+    one = solution.rows([i])
+    each = [_known_without_path(one, others.rows([k])) for k in range(len(others))]
+    open_ones = [k for k, known in enumerate(each) if known is None]
+    paths = iter(_paths(one, others.rows(open_ones))) if open_ones else iter(())
+    return tuple(
+        _barrier(one, others.rows([k]), next(paths)) if known is None else known
+        for k, known in enumerate(each)
+    )
 
 
-def _barrier(one: Solution, other: Solution) -> Barrier:
-    tables, robot = one.tables, one.robot
+def _is_twisted(one: Solution, other: Solution) -> bool:
     turned = np.linalg.norm(pose_difference(other.pose[0], one.pose[0])[3:])
-    twisted = bool(turned > TWISTED)
+    return bool(turned > TWISTED)
+
+
+def _known_without_path(one: Solution, other: Solution) -> Barrier | None:
+    """The barrier if that needs no path: without energies, and to the same equilibrium."""
     if not (np.isfinite(one.energy[0]) and np.isfinite(other.energy[0])):
-        return Barrier(np.nan, np.nan, np.full(7, np.nan), exact=False, twisted=twisted)
-    size = np.where(np.arange(6) < 3, 1.0 / robot.length, 1.0)
+        nowhere, twisted = np.full(7, np.nan), _is_twisted(one, other)
+        return Barrier(np.nan, np.nan, nowhere, exact=False, twisted=twisted)
+    size = np.where(np.arange(6) < 3, 1.0 / one.robot.length, 1.0)
     if np.linalg.norm(size * pose_difference(other.pose, one.pose)) < _ALIKE:
         return Barrier(0.0, 0.0, one.pose[0], exact=True, twisted=False)
-    way = _way(one, other)
-    top, exact = _top(one, tables, way)
+    return None
+
+
+def _barrier(one: Solution, other: Solution, path: _Path) -> Barrier:
+    tables, robot = one.tables, one.robot
+    top, exact = _top(one, tables, path)
     height = float(evaluated(robot, tables, top).energy[0])
     own, there = float(one.energy[0]), float(other.energy[0])
     # the top is as high as both ends; only rounding puts it lower
     height = max(height, own, there)
-    return Barrier(height - own, height - there, top[0], exact, twisted)
+    return Barrier(height - own, height - there, top[0], exact, _is_twisted(one, other))
 
 
 @dataclass(frozen=True, eq=False)
-class _Way:
+class _Path:
     """Poses (k, 7) from one equilibrium to another, and their energies (k,) [J]."""
 
     poses: Array
@@ -154,32 +171,37 @@ class _Way:
         return int(np.argmax(self.energies))
 
 
-def _way(one: Solution, other: Solution) -> _Way:
-    """The way of least energy, looked at closely; of ways that did not settle the lowest."""
-    ways = []
+def _paths(one: Solution, others: Solution) -> list[_Path]:
+    """Paths of least energy to b others, looked at closely; where none settled the lowest tried."""
+    out: list[_Path | None] = [None] * len(others)
+    left = list(range(len(others)))
     for part in _PARTS:
-        images, settled = _string(one, other, part)
-        ways.append(_closely(one, images))
-        if settled:
-            return ways[-1]
-    return min(ways, key=lambda way: float(way.energies.max()))
+        every, settled = _strings(one, others.rows(left), part)
+        for k, images, done in zip(left, every, settled, strict=True):
+            path, before = _closely(one, images), out[k]
+            lower = before is None or path.energies.max() < before.energies.max()
+            out[k] = path if done or lower else before
+        left = [k for k, done in zip(left, settled, strict=True) if not done]
+        if not left:
+            break
+    return [path for path in out if path is not None]
 
 
-def _closely(one: Solution, images: Array) -> _Way:
-    """Energies on the way through images (k, 7), and between those about its highest point."""
+def _closely(one: Solution, images: Array) -> _Path:
+    """Energies on the path through images (k, 7), and between those about its highest point."""
     poses = _between(one, images)
-    way = _Way(poses, _energies(one, poses))
+    path = _Path(poses, _energies(one, poses))
     for _ in range(_ZOOMS):
-        k = way.highest
+        k = path.highest
         part = slice(max(k - 1, 0), k + 2)
-        poses = _between(one, way.poses[part])
-        ends = way.poses[: part.start], way.poses[part.stop :]
-        values = way.energies[: part.start], way.energies[part.stop :]
-        way = _Way(
+        poses = _between(one, path.poses[part])
+        ends = path.poses[: part.start], path.poses[part.stop :]
+        values = path.energies[: part.start], path.energies[part.stop :]
+        path = _Path(
             np.concatenate([ends[0], poses, ends[1]]),
             np.concatenate([values[0], _energies(one, poses), values[1]]),
         )
-    return way
+    return path
 
 
 def _between(one: Solution, poses: Array) -> Array:
@@ -193,35 +215,44 @@ def _between(one: Solution, poses: Array) -> Array:
 def _energies(one: Solution, poses: Array) -> Array:
     many = take(one.tables, np.zeros(len(poses), int))
     energies = evaluated(one.robot, many, poses).energy
-    # what has no energy is no way
+    # what has no energy is no path
     return np.where(np.isfinite(energies), energies, np.inf)
 
 
-def _top(one: Solution, tables: Tables, way: _Way) -> tuple[Array, bool]:
-    """The saddle (1, 7) over which the way leads, and True; else its highest point."""
-    highest = way.poses[[way.highest]]
+def _top(one: Solution, tables: Tables, path: _Path) -> tuple[Array, bool]:
+    """The saddle (1, 7) over which the path leads, and True; else its highest point."""
+    highest = path.poses[[path.highest]]
     for longest in _LONGEST:
         saddle, found = _saddle(one, tables, highest, longest)
-        if found and _joins(one, tables, saddle, way):
+        if found and _joins(one, tables, saddle, path):
             return saddle, True
     return highest, False
 
 
-def _joins(one: Solution, tables: Tables, saddle: Array, way: _Way) -> bool:
-    """Whether a saddle (1, 7) is the highest point of a way between the ends.
+def _joins(one: Solution, tables: Tables, saddle: Array, path: _Path) -> bool:
+    """Whether a saddle (1, 7) is the highest point of a path between the ends.
 
-    Both sides of it fall to the ends, or to where points of the way fall to up to which it is
+    Both sides of it fall to the ends, or to where points of the path fall to up to which it is
     lower than the saddle.
     """
-    height, energies = float(_energies(one, saddle)[0]), way.energies
+    height, energies = float(_energies(one, saddle)[0]), path.energies
     rounding = _ROUNDING * (float(tables.scale[0]) * one.robot.length + abs(height))
     if max(energies[0], energies[-1]) > height + rounding or energies.max() < height - rounding:
         return False
     higher = np.flatnonzero(energies > height + rounding)
     # the last points from either end that are not higher
-    last = (higher[0] - 1, higher[-1] + 1) if len(higher) else (way.highest, way.highest)
+    last = (higher[0] - 1, higher[-1] + 1) if len(higher) else (path.highest, path.highest)
     feet = [_foot(one, tables, pose) for pose in _sides(one, tables, saddle)]
-    ends = [_feet_of(one, tables, way, k, end) for k, end in zip(last, (0, -1), strict=True)]
+    ends = [[path.poses[[0]]], [path.poses[[-1]]]]
+    if _pair(one, feet, ends):
+        return True
+    for k, points in zip(last, ends, strict=True):
+        points.append(_foot(one, tables, path.poses[[k]]))
+    return _pair(one, feet, ends)
+
+
+def _pair(one: Solution, feet: list[Array], ends: list[list[Array]]) -> bool:
+    """Whether one foot is among the points of the first end, and the other among the second's."""
     return any(
         _among(one, first, ends[0]) and _among(one, second, ends[1])
         for first, second in (feet, feet[::-1])
@@ -240,63 +271,87 @@ def _foot(one: Solution, tables: Tables, pose: Array) -> Array:
     return rest_below(one.robot, tables, pose)
 
 
-def _feet_of(one: Solution, tables: Tables, way: _Way, last: int, end: int) -> list[Array]:
-    """An end of the way, and where the last point falls to that it leads to from there."""
-    return [way.poses[[end]], _foot(one, tables, way.poses[[last]])]
-
-
 def _among(one: Solution, pose: Array, others: list[Array]) -> bool:
     return any(apart_from(one.robot, pose, other) < _ALIKE * one.robot.length for other in others)
 
 
-def _string(one: Solution, other: Solution, longest: float) -> tuple[Array, bool]:
-    """Images (k, 7) on the way of least energy, the two equilibria at its ends.
+def _strings(one: Solution, others: Solution, longest: float) -> tuple[Array, NDArray[np.bool_]]:
+    """Images (b, k, 7) on the paths of least energy from one equilibrium to b others.
 
     Args:
-        one, other: the two equilibria.
+        one, others: the equilibria.
         longest: step of an image [of the gap between two].
 
     Returns:
-        the images, and whether they came to rest across the way.
+        the images, with the equilibria at their ends, and (b,) whether they settled.
     """
-    robot, many = one.robot, take(one.tables, np.zeros(_IMAGES, int))
-    softest = _SOFTEST * float(many.scale[0]) / robot.length
-    whole = step_between(robot, other.pose, one.pose)
-    parts = np.linspace(0.0, 1.0, _IMAGES)[:, None]
-    images = moved(robot, np.repeat(one.pose, _IMAGES, axis=0), parts * whole)
+    robot, count = one.robot, len(others)
+    whole = step_between(robot, others.pose, np.repeat(one.pose, count, axis=0))
+    parts = np.linspace(0.0, 1.0, _IMAGES)[:, None] * whole[:, None]
+    every = np.broadcast_to(one.pose, (count, _IMAGES, 7))
+    every, settled = _moved(robot, every, parts), np.zeros(count, dtype=bool)
     for _ in range(_ROUNDS):
-        at = evaluated(robot, many, images)
-        way = step_between(robot, images[2:], images[:-2])
-        way /= np.linalg.norm(way, axis=1, keepdims=True)
-        across = np.eye(robot.n_dof) - way[:, :, None] * way[:, None, :]
-        slope = np.einsum("nij,nj->ni", across, at.gradient[1:-1])
-        if np.linalg.norm(slope, axis=1).max() < _ACROSS * many.scale[0]:
-            return images, True
-        values, vectors = np.linalg.eigh(across @ at.hessian[1:-1] @ across)
-        parts_of = np.einsum("nij,ni->nj", vectors, slope) / np.maximum(np.abs(values), softest)
-        step = -np.einsum("nij,nj->ni", vectors, parts_of)
-        gap = np.linalg.norm(step_between(robot, images[1:], images[:-1]), axis=1).mean()
-        size = np.linalg.norm(step, axis=1, keepdims=True)
-        step *= np.minimum(1.0, longest * gap / np.maximum(size, 1e-300))
-        images[1:-1] = moved(robot, images[1:-1], step)
-        images = _evenly(one, images)
-    return images, False
+        left = np.flatnonzero(~settled)
+        if len(left) == 0:
+            break
+        new, settled[left] = _round(one, every[left], longest)
+        every[left] = new
+    return every, settled
 
 
-def _evenly(one: Solution, images: Array) -> Array:
-    """The same path with evenly spaced images."""
-    steps = step_between(one.robot, images[1:], images[:-1])
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))])
-    aim = np.linspace(0.0, along[-1], len(images))[1:-1]
-    at = np.clip(np.searchsorted(along, aim, side="right") - 1, 0, len(steps) - 1)
-    part = (aim - along[at]) / np.maximum(along[at + 1] - along[at], 1e-300)
+def _round(one: Solution, images: Array, longest: float) -> tuple[Array, NDArray[np.bool_]]:
+    """Images (b, k, 7) after a step across their paths, and which of these needed none."""
+    robot, (b, k) = one.robot, images.shape[:2]
+    many = take(one.tables, np.zeros(b * k, int))
+    softest = _SOFTEST * float(many.scale[0]) / robot.length
+    at = evaluated(robot, many, images.reshape(-1, 7))
+    gradient = at.gradient.reshape(b, k, -1)[:, 1:-1]
+    hessian = at.hessian.reshape(b, k, *at.hessian.shape[1:])[:, 1:-1]
+    along = _steps(robot, images[:, 2:], images[:, :-2])
+    along /= np.linalg.norm(along, axis=2, keepdims=True)
+    across = np.eye(robot.n_dof) - along[..., :, None] * along[..., None, :]
+    slope = np.einsum("bnij,bnj->bni", across, gradient)
+    settled = np.linalg.norm(slope, axis=2).max(axis=1) < _ACROSS * many.scale[0]
+    values, vectors = np.linalg.eigh(across @ hessian @ across)
+    parts_of = np.einsum("bnij,bni->bnj", vectors, slope) / np.maximum(np.abs(values), softest)
+    step = -np.einsum("bnij,bnj->bni", vectors, parts_of)
+    gaps = np.linalg.norm(_steps(robot, images[:, 1:], images[:, :-1]), axis=2)
+    size = np.linalg.norm(step, axis=2, keepdims=True)
+    most = longest * gaps.mean(axis=1)[:, None, None]
+    step *= np.minimum(1.0, most / np.maximum(size, 1e-300))
     out = images.copy()
-    out[1:-1] = moved(one.robot, images[at], part[:, None] * steps[at])
+    out[:, 1:-1] = _moved(robot, images[:, 1:-1], step)
+    return np.where(settled[:, None, None], images, _evenly(robot, out)), settled
+
+
+def _evenly(robot: Robot, images: Array) -> Array:
+    """The same paths (b, k, 7) with evenly spaced images."""
+    steps = _steps(robot, images[:, 1:], images[:, :-1])
+    along = np.pad(np.cumsum(np.linalg.norm(steps, axis=2), axis=1), ((0, 0), (1, 0)))
+    aim = np.linspace(0.0, along[:, -1], images.shape[1], axis=1)[:, 1:-1]
+    at = np.sum(along[:, None, :] <= aim[:, :, None], axis=2) - 1
+    at = np.clip(at, 0, steps.shape[1] - 1)
+    row = np.arange(len(images))[:, None]
+    part = (aim - along[row, at]) / np.maximum(along[row, at + 1] - along[row, at], 1e-300)
+    out = images.copy()
+    out[:, 1:-1] = _moved(robot, images[row, at], part[..., None] * steps[row, at])
     return out
 
 
+def _moved(robot: Robot, poses: Array, steps: Array) -> Array:
+    """:func:`moved` for poses (b, k, 7) and steps (b, k, d)."""
+    out = moved(robot, poses.reshape(-1, 7), steps.reshape(-1, steps.shape[2]))
+    return out.reshape(poses.shape)
+
+
+def _steps(robot: Robot, poses: Array, before: Array) -> Array:
+    """:func:`step_between` for poses (b, k, 7): (b, k, d)."""
+    steps = step_between(robot, poses.reshape(-1, 7), before.reshape(-1, 7))
+    return steps.reshape(*poses.shape[:2], -1)
+
+
 def _saddle(one: Solution, tables: Tables, pose: Array, longest: float) -> tuple[Array, bool]:
-    """The saddle (1, 7) that is reached from near it: up the softest way, down all others."""
+    """The saddle (1, 7) that is reached from near it: up the softest direction, down all others."""
     robot = one.robot
     softest = _SOFTEST * float(tables.scale[0]) / robot.length
     for _ in range(_STEPS):

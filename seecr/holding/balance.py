@@ -9,12 +9,24 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from seecr.compiled.columns import EA, GAP, LIFT, REST, TENSION, WEIGHT
+from seecr.compiled.columns import (
+    ANCHOR,
+    EA,
+    EXIT,
+    GAP,
+    LIFT,
+    RADIUS,
+    REST,
+    TENSION,
+    WEIGHT,
+)
 from seecr.holding.hanging import bridged_lengths, rest_for
 from seecr.pose import Array
 from seecr.statics import batch
 from seecr.statics.tables import Tables
+from seecr.threads import in_parts
 
 # Step of a rest length for finite differences [robot's length].
 _STEP = 1e-5
@@ -147,3 +159,37 @@ def balance_of(tables: Tables, low: Array, about: Array | None = None) -> tuple[
     at = batch.evaluate(now, here(now), threads=None)
     rates = rates_of(now, at)
     return rates.by_tension, rates.load(at)
+
+
+def is_straight(tables: Tables, others: Tables) -> bool:
+    """Whether free platforms hang on straight cables whose ends and loads do not move along.
+
+    Args:
+        tables, others: of the same rows at different poses.
+    """
+    ends = [*range(EXIT, EXIT + 3), *range(ANCHOR, ANCHOR + 3)]
+    same = np.array_equal(tables.cables[..., ends], others.cables[..., ends])
+    same &= np.array_equal(tables.load, others.load)
+    free = tables.screws.shape[1] == 0
+    return bool(same and free and not np.any(tables.cables[..., [RADIUS, WEIGHT, LIFT]]))
+
+
+def straight_balance(tables: Tables, rows: NDArray[np.intp], poses: Array) -> tuple[Array, Array]:
+    """The same balance as :func:`balance_of` for poses (k, 7) of some rows (k,).
+
+    It is for tables that are :func:`is_straight`: the pulls' directions follow from the poses
+    alone, without rest lengths and tensions, ten times as fast.
+    """
+    from seecr.compiled.turning import straight_balance_batch  # takes a while to import
+
+    (m, d), k = (tables.cables.shape[1], tables.n_dof), len(poses)
+    matrices, loads, places = np.empty((k, d, m)), np.empty((k, d)), np.array(poses, order="C")
+
+    def run(part: slice) -> None:
+        straight_balance_batch(
+            tables.cables, tables.load, rows[part], places[part], tables.length,
+            matrices[part], loads[part],
+        )  # fmt: skip
+
+    in_parts(run, k)
+    return matrices, loads

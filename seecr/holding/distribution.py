@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import nnls
 
 from seecr.arguments import numbers
 from seecr.description.robot import Robot
@@ -116,6 +115,8 @@ def balanced(matrix: Array, load: Array, low: Array, high: Array) -> tuple[Array
     Args:
         matrix: (d, m). load: (d,). low, high: (m,) [N].
     """
+    from scipy.optimize import nnls  # takes a while to import
+
     scale = float(np.linalg.norm(load)) or 1.0
     bounded = np.flatnonzero(np.isfinite(high))
     d, m, k = len(load), len(low), len(bounded)

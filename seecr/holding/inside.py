@@ -273,6 +273,17 @@ def _hang(
     return rest, start.states[..., TENSION], held
 
 
+def can_balance(
+    matrices: Array, loads: Array, low: Array, high: Array, scale: Array
+) -> NDArray[np.bool_]:
+    """(n,) whether tensions within limits balance A tau = load; see :func:`innermost`."""
+    margins = _innermost(matrices, loads, low, high, scale)[0]
+    out, odd = margins >= -_BALANCED * scale, np.flatnonzero(np.isnan(margins))
+    if len(odd):
+        out[odd] = distribute(matrices[odd], loads[odd], low[odd], low[odd], high[odd])[1]
+    return np.asarray(out)
+
+
 def innermost(
     matrices: Array, loads: Array, low: Array, high: Array, scale: Array
 ) -> tuple[Array, Array]:
@@ -281,6 +292,16 @@ def innermost(
     Args:
         matrices: (n, d, m), loads: (n, d) [N]. low, high: (n, m) [N]. scale: (n,) [N].
     """
+    margins, tensions = _innermost(matrices, loads, low, high, scale)
+    for r in np.flatnonzero(np.isnan(margins)):
+        margins[r], tensions[r] = _by_search(matrices[r], loads[r], low[r], high[r])
+    return margins, tensions
+
+
+def _innermost(
+    matrices: Array, loads: Array, low: Array, high: Array, scale: Array
+) -> tuple[Array, Array]:
+    """The same; NaN where W is singular or there are too few cables."""
     from seecr.compiled.margin import innermost_of  # takes a while to import
 
     n = len(matrices)
@@ -295,8 +316,6 @@ def innermost(
             ),
             n,
         )  # fmt: skip
-    for r in np.flatnonzero(np.isnan(margins)):
-        margins[r], tensions[r] = _by_search(whole[r], load[r], low[r], high[r])
     return margins, tensions
 
 

@@ -15,6 +15,7 @@ from seecr.description.given import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.effects.base import Effect
 from seecr.errors import InputError
+from seecr.holding.balance import is_straight, straight_balance
 from seecr.holding.distribution import tension_limits, wanted_tensions
 from seecr.holding.hanging import least_of_heavy
 from seecr.holding.inside import balances, counted_balance
@@ -267,15 +268,16 @@ def correct(
     return search.run(prefer == "position")
 
 
-def held_in_place(
+def margins_in_place(
     robot: Robot, poses: Array, effects: GivenEffects, lowest: ArrayLike, highest: ArrayLike
-) -> NDArray[np.bool_]:
-    """(n,) whether positions can be held in some orientation by tensions within the limits.
+) -> Array:
+    """(n,) [N] how far inside their limits the tensions are that hold positions: for maps.
 
     Like :func:`correct` with ``prefer="position"``, but any orientation will do, and no other
-    positions are tried: for maps.
+    positions are tried. Of the orientations found, that with the largest margin counts, so a larger
+    one may exist. Minus infinity if none was found that holds and in which the platform stays.
     """
-    return _search_of(robot, poses, effects, lowest, highest, "minimum").held_in_place()
+    return _search_of(robot, poses, effects, lowest, highest, "minimum").margins_in_place()
 
 
 def _search_of(
@@ -344,17 +346,17 @@ class _Search:
             _STRAIN if np.isinf(self.limits.high).any() else None,
         )  # fmt: skip
 
-    def held_in_place(self) -> NDArray[np.bool_]:
-        """(n,) whether each position can be held, and is stable, in some orientation."""
-        held, tables = self._held(self.given)
-        aimed, lost = self.given.pose.copy(), np.flatnonzero(~held.fine)
-        if len(lost):
-            problem = self._reaching(lost, tables.scale, fix_position=True)
-            aimed[lost] = poses_in_place(problem)
+    def margins_in_place(self) -> Array:
+        """(n,) [N] margins of positions; minus infinity if they are not held or not stable."""
+        tables, rows = self._tables(self.given), np.arange(len(self.given))
+        problem = self._reaching(rows, tables.scale, fix_position=True)
+        aimed = poses_in_place(problem, tables)
         commands = replace(self.given, pose=aimed)
-        there = self._held(commands)[0] if len(lost) else held
+        there = self._held(commands)[0]
         solution = self._lengths(commands, there)[1].solution()
-        return there.fine & _rests_at(aimed, solution)
+        inside = np.minimum(there.tensions - self.limits.low, self.limits.high - there.tensions)
+        fine = there.fine & _rests_at(aimed, solution)
+        return np.where(fine, np.maximum(inside.min(axis=1), 0.0), -np.inf)
 
     def _why_not(self, lost: NDArray[np.intp], tables: Tables) -> tuple[str, ...]:
         """(n,) sentences; "" for rows that can be held."""
@@ -381,11 +383,16 @@ class _Search:
 
     def _reaching(self, rows: NDArray[np.intp], scale: Array, *, fix_position: bool) -> Reaching:
         """The problem of the nearest poses for some rows."""
-        limits = self.limits
+        limits, mine = self.limits, self.given.rows(rows)
+        home = np.tile(self.robot.reference_pose, (len(rows), 1))
+        own = self._tables(mine)
+        straight = is_straight(own, self._tables(replace(mine, pose=home)))
 
         def balance(
             poses: Array, some: NDArray[np.intp], about: Array | None = None
         ) -> tuple[Array, Array]:
+            if straight:
+                return straight_balance(own, some, poses)
             part = replace(self.given.rows(rows[some]), pose=poses)
             return counted_balance(self._tables(part), limits.low, limits.high, about)
 

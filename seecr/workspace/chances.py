@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import ndtri
 
 from seecr.commands.data import Commands
 from seecr.compiled.columns import EXTERNAL_FORCE, EXTERNAL_MOMENT
@@ -235,7 +234,8 @@ def _drawn(terms: Terms, covariance: Array, count: int) -> Array:
     error = np.sqrt(np.diag(covariance))
     unit = np.where(error > 0.0, error, 1.0)
     values, vectors = np.linalg.eigh(covariance / unit / unit[:, None])
-    from scipy.stats import qmc  # takes a second to import
+    from scipy.special import ndtri  # both take a second to import
+    from scipy.stats import qmc
 
     evenly = qmc.Sobol(len(covariance), seed=0).random(count)
     drawn = ndtri(np.clip(evenly, 1e-9, 1.0 - 1e-9))

@@ -30,8 +30,8 @@ class Workspace(Result):
         axes: the grid's x, y and z [m].
         orientation: (4,) quaternion of all poses.
         margin: [N] how far inside their limits all tensions can stay; negative if the pose cannot
-            be held. For robots with fewer cables than degrees of freedom it is zero if the position
-            can be held in some orientation in which it stays, and minus infinity if not.
+            be held. For robots with fewer cables than degrees of freedom it is that of the best
+            orientation found in which the platform stays, and minus infinity if none was found.
         deviation: (..., 3) [m] from the command to the elastic robot's equilibrium; NaN if it has
             none; float32.
         rotation: (..., 3) [rad] likewise.

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from seecr.description.robot import Robot
 from seecr.errors import InputError
-from seecr.inverse.correction import held_in_place
+from seecr.inverse.correction import margins_in_place
 from seecr.pose import Array
 from seecr.prediction.experiment import effects_of
 from seecr.prediction.model import GivenEffects, model_given
@@ -23,7 +23,7 @@ def margins_at(
 ) -> Array:  # fmt: skip
     """Margins (n,) [N]; robots with too few cables are solved for the orientation.
 
-    Their margins are 0 if the position can be held, else minus infinity.
+    Theirs are those of the best orientation found, and minus infinity if there is none.
     """
     acting = effects_of(effects, robot)
     if robot.n_cables >= robot.n_dof:
@@ -35,7 +35,7 @@ def margins_at(
             f"{robot.name} has fewer cables than degrees of freedom, so it holds no set of "
             "wrenches; expected none"
         )
-    return np.where(held_in_place(robot, poses, acting, lowest, highest), 0.0, -np.inf)
+    return margins_in_place(robot, poses, acting, lowest, highest)
 
 
 def is_held(robot: Robot, margin: Array) -> NDArray[np.bool_]:

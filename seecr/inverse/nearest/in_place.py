@@ -1,31 +1,42 @@
 """Positions that can be held in some orientation, for robots with fewer cables than freedoms.
 
-The orientation that holds changes little from one position to the next. So a full search is made
-for a few positions, and the others start from their results; any orientation will do.
+Plain cables are straight, and :mod:`seecr.inverse.nearest.turned` is all they need. With sag,
+pulleys or exit points that lift, its results are starting points: the orientation that holds
+changes little, also from one position to the next. So a full search is made for a few positions,
+and the others start from their results; any orientation will do.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
+from seecr.compiled.columns import LIFT, RADIUS, WEIGHT
 from seecr.inverse.nearest.firm import part_of
 from seecr.inverse.nearest.inward import tightened
 from seecr.inverse.nearest.problem import Reaching, Rows
 from seecr.inverse.nearest.search import Best, any_that_stays
+from seecr.inverse.nearest.turned import turned_in_place
 from seecr.pose import Array
+from seecr.statics.tables import Tables
 
 # Nearest positions whose results are tried, and how many full searches are made at once.
 _NEIGHBOURS, _AT_ONCE = 3, 8
 
 
-def poses_in_place(problem: Reaching) -> Array:
+def poses_in_place(problem: Reaching, tables: Tables) -> Array:
     """Stable poses (n, 7) at the wanted positions, if any are found.
+
     Args:
-        problem: one in which positions may not change.
+        problem: one in which positions may not change. tables: of its wanted poses.
     """
+    turned = turned_in_place(problem.robot, tables, problem.least, problem.most)
+    if not np.any(tables.cables[..., [RADIUS, WEIGHT, LIFT]]):
+        return turned.poses
     best, rows = Best.none(problem), np.arange(len(problem.wanted))
     _try_all(best, np.zeros((len(rows), len(problem.free))), rows)
+    # those of straight cables without pulleys are near
+    some = rows[turned.found & ~best.firm]
+    _try_all(best, problem.allowed(problem.to(turned.poses[some], some)), some)
     left, fresh = ~best.firm, np.flatnonzero(best.firm)
     while left.any():
         if len(fresh):
@@ -50,6 +61,8 @@ def _apart(rows: Rows) -> Rows:
 
 def _from_neighbours(best: Best, rows: Rows, fresh: Rows) -> Rows:
     """Try the results at the nearest fresh positions; returns the rows that were solved by it."""
+    from scipy.spatial import cKDTree  # takes a while to import
+
     problem, place = best.problem, best.problem.wanted[:, :3]
     near = cKDTree(place[fresh]).query(place[rows], k=min(_NEIGHBOURS, len(fresh)))[1]
     near = near.reshape(len(rows), -1)

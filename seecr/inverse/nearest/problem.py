@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from seecr.description.joints import pose_of_values, values_of_pose
 from seecr.description.robot import Robot
 from seecr.holding.distribution import balanced, distribute
+from seecr.holding.inside import can_balance
 from seecr.pose import Array, pose_add, pose_difference
 
 Rows = NDArray[np.intp]
@@ -133,8 +134,8 @@ class Reaching:
         """Whether poses (k, 7) can be held under the loads of rows."""
         if len(rows) == 0:
             return np.zeros(0, dtype=bool)
-        least = self.least[rows]
-        return distribute(*self.balance(poses, rows), least, least, self.most[rows])[1]
+        limits = self.least[rows], self.most[rows]
+        return can_balance(*self.balance(poses, rows), *limits, self.scale[rows])
 
     def lack(self, away: Array, rows: Rows) -> tuple[Array, NDArray[np.bool_]]:
         """(k,) approximate residual of the balance [load]; and whether the pose can be held."""

@@ -88,19 +88,18 @@ def spread(problem: Reaching, away: Array, rows: Rows, most: int) -> list[int]:
     """The nearest points of each row that differ in rotation from those before."""
     chosen, size = [], np.linalg.norm(away, axis=1)
     hinges, length = problem.robot.hinges, problem.robot.length
-    for row in range(len(problem.wanted)):
-        mine = np.flatnonzero(rows == row)
-        mine = mine[np.argsort(size[mine])]
+    order = np.lexsort((size, rows))
+    for mine in np.split(order, np.searchsorted(rows[order], np.arange(1, len(problem.wanted)))):
         # a platform that cannot turn is compared by position
         least = 1e-9 * length + size[mine[:1]].sum()
         unit = min(length, least) if hinges.any() else least
-        place = (away[:, hinges] if hinges.any() else away) / unit
+        place = (away[mine][:, hinges] if hinges.any() else away[mine]) / unit
+        far = np.full(len(mine), np.inf)
         taken: list[int] = []
         for gap in _APART:
-            for j in mine:
-                if len(taken) >= most:
-                    break
-                if np.all(np.linalg.norm(place[taken] - place[j], axis=1) > gap):
-                    taken.append(int(j))
+            while len(taken) < most and np.any(far > gap):
+                k = int(np.argmax(far > gap))
+                taken.append(int(mine[k]))
+                far = np.minimum(far, np.linalg.norm(place - place[k], axis=1))
         chosen += taken
     return chosen

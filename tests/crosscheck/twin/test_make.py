@@ -209,6 +209,38 @@ def test_a_seed_makes_the_same_twin_again():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 4, 7])
+def test_poses_are_the_same_with_and_without_tensions(seed):
+    alone, both = (make_twin(COGIRO, seed, points=POINTS, tensions=read) for read in (False, True))
+    np.testing.assert_array_equal(alone.measured.position, both.measured.position)
+    np.testing.assert_array_equal(alone.measured.quat_wxyz, both.measured.quat_wxyz)
+    assert (
+        np.isfinite(both.measured.tensions).any() and not np.isfinite(alone.measured.tensions).any()
+    )
+
+
+@pytest.mark.slow
+def test_an_effect_of_tensions_alone_is_still_enlarged_until_it_shows():
+    twin = make_twin(COGIRO, 3, effects=("tension_scale",), points=POINTS, tensions=True)
+    np.testing.assert_allclose(twin.truth.position, twin.measured.position, atol=1e-3)
+    assert twin.answer.moves_over_noise["tension_scale"].max > 3.0
+
+
+def test_with_tensions_their_scale_may_be_hidden_beside_what_is_hidden_without():
+    robot, seen = load_robot(COGIRO), 0
+    for seed in range(60):
+        alone, both = (
+            choose(robot, np.random.default_rng([seed, 0]), tensions=read) for read in (False, True)
+        )
+        assert [one.name for one in both[: len(alone)]] == [one.name for one in alone]
+        for one, other in zip(alone, both, strict=False):
+            np.testing.assert_array_equal(one.vector, other.vector)
+        assert [one.name for one in both[len(alone) :]] in ([], ["tension_scale"])
+        seen += len(both) - len(alone)
+    assert 1 <= seen <= 15
+
+
+@pytest.mark.slow
 def test_the_noise_says_nothing_of_what_is_hidden():
     """The same seed gives the same noise, whatever is hidden."""
     none, some = (

@@ -98,7 +98,7 @@ def test_where_there_is_no_energy_no_way_is_looked_for(monkeypatch: pytest.Monke
     pose[3:] /= np.linalg.norm(pose[3:])
     own, every = solve(robot, pose), equilibria(robot, pose)
     other = every.rows(elsewhere(own, every))
-    monkeypatch.setattr(passes, "_string", pytest.fail)
+    monkeypatch.setattr(passes, "_strings", pytest.fail)
     for energy in (own, other):
         energy.energy[:] = np.nan
         (way,) = barriers(own, other)

@@ -10,9 +10,11 @@ from seecr.description.joints import pose_of_values
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.effects.cable import CableWeight
+from seecr.errors import InputError
 from seecr.inverse.correction import correct
 from seecr.inverse.nearest import search
 from seecr.inverse.nearest.problem import Curved, Reaching
+from seecr.inverse.nearest.screen import spread
 from seecr.planar import bar_equilibria
 from seecr.pose import pose_difference
 from seecr.prediction.model import load_model
@@ -199,3 +201,46 @@ def test_every_position_at_which_a_bar_can_rest_is_kept() -> None:
         found = correct(bar, [x, 0.0, z, 1.0, 0.0, 0.0, 0.0], prefer="position")
         assert len(roots) == 1 and found.stays.all()
         assert np.abs(found.solution.pose[0, :3] - [x, 0.0, z]).max() < 1e-9
+
+
+def test_a_pose_so_far_away_that_rounding_is_longer_than_the_robot_is_refused() -> None:
+    """Turned poses about it end in numbers that are none, of which no singular values are found."""
+    robot = load_robot(model_path("planar_vertical"))
+    pose = robot.reference_pose.copy()
+    pose[0] = 1e20
+    with pytest.raises(InputError, match=r"cannot reach commanded pose 0, it is off by"):
+        correct(robot, pose[None])
+
+
+def test_starts_are_the_nearest_that_differ_in_rotation() -> None:
+    """One after the other, each compared with all that were taken; rows know nothing of others."""
+    robot = load_robot(model_path("demobot_parallel"))
+    random, most = np.random.default_rng(2), 9
+    rows = random.permutation(np.repeat([0, 2], 60))
+    away = robot.length * random.normal(size=(len(rows), 6))
+    problem = Reaching.within(
+        robot, np.tile(robot.reference_pose, (3, 1)), none_balances, none_stays,
+        (np.zeros(8), np.ones(8)), np.ones(3),
+    )  # fmt: skip
+    expected = []
+    for row in (0, 2):
+        mine = sorted(np.flatnonzero(rows == row), key=lambda j: np.linalg.norm(away[j]))
+        taken: list[int] = []
+        for gap in (0.7, 0.35, 0.175):
+            for j in mine:
+                apart = [np.linalg.norm(away[j, 3:] - away[i, 3:]) for i in taken]
+                if len(taken) < most and all(one > gap * robot.length for one in apart):
+                    taken.append(int(j))
+        expected += taken
+    assert spread(problem, away, rows, most) == expected
+    # displacements without end belong to another row, and overflow nothing here
+    huge = np.concatenate([away, np.full((1, 6), 1e150)])
+    assert spread(problem, huge, np.append(rows, 1), most)[:most] == expected[:most]
+
+
+def none_balances(*_: object) -> tuple[np.ndarray, np.ndarray]:
+    raise AssertionError("nothing is balanced here")
+
+
+def none_stays(*_: object) -> np.ndarray:
+    raise AssertionError("nothing has to stay here")

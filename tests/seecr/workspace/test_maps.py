@@ -23,9 +23,9 @@ from seecr.description.shipped import model_path
 from seecr.effects import Term
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
-from seecr.inverse.correction import correct, held_in_place
-from seecr.inverse.nearest import Reaching, in_place
-from seecr.inverse.nearest.search import Best
+from seecr.inverse import correction
+from seecr.inverse.correction import correct, margins_in_place
+from seecr.inverse.nearest.turned import Turned
 from seecr.planar import bar_tilt
 from seecr.pose import quat_from_rotvec
 from seecr.recording.workspace import write_map_recording
@@ -346,7 +346,7 @@ def test_positions_of_four_cables_are_held_where_a_correction_keeps_them() -> No
     kept = correct(robot, poses, prefer="position", highest=6.0)
     kept_there = kept.stays & (np.abs(kept.aimed[:, :3] - places).max(axis=1) < 1e-9)
     assert 0 < kept_there.sum() < len(places)
-    held = held_in_place(robot, poses, (), 0.0, 6.0)
+    held = margins_in_place(robot, poses, (), 0.0, 6.0) >= 0.0
     np.testing.assert_array_equal(held, kept_there)
     assert not kept.held[1:].any()  # only the middle is held level
 
@@ -354,30 +354,64 @@ def test_positions_of_four_cables_are_held_where_a_correction_keeps_them() -> No
 def test_an_orientation_from_which_the_platform_goes_elsewhere_does_not_hold(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    robot = only_cables(robot_named("demobot_parallel"), [0, 2, 4, 6])
-    poses = np.tile([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], (3, 1))
-    # balanced at the first two, at the first stably
-    poses[:, :3] = [[0.4, 0.25, 0.1], [0.1, 0.31, 0.42], [0.03, 0.25, 0.1]]
-    every = lambda _self, _away, rows: np.ones(len(rows), dtype=bool)  # noqa: E731
-    monkeypatch.setattr(Reaching, "rests", every)
-    assert held_in_place(robot, poses, (), 0.0, 6.0).tolist() == [True, False, False]
+    robot = robot_named("planar_two_cable")
+    below, above = robot.reference_pose[:3], [0.5, 0.0, 1.05]
+    poses = np.tile([*below, 1.0, 0.0, 0.0, 0.0], (2, 1))
+    poses[1, :3] = above  # the cables' ends are above their exit points: balanced, but not stable
+    monkeypatch.setattr(correction, "poses_in_place", lambda problem, _tables: problem.wanted)
+    held = margins_in_place(robot, poses, (), 0.0, 6.0)
+    assert held[0] > 0.0 and held[1] == -np.inf
 
 
 def test_few_positions_are_searched_in_earnest(monkeypatch: pytest.MonkeyPatch) -> None:
     """The others from their neighbours' orientations."""
-    searched, own = [], in_place.any_that_stays
+    tried, own = [], Turned.search
 
-    def counted(problem: Reaching) -> Best:
-        searched.append(len(problem.wanted))
-        return own(problem)
+    def counted(out: Turned, rows: np.ndarray, starts: Any, **how: Any) -> None:
+        if starts[0].shape[1] > 1:
+            tried.append(len(rows))
+        own(out, rows, starts, **how)
 
-    monkeypatch.setattr(in_place, "any_that_stays", counted)
+    monkeypatch.setattr(Turned, "search", counted)
     robot = only_cables(robot_named("demobot_parallel"), [0, 2, 4, 6])
-    x, y = np.meshgrid(np.linspace(0.2, 0.6, 8), np.linspace(0.15, 0.35, 8))
+    x, y = np.meshgrid(np.linspace(0.05, 0.75, 12), np.linspace(0.05, 0.45, 12))
     poses = np.tile([0.0, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0], (x.size, 1))
     poses[:, :2] = np.column_stack([x.ravel(), y.ravel()])
-    assert held_in_place(robot, poses, (), 0.0, 6.0).all()
-    assert sum(searched) < 0.3 * len(poses)
+    held = margins_in_place(robot, poses, (), 0.0, np.inf) >= 0.0
+    assert held.sum() > 0.5 * len(poses)
+    assert sum(tried) < (~held).sum() + 0.1 * len(poses)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("some", [[0, 2, 5], [0, 2, 4, 6], [0, 2, 3, 4, 6]])
+def test_platforms_that_must_turn_over_are_found(some: list[int]) -> None:
+    """Each position for itself: a search for the nearest orientation holds no more of them."""
+    robot = only_cables(robot_named("demobot_parallel"), some)
+    found = workspace_map(robot, *default_axes(robot, 5), elastic=False)
+    held = found.feasible.ravel()
+    places = np.stack(np.meshgrid(*found.axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    rows = np.concatenate([np.flatnonzero(~held)[::16], np.flatnonzero(held)[::16]])
+    poses = np.column_stack([places[rows], np.tile([1.0, 0.0, 0.0, 0.0], (len(rows), 1))])
+    other = correct(robot, poses, prefer="position")
+    there = other.stays & (np.abs(other.aimed[:, :3] - places[rows]).max(axis=1) < 1e-9)
+    assert not np.any(there & ~held[rows])
+    assert held.sum() > 10
+
+
+@pytest.mark.parametrize("name", ["planar_two_cable", "four"])
+def test_margins_of_too_few_cables_are_those_of_tensions_that_hold(name: str) -> None:
+    """A limit at which the margin was is the end: with it, nothing is left of the margin."""
+    four = name == "four"
+    robot = robot_named("demobot_parallel" if four else name)
+    robot = only_cables(robot, [0, 2, 4, 6]) if four else robot
+    poses = np.tile(robot.reference_pose, (3, 1))
+    poses[:, 0] += [0.0, 0.05 * robot.length, 0.1 * robot.length]
+    margins = margins_in_place(robot, poses, (), 0.0, np.inf)
+    assert np.all(margins > 0.1 * robot.weight)
+    for pose, margin in zip(poses, margins, strict=True):
+        less = margins_in_place(robot, pose[None], (), 0.6 * margin, np.inf)
+        np.testing.assert_allclose(less, 0.4 * margin, rtol=0.02)
+        assert margins_in_place(robot, pose[None], (), 1.05 * margin, np.inf)[0] == -np.inf
 
 
 def only_cables(robot: Robot, some: list[int]) -> Robot:

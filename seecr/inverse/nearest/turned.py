@@ -1,0 +1,193 @@
+"""Orientations in which too few cables hold a platform at many positions, for maps.
+
+The orientation that holds changes little from one position to the next. So searches from many
+orientations are made for a few positions, and the others start from their neighbours' results.
+What is found is in balance with straight cables; see :mod:`seecr.compiled.turning`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seecr.description.robot import Robot
+from seecr.pose import Array, quat_conjugate, quat_from_rotvec, quat_multiply
+from seecr.statics import batch
+from seecr.statics.tables import Tables
+from seecr.threads import in_parts
+
+Rows = NDArray[np.intp]
+
+# Neighbours of a position.
+_NEIGHBOURS = 8
+# Part of the remaining positions that get full searches at once, and no fewer than so many.
+_PART, _FEWEST = 8, 16
+# Orientations that a full search starts from, at the edge of what was found, and of these those
+# about the vertical.
+_STARTS, _MORE, _ABOUT = 24, 100, 4
+
+
+@dataclass(frozen=True, eq=False)
+class Turned:
+    """Orientations for n positions.
+
+    Attributes:
+        deviation: (n, 7) from the poses of the tables. values: (n, d) joint values minus those of
+            the tables, hinges times the robot's length.
+        margins: (n,) [N] how far all tensions are inside their limits; minus infinity if no
+            orientation was found that holds.
+    """
+
+    robot: Robot
+    tables: Tables
+    low: Array
+    high: Array
+    deviation: Array
+    values: Array
+    margins: Array
+
+    @property
+    def found(self) -> NDArray[np.bool_]:
+        """(n,) whether some orientation holds the position."""
+        return np.asarray(self.margins > -np.inf)
+
+    @property
+    def poses(self) -> Array:
+        """(n, 7), those of the tables where none was found."""
+        return batch.platform_poses(self.tables, self.deviation)
+
+    def search(self, rows: Rows, starts: tuple[Array, Array], *, farther: bool = False) -> None:
+        """Search from deviations (k, s, 7) and joint values (k, s, d) of rows (k,).
+
+        Args:
+            farther: try all starts, and turn on to where tensions are farther inside.
+        """
+        from seecr.compiled.turning import turn_batch  # takes a while to import
+
+        tables, part = self.tables, [self.deviation[rows], self.values[rows], self.margins[rows]]
+        given = (
+            tables.cables[rows], tables.load[rows], tables.poses[rows], tables.screws[rows],
+            tables.scale[rows], self.low[rows], self.high[rows],
+        )  # fmt: skip
+        first, first_values = (np.array(one, order="C") for one in starts)
+        hinges = np.array(self.robot.hinges)
+
+        def run(some: slice) -> None:
+            cables, load, poses, screws, scale, low, high = (one[some] for one in given)
+            turn_batch(
+                cables, load, poses, screws, hinges, tables.length, scale, low, high, first[some],
+                first_values[some], farther, *(one[some] for one in part),
+            )  # fmt: skip
+
+        in_parts(run, len(rows))
+        self.deviation[rows], self.values[rows], self.margins[rows] = part
+
+
+def turned_in_place(robot: Robot, tables: Tables, low: Array, high: Array) -> Turned:
+    """Orientations that hold the positions of tables with tensions within limits (n, m) [N].
+
+    Positions are those of the tables' poses; a platform on joints keeps its slides.
+    """
+    n, home = len(tables), batch.Evaluation.empty(len(tables), robot.n_cables, robot.n_dof)
+    out = Turned(robot, tables, low, high, home.deviation, home.values, np.full(n, -np.inf))
+    out.search(np.arange(n), (home.deviation[:, None].copy(), home.values[:, None].copy()))
+    near = _neighbours(tables.poses[:, :3])
+    _spread(out, near, np.flatnonzero(out.found))
+    _search_all(out, near, np.ones(n, dtype=bool), _STARTS)
+    _improve(out, near[:, :0])
+    _spread(out, near, np.flatnonzero(out.found))  # again, from farther inside
+    if robot.n_cables + int(robot.hinges.sum()) > robot.n_dof + 1:
+        # each orientation is one of many, and some of these are cut off by the limits
+        _search_all(out, near, np.any(out.found[near], axis=1), _MORE)
+    _improve(out, near)
+    return out
+
+
+def _search_all(out: Turned, near: Rows, asked: NDArray[np.bool_], count: int) -> None:
+    """Search from many orientations at those asked for (n,) that are left, a few at once."""
+    tried = out.found | ~asked
+    while True:
+        left = np.flatnonzero(~(tried | out.found))
+        if len(left) == 0:
+            return
+        many = max(_FEWEST, len(left) // _PART)
+        some = left[np.unique(np.linspace(0, len(left) - 1, many).round().astype(np.intp))]
+        out.search(some, _many_starts(out, some, count))
+        tried[some] = True
+        _spread(out, near, some[out.found[some]])
+
+
+def _neighbours(places: Array) -> Rows:
+    """(n, k) the nearest other positions of each."""
+    from scipy.spatial import cKDTree  # takes a while to import
+
+    count = min(_NEIGHBOURS + 1, len(places))
+    near = cKDTree(places).query(places, k=count)[1].reshape(len(places), -1)
+    return np.asarray(near[:, 1:], dtype=np.intp)
+
+
+def _spread(out: Turned, near: Rows, fresh: Rows) -> None:
+    """Start the neighbours of fresh results from these, and their neighbours, until none is left.
+
+    Each row tries each of its neighbours at most once, when that has just been solved.
+    """
+    while len(fresh):
+        new = np.zeros(len(near), dtype=bool)
+        new[fresh] = True
+        row, k = np.nonzero(new[near] & ~out.found[:, None])
+        for number in range(near.shape[1]):
+            some = (k == number) & ~out.found[row]
+            if np.any(some):
+                out.search(row[some], _starts_of(out, near[row[some], k[some]][:, None], row[some]))
+        fresh = np.unique(row[out.found[row]])
+
+
+def _improve(out: Turned, near: Rows) -> None:
+    """Turn rows on to where tensions are farther inside their limits.
+
+    They start from the best of their neighbours if that is better, or all from their own results
+    if no neighbours are given.
+    """
+    own = np.arange(len(near))
+    every = np.concatenate([own[:, None], near], axis=1)
+    best = every[own, np.argmax(out.margins[every], axis=1)]
+    rows = np.flatnonzero(out.found & ((best != own) | (near.shape[1] == 0)))
+    out.search(rows, _starts_of(out, best[rows, None], rows), farther=True)
+
+
+def _starts_of(out: Turned, others: Rows, rows: Rows) -> tuple[Array, Array]:
+    """The orientations of other rows (k, s) as deviations and joint values for rows (k,)."""
+    deviation = np.tile([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], (*others.shape, 1))
+    values = np.zeros((*others.shape, out.values.shape[1]))
+    hinges, tables = out.robot.hinges, out.tables
+    if out.robot.joints:
+        values[..., hinges] = out.values[others][..., hinges]
+        return deviation, values
+    turn = quat_multiply(out.deviation[others, 3:], tables.poses[others, 3:])
+    back = np.broadcast_to(quat_conjugate(tables.poses[rows, 3:])[:, None], turn.shape)
+    deviation[..., 3:] = quat_multiply(turn, back)
+    return deviation, values
+
+
+def _many_starts(out: Turned, rows: Rows, count: int) -> tuple[Array, Array]:
+    """For each of rows (k,): orientations about the vertical, and random ones, ``count`` in all."""
+    robot, random = out.robot, np.random.default_rng(count)
+    deviation = np.tile([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], (len(rows), count, 1))
+    values = np.zeros((len(rows), count, out.values.shape[1]))
+    if robot.joints:
+        hinges = np.flatnonzero(robot.hinges)
+        spread = np.linspace(-np.pi, np.pi, count, endpoint=False)
+        every = np.stack([random.permutation(spread) for _ in hinges], axis=1)
+        values[..., hinges] = robot.length * every
+        return deviation, values
+    about = 2.0 * np.pi / _ABOUT * np.arange(_ABOUT)[:, None] * robot.up
+    turn = random.normal(size=(count - _ABOUT, 4))
+    turn /= np.linalg.norm(turn, axis=1, keepdims=True)
+    home = np.broadcast_to(robot.reference_pose[3:], (_ABOUT, 4))
+    turn = np.concatenate([quat_multiply(quat_from_rotvec(about), home), turn])
+    back = quat_conjugate(out.tables.poses[rows, 3:])[:, None]
+    both = np.broadcast_shapes(back.shape, turn[None].shape)
+    deviation[..., 3:] = quat_multiply(np.broadcast_to(turn, both), np.broadcast_to(back, both))
+    return deviation, values
