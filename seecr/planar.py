@@ -128,7 +128,7 @@ def solution_manifold(
 
     Args:
         exit_points: (2, 2) [m].
-        x: (k,) [m] and y: (r,) [m], the grid.
+        x, y: (k,) and (r,) [m], the grid.
         half_length: [m].
 
     Returns:
