@@ -34,8 +34,9 @@ SI and radians throughout; quaternions are scalar first.
 Paths and loaded objects both work. `GivenRobot` is a `Robot`, the path of its MJCF, or the name of
 a shipped one; `GivenModel` and `GivenEffects` are a `Model`, the path of its TOML, or a list of
 `Term`s; `GivenData` is `Measurements`, their file, or several files; `GivenCommands` is poses
-(n, 7), a file of commands, or what was read from it; `GivenCase` is a case of the suite, the name
-of shipped ones or a pattern such as `"cogiro-*"`, or a robot.
+(n, 7), a file of commands, or what was read from it; `Commanded` is poses (n, 7),
+`seecr.Commands`, or `Measurements`; `GivenCase` is a case of the suite, the name of shipped ones
+or a pattern such as `"cogiro-*"`, or a robot.
 
 Written by `scripts/make_api.py` from the docstrings. Words that are ours are in the
 [glossary](glossary.md).
