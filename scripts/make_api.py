@@ -29,6 +29,7 @@ _HEAD = """# Names for Python
 What `import crosscheck` and `import seecr` give; a module is imported when one of its names is
 first used. Every result prints as a few readable lines, shows itself in a notebook, and gives a
 data frame with `to_frame()`: pyarrow's `Table`, or pandas' `DataFrame` where there is no pyarrow.
+`as_json()` gives a dictionary, and `to_json()` its text, with null where a number does not exist.
 SI and radians throughout; quaternions are scalar first.
 
 Paths and loaded objects both work. `GivenRobot` is a `Robot`, the path of its MJCF, or the name of

@@ -79,6 +79,10 @@ class BarRest(Result):
             f"{second:.4g} times the weight, {'stable' if self.stable else 'not stable'}"
         ]
 
+    def as_json(self) -> Record:
+        """Its only row."""
+        return self.records()[0]
+
     def records(self) -> Sequence[Record]:
         """One row; tensions in weights."""
         tensions = dict(zip(("tension_1", "tension_2"), self.tensions, strict=True))

@@ -96,3 +96,4 @@ def test_a_private_name_is_seen() -> None:
 def test_results_show_themselves(result: type) -> None:
     assert issubclass(result, Result)
     assert result.__repr__ is Result.__repr__ and result.__str__ is Result.__str__
+    assert result.to_frame is Result.to_frame and result.to_json is Result.to_json
