@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -209,16 +209,16 @@ class Diagnosis(Result):
                 "verdict": self.verdict.value,
                 "sentence": self.sentence,
                 "can_show": self.sight,
-                "missing": [found.as_json() for found in self.missing],
+                "missing": self.missing,
                 "before": self.before,
                 "after": self.after,
                 "held_out": self.held_out,
                 "noise_floor": self.floor,
                 "left_over": self.left,
-                "candidates": [candidate.as_json() for candidate in self.candidates],
+                "candidates": self.candidates,
                 "measure_next": self.measure_next,
-                "residual": None if self.whiteness is None else asdict(self.whiteness),
-                "where": [found.as_json() for found in self.where],
+                "residual": self.whiteness,
+                "where": self.where,
                 "notes": self.notes,
                 **(NOT_WEIGHED if self.chances is None else self.chances.as_json()),
             }

@@ -94,7 +94,7 @@ class Imported(Result):
             "files": [str(take.stream.path) for take in self.takes],
             "rows": self.measured.n_rows,
             "dwells": int(self.measured.read.sum()),
-            "sigma": vars(self.measured.sigma),
+            "sigma": self.measured.sigma,
             "free": list(self.frames.free),
             "tracker_to_base": {"quat_wxyz": self.frames.turn, "shift_m": self.frames.shift},
             "body_on_platform": {

@@ -150,7 +150,7 @@ class Measurements(Result):
         ):
             if getattr(self, name) is None:
                 self._set(name, np.any(np.isfinite(values), axis=0))
-        filled: dict[str, Any] = {
+        filled: dict[str, NDArray[Any]] = {
             "line": np.arange(2, n + 2),
             "stands": np.zeros(n, dtype=bool),
             "file": np.zeros(n, dtype=np.int64),

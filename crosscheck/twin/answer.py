@@ -11,6 +11,7 @@ import binascii
 import json
 import textwrap
 import zlib
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -82,7 +83,7 @@ class Answer:
         return {"hidden": self.hidden or ["null"], **asdict(self)}
 
     @classmethod
-    def of_json(cls, document: dict[str, Any]) -> Answer:
+    def of_json(cls, document: Mapping[str, Any]) -> Answer:
         """The answer that :meth:`as_json` described.
 
         Raises:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 from seecr.errors import InputFileError
-from seecr.files import read_bytes, read_text
+from seecr.files import plain, read_bytes, read_text
 
 
 def test_text_is_read_without_its_mark_and_with_plain_line_ends(tmp_path: Path) -> None:
@@ -28,3 +30,19 @@ def test_what_cannot_be_read_is_named_with_what_was_expected(tmp_path: Path) -> 
         with pytest.raises(InputFileError) as caught:
             read_text(path, "expected a list")
         assert str(caught.value) == f"{path}: {words}" and caught.value.exit_status == 2
+
+
+def test_in_json_a_dataclass_is_its_fields_unless_it_says_itself() -> None:
+    @dataclass
+    class Part:
+        size: float
+
+    @dataclass
+    class Whole:
+        part: Part
+        other: int = 3
+
+        def as_json(self) -> dict[str, object]:
+            return {"part": self.part}
+
+    assert plain(Whole(Part(math.inf))) == {"part": {"size": None}}

@@ -12,6 +12,7 @@ import pytest
 
 import seecr
 from crosscheck.errors import CrosscheckError
+from crosscheck.files import plain
 from crosscheck.settle.settler import Settling, SettlingBatch
 from crosscheck.suite import agreement, verdicts, words
 from crosscheck.suite import run as suite
@@ -219,7 +220,7 @@ def test_select_by_pattern_and_refuses_unknown_names(shipped):
 
 
 def test_shipped_thresholds_are_those_agreed():
-    found = load_thresholds().as_json()
+    found = plain(load_thresholds())
     assert found["settled"] == {"position_m": 1e-6, "orientation_rad": 1e-5}
     assert found["polished"] == {"position_m": 1e-8, "orientation_rad": 1e-7, "tension_N": 1e-6}
     assert found["findings"]["branches"] == 0
