@@ -122,7 +122,7 @@ def command(
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
-    given = _Ways(**ways)
+    given = _Commanded(**ways)
     commands, more, said, wanted = _commands(machine, poses, given)
     with staged(out, sometimes=("sweep.toml", *files_of_pictures("sweep"))) as folder:
         with progress_bar("solving", len(commands)) as tell:
@@ -175,7 +175,7 @@ _Columns = dict[str, Sequence[Any]]
 
 
 @dataclass(frozen=True)
-class _Ways:
+class _Commanded:
     """The options that say where the platform is commanded to, as typed."""
 
     line: tuple[float, ...] | None
@@ -232,7 +232,7 @@ def _solved(
 
 
 def _commands(
-    robot: Robot, poses: Path | None, given: _Ways
+    robot: Robot, poses: Path | None, given: _Commanded
 ) -> tuple[Commands, _Columns, tuple[str, ...], bool]:
     """The commands, what else their file says, notes on it, whether lengths have poses wanted."""
     from seecr import Commands, InputError
@@ -266,7 +266,7 @@ def _commands(
     return read.commands, more, notes, wanted
 
 
-def _along(robot: Robot, given: _Ways) -> NDArray[np.float64]:
+def _along(robot: Robot, given: _Commanded) -> NDArray[np.float64]:
     """Poses (n, 7) of --line or --grid."""
     import numpy as np
 
@@ -284,7 +284,7 @@ def _along(robot: Robot, given: _Ways) -> NDArray[np.float64]:
     return commanded_poses(np.column_stack([places, np.tile(turned, (len(places), 1))]))
 
 
-def _runs(robot: Robot, given: _Ways, more: _Columns) -> Sequence[int] | None:
+def _runs(robot: Robot, given: _Commanded, more: _Columns) -> Sequence[int] | None:
     """Which poses follow on each other: a column of --grid, a run of a file; None: all do."""
     if not given.grid:
         return more.get("run")
