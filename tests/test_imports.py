@@ -33,7 +33,7 @@ FLOORS = {
     "seecr.recording": 10, "seecr.report": 10,
     "seecr.cli": 11,
     "crosscheck.errors": 20,
-    "crosscheck.files": 21, "crosscheck.units": 21, "crosscheck.given": 21,
+    "crosscheck.units": 21, "crosscheck.given": 21,
     "crosscheck.settle": 22, "crosscheck.measurements": 22, "crosscheck.model": 22,
     "crosscheck.twin": 23, "crosscheck.fit": 23,
     "crosscheck.suite": 24, "crosscheck.calibration": 24, "crosscheck.importing": 24,
@@ -225,8 +225,11 @@ DESCRIPTION = {
 }
 
 
-# Beside it: what winches are told, how things are counted, and that numbers are numbers.
-BESIDE = {"seecr.commands.data", "seecr.commands.loads", "seecr.counted", "seecr.arguments"}
+# Beside it: what winches are told, how things are counted, that numbers are numbers, and files.
+BESIDE = {
+    "seecr.commands.data", "seecr.commands.loads", "seecr.counted", "seecr.arguments",
+    "seecr.files",
+}  # fmt: skip
 # What the effects edit is SEECR's side of them.
 PHYSICS = {"seecr.effects.setup", "seecr.effects.edits"}
 # A trajectory is poses that the robot's joints can reach: what is commanded, no physics.

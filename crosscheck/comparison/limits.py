@@ -10,9 +10,9 @@ import numpy as np
 
 from crosscheck.comparison.result import Comparison
 from crosscheck.errors import CrosscheckError
-from crosscheck.files import read_toml
 from crosscheck.fit.problem import KINDS, Kind
 from crosscheck.units import EXAMPLE, parse_quantity
+from seecr.files import read_toml
 
 
 @dataclass(frozen=True)

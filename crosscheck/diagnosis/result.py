@@ -12,7 +12,6 @@ from crosscheck.comparison.associations import Association
 from crosscheck.diagnosis.chances import NOT_WEIGHED, Chances
 from crosscheck.diagnosis.rivals import Rival
 from crosscheck.diagnosis.search import Search
-from crosscheck.files import plain
 from crosscheck.fit.noise import Whiteness
 from crosscheck.fit.problem import Rms
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Refusal
@@ -21,6 +20,7 @@ from crosscheck.fit.words import rms_words, value_lines, value_records
 from crosscheck.planning.sight import Sight
 from seecr.effects import Term, Terms
 from seecr.effects.base import Layout
+from seecr.files import plain
 from seecr.pose import Array
 from seecr.result import Record, Result
 

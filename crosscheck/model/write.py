@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import tomlkit
 
-from crosscheck.files import written
 from crosscheck.model.fitted import Fitted
 from crosscheck.model.own import Kept, kept, without_parts
 from crosscheck.model.place import check_place
@@ -23,6 +22,7 @@ from seecr.description.robot import Robot
 from seecr.effects import Knowledge, Terms
 from seecr.effects.base import Layout
 from seecr.errors import InputError
+from seecr.files import written
 from seecr.pose import Array
 from seecr.prediction.cells import UNSEEN
 from seecr.prediction.data_reach import TABLE, DataReach

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.files import json_text
 from crosscheck.settle.model import ignored_note
 from crosscheck.suite.agreement import allowances, differences_of
 from crosscheck.suite.cases import Case
@@ -30,6 +29,7 @@ from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.equilibrium.solving import solve as seecr_solve
 from seecr.errors import InputFileError
+from seecr.files import json_text
 from seecr.result import Record, Result
 from seecr.statics.solution import Solution
 

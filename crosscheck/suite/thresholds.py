@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from crosscheck.files import Toml, plain, read_toml
+from seecr.files import Toml, plain, read_toml
 
 SHIPPED = Path(__file__).with_name("thresholds.toml")
 

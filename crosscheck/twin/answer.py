@@ -18,10 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.files import plain, read_text
 from crosscheck.measurements.data import Sigma
 from crosscheck.twin.measure import Truth
 from seecr.errors import InputFileError
+from seecr.files import plain, read_text
 from seecr.pose import pose_difference
 
 NAME = "answer.sealed"

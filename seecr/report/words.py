@@ -131,7 +131,7 @@ def sag_lines(tables: Tables) -> Iterator[str]:
 
 def stiffness_lines(solution: Solution) -> Iterator[str]:
     """The softest direction of the first pose, its stiffness, and frequencies of vibrations."""
-    soft, way = solution.smallest_eigenvalue[0], softest_words(solution, 0)
+    soft, way = solution.smallest_eigenvalue[0], softest_words(solution)
     if solution.status[0] is Status.SINGULAR:
         yield f"free to {way}"
     elif solution.status[0] is Status.UNSTABLE:
@@ -165,9 +165,9 @@ def _metre(robot: Robot) -> Array:
     return np.where(robot.hinges, robot.length, 1.0)
 
 
-def softest_words(solution: Solution, i: int = 0) -> str:
-    """The softest direction of pose i, such as "turn about y"."""
-    return direction_words(solution.robot, solution.softest_direction[i])
+def softest_words(solution: Solution) -> str:
+    """The softest direction of the first pose, such as "turn about y"."""
+    return direction_words(solution.robot, solution.softest_direction[0])
 
 
 def direction_words(robot: Robot, direction: Array) -> str:

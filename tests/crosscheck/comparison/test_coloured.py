@@ -10,9 +10,9 @@ from made_data import COGIRO, SIGMA, measured
 
 from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.result import Comparison
-from crosscheck.files import plain
 from crosscheck.measurements.data import Measurements
 from seecr.description.mjcf import load_robot
+from seecr.files import plain
 from seecr.pose import Array
 
 ROBOT = load_robot(COGIRO)

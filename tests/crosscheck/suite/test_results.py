@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from crosscheck.files import json_text, staged
 from crosscheck.suite import words
 from crosscheck.suite.cases import Case
 from crosscheck.suite.junit import junit_xml
@@ -27,6 +26,7 @@ from crosscheck.suite.worst_pose import worst_pose, write_worst_pose
 from crosscheck.terminal.suite import print_run
 from seecr.description.shipped import model_path
 from seecr.errors import SeecrError
+from seecr.files import json_text, staged
 
 THRESHOLDS = load_thresholds()
 

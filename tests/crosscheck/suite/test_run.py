@@ -12,7 +12,6 @@ import pytest
 
 import seecr
 from crosscheck.errors import CrosscheckError
-from crosscheck.files import plain
 from crosscheck.settle.settler import Settling, SettlingBatch
 from crosscheck.suite import agreement, verdicts, words
 from crosscheck.suite import run as suite
@@ -31,6 +30,7 @@ from crosscheck.suite.thresholds import SHIPPED, FindingLimits, load_thresholds,
 from crosscheck.suite.verdicts import Verdict
 from seecr.description.shipped import CABLES, model_path
 from seecr.errors import InputFileError
+from seecr.files import plain
 from seecr.pose import pose_add, pose_difference, quat_from_rotvec
 
 PARALLEL, COGIRO = model_path("demobot_parallel"), model_path("demobot_cogiro")
