@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,8 +14,8 @@ from seecr.commands.data import Commands
 from seecr.counted import counted
 from seecr.description.given import GivenRobot, robot_of
 from seecr.description.robot import Robot
-from seecr.effects.checked import edit_setup
-from seecr.effects.setup import Setup, plain_setup
+from seecr.effects.edits import setup_with
+from seecr.effects.setup import Setup
 from seecr.equilibrium.following import follow_commands
 from seecr.equilibrium.multiple import other_rests
 from seecr.equilibrium.search import solve_setup
@@ -92,12 +93,7 @@ def solve(
     acting = effects_of(effects, robot)
     pushed = None if wrench is None else finite(wrench, "wrench")
 
-    def setup_of(rows: Commands, push: Array | None) -> Setup:
-        setup = plain_setup(robot, rows, push)
-        for effect in acting:
-            edit_setup(effect, setup)
-        return setup
-
+    setup_of = partial(setup_with, acting, robot)
     setup = setup_of(commands, pushed)
     if setup.has_history or setup.laws:
         if follow:
