@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Collection, Iterator
+from dataclasses import is_dataclass
 from enum import Enum
 from importlib import import_module
 from inspect import Parameter, cleandoc, get_annotations, getdoc, isclass, signature
@@ -20,6 +21,8 @@ from types import ModuleType
 from typing import Any
 
 from link_words import with_links
+
+from seecr.result import Result
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "api.md"
 PACKAGES = ("crosscheck", "seecr")
@@ -63,13 +66,21 @@ def _entries(face: ModuleType) -> Iterator[str]:
     for name in names:
         found = getattr(face, name)
         yield f"### {face.__name__}.{name}\n"
-        if not isclass(found):
+        if not isclass(found) or _is_made_by_hand(found):
             yield f"```python\n{name}{_signature(found)}\n```\n"
         yield from as_markdown(getdoc(found) or "", _own_names(found))
         if isclass(found) and issubclass(found, Enum):
             yield "".join(f"- `{one.name}`: {one.value}\n" for one in found)
         elif isclass(found):
             yield from _members(found)
+
+
+def _is_made_by_hand(found: type) -> bool:
+    """Whether people make such objects: what functions take, all of whose fields are explained."""
+    explained = re.findall(r"\w+(?=[^:\n]*:)", getdoc(found) or "")
+    if not is_dataclass(found) or issubclass(found, Result):
+        return False
+    return bool(signature(found).parameters) and set(signature(found).parameters) <= set(explained)
 
 
 def _signature(function: Any, width: float = 80) -> str:
@@ -81,7 +92,7 @@ def _signature(function: Any, width: float = 80) -> str:
             out.append("*")
         if one.name != "self":
             out.append(_parameter(one))
-    result = f" -> {_plain(called.return_annotation)}"
+    result = "" if isclass(function) else f" -> {_plain(called.return_annotation)}"
     short = f"({', '.join(out)}){result}"
     if len(short) < width:
         return short
@@ -92,7 +103,8 @@ def _parameter(one: Parameter) -> str:
     named = f"{_STARS.get(one.kind, '')}{one.name}: {_plain(one.annotation)}"
     if one.default is one.empty:
         return named
-    return f"{named} = {'...' if callable(one.default) else repr(one.default)}"
+    default = repr(one.default)
+    return f"{named} = {'...' if callable(one.default) or default[0] == '<' else default}"
 
 
 def _plain(annotation: Any) -> str:

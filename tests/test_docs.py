@@ -120,6 +120,7 @@ def test_the_page_of_names_shows_what_a_method_takes() -> None:
     page = make_api.PAGE.read_text(encoding="utf-8")
     assert "- `.count(verdict: Verdict) -> int`: " in page
     assert "- `.fixed(*names: str) -> Term`: " in page
+    assert "\nJoint(kind: str, name: str, axis: Array, point: Array)\n" in page
 
 
 def test_one_line_of_a_docstring_may_explain_several_names() -> None:
