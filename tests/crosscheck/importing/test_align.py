@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -38,6 +40,11 @@ def test_frames_take_the_trackers_poses_to_the_platforms() -> None:
     place, quat = frames.poses(*tracked(poses))
     assert place == pytest.approx(poses[:, :3])
     assert quat is not None and quat == pytest.approx(poses[:, 3:] * np.sign(poses[:, 3:4]))
+    inside = Rotation.from_rotvec([0.5, 0.1, -0.2]).as_quat(scalar_first=True)
+    mounted = replace(frames, target_turn=inside)
+    turned = quat_multiply(tracked(poses)[1], np.tile(inside, (len(poses), 1)))
+    same = mounted.poses(tracked(poses)[0], turned)[1]
+    assert same == pytest.approx(quat)
     alone, none = frames.poses(tracked(poses)[0], None)
     assert none is None and alone == pytest.approx(tracked(poses)[0] @ _matrix().T + SHIFT)
 

@@ -11,7 +11,7 @@ ROBOT = seecr.load_robot("demobot_cogiro")
 SIZES = {
     "exit_point_error": 0.003, "platform_mass": 0.1, "stiffness": 1.1, "pulley_radius": 0.02,
     "cable_length_offset": 0.001, "drum_gain": 0.01, "tracker_frame": 0.01, "creep": 0.02,
-    "backlash": 0.001,
+    "backlash": 0.001, "drum_eccentricity": 0.001, "thermal_expansion": 1e-5,
 }  # fmt: skip
 
 
@@ -28,7 +28,9 @@ def test_a_description_holds_points_masses_and_stiffness() -> None:
     assert not found.bodies and not found.lengths and not found.nowhere
 
 
-@pytest.mark.parametrize("name", ["cable_length_offset", "drum_gain"])
+@pytest.mark.parametrize(
+    "name", ["cable_length_offset", "drum_gain", "drum_eccentricity", "thermal_expansion"]
+)
 def test_what_winches_pay_out_is_in_the_rest_lengths_also_where_it_is_zero_at_home(
     name: str,
 ) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from slab import slab
@@ -27,6 +29,9 @@ def test_a_part_of_a_problem_has_the_loads_of_its_own_rows() -> None:
     assert np.array_equal(part.wanted, problem.wanted[[2, 0]])
     for mine, whole in zip(part.at(away, both), problem.at(away, np.array([2, 0])), strict=True):
         assert np.array_equal(mine, whole)
+    weighed = replace(problem, balance=lambda poses, rows, about=None: (rows, rows))
+    second = np.array([1])
+    assert part_of(weighed, np.array([2, 0])).at(away[:1], second)[0].tolist() == [0]
 
 
 def test_random_tries_go_to_the_border_and_never_beyond() -> None:
