@@ -84,7 +84,7 @@ def choose(
             )
     if len(set(names)) != len(names):
         raise CrosscheckError(f"effects {', '.join(names)}: expected each at most once")
-    drawn = [_with_numbers(layout_of(name, robot), robot, random) for name in names]
+    drawn = [_with_numbers(layout_of(effect_named(name), robot), robot, random) for name in names]
     return [_alike_both_ways(one) if "pulley_radius" in names else one for one in drawn]
 
 
