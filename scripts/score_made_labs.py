@@ -37,7 +37,7 @@ from crosscheck.twin.lab import random_of, sweeps
 from crosscheck.twin.measure import Truth, measure
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
-from seecr.effects import Term, Terms, effect_named, layout_of
+from seecr.effects import Term, Terms, layout_of
 
 CASES = ("B07", "B03", "B02", "B08", "B04", "B09")
 LARGE = ("hall", "crane")
@@ -57,7 +57,7 @@ def drawn(robot: Robot, seed: int, count: int) -> list[Term]:
         return choose(robot, random_of(seed, 0), None, count) if count else []
     random, out = random_of(seed, 7), []
     for name in TOLERANCES:
-        layout = layout_of(effect_named(name), robot)
+        layout = layout_of(name, robot)
         size = _TOLERANCE * layout.scale * random.standard_normal(len(layout))
         size = np.abs(size) if name == "pulley_radius" else size
         out.append(Term(layout, np.clip(layout.null + size, layout.lower, layout.upper)))

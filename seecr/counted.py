@@ -41,11 +41,11 @@ def some(words: Sequence[str], most: int = 4, mark: str = ", ") -> str:
     return f"{mark.join(words[:most])}{lead}and {more} more"
 
 
-def rows_words(rows: Iterable[int], line: NDArray[np.int64] | None, most: int = 8) -> str:
+def rows_words(rows: Iterable[int], line: NDArray[np.int64] | None) -> str:
     """The names of rows: their lines in a file; without a file pose 3, counted from 0.
 
     Args:
-        rows: counted from 0. line: (n,) line of each row in the file. most: how many are named.
+        rows: counted from 0. line: (n,) line of each row in the file.
     """
     numbers = [str(row if line is None else line[row]) for row in rows]
-    return f"{plural(len(numbers), 'pose' if line is None else 'line')} {some(numbers, most)}"
+    return f"{plural(len(numbers), 'pose' if line is None else 'line')} {some(numbers, 8)}"

@@ -17,7 +17,7 @@ import tempfile
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from enum import Enum
 from pathlib import Path
 from typing import Any
@@ -295,10 +295,12 @@ def json_text(document: Mapping[str, Any], indent: int | None = 1) -> str:
 def plain(value: Any) -> Any:
     """A value in JSON's types: null for numbers that are not finite, an enum's name in lower case.
 
-    Objects with a method ``as_json`` are replaced by its result.
+    Objects with a method ``as_json`` are replaced by its result, other dataclasses by their fields.
     """
     if hasattr(value, "as_json"):
         return plain(value.as_json())
+    if is_dataclass(value):
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
     if isinstance(value, Mapping):
         return {str(key): plain(part) for key, part in value.items()}
     if isinstance(value, np.ndarray | np.generic):

@@ -79,6 +79,10 @@ class BarRest(Result):
             f"{second:.4g} times the weight, {'stable' if self.stable else 'not stable'}"
         ]
 
+    def as_json(self) -> Record:
+        """Its only row."""
+        return self.records()[0]
+
     def records(self) -> Sequence[Record]:
         """One row; tensions in weights."""
         tensions = dict(zip(("tension_1", "tension_2"), self.tensions, strict=True))
@@ -128,7 +132,7 @@ def solution_manifold(
 
     Args:
         exit_points: (2, 2) [m].
-        x: (k,) [m] and y: (r,) [m], the grid.
+        x, y: (k,) and (r,) [m], the grid.
         half_length: [m].
 
     Returns:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from seecr.counted import counted
 from seecr.errors import MissingPackageError
+from seecr.files import json_text
 
 # Rows of the table in a notebook; the data frame has all of them.
 _MOST_ROWS = 20
@@ -39,6 +40,14 @@ class Result(ABC):
     @abstractmethod
     def records(self) -> Sequence[Record]:
         """The result's rows, all with the same keys."""
+
+    def as_json(self) -> Record:
+        """The result as a dictionary: its rows, unless a file of its own says more."""
+        return {"rows": list(self.records())}
+
+    def to_json(self) -> str:
+        """The content of ``as_json`` as text: SI, null where a number does not exist."""
+        return json_text(self.as_json())
 
     def __str__(self) -> str:
         return "\n".join(self.lines())

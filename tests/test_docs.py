@@ -116,6 +116,22 @@ def test_the_page_of_public_names_is_current() -> None:
     assert make_api.page() == make_api.PAGE.read_text(encoding="utf-8"), AGAIN
 
 
+def test_the_page_of_names_shows_what_a_method_takes() -> None:
+    page = make_api.PAGE.read_text(encoding="utf-8")
+    assert "- `.count(verdict: Verdict) -> int`: " in page
+    assert "- `.fixed(*names: str) -> Term`: " in page
+    assert "\nJoint(kind: str, name: str, axis: Array, point: Array)\n" in page
+
+
+def test_one_line_of_a_docstring_may_explain_several_names() -> None:
+    words = "Args:\n    a: the first. b, c: others,\n        further down.\n    d: a last: one."
+    shown = "- `a`: the first.\n- `b`, `c`: others, further down.\n- `d`: a last: one.\n"
+    assert list(make_api.as_markdown(words, "abcd")) == [shown]
+    assert list(make_api.as_markdown("Returns:\n    a :class:`X`,\n    or none.", "")) == [
+        "Returns: a `X`, or none.\n"
+    ]
+
+
 def test_the_page_of_commands_is_current() -> None:
     page = make_commands.PAGE.read_text(encoding="utf-8")
     assert make_commands.page() == page, AGAIN

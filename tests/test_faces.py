@@ -88,11 +88,12 @@ def test_commands_use_public_names_alone(path: Path) -> None:
 
 def test_a_private_name_is_seen() -> None:
     assert not is_public("crosscheck.fit.state", "evaluate")
-    assert not is_public("crosscheck.files", "_missing")
-    assert is_public("crosscheck.files", "staged") and is_public("crosscheck", "diagnose")
+    assert not is_public("seecr.files", "_missing")
+    assert is_public("seecr.files", "staged") and is_public("crosscheck", "diagnose")
 
 
 @pytest.mark.parametrize("result", RESULTS, ids=lambda result: result.__name__)
 def test_results_show_themselves(result: type) -> None:
     assert issubclass(result, Result)
     assert result.__repr__ is Result.__repr__ and result.__str__ is Result.__str__
+    assert result.to_frame is Result.to_frame and result.to_json is Result.to_json

@@ -21,8 +21,8 @@ ROOT = Path(__file__).resolve().parents[1]
 # A folder or file on its floor. crosscheck stands on seecr: a lower floor of the two is seecr's.
 FLOORS = {
     "seecr.errors": 0, "seecr.compiled": 0, "seecr.threads": 0, "seecr.lazy": 0, "seecr.counted": 0,
-    "seecr.files": 1, "seecr.result": 1, "seecr.made": 1, "seecr.pose": 1,
-    "seecr.curves": 2, "seecr.units": 2, "seecr.arguments": 2, "seecr.planar": 3,
+    "seecr.files": 1, "seecr.made": 1, "seecr.pose": 1,
+    "seecr.curves": 2, "seecr.units": 2, "seecr.arguments": 2, "seecr.result": 2, "seecr.planar": 3,
     "seecr.description": 3,
     "seecr.commands": 4,
     "seecr.columns": 5, "seecr.effects": 5,
@@ -33,7 +33,7 @@ FLOORS = {
     "seecr.recording": 10, "seecr.report": 10,
     "seecr.cli": 11,
     "crosscheck.errors": 20,
-    "crosscheck.files": 21, "crosscheck.units": 21, "crosscheck.given": 21,
+    "crosscheck.units": 21, "crosscheck.given": 21,
     "crosscheck.settle": 22, "crosscheck.measurements": 22, "crosscheck.model": 22,
     "crosscheck.twin": 23, "crosscheck.fit": 23,
     "crosscheck.suite": 24, "crosscheck.calibration": 24, "crosscheck.importing": 24,
@@ -225,8 +225,11 @@ DESCRIPTION = {
 }
 
 
-# Beside it: what winches are told, how things are counted, and that numbers are numbers.
-BESIDE = {"seecr.commands.data", "seecr.commands.loads", "seecr.counted", "seecr.arguments"}
+# Beside it: what winches are told, how things are counted, that numbers are numbers, and files.
+BESIDE = {
+    "seecr.commands.data", "seecr.commands.loads", "seecr.counted", "seecr.arguments",
+    "seecr.files",
+}  # fmt: skip
 # What the effects edit is SEECR's side of them.
 PHYSICS = {"seecr.effects.setup", "seecr.effects.edits"}
 # A trajectory is poses that the robot's joints can reach: what is commanded, no physics.

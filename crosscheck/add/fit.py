@@ -17,7 +17,7 @@ from crosscheck.fit.reasons import Why
 from crosscheck.fit.state import State
 from crosscheck.given import GivenModel, GivenRobot, basis_of, model_of, robot_of
 from crosscheck.measurements.read import GivenData, measurements_of
-from seecr.effects import ApartLayout, Own, Term, Terms, effect_named, layout_of
+from seecr.effects import ApartLayout, Own, Term, Terms, layout_of
 from seecr.effects.base import Layout
 from seecr.pose import Array
 from seecr.prediction.model import no_effects
@@ -56,7 +56,7 @@ def add_effect(
         UnsolvedError: rows have no equilibrium, or the fit does not converge.
     """
     robot = robot_of(robot)
-    layout = layout_of(effect_named(name), robot)
+    layout = layout_of(name, robot)
 
     def fitter(problem: Problem, terms: Terms, factor: Array) -> Fit:
         return _fitted(problem, terms, layout, factor)

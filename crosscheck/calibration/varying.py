@@ -18,8 +18,7 @@ from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.fit.problem import KINDS, POSITION
 from crosscheck.fit.smooth import field_columns, monomials
 from crosscheck.fit.state import derivatives
-from seecr.effects import Term, Terms, catalogue
-from seecr.effects.base import layout_of
+from seecr.effects import Term, Terms, catalogue, layout_of
 from seecr.pose import Array
 
 _MOVE = (

@@ -160,7 +160,7 @@ def _check_names(old: Model, effect: str, refit: bool, path: Path) -> None:
 
 
 def _text(found: Addition, old: Model, model: Path, written: bool, made: Made) -> str:
-    from crosscheck.files import json_text
+    from seecr.files import json_text
 
     document = {"made": made, "written": written, "model": str(model), **found.as_json()}
     return json_text({**document, "model_notes": list(old.notes)})

@@ -58,12 +58,12 @@ def command(
     2 bad input, 3 rows without an equilibrium or a fit that does not converge.
     """
     from crosscheck import calibrate, load_measurements, save_model
-    from crosscheck.files import json_text
     from crosscheck.given import considered
     from crosscheck.measurements.stated import with_stated
     from crosscheck.model import check_place
     from crosscheck.terminal import print_calibration
     from seecr import load_model, load_robot, new_model
+    from seecr.files import json_text
 
     considered(only, exclude)  # a wrong name is told before any file is read
     machine = load_robot(robot)

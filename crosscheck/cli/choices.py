@@ -68,8 +68,8 @@ figures_option = click.option(
 @contextmanager
 def figures_in(folder: Path | None) -> Iterator[None]:
     """Figures that are drawn meanwhile are kept there, if anywhere; all of them or none."""
-    from crosscheck.files import staged
     from crosscheck.report import keeping
+    from seecr.files import staged
 
     if folder is None:
         yield
@@ -81,7 +81,7 @@ def figures_in(folder: Path | None) -> Iterator[None]:
 @contextmanager
 def result_in(out: Path | None, name: str) -> Iterator[Callable[[str], None]]:
     """A function that keeps a result's text in a folder, if any; it is tried before the work."""
-    from crosscheck.files import staged, write_text
+    from seecr.files import staged, write_text
 
     if out is None:
         yield lambda _text: None

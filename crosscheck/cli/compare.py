@@ -66,10 +66,10 @@ def command(
     """
     from crosscheck import compare, load_measurements
     from crosscheck.comparison import Limits, check, load_limits, with_options
-    from crosscheck.files import json_text, staged, write_text
     from crosscheck.measurements.stated import with_stated
     from crosscheck.report import write_page
     from seecr import load_model, load_robot
+    from seecr.files import json_text, staged, write_text
 
     limits = with_options(load_limits(limits_file) if limits_file else Limits(), options)
     machine = load_robot(robot)

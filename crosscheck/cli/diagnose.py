@@ -76,13 +76,13 @@ def command(
     input, 3 rows without an equilibrium.
     """
     from crosscheck import DiagnosisVerdict, Tolerance, diagnose, load_measurements
-    from crosscheck.files import json_text, staged, write_text
     from crosscheck.given import considered
     from crosscheck.measurements.stated import with_stated
     from crosscheck.model import check_place
     from crosscheck.report import write_page
     from seecr import load_model, load_robot, new_model
     from seecr.description.fingerprint import fingerprint
+    from seecr.files import json_text, staged, write_text
 
     gates = [DiagnosisVerdict.named(word) for word in fail_on]
     tolerance = Tolerance.parsed(tolerances)

@@ -31,10 +31,10 @@ def command(name: str | None, robot: Path | None, as_json: bool) -> int:
     parameter for that robot is shown; diagnose and calibrate use it as the prior's standard
     deviation.
     """
-    from crosscheck.files import json_text
     from crosscheck.terminal import effect_record, print_effect, print_effects
     from seecr import load_robot
     from seecr.effects import catalogue, effect_named
+    from seecr.files import json_text
 
     machine = load_robot(robot) if robot is not None else None
     chosen = [effect_named(name)] if name is not None else list(catalogue().values())

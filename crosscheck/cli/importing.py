@@ -117,9 +117,9 @@ def command(
       dwells.csv       when each dwell was, its samples and their scatter
       import.json      what was done
     """
-    from crosscheck.files import json_text
     from crosscheck.importing import ImportChoices, check_case, import_case, write_case
     from seecr import load_robot
+    from seecr.files import json_text
 
     machine = load_robot(robot)
     choices = ImportChoices.said(machine, **options)

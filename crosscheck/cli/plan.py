@@ -96,12 +96,12 @@ def command(
         got = "neither" if poses is None else "both"
         raise click.UsageError(f"expected POSES.csv or --rows N, got {got}")
     from crosscheck import Sigma, choose_poses, load_commands, make_plan, write_plan
-    from crosscheck.files import json_text, staged, write_text
     from crosscheck.measurements.stated import stated
     from crosscheck.planning import box_of
     from crosscheck.report import write_page
     from crosscheck.terminal import print_plan
     from seecr import load_robot
+    from seecr.files import json_text, staged, write_text
 
     machine = load_robot(robot)
     room = box_of(box) if box else None

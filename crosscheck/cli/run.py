@@ -146,7 +146,7 @@ def _run(
     out: Path,
     as_json: bool,
 ) -> int:
-    from crosscheck.files import staged
+    from seecr.files import staged
 
     recordings_of = [f"{case.name}.rrd" for case in chosen]
     with staged(out, sometimes=recordings_of) as folder:
@@ -193,7 +193,6 @@ def _record(result: CaseResult, folder: Path) -> str:
 
 
 def _write(run: Run, folder: Path) -> None:
-    from crosscheck.files import write_text
     from crosscheck.suite import (
         junit_xml,
         results_json,
@@ -201,6 +200,7 @@ def _write(run: Run, folder: Path) -> None:
         thresholds_toml,
         write_worst_pose,
     )
+    from seecr.files import write_text
 
     sentence = write_worst_pose(run.results, folder) if run.results else ""
     texts = {

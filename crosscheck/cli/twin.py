@@ -138,9 +138,9 @@ def _check_alone(*others: object) -> None:
 
 def _tell(twin: Twin, out: Path, made: Made | None) -> None:
     """What was made, as JSON where it is told how it was made."""
-    from crosscheck.files import json_text
     from crosscheck.twin import FILES
     from seecr.counted import counted
+    from seecr.files import json_text
 
     files = list(FILES)
     for note in twin.notes:
@@ -169,9 +169,9 @@ def _noises(sigma: Mapping[str, float]) -> Iterator[str]:
 
 
 def _open(path: Path, as_json: bool) -> int:
-    from crosscheck.files import json_text
     from crosscheck.terminal import parameter_lines
     from crosscheck.twin import FILES, unseal
+    from seecr.files import json_text
 
     answer = unseal(path)
     if as_json:

@@ -82,8 +82,7 @@ class Association:
 
     def as_json(self) -> dict[str, Any]:
         """The content in ``comparison.json`` and ``diagnosis.json``."""
-        kept = {key: value for key, value in vars(self).items() if key != "kind"}
-        return {**kept, "bins": [vars(part) for part in self.bins]}
+        return {key: value for key, value in vars(self).items() if key != "kind"}
 
 
 def associations(problem: Problem, white: Array, prediction: Prediction) -> list[Association]:

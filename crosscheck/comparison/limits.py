@@ -5,15 +5,14 @@ from __future__ import annotations
 import difflib
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from crosscheck.comparison.result import Comparison
 from crosscheck.errors import CrosscheckError
-from crosscheck.files import read_toml
 from crosscheck.fit.problem import KINDS, Kind
 from crosscheck.units import EXAMPLE, parse_quantity
+from seecr.files import read_toml
 
 
 @dataclass(frozen=True)
@@ -69,10 +68,6 @@ class Exceeded:
     value: float
     words: str
 
-    def as_json(self) -> dict[str, Any]:
-        """The content in ``comparison.json``."""
-        return vars(self)
-
 
 def parse_limit(name: str, text: str) -> float:
     """Parse a limit, one of RULES, with its unit; SI.
@@ -119,7 +114,7 @@ def load_limits(path: str | Path) -> Limits:
 
 def with_options(limits: Limits, options: dict[str, str | None]) -> Limits:
     """Limits of a file, replaced by those of the command line where given."""
-    given: dict[str, Any] = {k: parse_limit(k, v) for k, v in options.items() if v is not None}
+    given = {k: parse_limit(k, v) for k, v in options.items() if v is not None}
     return replace(limits, **given)
 
 

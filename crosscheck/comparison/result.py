@@ -46,10 +46,6 @@ class Coordinate:
     row: int
     line: int
 
-    def as_json(self) -> dict[str, Any]:
-        """As in ``comparison.json``."""
-        return vars(self)
-
 
 @dataclass(frozen=True, eq=False)
 class Group:
@@ -83,10 +79,6 @@ class WorstRow:
     command: Array
     errors: dict[str, float]
     times_noise: float
-
-    def as_json(self) -> dict[str, Any]:
-        """As in ``comparison.json``."""
-        return vars(self)
 
 
 @dataclass(frozen=True)
@@ -251,8 +243,8 @@ class Comparison(Result):
             "rows": {"all": problem.data.n_rows, "compared": int(problem.use.sum())},
             "rms": self.rms,
             "noise_floor": self.floor,
-            "sigma": vars(problem.sigma),
-            "coloured_noise": None if self.coloured is None else vars(self.coloured),
+            "sigma": problem.sigma,
+            "coloured_noise": self.coloured,
             "residual": None if w is None else {**vars(w), "structured": w.structured},
             "coordinates": self.coordinates,
             "runs": self.runs,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -67,7 +66,7 @@ def check_of(term: Term, robot: Robot, stderr: Array | None = None) -> str:
             f"{measured_directly(layout.name)}: no robot can have the values that fit these data "
             "best, so something else acts like this effect"
         )
-    values: dict[str, Any] = {}
+    values: dict[str, _Sure | str] = {}
     errors = np.full(len(layout), np.inf) if stderr is None else stderr
     doubts = _errors_of_totals(term, robot, errors)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +18,7 @@ PROBABLE = 0.5
 
 
 # What diagnosis.json has if no probabilities were computed.
-NOT_WEIGHED: dict[str, Any] = {"catalogue": [], "classes": []}
+NOT_WEIGHED: Mapping[str, Sequence[object]] = {"catalogue": [], "classes": []}
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Chances:
 
     def as_json(self) -> dict[str, Any]:
         """``catalogue``, ``classes``, ``calibrated`` and ``unknown`` of ``diagnosis.json``."""
-        unknown: dict[str, Any] = {"log_odds": self.field, "shown_from": self.shown}
+        unknown: dict[str, object] = {"log_odds": self.field, "shown_from": self.shown}
         if self.imitated is not None:
             unknown |= {
                 "instead_of": sorted(self.imitated.replaced), "seen_in": self.imitated.seen,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,6 @@ from crosscheck.comparison.associations import Association
 from crosscheck.diagnosis.chances import NOT_WEIGHED, Chances
 from crosscheck.diagnosis.rivals import Rival
 from crosscheck.diagnosis.search import Search
-from crosscheck.files import plain
 from crosscheck.fit.noise import Whiteness
 from crosscheck.fit.problem import Rms
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Refusal
@@ -21,6 +20,7 @@ from crosscheck.fit.words import rms_words, value_lines, value_records
 from crosscheck.planning.sight import Sight
 from seecr.effects import Term, Terms
 from seecr.effects.base import Layout
+from seecr.files import plain
 from seecr.pose import Array
 from seecr.result import Record, Result
 
@@ -213,16 +213,16 @@ class Diagnosis(Result):
                 "verdict": self.verdict.value,
                 "sentence": self.sentence,
                 "can_show": self.sight,
-                "missing": [found.as_json() for found in self.missing],
+                "missing": self.missing,
                 "before": self.before,
                 "after": self.after,
                 "held_out": self.held_out,
                 "noise_floor": self.floor,
                 "left_over": self.left,
-                "candidates": [candidate.as_json() for candidate in self.candidates],
+                "candidates": self.candidates,
                 "measure_next": self.measure_next,
-                "residual": None if self.whiteness is None else asdict(self.whiteness),
-                "where": [found.as_json() for found in self.where],
+                "residual": self.whiteness,
+                "where": self.where,
                 "notes": self.notes,
                 **(NOT_WEIGHED if self.chances is None else self.chances.as_json()),
             }

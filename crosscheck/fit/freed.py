@@ -22,7 +22,7 @@ from crosscheck.fit.registration import registered_each
 from crosscheck.fit.state import State, evaluate
 from crosscheck.fit.words import measured
 from crosscheck.units import parameter_name
-from seecr.effects import ApartLayout, Term, Terms, apart, effect_named, layout_of
+from seecr.effects import ApartLayout, Term, Terms, apart, layout_of
 from seecr.pose import Array
 
 __all__ = ["Freed", "freed"]
@@ -68,7 +68,7 @@ def freed(problem: Problem, laid: LaidOut) -> Freed:
 
 def _new(problem: Problem, name: str) -> Term:
     """An effect that the model lacks, at its null values; separate for each of several files."""
-    layout, data = layout_of(effect_named(name), problem.robot), problem.data
+    layout, data = layout_of(name, problem.robot), problem.data
     if data.files:
         files = data.free_in.get(name, range(len(data.files)))
         layout = apart(layout, "file", tuple(data.origins[k] for k in files), layout.null)

@@ -219,7 +219,7 @@ class _End:
 
 
 @dataclass(frozen=True, eq=False)
-class _Step:
+class _Tried:
     """One step of a descent.
 
     Attributes:
@@ -278,7 +278,7 @@ class _Descent:
                 break
         return _End(state, None, count, iterations == 0)
 
-    def step(self, state: State, jacobian: Array, damping: float) -> _Step:
+    def step(self, state: State, jacobian: Array, damping: float) -> _Tried:
         """The first step that improves the objective, with more and more damping."""
         terms, z = state.terms, state.terms.sizes
         known, off = known_readings(terms)[0], known_left(terms)
@@ -286,7 +286,7 @@ class _Descent:
         normal = jacobian.T @ jacobian + known.T @ known + np.eye(len(z)) / PRIOR_SIZES**2
         move = self._moving(terms, gradient)
         if len(move) == 0:
-            return _Step(None, damping)
+            return _Tried(None, damping)
         before = _objective(state)
         for _ in range(_DAMPINGS):
             by = _damped_step(normal, gradient, move, damping)
@@ -295,11 +295,11 @@ class _Descent:
             after = _objective(trial) if trial.valid else np.inf
             promised = -2.0 * float(gradient @ by + 0.5 * by @ normal @ by)
             if after < before:
-                return _Step(trial, max(0.2 * damping, 1e-9), before - after, promised)
+                return _Tried(trial, max(0.2 * damping, 1e-9), before - after, promised)
             if trial.valid and promised < _GAIN:  # nothing left to gain
                 break
             damping = max(10.0 * damping, 1e-4)
-        return _Step(None, damping)
+        return _Tried(None, damping)
 
     def _moving(self, terms: Terms, gradient: Array) -> NDArray[np.intp]:
         """Indices of parameters that are free and not pushed against a bound."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.fit.problem import Problem
-from seecr.effects import ApartLayout, Layout, Term, effect_named, layout_of
+from seecr.effects import ApartLayout, Layout, Term, layout_of
 from seecr.pose import Array, quat_conjugate, quat_multiply, quat_rotate, rotvec_from_quat
 from seecr.prediction.experiment import Prediction
 
@@ -26,7 +26,7 @@ def registered(problem: Problem, at: Prediction) -> Term | None:
 
     Outliers get little weight. None if the positions and orientations read determine no rotation.
     """
-    layout = layout_of(effect_named(NAME), problem.robot)
+    layout = layout_of(NAME, problem.robot)
     data = problem.data
     whole = problem.use & np.isfinite(data.position).all(axis=1) & at.solved
     turn = _turn(problem, at)

@@ -59,4 +59,5 @@ def _with_columns(found: Fit, columns: Array) -> tuple[float, Array]:
     white = found.state.white
     step = np.linalg.solve(normal, x.T @ white)
     left = white - x @ step
-    return float(white @ white - left @ left), np.where(stays, 0.0, step[:p])
+    # values that stay have no columns, so their step is zero
+    return float(white @ white - left @ left), step[:p]

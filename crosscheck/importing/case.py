@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.files import check_replaces, json_text, staged, write_text
 from crosscheck.given import GivenRobot, copy_robot, file_of, numbers_of, robot_of
 from crosscheck.importing.align import (
     Frames,
@@ -32,6 +31,7 @@ from crosscheck.units import LEAST
 from seecr.counted import counted
 from seecr.description.robot import Robot
 from seecr.errors import InputError
+from seecr.files import check_replaces, json_text, staged, write_text
 from seecr.made import Made
 from seecr.pose import Array
 from seecr.result import Record, Result
@@ -94,7 +94,7 @@ class Imported(Result):
             "files": [str(take.stream.path) for take in self.takes],
             "rows": self.measured.n_rows,
             "dwells": int(self.measured.read.sum()),
-            "sigma": vars(self.measured.sigma),
+            "sigma": self.measured.sigma,
             "free": list(self.frames.free),
             "tracker_to_base": {"quat_wxyz": self.frames.turn, "shift_m": self.frames.shift},
             "body_on_platform": {

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.files import read_text
 from seecr.columns.table import show, taken_for
 from seecr.counted import counted
 from seecr.errors import InputFileError
+from seecr.files import read_text
 from seecr.pose import Array
 
 Row = list[str]

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.files import Toml, read_toml
 from crosscheck.measurements.data import Sigma
 from crosscheck.units import EXAMPLE, LEAST_NOISE, MOST, parse_quantity
 from seecr.columns.beside import CHOICES, choice
 from seecr.effects import catalogue
+from seecr.files import Toml, read_toml
 
 _SIGMAS = tuple(item.name for item in fields(Sigma))
 

@@ -63,9 +63,9 @@ class Sigma:
     length_m: float | None = None
 
 
-def origin_of(path: Path, depth: int = 2) -> str:
+def origin_of(path: Path) -> str:
     """The name by which models know a file: its own and that of its folder."""
-    return "/".join(path.resolve().parts[-depth:])
+    return "/".join(path.resolve().parts[-2:])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -150,7 +150,7 @@ class Measurements(Result):
         ):
             if getattr(self, name) is None:
                 self._set(name, np.any(np.isfinite(values), axis=0))
-        filled: dict[str, Any] = {
+        filled: dict[str, NDArray[Any]] = {
             "line": np.arange(2, n + 2),
             "stands": np.zeros(n, dtype=bool),
             "file": np.zeros(n, dtype=np.int64),

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from crosscheck.files import write_texts
 from crosscheck.measurements.data import Measurements
+from seecr.files import write_texts
 
 
 def write_measurements(path: str | Path, data: Measurements, remark: str = "") -> None:

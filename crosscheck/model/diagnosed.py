@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from crosscheck.files import read_text
 from seecr.description.fingerprint import check_robot
 from seecr.description.robot import Robot
 from seecr.effects import Term, Terms
 from seecr.errors import InputError, InputFileError
+from seecr.files import read_text
 from seecr.made import digits_of
 from seecr.prediction.cells import number_of
 

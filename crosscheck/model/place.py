@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from crosscheck.files import check_writable
+from seecr.files import check_writable
 from seecr.prediction.model import read_document
 
 __all__ = ["check_place"]

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import tomlkit
 
-from crosscheck.files import written
 from crosscheck.model.fitted import Fitted
 from crosscheck.model.own import Kept, kept, without_parts
 from crosscheck.model.place import check_place
@@ -23,6 +22,7 @@ from seecr.description.robot import Robot
 from seecr.effects import Knowledge, Terms
 from seecr.effects.base import Layout
 from seecr.errors import InputError
+from seecr.files import written
 from seecr.pose import Array
 from seecr.prediction.cells import UNSEEN
 from seecr.prediction.data_reach import TABLE, DataReach
@@ -241,7 +241,7 @@ def _fill_cells(parameters: Any, fitted: Fitted) -> None:
             parameters[key] = _inline(cell | _known(fitted.term.knowledge, i))
 
 
-def _known(knowledge: Knowledge, i: int) -> dict[str, Any]:
+def _known(knowledge: Knowledge, i: int) -> dict[str, object]:
     """What is known about a parameter from outside the data."""
     if knowledge.fixed[i]:
         return {"fixed": True}
@@ -251,13 +251,13 @@ def _known(knowledge: Knowledge, i: int) -> dict[str, Any]:
     return {"known": _inline({"value": value, "stderr": stderr})}
 
 
-def _inline(cell: Mapping[str, Any]) -> Any:
+def _inline(cell: Mapping[str, object]) -> Any:
     """A table on one line, with the spaces that people write."""
     parts = [f"{word} = {tomlkit.item(value).as_string()}" for word, value in cell.items()]
     return tomlkit.parse(f"x = {{ {', '.join(parts)} }}\n")["x"]
 
 
-def _cell(layout: Layout, i: int, fitted: Fitted) -> dict[str, Any]:
+def _cell(layout: Layout, i: int, fitted: Fitted) -> dict[str, object]:
     error = float(fitted.stderr[i])
     value = float(f"{float(fitted.term.vector[i]):.{_VALUE}g}")
     # rounding must not carry a value beyond its bound

@@ -27,7 +27,7 @@ from crosscheck.planning.proposer import propose
 from crosscheck.planning.result import Plan, Visible
 from crosscheck.planning.sight import all_visible
 from crosscheck.planning.visibility import Signal, signals, signals_like
-from seecr.effects import Term, Terms, effect_named, layout_of
+from seecr.effects import Term, Terms, layout_of
 from seecr.pose import Array
 
 
@@ -62,7 +62,7 @@ def make_plan(
     kinds = kinds_of(reads, stated)
     read = Reads.of_kinds(robot.n_cables, kinds)
     full, assumed = expected_sigma(robot, stated, kinds)
-    free = [layout_of(effect_named(name), robot) for name in commands.free]
+    free = [layout_of(name, robot) for name in commands.free]
     plan = planned(robot, commands, full, read, Terms(Term(one, one.null) for one in free))
     notes = [*commands.notes, *assumed, *_unsolved(plan)]
     if not plan.problem.use.any():

@@ -90,7 +90,7 @@ class Suggestion:
             "kind": self.kind.value,
             "words": self.words,
             "poses": self.poses,
-            "gains": [gain.as_json() for gain in self.gains],
+            "gains": self.gains,
         }
 
 

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from crosscheck.errors import CrosscheckError
-from crosscheck.files import check_writable
 from crosscheck.given import numbers_of
 from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.write import write_measurements
 from crosscheck.planning.result import Plan
+from seecr.files import check_writable
 from seecr.pose import Array
 
 __all__ = ["box_of", "write_plan"]

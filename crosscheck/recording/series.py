@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
@@ -14,7 +13,7 @@ from seecr.pose import Array, pose_difference
 from seecr.recording import colours, layout, plots
 from seecr.recording.colours import Rgba
 from seecr.recording.legends import Legend, legend_of
-from seecr.recording.stream import Index, Recording
+from seecr.recording.stream import Index, Recording, entity_of
 
 DEVIATION, TILT, TENSION = "plot/deviation", "plot/tilt", "plot/tension"
 DIFFERENCE, SETTLED, LIMIT = "plot/difference", "plot/plain_settling", "plot/limit"
@@ -107,11 +106,11 @@ class Series:
     def _deviation(self, who: str, index: Index, poses: Array, command: Array) -> None:
         for name, values in plots.deviation(poses, command).items():
             root = DEVIATION if name in plots.TRANSLATIONS else TILT
-            self.recording.scalars(f"{root}/{who}/{_entity(name)}", index, values)
+            self.recording.scalars(f"{root}/{who}/{entity_of(name)}", index, values)
 
     def _tension(self, who: str, index: Index, tensions: Array) -> None:
         for name, values in zip(self.material.robot.cable_names, tensions.T, strict=True):
-            self.recording.scalars(f"{TENSION}/{who}/{_entity(name)}", index, values)
+            self.recording.scalars(f"{TENSION}/{who}/{entity_of(name)}", index, values)
 
     def _differences(self, index: Index) -> None:
         gap, limit = self.material.gap, self.material.result.allowance
@@ -129,7 +128,7 @@ class Series:
 
     def _lanes(self, index: Index, states: NDArray[np.object_]) -> None:
         for name, column in zip(self.material.robot.cable_names, states.T, strict=True):
-            plots.lanes(self.recording, f"{LANES}/{_entity(name)}", index, list(column))
+            plots.lanes(self.recording, f"{LANES}/{entity_of(name)}", index, list(column))
 
     def _log(self, root: str, quantity: str, index: Index, values: Array) -> None:
         self.recording.scalars(f"{root}/{quantity}", index, plots.log10(values))
@@ -138,14 +137,14 @@ class Series:
         """Lines for SEECR and dots for MuJoCo, or two kinds of dots if poses are unrelated."""
         for name, colour in _COMPONENTS.items():
             root = DEVIATION if name in plots.TRANSLATIONS else TILT
-            self._pair(root, _entity(name), name, colour)
+            self._pair(root, entity_of(name), name, colour)
         names = self.material.robot.cable_names
         shades = colours.cable_colours(self.material.robot.n_cables)
         said = {group[0]: joined([names[k] for k in group]) for group in _drawn(self.material)}
         for k, (name, shade) in enumerate(zip(names, shades, strict=True)):
             colour = (int(shade[0]), int(shade[1]), int(shade[2]), 255)
-            self._pair(TENSION, _entity(name), said.get(k, name), colour)
-            plots.lane_style(self.recording, f"{LANES}/{_entity(name)}", colour)
+            self._pair(TENSION, entity_of(name), said.get(k, name), colour)
+            plots.lane_style(self.recording, f"{LANES}/{entity_of(name)}", colour)
         for quantity, (name, colour) in _QUANTITIES.items():
             plots.as_dots(self.recording, f"{DIFFERENCE}/{quantity}", name, colour, 2.5)
             plots.as_crosses(self.recording, f"{SETTLED}/{quantity}", name, colour, 3.5)
@@ -253,8 +252,4 @@ def _still(largest: float) -> tuple[float, float] | None:
 
 
 def _both(root: str, names: list[str]) -> list[str]:
-    return [f"{root}/{who}/{_entity(name)}" for who in ("seecr", "mujoco") for name in names]
-
-
-def _entity(name: str) -> str:
-    return rr.escape_entity_path_part(name.replace(" ", "_"))
+    return [f"{root}/{who}/{entity_of(name)}" for who in ("seecr", "mujoco") for name in names]

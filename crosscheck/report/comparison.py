@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from markupsafe import Markup
 
@@ -20,13 +19,13 @@ from crosscheck.units import in_unit, short
 _MOST = 5
 
 
-def comparison_context(found: Comparison) -> dict[str, Any]:
+def comparison_context(found: Comparison) -> dict[str, object]:
     """What the template of a comparison asks for."""
     problem, names = found.problem, list(found.terms.names)
     kinds = [kind for kind in KINDS if found.rms.get(kind.key) is not None]
     model = " + ".join(["SEECR", *names]) if names else "plain SEECR"
     verdict, words = _verdict(found)
-    context: dict[str, Any] = {
+    context: dict[str, object] = {
         "page_title": f"Comparison: {title_of(problem)}",
         "heading": f"Comparison of {title_of(problem)} with {model}",
         "verdict": verdict,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 from markupsafe import Markup
 
@@ -20,14 +21,39 @@ from crosscheck.report.tables import association_block, candidate_rows, checks, 
 from crosscheck.report.waterfall import waterfall
 from crosscheck.report.where import caption, failure_map
 
-_NO_SEARCH: dict[str, Any] = {
-    "facts": [], "figures": dict.fromkeys(("waterfall", "map", "confusion"), ""),
-    "walls": [], "twins": [], "caption": "", "added": [], "tint": BEFORE, "together": False,
-    "unsure": False, "other_noise": False,
-}  # fmt: skip
+
+@dataclass(frozen=True)
+class _Searched:
+    """Facts and figures about a search; empty where there was none.
+
+    Attributes:
+        facts: about the data, and what is left of the errors.
+        other_noise: whether noise was found to be other than that assumed.
+        waterfall, map, confusion: figures; "" for none.
+        walls: figures of residuals, one for each kind of reading.
+        twins: effects that imitate each other.
+        caption: of the map.
+        together: whether the noise of the lengths couples the readings.
+        unsure: whether some steps are not listed.
+        added: names of the effects that the last model has beyond the given one.
+        tint: colour of what the last model does not explain.
+    """
+
+    facts: Sequence[tuple[str, str]] = ()
+    other_noise: bool = False
+    waterfall: str = ""
+    map: str = ""
+    confusion: str = ""
+    walls: Sequence[str] = ()
+    twins: Sequence[tuple[str, str]] = ()
+    caption: str = ""
+    together: bool = False
+    unsure: bool = False
+    added: Sequence[str] = ()
+    tint: str = BEFORE
 
 
-def diagnosis_context(found: Diagnosis) -> dict[str, Any]:
+def diagnosis_context(found: Diagnosis) -> dict[str, object]:
     """What the template of a diagnosis asks for."""
     of = f" of {title_of(found.search.problem)}" if found.search is not None else ""
     return {
@@ -50,41 +76,37 @@ def diagnosis_context(found: Diagnosis) -> dict[str, Any]:
         "after": AFTER,
         "checks": checks(found),
         "where": [association_block(row) for row in found.where],
-        **_of_search(found),
+        **vars(_searched(found)),
     }
 
 
-def _of_search(found: Diagnosis) -> dict[str, Any]:
-    """Facts and figures; empty where there was no search."""
+def _searched(found: Diagnosis) -> _Searched:
     if found.search is None:
-        return _NO_SEARCH
+        return _Searched()
     problem = found.search.problem
     before, after = shown_stages(found)
     # what the wall overlays is the last model, sure or not: it shows what was tried
     last = stages_of(found)[-1]
     confusion = confusion_of(found)
-    figures = {
-        "waterfall": waterfall(found),
-        "map": failure_map(problem, before, after),
-        "confusion": draw_confusion(confusion) if confusion is not None else "",
-    }
     other = noise_is_other(found)
     calm = found.verdict is DiagnosisVerdict.NO_EFFECT_MISSING
     alone = CALM if calm else BEFORE
     walls = [draw_wall(wall, alone) for wall in walls_of(problem, before, last)]
     added = [n for n in last.state.terms.names if n not in found.search.base]
-    return {
-        "facts": [*facts(problem, other_noise=other), *_unknown_facts(found)],
-        "other_noise": other,
-        "figures": {key: Markup(text) for key, text in figures.items()},  # ours, escaped there
-        "walls": [Markup(text) for text in walls],
-        "twins": confusion.twins if confusion is not None else [],
-        "caption": caption(problem, before),
-        "together": bool(problem.sigma.length_m),
-        "unsure": not all(stage.listed for stage in stages_of(found)),
-        "added": added,
-        "tint": TINT if added else alone,
-    }
+    return _Searched(
+        facts=[*facts(problem, other_noise=other), *_unknown_facts(found)],
+        other_noise=other,
+        waterfall=Markup(waterfall(found)),  # ours, escaped there; so are the others
+        map=Markup(failure_map(problem, before, after)),
+        confusion="" if confusion is None else Markup(draw_confusion(confusion)),
+        walls=[Markup(text) for text in walls],
+        twins=[] if confusion is None else confusion.twins,
+        caption=caption(problem, before),
+        together=bool(problem.sigma.length_m),
+        unsure=not all(stage.listed for stage in stages_of(found)),
+        added=added,
+        tint=TINT if added else alone,
+    )
 
 
 def _unknown_facts(found: Diagnosis) -> list[tuple[str, str]]:

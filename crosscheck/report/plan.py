@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from markupsafe import Markup
@@ -21,10 +20,10 @@ from seecr.pose import Array, rotvec_from_quat
 _ROW = 0.19
 
 
-def plan_context(plan: Plan) -> dict[str, Any]:
+def plan_context(plan: Plan) -> dict[str, object]:
     """What the template of a plan asks for."""
     problem = plan.planned.problem
-    context: dict[str, Any] = {
+    context: dict[str, object] = {
         "page_title": f"Plan: {title_of(problem)}",
         "heading": f"Plan of {title_of(problem)}",
         "verdict": "plan",

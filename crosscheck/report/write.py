@@ -6,12 +6,12 @@ from pathlib import Path
 
 from crosscheck.comparison.result import Comparison
 from crosscheck.diagnosis.result import Diagnosis
-from crosscheck.files import write_text
 from crosscheck.planning.result import Plan
 from crosscheck.report.comparison import comparison_context
 from crosscheck.report.diagnosis import diagnosis_context
 from crosscheck.report.page import page_of
 from crosscheck.report.plan import plan_context
+from seecr.files import write_text
 from seecr.made import Made
 
 

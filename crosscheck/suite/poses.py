@@ -40,10 +40,10 @@ def demobot_sweep(z: float, n: int = N_SWEEP) -> Array:
     return poses
 
 
-def demobot_turned_sweep(n: int = N_SWEEP) -> Array:
-    """The same line between the two heights, (n, 7), with rotations commanded on the way."""
-    poses = demobot_sweep(0.5 * sum(SWEEP_Z), n)
-    angle = np.linspace(0.0, 2.0 * np.pi, n)
+def demobot_turned_sweep() -> Array:
+    """The same line between the two heights, (N_SWEEP, 7), with rotations commanded on the way."""
+    poses = demobot_sweep(0.5 * sum(SWEEP_Z))
+    angle = np.linspace(0.0, 2.0 * np.pi, len(poses))
     parts = [np.sin(angle), np.sin(angle + 1.0), np.cos(2.0 * angle)]
     poses[:, 3:] = quat_from_rotvec(_SWEEP_TURN * np.stack(parts, axis=1))
     return poses

@@ -172,7 +172,7 @@ class CaseResult(Result):
             "seecr": self.solution,
             "mujoco": {"rest_lengths_m": self.mujoco_rest_lengths, **self.settling.as_json()},
             "difference": asdict(self.difference) | {"tension_N": self.difference.tension_N},
-            "allowed": asdict(self.allowance),
+            "allowed": self.allowance,
         }
 
     def mujoco_robot(self) -> MujocoRobot:

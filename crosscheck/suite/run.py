@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.files import json_text
 from crosscheck.settle.model import ignored_note
 from crosscheck.suite.agreement import allowances, differences_of
 from crosscheck.suite.cases import Case
@@ -30,7 +29,8 @@ from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.equilibrium.solving import solve as seecr_solve
 from seecr.errors import InputFileError
-from seecr.result import Result
+from seecr.files import json_text
+from seecr.result import Record, Result
 from seecr.statics.solution import Solution
 
 FORMAT = 1
@@ -97,7 +97,7 @@ class Run(Result):
         notes = [f"note: {note}" for note in self.notes]
         return [words.verdict_line(self), *failures, *words.effect_failures(self.effects), *notes]
 
-    def records(self) -> list[dict[str, Any]]:
+    def records(self) -> list[Record]:
         """One row per pose of every case; effects have none."""
         return [
             {"case": result.case.name, **record}

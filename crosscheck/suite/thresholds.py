@@ -5,12 +5,12 @@ from __future__ import annotations
 import difflib
 import fnmatch
 import math
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Callable, Collection, Iterable
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from crosscheck.files import Toml, plain, read_toml
+from seecr.files import Toml, plain, read_toml
 
 SHIPPED = Path(__file__).with_name("thresholds.toml")
 
@@ -65,10 +65,6 @@ class Thresholds:
     polished: PolishedLimits = field(default_factory=PolishedLimits)
     findings: FindingLimits = field(default_factory=FindingLimits)
 
-    def as_json(self) -> dict[str, dict[str, Any]]:
-        """Tables and values as in the file."""
-        return asdict(self)
-
 
 def load_thresholds(path: str | Path | None = None) -> Thresholds:
     """Read thresholds; those that the file leaves out keep their shipped values.
@@ -97,18 +93,18 @@ def thresholds_toml(thresholds: Thresholds) -> str:
 
 def _merge(thresholds: Thresholds, path: Path) -> Thresholds:
     file = read_toml(path, f"expected thresholds such as those in {SHIPPED}")
-    _check_names(file, file.content, thresholds.as_json(), "table")
+    _check_names(file, file.content, vars(thresholds), "table")
     parts = {}
     for table, values in file.content.items():
         part = getattr(thresholds, table)
         if not isinstance(values, dict):
             raise file.error(f"{table}: expected a table [{table}], got {values!r}", table)
-        _check_names(file, values, asdict(part), f"key of [{table}]")
+        _check_names(file, values, vars(part), f"key of [{table}]")
         parts[table] = replace(part, **{k: _value(file, table, k, v) for k, v in values.items()})
     return replace(thresholds, **parts)
 
 
-def _check_names(file: Toml, got: dict[str, Any], known: dict[str, Any], what: str) -> None:
+def _check_names(file: Toml, got: Iterable[str], known: Collection[str], what: str) -> None:
     for name in got:
         if name not in known:
             near = difflib.get_close_matches(name, known, n=len(known), cutoff=0.0)

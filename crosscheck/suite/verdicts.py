@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from enum import Enum
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,10 +82,6 @@ class PoseFinding:
     def fails(self) -> bool:
         """Whether the case fails because of it."""
         return self.beyond_limits or self.verdict not in FINDINGS
-
-    def as_json(self) -> dict[str, Any]:
-        """As in ``results.json``."""
-        return asdict(self)
 
 
 class Answers(NamedTuple):

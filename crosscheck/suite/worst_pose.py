@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from crosscheck.files import written
 from crosscheck.suite.results import CaseResult, worst_of
 from crosscheck.suite.verdicts import FINDINGS, UNSOLVED, Verdict
 from seecr.errors import InputFileError
+from seecr.files import written
 from seecr.pose import Array
 
 KEYFRAME = "worst"

@@ -12,6 +12,7 @@ from rich.text import Text
 from crosscheck.suite import words
 from crosscheck.suite.outcome import Outcome
 from crosscheck.suite.verdicts import FINDINGS, Verdict
+from crosscheck.terminal.lines import console_for, say
 from seecr.counted import counted
 
 if TYPE_CHECKING:
@@ -30,8 +31,6 @@ _RESULT = words.TABLE_HEADS.index("result")
 _WORDS = (0, _RESULT, _RESULT + 1)
 _ESSENTIAL = (0, *(words.TABLE_HEADS.index(head) for head in words.HEADS.values()), _RESULT)
 _ROOMY = 124
-# Where there is no terminal to ask, lines are not broken below this.
-_WIDE = 160
 
 
 def print_run(run: Run, out: Path, console: Console | None = None) -> None:
@@ -42,9 +41,7 @@ def print_run(run: Run, out: Path, console: Console | None = None) -> None:
         out: the folder of results.
         console: where to; standard output by default.
     """
-    console = console or Console(highlight=False)
-    if not console.is_terminal:
-        console.width = max(console.width, _WIDE)
+    console = console_for(console)
     if run.results:
         console.print(_table(run, console.width))
     for result in run.results:
@@ -52,17 +49,12 @@ def print_run(run: Run, out: Path, console: Console | None = None) -> None:
     for verdict in FINDINGS:
         if run.count(verdict):
             poses = counted(run.count(verdict), "pose")
-            _print(console, f"Finding at {poses}: {verdict.value}.")
+            say(console, f"Finding at {poses}: {verdict.value}.")
     _print_lines(console, words.effect_failures(run.effects), "effects")
     if run.effects and run.results:
-        _print(console, words.effects_line(run.effects))
-    _print(console, words.verdict_line(run), _STYLE[run.outcome])
-    _print(console, f"{run.wall_s:.1f} s; results in {out}/")
-
-
-def _print(console: Console, line: str, style: str = "") -> None:
-    # Lines stay whole, for people who search or pipe them.
-    console.print(Text(line, style=style), soft_wrap=True)
+        say(console, words.effects_line(run.effects))
+    say(console, words.verdict_line(run), _STYLE[run.outcome])
+    say(console, f"{run.wall_s:.1f} s; results in {out}/")
 
 
 def _table(run: Run, width: int) -> Table:
@@ -94,6 +86,6 @@ def _print_notes(console: Console, result: CaseResult) -> None:
 def _print_lines(console: Console, lines: list[str], name: str) -> None:
     """The first few lines about a case or the effects, and how many more there are."""
     for line in lines[:_MOST]:
-        _print(console, line)
+        say(console, line)
     if len(lines) > _MOST:
-        _print(console, f"{name}: {len(lines) - _MOST} more in summary.md")
+        say(console, f"{name}: {len(lines) - _MOST} more in summary.md")

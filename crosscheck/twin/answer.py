@@ -11,16 +11,17 @@ import binascii
 import json
 import textwrap
 import zlib
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from crosscheck.files import plain, read_text
 from crosscheck.measurements.data import Sigma
 from crosscheck.twin.measure import Truth
 from seecr.errors import InputFileError
+from seecr.files import plain, read_text
 from seecr.pose import pose_difference
 
 NAME = "answer.sealed"
@@ -82,7 +83,7 @@ class Answer:
         return {"hidden": self.hidden or ["null"], **asdict(self)}
 
     @classmethod
-    def of_json(cls, document: dict[str, Any]) -> Answer:
+    def of_json(cls, document: Mapping[str, Any]) -> Answer:
         """The answer that :meth:`as_json` described.
 
         Raises:

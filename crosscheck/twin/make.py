@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.files import check_replaces, staged, write_text
 from crosscheck.given import GivenRobot, copy_robot, file_of, robot_of
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.measurements.read import GivenCommands, commands_of
@@ -38,6 +37,7 @@ from crosscheck.twin.measure import Truth
 from seecr.arguments import whole
 from seecr.description.robot import Robot
 from seecr.effects import Term
+from seecr.files import check_replaces, staged, write_text
 from seecr.result import Record, Result
 
 FILES = ("robot.xml", "measured.csv", "measured.toml", NAME)

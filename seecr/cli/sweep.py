@@ -94,7 +94,7 @@ def command(
     no_recording: bool,
     out: Path,
     as_json: bool,
-    **given: Any,
+    **ways: Any,
 ) -> int:
     """Show where the platform comes to rest at each of many commands.
 
@@ -122,6 +122,7 @@ def command(
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
+    given = _Commanded(**ways)
     commands, more, said, wanted = _commands(machine, poses, given)
     with staged(out, sometimes=("sweep.toml", *files_of_pictures("sweep"))) as folder:
         with progress_bar("solving", len(commands)) as tell:
@@ -141,7 +142,7 @@ def command(
             "cables": machine.cable_names,
             "model": None if own is None else own.names,
             "notes": notes,
-            **({} if search is None else {"search": vars(search)}),
+            **({} if search is None else {"search": search}),
             "rows": rows,
         }
         text = json_text(document)
@@ -167,6 +168,20 @@ def command(
     for line in [*notes, *lines, f"Results in {out}/", then]:
         click.echo(line)
     return status
+
+
+_Columns = dict[str, Sequence[Any]]
+"""Further values of each row, by the column's name."""
+
+
+@dataclass(frozen=True)
+class _Commanded:
+    """The options that say where the platform is commanded to, as typed."""
+
+    line: tuple[float, ...] | None
+    count: int | None
+    grid: tuple[str, ...] | None
+    turned: tuple[float, ...] | None
 
 
 @dataclass(frozen=True)
@@ -217,21 +232,21 @@ def _solved(
 
 
 def _commands(
-    robot: Robot, poses: Path | None, given: dict[str, Any]
-) -> tuple[Commands, dict[str, Any], tuple[str, ...], bool]:
+    robot: Robot, poses: Path | None, given: _Commanded
+) -> tuple[Commands, _Columns, tuple[str, ...], bool]:
     """The commands, what else their file says, notes on it, whether lengths have poses wanted."""
     from seecr import Commands, InputError
     from seecr.columns.command_file import read_commands
 
-    ways = [name for name in ("line", "grid") if given[name]]
+    ways = [name for name in ("line", "grid") if getattr(given, name)]
     if len(ways) + (poses is not None) != 1:
         got = " and ".join([*(["POSES.csv"] if poses else []), *(f"--{w}" for w in ways)])
         raise InputError(f"expected one of POSES.csv, --line, --grid; got {got or 'none'}")
-    if poses is not None and given["turned"]:
+    if poses is not None and given.turned:
         raise InputError(
             f"--turned applies to --line and --grid; {poses} has its own orientations; leave it out"
         )
-    if given["count"] and not given["line"]:
+    if given.count and not given.line:
         raise InputError(
             f"--count applies to --line, got it together with {poses or '--grid'}, which sets the "
             "number of poses; leave it out"
@@ -239,7 +254,7 @@ def _commands(
     if poses is None:
         return Commands(_along(robot, given)), {}, (_COUNTED,), False
     read = read_commands(poses, robot)
-    more: dict[str, Any] = {}
+    more: _Columns = {}
     if len(set(read.run)) > 1:
         more["run"] = read.run
     if read.commands.time is not None:
@@ -251,28 +266,28 @@ def _commands(
     return read.commands, more, notes, wanted
 
 
-def _along(robot: Robot, given: dict[str, Any]) -> NDArray[np.float64]:
+def _along(robot: Robot, given: _Commanded) -> NDArray[np.float64]:
     """Poses (n, 7) of --line or --grid."""
     import numpy as np
 
     from seecr.statics.starts import commanded_poses
 
-    if given["line"]:
-        check_places(given["line"], robot)
-        count = given["count"] or _COUNT
+    if given.line:
+        check_places(given.line, robot)
+        count = given.count or _COUNT
         check_count("--count", count)
-        places = np.linspace(given["line"][:3], given["line"][3:], count)
+        places = np.linspace(given.line[:3], given.line[3:], count)
     else:
-        axes = axes_of(given["grid"], robot)
+        axes = axes_of(given.grid or (), robot)
         places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    turned = given["turned"] or robot.reference_pose[3:]
+    turned = given.turned or robot.reference_pose[3:]
     return commanded_poses(np.column_stack([places, np.tile(turned, (len(places), 1))]))
 
 
-def _runs(robot: Robot, given: dict[str, Any], more: dict[str, Any]) -> Sequence[int] | None:
+def _runs(robot: Robot, given: _Commanded, more: _Columns) -> Sequence[int] | None:
     """Which poses follow on each other: a column of --grid, a run of a file; None: all do."""
-    if not given["grid"]:
+    if not given.grid:
         return more.get("run")
-    counts = [len(axis) for axis in axes_of(given["grid"], robot)]
+    counts = [len(axis) for axis in axes_of(given.grid, robot)]
     column = next((n for n in reversed(counts) if n > 1), 1)
     return [k // column for k in range(math.prod(counts))]

@@ -11,6 +11,8 @@ FOUND, NONE, UNDECIDED = 0, 1, 2
 # Most steps, most halvings of one, residual of the balance relative to its load, and damping of a
 # step relative to the residual.
 _STEPS, _HALVINGS, _LEFT, _DAMPING = 100, 40, 1e-13, 1e-9
+# A shortened step ends where the slope is this part of that at its start.
+_FLAT = 0.1
 _NEARLY = 1e-9
 # Tensions beyond this many loads do not occur.
 _MOST_EVER = 1e6
@@ -138,17 +140,27 @@ def project(matrix, load, aim, low, high, tension):
         for k in range(d):
             descent += left[k] * step[k]
         part, before = 1.0, most
+        # with too few cables inside their limits a step is far too long; the first part of it that
+        # is any better is still too long, so it is shortened to where the value is about least
+        short, long = 0.0, 1.0
         for _ in range(_HALVINGS):
-            work = 0.0
+            work, slope = 0.0, 0.0
             for k in range(d):
                 tried[k] = dual[k] + part * step[k]
                 work += load[k] * tried[k]
             new = _clipped(matrix, aim, low, high, tried, tension) - work
             most = _unbalanced(matrix, load, tension, left)
+            for k in range(d):
+                slope += left[k] * step[k]
             # near the solution the dual's value is rounding, and the residual decides
-            if new <= value + 1e-4 * part * descent or most < 0.5 * before:
+            fine = new <= value + 1e-4 * part * descent or most < 0.5 * before
+            if fine and (part == 1.0 or abs(slope) <= _FLAT * abs(descent)):
                 break
-            part *= 0.5
+            if slope > 0.0:
+                long = part
+            else:
+                short = part
+            part = 0.5 * (short + long)
         dual[:] = tried
         value = new
     return UNDECIDED

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from seecr.effects.base import PLACES, Effect, Layout, Readings, layout_of, parameter
+from seecr.effects.base import PLACES, Effect, Layout, Readings, parameter
 from seecr.effects.knowledge import Knowledge
 from seecr.effects.own_values import Apart, ApartLayout, Own, Values, apart
-from seecr.effects.registry import BUILT_IN, catalogue, effect_named
+from seecr.effects.registry import BUILT_IN, catalogue, effect_named, layout_of
 from seecr.effects.terms import Term, Terms
 
 __all__ = [

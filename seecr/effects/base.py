@@ -22,7 +22,6 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr.description.given import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.effects.setup import Setup
 from seecr.effects.totals import Total
@@ -179,6 +178,35 @@ class Layout:
     shape: np.ndarray
     _parts: tuple[tuple[str, int, str], ...]
 
+    @classmethod
+    def of(cls, effect: type[Effect], robot: Robot) -> Layout:
+        """The flat parameters of an effect for a robot."""
+        names: list[str] = []
+        units: list[str] = []
+        columns: dict[str, list[float]] = {"null": [], "lower": [], "upper": [], "scale": []}
+        shape: list[bool] = []
+        parts = []
+        for item in fields(effect):
+            meta = item.metadata
+            suffix = f"_{meta['unit']}" if meta["unit"] else ""
+            endings = _SIZES[meta["size"]](robot.n_cables)
+            names += [f"{item.name}{ending}{suffix}" for ending in endings]
+            units += [meta["unit"]] * len(endings)
+            one_row = [meta["null"], *meta["bounds"], meta["scale"]]
+            one_row = [value(robot) if callable(value) else value for value in one_row]
+            for key, value in zip(columns, one_row, strict=True):
+                columns[key] += [float(value)] * len(endings)
+            shape += [bool(meta["shape"])] * len(endings)
+            parts.append((item.name, len(endings), meta["size"]))
+        arrays = {key: np.array(column) for key, column in columns.items()}
+        # a shape starts where it may be: bounds go with the robot's size
+        inside = np.clip(arrays["null"], arrays["lower"], arrays["upper"])
+        arrays["null"] = np.where(shape, inside, arrays["null"])
+        return cls(
+            effect, tuple(names), tuple(units), arrays["null"], arrays["lower"], arrays["upper"],
+            arrays["scale"], np.array(shape, dtype=bool), tuple(parts),
+        )  # fmt: skip
+
     def __len__(self) -> int:
         return len(self.names)
 
@@ -228,36 +256,6 @@ class Layout:
                 vector[first : first + count] = shape[name]
             first += count
         return vector
-
-
-def layout_of(effect: type[Effect], robot: GivenRobot) -> Layout:
-    """The flat parameters of an effect for a robot, or for that in an MJCF."""
-    robot = robot_of(robot)
-    names: list[str] = []
-    units: list[str] = []
-    columns: dict[str, list[float]] = {"null": [], "lower": [], "upper": [], "scale": []}
-    shape: list[bool] = []
-    parts = []
-    for item in fields(effect):
-        meta = item.metadata
-        suffix = f"_{meta['unit']}" if meta["unit"] else ""
-        endings = _SIZES[meta["size"]](robot.n_cables)
-        names += [f"{item.name}{ending}{suffix}" for ending in endings]
-        units += [meta["unit"]] * len(endings)
-        one_row = [meta["null"], *meta["bounds"], meta["scale"]]
-        one_row = [value(robot) if callable(value) else value for value in one_row]
-        for key, value in zip(columns, one_row, strict=True):
-            columns[key] += [float(value)] * len(endings)
-        shape += [bool(meta["shape"])] * len(endings)
-        parts.append((item.name, len(endings), meta["size"]))
-    arrays = {key: np.array(column) for key, column in columns.items()}
-    # a shape starts where it may be: bounds go with the robot's size
-    inside = np.clip(arrays["null"], arrays["lower"], arrays["upper"])
-    arrays["null"] = np.where(shape, inside, arrays["null"])
-    return Layout(
-        effect, tuple(names), tuple(units), arrays["null"], arrays["lower"], arrays["upper"],
-        arrays["scale"], np.array(shape, dtype=bool), tuple(parts),
-    )  # fmt: skip
 
 
 def mean_length(robot: Robot) -> float:

@@ -5,9 +5,27 @@ from __future__ import annotations
 from collections.abc import Sequence
 from threading import Lock
 
+from seecr.commands.data import Commands
+from seecr.description.robot import Robot
 from seecr.effects.base import Effect
 from seecr.effects.checked import edit_setup
-from seecr.effects.setup import Setup
+from seecr.effects.setup import Setup, plain_setup
+from seecr.pose import Array
+
+
+def setup_with(
+    effects: Sequence[Effect], robot: Robot, commands: Commands, wrench: Array | None = None
+) -> Setup:
+    """The setup of commands as the effects leave it, in their order.
+
+    Args:
+        effects: with values.
+        robot, commands, wrench: as for :func:`seecr.effects.setup.plain_setup`.
+    """
+    setup = plain_setup(robot, commands, wrench)
+    for effect in effects:
+        edit_setup(effect, setup)
+    return setup
 
 
 class Edits:

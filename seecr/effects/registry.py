@@ -6,6 +6,7 @@ import difflib
 from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points
 
+from seecr.description.given import GivenRobot, robot_of
 from seecr.effects.actuation import (
     Backlash,
     CableLengthOffset,
@@ -15,7 +16,7 @@ from seecr.effects.actuation import (
     LengthScale,
     ThermalExpansion,
 )
-from seecr.effects.base import Effect
+from seecr.effects.base import Effect, Layout
 from seecr.effects.cable import (
     CableStiffness,
     CableWeight,
@@ -102,10 +103,26 @@ def effect_named(name: str) -> type[Effect]:
     Raises:
         InputError: there is none; lists the known ones, nearest first.
     """
+    if not isinstance(name, str):
+        raise InputError(f"expected the name of an effect, got {name!r}")
     known = catalogue()
     if name in known:
         return known[name]
-    if not isinstance(name, str):
-        raise InputError(f"expected the name of an effect, got {name!r}")
     near = difflib.get_close_matches(name, known, n=len(known), cutoff=0.0)
     raise InputError(f"no effect {name!r}; known, nearest first: {', '.join(near)}")
+
+
+def layout_of(effect: type[Effect] | str, robot: GivenRobot) -> Layout:
+    """The flat parameters of an effect for a robot.
+
+    Args:
+        effect: its name, or its class.
+        robot: as described, or its MJCF.
+
+    Raises:
+        InputError: neither the name of an effect nor an effect's class.
+    """
+    kind = effect if isinstance(effect, type) else effect_named(effect)
+    if not issubclass(kind, Effect):
+        raise InputError(f"expected the name of an effect, or its class, got {effect!r}")
+    return Layout.of(kind, robot_of(robot))

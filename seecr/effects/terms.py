@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 from seecr.arguments import finite
 from seecr.description.given import GivenRobot
 from seecr.description.robot import Robot
-from seecr.effects.base import Effect, Layout, layout_of
+from seecr.effects.base import Effect, Layout
 from seecr.effects.knowledge import Knowledge
 from seecr.effects.own_values import Own
-from seecr.effects.registry import catalogue, effect_named
+from seecr.effects.registry import catalogue, layout_of
 from seecr.errors import InputError
 from seecr.pose import Array
 
@@ -60,7 +60,7 @@ class Term:
         Raises:
             InputError: no such effect, or no such parameter.
         """
-        layout = layout_of(effect_named(name), robot)
+        layout = layout_of(name, robot)
         vector = layout.null.copy()
         for key, value in values.items():
             vector[_place_of(layout, key)] = finite(value, key)

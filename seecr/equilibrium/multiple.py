@@ -13,8 +13,8 @@ from seecr.commands.data import Commands
 from seecr.description.given import GivenRobot, robot_of
 from seecr.description.joints import pose_of_values, values_of_pose
 from seecr.description.robot import Robot
-from seecr.effects.checked import edit_setup
-from seecr.effects.setup import Setup, plain_setup
+from seecr.effects.edits import setup_with
+from seecr.effects.setup import Setup
 from seecr.equilibrium.search import solve_setup
 from seecr.errors import InputError
 from seecr.pose import Array, pose_difference
@@ -66,10 +66,7 @@ def equilibria(
     acting = effects_of(effects, robot)
 
     def repeated(n: int) -> Setup:
-        setup = plain_setup(robot, Commands(np.repeat(command, n, axis=0)))
-        for effect in acting:
-            edit_setup(effect, setup)
-        return setup
+        return setup_with(acting, robot, Commands(np.repeat(command, n, axis=0)))
 
     one = repeated(1)
     if one.has_history or one.laws:

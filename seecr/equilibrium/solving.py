@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,8 +14,8 @@ from seecr.commands.data import Commands
 from seecr.counted import counted
 from seecr.description.given import GivenRobot, robot_of
 from seecr.description.robot import Robot
-from seecr.effects.checked import edit_setup
-from seecr.effects.setup import Setup, plain_setup
+from seecr.effects.edits import setup_with
+from seecr.effects.setup import Setup
 from seecr.equilibrium.following import follow_commands
 from seecr.equilibrium.multiple import other_rests
 from seecr.equilibrium.search import solve_setup
@@ -23,7 +24,7 @@ from seecr.pose import Array
 from seecr.prediction.experiment import Experiment, effects_of
 from seecr.statics.led import led
 from seecr.statics.solution import Solution
-from seecr.statics.starts import commanded_poses
+from seecr.statics.starts import Commanded, HasCommands, commanded_poses
 
 if TYPE_CHECKING:
     from seecr.prediction.model import GivenEffects
@@ -33,7 +34,7 @@ METHODS = ("newton", "fsolve", "least_squares")
 
 def solve(
     robot: GivenRobot,
-    poses: Commands | ArrayLike | None = None,
+    poses: Commanded | None = None,
     *,
     rest_lengths: ArrayLike | None = None,
     effects: GivenEffects = (),
@@ -51,7 +52,8 @@ def solve(
     Args:
         robot: from :func:`seecr.load_robot`, its MJCF, or made by hand.
         poses: (n, 7) or (7,) commanded poses; the winches pay out the straight lengths from A_i to
-            B_i at these poses (eqs 1, 2). Or :class:`seecr.Commands` with runs, times or lengths.
+            B_i at these poses (eqs 1, 2). Or :class:`seecr.Commands` with runs, times or lengths,
+            or ``crosscheck.Measurements``, of which only the commands count.
         rest_lengths: (n, m) or (m,) [m] absolute lengths instead of poses. Poses given as well are
             only where the search starts; by default it starts at the poses whose straight lengths
             fit these best, found from the reference pose.
@@ -85,16 +87,13 @@ def solve(
     robot = robot_of(robot)
     if gravity is not None:
         robot = replace(robot, gravity=_array(gravity, (3,), "gravity"))
+    if isinstance(poses, HasCommands):
+        poses = poses.as_commands(robot)
     commands = _commands(robot, poses, rest_lengths)
     acting = effects_of(effects, robot)
     pushed = None if wrench is None else finite(wrench, "wrench")
 
-    def setup_of(rows: Commands, push: Array | None) -> Setup:
-        setup = plain_setup(robot, rows, push)
-        for effect in acting:
-            edit_setup(effect, setup)
-        return setup
-
+    setup_of = partial(setup_with, acting, robot)
     setup = setup_of(commands, pushed)
     if setup.has_history or setup.laws:
         if follow:

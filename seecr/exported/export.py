@@ -14,8 +14,7 @@ from seecr.compiled.columns import FORCE_OF_WEIGHT, UP
 from seecr.description.given import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.effects import Effect
-from seecr.effects.checked import edit_setup
-from seecr.effects.setup import Setup, plain_setup
+from seecr.effects.edits import setup_with
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError, NoRestError
 from seecr.exported.bodies import SEGMENTS, bodies_text
@@ -140,7 +139,8 @@ def export(robot: GivenRobot, effects: GivenEffects = (), at: ArrayLike | None =
     """
     robot = robot_of(robot)
     said = expressed(robot, effects_of(effects, robot))
-    plain = _edited(robot, robot.reference_pose[None], (*said.plain, *said.lengths))
+    home = Commands(robot.reference_pose[None])
+    plain = setup_with((*said.plain, *said.lengths), robot, home)
     described = replace(
         robot, exit_points=plain.exit_points, anchor_points=plain.anchor_points, ea=plain.ea,
         mass=plain.mass, centre_of_mass=plain.centre_of_mass, gravity=plain.gravity,
@@ -173,14 +173,7 @@ def _for_mujoco(
             "expected another pose"
         )
     comment = f"{robot.name} with {_names(effects)}; for MuJoCo alone, written by seecr export"
-    return bodies_text(_edited(robot, pose, effects), solution, comment), solution
-
-
-def _edited(robot: Robot, pose: np.ndarray, effects: tuple[Effect, ...]) -> Setup:
-    setup = plain_setup(robot, Commands(pose))
-    for effect in effects:
-        edit_setup(effect, setup)
-    return setup
+    return bodies_text(setup_with(effects, robot, Commands(pose)), solution, comment), solution
 
 
 def _names(effects: tuple[Effect, ...]) -> str:

@@ -27,7 +27,7 @@ from seecr.pose import Array, pose_difference
 from seecr.prediction.experiment import Experiment, Prediction, effects_of
 from seecr.result import COORDINATES, Record, Result, named
 from seecr.statics.solution import Solution
-from seecr.statics.starts import commanded_poses
+from seecr.statics.starts import Commanded, commands_from
 from seecr.statics.tables import Tables, assemble, take
 
 if TYPE_CHECKING:
@@ -228,7 +228,7 @@ class Correction(Result):
 
 def correct(
     robot: GivenRobot,
-    poses: Commands | ArrayLike,
+    poses: Commanded,
     *,
     effects: GivenEffects = (),
     lowest: ArrayLike = 0.0,
@@ -246,7 +246,7 @@ def correct(
     Args:
         robot: as described, or its MJCF.
         poses: (n, 7) wanted, or :class:`seecr.Commands` with runs and times, for effects that
-            depend on them.
+            depend on them, or ``crosscheck.Measurements``, of which only the commands count.
         effects: a model, its file, or effects with values.
         lowest: (m,) or one [N], not negative. A cable with zero tension is made a little longer
             than its span.
@@ -282,14 +282,14 @@ def margins_in_place(
 
 def _search_of(
     robot: Robot,
-    poses: Commands | ArrayLike,
+    poses: Commanded,
     effects: GivenEffects,
     lowest: ArrayLike,
     highest: ArrayLike,
     aim: str | ArrayLike,
 ) -> _Search:
     """A search with checked arguments."""
-    given = poses if isinstance(poses, Commands) else Commands(commanded_poses(poses))
+    given = commands_from(poses, robot)
     if given.lengths is not None:
         raise InputError("correct needs wanted poses (n, 7); got lengths")
     low, high = tension_limits(robot, lowest, highest)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from seecr.commands.data import Commands
 from seecr.commands.path import Path, path_of
@@ -25,7 +25,7 @@ from seecr.result import COORDINATES, Record, Result, named
 from seecr.statics import batch
 from seecr.statics.led import led
 from seecr.statics.solution import Solution, certify
-from seecr.statics.starts import commanded_poses, start_of
+from seecr.statics.starts import Commanded, commands_from, start_of
 from seecr.statics.tables import Tables, assemble, relengthened, take
 
 if TYPE_CHECKING:
@@ -305,14 +305,15 @@ class Experiment:
 
 def predict(
     robot: GivenRobot,
-    commands: Commands | ArrayLike,
+    commands: Commanded,
     model: GivenEffects = (),
 ) -> Prediction:
     """Predict where a robot with effects comes to rest, and what its sensors would report.
 
     Args:
         robot: as described, or its MJCF.
-        commands: commanded poses (n, 7), or :class:`seecr.Commands` with runs, times or lengths.
+        commands: commanded poses (n, 7), :class:`seecr.Commands` with runs, times or lengths, or
+            ``crosscheck.Measurements``, of which only the commands count.
         model: from :func:`seecr.load_model`, its file, or effects with values; none by default.
 
     Returns:
@@ -325,9 +326,7 @@ def predict(
         ``seecr.predict(robot, poses, [seecr.Term.of(robot, "pulley_radius", radius_m=0.01)])``
     """
     robot = robot_of(robot)
-    if not isinstance(commands, Commands):
-        commands = Commands(commanded_poses(commands))
-    return Experiment(robot, commands).predict(effects_of(model, robot))
+    return Experiment(robot, commands_from(commands, robot)).predict(effects_of(model, robot))
 
 
 def effects_of(given: GivenEffects, robot: Robot) -> list[Effect]:

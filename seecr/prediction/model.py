@@ -120,10 +120,19 @@ class Model(Result):
         places, tensions = solution.pose[rests, :3], solution.tensions[rests]
         return self.reach.beyond(places, tensions, solution.robot.length)
 
+    def as_json(self) -> Record:
+        """The robot's name, one row per parameter, and the notes."""
+        return {"robot": self._robot, "rows": self.records(), "notes": self.notes}
+
+    @property
+    def _robot(self) -> str | None:
+        """The robot's name, if the file states it."""
+        table = self.document.get("robot")
+        return table.get("name") if isinstance(table, Mapping) else None
+
     def lines(self) -> list[str]:
         """The robot's name, and each effect with its first few values."""
-        table = self.document.get("robot")
-        robot = table.get("name", "a robot") if isinstance(table, Mapping) else "a robot"
+        robot = self._robot or "a robot"
         count = counted(len(self.names), "effect")
         return [
             f"model of {robot}: plain SEECR and {count}" if self.names else

@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from seecr.commands.data import Commands
 from seecr.counted import counted
 from seecr.description.given import GivenRobot, robot_of
 from seecr.effects import Terms
@@ -21,7 +20,7 @@ from seecr.prediction.experiment import Experiment, senses
 from seecr.prediction.model import CALIBRATION, FIT, Model, model_given
 from seecr.prediction.sensitivity import sensitivities
 from seecr.result import Record, Result, named
-from seecr.statics.starts import commanded_poses
+from seecr.statics.starts import Commanded, commands_from
 from seecr.units import short
 
 PARAMETERS, STDERR, CORRELATION = "parameters", "stderr", "correlation"
@@ -220,14 +219,12 @@ def _file_of(model: Model) -> Where:
     return Where(model.path, read_text(model.path, "expected a model"))
 
 
-def spread_of(
-    robot: GivenRobot, commands: Commands | ArrayLike, model: Model | str | Path
-) -> Spread | None:
+def spread_of(robot: GivenRobot, commands: Commanded, model: Model | str | Path) -> Spread | None:
     """Standard deviations of poses and tensions; None if the model keeps no covariance.
 
     Args:
         robot: as described, or its MJCF.
-        commands: poses (n, 7), or :class:`seecr.Commands`.
+        commands: as in :func:`seecr.predict`.
         model: as ``crosscheck calibrate``, ``add`` or ``diagnose`` write it, or its file.
 
     Raises:
@@ -238,10 +235,8 @@ def spread_of(
     whole, known = covariance_of(model), moving_covariance(model)
     if whole is None or known is None:
         return None
-    if not isinstance(commands, Commands):
-        commands = Commands(commanded_poses(commands))
     terms, covariance = known
-    experiment = Experiment(robot, commands)
+    experiment = Experiment(robot, commands_from(commands, robot))
     own = _spread(experiment, terms, covariance)
     all_move = len(terms.names) == len(model.terms.names)
     seen = own if all_move else _spread(experiment, model.terms, whole)

@@ -50,6 +50,11 @@ class Recording:
         self.rows(entity, index, columns.partition(lengths) if lengths else columns)
 
 
+def entity_of(name: str) -> str:
+    """The part of an entity's path that stands for a name of the user's, such as a cable's."""
+    return str(rr.escape_entity_path_part(name.replace(" ", "_")))
+
+
 def pose_index(count: int) -> rr.TimeColumn:
     """The timeline over poses, counted from 0 as in a terminal and in every file of results."""
     return rr.TimeColumn(POSE, sequence=range(count))

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-import rerun as rr
 import rerun.blueprint as rrb
 
 from seecr.curves import alike, joined
@@ -19,6 +18,7 @@ from seecr.recording.shapes import States
 from seecr.recording.stream import (
     Index,
     Recording,
+    entity_of,
     opening,
     pose_index,
     recording_file,
@@ -100,7 +100,7 @@ def _tension_view(solution: Solution, size: tuple[float, float]) -> rrb.TimeSeri
     legend = legend_of([solution.tensions], list(said.values()), size)
     title = "Tension [N]" + ("" if legend.fits else ", cables in the colours of their lanes")
     contents = [
-        f"{_PULL}/{_entity(names[k])}" for k in (said if legend.fits else range(len(names)))
+        f"{_PULL}/{entity_of(names[k])}" for k in (said if legend.fits else range(len(names)))
     ]
     return layout.plot(title, contents, legend, listed=legend.fits)
 
@@ -114,7 +114,7 @@ def _plots(recording: Recording, index: Index, solution: Solution, commanded: bo
     if commanded:
         parts = plots.deviation(solution.pose, solution.command)
         for (name, values), colour in zip(parts.items(), colours.SERIES, strict=False):
-            entity = f"{_AWAY if name in plots.TRANSLATIONS else _TURN}/{_entity(name)}"
+            entity = f"{_AWAY if name in plots.TRANSLATIONS else _TURN}/{entity_of(name)}"
             recording.scalars(entity, index, values)
             plots.as_line(recording, entity, name, colour, 1.5)
     known = np.asarray(np.isfinite(solution.pose).all(axis=1))
@@ -124,13 +124,9 @@ def _plots(recording: Recording, index: Index, solution: Solution, commanded: bo
     said = _said(names, alike([solution.tensions]))
     for k, shade in enumerate(colours.cable_colours(solution.robot.n_cables)):
         colour = (int(shade[0]), int(shade[1]), int(shade[2]), 255)
-        entity = f"{_PULL}/{_entity(names[k])}"
+        entity = f"{_PULL}/{entity_of(names[k])}"
         recording.scalars(entity, index, solution.tensions[:, k])
         plots.as_line(recording, entity, said.get(k, names[k]), colour, 1.5)
-        lane = f"{_LANES}/{_entity(names[k])}"
+        lane = f"{_LANES}/{entity_of(names[k])}"
         plots.lanes(recording, lane, index, list(states[:, k]))
         plots.lane_style(recording, lane, colour)
-
-
-def _entity(name: str) -> str:
-    return rr.escape_entity_path_part(name.replace(" ", "_"))

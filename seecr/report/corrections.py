@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -30,7 +30,7 @@ def corrected_csv(found: Correction, wanted: CommandFile) -> str:
         wanted: the list that it is for, whose runs, times, temperatures and loads are kept.
     """
     given, n = wanted.commands, len(wanted.commands)
-    columns: dict[str, Any] = {}
+    columns: dict[str, Sequence[object] | Array] = {}
     if len(set(wanted.run)) > 1:
         columns["run"] = wanted.run
     if given.time is not None:

@@ -46,50 +46,45 @@ _NUDGE = 0.01
 _DECIMALS = 9
 
 
-def pose_lines(
-    solution: Solution, i: int = 0, commanded: bool = True, spread: Spread | None = None
-) -> Iterator[str]:
-    """The equilibrium of pose i, and how far it is from its command.
+def pose_lines(solution: Solution, spread: Spread | None = None) -> Iterator[str]:
+    """The equilibrium of the first pose, and how far it is from its command.
 
     Args:
-        solution: the solution.
-        i: index of the pose.
-        commanded: whether a pose was commanded, and not lengths.
+        solution: of commanded poses.
         spread: standard deviations, if the model has a covariance.
     """
-    yield f"{solution.robot.name}: {solution.sentence(i)}"
-    pose, away = solution.pose[i], solution.deviation[i]
+    yield f"{solution.robot.name}: {solution.sentence(0)}"
+    pose, away = solution.pose[0], solution.deviation[0]
     if not np.isfinite(pose).all():
         return
     place, angles = 1e3 * pose[:3], np.degrees(rxyz_from_quat(pose[3:]))
     if spread is None:
         at, turned = _three(place, ".3f"), _three(angles, ".3f")
     else:
-        at = _known(place, 1e3 * spread.position[i])
-        turned = _known(angles, np.degrees(spread.rotation[i]))
+        at = _known(place, 1e3 * spread.position[0])
+        turned = _known(angles, np.degrees(spread.rotation[0]))
     yield f"rests at x y z {at} mm, turned rx ry rz {turned} deg"
     if spread is not None:
-        yield from _spread_lines(spread, i)
+        yield from _spread_lines(spread)
     yield "  quaternion " + " ".join(f"{q + 0.0:.7f}" for q in np.round(pose[3:], 9))
-    if commanded:
+    yield (
+        f"off its command by {_three(1e3 * away[:3], '+.4f')} mm "
+        f"({np.round(1e3 * np.linalg.norm(away[:3]), _DECIMALS):.4g} mm), turned by "
+        f"{np.round(np.degrees(np.linalg.norm(away[3:])), _DECIMALS):.4g} deg"
+        f" ({_three(np.degrees(away[3:]), '+.4f')} deg about x y z)"
+    )
+    if np.linalg.norm(away[3:]) > TWISTED and not solution.robot.joints:
         yield (
-            f"off its command by {_three(1e3 * away[:3], '+.4f')} mm "
-            f"({np.round(1e3 * np.linalg.norm(away[:3]), _DECIMALS):.4g} mm), turned by "
-            f"{np.round(np.degrees(np.linalg.norm(away[3:])), _DECIMALS):.4g} deg"
-            f" ({_three(np.degrees(away[3:]), '+.4f')} deg about x y z)"
+            "hangs twisted, more than a right angle from its command: following the path "
+            "there may lead to another equilibrium (seecr sweep --follow)"
         )
-        if np.linalg.norm(away[3:]) > TWISTED and not solution.robot.joints:
-            yield (
-                "hangs twisted, more than a right angle from its command: following the path "
-                "there may lead to another equilibrium (seecr sweep --follow)"
-            )
-    yield from stiffness_lines(solution, i)
-    yield f"forces balance to {solution.residual[i]:.1g} of the load"
+    yield from stiffness_lines(solution)
+    yield f"forces balance to {solution.residual[0]:.1g} of the load"
 
 
-def _spread_lines(spread: Spread, i: int) -> Iterator[str]:
-    seen = spread.seen[i]
-    own = np.concatenate([spread.position[i], spread.rotation[i]])
+def _spread_lines(spread: Spread) -> Iterator[str]:
+    seen = spread.seen[0]
+    own = np.concatenate([spread.position[0], spread.rotation[0]])
     yield f"  {_off(own)}: one standard deviation, from the uncertainty of the model"
     if not np.allclose(seen, own, rtol=0.01):
         yield f"  {_off(seen)} as the calibration's tracker would read it"
@@ -109,22 +104,22 @@ def _known(values: Array, errors: Array) -> str:
     return said.replace("−", "-")  # as in all other numbers beside them
 
 
-def cable_lines(solution: Solution, i: int = 0, spread: Spread | None = None) -> Iterator[str]:
+def cable_lines(solution: Solution, spread: Spread | None = None) -> Iterator[str]:
     """One line per cable: tension with its standard deviation, rest length, whether it is slack."""
     robot = solution.robot
     wide = max(len("cable"), *(len(name) for name in robot.cable_names))
     off = "" if spread is None else "      ± [N]"
     yield f"{'cable':<{wide}}  tension [N]{off}  rest length [m]"
     for k, name in enumerate(robot.cable_names):
-        slack = "  slack" if solution.slack[i, k] else ""
-        tension, rest = solution.tensions[i, k] + 0.0, solution.rest_lengths[i, k]
+        slack = "  slack" if solution.slack[0, k] else ""
+        tension, rest = solution.tensions[0, k] + 0.0, solution.rest_lengths[0, k]
         shown, off = f"{tension:.4f}", ""
         if spread is not None:
-            known = solution.slack[i, k]  # zero, and certain to first order
-            shown, error = (shown, "") if known else with_error(tension, spread.tensions[i, k])
+            known = solution.slack[0, k]  # zero, and certain to first order
+            shown, error = (shown, "") if known else with_error(tension, spread.tensions[0, k])
             off = f"  {error:>9}"
         yield f"{name:<{wide}}  {shown:>11}{off}  {rest:15.6f}{slack}"
-    if solution.slack[i].any():
+    if solution.slack[0].any():
         yield from sag_lines(solution.tables)
 
 
@@ -134,29 +129,29 @@ def sag_lines(tables: Tables) -> Iterator[str]:
         yield SAGS
 
 
-def stiffness_lines(solution: Solution, i: int = 0) -> Iterator[str]:
-    """The softest direction of pose i, with its stiffness, and the frequencies of vibrations."""
-    soft, way = solution.smallest_eigenvalue[i], softest_words(solution, i)
-    if solution.status[i] is Status.SINGULAR:
+def stiffness_lines(solution: Solution) -> Iterator[str]:
+    """The softest direction of the first pose, its stiffness, and frequencies of vibrations."""
+    soft, way = solution.smallest_eigenvalue[0], softest_words(solution)
+    if solution.status[0] is Status.SINGULAR:
         yield f"free to {way}"
-    elif solution.status[i] is Status.UNSTABLE:
+    elif solution.status[0] is Status.UNSTABLE:
         yield f"leaves this pose: {way}"
     else:
-        yield f"softest direction: {way}, {soft:.4g} N/m{_nudged(solution, i)}"
-    frequencies, shapes = (part[i] for part in solution.modes)
+        yield f"softest direction: {way}, {soft:.4g} N/m{_nudged(solution)}"
+    frequencies, shapes = (part[0] for part in solution.modes)
     known = [f"{value:.4g}" for value in frequencies if np.isfinite(value)]
     if known:
         first = direction_words(solution.robot, shapes[:, 0])
         yield f"natural frequencies without damping: {', '.join(known)} Hz; lowest mode: {first}"
 
 
-def _nudged(solution: Solution, i: int) -> str:
-    """The motion that a hundredth of the weight causes in the softest direction of pose i."""
+def _nudged(solution: Solution) -> str:
+    """The motion that a hundredth of the weight causes in the softest direction."""
     robot = solution.robot
-    soft = solution.smallest_eigenvalue[i]
+    soft = solution.smallest_eigenvalue[0]
     if robot.weight == 0.0 or not soft > 0.0:
         return ""
-    step = _NUDGE * robot.weight / soft * solution.softest_direction[i]
+    step = _NUDGE * robot.weight / soft * solution.softest_direction[0]
     whole = np.linalg.norm(step * _metre(robot))
     moved = float(np.linalg.norm(step[~robot.hinges]))
     turned = float(np.linalg.norm(step[robot.hinges]))
@@ -170,9 +165,9 @@ def _metre(robot: Robot) -> Array:
     return np.where(robot.hinges, robot.length, 1.0)
 
 
-def softest_words(solution: Solution, i: int = 0) -> str:
-    """The softest direction of pose i, such as "turn about y"."""
-    return direction_words(solution.robot, solution.softest_direction[i])
+def softest_words(solution: Solution) -> str:
+    """The softest direction of the first pose, such as "turn about y"."""
+    return direction_words(solution.robot, solution.softest_direction[0])
 
 
 def direction_words(robot: Robot, direction: Array) -> str:
@@ -210,11 +205,11 @@ def _axis_name(joint: Joint) -> str:
     return "xyz"[along[0]] if len(along) else joint.name
 
 
-def midline_lines(solution: Solution, i: int = 0) -> Iterator[str]:
+def midline_lines(solution: Solution) -> Iterator[str]:
     """Where the midlines of two pairs of parallel cables in a plane meet, the paper's V or H."""
     robot = solution.robot
     anchors = transform_points(
-        np.stack([robot.reference_pose, solution.pose[i]]), robot.anchor_points
+        np.stack([robot.reference_pose, solution.pose[0]]), robot.anchor_points
     )
     points = np.concatenate([robot.exit_points, *anchors])
     plane = np.flatnonzero(np.ptp(points, axis=0) > 1e-9 * robot.length)
@@ -231,38 +226,37 @@ def midline_lines(solution: Solution, i: int = 0) -> Iterator[str]:
         yield f"midlines of both pairs of cables meet at {where} {place} mm (the paper's V or H)"
 
 
-def elsewhere(solution: Solution, others: Solution, i: int = 0) -> NDArray[np.intp]:
-    """Indices of the equilibria that differ from that of command i."""
-    gaps = pose_difference(others.pose, np.repeat(solution.pose[i : i + 1], len(others), axis=0))
+def elsewhere(solution: Solution, others: Solution) -> NDArray[np.intp]:
+    """Indices of the equilibria that differ from that of the first command."""
+    gaps = pose_difference(others.pose, np.repeat(solution.pose[:1], len(others), axis=0))
     apart = np.linalg.norm(gaps[:, :3], axis=1) / solution.robot.length
     return np.flatnonzero(np.maximum(apart, np.linalg.norm(gaps[:, 3:], axis=1)) > 1e-6)
 
 
 def other_lines(
-    solution: Solution, others: Solution | None, passes: Sequence[Barrier] = (), i: int = 0
+    solution: Solution, others: Solution | None, passes: Sequence[Barrier] = ()
 ) -> Iterator[str]:
     """Where else the platform could rest, and the difference in energy.
 
     Args:
         solution: the equilibria found.
-        others: the equilibria of command i.
+        others: those of the first command.
         passes: barriers to each of the other equilibria, if they were computed.
-        i: which command.
     """
     if others is None:
         return
-    away = elsewhere(solution, others, i)
+    away = elsewhere(solution, others)
     if len(away) == 0:
         yield "no other stable equilibrium was found"
     for n, k in enumerate(away):
-        gap = pose_difference(others.pose[k], solution.pose[i])
+        gap = pose_difference(others.pose[k], solution.pose[0])
         slack = [n for n, s in zip(solution.robot.cable_names, others.slack[k], strict=True) if s]
         line = (
             f"could also rest {1e3 * np.linalg.norm(gap[:3]):.4g} mm and "
             f"{np.degrees(np.linalg.norm(gap[3:])):.4g} deg away: at "
             f"{_three(1e3 * others.pose[k, :3], '.4g')} mm, turned "
             f"{_three(np.degrees(rxyz_from_quat(others.pose[k, 3:])), '.4g')} deg, "
-            f"{_more_energy(others.energy[k] - solution.energy[i])}slack: "
+            f"{_more_energy(others.energy[k] - solution.energy[0])}slack: "
             f"{' '.join(slack) or 'none'}"
         )
         yield f"{line}; {passes[n].words}" if passes else line

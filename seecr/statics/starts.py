@@ -1,11 +1,14 @@
-"""Poses given by callers: commanded poses, and poses at which a search starts."""
+"""Commands and poses given by callers, and poses at which a search starts."""
 
 from __future__ import annotations
+
+from typing import Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from seecr.arguments import finite
+from seecr.commands.data import Commands
 from seecr.description.joints import values_of_pose
 from seecr.description.robot import Robot
 from seecr.errors import InputError
@@ -13,7 +16,32 @@ from seecr.pose import Array
 from seecr.statics import batch
 from seecr.statics.tables import Tables
 
-__all__ = ["commanded_poses", "start_of"]
+__all__ = ["Commanded", "HasCommands", "commanded_poses", "commands_from", "start_of"]
+
+
+@runtime_checkable
+class HasCommands(Protocol):
+    """What holds commands among other things, such as ``crosscheck.Measurements``."""
+
+    def as_commands(self, robot: Robot) -> Commands:
+        """The commands to the robot."""
+
+
+Commanded: TypeAlias = Commands | HasCommands | ArrayLike
+"""Commands, what holds them, or commanded poses (n, 7)."""
+
+
+def commands_from(given: Commanded, robot: Robot) -> Commands:
+    """Commands as the statics takes them.
+
+    Raises:
+        InputError: neither commands nor poses (n, 7) with unit quaternions.
+    """
+    if isinstance(given, Commands):
+        return given
+    if isinstance(given, HasCommands):
+        return given.as_commands(robot)
+    return Commands(commanded_poses(given))
 
 
 def start_of(

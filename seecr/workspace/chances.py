@@ -22,7 +22,7 @@ from seecr.prediction.experiment import Experiment, effects_of
 from seecr.prediction.model import GivenEffects, Model, model_given
 from seecr.prediction.sensitivity import sensitivities
 from seecr.prediction.uncertainty import moving_covariance
-from seecr.statics.starts import commanded_poses
+from seecr.statics.starts import Commanded, commanded_poses, commands_from
 from seecr.statics.tables import Tables, assemble
 from seecr.workspace.zones import load_scale, margins_from
 
@@ -47,7 +47,7 @@ _NO_COVARIANCE = (
 
 def kept_chance(
     robot: GivenRobot,
-    commands: Commands,
+    commands: Commanded,
     model: Model | str | Path,
     *,
     lowest: ArrayLike = 0.0,
@@ -60,7 +60,8 @@ def kept_chance(
 
     Args:
         robot: as described, or its MJCF.
-        commands: n rows, such as those of a correction; NaN lengths mark rows without any.
+        commands: n rows as in :func:`seecr.predict`, such as those of a correction; NaN lengths
+            mark rows without any.
         model: as ``crosscheck calibrate`` writes it, or its file.
         lowest, highest: (m,) or one [N].
 
@@ -72,6 +73,7 @@ def kept_chance(
     if known is None:
         return None
     terms, covariance = known
+    commands = commands_from(commands, robot)
     low, high = tension_limits(robot, lowest, highest)
     lost: NDArray[np.bool_] = np.zeros(len(commands), dtype=bool)
     if commands.lengths is not None:

@@ -54,6 +54,10 @@ class Zone(Result):
         count = "no answer" if self.slack is None else counted(self.slack, "slack cable")
         return [f"{poses}: {count}"]
 
+    def as_json(self) -> Record:
+        """Its only row."""
+        return self.records()[0]
+
     def records(self) -> Sequence[Record]:
         """One row."""
         return [{"first_pose": self.first, "last_pose": self.last, "slack_cables": self.slack}]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import builtins
+import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -165,3 +167,34 @@ def test_a_class_says_its_lines_and_its_records_and_has_the_rest() -> None:
     assert two.to_frame().to_pydict() == {"a_m": [1.23456789, 2.0], "b": [None, "x"]}
     page = two._repr_html_()
     assert "two &amp; two" in page and "<td>1.23457</td><td></td>" in page
+
+
+def test_rows_as_json_are_those_of_the_data_frame() -> None:
+    robot = seecr.load_robot("demobot_cogiro")
+    found = seecr.predict(
+        robot, [HOME, HOME], [seecr.Term.of(robot, "pulley_radius", radius_m=0.1)]
+    )
+    rows = json.loads(found.to_json())["rows"]
+    assert rows == found.to_frame().to_pylist()
+
+
+def test_a_number_that_does_not_exist_is_null_in_json() -> None:
+    unknown = np.full((1, 3), math.nan)
+    spread = seecr.Spread(unknown, unknown, np.zeros((1, 2)), np.ones((1, 6)))
+    (row,) = json.loads(spread.to_json())["rows"]
+    assert row["stderr_x_m"] is None and row["stderr_tension_2_N"] == 0.0
+
+
+def test_a_model_as_json_has_its_robot_and_its_values() -> None:
+    robot = seecr.load_robot("demobot_cogiro")
+    plain = json.loads(seecr.new_model(robot).to_json())
+    assert plain == {"robot": "demobot_cogiro", "rows": [], "notes": []}
+
+
+def test_results_of_one_row_are_that_row_in_json() -> None:
+    level = seecr.BarRest(0.0, (0.5, 0.5), True)
+    assert level.as_json() == {
+        "theta_rad": 0.0, "tension_1": 0.5, "tension_2": 0.5, "stable": True,
+    }  # fmt: skip
+    zone = seecr.Zone(2, 5, None)
+    assert json.loads(zone.to_json()) == {"first_pose": 2, "last_pose": 5, "slack_cables": None}

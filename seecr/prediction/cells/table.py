@@ -11,7 +11,7 @@ import numpy as np
 import tomlkit
 
 from seecr.counted import some
-from seecr.effects import Knowledge, Own, Term, Values, effect_named, layout_of
+from seecr.effects import Knowledge, Own, Term, Values, layout_of
 from seecr.effects.base import Layout
 from seecr.effects.own_values import KINDS
 from seecr.errors import InputError
@@ -109,7 +109,7 @@ def _layout(where: Where, k: int, table: Mapping[str, Any], robot: Robot) -> Lay
         if key not in _OF_EFFECT and near:
             raise where.error(f"effect {name}: unknown {key}; expected {near[0]}", k, key)
     try:
-        return layout_of(effect_named(str(name)), robot)
+        return layout_of(str(name), robot)
     except InputError as error:
         raise where.error(str(error), k, "name") from None
 

@@ -8,8 +8,7 @@ import pytest
 from made_data import COGIRO, run
 
 from seecr.description.mjcf import load_robot
-from seecr.effects import catalogue
-from seecr.effects.base import layout_of
+from seecr.effects import catalogue, layout_of
 
 
 def test_all_effects_are_listed_with_their_place() -> None:

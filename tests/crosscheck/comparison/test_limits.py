@@ -37,7 +37,7 @@ def test_a_limit_just_below_is_exceeded_and_one_just_above_holds(
     assert value is not None and check(Limits(**{name: 1.001 * value}), found) == []
     (item,) = check(Limits(**{name: 0.999 * value}), found)
     assert (item.name, item.value) == (name, value)
-    assert item.words.startswith(rule.words) and item.as_json() == vars(item)
+    assert item.words.startswith(rule.words)
     worst = int(np.nanargmax(sizes))
     assert f"worst at line {found.problem.data.line[worst]}, " in item.words
 

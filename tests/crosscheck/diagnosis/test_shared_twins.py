@@ -15,7 +15,7 @@ import pytest
 from made_data import run
 
 from crosscheck.diagnosis.verdict import diagnose
-from crosscheck.files import json_text
+from seecr.files import json_text
 
 # In a sweep, since every run asks it of other data as well: an unknown effect (L09) and pulleys
 # (L04) in test_unknown_effects.py, hysteresis (L06) and several at once (L10) in the laboratories

@@ -10,7 +10,6 @@ import pytest
 from made_data import SIGMA, measured, soft_cogiro, term
 from scipy import stats
 
-from crosscheck.files import json_text
 from crosscheck.fit.candidates import Trials, null_fit, try_candidate
 from crosscheck.fit.problem import Problem
 from crosscheck.measurements.data import Sigma
@@ -26,6 +25,7 @@ from crosscheck.planning.visibility import joined, left_over, needed, signals, s
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.effects import Terms
+from seecr.files import json_text
 from seecr.pose import rotvec_from_quat
 from seecr.workspace.zones import feasible
 

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from crosscheck.files import json_text, staged
 from crosscheck.suite import words
 from crosscheck.suite.cases import Case
 from crosscheck.suite.junit import junit_xml
@@ -27,6 +26,7 @@ from crosscheck.suite.worst_pose import worst_pose, write_worst_pose
 from crosscheck.terminal.suite import print_run
 from seecr.description.shipped import model_path
 from seecr.errors import SeecrError
+from seecr.files import json_text, staged
 
 THRESHOLDS = load_thresholds()
 
@@ -65,7 +65,7 @@ def test_json_holds_every_number_of_every_pose(good):
     document = json.loads(results_json(run_of(good)))
     assert document["verdict"] == "agree"
     assert document["exit_status"] == 0
-    assert document["thresholds"] == json.loads(json_text(THRESHOLDS.as_json()))
+    assert document["thresholds"] == json.loads(json_text(vars(THRESHOLDS)))
     assert set(document["packages"]) >= {"seecr", "mujoco", "numpy", "numba", "python"}
     assert document["poses"] == {
         "total": 3, "agrees": 3, "neutral": 0, "branch": 0, "differs": 0, "seecr_unsolved": 0,

@@ -30,6 +30,7 @@ from crosscheck.suite.thresholds import SHIPPED, FindingLimits, load_thresholds,
 from crosscheck.suite.verdicts import Verdict
 from seecr.description.shipped import CABLES, model_path
 from seecr.errors import InputFileError
+from seecr.files import plain
 from seecr.pose import pose_add, pose_difference, quat_from_rotvec
 
 PARALLEL, COGIRO = model_path("demobot_parallel"), model_path("demobot_cogiro")
@@ -219,7 +220,7 @@ def test_select_by_pattern_and_refuses_unknown_names(shipped):
 
 
 def test_shipped_thresholds_are_those_agreed():
-    found = load_thresholds().as_json()
+    found = plain(load_thresholds())
     assert found["settled"] == {"position_m": 1e-6, "orientation_rad": 1e-5}
     assert found["polished"] == {"position_m": 1e-8, "orientation_rad": 1e-7, "tension_N": 1e-6}
     assert found["findings"]["branches"] == 0

@@ -14,7 +14,6 @@ from scipy.stats import chi2
 
 from crosscheck.cli import main
 from crosscheck.errors import CrosscheckError
-from crosscheck.files import json_text
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import load_measurements
 from crosscheck.twin.answer import NAME, Answer, Moves, seal, unseal
@@ -27,6 +26,7 @@ from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.effects import Term, effect_named, layout_of
 from seecr.errors import InputError, InputFileError
+from seecr.files import json_text
 from seecr.pose import pose_difference
 from seecr.prediction.experiment import Experiment
 

@@ -14,8 +14,7 @@ from seecr.commands.loads import Loads
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.description.shipped import model_path
-from seecr.effects import Term, catalogue
-from seecr.effects.base import layout_of
+from seecr.effects import Term, catalogue, layout_of
 from seecr.errors import InputError
 from seecr.holding.unheld import why_not_held
 from seecr.inverse.correction import correct

@@ -1,0 +1,98 @@
+"""What a diagnosis lists and what not: every effect that was tried has one place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from made_diagnoses import pulleys, unknown
+
+from crosscheck.calibration.equals import SMALL
+from crosscheck.diagnosis.importance import weighed
+from crosscheck.diagnosis.listed import left_out, missing_of, not_listed
+from crosscheck.diagnosis.result import Diagnosis
+from crosscheck.diagnosis.search import Search
+from crosscheck.diagnosis.unexplained import unexplained, where_of
+from crosscheck.fit.problem import rms_by_kind
+from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
+from crosscheck.fit.tolerance import Tolerance
+from seecr.effects import catalogue
+
+pytestmark = pytest.mark.slow
+
+
+def searched(found: Diagnosis) -> Search:
+    assert found.search is not None
+    return found.search
+
+
+def test_every_effect_is_listed_or_has_a_reason_the_best_first() -> None:
+    found = pulleys()
+    listed = [effect.effect for effect in found.missing]
+    others = not_listed(searched(found), listed)
+    names = [other.effect for other in others]
+    assert sorted(names + listed) == sorted(catalogue())
+    scores = [other.score for other in others]
+    assert scores == sorted(scores, reverse=True)
+    assert all(str(other.why_not) for other in others)
+
+
+def test_a_reason_of_its_own_goes_before_any_other() -> None:
+    search = searched(pulleys())
+    said = Reason(Why.NOT_NEEDED)
+    start = search.steps[0]
+    own = {c.name: c.why_not for c in start.candidates if c.why_not is not None}
+    rows = left_out(search, [], lambda candidate: said)
+    assert {row.effect: row.why_not for row in rows if row.why_not is not said} == own
+
+
+def test_where_structure_remains_only_small_effects_explain_a_part_of_it() -> None:
+    search = searched(unknown())
+    sizes = {c.name: len(c.layout) for c in search.steps[0].candidates if c.why_not is None}
+    rows = {row.effect: row.why_not for row in not_listed(search, [])}
+    assert {rows[name].why for name in sizes} == {Why.IMITATES, Why.EXPLAINS_PART}
+    assert all((rows[name].why is Why.IMITATES) == (sizes[name] > SMALL) for name in sizes)
+
+
+def test_a_step_tells_the_errors_with_its_effect() -> None:
+    found, search = pulleys(), searched(pulleys())
+    assert found.chances is not None
+    effect = missing_of(search, "pulley_radius", found.chances, rivals=())
+    before, after = search.steps[0], search.steps[1]
+    assert effect.rms == rms_by_kind(search.problem, after.fit.state.raw)
+    assert effect.probability == found.chances.of("pulley_radius")
+    assert effect.share == pytest.approx(1.0, abs=0.01) and effect.rivals == ()
+    assert before.fit.state.chi2 > 100.0 * after.fit.state.chi2
+    wider = replace(after, node=replace(after.node, whiteness=replace(after.whiteness, scale=3.0)))
+    other = replace(search, steps=(*search.steps[:1], wider))
+    there = missing_of(other, "pulley_radius", found.chances, rivals=())
+    ratio = wider.whiteness.inflation / after.whiteness.inflation
+    assert there.stderr == pytest.approx(ratio * effect.stderr)
+
+
+def test_structure_that_nothing_explains_is_said_with_what_it_goes_with() -> None:
+    search, chances = searched(unknown()), unknown().chances
+    assert chances is not None
+    found = unexplained(search, chances, ["a note"])
+    assert found.verdict is DiagnosisVerdict.UNKNOWN_EFFECT and "a note" in found.notes
+    assert all(len(effect.layout) <= SMALL for effect in found.missing)
+    assert [row.p for row in where_of(search)] == sorted(row.p for row in where_of(search))
+
+
+def test_structure_too_small_to_matter_is_no_unknown_effect() -> None:
+    found = replace(unknown(), left=None)
+    problem = searched(found).problem
+    small = weighed(found, problem, Tolerance(position_m=1.0, orientation_rad=1.0, tension_N=1e3))
+    assert small.verdict is not DiagnosisVerdict.UNKNOWN_EFFECT
+    assert "is too small to matter: " in small.sentence and small.left is not None
+    large = weighed(found, problem, Tolerance(position_m=1e-6))
+    assert large.verdict is DiagnosisVerdict.UNKNOWN_EFFECT and large.sentence == found.sentence
+
+
+def test_a_joint_fit_in_the_form_of_a_fit_keeps_its_errors_and_names_what_is_unseen() -> None:
+    fit = searched(pulleys()).last.fit
+    assert fit.terms.names == ("pulley_radius",) and fit.settled
+    assert fit.covariance.shape == (1, 1) and fit.stderr[0] == pytest.approx(
+        fit.covariance[0, 0] ** 0.5
+    )
+    assert searched(pulleys()).last.node.evidence.parameters == 1
