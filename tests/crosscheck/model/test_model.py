@@ -14,7 +14,9 @@ from crosscheck.model.fitted import Fitted
 from crosscheck.model.write import Provenance, calibrated, renewed, save_model, with_fit
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
+from seecr.effects import catalogue, layout_of
 from seecr.errors import InputFileError
+from seecr.prediction.cells import limits_of
 from seecr.prediction.experiment import predict
 from seecr.prediction.model import load_model, new_model
 from seecr.prediction.uncertainty import covariance_of
@@ -188,7 +190,8 @@ BAD = {
         r"line \d+: .* radius_m: -0.01 is out of bounds; expected 0 to 0\.\d+$",
     ),
     "wrong unit": ('unit = "m"', 'unit = "mm"', r"radius_m: expected unit 'm', got 'mm'"),
-    "bad error": ("stderr = 0.0001", "stderr = -1", r"stderr must be a number from 0 or"),
+    "bad error": ("stderr = 0.0001", "stderr = -1", r"stderr must be a number from 0 to 1e\+30 or"),
+    "no error": ("stderr = 0.0001", "stderr = 1e300", r"0 to 1e\+30 or \"unseen\", got 1e\+300$"),
     "odd word": ("at_bound", "atbound", r"unknown atbound; expected at_bound, .*nearest first"),
     "misspelt table": (
         "[[effect]]", "[[effects]]\n[[effect]]", r"line \d+: unknown effects; expected effect",
@@ -220,6 +223,33 @@ def test_winches_are_zeroed_where_somebody_can_stand(robot, saved):
     assert "zero_temperature_C: 199 is out of bounds; expected -40 to 60" in error_of(saved, robot)
 
 
+@pytest.mark.parametrize(
+    "values, words",
+    [
+        ("shift_m = -1e300\nrotation_rad = 0.0", "shift_x_m: -1e+300 is out of bounds; expected -"),
+        (
+            "shift_m = 0.0\nrotation_rad = 90.0",
+            "rotation_x_rad: 90 is out of bounds; expected -6.28",
+        ),
+    ],
+)
+def test_values_are_of_a_size_that_a_robot_can_have(robot, saved, values, words):
+    extra = f'\n[[effect]]\nname = "tracker_target"\n[effect.parameters]\n{values}\n'
+    saved.write_text(saved.read_text() + extra)
+    assert words in error_of(saved, robot)
+
+
+def test_every_value_has_finite_limits_that_hold_its_plausible_sizes(robot):
+    for effect in catalogue().values():
+        layout = layout_of(effect, robot)
+        for i in range(len(layout)):
+            low, high = limits_of(layout, i)
+            assert np.isfinite([low, high]).all() and low <= layout.null[i] <= high
+            far = layout.null[i] + 30.0 * layout.scale[i] * np.array([-1.0, 1.0])
+            far = np.clip(far, layout.lower[i], layout.upper[i])
+            assert layout.shape[i] or ((low <= far).all() and (far <= high).all())
+
+
 def test_an_effect_may_stand_there_once(robot, saved):
     text = saved.read_text()
     saved.write_text(text + text[text.index("[[effect]]") :])
@@ -231,15 +261,15 @@ def test_a_model_made_for_another_robot_is_noticed(robot, saved):
     assert "made for another robot: demobot_cogiro with 8 cables; " in error_of(saved, planar)
     parallel = load_robot(model_path("demobot_parallel"))
     text = error_of(saved, parallel)
-    assert "made for another robot: demobot_cogiro, not demobot_parallel: the exit point of" in text
-    assert "mm away" in text
+    assert "made for another robot: demobot_cogiro, not demobot_parallel: its exit point of" in text
+    assert "mm from that of this robot" in text
 
 
 def test_points_that_moved_are_another_robot_and_a_new_mass_is_noted(robot, saved):
     exits = robot.exit_points.copy()
     exits[3, 1] += 2e-3
     text = error_of(saved, replace(robot, exit_points=exits))
-    assert "exit point of cable4 is 2 mm away" in text
+    assert "demobot_cogiro too, but with other numbers: its exit point of cable4 is 2 mm" in text
     moved = robot.reference_pose.copy()
     moved[0] += 0.01
     assert "reference pose is (0.4" in error_of(saved, replace(robot, reference_pose=moved))
@@ -275,7 +305,7 @@ KNOWN = {
     "known is a number": ("value = 0.01,", "known = 0.01,", r"expected known = .*, got 0.01"),
     "known is exact": (
         "value = 0.01,", "known = { value = 0.01, stderr = 0 },",
-        r"known: stderr must be a number above 0, got 0; .* fixed = true",
+        r"known: stderr must be a number above 0 and at most .*, got 0; .* fixed = true",
     ),
     "known out of bounds": (
         "value = 0.01,", "known = { value = -0.01, stderr = 1e-3 },",
