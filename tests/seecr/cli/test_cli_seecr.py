@@ -268,7 +268,8 @@ def test_map_writes_its_files_or_says_why_not(tmp_path: Path) -> None:
     line = run("map", "demobot_cogiro", "--grid", "0.3:0.5:3", "0.2", "0.1", "--out", out)
     assert "no figure: the grid has more than one value along fewer than two axes" in line.output
     soft = run("map", "demobot_cogiro", *grid, "--cable", "0.001", "--out", out)
-    assert "elastic robot: at rest at 0 of 6 commands" in soft.output
+    assert "elastic robot: at rest at 0 of 6 commands" in soft.output and soft.exit_code == 3
+    assert json.loads((out / "map.json").read_text())["exit_status"] == 3
     lost = run("map", "demobot_cogiro", *grid, "--lowest", "90", "--out", tmp_path / "lost")
     assert lost.exit_code == 2 and not (tmp_path / "lost").exists()
     assert "no pose of the grid can be held: no tensions from 90 to inf N" in lost.stderr
