@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from seecr.counted import counted
+from seecr.description.quiet import quiet_mujoco
 from seecr.description.robot import ABSURD, Joint, Robot
 from seecr.description.shipped import robot_file
 from seecr.errors import RobotError
@@ -71,18 +72,29 @@ def load_robot(path: str | Path) -> Robot:
         cable_names=tuple(names),
         source=path,
     )
-    _check_lengths(robot, path)
+    _check_sizes(robot, _body_name(model, body), path)
     return robot
 
 
-def _check_lengths(robot: Robot, path: Path) -> None:
-    """Check that no rest length is far larger than the frame."""
+def _check_sizes(robot: Robot, body: str, path: Path) -> None:
+    """Check that neither rest lengths nor the platform are far larger than the frame."""
+    most = ABSURD * robot.reach
+    frame = f"expected metres, of the size of the frame, {robot.reach:.3g} m across"
     for name, length in zip(robot.cable_names, robot.rest_lengths, strict=True):
-        if length > ABSURD * robot.reach:
+        if length > most:
+            raise RobotError(f"{path}: tendon {name} has rest length {length:g} m; {frame}")
+    for name, anchor in zip(robot.cable_names, robot.anchor_points, strict=True):
+        away = float(np.linalg.norm(anchor))
+        if away > most:
             raise RobotError(
-                f"{path}: tendon {name} has rest length {length:g} m; expected metres, of the size "
-                f"of the frame, {robot.reach:.3g} m across"
+                f"{path}: tendon {name} is anchored {away:g} m from the origin of body {body}; "
+                f"{frame}"
             )
+    away = float(np.linalg.norm(robot.centre_of_mass - robot.anchor_points, axis=1).min())
+    if away > most:
+        raise RobotError(
+            f"{path}: body {body} has its centre of mass {away:g} m from its anchor points; {frame}"
+        )
 
 
 def _compile(path: Path) -> mujoco.MjModel:
@@ -96,7 +108,8 @@ def _compile(path: Path) -> mujoco.MjModel:
     import mujoco
 
     try:
-        model = mujoco.MjModel.from_xml_path(str(path))
+        with quiet_mujoco():
+            model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
         reason = " ".join(str(error).split())
         raise RobotError(f"{path}: MuJoCo cannot read this as MJCF: {reason}") from None

@@ -308,3 +308,16 @@ def test_mass_may_be_zero_but_the_answer_says_nothing_holds_the_platform(tmp_pat
     robot = replace(load_robot(mjcf(tmp_path)), mass=0.0)
     answer = solve(robot, robot.reference_pose)
     assert not answer.converged[0]
+
+
+def test_a_platform_far_larger_than_its_frame_is_refused(tmp_path: Path) -> None:
+    far = PLATFORM.replace('"0 0 -0.1"', '"0 0 -100"')
+    assert refusal(mjcf(tmp_path, platform=far)) == (
+        "body platform has its centre of mass 100 m from its anchor points; expected metres, of "
+        "the size of the frame, 1.12 m across"
+    )
+    wide = PLATFORM.replace('"0.1 0 0"', '"100 0 0"')
+    text = refusal(mjcf(tmp_path, platform=wide))
+    assert text.startswith("tendon right is anchored 100 m from the origin of body platform; ")
+    long = TENDONS.replace("0 1.1", "0 1100", 1)
+    assert refusal(mjcf(tmp_path, tendons=long)).startswith("tendon left has rest length 1100 m;")
