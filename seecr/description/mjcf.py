@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from seecr.counted import counted
 from seecr.description.quiet import quiet_mujoco
 from seecr.description.robot import ABSURD, Joint, Robot
 from seecr.description.shipped import robot_file
-from seecr.errors import RobotError
+from seecr.errors import RobotError, SeecrError
 from seecr.files import no_text, read_bytes
 from seecr.pose import Array, quat_rotate, quat_to_matrix
 
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 _NO_NUMBER = re.compile(
     rb"""\b(?!name\b)\w+\s*=\s*["'](?:[-+.\deE\s]*\s)?[-+]?nan\b[-+.\deE\sna]*["']""", re.IGNORECASE
 )
+# No rest length is this part of the frame: no cable is, and none stretches so far.
+_LEAST = 1e-4
 _EXPECTED = "expected the robot as MJCF, XML that begins with <mujoco"
 
 
@@ -57,7 +59,8 @@ def load_robot(path: str | Path) -> Robot:
     if not joints:
         first = model.jnt_qposadr[model.body_jntadr[body]]
         reference_pose = model.qpos0[first : first + 7].copy()
-    robot = Robot(
+    robot = _robot(
+        path,
         name=_model_name(model, path),
         exit_points=np.array(exit_points),
         anchor_points=np.array(anchor_points),
@@ -76,12 +79,20 @@ def load_robot(path: str | Path) -> Robot:
     return robot
 
 
+def _robot(path: Path, **numbers: Any) -> Robot:
+    """The robot with these numbers; errors about them name the file."""
+    try:
+        return Robot(**numbers)
+    except SeecrError as error:
+        raise RobotError(f"{path}: {error}") from None
+
+
 def _check_sizes(robot: Robot, body: str, path: Path) -> None:
-    """Check that neither rest lengths nor the platform are far larger than the frame."""
+    """Check that neither rest lengths nor the platform are of another order than the frame."""
     most = ABSURD * robot.reach
     frame = f"expected metres, of the size of the frame, {robot.reach:.3g} m across"
     for name, length in zip(robot.cable_names, robot.rest_lengths, strict=True):
-        if length > most:
+        if not _LEAST * robot.reach < length < most:
             raise RobotError(f"{path}: tendon {name} has rest length {length:g} m; {frame}")
     for name, anchor in zip(robot.cable_names, robot.anchor_points, strict=True):
         away = float(np.linalg.norm(anchor))

@@ -321,3 +321,18 @@ def test_a_platform_far_larger_than_its_frame_is_refused(tmp_path: Path) -> None
     assert text.startswith("tendon right is anchored 100 m from the origin of body platform; ")
     long = TENDONS.replace("0 1.1", "0 1100", 1)
     assert refusal(mjcf(tmp_path, tendons=long)).startswith("tendon left has rest length 1100 m;")
+    short = TENDONS.replace("0 1.1", "0 1e-9", 1)
+    assert refusal(mjcf(tmp_path, tendons=short)).startswith("tendon left has rest length 1e-09 m;")
+
+
+def test_numbers_that_no_robot_has_name_the_file_and_the_cable(tmp_path: Path) -> None:
+    far = WORLD.replace("1 0 2", "1e300 0 2")
+    assert refusal(mjcf(tmp_path, world=far)) == (
+        "robot two ropes: exit_points of right holds a number that is not finite, or beyond 1e+30"
+    )
+    stiff = TENDONS.replace('"200"', '"1e150"')
+    text = refusal(mjcf(tmp_path, tendons=stiff))
+    assert text.startswith("robot two ropes: stiffness x rest length of left holds a number that")
+    there = WORLD.replace("0 0 2", "0.4 0 1")
+    text = refusal(mjcf(tmp_path, world=there))
+    assert text.startswith("robot two ropes: left has its anchor point on its exit point at the")
