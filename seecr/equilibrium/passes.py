@@ -1,10 +1,10 @@
 """Barriers: the height of the lowest pass between two equilibria of one command.
 
-The way of least energy by the string method (E, Ren and Vanden-Eijnden, J. Chem. Phys. 126, 164103,
-2007), its images moved across the way by Newton's steps; its highest point made exact by following
-the one falling direction (Cerjan and Miller, J. Chem. Phys. 75, 1981). That may lead to the saddle
-between two other equilibria, so what it leads to is checked: it must be the highest point of a way
-from one to the other.
+The path of least energy by the string method (E, Ren and Vanden-Eijnden, J. Chem. Phys. 126,
+164103, 2007), its images moved across the path by Newton's steps; its highest point made exact by
+following the one falling direction (Cerjan and Miller, J. Chem. Phys. 75, 1981). That may lead to
+the saddle between two other equilibria, so what it leads to is checked: it must be the highest
+point of a path from one to the other.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ __all__ = ["Barrier", "barriers"]
 _IMAGES, _ROUNDS, _ACROSS = 33, 300, 1e-3
 # Longest steps of images [of the gap between them]; each is tried where the one before did not end.
 _PARTS = (0.5, 0.1)
-# Points between images at which the way's energy is looked at, at first and then about its highest.
+# Points between images at which the path's energy is computed, first and then about its highest.
 _FINE, _ZOOMS = 8, 3
 # Steps to the saddle at most; the longest, and the softest stiffness, over length and load.
 _STEPS, _LONGEST, _SOFTEST = 200, (0.1, 0.01), 1e-2
@@ -53,9 +53,9 @@ class Barrier(Result):
                 none.
         back: [J] needed from the other equilibrium.
         pose: (7,) at the top.
-        exact: whether the top is a saddle (balanced, with one falling direction) from which ways
+        exact: whether the top is a saddle (balanced, with one falling direction) from which paths
             that only fall, or that stay below it, lead to both equilibria. Else it is the highest
-            point of the way that was found, and the lowest way may be lower.
+            point of the path that was found, and the lowest path may be lower.
         twisted: whether the other is turned by more than a right angle from the first: pushes lead
             back and forth no more, cables lie across each other.
     """
@@ -133,8 +133,8 @@ def _barrier(one: Solution, other: Solution) -> Barrier:
     size = np.where(np.arange(6) < 3, 1.0 / robot.length, 1.0)
     if np.linalg.norm(size * pose_difference(other.pose, one.pose)) < _ALIKE:
         return Barrier(0.0, 0.0, one.pose[0], exact=True, twisted=False)
-    way = _way(one, other)
-    top, exact = _top(one, tables, way)
+    path = _path(one, other)
+    top, exact = _top(one, tables, path)
     height = float(evaluated(robot, tables, top).energy[0])
     own, there = float(one.energy[0]), float(other.energy[0])
     # the top is as high as both ends; only rounding puts it lower
@@ -143,7 +143,7 @@ def _barrier(one: Solution, other: Solution) -> Barrier:
 
 
 @dataclass(frozen=True, eq=False)
-class _Way:
+class _Path:
     """Poses (k, 7) from one equilibrium to another, and their energies (k,) [J]."""
 
     poses: Array
@@ -154,32 +154,32 @@ class _Way:
         return int(np.argmax(self.energies))
 
 
-def _way(one: Solution, other: Solution) -> _Way:
-    """The way of least energy, looked at closely; of ways that did not settle the lowest."""
-    ways = []
+def _path(one: Solution, other: Solution) -> _Path:
+    """The path of least energy, looked at closely; of paths that did not settle the lowest."""
+    paths = []
     for part in _PARTS:
         images, settled = _string(one, other, part)
-        ways.append(_closely(one, images))
+        paths.append(_closely(one, images))
         if settled:
-            return ways[-1]
-    return min(ways, key=lambda way: float(way.energies.max()))
+            return paths[-1]
+    return min(paths, key=lambda path: float(path.energies.max()))
 
 
-def _closely(one: Solution, images: Array) -> _Way:
-    """Energies on the way through images (k, 7), and between those about its highest point."""
+def _closely(one: Solution, images: Array) -> _Path:
+    """Energies on the path through images (k, 7), and between those about its highest point."""
     poses = _between(one, images)
-    way = _Way(poses, _energies(one, poses))
+    path = _Path(poses, _energies(one, poses))
     for _ in range(_ZOOMS):
-        k = way.highest
+        k = path.highest
         part = slice(max(k - 1, 0), k + 2)
-        poses = _between(one, way.poses[part])
-        ends = way.poses[: part.start], way.poses[part.stop :]
-        values = way.energies[: part.start], way.energies[part.stop :]
-        way = _Way(
+        poses = _between(one, path.poses[part])
+        ends = path.poses[: part.start], path.poses[part.stop :]
+        values = path.energies[: part.start], path.energies[part.stop :]
+        path = _Path(
             np.concatenate([ends[0], poses, ends[1]]),
             np.concatenate([values[0], _energies(one, poses), values[1]]),
         )
-    return way
+    return path
 
 
 def _between(one: Solution, poses: Array) -> Array:
@@ -193,35 +193,35 @@ def _between(one: Solution, poses: Array) -> Array:
 def _energies(one: Solution, poses: Array) -> Array:
     many = take(one.tables, np.zeros(len(poses), int))
     energies = evaluated(one.robot, many, poses).energy
-    # what has no energy is no way
+    # what has no energy is no path
     return np.where(np.isfinite(energies), energies, np.inf)
 
 
-def _top(one: Solution, tables: Tables, way: _Way) -> tuple[Array, bool]:
-    """The saddle (1, 7) over which the way leads, and True; else its highest point."""
-    highest = way.poses[[way.highest]]
+def _top(one: Solution, tables: Tables, path: _Path) -> tuple[Array, bool]:
+    """The saddle (1, 7) over which the path leads, and True; else its highest point."""
+    highest = path.poses[[path.highest]]
     for longest in _LONGEST:
         saddle, found = _saddle(one, tables, highest, longest)
-        if found and _joins(one, tables, saddle, way):
+        if found and _joins(one, tables, saddle, path):
             return saddle, True
     return highest, False
 
 
-def _joins(one: Solution, tables: Tables, saddle: Array, way: _Way) -> bool:
-    """Whether a saddle (1, 7) is the highest point of a way between the ends.
+def _joins(one: Solution, tables: Tables, saddle: Array, path: _Path) -> bool:
+    """Whether a saddle (1, 7) is the highest point of a path between the ends.
 
-    Both sides of it fall to the ends, or to where points of the way fall to up to which it is
+    Both sides of it fall to the ends, or to where points of the path fall to up to which it is
     lower than the saddle.
     """
-    height, energies = float(_energies(one, saddle)[0]), way.energies
+    height, energies = float(_energies(one, saddle)[0]), path.energies
     rounding = _ROUNDING * (float(tables.scale[0]) * one.robot.length + abs(height))
     if max(energies[0], energies[-1]) > height + rounding or energies.max() < height - rounding:
         return False
     higher = np.flatnonzero(energies > height + rounding)
     # the last points from either end that are not higher
-    last = (higher[0] - 1, higher[-1] + 1) if len(higher) else (way.highest, way.highest)
+    last = (higher[0] - 1, higher[-1] + 1) if len(higher) else (path.highest, path.highest)
     feet = [_foot(one, tables, pose) for pose in _sides(one, tables, saddle)]
-    ends = [_feet_of(one, tables, way, k, end) for k, end in zip(last, (0, -1), strict=True)]
+    ends = [_feet_of(one, tables, path, k, end) for k, end in zip(last, (0, -1), strict=True)]
     return any(
         _among(one, first, ends[0]) and _among(one, second, ends[1])
         for first, second in (feet, feet[::-1])
@@ -240,9 +240,9 @@ def _foot(one: Solution, tables: Tables, pose: Array) -> Array:
     return rest_below(one.robot, tables, pose)
 
 
-def _feet_of(one: Solution, tables: Tables, way: _Way, last: int, end: int) -> list[Array]:
-    """An end of the way, and where the last point falls to that it leads to from there."""
-    return [way.poses[[end]], _foot(one, tables, way.poses[[last]])]
+def _feet_of(one: Solution, tables: Tables, path: _Path, last: int, end: int) -> list[Array]:
+    """An end of the path, and where the last point falls to that it leads to from there."""
+    return [path.poses[[end]], _foot(one, tables, path.poses[[last]])]
 
 
 def _among(one: Solution, pose: Array, others: list[Array]) -> bool:
@@ -250,14 +250,14 @@ def _among(one: Solution, pose: Array, others: list[Array]) -> bool:
 
 
 def _string(one: Solution, other: Solution, longest: float) -> tuple[Array, bool]:
-    """Images (k, 7) on the way of least energy, the two equilibria at its ends.
+    """Images (k, 7) on the path of least energy, the two equilibria at its ends.
 
     Args:
         one, other: the two equilibria.
         longest: step of an image [of the gap between two].
 
     Returns:
-        the images, and whether they came to rest across the way.
+        the images, and whether they came to rest across the path.
     """
     robot, many = one.robot, take(one.tables, np.zeros(_IMAGES, int))
     softest = _SOFTEST * float(many.scale[0]) / robot.length
@@ -266,9 +266,9 @@ def _string(one: Solution, other: Solution, longest: float) -> tuple[Array, bool
     images = moved(robot, np.repeat(one.pose, _IMAGES, axis=0), parts * whole)
     for _ in range(_ROUNDS):
         at = evaluated(robot, many, images)
-        way = step_between(robot, images[2:], images[:-2])
-        way /= np.linalg.norm(way, axis=1, keepdims=True)
-        across = np.eye(robot.n_dof) - way[:, :, None] * way[:, None, :]
+        along = step_between(robot, images[2:], images[:-2])
+        along /= np.linalg.norm(along, axis=1, keepdims=True)
+        across = np.eye(robot.n_dof) - along[:, :, None] * along[:, None, :]
         slope = np.einsum("nij,nj->ni", across, at.gradient[1:-1])
         if np.linalg.norm(slope, axis=1).max() < _ACROSS * many.scale[0]:
             return images, True
@@ -296,7 +296,7 @@ def _evenly(one: Solution, images: Array) -> Array:
 
 
 def _saddle(one: Solution, tables: Tables, pose: Array, longest: float) -> tuple[Array, bool]:
-    """The saddle (1, 7) that is reached from near it: up the softest way, down all others."""
+    """The saddle (1, 7) that is reached from near it: up the softest direction, down all others."""
     robot = one.robot
     softest = _SOFTEST * float(tables.scale[0]) / robot.length
     for _ in range(_STEPS):

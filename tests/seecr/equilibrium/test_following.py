@@ -121,5 +121,5 @@ def test_what_does_not_go_with_following_is_refused() -> None:
     with pytest.raises(InputError, match="expected no other method and no start"):
         solve(robot, robot.reference_pose, follow=True, method="fsolve")
     friction = [Term.of(robot, "hysteresis", amplitude_N=0.1)]
-    with pytest.raises(InputError, match="expected no follow with them"):
+    with pytest.raises(InputError, match="solved along the path; leave follow out"):
         solve(robot, robot.reference_pose, follow=True, effects=friction)
