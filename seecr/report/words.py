@@ -105,8 +105,7 @@ def _off(values: Array) -> str:
 
 def _known(values: Array, errors: Array) -> str:
     """Three numbers with as many digits as their standard errors justify."""
-    said = ", ".join(with_error(*pair)[0] for pair in zip(values + 0.0, errors, strict=True))
-    return said.replace("−", "-")  # as in all other numbers beside them
+    return ", ".join(with_error(*pair)[0] for pair in zip(values + 0.0, errors, strict=True))
 
 
 def cable_lines(solution: Solution, i: int = 0, spread: Spread | None = None) -> Iterator[str]:
