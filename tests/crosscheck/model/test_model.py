@@ -119,6 +119,32 @@ def test_comments_survive_another_effect(robot, saved):
     assert model.names == ("pulley_radius",)
 
 
+def test_comments_survive_in_tables_that_a_fit_writes_anew(robot, tmp_path):
+    path, names = tmp_path / "m.toml", ["pulley_radius"]
+    one, covariance = [fitted(robot, *names, radius_m=0.01)], np.array([[1e-8]])
+    for kind in ("fit", "calibration"):
+        model = with_fit(new_model(robot), one, names, SOURCE, ERRORS, covariance)
+        if kind == "calibration":
+            model = calibrated(new_model(robot), one, covariance, SOURCE, ERRORS)
+        save_model(path, renewed(model, robot, measured(robot)))
+        changed(path, f"[{kind}]", f"[{kind}]\n# after the new spools")
+        changed(path, "[fitted_to]", "[fitted_to]\n# the whole frame")
+        changed(path, 'date = "2024-05-13"', 'date = "2024-05-13" # a Monday')
+        changed(path, "after]", "after]\n# without the outlier")
+        model = load_model(path, robot)
+        if kind == "fit":
+            again = with_fit(model, one, names, SOURCE, ERRORS, covariance)
+        else:
+            again = calibrated(model, one, covariance, SOURCE, ERRORS)
+        save_model(path, renewed(again, robot, measured(robot)))
+        text = path.read_text()
+        assert f"[{kind}]\n" in text and "after]\n# without the outlier" in text
+        for remark in ("# after the new spools", "# the whole frame", "# a Monday"):
+            assert text.count(remark) == 1, text
+        assert text.count("# Standard errors of the values above") == (kind == "fit")
+        assert covariance_of(load_model(path, robot)) == pytest.approx(covariance)
+
+
 def test_a_person_may_write_one_by_hand(robot, tmp_path):
     path = tmp_path / "m.toml"
     path.write_text('[[effect]]\nname = "stiffness"\nparameters.factor = 1.4\n')
