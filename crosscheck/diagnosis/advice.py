@@ -23,7 +23,7 @@ from crosscheck.units import in_unit, parameter_name
 from seecr.description.robot import Robot
 from seecr.effects import Term, catalogue
 from seecr.pose import Array, rotvec_from_quat
-from seecr.units import with_error
+from seecr.units import short, with_error
 
 # Most ways that are named to tell two effects apart.
 _MOST_WAYS = 2
@@ -191,8 +191,8 @@ def _words_of(way: Suggestion) -> str:
         places = ", ".join(_place(pose) for pose in way.poses)
         words = f"add poses at {places}"
     return (
-        f"{words} (signal that separates them: {gain.now:.2g} now, {gain.then:.2g} then, "
-        f"{gain.needed:g} needed)"
+        f"{words} (signal that separates them: {short(gain.now, 2)} now, "
+        f"{short(gain.then, 2)} then, {gain.needed:g} needed)"
     )
 
 

@@ -215,8 +215,8 @@ def _frames(robot: Robot, takes: Sequence[Take], choices: ImportChoices) -> Fram
             return to_commands(position, quat, told, target)
         found = by_points(names, there, here)
     except CrosscheckError as error:
-        files = ", ".join(str(take.stream.path) for take in takes)
-        raise CrosscheckError(f"{files}: {error}") from None
+        pairs = [f"{take.stream.path} with {take.held.log.path}" for take in takes]
+        raise CrosscheckError(f"{', '.join(pairs)}: {error}") from None
     frames = with_target(found, quat, told, target)
     return frames if target is not None else place_of_target(frames, position, told)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from crosscheck.planning.proposer import Gain
 from crosscheck.planning.result import Visible
 from seecr.counted import some
+from seecr.units import short
 
 
 def alike(found: Visible) -> str:
@@ -18,7 +19,8 @@ def alike(found: Visible) -> str:
 
 def gain_words(gain: Gain) -> str:
     """What a measurement would gain, with numbers."""
-    numbers = f"(signal {gain.now:.2g} now, {gain.then:.2g} then, {gain.needed:.2g} needed)"
+    now, then, needed = (short(value, 2) for value in (gain.now, gain.then, gain.needed))
+    numbers = f"(signal {now} now, {then} then, {needed} needed)"
     if gain.other:
         return f"tells {gain.effect} from {gain.other} {numbers}"
     return f"makes {gain.effect} visible {numbers}"

@@ -217,7 +217,9 @@ def test_frames_that_cannot_be_aligned(files, made, tmp_path):
     rows = [",".join([*a, *b]) for a, b in zip(head, poses, strict=True)]
     other.write_text("\n".join([lines[0], *rows]) + "\n")
     message = wrong(files, commands=other)
-    assert message.startswith(f"{files['poses']}: the frames cannot be aligned: errors of ")
+    assert message.startswith(
+        f"{files['poses']} with {other}: the frames cannot be aligned: errors of "
+    )
     assert "do their clocks agree (--clock)?" in wrong(files, clock=2.0)
     assert "expected these times to overlap; give with --clock how" in wrong(files, clock=900.0)
     two = {"0,0,0": np.zeros(3), "1,0,0": np.ones(3)}
