@@ -19,11 +19,12 @@ from crosscheck.planning.adding import Extension
 from crosscheck.planning.extensions import extensions
 from crosscheck.planning.planned import Planned, Reads
 from crosscheck.planning.proposer import Suggestion, telling_apart
+from crosscheck.planning.words import signals
 from crosscheck.units import in_unit, parameter_name
 from seecr.description.robot import Robot
 from seecr.effects import Term, catalogue
 from seecr.pose import Array, rotvec_from_quat
-from seecr.units import short, with_error
+from seecr.units import with_error
 
 # Most ways that are named to tell two effects apart.
 _MOST_WAYS = 2
@@ -190,10 +191,7 @@ def _words_of(way: Suggestion) -> str:
     if way.poses is not None:
         places = ", ".join(_place(pose) for pose in way.poses)
         words = f"add poses at {places}"
-    return (
-        f"{words} (signal that separates them: {short(gain.now, 2)} now, "
-        f"{short(gain.then, 2)} then, {gain.needed:g} needed)"
-    )
+    return f"{words} (signal that separates them: {signals(gain)})"
 
 
 def _place(pose: Array) -> str:
