@@ -14,8 +14,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from seecr.description.mjcf import not_mjcf
-from seecr.description.quiet import quiet_mujoco
+from seecr.description.mjcf import not_mjcf, quiet_mujoco
 from seecr.errors import InputFileError
 
 _DISABLE = (

@@ -24,7 +24,7 @@ from crosscheck.settle.model import (
     platform_of,
     switch_off,
 )
-from seecr.description.quiet import quiet_mujoco
+from seecr.description.mjcf import quiet_mujoco
 from seecr.pose import Array, pose_difference
 
 if TYPE_CHECKING:

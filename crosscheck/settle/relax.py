@@ -20,7 +20,7 @@ import mujoco
 import numpy as np
 
 from crosscheck.settle.physics import Physics
-from seecr.description.quiet import quiet_mujoco
+from seecr.description.mjcf import quiet_mujoco
 
 Observer = Callable[[Physics], None]
 

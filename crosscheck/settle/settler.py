@@ -19,7 +19,7 @@ from crosscheck.errors import CrosscheckError
 from crosscheck.settle.physics import Physics
 from crosscheck.settle.polish import Polished, polish
 from crosscheck.settle.relax import Observer, Rest, SettleStatus, come_to_rest
-from seecr.description.quiet import quiet_mujoco
+from seecr.description.mjcf import quiet_mujoco
 from seecr.pose import Array
 from seecr.result import Record
 

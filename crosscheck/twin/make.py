@@ -36,7 +36,7 @@ from crosscheck.twin.lab import (
 )
 from crosscheck.twin.measure import Truth
 from seecr.arguments import whole
-from seecr.description.quiet import quiet_mujoco
+from seecr.description.mjcf import quiet_mujoco
 from seecr.description.robot import Robot
 from seecr.effects import Term
 from seecr.result import Record, Result

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from seecr.counted import counted
-from seecr.description.quiet import quiet_mujoco
 from seecr.description.robot import ABSURD, Joint, Robot
 from seecr.description.shipped import robot_file
 from seecr.errors import RobotError, SeecrError
@@ -26,6 +28,35 @@ _NO_NUMBER = re.compile(
 # No rest length is this part of the frame: no cable is, and none stretches so far.
 _LEAST = 1e-4
 _EXPECTED = "expected the robot as MJCF, XML that begins with <mujoco"
+
+_quiet_lock = Lock()
+_quiet_depth = 0
+
+
+@contextmanager
+def quiet_mujoco() -> Iterator[None]:
+    """Keep MuJoCo from writing MUJOCO_LOG.TXT into the working folder; statuses report instead.
+
+    Also a decorator, ``@quiet_mujoco()``. A handler of the user's own stays.
+    """
+    import mujoco
+
+    global _quiet_depth
+    with _quiet_lock:
+        _quiet_depth += 1
+        if _quiet_depth == 1 and mujoco.get_mju_user_warning() is None:
+            mujoco.set_mju_user_warning(_ignore)
+    try:
+        yield
+    finally:
+        with _quiet_lock:
+            _quiet_depth -= 1
+            if _quiet_depth == 0 and mujoco.get_mju_user_warning() is _ignore:
+                mujoco.set_mju_user_warning(None)
+
+
+def _ignore(message: str) -> None:
+    """Discard a warning of MuJoCo's."""
 
 
 def load_robot(path: str | Path) -> Robot:

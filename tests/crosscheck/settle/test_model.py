@@ -18,8 +18,7 @@ from crosscheck.settle.model import (
     platform_of,
 )
 from crosscheck.settle.physics import Physics
-from seecr.description.mjcf import load_robot
-from seecr.description.quiet import quiet_mujoco
+from seecr.description.mjcf import load_robot, quiet_mujoco
 from seecr.description.shipped import model_names, model_path
 from seecr.errors import InputFileError, RobotError
 
