@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 _NO_NUMBER = re.compile(
     rb"""\b(?!name\b)\w+\s*=\s*["'](?:[-+.\deE\s]*\s)?[-+]?nan\b[-+.\deE\sna]*["']""", re.IGNORECASE
 )
-# No rest length is this part of the frame: no cable is, and none stretches so far.
-_LEAST = 1e-4
+# No cable is stretched to a hundred times its rest length.
+_LEAST = 0.01
 _EXPECTED = "expected the robot as MJCF, XML that begins with <mujoco"
 
 _quiet_lock = Lock()
@@ -122,9 +122,15 @@ def _check_sizes(robot: Robot, body: str, path: Path) -> None:
     """Check that neither rest lengths nor the platform are of another order than the frame."""
     most = ABSURD * robot.reach
     frame = f"expected metres, of the size of the frame, {robot.reach:.3g} m across"
-    for name, length in zip(robot.cable_names, robot.rest_lengths, strict=True):
-        if not _LEAST * robot.reach < length < most:
+    cables = zip(robot.cable_names, robot.rest_lengths, robot.reference_lengths, strict=True)
+    for name, length, straight in cables:
+        if length > most:
             raise RobotError(f"{path}: tendon {name} has rest length {length:g} m; {frame}")
+        if length < _LEAST * straight:
+            raise RobotError(
+                f"{path}: tendon {name} has rest length {length:g} m, but its sites are "
+                f"{straight:.3g} m apart at the reference pose; expected both in metres"
+            )
     for name, anchor in zip(robot.cable_names, robot.anchor_points, strict=True):
         away = float(np.linalg.norm(anchor))
         if away > most:
@@ -175,7 +181,7 @@ def not_mjcf(path: Path) -> str:
     if kind or begins.startswith(b"<"):
         return ""
     line = begins.splitlines()[0][:40].decode("utf-8", "replace")
-    return f"begins with {line!r}, which is no XML; {_EXPECTED}; the robot's file goes first"
+    return f"begins with {line!r}, which is not XML; {_EXPECTED}; the robot's file comes first"
 
 
 def _check_names(model: mujoco.MjModel, path: Path) -> None:
@@ -317,8 +323,8 @@ def _cable_sites(
     wraps = slice(first, first + count)
     if count != 2 or np.any(model.wrap_type[wraps] != int(mujoco.mjtWrap.mjWRAP_SITE)):
         raise RobotError(
-            f"{path}: tendon {name} has {counted(count, 'path element')} or something that is no "
-            "site; expected exactly two sites, exit point and anchor point"
+            f"{path}: tendon {name} has {counted(count, 'path element')} or something other "
+            "than sites; expected exactly two sites, exit point and anchor point"
         )
     sites = [int(s) for s in model.wrap_objid[wraps]]
     on_body = [int(model.site_bodyid[s]) == body for s in sites]

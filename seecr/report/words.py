@@ -277,11 +277,11 @@ def jump_lines(solution: Solution) -> Iterator[str]:
     if solution.jumps is None:
         return
     if not any(solution.jumps):
-        yield "followed from the reference pose: the platform does not jump on the way"
+        yield "followed from the reference pose: the platform does not jump on the path"
     for i, jumps in enumerate(solution.jumps):
         for jump in jumps:
             command = _three(1e3 * jump.command[:3], ".1f")
-            at = f"on the way to {solution.place(i)}, at command {command} mm"
+            at = f"on the path to {solution.place(i)}, at command {command} mm"
             yield f"{at}: {jump.words}"
 
 

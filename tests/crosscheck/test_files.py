@@ -91,7 +91,9 @@ def test_a_folder_that_is_not_there_is_said(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="Linux's own folder")
 def test_what_permissions_allow_may_still_not_be_written() -> None:
-    with pytest.raises(InputFileError, match=r"cannot be written: /proc is no folder to write to:"):
+    with pytest.raises(
+        InputFileError, match=r"cannot be written: /proc is not a folder that can be written to:"
+    ):
         check_writable(Path("/proc/none/model.toml"))
 
 

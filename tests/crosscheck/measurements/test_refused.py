@@ -37,7 +37,7 @@ REFUSED = {
     ),
     "marks of two kinds": (
         ["cmd_x_m;cmd_y_m,cmd_z_m;meas_x_m,run", "0;0,0;0,a"],
-        "line 1: expected one kind of mark between the names, got as many of one as of another",
+        "line 1: expected one kind of separator between the names, got as many of one as",
     ),
     "points and commas": (
         [POSE.replace(",", ";"), "0;0;0;0.5", "0;0;0;1,5"],

@@ -150,7 +150,7 @@ def test_negative_numbers_are_coordinates() -> None:
     [
         (
             ["pose", "nobot", *PLACE],
-            "nobot: no such file and no shipped robot; expected an MJCF file or one of",
+            "nobot: neither a file nor a shipped robot; expected an MJCF file or one of",
         ),
         (["pose", "no.xml", *PLACE], "no.xml: no such file; expected an MJCF model"),
         (["pose", "demobot_cogiro", "1", "2"], "expected X Y Z or X Y Z QW QX QY QZ, got 2"),
