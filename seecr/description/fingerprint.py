@@ -181,13 +181,13 @@ def _elsewhere(
     else:
         word = key.removesuffix("s_m").replace("_", " ")
         what = (
-            f"its {word} of {robot.cable_names[k]} is {1e3 * float(apart[k]):.3g} mm from that of "
-            "this robot"
+            f"its {word} of {robot.cable_names[k]} is {1e3 * float(apart[k]):.3g} mm from that "
+            f"{'of this robot' if robot.source is None else f'in {robot.source}'}"
         )
-    which = f"{name}, not {robot.name}"
+    other = f": {name}, not {robot.name}"
     if name == robot.name:
-        which = f"{name} too, but with other numbers"
-    return InputFileError.at(path, f"made for another robot: {which}: {what}; {_ANEW}")
+        other = f" of the same name, {name}"
+    return InputFileError.at(path, f"made for another robot{other}: {what}; {_ANEW}")
 
 
 def _short(value: Any) -> str:

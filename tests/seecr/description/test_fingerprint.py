@@ -33,14 +33,14 @@ def test_a_model_that_says_nothing_is_the_users_business() -> None:
     [
         (
             {"exit_points": ROBOT.exit_points + np.eye(3)[0] * 2e-3},
-            "its exit point of cable1 is 2 mm from that of this robot",
+            "its exit point of cable1 is 2 mm from that in /",
         ),
         ({"anchor_points": 1.1 * ROBOT.anchor_points}, "its anchor point of cable"),
         ({"reference_pose": [0.4, 0.25, 0.3, 1, 0, 0, 0]}, "its reference pose is"),
     ],
 )
 def test_points_elsewhere_are_another_robot(change: dict, words: str) -> None:
-    with pytest.raises(InputFileError, match=f"made for another robot: .*{words}"):
+    with pytest.raises(InputFileError, match=f"robot of the same name, demobot_cogiro: .*{words}"):
         check_robot(PATH, fingerprint(replace(ROBOT, **change)), ROBOT)
 
 
