@@ -78,7 +78,7 @@ def copy_robot(source: Path, copy: Path) -> None:
         load_robot(copy)
     except RobotError:
         raise CrosscheckError(
-            f"{source}: needs files beside it, which a case folder does not have; expected an "
+            f"{source}: needs other files, which a case folder does not have; expected an "
             "MJCF that stands alone"
         ) from None
 

@@ -98,7 +98,7 @@ def parse_kind(
 
 def chance(p: float) -> str:
     """A probability."""
-    return "< 1e−12" if p < 1e-12 else short(p, 2)
+    return "< 1e-12" if p < 1e-12 else short(p, 2)
 
 
 def parameter_name(name: str, unit: str) -> str:

@@ -147,12 +147,20 @@ def picture(found: Change) -> str:
     figure.savefig(out, format="svg", metadata={"Date": None, "Creator": None})
     # numbers of the axes stand between the tags and are kept
     text = re.sub(r"<[^>]*>", lambda tag: _rounded(tag[0]), out.getvalue())
-    return re.sub(r' transform="rotate\(-0 [^"]*"', "", text)
+    return _named(re.sub(r' transform="rotate\(-0 [^"]*"', "", text), found.effect.name)
 
 
 def _rounded(tag: str) -> str:
     """A tag whose places have two digits: a hundredth of a point is finer than any screen."""
     return re.sub(r"(\d\.\d\d)\d+", r"\1", tag)
+
+
+def _named(svg: str, effect: str) -> str:
+    """The SVG with its clips and markers numbered: Matplotlib's names change with rounding."""
+    names = dict.fromkeys(re.findall(r' id="([pmC][0-9a-f]{10})"', svg))
+    for k, name in enumerate(names):
+        svg = svg.replace(name, f"{effect}-{k + 1}")
+    return svg
 
 
 def _draw(axes: Axes, x: Array, values: Array, names: list[str], label: str) -> None:

@@ -200,7 +200,7 @@ def check_writable(path: Path) -> None:
         with tempfile.TemporaryFile(dir=above):  # permission bits do not tell all
             pass
     except OSError as error:
-        what = f"{above} is no folder to write to: {reason_of(error)}"
+        what = f"{above} is not a folder that can be written to: {reason_of(error)}"
     if what:
         raise InputFileError.at(path, f"cannot be written: {what}; expected the name of a file")
 
@@ -229,8 +229,8 @@ def check_replaces(
         if copied is None or not copied.exists() or not (out / name).samefile(copied):
             raise InputFileError.at(
                 out / name,
-                f"would be replaced, and is no older result: there is no {mark} beside it; "
-                "expected a new folder or that of an older one; name one with --out",
+                f"would be overwritten, but is not part of an older result: there is no {mark} "
+                "next to it; expected a new folder or that of an older result; name one with --out",
             )
 
 

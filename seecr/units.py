@@ -80,7 +80,10 @@ def of_columns(si: str) -> dict[str, Unit]:
 
 
 def short(value: float | None, digits: int = 3) -> str:
-    """A number with so many digits, without an exponent if that is readable."""
+    """A number with so many digits, without an exponent if that is readable.
+
+    Its minus sign is a hyphen, as in every text that the programs print: people copy numbers.
+    """
     if value is None or not np.isfinite(value):
         return "–"
     if value == 0.0:
@@ -88,9 +91,9 @@ def short(value: float | None, digits: int = 3) -> str:
     size = int(np.floor(np.log10(abs(value)))) + 1
     if not -4 < size <= _MOST_DIGITS:
         mantissa, power = f"{value:.{digits - 1}e}".split("e")
-        return f"{mantissa}e{int(power)}".replace("-", "−")
+        return f"{mantissa}e{int(power)}"
     decimals = max(digits - size, 0)
-    return f"{value:.{decimals}f}".replace("-", "−")
+    return f"{value:.{decimals}f}"
 
 
 def joules(energy: float, form: str = ".3g") -> str:
@@ -108,4 +111,4 @@ def with_error(value: float, error: float, digits: int = 2) -> tuple[str, str]:
     if decimals > 9 or abs(value) >= 10.0**_MOST_DIGITS:
         return short(value, 6), short(error, 2)
     decimals = max(decimals, 0)
-    return f"{value:.{decimals}f}".replace("-", "−"), f"{error:.{decimals}f}"
+    return f"{value:.{decimals}f}", f"{error:.{decimals}f}"

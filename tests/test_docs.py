@@ -108,7 +108,11 @@ def test_small_changes_keep_the_digits_of_their_axis() -> None:
     x = np.concatenate([x, x[-2::-1]])
     small = 5e-6 * np.stack([x, -x, x**2], axis=1)
     change = draw_effects.Change(BUILT_IN[0](), "demobot_cogiro", 1.0, x, small, small, small)
-    every = numbers_beside_axes(draw_effects.picture(change))
+    svg = draw_effects.picture(change)
+    # the names of clips and markers are counted: Matplotlib's own come from unrounded places
+    assert set(re.findall(r"#([^)\"]+)", svg)) >= {f"{BUILT_IN[0].name}-{k}" for k in (1, 2)}
+    assert re.search(r"#[mpC][0-9a-f]{10}\b", svg) is None
+    every = numbers_beside_axes(svg)
     assert len(every) == 4 and all(map(evenly_spaced, every))
 
 

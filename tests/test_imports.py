@@ -97,7 +97,7 @@ def imports(path: Path) -> frozenset[str]:
 
 def place(module: str) -> str:
     """The folder or file that a module belongs to, "" for a package's own face."""
-    parts = module.split(".")
+    parts = module.replace("__main__", "cli").split(".")  # it is how cli is called
     return ".".join(parts[:2]) if len(parts) > 1 else ""
 
 
@@ -296,6 +296,15 @@ def test_rerun_is_imported_by_recordings_alone() -> None:
 def test_compiled_modules_import_numba_and_nobody_else_does() -> None:
     users = [name_of(p) for p in modules("seecr") + modules("crosscheck") if uses(p, "numba")]
     assert users == ["seecr.compiled.jit"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("package", ["seecr", "crosscheck"])
+def test_a_package_runs_as_its_command(package: str) -> None:
+    run = subprocess.run(
+        [sys.executable, "-m", package, "--help"], capture_output=True, text=True, cwd=ROOT
+    )
+    assert run.returncode == 0 and run.stdout.startswith(f"Usage: {package} [OPTIONS]")
 
 
 def test_what_is_compiled_takes_arrays_alone() -> None:

@@ -7,10 +7,11 @@ from dataclasses import replace
 from typing import TypeAlias
 
 from crosscheck.add.result import Addition
-from crosscheck.add.weigh import base_of, weigh
+from crosscheck.add.weigh import base_of, weigh, whiteness_of
 from crosscheck.errors import CrosscheckError, UnsolvedError
 from crosscheck.fit.candidates import Trials, candidates_for, try_candidate
 from crosscheck.fit.gauss_newton import Fit, fit
+from crosscheck.fit.known import firmer
 from crosscheck.fit.prepare import Progress, outlying_rows, prepare
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.reasons import Why
@@ -129,10 +130,22 @@ def _added(
         notes.append(words)
         problem = problem.without(outliers, words)
         best = fitter(problem, terms, factor)
+    firmness = _firmness(problem, best)
+    if firmness > 1.0:
+        terms = firmer(terms, firmness)
+        best = fitter(problem, terms, factor)
     progress("predicting held-out runs", 0.6)
     # effects that are free in the data were fitted in advance: they are not in the model before
     before = terms.only(name for name in terms.names if name in had or name not in names)
-    return weigh(problem, before, names, factor, best, notes, basis_of(model, robot))
+    return weigh(problem, before, names, factor, best, notes, basis_of(model, robot), firmness)
+
+
+def _firmness(problem: Problem, best: Fit) -> float:
+    """How much firmer than the data, compared with what is stated, independent values count."""
+    if not best.terms.knowledge.measured.any():
+        return 1.0
+    white = whiteness_of(problem, best)
+    return 1.0 if white.is_noise else white.inflation
 
 
 def _apart(terms: Terms, layout: Layout, kind: str) -> Term:

@@ -14,7 +14,8 @@ from crosscheck.fit.candidates import null_fit, seen_directions
 from crosscheck.fit.evidence import FALSE_ALARM, p_value
 from crosscheck.fit.gauss_newton import Fit, fit
 from crosscheck.fit.held_out import HeldOut, hold_out, improves, pays, unfitted
-from crosscheck.fit.noise import whiteness
+from crosscheck.fit.known import firmer
+from crosscheck.fit.noise import Whiteness, whiteness
 from crosscheck.fit.problem import Problem, Rms, rms_by_kind
 from crosscheck.fit.state import evaluate
 from crosscheck.fit.systematic import moved_by_others
@@ -30,6 +31,8 @@ from seecr.prediction.model import Model
 _IMPLAUSIBLE = 5.0
 # Parameters with a larger correlation than this can hardly be determined separately.
 _CORRELATED = 0.95
+# So many of its standard errors, a value measured independently is contradicted by the data.
+_CONTRADICTED = 3.0
 _MOST_NAMED = 4
 # Held-out runs are not predicted better than they are fitted, except by chance. If their chi2 is
 # below this part of the fit's, the fit has ended in a local minimum.
@@ -38,9 +41,15 @@ _HOLLOW = 0.9
 
 def weigh(
     problem: Problem, terms: Terms, names: Sequence[str], factor: Array, best: Fit,
-    notes: Sequence[str], basis: Model,
+    notes: Sequence[str], basis: Model, firmness: float = 1.0,
 ) -> Addition:  # fmt: skip
     """Judge what the named effects are worth in the best fit, against the model without them.
+
+    Args:
+        problem: the data. terms: effects before. names: of the new ones. factor: of the noise.
+        best: the fit with all of them. notes: about the data. basis: the model to write into.
+        firmness: by how much independently measured values were made firmer for this fit
+            (:func:`crosscheck.fit.known.firmer`).
 
     Raises:
         UnsolvedError: the fit did not converge, or ended in a local minimum.
@@ -51,12 +60,14 @@ def weigh(
     best, held = _out_of_hollows(problem, factor, best)
     _refuse_unsettled(problem, names, best, held)
     own = np.isin([effect for effect, _key in best.terms.labels], list(names))
-    white = whiteness(problem, best.state.white, int(np.sum(np.isfinite(best.stderr))))
+    white = whiteness_of(problem, best)
     # standard errors are too small if the noise is larger than stated or autocorrelated, and also
     # if another effect is still missing
     moved = np.zeros(len(own)) if white.is_noise else moved_by_others(problem, best)
-    covariance = white.inflation**2 * best.covariance + np.diag(moved**2)
-    fitted = _split(best, np.sqrt(np.diag(covariance)))
+    inflation = max(white.inflation, firmness)
+    known = firmer(best.terms, 1.0 / firmness)
+    covariance = _no_wider(known, inflation**2 * best.covariance + np.diag(moved**2))
+    fitted = _split(known, best, np.sqrt(np.diag(covariance)))
     drop = (base.chi2 - best.chi2) / max(1.0, white.scale) ** 2
     p = p_value(drop, seen_directions(best, own), False)
     distance, count = distance_from_nothing(best.terms, covariance, own)
@@ -172,8 +183,22 @@ def is_nothing(distance: float, count: int) -> bool:
     return bool(stats.chi2.cdf(distance**2, count) <= stats.chi2.cdf(1.0, 1))
 
 
-def _split(best: Fit, stderr: Array) -> tuple[Fitted, ...]:
-    parts = [(term, best.terms.part(term.name)) for term in best.terms]
+def whiteness_of(problem: Problem, found: Fit) -> Whiteness:
+    """Test the residuals of a fit."""
+    return whiteness(problem, found.state.white, int(np.sum(np.isfinite(found.stderr))))
+
+
+def _no_wider(terms: Terms, covariance: Array) -> Array:
+    """The covariance (p, p), no value less certain than it was measured independently."""
+    stderr = np.sqrt(np.diag(covariance))
+    wide = terms.knowledge.measured & (stderr > terms.knowledge.stderr)
+    shrink = np.ones(len(stderr))
+    shrink[wide] = terms.knowledge.stderr[wide] / stderr[wide]
+    return np.asarray(covariance * np.outer(shrink, shrink))
+
+
+def _split(terms: Terms, best: Fit, stderr: Array) -> tuple[Fitted, ...]:
+    parts = [(term, terms.part(term.name)) for term in terms]
     return tuple(Fitted(t, stderr[own], best.at_bound[own]) for t, own in parts)
 
 
@@ -183,6 +208,14 @@ def _warnings(
     out = []
     for f in fitted:
         names = np.array(f.term.layout.names)
+        off = np.abs(f.term.vector - f.term.knowledge.value) / f.term.knowledge.stderr
+        against = f.term.knowledge.measured & (off > _CONTRADICTED)
+        if against.any():
+            which, most = some(names[against].tolist()), off[against].max()
+            out.append(
+                f"{f.term.name}: {which} is up to {most:.3g} standard errors from what was "
+                "measured independently: check that measurement, and the values that are fixed"
+            )
         unseen, stopped = ~np.isfinite(f.stderr), np.asarray(f.at_bound, bool)
         if stopped.any():
             out.append(f"{f.term.name}: {some(names[stopped])} stopped at a bound")

@@ -140,7 +140,7 @@ def _arguments(
     expected = ["EFFECT", "ROBOT.xml", "DATA.csv"][0 if all_from is None else 1 :]
     if len(words) < len(expected):
         given = " ".join(words) or "nothing"
-        beside = "" if all_from is None else " beside --all-from"
+        beside = "" if all_from is None else " with --all-from"
         raise click.UsageError(f"expected {' '.join(expected)}{beside}, got {given}")
     effect = words[0] if all_from is None else None
     robot, *data = (Path(word) for word in words[len(expected) - 2 :])

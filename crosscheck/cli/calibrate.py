@@ -34,7 +34,9 @@ Examples:
 @click.option(
     "--force", is_flag=True, help="Write it even if it does not predict held-out runs better."
 )
-@click.option("--out", type=FILE, metavar="DIR", help="Folder for calibration.json.")
+@click.option(
+    "--out", type=FILE, metavar="DIR", help="Folder for calibration.json.  [default: none]"
+)
 @json_option
 def command(
     robot: Path,

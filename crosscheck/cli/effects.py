@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from crosscheck.cli.choices import result_in
 from seecr.cli.following import following
 from seecr.cli.options import FILE, json_option, made_by
 
@@ -22,8 +23,9 @@ Examples:
 @click.option(
     "--robot", type=FILE, metavar="ROBOT.xml", help="Show plausible sizes for this robot."
 )
+@click.option("--out", type=FILE, metavar="DIR", help="Folder for effects.json.  [default: none]")
 @json_option
-def command(name: str | None, robot: Path | None, as_json: bool) -> int:
+def command(name: str | None, robot: Path | None, out: Path | None, as_json: bool) -> int:
     """List the effects of the catalogue, or describe one: its formula, its parameters, and how to
     check it.
 
@@ -38,11 +40,13 @@ def command(name: str | None, robot: Path | None, as_json: bool) -> int:
 
     machine = load_robot(robot) if robot is not None else None
     chosen = [effect_named(name)] if name is not None else list(catalogue().values())
+    rows = [effect_record(effect, machine) for effect in chosen]
+    told = rows[0] if name is not None else {"effects": rows}
+    text = json_text({"made": made_by(None if machine is None else machine.source), **told})
+    with result_in(out, "effects.json") as keep:
+        keep(text)
     if as_json:
-        rows = [effect_record(effect, machine) for effect in chosen]
-        told = rows[0] if name is not None else {"effects": rows}
-        made = made_by(None if machine is None else machine.source)
-        click.echo(json_text({"made": made, **told}))
+        click.echo(text)
     elif name is not None:
         print_effect(chosen[0], machine)
         given = (robot or "ROBOT.xml", "DATA.csv", "--model", "model.toml")

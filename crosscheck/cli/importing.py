@@ -28,7 +28,7 @@ Examples:
     type=FILE,
     required=True,
     metavar="ROBOT.xml",
-    help="The program that wrote the recordings.",
+    help="The recorded robot, as MJCF or the name of a shipped one.",
 )
 @click.option(
     "--commands",

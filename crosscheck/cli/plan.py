@@ -90,6 +90,8 @@ def command(
       plan.html        the same as a page
       poses.csv        with --rows: the poses, as a controller can take them
       add-KIND.csv     the commands of each thing to add
+
+    \b
     Exit status: 0 all well, 2 bad input, 3 poses without an equilibrium.
     """
     if (poses is None) == (rows is None):

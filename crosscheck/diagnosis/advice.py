@@ -18,6 +18,7 @@ from crosscheck.planning.adding import Extension
 from crosscheck.planning.extensions import extensions
 from crosscheck.planning.planned import Planned, Reads
 from crosscheck.planning.proposer import Suggestion, telling_apart
+from crosscheck.planning.words import signals
 from crosscheck.units import in_unit, parameter_name
 from seecr.description.robot import Robot
 from seecr.effects import Term, catalogue
@@ -189,10 +190,7 @@ def _words_of(way: Suggestion) -> str:
     if way.poses is not None:
         places = ", ".join(_place(pose) for pose in way.poses)
         words = f"add poses at {places}"
-    return (
-        f"{words} (signal that separates them: {gain.now:.2g} now, {gain.then:.2g} then, "
-        f"{gain.needed:g} needed)"
-    )
+    return f"{words} (signal that separates them: {signals(gain)})"
 
 
 def _place(pose: Array) -> str:

@@ -3,9 +3,14 @@
 A value z = (value - null)/scale that was measured with the standard error s counts as one more
 reading: y = z_measured/s, with the derivative 1/s and unit noise. It adds ((z_measured - z)/s)^2 to
 the objective. A fixed value has zero derivatives.
+
+The noise of the data is taken as stated. If a fit leaves more than that, the readings of the data
+count for less than stated and those values for as much as before: see :func:`firmer`.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,6 +31,17 @@ def known_readings(terms: Terms) -> tuple[Array, Array]:
     columns = np.zeros((len(own), len(terms)))
     columns[np.arange(len(own)), own] = (terms.scale / known.stderr)[own]
     return columns, ((known.value - terms.null) / known.stderr)[own]
+
+
+def firmer(terms: Terms, factor: float) -> Terms:
+    """The same terms; what was measured independently has standard errors smaller by a factor.
+
+    A fit with noise that is larger by this factor than stated has the same optimum.
+    """
+    return Terms(
+        replace(t, knowledge=replace(t.knowledge, stderr=t.knowledge.stderr / factor))
+        for t in terms
+    )
 
 
 def known_left(terms: Terms) -> Array:

@@ -28,8 +28,8 @@ _TURNED = np.radians(3.0)
 _ROUNDS = 10
 _LEAST = 3
 _ONE_LINE = (
-    "the frames cannot be aligned: the commanded positions of the dwells lie in one line, or "
-    "nearer to one than to what was read, which shows no turn about it; name three points with "
+    "the frames cannot be aligned: the commanded positions of the dwells lie on one line, or so "
+    "close to one that the readings do not show the rotation about it; name three points with "
     "--point"
 )
 _NONE = np.array([1.0, 0.0, 0.0, 0.0])
@@ -79,7 +79,7 @@ def by_points(names: Sequence[str], there: Array, here: Array) -> Frames:
     if turn is None:
         raise CrosscheckError(
             f"the frames cannot be aligned by {counted(len(names), 'point')} "
-            f"({', '.join(names)}): expected three or more that are not in one line; "
+            f"({', '.join(names)}): expected three or more that are not on one line; "
             "name more with --point"
         )
     shift = here.mean(axis=0) - quat_rotate(turn, there).mean(axis=0)
@@ -87,9 +87,9 @@ def by_points(names: Sequence[str], there: Array, here: Array) -> Frames:
     worst, spread = int(np.argmax(left)), _spread(here)
     if left[worst] > _LEFT_OF_POINTS * spread:
         raise CrosscheckError(
-            f"the frames cannot be aligned: point {names[worst]} is {left[worst]:.3g} m off "
-            f"where the others put it, over {spread:.3g} m of all; check its coordinates in "
-            "metres, and that both frames are right-handed"
+            f"the frames cannot be aligned: point {names[worst]} is {left[worst]:.3g} m from "
+            f"where the other points put it, and all of them spread by {spread:.3g} m; check its "
+            "coordinates in metres, and that both frames are right-handed"
         )
     how = (
         f"tracker's frame aligned by {len(names)} points, which fit to {1e3 * np.max(left):.2g} mm"
@@ -112,8 +112,8 @@ def to_commands(position: Array, quat: Array | None, told: Array, target: Array 
     if len(told) < _LEAST:
         raise CrosscheckError(
             f"the frames cannot be aligned by {counted(len(told), 'dwell')}: expected {_LEAST} or "
-            "more that fall into a command; are both logs of one clock (--clock)? If so, name "
-            "three points with --point"
+            "more at which a command was held; do the clocks of both logs agree (--clock)? If they "
+            "do, name three points with --point"
         )
     home = told[:, 3:]
     shift = np.zeros(3) if target is None else target
@@ -193,7 +193,7 @@ def _check(left: Array, told: Array) -> None:
     most, spread = float(np.quantile(left, _MOST)), _spread(told[:, :3])
     if most > _LEFT * spread:
         raise CrosscheckError(
-            f"the frames cannot be aligned: {1e3 * most:.3g} mm are left of commands that spread "
-            f"by {1e3 * spread:.3g} mm; expected commands and a tracker's log of one recording; "
-            "are these of the same robot, and of one clock (--clock)?"
+            f"the frames cannot be aligned: errors of {1e3 * most:.3g} mm remain, and the commands "
+            f"spread by {1e3 * spread:.3g} mm; expected the commands and the tracker's log of one "
+            "recording; are they of the same robot, and do their clocks agree (--clock)?"
         )

@@ -207,12 +207,17 @@ def _frames(robot: Robot, takes: Sequence[Take], choices: ImportChoices) -> Fram
     target = np.zeros(3) if choices.shape and choices.target is None else choices.target
     if choices.aligned:
         return as_they_are(target)
-    if not choices.points:
-        return to_commands(position, quat, told, target)
     names = list(choices.points)
     there = np.array([_place(takes[0].export, name) for name in names])
     here = np.array([choices.points[name] for name in names])
-    frames = with_target(by_points(names, there, here), quat, told, target)
+    try:
+        if not choices.points:
+            return to_commands(position, quat, told, target)
+        found = by_points(names, there, here)
+    except CrosscheckError as error:
+        pairs = [f"{take.stream.path} with {take.held.log.path}" for take in takes]
+        raise CrosscheckError(f"{', '.join(pairs)}: {error}") from None
+    frames = with_target(found, quat, told, target)
     return frames if target is not None else place_of_target(frames, position, told)
 
 

@@ -80,15 +80,15 @@ class ImportChoices:
         """
         said = [
             (self.aligned and self.points, "--aligned and --point", "one of them: the frame is "
-             "known, or points find it"),
+             "known, or points determine it"),
             (self.markers and self.body, "--body and --markers", "one of them: a body of the "
-             "file, or markers that make one"),
+             "file, or markers that form one"),
             (self.shape and not self.markers, "--shape without --markers", "the names of the "
-             "markers that make the body"),
-            (self.rotation and form != "vicon", f"--rotation beside {form}", "it with vicon only: "
-             "others say themselves what their columns mean"),
-            (self.unit and form != "poses", f"--unit beside {form}", "it with poses only: others "
-             "say their unit in the file"),
+             "markers that form the body"),
+            (self.rotation and form != "vicon", f"--rotation with {form}", "it with vicon only: "
+             "other formats state what their columns mean"),
+            (self.unit and form != "poses", f"--unit with {form}", "it with poses only: other "
+             "formats state their units"),
         ]  # fmt: skip
         for wrong, got, expected in said:
             if wrong:

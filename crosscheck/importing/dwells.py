@@ -105,9 +105,10 @@ def find_dwells(
     good = [(a, b) for a, b in long if seen[a:b].sum() >= LEAST]
     if not good:
         raise stream.error(
-            f"nothing rests for {rest_for:g} s: the slowest tenth moves at "
-            f"{1e3 * np.nanpercentile(speed, 10):.3g} mm/s, at rest is below {1e3 * limit:.3g} "
-            "mm/s; expected poses that are held; give --rest-for or --rest-speed"
+            f"nothing rests for {rest_for:g} s: in its slowest tenth the body moves at "
+            f"{1e3 * np.nanpercentile(speed, 10):.3g} mm/s or less, and counts as resting below "
+            f"{1e3 * limit:.3g} mm/s; expected poses that are held; change --rest-for or "
+            "--rest-speed"
         )
     return _averaged(stream, good, limit)
 

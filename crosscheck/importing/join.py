@@ -101,19 +101,19 @@ def matched(stream: Stream, held: HeldCommands, dwells: Dwells) -> NDArray[np.in
     if held.begin_s is None or held.end_s is None:
         if len(dwells) != len(held.row):
             raise stream.error(
-                f"rests {counted(len(dwells), 'time')}; expected the "
-                f"{counted(len(held.row), 'command')} of "
-                f"{held.log.path.name}, which has no times to tell them by; add a column t_s "
-                "there, or change --rest-for or --rest-speed"
+                f"rests {counted(len(dwells), 'time')}; expected one rest for each of the "
+                f"{counted(len(held.row), 'command')} in {held.log.path.name}, which has no times "
+                "to match them by; add a column t_s there, or change --rest-for or --rest-speed"
             )
         return np.arange(len(dwells))
     out = owners(held, dwells)
     if np.all(out < 0):
         raise InputFileError.at(
             held.log.path,
-            f"commands from {held.begin_s[0]:.6g} to {held.end_s[-1]:.6g} s by the tracker's; "
-            f"{stream.path.name} rests from {dwells.begin_s[0]:.6g} to {dwells.end_s[-1]:.6g} s: "
-            "expected these to overlap; give what the tracker's clock shows more with --clock",
+            f"has commands from {held.begin_s[0]:.6g} to {held.end_s[-1]:.6g} s of the tracker's "
+            f"clock, but {stream.path.name} rests from {dwells.begin_s[0]:.6g} to "
+            f"{dwells.end_s[-1]:.6g} s; expected these times to overlap; give with --clock how far "
+            "the tracker's clock is ahead",
         )
     return out
 

@@ -51,16 +51,16 @@ def body_of_markers(
     if across[1] < THIN * across[0]:
         raise InputFileError.at(
             export.path,
-            f"the markers {', '.join(names)} lie in one line, which shows no turn about it; "
-            "expected three that do not; name another",
+            f"the markers {', '.join(names)} lie on one line, so the rotation about it is not "
+            "seen; expected three that do not; name another",
         )
     position, quat, misfit = _fitted(points, seen, shape)
     usual = float(np.nanmedian(misfit))
     if usual > _BENT * across[0]:
         raise InputFileError.at(
             export.path,
-            f"the markers {', '.join(names)} do not keep their distances: they fit a rigid body to "
-            f"{1e3 * usual:.3g} mm; expected markers of one body; name others",
+            f"the markers {', '.join(names)} do not keep their distances: a rigid body only fits "
+            f"to {1e3 * usual:.3g} mm; expected markers of one body; name others",
         )
     swapped = misfit > max(_SWAPPED * usual, 1e-9)
     position[swapped], quat[swapped] = np.nan, np.nan

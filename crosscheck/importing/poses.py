@@ -45,11 +45,11 @@ def read_poses(path: Path, unit: str | None = None) -> Logged:
     lacking = [axis for axis in "xyz" if axis not in found]
     if lacking:
         raise table.error(
-            f"expected columns of a pose such as x_mm y_mm z_mm, got no {', '.join(lacking)}; name "
-            "them so"
+            f"expected columns of a pose such as x_mm y_mm z_mm, got no {', '.join(lacking)}; "
+            "rename them"
         )
     if unit is not None and all(found[axis][1] for axis in "xyz"):
-        raise InputError(f"--unit {unit}: the columns of {path.name} say their own; leave it out")
+        raise InputError(f"--unit {unit}: the columns of {path.name} state their own; leave it out")
     position = np.stack([_length(table, *found[axis], unit) for axis in "xyz"], axis=1)
     bodies = {path.stem: (position, _turns(table, found))}
     return Logged(path, t_s, table.line, bodies, {}, began=first)
@@ -72,12 +72,13 @@ def _columns(table: Table) -> dict[str, tuple[int, str]]:
 
 def _times(table: Table) -> tuple[Array, datetime | None]:
     if len(table.names) == 1:
-        text = "expected names, and cells between commas, semicolons or tabs under them"
-        raise table.error(f"{text}, got {show(table.names[0])}; export it so")
+        text = "expected a row of names, and cells separated by commas, semicolons or tabs"
+        raise table.error(f"{text}, got {show(table.names[0])}; export it like this")
     found = [(c, m) for c, name in enumerate(table.names) if (m := _TIMES.fullmatch(name))]
     if len(found) != 1:
-        got = ", ".join(table.names[c] for c, _m in found) or "none"
-        raise table.error(f"expected one column of times such as t_s, got {got}; name it so")
+        got = ", ".join(table.names[c] for c, _m in found)
+        todo = f"got {got}; rename the others" if got else "got none; add or rename it"
+        raise table.error(f"expected one column of times such as t_s, {todo}")
     column, match = found[0]
     first = began(table, column)
     if first is None:
@@ -89,8 +90,8 @@ def _times(table: Table) -> tuple[Array, datetime | None]:
     if len(falls):
         k = int(falls[0]) + 1
         text = (
-            f"expected times that grow after {t_s[k - 1]:.9g} s, got {t_s[k]:.9g} s; are two "
-            "recordings in one file? Give them one by one"
+            f"expected times that increase after {t_s[k - 1]:.9g} s, got {t_s[k]:.9g} s; are two "
+            "recordings in one file? Import them one at a time"
         )
         raise table.error(text, row=k, column=table.names[column])
     return t_s, first

@@ -15,7 +15,7 @@ from seecr.columns.table import show, taken_for
 from seecr.counted import counted
 from seecr.errors import InputFileError
 from seecr.files import read_text
-from seecr.pose import Array
+from seecr.pose import LARGEST, Array
 
 Row = list[str]
 
@@ -123,7 +123,7 @@ class Block:
         """The numbers (n, k) of some columns; NaN for empty cells.
 
         Raises:
-            InputFileError: a row that is too short, or a cell that is not a number.
+            InputFileError: a row that is too short, or a cell that is not a finite number.
         """
         out = np.empty((len(self.body), len(columns)))
         for k, row in enumerate(self.body):
@@ -132,6 +132,9 @@ class Block:
                 out[k] = [float(cells[c]) if cells[c] else np.nan for c in columns]
             except (IndexError, ValueError):
                 raise self._fault(row, columns) from None
+        if np.any(np.abs(out) > LARGEST):
+            k = int(np.argmax((np.abs(out) > LARGEST).any(axis=1)))
+            raise self._fault(self.body[k], columns)
         return out
 
     def _fault(self, row: int, columns: Sequence[int]) -> InputFileError:
@@ -146,8 +149,10 @@ class Block:
             return self.rows.error(text, row)
         for c in columns:
             try:
-                float(cells[c] or "nan")
+                wrong = abs(float(cells[c] or "nan")) > LARGEST
             except ValueError:
+                wrong = True
+            if wrong:
                 text = f"expected a number, got {show(cells[c])}; export the file again"
                 return self.rows.error(text, row, self.labels[c] or f"number {c + 1}")
         raise AssertionError("a row without a fault")
@@ -169,8 +174,10 @@ class Block:
             return
         k = int(wrong[0])
         before = "" if k == 0 else f" after {t_s[k - 1]:.9g} s"
-        text = f"expected times that grow{before}, got {t_s[k]:.9g} s; are two recordings in one "
-        raise self.rows.error(f"{text}file? Export them one by one", self.body[k], label)
+        text = (
+            f"expected times that increase{before}, got {t_s[k]:.9g} s; are two recordings in one "
+        )
+        raise self.rows.error(f"{text}file? Export them one at a time", self.body[k], label)
 
 
 def check_body(rows: FileRows, body: range, what: str) -> None:

@@ -115,7 +115,7 @@ def _told(take: Take) -> list[str]:
     out += [shorter] * (rest > 0)
     if take.held.passed:
         passed = counted(take.held.passed, "set point")
-        out.append(f"{passed} on the way left out: the way is taken as straight")
+        out.append(f"{passed} between held commands left out: the path is taken as straight")
     return out
 
 
@@ -125,7 +125,7 @@ def _stream(export: Logged, choices: ImportChoices) -> tuple[Stream, tuple[str, 
     lacking = [name for name in choices.markers if choices.shape and name not in choices.shape]
     if lacking:
         raise CrosscheckError(
-            f"--shape has no place of {', '.join(lacking)}; expected a row for each of --markers"
+            f"--shape has no position of {', '.join(lacking)}; expected a row for each of --markers"
         )
     shape = np.array([choices.shape[name] for name in choices.markers]) if choices.shape else None
     stream, said = body_of_markers(export, list(choices.markers), shape)

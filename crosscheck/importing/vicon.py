@@ -58,8 +58,8 @@ def read_vicon(path: Path, rotation: str | None = None, *, bodies_too: bool = Tr
     frames = [_frames(one) for one in found]
     for one, frame in zip(found[1:], frames[1:], strict=True):
         if not np.array_equal(frame, frames[0]):
-            text = f"expected the frames of the first block again, got {len(frame)} other ones"
-            raise rows.error(f"{text}; export the blocks one by one", one.block.body[0])
+            text = f"expected the frames of the first block again, got {len(frame)} different ones"
+            raise rows.error(f"{text}; export the blocks one at a time", one.block.body[0])
     bodies: dict[str, tuple[Array, Array | None]] = {}
     markers: dict[str, Array] = {}
     for one in found:
@@ -81,7 +81,7 @@ def _blocks(rows: FileRows) -> list[_Found]:
     starts = [k for k, row in enumerate(rows.cells) if row and row[0] == "Frame"]
     for top in starts:
         if top < 3 or not any(rows.cells[top - 3]):
-            text = "expected a kind of block, its rate and its names above, got a header cut off"
+            text = "expected the kind, rate and names of the block above, got an incomplete header"
             raise rows.error(f"{text}; export it again", top)
         kind, rate = rows.cells[top - 3][0].lower(), _rate(rows, top - 2)
         end = top + 2
@@ -146,7 +146,9 @@ def _rotations(one: _Found, columns: dict[str, int], rotation: str | None) -> Ar
     if not set(_THREE) <= set(columns):
         return None
     if rotation is None:
-        text = f"three numbers for a rotation may mean many things; expected --rotation {ROTATIONS}"
+        text = (
+            f"three numbers of a rotation can mean several things; expected --rotation {ROTATIONS}"
+        )
         raise one.block.rows.error(text, one.block.label_row)
     given = [columns[axis] for axis in _THREE]
     unit = of_columns("rad").get(_unit(one, given[0]))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from crosscheck.measurements.data import Measurements
+from crosscheck.measurements.sentinels import refuse_sentinels
 from seecr.columns.known import ANGLES, POSITION, Columns
 from seecr.columns.reach import away_from, check_reach
 from seecr.counted import some
@@ -37,6 +38,7 @@ def notice(columns: Columns, robot: Robot, data: Measurements) -> list[str]:
         InputFileError: commands or readings that must be in another unit or order.
     """
     check_reach(columns, robot, data.command_pose, data.command_lengths)
+    refuse_sentinels(columns, robot)
     _check_spread(columns, robot, data)
     return [
         *_far(robot, data),

@@ -88,7 +88,7 @@ def _check_alike(parts: Sequence[Measurements]) -> None:
             raise InputFileError.at(
                 part.path,
                 f"commands {_commanded_in(part)}, but {first.path} {_commanded_in(first)}; "
-                "expected files with the same kind of commands; use them one by one",
+                "expected files with the same kind of commands; use them one at a time",
             )
 
 

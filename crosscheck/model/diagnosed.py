@@ -13,7 +13,7 @@ from seecr.effects import Term, Terms
 from seecr.errors import InputError, InputFileError
 from seecr.files import read_text
 from seecr.made import digits_of
-from seecr.prediction.cells import number_of
+from seecr.prediction.cells import limits_of, number_of
 
 __all__ = ["load_diagnosed"]
 
@@ -98,4 +98,11 @@ def _term(path: Path, item: Any, robot: Robot) -> Term:
         raise InputFileError.at(
             path, f"effect {name}: expected a number for {lacking[0]}; is it of another robot?"
         )
+    for i, (key, value) in enumerate(zip(term.layout.names, term.vector, strict=True)):
+        low, high = limits_of(term.layout, i)
+        if not low <= value <= high:
+            raise InputFileError.at(
+                path,
+                f"effect {name}: {key}: {value:g} is out of bounds; expected {low:g} to {high:g}",
+            )
     return term

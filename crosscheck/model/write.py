@@ -16,6 +16,7 @@ import tomlkit
 from crosscheck.model.fitted import Fitted
 from crosscheck.model.own import Kept, kept, without_parts
 from crosscheck.model.place import check_place
+from crosscheck.model.remarks import with_remarks
 from seecr import __version__
 from seecr.description.fingerprint import fingerprint
 from seecr.description.robot import Robot
@@ -92,12 +93,13 @@ def with_fit(
         if name in added:
             _describe(table, provenance, errors)
         elif not by_name[name].usual.term.knowledge.fixed.all():
-            table["refitted"] = _plain(vars(provenance))
+            table["refitted"] = with_remarks(_plain(vars(provenance)), table.get("refitted"))
+    before = document.get(FIT)
     _forget_covariance(document)
     if covariance is not None:
         same = without_parts(fitted, covariance)
         if same[0] and np.all(np.isfinite(np.diag(same[1]))):
-            document[FIT] = _with_covariance(_together(), *same)
+            document[FIT] = with_remarks(_with_covariance(_together(), *same), before)
     return _with_values(replace(model, document=document), [by_name[name].usual for name in order])
 
 
@@ -134,12 +136,13 @@ def calibrated(
             _fill(tables[one.usual.term.name], one)
         else:
             _appended(document, one)
-    document.pop(CALIBRATION, None)
+    before = document.pop(CALIBRATION, None)
     _forget_covariance(document)
     table = tomlkit.table()
     table.trivia.indent = "\n"
     _describe(table, provenance, errors)
-    document[CALIBRATION] = _with_covariance(table, *without_parts(fitted, covariance))
+    table = _with_covariance(table, *without_parts(fitted, covariance))
+    document[CALIBRATION] = with_remarks(table, before)
     return _with_values(replace(model, document=document), [one.usual for one in every])
 
 
@@ -273,11 +276,10 @@ def _cell(layout: Layout, i: int, fitted: Fitted) -> dict[str, object]:
 
 
 def _describe(table: Any, provenance: Provenance, errors: Mapping[str, Rms]) -> None:
-    table["provenance"] = _plain(vars(provenance))
+    table["provenance"] = with_remarks(_plain(vars(provenance)), table.get("provenance"))
     for name in _ERRORS:
-        table[name] = _plain(
-            {k: float(f"{v:.4g}") for k, v in errors[name].items() if v is not None}
-        )
+        rms = {k: float(f"{v:.4g}") for k, v in errors[name].items() if v is not None}
+        table[name] = with_remarks(_plain(rms), table.get(name))
 
 
 def _plain(values: Mapping[str, Any]) -> Any:
@@ -301,11 +303,11 @@ def renewed(model: Model, robot: Robot, data: Measurements) -> Model:
     there = predict(robot, data.as_commands(robot), model)
     rows = data.read & there.solved
     reach = DataReach.of(there.pose[rows, :3], there.tensions[rows])
-    document.pop(TABLE, None)
+    before = document.pop(TABLE, None)
     if reach is not None:
         table = reach.as_toml()
         table.trivia.indent = "\n" if FIT in document else ""
-        document[TABLE] = table
+        document[TABLE] = with_remarks(table, before)
     return replace(model, document=document, notes=(), reach=reach)
 
 

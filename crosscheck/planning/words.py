@@ -16,9 +16,16 @@ def alike(found: Visible) -> str:
     return some(names)
 
 
+def signals(gain: Gain) -> str:
+    """The signal now, after the measurement, and that which is needed, to two digits."""
+    # :g writes 2000, where :.2g alone writes 2e+03
+    now, then = (f"{float(f'{value:.2g}'):g}" for value in (gain.now, gain.then))
+    return f"{now} now, {then} then, {gain.needed:.2g} needed"
+
+
 def gain_words(gain: Gain) -> str:
     """What a measurement would gain, with numbers."""
-    numbers = f"(signal {gain.now:.2g} now, {gain.then:.2g} then, {gain.needed:.2g} needed)"
+    numbers = f"(signal {signals(gain)})"
     if gain.other:
         return f"tells {gain.effect} from {gain.other} {numbers}"
     return f"makes {gain.effect} visible {numbers}"

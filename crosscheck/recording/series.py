@@ -68,7 +68,7 @@ class Series:
             ),
             _tension_view(material),
             layout.plot(
-                "log10 |SEECR − MuJoCo| (crosses: before the polish, lines: limits)",
+                "log10 |SEECR - MuJoCo| (crosses: before the polish, lines: limits)",
                 [f"{SETTLED}/**", f"{DIFFERENCE}/**", f"{LIMIT}/**"],
                 legend_of(_logarithms(material), _QUANTITY_NAMES, (_WIDTH, _HEIGHTS[3])),
             ),

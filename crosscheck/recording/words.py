@@ -18,7 +18,7 @@ _READ_ME = """# {name}
 Blue inside orange means that both agree. A thick cable pulls, coloured by its tension; a grey \
 dashed one hangs slack.
 
-**Plots.** {marks} The lowest plot is their difference as a decimal logarithm: −9 is a billionth \
+**Plots.** {marks} The lowest plot is their difference as a decimal logarithm: -9 is a billionth \
 of a metre.
 
 **Play.** The timeline `{along}` goes through the {n}.{settling}

@@ -7,16 +7,14 @@ no equilibrium, but delays it).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from copy import copy
 from pathlib import Path
-from threading import Lock
 
 import mujoco
 import numpy as np
 
-from seecr.description.mjcf import not_mjcf
+from seecr.description.mjcf import not_mjcf, quiet_mujoco
 from seecr.errors import InputFileError
 
 _DISABLE = (
@@ -27,31 +25,8 @@ _DISABLE = (
     mujoco.mjtDisableBit.mjDSBL_SENSOR,
 )
 
-_quiet_lock = Lock()
-_quiet_depth = 0
 
-
-@contextmanager
-def quiet_mujoco() -> Iterator[None]:
-    """Keep MuJoCo from writing MUJOCO_LOG.TXT into the working folder; statuses report instead."""
-    global _quiet_depth
-    with _quiet_lock:
-        _quiet_depth += 1
-        if _quiet_depth == 1 and mujoco.get_mju_user_warning() is None:
-            mujoco.set_mju_user_warning(_ignore)
-    try:
-        yield
-    finally:
-        with _quiet_lock:
-            _quiet_depth -= 1
-            if _quiet_depth == 0 and mujoco.get_mju_user_warning() is _ignore:
-                mujoco.set_mju_user_warning(None)
-
-
-def _ignore(message: str) -> None:
-    """Discard a warning of MuJoCo's."""
-
-
+@quiet_mujoco()
 def compile_model(source: str | Path | mujoco.MjModel) -> mujoco.MjModel:
     """Compile a file, or copy a model, so that the result may be changed."""
     if isinstance(source, mujoco.MjModel):

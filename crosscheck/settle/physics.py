@@ -24,6 +24,7 @@ from crosscheck.settle.model import (
     platform_of,
     switch_off,
 )
+from seecr.description.mjcf import quiet_mujoco
 from seecr.pose import Array, pose_difference
 
 if TYPE_CHECKING:
@@ -82,6 +83,7 @@ class Physics:
         ignored: features of the MJCF that are switched off here, such as "contacts".
     """
 
+    @quiet_mujoco()
     def __init__(self, model: mujoco.MjModel, parts: Parts, length: float | None = None) -> None:
         """Take over a model, which is changed from now on.
 

@@ -19,8 +19,8 @@ from enum import Enum
 import mujoco
 import numpy as np
 
-from crosscheck.settle.model import quiet_mujoco
 from crosscheck.settle.physics import Physics
+from seecr.description.mjcf import quiet_mujoco
 
 Observer = Callable[[Physics], None]
 
@@ -105,6 +105,7 @@ def time_step(physics: Physics) -> float:
     return min((_TIME_STEP_STIFF if stiff else _TIME_STEP) * swing, _TIME_STEP_ROTATION * spin)
 
 
+@quiet_mujoco()
 def come_to_rest(
     physics: Physics, tolerance: float, max_steps: int, observe: Observer | None = None
 ) -> Rest:
@@ -125,8 +126,7 @@ def come_to_rest(
         physics.data.qvel[:] = 0.0
         physics.data.time = 0.0
         before = rest
-        with quiet_mujoco():
-            status, residual, steps = _run(physics, tolerance, max_steps - before.steps, observe)
+        status, residual, steps = _run(physics, tolerance, max_steps - before.steps, observe)
         data, wall = physics.data, time.perf_counter() - began
         simulated = before.simulated_s + float(data.time)
         step = float(physics.model.opt.timestep)

@@ -19,6 +19,7 @@ from crosscheck.errors import CrosscheckError
 from crosscheck.settle.physics import Physics
 from crosscheck.settle.polish import Polished, polish
 from crosscheck.settle.relax import Observer, Rest, SettleStatus, come_to_rest
+from seecr.description.mjcf import quiet_mujoco
 from seecr.pose import Array
 from seecr.result import Record
 
@@ -185,6 +186,7 @@ class Settler:
         self.tolerance = tolerance
         self.max_steps = max_steps
 
+    @quiet_mujoco()
     def settle(
         self,
         pose: Array,
@@ -217,6 +219,7 @@ class Settler:
             rest = self._rest(observe).after(rest)
         return _result(physics, rest, polished, settled_pose, nudges)
 
+    @quiet_mujoco()
     def energy(self, pose: Array, rest_lengths: Array) -> float:
         """Potential energy [J] in MuJoCo at a pose (7,), see :meth:`Physics.energy`."""
         self._prepare(pose, rest_lengths)

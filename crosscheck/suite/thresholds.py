@@ -109,7 +109,7 @@ def _check_names(file: Toml, got: Iterable[str], known: Collection[str], what: s
         if name not in known:
             near = difflib.get_close_matches(name, known, n=len(known), cutoff=0.0)
             raise file.error(
-                f"{name!r} is no {what} of thresholds; expected {' or '.join(near)}", name
+                f"{name!r} is not a {what} of thresholds; expected {' or '.join(near)}", name
             )
 
 

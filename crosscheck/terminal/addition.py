@@ -30,13 +30,13 @@ def print_addition(
     left = "the residuals are noise" if found.whiteness.is_noise else _left(found)
     say(console, f"With {found.name}, {left}.", "green" if found.whiteness.is_noise else "")
     if not found.pays:
-        say(console, why_not(found), "bold yellow")
+        say(console, why_not(found, written), "bold yellow")
     if written:
         say(console, f"Written to {model}: {', '.join(f.term.name for f in found.fitted)}")
 
 
-def why_not(found: Addition) -> str:
-    """Why an effect is not worth adding."""
+def why_not(found: Addition, forced: bool = False) -> str:
+    """Why an effect is not worth adding, and that --force adds it, or has added it."""
     mean, error = found.fall
     if found.is_nothing:
         reason = _nothing(found)
@@ -47,7 +47,8 @@ def why_not(found: Addition) -> str:
             f"{found.name} does not improve the prediction of held-out runs (chi2 of a block "
             f"falls by {' ± '.join(with_error(mean, error))})"
         )
-    return f"{reason}: it is not worth adding; --force adds it anyway"
+    then = "added because of --force" if forced else "--force adds it anyway"
+    return f"{reason}: it is not worth adding; {then}"
 
 
 def _nothing(found: Addition) -> str:

@@ -118,4 +118,4 @@ def unseal(path: str | Path) -> Answer:
             raise ValueError
         return Answer.of_json(json.loads(zlib.decompress(base64.b64decode(body))))
     except (ValueError, KeyError, TypeError, zlib.error, binascii.Error):
-        raise InputFileError.at(file, f"is no sealed answer; {_EXPECTED}") from None
+        raise InputFileError.at(file, f"is not a sealed answer; {_EXPECTED}") from None

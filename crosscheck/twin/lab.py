@@ -124,7 +124,7 @@ def rest_of(lab: Lab, cases: Sequence[Measurements], hidden: list[Term]) -> Meas
     if len(cases) == 1:
         where = f"the commands of {cases[0].path}"
     raise CrosscheckError(
-        f"robot {lab.robot.name}: MuJoCo finds no stable rest along {where}; expected a robot "
+        f"{lab.robot.source}: MuJoCo finds no stable rest along {where}; expected a robot "
         "whose cables hold its platform around there"
     )
 

@@ -203,7 +203,7 @@ def _zero(true: TrueRobot) -> Array:
     world.place(true.zero_pose)
     if not world.wraps:
         raise CrosscheckError(
-            f"robot {robot.name}: pulley_radius {true.pulley_radius:g} m leaves a cable no way "
+            f"robot {robot.name}: pulley_radius {true.pulley_radius:g} m leaves a cable no path "
             "over its sheave at the reference pose; expected anchor points aside of exit points"
         )
     pretension = robot.rest_lengths - _straight(true, robot.reference_pose[None])[0]

@@ -35,6 +35,7 @@ from crosscheck.twin.lab import (
 )
 from crosscheck.twin.measure import Truth
 from seecr.arguments import whole
+from seecr.description.mjcf import quiet_mujoco
 from seecr.description.robot import Robot
 from seecr.effects import Term
 from seecr.files import check_replaces, staged, write_text
@@ -87,6 +88,7 @@ class Twin(Result):
         return self.measured.records()
 
 
+@quiet_mujoco()
 def make_twin(
     robot: GivenRobot,
     seed: int,

@@ -112,13 +112,13 @@ def true_robot(robot: Robot, effects: Sequence[Effect] = ()) -> TrueRobot:
             _BODILY[effect.name](true, effect)
         else:
             raise CrosscheckError(
-                f"effect {effect.name}: no truth with MuJoCo; expected one of "
+                f"effect {effect.name}: MuJoCo cannot simulate it; expected one of "
                 f"{', '.join(TRUE_EFFECTS)}"
             )
     if true.pulley_radius and true.compliance != true.compliance_up:
         raise CrosscheckError(
             f"frame_compliance {true.compliance:g} m/N sideways and {true.compliance_up:g} m/N "
-            "upwards: no truth with MuJoCo beside pulley_radius; expected the same both ways"
+            "upwards: MuJoCo cannot simulate this with pulley_radius; expected equal values"
         )
     return true
 

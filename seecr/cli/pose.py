@@ -28,7 +28,7 @@ Examples:
 @robot_options
 @click.argument("coordinates", nargs=-1, type=float, metavar="X Y Z [QW QX QY QZ]")
 @click.option("--alone", is_flag=True, help="Do not search for other equilibria.")
-@click.option("--out", type=FILE, metavar="DIR", help="Also write pose.json into this folder.")
+@click.option("--out", type=FILE, metavar="DIR", help="Folder for pose.json.  [default: none]")
 @json_option
 def command(
     robot: Path,

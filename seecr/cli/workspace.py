@@ -99,7 +99,8 @@ def command(
     Writes map.npz, map.json, a figure of slices and map.rrd.
 
     \b
-    Exit status: 0 all well, 2 bad input, or no pose of the grid can be held.
+    Exit status: 0 all well, 2 bad input, or no pose of the grid can be held, 3 the elastic robot
+    comes to rest nowhere on the grid.
     """  # fmt: skip
     import numpy as np
 
@@ -146,8 +147,9 @@ def command(
                 effects=own or (), at_least=at_least,
             )  # fmt: skip
         notes = [*own.notes, *beyond_line(found, own.reach)] if own else []
+        status = 3 if found.elastic and not np.any(found.rests) else 0
         text = json_text({
-            "made": made_by(machine.source, model), "exit_status": 0, "notes": notes,
+            "made": made_by(machine.source, model), "exit_status": status, "notes": notes,
             **found.as_json(at_least),
             "edge": None if places is None else {"tolerance_m": edge, "places": len(places)},
         })  # fmt: skip
@@ -163,7 +165,7 @@ def command(
             write_map_recording(found, folder / "map.rrd", places)
     if as_json:
         click.echo(text)
-        return 0
+        return status
     lines = [*found.lines(), *softest_line(found), *likely_lines(found, at_least)]
     lines += sag_lines_of(found, own.names if own else ())
     if figure != "none" and not drawn:
@@ -175,4 +177,4 @@ def command(
     then = following("crosscheck", "plan", robot, "--rows", 40, *tensions, *most)
     for line in [*notes, *lines, f"Results in {out}/", then]:
         click.echo(line)
-    return 0
+    return status

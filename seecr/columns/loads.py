@@ -9,13 +9,17 @@ from seecr.commands.loads import Loads
 from seecr.description.robot import Robot
 from seecr.pose import Array
 
+# A load at which all cables together would be stretched to more than this many times their length.
+_STRAIN = 10.0
+
 
 def known_loads(columns: Columns, robot: Robot) -> Loads | None:
     """The known load of each row, or None if the file has no such columns.
 
     Raises:
-        InputFileError: a centre without a payload, an incomplete centre, or a payload that leaves
-            the platform without mass.
+        InputFileError: a centre without a payload, an incomplete centre, one that is farther from
+            the platform than the robot is large, a payload that leaves the platform without mass,
+            or a load that would stretch all cables to many times their length.
     """
     mass = _payload(columns, robot)
     wrench = np.zeros((columns.n_rows, 6))
@@ -24,7 +28,9 @@ def known_loads(columns: Columns, robot: Robot) -> Loads | None:
     ):
         if part in columns.known:
             wrench[:, k] = columns.numbers(part)
-    centre = _centre(columns, mass)
+            arm = 1.0 if k < 3 else robot.reach
+            _refuse_heavy(columns, part, wrench[:, k], arm * _most(robot), "N" if k < 3 else "N m")
+    centre = _centre(columns, mass, robot)
     if mass is None and not np.any(wrench):
         return None
     return Loads.of(columns.n_rows, mass=mass, centre=centre, wrench=wrench)
@@ -42,10 +48,46 @@ def _payload(columns: Columns, robot: Robot) -> Array | None:
             f"{mass[row]:g} kg"
         ),
     )
+    gravity = float(np.linalg.norm(robot.gravity))
+    if gravity > 0.0:
+        _refuse_heavy(columns, "payload", mass, _most(robot) / gravity, "kg")
     return mass
 
 
-def _centre(columns: Columns, mass: Array | None) -> Array | None:
+def _most(robot: Robot) -> float:
+    """More than all cables together can carry [N]."""
+    return _STRAIN * float(np.sum(robot.ea))
+
+
+def _refuse_heavy(columns: Columns, quantity: str, load: Array, most: float, unit: str) -> None:
+    columns.refuse(
+        np.abs(load) > most,
+        quantity,
+        lambda row: (
+            f"expected a load that the cables of this robot can carry, at most {most:.3g} {unit}, "
+            f"got {load[row]:g} {unit}"
+        ),
+    )
+
+
+def _refuse_far(columns: Columns, centre: Array, robot: Robot) -> None:
+    """Refuse centres (n, 3) farther from all anchor points than the robot is large."""
+    apart = np.linalg.norm(centre[:, None] - robot.anchor_points, axis=-1).min(axis=1)
+    far = apart > robot.reach  # False where it is not given
+    if np.any(far):
+        largest = int(np.argmax(np.abs(centre[int(np.argmax(far))])))
+        columns.refuse(
+            far,
+            f"payload_{POSITION[largest]}",
+            lambda row: (
+                "expected the centre of a payload on the platform, in the platform's frame, got "
+                f"one that is {apart[row]:.3g} m from its anchor points, where the frame is "
+                f"{robot.reach:.3g} m across"
+            ),
+        )
+
+
+def _centre(columns: Columns, mass: Array | None, robot: Robot) -> Array | None:
     """Centres of payloads (n, 3) [m]; NaN, the platform's own, where no cell is filled."""
     present = columns.present("payload", POSITION)
     if not present:
@@ -66,4 +108,5 @@ def _centre(columns: Columns, mass: Array | None) -> Array | None:
             f"payload_{part}",
             lambda row: "incomplete centre; expected all three cells filled or all three empty",
         )
+    _refuse_far(columns, centre, robot)
     return centre

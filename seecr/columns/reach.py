@@ -54,7 +54,7 @@ def _refuse_another(columns: Columns, robot: Robot, poses: Array) -> None:
     off = off_joints(robot, poses)
     if off is not None:
         raise columns.table.error(
-            f"the joints of robot {robot.name} cannot reach the commanded pose, it is off by "
+            f"the joints of robot {robot.name} cannot reach the commanded pose: it is off by "
             f"{off[1]}; expected a pose that they can reach; are these the commands of another "
             "robot?",
             row=off[0],

@@ -199,7 +199,7 @@ def _separator(path: Path, number: int, line: str) -> str:
     mark = max(_SEPARATORS, key=lambda one: counts[one])
     others = [count for one, count in counts.items() if one != mark]
     if counts[mark] and counts[mark] in others:
-        text = "expected one kind of mark between the names, got as many of one as of another"
+        text = "expected one kind of separator between the names, got as many of one as of another"
         raise InputFileError.at(path, f"{text}; write all with commas", line=number)
     return mark
 
@@ -227,7 +227,7 @@ def _check_cell_counts(
     for line, row in body:
         if row == header:
             text = f"expected a row of cells, got the header (line {header_line}) again; are two "
-            raise InputFileError.at(path, f"{text}files in one? Give them one by one", line=line)
+            raise InputFileError.at(path, f"{text}files in one? Give them one at a time", line=line)
         if len(row) != n_columns:
             text = (
                 f"expected {counted(n_columns, 'cell')} as in the header (line {header_line}), "

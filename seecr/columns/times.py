@@ -16,7 +16,8 @@ from seecr.pose import Array
 
 # A date, with or without a time of day.
 _ISO = re.compile(r"\d{4}-?\d\d-?\d\d([T ]\d.*)?")
-_ABSOLUTE_ZERO_C = -273.15
+# Temperatures at which no cable robot works.
+_COLDEST_C, _WARMEST_C = -100.0, 200.0
 
 
 def runs(columns: Columns) -> NDArray[np.str_]:
@@ -81,16 +82,19 @@ def temperatures(columns: Columns) -> Array | None:
     """Temperatures (n,) [deg C], or None.
 
     Raises:
-        InputFileError: a cell that is empty or not a temperature.
+        InputFileError: a cell that is empty, or not a temperature that cables bear.
     """
     if "temperature" not in columns.known:
         return None
     # It affects the cables in every row, so it may not be missing like a reading.
     celsius = columns.numbers("temperature")
     columns.refuse(
-        celsius < _ABSOLUTE_ZERO_C,
+        (celsius < _COLDEST_C) | (celsius > _WARMEST_C),
         "temperature",
-        lambda row: f"expected a temperature above {_ABSOLUTE_ZERO_C} C, got {celsius[row]:g} C",
+        lambda row: (
+            f"expected a temperature from {_COLDEST_C:g} to {_WARMEST_C:g} C, got "
+            f"{celsius[row]:g} C; leave the column out if it was not measured"
+        ),
     )
     return celsius
 

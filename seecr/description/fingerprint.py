@@ -104,7 +104,7 @@ def check_robot(
         text = f"robot: expected a table [robot], got {table!r}"
         raise InputFileError.at(path, text, line=line_of("robot"))
     said = _Said(path, table, line_of)
-    _check_cables(path, table, robot)
+    _check_cables(said, robot)
     own = fingerprint(robot)
     tolerance = _SAME * float(np.max(robot.nominal_lengths(robot.reference_pose[None])))
     for key in _POINTS:
@@ -123,15 +123,21 @@ def check_robot(
     return tuple(notes)
 
 
-def _check_cables(path: Path, table: Mapping[str, Any], robot: Robot) -> None:
-    cables = table.get("cables")
-    if not isinstance(cables, list):
+def _check_cables(said: _Said, robot: Robot) -> None:
+    """Refuse a name that is no text, cables that are no names, or another number of them."""
+    name, cables = said.table.get("name", "one"), said.table.get("cables")
+    if not isinstance(name, str):
+        raise said.error("name", f"expected a text, got {_cut(repr(name))}")
+    if cables is None:
         return
+    if not isinstance(cables, list) or not all(isinstance(cable, str) for cable in cables):
+        raise said.error(
+            "cables", f"expected a list of names, got {_cut(repr(cables))}; leave it out otherwise"
+        )
     if len(cables) != robot.n_cables:
         raise InputFileError.at(
-            path,
-            f"made for another robot: {table.get('name', 'one')} with "
-            f"{counted(len(cables), 'cable')}; "
+            said.path,
+            f"made for another robot: {name} with {counted(len(cables), 'cable')}; "
             f"{robot.name} has {robot.n_cables}; {_ANEW}",
         )
 
@@ -170,14 +176,18 @@ def _elsewhere(
     name = table.get("name", "one")
     k = int(np.argmax(apart))
     if key == "reference_pose":
-        what = f"its reference pose is {_short(table[key])}"
+        now = _short(robot.reference_pose)
+        what = f"its reference pose is {_short(table[key])}, here it is {now}"
     else:
         word = key.removesuffix("s_m").replace("_", " ")
-        what = f"the {word} of {robot.cable_names[k]} is {1e3 * float(apart[k]):.3g} mm away"
-    return InputFileError.at(
-        path,
-        f"made for another robot: {name}, not {robot.name}: {what}; {_ANEW}",
-    )
+        what = (
+            f"its {word} of {robot.cable_names[k]} is {1e3 * float(apart[k]):.3g} mm from that "
+            f"{'of this robot' if robot.source is None else f'in {robot.source}'}"
+        )
+    other = f": {name}, not {robot.name}"
+    if name == robot.name:
+        other = f" of the same name, {name}"
+    return InputFileError.at(path, f"made for another robot{other}: {what}; {_ANEW}")
 
 
 def _short(value: Any) -> str:

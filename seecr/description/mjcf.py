@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from threading import Lock
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from seecr.counted import counted
 from seecr.description.robot import ABSURD, Joint, Robot
 from seecr.description.shipped import robot_file
-from seecr.errors import RobotError
+from seecr.errors import RobotError, SeecrError
 from seecr.files import no_text, read_bytes
 from seecr.pose import Array, quat_rotate, quat_to_matrix
 
@@ -22,7 +25,38 @@ if TYPE_CHECKING:
 _NO_NUMBER = re.compile(
     rb"""\b(?!name\b)\w+\s*=\s*["'](?:[-+.\deE\s]*\s)?[-+]?nan\b[-+.\deE\sna]*["']""", re.IGNORECASE
 )
+# No cable is stretched to a hundred times its rest length.
+_LEAST = 0.01
 _EXPECTED = "expected the robot as MJCF, XML that begins with <mujoco"
+
+_quiet_lock = Lock()
+_quiet_depth = 0
+
+
+@contextmanager
+def quiet_mujoco() -> Iterator[None]:
+    """Keep MuJoCo from writing MUJOCO_LOG.TXT into the working folder; statuses report instead.
+
+    Also a decorator, ``@quiet_mujoco()``. A handler of the user's own stays.
+    """
+    import mujoco
+
+    global _quiet_depth
+    with _quiet_lock:
+        _quiet_depth += 1
+        if _quiet_depth == 1 and mujoco.get_mju_user_warning() is None:
+            mujoco.set_mju_user_warning(_ignore)
+    try:
+        yield
+    finally:
+        with _quiet_lock:
+            _quiet_depth -= 1
+            if _quiet_depth == 0 and mujoco.get_mju_user_warning() is _ignore:
+                mujoco.set_mju_user_warning(None)
+
+
+def _ignore(message: str) -> None:
+    """Discard a warning of MuJoCo's."""
 
 
 def load_robot(path: str | Path) -> Robot:
@@ -56,7 +90,8 @@ def load_robot(path: str | Path) -> Robot:
     if not joints:
         first = model.jnt_qposadr[model.body_jntadr[body]]
         reference_pose = model.qpos0[first : first + 7].copy()
-    robot = Robot(
+    robot = _robot(
+        path,
         name=_model_name(model, path),
         exit_points=np.array(exit_points),
         anchor_points=np.array(anchor_points),
@@ -71,18 +106,43 @@ def load_robot(path: str | Path) -> Robot:
         cable_names=tuple(names),
         source=path,
     )
-    _check_lengths(robot, path)
+    _check_sizes(robot, _body_name(model, body), path)
     return robot
 
 
-def _check_lengths(robot: Robot, path: Path) -> None:
-    """Check that no rest length is far larger than the frame."""
-    for name, length in zip(robot.cable_names, robot.rest_lengths, strict=True):
-        if length > ABSURD * robot.reach:
+def _robot(path: Path, **numbers: Any) -> Robot:
+    """The robot with these numbers; errors about them name the file."""
+    try:
+        return Robot(**numbers)
+    except SeecrError as error:
+        raise RobotError(f"{path}: {error}") from None
+
+
+def _check_sizes(robot: Robot, body: str, path: Path) -> None:
+    """Check that neither rest lengths nor the platform are of another order than the frame."""
+    most = ABSURD * robot.reach
+    frame = f"expected metres, of the size of the frame, {robot.reach:.3g} m across"
+    cables = zip(robot.cable_names, robot.rest_lengths, robot.reference_lengths, strict=True)
+    for name, length, straight in cables:
+        if length > most:
+            raise RobotError(f"{path}: tendon {name} has rest length {length:g} m; {frame}")
+        if length < _LEAST * straight:
             raise RobotError(
-                f"{path}: tendon {name} has rest length {length:g} m; expected metres, of the size "
-                f"of the frame, {robot.reach:.3g} m across"
+                f"{path}: tendon {name} has rest length {length:g} m, but its sites are "
+                f"{straight:.3g} m apart at the reference pose; expected both in metres"
             )
+    for name, anchor in zip(robot.cable_names, robot.anchor_points, strict=True):
+        away = float(np.linalg.norm(anchor))
+        if away > most:
+            raise RobotError(
+                f"{path}: tendon {name} is anchored {away:g} m from the origin of body {body}; "
+                f"{frame}"
+            )
+    away = float(np.linalg.norm(robot.centre_of_mass - robot.anchor_points, axis=1).min())
+    if away > most:
+        raise RobotError(
+            f"{path}: body {body} has its centre of mass {away:g} m from its anchor points; {frame}"
+        )
 
 
 def _compile(path: Path) -> mujoco.MjModel:
@@ -96,7 +156,8 @@ def _compile(path: Path) -> mujoco.MjModel:
     import mujoco
 
     try:
-        model = mujoco.MjModel.from_xml_path(str(path))
+        with quiet_mujoco():
+            model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
         reason = " ".join(str(error).split())
         raise RobotError(f"{path}: MuJoCo cannot read this as MJCF: {reason}") from None
@@ -120,7 +181,7 @@ def not_mjcf(path: Path) -> str:
     if kind or begins.startswith(b"<"):
         return ""
     line = begins.splitlines()[0][:40].decode("utf-8", "replace")
-    return f"begins with {line!r}, which is no XML; {_EXPECTED}; the robot's file goes first"
+    return f"begins with {line!r}, which is not XML; {_EXPECTED}; the robot's file comes first"
 
 
 def _check_names(model: mujoco.MjModel, path: Path) -> None:
@@ -262,8 +323,8 @@ def _cable_sites(
     wraps = slice(first, first + count)
     if count != 2 or np.any(model.wrap_type[wraps] != int(mujoco.mjtWrap.mjWRAP_SITE)):
         raise RobotError(
-            f"{path}: tendon {name} has {counted(count, 'path element')} or something that is no "
-            "site; expected exactly two sites, exit point and anchor point"
+            f"{path}: tendon {name} has {counted(count, 'path element')} or something other "
+            "than sites; expected exactly two sites, exit point and anchor point"
         )
     sites = [int(s) for s in model.wrap_objid[wraps]]
     on_body = [int(model.site_bodyid[s]) == body for s in sites]

@@ -15,6 +15,9 @@ from seecr.pose import LARGEST, Array, all_finite, transform_points
 ABSURD = 10.0
 """Commands and rest lengths beyond this many times the frame's reach are in another unit."""
 
+# What every cable has one of.
+_OF_CABLES = ("exit_points", "anchor_points", "ea", "rest_lengths")
+
 IDENTITY_POSE = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 
 
@@ -87,16 +90,24 @@ class Robot:
             if value.shape != shape:
                 raise InputError(f"robot {self.name}: {name} must be {shape}, got {value.shape}")
             if not all_finite(value):
-                what = "stiffness x rest length" if name == "ea" else name
-                raise InputError(
-                    f"robot {self.name}: {what} holds a number that is not finite, or beyond "
-                    f"{LARGEST:g}"
-                )
+                raise self._not_finite(name, value, m)
             value.flags.writeable = False
             object.__setattr__(self, name, value)
         if not self.cable_names:
             object.__setattr__(self, "cable_names", tuple(f"cable{i + 1}" for i in range(m)))
         self._check_values()
+
+    def _not_finite(self, name: str, value: Array, m: int) -> InputError:
+        """The error about a number that is none; it names the cable if each has one."""
+        what = "stiffness x rest length" if name == "ea" else name
+        if name in _OF_CABLES:
+            rows = np.abs(value.reshape(m, -1)).max(axis=1)
+            i = int(np.argmin(rows <= LARGEST))
+            of = self.cable_names[i] if self.cable_names else f"cable{i + 1}"
+            what = f"{what} of {of}"
+        return InputError(
+            f"robot {self.name}: {what} holds a number that is not finite, or beyond {LARGEST:g}"
+        )
 
     def _check_values(self) -> None:
         if self.n_cables == 0:

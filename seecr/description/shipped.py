@@ -59,7 +59,7 @@ def robot_file(given: str | Path) -> Path:
     if path.exists() or path.name != str(given):
         return path
     raise InputError(
-        f"{given}: no such file and no shipped robot; expected an MJCF file or one of "
+        f"{given}: neither a file nor a shipped robot; expected an MJCF file or one of "
         f"{_names_near(str(given))}"
     )
 

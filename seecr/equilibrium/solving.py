@@ -99,7 +99,7 @@ def solve(
         if follow:
             raise InputError(
                 "effects with history or with a law of their own are always solved along the "
-                "path; expected no follow with them"
+                "path; leave follow out"
             )
         if method != "newton" or start is not None or wrench is not None or others:
             raise InputError(

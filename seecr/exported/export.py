@@ -97,10 +97,10 @@ class Export(Result):
         }
 
     def _lines(self, name: str, mujoco_name: str) -> Iterator[str]:
-        yield f"{name}: {', '.join(self.plain) or 'the robot as it was'}"
+        yield f"{name} contains {', '.join(self.plain) or 'the robot as it was'}"
         if self.bodies:
-            alone = "" if mujoco_name.endswith("MuJoCo") else ", for MuJoCo"
-            yield f"{mujoco_name}{alone} alone: also {', '.join(self.bodies)}"
+            alone = " alone" if mujoco_name.endswith("MuJoCo") else ", for MuJoCo alone,"
+            yield f"{mujoco_name}{alone} also contains {', '.join(self.bodies)}"
         if "cable_weight" in self.bodies:
             yield (
                 f"  cables hang as {SEGMENTS} springs with masses between: as catenaries do at "

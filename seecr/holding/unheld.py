@@ -54,7 +54,7 @@ def why_not_held(
     more = len(order) - _MOST
     if more > 0:
         said[-1] += (
-            f" and {counted(more, 'more cable')} {'is' if more == 1 else 'are'} beyond limits"
+            f", and {counted(more, 'more cable')} {'is' if more == 1 else 'are'} beyond the limits"
         )
     return "; ".join(said)
 
@@ -78,7 +78,7 @@ def _of_cable(name: str, beyond: float, low: float, high: float, of_weight: bool
         return f"{who} would have to pull {_newtons(pull)}, less than {least}"
     if low > 0.0 and not of_weight:
         push = _newtons(-pull)
-        return f"{who} would have to push with {push} for others to pull at least {_newtons(low)}"
+        return f"{who} would have to push with {push} where others pull at least {_newtons(low)}"
     return f"{who} would have to push with {_newtons(-pull)}"
 
 

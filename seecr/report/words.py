@@ -100,8 +100,7 @@ def _off(values: Array) -> str:
 
 def _known(values: Array, errors: Array) -> str:
     """Three numbers with as many digits as their standard errors justify."""
-    said = ", ".join(with_error(*pair)[0] for pair in zip(values + 0.0, errors, strict=True))
-    return said.replace("−", "-")  # as in all other numbers beside them
+    return ", ".join(with_error(*pair)[0] for pair in zip(values + 0.0, errors, strict=True))
 
 
 def cable_lines(solution: Solution, spread: Spread | None = None) -> Iterator[str]:
@@ -272,11 +271,11 @@ def jump_lines(solution: Solution) -> Iterator[str]:
     if solution.jumps is None:
         return
     if not any(solution.jumps):
-        yield "followed from the reference pose: the platform does not jump on the way"
+        yield "followed from the reference pose: the platform does not jump on the path"
     for i, jumps in enumerate(solution.jumps):
         for jump in jumps:
             command = _three(1e3 * jump.command[:3], ".1f")
-            at = f"on the way to {solution.place(i)}, at command {command} mm"
+            at = f"on the path to {solution.place(i)}, at command {command} mm"
             yield f"{at}: {jump.words}"
 
 

@@ -25,7 +25,7 @@ def test_a_robot_that_needs_files_beside_it_is_refused(tmp_path: Path) -> None:
     robot.write_text(text.replace("<worldbody>", '<include file="beside.xml"/><worldbody>', 1))
     folder = tmp_path / "case"
     folder.mkdir()
-    with pytest.raises(CrosscheckError, match=r"robot\.xml: needs files beside it"):
+    with pytest.raises(CrosscheckError, match=r"robot\.xml: needs other files"):
         given.copy_robot(robot, folder / "robot.xml")
 
 

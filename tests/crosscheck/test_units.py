@@ -83,8 +83,8 @@ def test_a_unit_of_another_kind_is_refused() -> None:
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(0.0, "0"), (0.0296, "0.0296"), (-4.274, "−4.27"), (123456.0, "123456"),
-     (1.234e-7, "1.23e−7"), (9.9e9, "9.90e9"), (np.nan, "–"), (None, "–")],
+    [(0.0, "0"), (0.0296, "0.0296"), (-4.274, "-4.27"), (123456.0, "123456"),
+     (1.234e-7, "1.23e-7"), (9.9e9, "9.90e9"), (np.nan, "–"), (None, "–")],
 )  # fmt: skip
 def test_short_numbers(value: float | None, text: str) -> None:
     assert short(value) == text
@@ -93,7 +93,7 @@ def test_short_numbers(value: float | None, text: str) -> None:
 @pytest.mark.parametrize(
     ("value", "error", "texts"),
     [(10.00238, 0.005576, ("10.0024", "0.0056")), (1.3988, np.inf, ("1.40", "undetermined")),
-     (-1437.0, 210.0, ("−1437", "210")), (1.5, 0.0, ("1.50000", "0"))],
+     (-1437.0, 210.0, ("-1437", "210")), (1.5, 0.0, ("1.50000", "0"))],
 )  # fmt: skip
 def test_values_show_two_digits_of_their_error(
     value: float, error: float, texts: tuple[str, str]
@@ -103,4 +103,4 @@ def test_values_show_two_digits_of_their_error(
 
 def test_names_and_chances() -> None:
     assert parameter_name("radius_m", "m") == "radius" and parameter_name("gain", "") == "gain"
-    assert chance(1e-20) == "< 1e−12" and chance(0.25) == "0.25"
+    assert chance(1e-20) == "< 1e-12" and chance(0.25) == "0.25"

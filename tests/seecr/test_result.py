@@ -128,7 +128,7 @@ def test_small_results_are_a_line_each_and_a_row_for_each_thing() -> None:
     off = np.array([[3e-4, 4e-4, 0.0], [np.nan] * 3])
     fall = seecr.Jump(up, up, np.full(7, np.nan), np.nan, certain=True)
     results: dict[str, Result] = {
-        "the file for MuJoCo alone: also pulley_radius": seecr.export(
+        "the file for MuJoCo alone also contains pulley_radius": seecr.export(
             robot, [seecr.Term.of(robot, "pulley_radius", radius_m=0.01)]
         ),
         "2 commands, at rest at 1; one standard deviation: up to 0.50 mm and 0.029 deg, "

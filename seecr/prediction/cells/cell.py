@@ -17,6 +17,8 @@ from typing import Any
 
 from seecr.effects.base import Layout
 from seecr.errors import InputFileError
+from seecr.pose import LARGEST
+from seecr.prediction.cells.limits import limits_of
 
 UNSEEN = "unseen"
 """Stands for an infinite standard error."""
@@ -120,7 +122,7 @@ class _Reader:
         value = number_of(given)
         if value is None:
             raise self.error(f"{what}expected a number, got {given!r}")
-        low, high = self.layout.lower[self.i], self.layout.upper[self.i]
+        low, high = limits_of(self.layout, self.i)
         if not low <= value <= high:
             raise self.error(f"{what}{value:g} is out of bounds; expected {low:g} to {high:g}")
         return value
@@ -145,10 +147,10 @@ class _Reader:
         if fixed:
             raise self.error("is both fixed and known; leave one of them out")
         error = number_of(known["stderr"])
-        if error is None or error <= 0.0:
+        if error is None or not 0.0 < error <= LARGEST:
             raise self.error(
-                f"known: stderr must be a number above 0, got {known['stderr']!r}; a value that "
-                "is exact is fixed = true"
+                f"known: stderr must be a number above 0 and at most {LARGEST:g}, got "
+                f"{known['stderr']!r}; a value that is exact is fixed = true"
             )
         return self._within(known["value"], "known: "), error
 
@@ -157,8 +159,10 @@ class _Reader:
         if error == UNSEEN:
             return math.inf
         number = math.nan if error is math.nan else number_of(error)
-        if number is None or number < 0:
-            raise self.error(f'stderr must be a number from 0 or "{UNSEEN}", got {error!r}')
+        if number is None or number < 0 or number > LARGEST:
+            raise self.error(
+                f'stderr must be a number from 0 to {LARGEST:g} or "{UNSEEN}", got {error!r}'
+            )
         return number
 
 

@@ -69,6 +69,7 @@ def test_an_effect_that_does_not_pay_is_not_written_unless_forced(both, tmp_path
     assert "it is not worth adding; --force adds it anyway" in result.stdout
     result = add("tracker_scale", both, model, "--force")
     assert result.exit_code == 0 and "tracker_scale" in model.read_text()
+    assert "it is not worth adding; added because of --force\n" in result.stdout
 
 
 def test_what_is_there_already_is_only_fitted_again_when_asked(both, tmp_path):

@@ -162,7 +162,7 @@ def test_all_that_a_diagnosis_lists_is_added_at_once(
         said = refused("add", "--all-from", found, other, planar[1], "--model", model)
         assert f"{found}" in said and words in said
     said = refused("add", "--all-from", found, planar[0], "--model", model)
-    assert "expected ROBOT.xml DATA.csv beside --all-from, got " in said
+    assert "expected ROBOT.xml DATA.csv with --all-from, got " in said
     said = refused("add", *planar, "--model", model)
     assert "expected EFFECT ROBOT.xml DATA.csv, got " in said
 

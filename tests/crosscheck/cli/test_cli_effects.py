@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import pytest
 from made_data import COGIRO, run
@@ -52,6 +53,17 @@ def test_for_programs() -> None:
     one = json.loads(run("effects", "drum_gain", "--robot", COGIRO, "--json").stdout)
     assert len(one["parameters"]) == load_robot(COGIRO).n_cables
     assert not one["own"]
+
+
+def test_the_catalogue_is_kept_in_a_folder(tmp_path: Path) -> None:
+    shown = run("effects", "--json", "--out", tmp_path / "out").stdout
+    assert json.loads((tmp_path / "out/effects.json").read_text()) == json.loads(shown)
+    one = run("effects", "stiffness", "--out", tmp_path / "out")
+    assert one.exit_code == 0 and "stiffness" in one.stdout
+    assert json.loads((tmp_path / "out/effects.json").read_text())["effect"] == "stiffness"
+    (tmp_path / "file").write_text("")
+    refused = run("effects", "--out", tmp_path / "file")
+    assert refused.exit_code == 2 and f"--out {tmp_path}/file: cannot write there" in refused.stderr
 
 
 def test_an_unknown_name_names_the_nearest() -> None:

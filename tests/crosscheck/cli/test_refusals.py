@@ -58,7 +58,7 @@ def test_where_nothing_can_be_written(stiff: tuple[Path, Path], tmp_path: Path) 
     assert "is a folder; expected the name of a file" in refused(
         "diagnose", *stiff, "--model-out", tmp_path, *only
     )
-    assert f"{file} is no folder to write to" in refused(
+    assert f"{file} is not a folder that can be written to" in refused(
         "diagnose", *stiff, "--model-out", file / "model.toml", *only
     )
     assert [path.name for path in tmp_path.iterdir()] == ["file"] and file.read_text() == "mine"
@@ -75,8 +75,9 @@ def test_what_cannot_be_written_is_told_before_the_fit(
         monkeypatch.setattr(crosscheck, name, fitted)
     file, model = tmp_path / "file", tmp_path / "model.toml"
     file.write_text("mine")
-    assert f"model.toml: cannot be written: {file} is no folder to write to: Not a di" in refused(
-        *words, *stiff, "--model", file / "model.toml"
+    assert (
+        f"model.toml: cannot be written: {file} is not a folder that can be written to: Not a di"
+        in refused(*words, *stiff, "--model", file / "model.toml")
     )
     assert f"--out {file}: cannot write there" in refused(
         *words, *stiff, "--model", model, "--out", file
@@ -166,7 +167,7 @@ def test_nothing_given_is_not_the_same_as_not_given(words: tuple[str, ...], said
 def test_an_unknown_robot_lists_the_shipped_ones_nearest_first(verb: tuple[str, ...]) -> None:
     said = refused(*verb, "demobot_4", "d.csv", *(("--model", "m.toml") if "add" in verb else ()))
     assert (
-        "demobot_4: no such file and no shipped robot; expected an MJCF file or one of de" in said
+        "demobot_4: neither a file nor a shipped robot; expected an MJCF file or one of de" in said
     )
 
 
@@ -228,11 +229,11 @@ def test_measurements_are_not_replaced_by_those_of_a_twin(
     mine = tmp_path / "measured.csv"
     mine.write_bytes(data.read_bytes())
     said = refused("twin", robot, "--hide", 1, "--out", tmp_path)
-    assert f"{mine}: would be replaced, and is no older result: there is no answer.sealed" in said
+    assert f"{mine}: would be overwritten, but is not part of an older result: there is no" in said
     log = tmp_path / "log.csv"
     log.write_text("t_s,x_mm,y_mm,z_mm\n0,1,2,3\n")
     words = ("import", "poses", log, "--robot", robot, "--commands", data)
-    assert "there is no import.json beside it; expected a new folder or that of an" in refused(
+    assert "there is no import.json next to it; expected a new folder or that of" in refused(
         *words, "--out", tmp_path
     )
     assert mine.read_bytes() == data.read_bytes()

@@ -36,7 +36,7 @@ def test_commands_off_the_joints_of_a_planar_robot(tmp_path):
     data = tmp_path / "measured.csv"
     write_measurements(data, measured(COGIRO, points=3))
     with pytest.raises(InputFileError, match=(
-        r"measured.csv: line \d+: the joints of robot .* cannot reach the commanded pose, it is "
+        r"measured.csv: line \d+: the joints of robot .* cannot reach the commanded pose: it is "
         r"off by .*; expected a pose that they can reach; are these the commands of another robot\?"
     )):  # fmt: skip
         load_measurements(data, PLANAR)

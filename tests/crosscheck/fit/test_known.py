@@ -53,6 +53,30 @@ def test_a_known_value_pulls_as_one_more_reading(data: Measurements) -> None:
     assert both.stderr[0] == pytest.approx(weights.sum() ** -0.5, rel=0.02)
 
 
+def test_beside_a_wrong_fixed_value_a_known_one_keeps_its_weight(data: Measurements) -> None:
+    """Pulleys that are fixed at a wrong radius leave far more than the stated noise."""
+    mass = Term.of(robot(), "platform_mass").measured(added_kg=(0.0, 1e-4))
+    model = [pulleys(3.0 * TRUE).fixed(), mass]
+    found = add_effect(robot(), data, "stiffness", model)
+    (heavy,) = [f for f in found.fitted if f.term.name == "platform_mass"]
+    assert not found.whiteness.is_noise and found.whiteness.scale > 3.0
+    # as if the noise were stated as large as it seems
+    assert abs(heavy.term.vector[0]) < 3e-4 and heavy.stderr[0] <= 1e-4 * (1 + 1e-9)
+    assert heavy.term.knowledge.stderr == pytest.approx([1e-4])
+
+
+def test_a_known_value_that_the_data_contradict_is_warned_of(data: Measurements) -> None:
+    wrong = pulleys(0.0).measured(radius_m=(2.0 * TRUE, 0.1 * TRUE))
+    found = add_effect(robot(), data, "pulley_radius", [wrong])
+    (warning,) = [text for text in found.warnings if "measured independently" in text]
+    assert "pulley_radius: radius_m is up to " in warning and "check that measurement" in warning
+    right = pulleys(0.0).measured(radius_m=(TRUE, 0.1 * TRUE))
+    assert not any(
+        "measured independently" in text
+        for text in add_effect(robot(), data, "pulley_radius", [right]).warnings
+    )
+
+
 def test_some_components_may_be_fixed(data: Measurements) -> None:
     held = Term.of(robot(), "cable_length_offset", offset_2_m=1e-3).fixed("offset_2_m")
     ready = prepare(robot(), data, Terms())

@@ -61,9 +61,13 @@ DAMAGE = {
         "motive", lambda x: cell(x, 30, 7, "occluded"),
         r"line 30, column X: expected a number, got 'occluded'; export the file again"
     ),
+    "a number without end": (
+        "motive", lambda x: cell(x, 30, 7, "1e400"),
+        r"line 30, column X: expected a number, got '1e400'; export the file again"
+    ),
     "times that jump back": (
         "motive", lambda x: [*x[:107], *x[57:]],
-        r"line 108, column Time \(Seconds\): expected times that grow after 1.98 s, got 1 s; are"
+        r"line 108, column Time \(Seconds\): expected times that increase after 1.98 s, got 1 s;"
     ),
     "Euler angles": (
         "motive", lambda x: [x[0].replace("Quaternion", "XYZ"), *x[1:]],
@@ -95,7 +99,7 @@ DAMAGE = {
     ),
     "angles of unknown meaning": (
         "vicon", lambda x: x,
-        r"line 14: three numbers for a rotation may mean many things; expected --rotation vector"
+        r"line 14: three numbers of a rotation can mean several things; expected --rotation vector"
     ),
     "no rate": (
         "vicon", lambda x: ["" if k == 11 else y for k, y in enumerate(x)],
@@ -107,7 +111,7 @@ DAMAGE = {
     ),
     "frames that jump back": (
         "vicon", lambda x: cell(x, 40, 1, "3"),
-        r"line 40, column Frame: expected times that grow after 0.48 s, got 0.06 s"
+        r"line 40, column Frame: expected times that increase after 0.48 s, got 0.06 s"
     ),
     "two columns of one quantity": (
         "poses", lambda x: [x[0].replace("y_m", "tx_m"), *x[1:]],
@@ -135,15 +139,15 @@ DAMAGE = {
     ),
     "spaces between numbers without names": (
         "poses", lambda x: ["# t x y z qw qx qy qz", *(y.replace(",", " ") for y in x[1:])],
-        r"line 2: expected names, and cells between commas, semicolons or tabs under them, got '0"
+        r"line 2: expected a row of names, and cells separated by commas, semicolons or tabs, got"
     ),
     "no times": (
         "poses", lambda x: [x[0].replace("time_s", "when"), *x[1:]],
-        r"line 1: expected one column of times such as t_s, got none; name it so"
+        r"line 1: expected one column of times such as t_s, got none; add or rename it"
     ),
     "a log that jumps back": (
         "poses", lambda x: cell(x, 30, 1, "0.1"),
-        r"line 30, column time_s: expected times that grow after 0.54 s, got 0.1 s; are two"
+        r"line 30, column time_s: expected times that increase after 0.54 s, got 0.1 s; are two"
     ),
     "a dwell of one sample": (
         "poses", lambda x: [x[0], *x[1::50]],
@@ -152,7 +156,7 @@ DAMAGE = {
     "nothing at rest": (
         "poses", lambda x: [x[0], *(f"{0.02 * k:.2f},{0.01 * k:.4f},0,0,1,0,0,0"
                                     for k in range(500))],
-        r"nothing rests for 0.5 s: the slowest tenth moves at 500 mm/s, at rest is below"
+        r"nothing rests for 0.5 s: in its slowest tenth the body moves at 500 mm/s or less, and"
     ),
 }  # fmt: skip
 
@@ -197,14 +201,14 @@ def test_frames_that_cannot_be_aligned(files, made, tmp_path):
     rows = int(made_of.RATE * made.sent_s[3])
     short.write_text("\n".join(lines_of(files["poses"])[:rows]) + "\n")
     message = wrong({"poses": short}, commands=line)
-    assert "the commanded positions of the dwells lie in one line" in message
+    assert "the commanded positions of the dwells lie on one line" in message
     # a robot that sags bends them, which is its error and shows no turn about the line
     bent = replace(made, position=made.position + 0.002 * np.sin(20.0 * made.position[:, :1]))
     sagging = made_of.poses_csv(tmp_path / "bent.csv", bent)
-    assert "of the dwells lie in one line" in wrong({"poses": sagging}, commands=line)
+    assert "of the dwells lie on one line" in wrong({"poses": sagging}, commands=line)
     about = cell(lines_of(line), 3, 4, str(made.truth.command_pose[1, 1] + 1e-3))
     line.write_text("\n".join(about) + "\n")
-    assert "in one line, or nearer to one than" in wrong({"poses": sagging}, commands=line)
+    assert "on one line, or so close to one that" in wrong({"poses": sagging}, commands=line)
     # the commands of another recording: the same poses in another order
     other = tmp_path / "other.csv"
     head = [row.split(",")[:2] for row in lines[1:]]
@@ -212,13 +216,18 @@ def test_frames_that_cannot_be_aligned(files, made, tmp_path):
     poses = [lines[1:][k].split(",")[2:] for k in order]
     rows = [",".join([*a, *b]) for a, b in zip(head, poses, strict=True)]
     other.write_text("\n".join([lines[0], *rows]) + "\n")
-    assert "the frames cannot be aligned: " in wrong(files, commands=other)
-    assert "of one clock (--clock)?" in wrong(files, clock=2.0)
-    assert "expected these to overlap; give what the tracker's clock" in wrong(files, clock=900.0)
+    message = wrong(files, commands=other)
+    assert message.startswith(
+        f"{files['poses']} with {other}: the frames cannot be aligned: errors of "
+    )
+    assert "do their clocks agree (--clock)?" in wrong(files, clock=2.0)
+    assert "expected these times to overlap; give with --clock how" in wrong(files, clock=900.0)
     two = {"0,0,0": np.zeros(3), "1,0,0": np.ones(3)}
     assert "cannot be aligned by 2 points" in wrong(files, points=two)
     three = {"0,0,0": np.zeros(3), "1,0,0": np.array([1.0, 0, 0]), "0,1,0": np.array([0, 2.0, 0])}
-    assert re.search(r"point .* is 2 m off where the others put it", wrong(files, points=three))
+    assert re.search(
+        r"point .* is 2 m from where the other points put it", wrong(files, points=three)
+    )
 
 
 def test_files_of_different_robots(files, tmp_path):
@@ -271,11 +280,11 @@ def test_the_command_line_says_it_in_one_line_and_writes_nothing(files, tmp_path
         ("motive", {"aligned": True, "points": {"a": np.zeros(3)}}, "--aligned and --point: exp"),
         ("motive", {"body": "platform", "markers": POINTS}, "--body and --markers: expected one"),
         ("motive", {"shape": {"a": np.zeros(3)}}, "--shape without --markers: expected the names"),
-        ("motive", {"rotation": "vector"}, "--rotation beside motive: expected it with vicon onl"),
-        ("vicon", {"unit": "mm"}, "--unit beside vicon: expected it with poses only"),
+        ("motive", {"rotation": "vector"}, "--rotation with motive: expected it with vicon only:"),
+        ("vicon", {"unit": "mm"}, "--unit with vicon: expected it with poses only"),
         ("vicon", {"rotation": "foo"}, "--rotation: expected vector, or the order of Euler angles"),
         ("vicon", {"rotation": "xxy"}, "got 'xxy'"),
-        ("poses", {"unit": "mm"}, "--unit mm: the columns of log.csv say their own; leave it out"),
+        ("poses", {"unit": "mm"}, "--unit mm: the columns of log.csv state their own; leave"),
     ],
 )  # fmt: skip
 def test_what_is_said_and_has_no_use(files, form, given, said):

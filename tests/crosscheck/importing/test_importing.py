@@ -235,7 +235,7 @@ def test_a_dense_log_of_commands_with_tensions(made, tmp_path):
     assert data.command_pose == pytest.approx(pose[wanted], abs=1e-8)
     assert data.tensions[1:, 1] == pytest.approx(np.arange(2, len(wanted) + 1), abs=0.2)
     assert 0.01 < data.sigma.tension_N < 0.06
-    assert any("set points on the way left out" in note for note in found.notes)
+    assert any("set points between held commands left out" in note for note in found.notes)
 
 
 def test_two_recordings_are_one_case(made, commands, tmp_path):

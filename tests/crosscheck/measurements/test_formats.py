@@ -272,6 +272,24 @@ REFUSED = {
         [f"{LOADED},payload_x_m,payload_y_m,payload_z_m", "a,0,0,0,0,1,0,,0"],
         "line 2, column payload_y_m: incomplete centre; expected all three cells filled or all",
     ),
+    "centre in millimetres": (
+        [
+            f"{LOADED},payload_x_m,payload_y_m,payload_z_m",
+            "a,0,0,0,0,1,0,0,0",
+            "a,0,0,0,0,1,0,10,0",
+        ],
+        "line 3, column payload_y_m: expected the centre of a payload on the platform, in the "
+        r"platform's frame, got one that is 9\.\d+ m from its anchor points, where the frame",
+    ),
+    "heavier than all cables bear": (
+        [LOADED, "a,0,0,0,0,1e9"],
+        r"line 2, column payload_kg: expected a load that the cables of this robot can carry, at "
+        r"most [\d.e+]+ kg, got 1e\+09 kg$",
+    ),
+    "a force of giganewtons": (
+        [f"{POSE},force_z_kN", "a,0,0,0,0,-1e6"],
+        r"line 2, column force_z_kN: expected a load .* at most [\d.e+]+ N, got -1e\+09 N$",
+    ),
     "moment in newtons": (
         [f"{POSE},moment_x_N", "a,0,0,0,0,1"],
         "column moment_x_N: unknown unit 'N'; expected moment_x_Nm",

@@ -37,7 +37,7 @@ REFUSED = {
     ),
     "marks of two kinds": (
         ["cmd_x_m;cmd_y_m,cmd_z_m;meas_x_m,run", "0;0,0;0,a"],
-        "line 1: expected one kind of mark between the names, got as many of one as of another",
+        "line 1: expected one kind of separator between the names, got as many of one as",
     ),
     "points and commas": (
         [POSE.replace(",", ";"), "0;0;0;0.5", "0;0;0;1,5"],
@@ -207,7 +207,24 @@ REFUSED = {
     ),
     "cold": (
         ["temperature_C," + POSE, "-300,0,0,0,0"],
-        "line 2, column temperature_C: expected a temperature above -273.15 C, got -300 C",
+        "line 2, column temperature_C: expected a temperature from -100 to 200 C, got -300 C;",
+    ),
+    "hot": (
+        ["temperature_C," + POSE, "20,0,0,0,0", "1e9,0,0,0,0"],
+        r"line 3, column temperature_C: expected a temperature from -100 to 200 C, got 1e\+09 C",
+    ),
+    "another world": (
+        [POSE.replace("_x_m", "_x_mm"), "0,0,0,0", "0,0,0,-999999"],
+        r"line 3, column meas_x_mm: expected a reading within \d+ m of the robot, got -999999 mm; "
+        "leave the cells empty where nothing was read$",
+    ),
+    "thousands of turns": (
+        [POSE.replace("meas_x_m", "meas_rx_deg"), "0,0,0,9999.5"],
+        "line 2, column meas_rx_deg: expected a reading of at most ten turns, got 9999.5 deg",
+    ),
+    "nines": (
+        [POSE + ",tension_2_N", *["0,0,0,0,9999"] * 2, "0,0,0,0,", *["0,0,0,0,9999"] * 2],
+        "line 2, column tension_2_N: expected readings, got 9999 in every row; leave the",
     ),
     "length zero": (
         [LENGTHS + ",meas_x_m", "1,1,0,1,0"],
@@ -247,6 +264,14 @@ def test_mistakes_get_one_sentence_with_their_place(csv_file, robot, case):
     assert message.startswith(f"{path}: ")
     assert "\n" not in message
     assert caught.value.exit_status == 2
+
+
+def test_nines_that_may_be_readings_are_readings(csv_file, robot):
+    """A few of them, or two digits: an angle held, a load cell that ends there."""
+    header = CMD + ",meas_x_m,tension_1_N"
+    few = load_measurements(csv_file(header, *["0,0,0,0,999"] * 3), robot)
+    assert few.tensions[:, 0] == pytest.approx([999.0] * 3)
+    load_measurements(csv_file(header, *["0,0,0,0,99"] * 9), robot)
 
 
 def test_norm_tolerance_lies_between_rounding_and_mistake(csv_file, robot):

@@ -47,12 +47,19 @@ def test_its_own_diagnosis_is_read_without_a_word(tmp_path: Path) -> None:
     "other, words",
     [
         ("planar_vertical", "planar_vertical with 4 cables; demobot_cogiro has 8; use the robot"),
-        ("demobot_parallel", "demobot_parallel, not demobot_cogiro: the exit point of cable"),
+        ("demobot_parallel", "demobot_parallel, not demobot_cogiro: its exit point of cable"),
     ],
 )
 def test_that_of_another_robot_is_refused(tmp_path: Path, other: str, words: str) -> None:
     path = diagnosis(tmp_path, load_robot(other), model_path(other))
     with pytest.raises(InputFileError, match=f"^{path}: made for another robot: {words}"):
+        load_diagnosed(path, ROBOT)
+
+
+def test_a_value_beyond_all_sizes_is_refused(tmp_path: Path) -> None:
+    path = diagnosis(tmp_path)
+    path.write_text(path.read_text().replace('"value": 0.01', '"value": 1e3'))
+    with pytest.raises(InputFileError, match=r"radius_m: 1000 is out of bounds; expected 0 to"):
         load_diagnosed(path, ROBOT)
 
 

@@ -14,7 +14,9 @@ from crosscheck.model.fitted import Fitted
 from crosscheck.model.write import Provenance, calibrated, renewed, save_model, with_fit
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
+from seecr.effects import catalogue, layout_of
 from seecr.errors import InputFileError
+from seecr.prediction.cells import limits_of
 from seecr.prediction.experiment import predict
 from seecr.prediction.model import load_model, new_model
 from seecr.prediction.uncertainty import covariance_of
@@ -117,6 +119,32 @@ def test_comments_survive_another_effect(robot, saved):
     assert model.names == ("pulley_radius",)
 
 
+def test_comments_survive_in_tables_that_a_fit_writes_anew(robot, tmp_path):
+    path, names = tmp_path / "m.toml", ["pulley_radius"]
+    one, covariance = [fitted(robot, *names, radius_m=0.01)], np.array([[1e-8]])
+    for kind in ("fit", "calibration"):
+        model = with_fit(new_model(robot), one, names, SOURCE, ERRORS, covariance)
+        if kind == "calibration":
+            model = calibrated(new_model(robot), one, covariance, SOURCE, ERRORS)
+        save_model(path, renewed(model, robot, measured(robot)))
+        changed(path, f"[{kind}]", f"[{kind}]\n# after the new spools")
+        changed(path, "[fitted_to]", "[fitted_to]\n# the whole frame")
+        changed(path, 'date = "2024-05-13"', 'date = "2024-05-13" # a Monday')
+        changed(path, "after]", "after]\n# without the outlier")
+        model = load_model(path, robot)
+        if kind == "fit":
+            again = with_fit(model, one, names, SOURCE, ERRORS, covariance)
+        else:
+            again = calibrated(model, one, covariance, SOURCE, ERRORS)
+        save_model(path, renewed(again, robot, measured(robot)))
+        text = path.read_text()
+        assert f"[{kind}]\n" in text and "after]\n# without the outlier" in text
+        for remark in ("# after the new spools", "# the whole frame", "# a Monday"):
+            assert text.count(remark) == 1, text
+        assert text.count("# Standard errors of the values above") == (kind == "fit")
+        assert covariance_of(load_model(path, robot)) == pytest.approx(covariance)
+
+
 def test_a_person_may_write_one_by_hand(robot, tmp_path):
     path = tmp_path / "m.toml"
     path.write_text('[[effect]]\nname = "stiffness"\nparameters.factor = 1.4\n')
@@ -188,7 +216,8 @@ BAD = {
         r"line \d+: .* radius_m: -0.01 is out of bounds; expected 0 to 0\.\d+$",
     ),
     "wrong unit": ('unit = "m"', 'unit = "mm"', r"radius_m: expected unit 'm', got 'mm'"),
-    "bad error": ("stderr = 0.0001", "stderr = -1", r"stderr must be a number from 0 or"),
+    "bad error": ("stderr = 0.0001", "stderr = -1", r"stderr must be a number from 0 to 1e\+30 or"),
+    "no error": ("stderr = 0.0001", "stderr = 1e300", r"0 to 1e\+30 or \"unseen\", got 1e\+300$"),
     "odd word": ("at_bound", "atbound", r"unknown atbound; expected at_bound, .*nearest first"),
     "misspelt table": (
         "[[effect]]", "[[effects]]\n[[effect]]", r"line \d+: unknown effects; expected effect",
@@ -220,6 +249,33 @@ def test_winches_are_zeroed_where_somebody_can_stand(robot, saved):
     assert "zero_temperature_C: 199 is out of bounds; expected -40 to 60" in error_of(saved, robot)
 
 
+@pytest.mark.parametrize(
+    "values, words",
+    [
+        ("shift_m = -1e300\nrotation_rad = 0.0", "shift_x_m: -1e+300 is out of bounds; expected -"),
+        (
+            "shift_m = 0.0\nrotation_rad = 90.0",
+            "rotation_x_rad: 90 is out of bounds; expected -6.28",
+        ),
+    ],
+)
+def test_values_are_of_a_size_that_a_robot_can_have(robot, saved, values, words):
+    extra = f'\n[[effect]]\nname = "tracker_target"\n[effect.parameters]\n{values}\n'
+    saved.write_text(saved.read_text() + extra)
+    assert words in error_of(saved, robot)
+
+
+def test_every_value_has_finite_limits_that_hold_its_plausible_sizes(robot):
+    for effect in catalogue().values():
+        layout = layout_of(effect, robot)
+        for i in range(len(layout)):
+            low, high = limits_of(layout, i)
+            assert np.isfinite([low, high]).all() and low <= layout.null[i] <= high
+            far = layout.null[i] + 30.0 * layout.scale[i] * np.array([-1.0, 1.0])
+            far = np.clip(far, layout.lower[i], layout.upper[i])
+            assert layout.shape[i] or ((low <= far).all() and (far <= high).all())
+
+
 def test_an_effect_may_stand_there_once(robot, saved):
     text = saved.read_text()
     saved.write_text(text + text[text.index("[[effect]]") :])
@@ -231,15 +287,15 @@ def test_a_model_made_for_another_robot_is_noticed(robot, saved):
     assert "made for another robot: demobot_cogiro with 8 cables; " in error_of(saved, planar)
     parallel = load_robot(model_path("demobot_parallel"))
     text = error_of(saved, parallel)
-    assert "made for another robot: demobot_cogiro, not demobot_parallel: the exit point of" in text
-    assert "mm away" in text
+    assert "made for another robot: demobot_cogiro, not demobot_parallel: its exit point of" in text
+    assert "mm from that in " in text
 
 
 def test_points_that_moved_are_another_robot_and_a_new_mass_is_noted(robot, saved):
     exits = robot.exit_points.copy()
     exits[3, 1] += 2e-3
     text = error_of(saved, replace(robot, exit_points=exits))
-    assert "exit point of cable4 is 2 mm away" in text
+    assert "of the same name, demobot_cogiro: its exit point of cable4 is 2 mm" in text
     moved = robot.reference_pose.copy()
     moved[0] += 0.01
     assert "reference pose is (0.4" in error_of(saved, replace(robot, reference_pose=moved))
@@ -275,7 +331,7 @@ KNOWN = {
     "known is a number": ("value = 0.01,", "known = 0.01,", r"expected known = .*, got 0.01"),
     "known is exact": (
         "value = 0.01,", "known = { value = 0.01, stderr = 0 },",
-        r"known: stderr must be a number above 0, got 0; .* fixed = true",
+        r"known: stderr must be a number above 0 and at most .*, got 0; .* fixed = true",
     ),
     "known out of bounds": (
         "value = 0.01,", "known = { value = -0.01, stderr = 1e-3 },",

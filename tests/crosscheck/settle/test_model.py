@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import mujoco
@@ -15,11 +16,11 @@ from crosscheck.settle.model import (
     hindrances,
     ignored_note,
     platform_of,
-    quiet_mujoco,
 )
 from crosscheck.settle.physics import Physics
+from seecr.description.mjcf import load_robot, quiet_mujoco
 from seecr.description.shipped import model_names, model_path
-from seecr.errors import InputFileError
+from seecr.errors import InputFileError, RobotError
 
 PLANAR = model_path("planar_vertical").read_text(encoding="utf-8")
 
@@ -96,6 +97,17 @@ def test_mujoco_is_quiet_inside_and_speaks_again_after():
     with quiet_mujoco(), quiet_mujoco():
         assert mujoco.get_mju_user_warning() is not None
     assert mujoco.get_mju_user_warning() is None
+
+
+def test_a_singular_platform_leaves_no_log(tmp_path, monkeypatch):
+    """Its mass 1e6 m away makes MuJoCo warn wherever it is compiled, placed or settled."""
+    monkeypatch.chdir(tmp_path)
+    inertial = re.compile(r'<inertial pos="[^"]*"')
+    Path("far.xml").write_text(inertial.sub('<inertial pos="0 0 1e6"', PLANAR), encoding="utf-8")
+    with pytest.raises(RobotError, match="has its centre of mass 1e"):
+        load_robot("far.xml")
+    Physics.of("far.xml").update()
+    assert [file.name for file in tmp_path.iterdir()] == ["far.xml"]
 
 
 def test_without_a_load_residuals_are_relative_to_what_cables_pull() -> None:

@@ -241,10 +241,13 @@ def test_a_copy_may_change_one_value_and_is_written_back(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("[polish]\nposition_m = 1", r"'polish' is no table of thresholds; expected polished or"),
+        (
+            "[polish]\nposition_m = 1",
+            r"'polish' is not a table of thresholds; expected polished or",
+        ),
         (
             "[polished]\nposition_mm = 1",
-            r"'position_mm' is no key of \[polished\] of thresholds; expected position_m or",
+            r"'position_mm' is not a key of \[polished\] of thresholds; expected position_m or",
         ),
         ("[settled]\nposition_m = 0", r"\[settled\] position_m: expected a positive number, got 0"),
         ("[settled]\nposition_m = -1e-6", r"expected a positive number, got -1e-06"),

@@ -392,7 +392,7 @@ def test_the_command_s_json_is_all_it_prints(tmp_path):
         (["ROBOT", "--hide", "1", "--effect", "pully_radius"], "nearest first: pulley_radius"),
         (["ROBOT", "--hide", "1", "--effect", "stiffness", "--effects", "1"], "leave out --effect"),
         (["missing.xml", "--hide", "1"], "missing.xml"),
-        (["--open", "ROBOT"], "is no sealed answer; expected a file answer.sealed"),
+        (["--open", "ROBOT"], "is not a sealed answer; expected a file answer.sealed"),
         (["--open", "nowhere"], "nowhere: no such file; expected a file answer.sealed"),
     ],
 )
@@ -420,7 +420,7 @@ def test_a_seal_comes_off_again_and_only_a_seal_does(tmp_path, answer):
     assert unseal(file) == nothing
     assert nothing.hidden == [] and nothing.as_json()["hidden"] == ["null"]
     file.write_text(seal(answer)[:-9], encoding="ascii")
-    with pytest.raises(InputFileError, match="is no sealed answer"):
+    with pytest.raises(InputFileError, match="is not a sealed answer"):
         unseal(file)
 
 

@@ -225,5 +225,7 @@ class Moonlight(Effect):
 
 
 def test_an_effect_without_a_truth_is_refused():
-    with pytest.raises(CrosscheckError, match="moonlight: no truth with MuJoCo; expected one of"):
+    with pytest.raises(
+        CrosscheckError, match="moonlight: MuJoCo cannot simulate it; expected one of"
+    ):
         true_robot(robot_named(), [Moonlight()])

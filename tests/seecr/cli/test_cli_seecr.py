@@ -126,7 +126,8 @@ def test_export_writes_a_description_and_what_mujoco_alone_reads(tmp_path: Path)
     result = run("export", "demobot_cogiro", out, "0.3", "0.2", "0.15", "--model", model)
     assert result.exit_code == 0
     assert result.stdout.splitlines()[1:] == [
-        "out.xml: stiffness", "out-mujoco.xml, for MuJoCo alone: also pulley_radius",
+        "out.xml contains stiffness",
+        "out-mujoco.xml, for MuJoCo alone, also contains pulley_radius",
         f"next: seecr pose {out} 0.3 0.2 0.15",
     ]  # fmt: skip
     np.testing.assert_allclose(load_robot(out).ea, 1.1 * robot.ea)
@@ -149,7 +150,7 @@ def test_negative_numbers_are_coordinates() -> None:
     [
         (
             ["pose", "nobot", *PLACE],
-            "nobot: no such file and no shipped robot; expected an MJCF file or one of",
+            "nobot: neither a file nor a shipped robot; expected an MJCF file or one of",
         ),
         (["pose", "no.xml", *PLACE], "no.xml: no such file; expected an MJCF model"),
         (["pose", "demobot_cogiro", "1", "2"], "expected X Y Z or X Y Z QW QX QY QZ, got 2"),
@@ -268,7 +269,8 @@ def test_map_writes_its_files_or_says_why_not(tmp_path: Path) -> None:
     line = run("map", "demobot_cogiro", "--grid", "0.3:0.5:3", "0.2", "0.1", "--out", out)
     assert "no figure: the grid has more than one value along fewer than two axes" in line.output
     soft = run("map", "demobot_cogiro", *grid, "--cable", "0.001", "--out", out)
-    assert "elastic robot: at rest at 0 of 6 commands" in soft.output
+    assert "elastic robot: at rest at 0 of 6 commands" in soft.output and soft.exit_code == 3
+    assert json.loads((out / "map.json").read_text())["exit_status"] == 3
     lost = run("map", "demobot_cogiro", *grid, "--lowest", "90", "--out", tmp_path / "lost")
     assert lost.exit_code == 2 and not (tmp_path / "lost").exists()
     assert "no pose of the grid can be held: no tensions from 90 to inf N" in lost.stderr

@@ -26,9 +26,9 @@ ROBOT = "planar_vertical"
          "--cable: expected vectran, fishing or k_c from 0.001 to 1e+12 N, got '1e300'"),
         ("pose demobot_parallel 0.4 0.25 0.1 1 1 0 0",
          "QW QX QY QZ: expected a unit quaternion, scalar first, got one of norm 1.414"),
-        ("pose here.csv 0 0 0", "here.csv: begins with 'run,cmd_x_m,cmd_y_m,cmd_z_m', which is no "
-         "XML; expected the robot as MJCF, XML that begins with <mujoco; the robot's file goes "
-         "first"),
+        ("pose here.csv 0 0 0", "here.csv: begins with 'run,cmd_x_m,cmd_y_m,cmd_z_m', which is "
+         "not XML; expected the robot as MJCF, XML that begins with <mujoco; the robot's file "
+         "comes first"),
         ("pose picture.xml 0 0 0", "picture.xml: is a PNG picture; expected the robot as MJCF"),
         ("pose empty.xml 0 0 0", "empty.xml: is empty; expected the robot as MJCF"),
         ("pose demobot_parallel 0.4 0.25 0.1 --model noise.toml",
@@ -71,7 +71,7 @@ ROBOT = "planar_vertical"
         ("pose long.xml 0.4 0.25 0.1", "long.xml: tendon cable1 has rest length 1e+06 m; expected "
          "metres, of the size of the frame, 0.834 m across"),
         ("pose stiff.xml 0.4 0.25 0.1",
-         "stiffness x rest length holds a number that is not finite, or beyond 1e+30"),
+         "stiffness x rest length of cable1 holds a number that is not finite, or beyond 1e+30"),
         ("export demobot_parallel out.csv",
          "out.csv: expected the name of an MJCF file to write, such as out.xml"),
         ("export own.xml own.xml",

@@ -33,14 +33,14 @@ def test_a_model_that_says_nothing_is_the_users_business() -> None:
     [
         (
             {"exit_points": ROBOT.exit_points + np.eye(3)[0] * 2e-3},
-            "exit point of cable1 is 2 mm away",
+            "its exit point of cable1 is 2 mm from that in /",
         ),
-        ({"anchor_points": 1.1 * ROBOT.anchor_points}, "the anchor point of cable"),
+        ({"anchor_points": 1.1 * ROBOT.anchor_points}, "its anchor point of cable"),
         ({"reference_pose": [0.4, 0.25, 0.3, 1, 0, 0, 0]}, "its reference pose is"),
     ],
 )
 def test_points_elsewhere_are_another_robot(change: dict, words: str) -> None:
-    with pytest.raises(InputFileError, match=f"made for another robot: .*{words}"):
+    with pytest.raises(InputFileError, match=f"robot of the same name, demobot_cogiro: .*{words}"):
         check_robot(PATH, fingerprint(replace(ROBOT, **change)), ROBOT)
 
 
@@ -58,6 +58,11 @@ def test_a_table_of_another_kind_is_refused() -> None:
         check_robot(PATH, {"ea_N": [3000.0] * 7}, ROBOT)
     with pytest.raises(InputFileError, match="with 4 cables; demobot_cogiro has 8"):
         check_robot(PATH, {"name": "other", "cables": list("abcd")}, ROBOT)
+    for wrong in ({"value": 8}, "cable1", list(range(8))):
+        with pytest.raises(InputFileError, match=r"\[robot\] cables: expected a list of names"):
+            check_robot(PATH, {"cables": wrong}, ROBOT)
+    with pytest.raises(InputFileError, match=r"\[robot\] name: expected a text, got 3"):
+        check_robot(PATH, {"name": 3}, ROBOT)
 
 
 def test_a_hundredth_of_a_micrometre_is_the_same_robot() -> None:

@@ -185,7 +185,7 @@ def test_missing_folder_and_broken_files(tmp_path: Path, monkeypatch: pytest.Mon
     broken.write_text('<mujoco model="nano"><site name="nan"/></mujoco>')
     assert "expected numbers" not in refusal(broken)
     other = {"": "is empty; ", "\x00\x01": "is a binary file; ",
-             "run,t_s\n1,2\n": "begins with 'run,t_s', which is no XML; "}  # fmt: skip
+             "run,t_s\n1,2\n": "begins with 'run,t_s', which is not XML; "}  # fmt: skip
     for text, words in other.items():
         broken.write_text(text)
         assert refusal(broken).startswith(f"{words}expected the robot as MJCF, XML that begins")
@@ -260,7 +260,7 @@ CURVED = 'stiffness="200 30"'
         (changed('stiffness="200"', CURVED), "tendon left has a polynomial stiffness; expected on"),
         (
             changed('<site site="B1"/>', '<site site="B1"/><site site="B2"/>'),
-            "tendon left has 3 path elements or something that is no site; expected exactly two",
+            "tendon left has 3 path elements or something other than sites; expected exactly two",
         ),
         (
             {"world": WORLD + DRUM, **changed('<site site="A1"/>', '<geom geom="drum"/>')},
@@ -268,13 +268,13 @@ CURVED = 'stiffness="200 30"'
         ),
         (
             {"world": WORLD + DRUM, **changed('<site site="B1"/>', f'{OVER}<site site="B1"/>')},
-            "tendon left has 3 path elements or something that is no site",
+            "tendon left has 3 path elements or something other than sites",
         ),
         (changed('"B1"', '"A2"'), "tendon left has both sites on the world; expected one on the"),
         (changed('"A1"', '"B2"'), "tendon left has both sites on the platform; expected one on"),
         (
             {"joint": SLIDE, "tendons": GEAR},
-            "tendon gear has 1 path element or something that is no site",
+            "tendon gear has 1 path element or something other than sites",
         ),
     ],
 )
@@ -308,3 +308,34 @@ def test_mass_may_be_zero_but_the_answer_says_nothing_holds_the_platform(tmp_pat
     robot = replace(load_robot(mjcf(tmp_path)), mass=0.0)
     answer = solve(robot, robot.reference_pose)
     assert not answer.converged[0]
+
+
+def test_a_platform_far_larger_than_its_frame_is_refused(tmp_path: Path) -> None:
+    far = PLATFORM.replace('"0 0 -0.1"', '"0 0 -100"')
+    assert refusal(mjcf(tmp_path, platform=far)) == (
+        "body platform has its centre of mass 100 m from its anchor points; expected metres, of "
+        "the size of the frame, 1.12 m across"
+    )
+    wide = PLATFORM.replace('"0.1 0 0"', '"100 0 0"')
+    text = refusal(mjcf(tmp_path, platform=wide))
+    assert text.startswith("tendon right is anchored 100 m from the origin of body platform; ")
+    long = TENDONS.replace("0 1.1", "0 1100", 1)
+    assert refusal(mjcf(tmp_path, tendons=long)).startswith("tendon left has rest length 1100 m;")
+    short = TENDONS.replace("0 1.1", "0 1e-9", 1)
+    assert refusal(mjcf(tmp_path, tendons=short)) == (
+        "tendon left has rest length 1e-09 m, but its sites are 1.08 m apart at the reference "
+        "pose; expected both in metres"
+    )
+
+
+def test_numbers_that_no_robot_has_name_the_file_and_the_cable(tmp_path: Path) -> None:
+    far = WORLD.replace("1 0 2", "1e300 0 2")
+    assert refusal(mjcf(tmp_path, world=far)) == (
+        "robot two ropes: exit_points of right holds a number that is not finite, or beyond 1e+30"
+    )
+    stiff = TENDONS.replace('"200"', '"1e150"')
+    text = refusal(mjcf(tmp_path, tendons=stiff))
+    assert text.startswith("robot two ropes: stiffness x rest length of left holds a number that")
+    there = WORLD.replace("0 0 2", "0.4 0 1")
+    text = refusal(mjcf(tmp_path, world=there))
+    assert text.startswith("robot two ropes: left has its anchor point on its exit point at the")

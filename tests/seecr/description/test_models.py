@@ -438,7 +438,7 @@ def test_a_robot_is_a_file_or_a_shipped_name(
     with pytest.raises(InputError) as caught:
         robot_file("demobot_4")
     assert str(caught.value).startswith(
-        "demobot_4: no such file and no shipped robot; expected an MJCF file or one of demobot_"
+        "demobot_4: neither a file nor a shipped robot; expected an MJCF file or one of demobot_"
     )
 
 

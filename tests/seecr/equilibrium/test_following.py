@@ -97,7 +97,7 @@ def test_where_a_rest_ends_the_platform_jumps() -> None:
     assert np.abs(pose_difference(settled.pose, jump.after)).max() < 1e-4
     (line,) = jump_lines(led)
     assert line.startswith(
-        "on the way to pose 1, at command 400.0, 250.0, 150.0 mm: its equilibrium ends"
+        "on the path to pose 1, at command 400.0, 250.0, 150.0 mm: its equilibrium ends"
     )
     assert SweepRows(led).as_json()[1]["jumps"][0].as_json()["energy_J"] == jump.energy
 
@@ -109,7 +109,7 @@ def test_a_way_back_ends_where_it_began_and_lengths_are_followed_alike() -> None
     led = solve(robot, poses, follow=True)
     np.testing.assert_allclose(led.pose[2], led.pose[0], atol=1e-9)
     assert list(jump_lines(led)) == [
-        "followed from the reference pose: the platform does not jump on the way"
+        "followed from the reference pose: the platform does not jump on the path"
     ]
     assert list(jump_lines(solve(robot, poses[0]))) == []
     told = solve(robot, rest_lengths=led.rest_lengths, follow=True)
@@ -121,5 +121,5 @@ def test_what_does_not_go_with_following_is_refused() -> None:
     with pytest.raises(InputError, match="expected no other method and no start"):
         solve(robot, robot.reference_pose, follow=True, method="fsolve")
     friction = [Term.of(robot, "hysteresis", amplitude_N=0.1)]
-    with pytest.raises(InputError, match="expected no follow with them"):
+    with pytest.raises(InputError, match="solved along the path; leave follow out"):
         solve(robot, robot.reference_pose, follow=True, effects=friction)

@@ -227,7 +227,7 @@ def test_what_mjcf_cannot_say_is_said() -> None:
         ],
     ).lines("robot.xml")
     assert lines == [
-        "robot.xml: stiffness",
+        "robot.xml contains stiffness",
         "only in the rest lengths of the reference pose: drum_gain, "
         "drum_eccentricity, thermal_expansion; at other poses use the rest lengths that seecr "
         "computes",
