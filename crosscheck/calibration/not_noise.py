@@ -83,18 +83,18 @@ def outliers_cluster(setting: Setting, joint: JointFit) -> bool:
     """
     problem, chain = setting.problem, setting.chain
     out = outliers_by_kind(chain, joint.weight, problem.data.n_rows)
-    kinds = np.unique(chain.kind)
     read = np.zeros(out.shape, dtype=bool)
     read[chain.row, chain.kind] = True
-    part = out.sum(axis=0) / np.maximum(read.sum(axis=0), 1)
-    if part.max() > _MOST:
+    if (out.sum(axis=0) / np.maximum(read.sum(axis=0), 1)).max() > _MOST:
         return True
+    kinds = np.unique(chain.kind)
+    any_kind = [np.asarray(out.any(axis=1))] if len(kinds) > 1 else []
+    groups = [*(out[:, k] for k in kinds), *any_kind]
+    part = [group.sum() / max(int(problem.use.sum()), 1) for group in groups]
     for pairs in (next_rows(problem), nearest_rows(problem)):
-        for k in kinds:
-            both = int((out[pairs[:, 0], k] & out[pairs[:, 1], k]).sum()) if len(pairs) else 0
-            if both and stats.poisson.sf(both - 1, len(pairs) * part[k] ** 2) < _CHANCE / len(
-                kinds
-            ):
+        for group, rate in zip(groups, part, strict=True):
+            both = int((group[pairs[:, 0]] & group[pairs[:, 1]]).sum()) if len(pairs) else 0
+            if both and stats.poisson.sf(both - 1, len(pairs) * rate**2) < _CHANCE / len(groups):
                 return True
     return False
 
