@@ -106,7 +106,7 @@ class Calibrated(Result, JointErrors):
     def as_json(self) -> dict[str, Any]:
         """The content of ``calibration.json``, in SI."""
         return {
-            **super().as_json(),
+            **JointErrors.as_json(self),
             "outliers": list(self.outliers),
             "settled": self.settled,
             "improves_held_out": self.pays,

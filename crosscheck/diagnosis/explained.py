@@ -19,10 +19,10 @@ from crosscheck.diagnosis.listed import diagnosis_of, left_out
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect, NotListed
 from crosscheck.diagnosis.rivals import Rival, loss_of_its_part
 from crosscheck.diagnosis.search import Search
+from crosscheck.diagnosis.set_steps import fit_of, steps_of_set
 from crosscheck.diagnosis.small import share_of
 from crosscheck.diagnosis.steps import OTHER
 from crosscheck.diagnosis.unexplained import where_of
-from crosscheck.diagnosis.way import fit_of, way_of
 from crosscheck.diagnosis.words import (
     agreement,
     and_what_is_left,
@@ -51,42 +51,42 @@ MORE = (
 def explained(sought: SetSearch, notes: Sequence[str]) -> Diagnosis:
     """The diagnosis by compared sets of effects that leave only noise."""
     verdict, imitated = sought.judgement.verdict, sought.judgement.imitated
-    way = way_of(sought, frozenset(sought.judgement.sure))
+    search = steps_of_set(sought, frozenset(sought.judgement.sure))
     chances = chances_of(sought)
     more = sought.judgement.more
-    some = [] if way.found or more or imitated else alternatives(sought.found, sought.classes)
-    missing = [_missing(sought, way, chances, name) for name in way.found]
+    some = [] if search.found or more or imitated else alternatives(sought.found, sought.classes)
+    missing = [_missing(sought, search, chances, name) for name in search.found]
     return diagnosis_of(
         verdict,
-        _sentence(sought.judgement, missing, way.tried, chances, some),
+        _sentence(sought.judgement, missing, search.tried, chances, some),
         missing,
-        way,
+        search,
         before=sought.calibration.before,
         floor=_floor(sought),
-        candidates=_not_listed(way, chances),
+        candidates=_not_listed(search, chances),
         notes=(*notes, *_noise_notes(sought, chances), *_size_notes(sought), *([MORE] * more)),
         chances=chances,
-        where=where_of(way) if imitated else (),
+        where=where_of(search) if imitated else (),
         alternatives=some,
     )
 
 
-def _missing(sought: SetSearch, way: Search, chances: Chances, name: str) -> MissingEffect:
-    best = way.last.fit
+def _missing(sought: SetSearch, search: Search, chances: Chances, name: str) -> MissingEffect:
+    best = search.last.fit
     if sought.judgement.verdict is not DiagnosisVerdict.EFFECTS_FOUND:
         # effects that are not sure are missing too, and with them in the model values are better;
         # for EFFECTS_FOUND, the listed effects have to be a model by themselves
         best = fit_of(sought.calibration.setting, sought.found.best.joint)
     term, part = best.terms[name], best.terms.part(name)
-    index = 1 + way.found.index(name)
-    before, step = way.steps[index - 1], way.steps[index]
+    index = 1 + search.found.index(name)
+    before, step = search.steps[index - 1], search.steps[index]
     return MissingEffect(
         term=term,
         stderr=best.stderr[part],
         at_bound=best.at_bound[part],
-        rivals=tuple(_rivals(sought, frozenset(way.last.fit.terms.names), name)),
-        check=check_of(term, way.problem.robot, best.stderr[part]),
-        rms=rms_by_kind(way.problem, step.fit.state.raw),
+        rivals=tuple(_rivals(sought, frozenset(search.last.fit.terms.names), name)),
+        check=check_of(term, search.problem.robot, best.stderr[part]),
+        rms=rms_by_kind(search.problem, step.fit.state.raw),
         held_out_rms=step.held_out.rms,
         share=share_of(before, step),
         probability=chances.of(name),
@@ -194,21 +194,21 @@ def _sentence(
     )
 
 
-def _not_listed(way: Search, chances: Chances) -> list[NotListed]:
+def _not_listed(search: Search, chances: Chances) -> list[NotListed]:
     """All effects that are not listed, the most probable first."""
-    rows = left_out(way, way.found, lambda c: _why_not(way, chances, c))
+    rows = left_out(search, search.found, lambda c: _why_not(search, chances, c))
     return sorted(rows, key=lambda row: (-chances.effect.get(row.effect, 0.0), -row.score))
 
 
-def _why_not(way: Search, chances: Chances, c: Candidate) -> Reason:
+def _why_not(search: Search, chances: Chances, c: Candidate) -> Reason:
     p = chances.effect.get(c.name, 0.0)
     if chances.imitated is not None and c.name in chances.imitated.replaced:
         return Reason(Why.MAY_IMITATE)
     for members, _p in chances.classes:
-        first = next((m for m in members if m in way.found), None)
+        first = next((m for m in members if m in search.found), None)
         if c.name in members and first is not None:
             return Reason(Why.ALIKE, by=(first,))
-    if way.found:
+    if search.found:
         why = Why.CARRIES_LITTLE if p > PROBABLE else Why.NOT_NEEDED_BESIDE
-        return Reason(why, p=p, by=way.found)
+        return Reason(why, p=p, by=search.found)
     return Reason(Why.NOT_SURE if p > PROBABLE else Why.IMPROBABLE, p=p)

@@ -24,7 +24,7 @@ def diagnosis_of(
     verdict: DiagnosisVerdict,
     sentence: str,
     missing: Sequence[MissingEffect],
-    way: Search,
+    search: Search,
     *,
     before: Rms,
     floor: Rms,
@@ -40,12 +40,12 @@ def diagnosis_of(
     Args:
         verdict, sentence, missing, before, floor, candidates, notes, chances, where: as in the
             diagnosis.
-        way: steps from the model as it stands to what is kept.
-        shown: the steps whose errors are shown, if ``way`` leads to more than is listed.
+        search: steps from the model as it stands to what is kept.
+        shown: the steps whose errors are shown, if ``search`` leads to more than is listed.
         alternatives: sets of effects of which one is missing.
     """
-    last = (way if shown is None else shown).last
-    after = rms_by_kind(way.problem, last.fit.state.raw)
+    last = (search if shown is None else shown).last
+    after = rms_by_kind(search.problem, last.fit.state.raw)
     seen = None if chances.imitated is None else chances.imitated.seen
     return Diagnosis(
         verdict=verdict,
@@ -56,10 +56,10 @@ def diagnosis_of(
         held_out=last.held_out.rms,
         floor=floor,
         candidates=tuple(candidates),
-        measure_next=tuple(measure_next(way, missing, verdict, where, alternatives, seen)),
-        notes=tuple(dict.fromkeys([*notes, *overestimated(way.problem, after)])),
-        search=way,
-        whiteness=way.last.whiteness,
+        measure_next=tuple(measure_next(search, missing, verdict, where, alternatives, seen)),
+        notes=tuple(dict.fromkeys([*notes, *overestimated(search.problem, after)])),
+        search=search,
+        whiteness=search.last.whiteness,
         where=where,
         chances=chances,
     )

@@ -14,13 +14,13 @@ from crosscheck.fit.noise import Whiteness
 from crosscheck.fit.reasons import Reason, Why
 from seecr.effects import Terms
 
-# Gauss-Newton steps for a model on the way that the search did not meet.
+# Gauss-Newton steps for an intermediate model that the search did not meet.
 _ITERATIONS = 8
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """A model on the way: what was added last, and how well it does.
+    """An intermediate model: what was added last, and how well it does.
 
     Attributes:
         added: name of the effect that was added last, "" for the start.

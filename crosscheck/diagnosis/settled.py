@@ -24,7 +24,7 @@ from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 def settled(
     found: Search, notes: Sequence[str], told: Callable[[str], None] = lambda _text: None
 ) -> Diagnosis:
-    """The diagnosis of a search whose last model leaves noise; ``told`` is called on the way."""
+    """The diagnosis of a search whose last model leaves noise; ``told`` says what is being done."""
     rivals = _all_rivals(found, told)
     chances = _chances(found, rivals)
     other = exchanged(found, chances)
@@ -34,11 +34,11 @@ def settled(
     wider = _by_evidence(found, rivals, chances)
     if wider != rivals:
         rivals, chances = wider, _chances(found, wider)
-    way = _sure_part(found, chances)
-    if way is not found:
-        rivals = _all_rivals(way, told)
-    missing = [missing_of(way, name, chances, rivals[name]) for name in way.found]
-    hints = hints_of(chances, way.found, found.found)
+    kept = _sure_part(found, chances)
+    if kept is not found:
+        rivals = _all_rivals(kept, told)
+    missing = [missing_of(kept, name, chances, rivals[name]) for name in kept.found]
+    hints = hints_of(chances, kept.found, found.found)
     verdict, sentence = DiagnosisVerdict.NO_EFFECT_MISSING, agreement(found.tried, hints)
     if missing:
         verdict = DiagnosisVerdict.EFFECTS_FOUND
@@ -47,12 +47,12 @@ def settled(
         verdict,
         sentence,
         missing,
-        way,
+        kept,
         before=rms_by_kind(found.problem, found.steps[0].fit.state.raw),
         floor=noise_floor(found.problem, found.last.fit.state),
         candidates=_with_hints(
-            not_listed(way, way.found),
-            {name: chances.of(name) for name in found.found if name not in way.found},
+            not_listed(kept, kept.found),
+            {name: chances.of(name) for name in found.found if name not in kept.found},
         ),
         notes=notes,
         chances=chances,
@@ -88,10 +88,10 @@ def _by_evidence(
 
 def _sure_part(found: Search, chances: Chances) -> Search:
     """The search without its last effects that are not sure, if it leaves noise without them."""
-    way = found
-    while way.found and chances.of(way.found[-1]) < SURE and way.steps[-2].whiteness.is_noise:
-        way = replace(way, steps=way.steps[:-1])
-    return way
+    kept = found
+    while kept.found and chances.of(kept.found[-1]) < SURE and kept.steps[-2].whiteness.is_noise:
+        kept = replace(kept, steps=kept.steps[:-1])
+    return kept
 
 
 def _with_hints(rows: Sequence[NotListed], hints: Mapping[str, float]) -> list[NotListed]:

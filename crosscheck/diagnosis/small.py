@@ -37,32 +37,32 @@ def small_effects_alone(
         shares: least part of the unexplained chi2 on held-out runs that the first effect, and each
             later one, must remove.
     """
-    way = replace(found, steps=found.steps[:1])
-    while len(way.found) < MOST_EFFECTS:
-        last = way.last
-        if way.found:
-            tried = tuple(_small_candidates(way, parameters))
+    search = replace(found, steps=found.steps[:1])
+    while len(search.found) < MOST_EFFECTS:
+        last = search.last
+        if search.found:
+            tried = tuple(_small_candidates(search, parameters))
             last = replace(last, node=replace(last.node, candidates=tried))
-            way = replace(way, steps=(*way.steps[:-1], last))
-        step = _small_step(way, parameters, shares[1] if way.found else shares[0])
+            search = replace(search, steps=(*search.steps[:-1], last))
+        step = _small_step(search, parameters, shares[1] if search.found else shares[0])
         if step is None:
             break
-        way = replace(way, steps=(*way.steps, step))
-    return way if way.found else None
+        search = replace(search, steps=(*search.steps, step))
+    return search if search.found else None
 
 
-def _small_step(way: Search, parameters: int, share: float) -> Step | None:
+def _small_step(search: Search, parameters: int, share: float) -> Step | None:
     """The small effect with the most evidence, if it explains such a share of the remainder."""
-    best = _best_small(way.last.candidates, parameters)
+    best = _best_small(search.last.candidates, parameters)
     if best is None or best.fit is None:
         return None
-    full = way.trials.refit(best.fit.terms, best.fit.state)
+    full = search.trials.refit(best.fit.terms, best.fit.state)
     if not full.valid:
         return None
-    step = step_of(way.trials, best.name, node_of(way.trials, full))
-    significant = significantly_improves(way.last.held_out, step.held_out)
-    listed = significant and not np.any(full.at_bound) and share_of(way.last, step) > share
-    if not listed or not beyond_smooth(way.problem, way.last.fit.state, full.state, share):
+    step = step_of(search.trials, best.name, node_of(search.trials, full))
+    significant = significantly_improves(search.last.held_out, step.held_out)
+    listed = significant and not np.any(full.at_bound) and share_of(search.last, step) > share
+    if not listed or not beyond_smooth(search.problem, search.last.fit.state, full.state, share):
         return None
     return step
 
@@ -87,11 +87,11 @@ def _happens(found: Fit, candidate: Candidate) -> bool:
     return is_plausible(found.terms[candidate.name])
 
 
-def _small_candidates(way: Search, parameters: int) -> list[Candidate]:
+def _small_candidates(search: Search, parameters: int) -> list[Candidate]:
     """The small effects that the last model does not have, fitted beside it."""
-    held, trials = way.last.fit.terms.names, way.trials
+    held, trials = search.last.fit.terms.names, search.trials
     return [
-        try_candidate(trials, way.last.fit, c.layout)
+        try_candidate(trials, search.last.fit, c.layout)
         for c in trials.candidates(trials.problem)
         if c.name not in held and c.why_not is None and len(c.layout) <= parameters
     ]

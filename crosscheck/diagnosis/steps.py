@@ -1,4 +1,4 @@
-"""The models on the way of a diagnosis, as its page and its recording show them."""
+"""The models that a diagnosis went through, as its page and its recording show them."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Standing:
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """One model on the way.
+    """One of these models.
 
     Attributes:
         label: what was added, in words.

@@ -57,12 +57,12 @@ def _warranted(found: Search, chances: Chances) -> tuple[list[MissingEffect], Se
     # an effect that was found beside one that may not be listed may not be listed either
     first = list(takewhile(lambda name: _is_warranted(found, name), found.found))
     if first:
-        way: Search | None = replace(found, steps=found.steps[: 1 + len(first)])
+        search: Search | None = replace(found, steps=found.steps[: 1 + len(first)])
     else:
-        way = small_effects_alone(found, SMALL, _LEAST_ALONE)
-    if way is None:
+        search = small_effects_alone(found, SMALL, _LEAST_ALONE)
+    if search is None:
         return [], replace(found, steps=found.steps[:1])
-    return [missing_of(way, name, chances) for name in way.found], way
+    return [missing_of(search, name, chances) for name in search.found], search
 
 
 def _is_warranted(found: Search, name: str) -> bool:

@@ -157,8 +157,8 @@ def _searched(
     # The steps do not end with stated noise, or leave something open: an effect is not sure, or the
     # noise is autocorrelated, larger than stated (perhaps by a few outliers), or estimated from
     # what may be an effect. So all effects are fitted at once, and sets of them compared.
-    way = [step.fit.terms for step in found.steps[1:]]
-    sought = search_sets(problem, problem.data.sigma, ready.terms, _part(progress, 0.5, 1.0), way)
+    given = [step.fit.terms for step in found.steps[1:]]
+    sought = search_sets(problem, problem.data.sigma, ready.terms, _part(progress, 0.5, 1.0), given)
     said = sought.judgement
     if said.verdict is not DiagnosisVerdict.UNKNOWN_EFFECT or said.imitated is not None:
         return explained(sought, notes)

@@ -57,11 +57,11 @@ def find_clock(held: HeldCommands, told: Array, rests: Dwells) -> Clock:
     if not clear or off[0] <= _CLEAR * off[best]:
         return Clock(0.0)
     shift, n = _leaves(held.begin_s, rests, whose[best])
-    way = "more" if shift > 0.0 else "less"
+    sign = "more" if shift > 0.0 else "less"
     return Clock(
         shift,
         (
-            f"the tracker's clock shows {abs(shift):.3f} s {way} than that of the commands, "
+            f"the tracker's clock shows {abs(shift):.3f} s {sign} than that of the commands, "
             f"estimated from {counted(n, 'command')} at which the platform starts to move (--clock "
             f"{shift:.3f})",
         ),

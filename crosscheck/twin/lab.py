@@ -143,15 +143,15 @@ def _together(lab: Lab, case: Measurements, alone: list[tuple[Term, Truth]], pla
 
 def sweeps(robot: Robot, points: int, extent: float, seed: int) -> Measurements:
     """Sweeps to and fro, and the temperature at which they are commanded."""
-    way = trajectory(robot, points, extent)
+    planned = trajectory(robot, points, extent)
     random = random_of(seed, 1)
     # a hall that warms up, with a door that is opened now and then
-    t = way.t_s
+    t = planned.t_s
     rise, period = random.uniform(3.0, 6.0), random.uniform(200.0, 400.0)
     drift = rise * (1.0 - np.exp(-t / 300.0)) + 0.5 * np.sin(2.0 * np.pi * t / period)
     return Measurements(
-        path=Path("measured.csv"), n_cables=robot.n_cables, run=way.run, t_s=t,
-        command_pose=way.pose, temperature_C=np.round(20.0 + drift, 2),
+        path=Path("measured.csv"), n_cables=robot.n_cables, run=planned.run, t_s=t,
+        command_pose=planned.pose, temperature_C=np.round(20.0 + drift, 2),
     )  # fmt: skip
 
 

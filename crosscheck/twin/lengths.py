@@ -21,8 +21,8 @@ _WATCHED = 64
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
-    """The commands with all points on the way, N in all.
+class Waypoints:
+    """The commands with all points on the path, N in all.
 
     Attributes:
         pose: (N, 7) commanded; lengths: (N, m) [m] commanded, or None. told: whether these are told
@@ -41,7 +41,9 @@ class Way:
     elapsed: Array
 
 
-def way_of(true: TrueRobot, commands: Commands, waypoints: tuple[int, int] = WAYPOINTS) -> Way:
+def waypoints_of(
+    true: TrueRobot, commands: Commands, waypoints: tuple[int, int] = WAYPOINTS
+) -> Waypoints:
     """Every run from the reference pose straight to its first row, then from row to row.
 
     A run that starts at its first row has no way to it; a load changes before the motion.
@@ -72,8 +74,8 @@ def way_of(true: TrueRobot, commands: Commands, waypoints: tuple[int, int] = WAY
         for pose, part in zip(poses, parts, strict=True):
             length = paid + part * (told - paid)
             points.append((pose, length, k, part == 1.0, False, passed / steps))
-    way, lengths, *others = (np.array(part) for part in zip(*points, strict=True))
-    return Way(way, None if commands.lengths is None else lengths, commands.told, *others)
+    path, lengths, *others = (np.array(part) for part in zip(*points, strict=True))
+    return Waypoints(path, None if commands.lengths is None else lengths, commands.told, *others)
 
 
 def _reloaded(commands: Commands, k: int) -> bool:
@@ -95,7 +97,7 @@ def _guide(true: TrueRobot) -> World | None:
 
 
 def _straight_way(guide: World | None, before: Array, after: Array, parts: Array) -> Array:
-    """Poses (k, 7) at fractions (k,) of a way, straight in pose or in joint values."""
+    """Poses (k, 7) at fractions (k,) of a path, straight in pose or in joint values."""
     if guide is None:
         return pose_add(before, parts[:, None] * pose_difference(after, before))
     n = guide.places.n_platform
@@ -111,24 +113,24 @@ def _straight_way(guide: World | None, before: Array, after: Array, parts: Array
     return poses
 
 
-def paid_out(true: TrueRobot, way: Way, temperature: Array | None) -> Array:
-    """Rest lengths (N, m) [m] at the points of a way.
+def paid_out(true: TrueRobot, path: Waypoints, temperature: Array | None) -> Array:
+    """Rest lengths (N, m) [m] at the points of a path.
 
     Args:
         true: the robot.
-        way: its commands.
+        path: its commands.
         temperature: (n,) [deg C] of the rows, or None.
     """
-    absolute = way.lengths is not None and not way.told
-    if way.lengths is None:
-        told = _straight_change(true, way.pose)
+    absolute = path.lengths is not None and not path.told
+    if path.lengths is None:
+        told = _straight_change(true, path.pose)
     else:
-        told = way.lengths - (0.0 if absolute else true.robot.rest_lengths)
+        told = path.lengths - (0.0 if absolute else true.robot.rest_lengths)
     turned = told
     if true.backlash > 0.0:
         # lengths are commanded evenly: nothing reverses between two points
-        watched = _watched(true, way) if way.lengths is None else [told[:0]] * len(told)
-        turned = _with_play(told, watched, way.fresh, 0.5 * true.backlash)
+        watched = _watched(true, path) if path.lengths is None else [told[:0]] * len(told)
+        turned = _with_play(told, watched, path.fresh, 0.5 * true.backlash)
     paid = (1.0 + true.gain) * turned + true.offset
     zero = 0.0 if absolute else 1.0
     for sine, cosine, radius in true.run_out:
@@ -137,7 +139,7 @@ def paid_out(true: TrueRobot, way: Way, temperature: Array | None) -> Array:
     if not absolute:
         paid = paid + _zero(true)
     if temperature is not None and true.expansion != 0.0:
-        warmer = temperature[way.row] - true.zero_temperature
+        warmer = temperature[path.row] - true.zero_temperature
         paid = paid * (1.0 + true.expansion * warmer)[:, None]
     return np.asarray(paid)
 
@@ -153,7 +155,7 @@ def _straight(true: TrueRobot, poses: Array) -> Array:
     return np.asarray(np.linalg.norm(anchors - robot.exit_points, axis=-1))
 
 
-def _watched(true: TrueRobot, way: Way) -> list[Array]:
+def _watched(true: TrueRobot, path: Waypoints) -> list[Array]:
     """Lengths (k, m) [m] commanded on the way to each of N points, in order.
 
     The squared length is taken at even steps. At a reversal it is replaced by the vertex of the
@@ -163,15 +165,15 @@ def _watched(true: TrueRobot, way: Way) -> list[Array]:
     # one step more at either end, to see reversals there too
     parts = np.arange(-1, _WATCHED + 2) / _WATCHED
     watched = []
-    for k, pose in enumerate(way.pose):
-        before = pose if way.fresh[k] else way.pose[k - 1]
+    for k, pose in enumerate(path.pose):
+        before = pose if path.fresh[k] else path.pose[k - 1]
         square = _straight(true, _straight_way(guide, before, pose, parts)) ** 2
         watched.append(np.sqrt(_with_vertices(square, parts[1:-1])) - home)
     return watched
 
 
 def _with_vertices(value: Array, parts: Array) -> Array:
-    """Values (k + 2, m) without the outer ones, at fractions (k,) of a way, with exact extrema."""
+    """Values (k + 2, m) without the outer ones, at fractions (k,) of a path, with exact extrema."""
     earlier, now, later = value[:-2], value[1:-1], value[2:]
     rise, bend = 0.5 * (later - earlier), later - 2.0 * now + earlier
     near = (np.abs(rise) <= 0.5 * np.abs(bend)) & (bend != 0.0)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from crosscheck.settle.relax import SettleStatus, come_to_rest
 from crosscheck.twin.descent import Descent, descend
-from crosscheck.twin.lengths import WAYPOINTS, Way, paid_out, way_of
+from crosscheck.twin.lengths import WAYPOINTS, Waypoints, paid_out, waypoints_of
 from crosscheck.twin.robot import true_robot
 from crosscheck.twin.springs import Cable, Springs
 from crosscheck.twin.world import World
@@ -105,16 +105,16 @@ def measure(
         progress: called with the number of rows done since the last call.
     """
     true = true_robot(robot, effects)
-    way = way_of(true, commands, waypoints)
-    rest, loads = paid_out(true, way, commands.temperature), commands.loads
+    path = waypoints_of(true, commands, waypoints)
+    rest, loads = paid_out(true, path, commands.temperature), commands.loads
     if length_errors is not None:
-        rest = rest + length_errors[way.row]
+        rest = rest + length_errors[path.row]
     tell = progress or (lambda rows: None)
     settle = _walk if true.has_history else _each
     fine = World(true, segments[-1] if true.cable_weight > 0 else 1)
-    rows = settle(fine, way, rest, loads, tell)
+    rows = settle(fine, path, rest, loads, tell)
     if true.cable_weight > 0 and len(segments) > 1:
-        coarse = settle(World(true, segments[0]), way, rest, loads, lambda rows: None)
+        coarse = settle(World(true, segments[0]), path, rest, loads, lambda rows: None)
         rows = _extrapolated(coarse, rows, (segments[-1] / segments[0]) ** 2)
     reading = (rows.pose[:, :3], rows.pose[:, 3:], rows.tensions)
     for sensor in true.sensors:
@@ -123,7 +123,7 @@ def measure(
         rows.pose,
         rows.tensions,
         *reading,
-        rest[way.is_row],
+        rest[path.is_row],
         rows.at_rest,
         rows.free,
         rows.residual,
@@ -142,9 +142,9 @@ def _extrapolated(coarse: _Rows, fine: _Rows, ratio: float) -> _Rows:
     return _Rows(pose, tensions, at_rest, free, fine.residual)
 
 
-def _each(world: World, way: Way, rest: Array, loads: Loads | None, tell: Progress) -> _Rows:
+def _each(world: World, path: Waypoints, rest: Array, loads: Loads | None, tell: Progress) -> _Rows:
     """Every row by itself, from its commanded pose."""
-    poses, lengths = way.pose[way.is_row], rest[way.is_row]
+    poses, lengths = path.pose[path.is_row], rest[path.is_row]
     out = _Rows.empty(len(poses), world.n_cables)
     bare = _without_weight(world)
     for k, pose in enumerate(poses):
@@ -213,23 +213,23 @@ def _note(world: World, out: _Rows, k: int, found: Descent) -> None:
         out.pose[k] = world.pose()
 
 
-def _walk(world: World, way: Way, rest: Array, loads: Loads | None, tell: Progress) -> _Rows:
+def _walk(world: World, path: Waypoints, rest: Array, loads: Loads | None, tell: Progress) -> _Rows:
     """All points of the way in order, each from the equilibrium of the last one."""
     true = world.true
-    out = _Rows.empty(int(way.is_row.sum()), world.n_cables)
+    out = _Rows.empty(int(path.is_row.sum()), world.n_cables)
     cables = [Cable(true, float(ea)) for ea in true.ea]
     bare = _without_weight(world)
     found = _NOWHERE
-    for k, pose in enumerate(way.pose):
-        _carry((world, bare), loads, int(way.row[k]))
+    for k, pose in enumerate(path.pose):
+        _carry((world, bare), loads, int(path.row[k]))
         for cable, length in zip(cables, rest[k], strict=True):
-            cable.pays_out(float(length), float(way.elapsed[k]), bool(way.fresh[k]))
+            cable.pays_out(float(length), float(path.elapsed[k]), bool(path.fresh[k]))
         go = found.balanced
-        if way.fresh[k]:
+        if path.fresh[k]:
             go = _start(world, bare, pose, Springs.plain(rest[k], true))
         found = _agree(world, cables) if go else _NOWHERE
-        if way.is_row[k]:
-            _note(world, out, int(way.row[k]), found)
+        if path.is_row[k]:
+            _note(world, out, int(path.row[k]), found)
             tell(1)
     return out
 

@@ -126,14 +126,14 @@ def follow_commands(robot: Robot, commands: Commands, setup_of: SetupOf) -> Solu
     """
     path = path_of(robot, commands, waypoints=_WAY)
     tables = assemble(setup_of(path.commands, path.source))
-    way = _Way(robot, path, tables, setup_of)
+    followed = _Followed(robot, path, tables, setup_of)
     found = batch.Evaluation.empty(len(tables), robot.n_cables, robot.n_dof)
     jumps: list[list[Jump]] = [[] for _ in range(len(commands))]
     state = None
     for k in range(len(tables)):
         jumped: list[Jump] = []
         last = None if path.fresh[k] else state
-        now = way.afresh(k) if last is None else way.on(k, last, jumped)
+        now = followed.afresh(k) if last is None else followed.on(k, last, jumped)
         batch.put_evaluation(found, np.array([k]), now)
         state = now if _rests(now) else None
         jumps[path.source[k]] += jumped
@@ -142,7 +142,7 @@ def follow_commands(robot: Robot, commands: Commands, setup_of: SetupOf) -> Solu
 
 
 @dataclass(frozen=True, eq=False)
-class _Way:
+class _Followed:
     """N waypoints as tables, and the continuation from one to the next."""
 
     robot: Robot

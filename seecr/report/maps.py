@@ -55,8 +55,8 @@ def softest_line(found: Workspace) -> Iterator[str]:
     at = found.softest_at
     if at is not None:
         place = " ".join(f"{1e3 * axis[k]:.4g}" for axis, k in zip(found.axes, at, strict=True))
-        way = direction_words(found.robot, found.softest[at])
-        yield f"softest of these at x y z {place} mm: {way}, {found.stiffness[at]:.4g} N/m"
+        direction = direction_words(found.robot, found.softest[at])
+        yield f"softest of these at x y z {place} mm: {direction}, {found.stiffness[at]:.4g} N/m"
 
 
 def sag_lines_of(found: Workspace, effects: Collection[str]) -> Iterator[str]:

@@ -130,13 +130,13 @@ def sag_lines(tables: Tables) -> Iterator[str]:
 
 def stiffness_lines(solution: Solution) -> Iterator[str]:
     """The softest direction of the first pose, its stiffness, and frequencies of vibrations."""
-    soft, way = solution.smallest_eigenvalue[0], softest_words(solution)
+    soft, direction = solution.smallest_eigenvalue[0], softest_words(solution)
     if solution.status[0] is Status.SINGULAR:
-        yield f"free to {way}"
+        yield f"free to {direction}"
     elif solution.status[0] is Status.UNSTABLE:
-        yield f"leaves this pose: {way}"
+        yield f"leaves this pose: {direction}"
     else:
-        yield f"softest direction: {way}, {soft:.4g} N/m{_nudged(solution)}"
+        yield f"softest direction: {direction}, {soft:.4g} N/m{_nudged(solution)}"
     frequencies, shapes = (part[0] for part in solution.modes)
     known = [f"{value:.4g}" for value in frequencies if np.isfinite(value)]
     if known:

@@ -59,9 +59,11 @@ def test_points_that_are_known_in_both_frames_align_them() -> None:
     found = by_points(NAMES, there, here)
     assert found.shift == pytest.approx(SHIFT) and found.free == ("tracker_frame",)
     assert abs(found.turn @ TURN) == pytest.approx(1.0)
-    with pytest.raises(CrosscheckError, match=r"point c is .* m off where the others put it"):
+    with pytest.raises(
+        CrosscheckError, match=r"point c is .* m from where the other points put it"
+    ):
         by_points(NAMES, there + np.outer(np.arange(4) == 2, [0.0, 0.0, 2.0]), here)
-    with pytest.raises(CrosscheckError, match="three or more that are not in one line"):
+    with pytest.raises(CrosscheckError, match="three or more that are not on one line"):
         by_points(NAMES[:3], there[[0, 1, 1]], here[[0, 1, 1]])
 
 
@@ -84,7 +86,7 @@ def test_a_body_that_is_stated_stays_where_it_is() -> None:
     assert found.shift == pytest.approx(SHIFT)
 
 
-@pytest.mark.parametrize(("count", "said"), [(2, "by 2 dwells"), (12, "lie in one line")])
+@pytest.mark.parametrize(("count", "said"), [(2, "by 2 dwells"), (12, "lie on one line")])
 def test_commands_that_show_no_frame_are_refused(count: int, said: str) -> None:
     poses = told(count)
     poses[:, 1:3], poses[:, 3:] = 0.0, NONE

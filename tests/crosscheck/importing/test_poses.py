@@ -32,7 +32,7 @@ def test_a_unit_is_stated_where_names_have_none(tmp_path: Path) -> None:
     assert read_poses(path, "mm").bodies["log"][0] == pytest.approx(np.array([[1, 2, 3]]) * 1e-3)
     with pytest.raises(InputFileError, match="expected a unit in the name of column x"):
         read_poses(path)
-    with pytest.raises(InputError, match=r"the columns of log\.csv say their own"):
+    with pytest.raises(InputError, match=r"the columns of log\.csv state their own"):
         read_poses(log(tmp_path, "t,x_m,y_m,z_m", "0,1,2,3"), "mm")
 
 

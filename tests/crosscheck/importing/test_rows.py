@@ -52,7 +52,7 @@ def test_a_row_that_is_no_row_of_numbers_is_named(tmp_path: Path, text: str, sai
 def test_times_that_do_not_grow_are_two_recordings(tmp_path: Path, times: list[float]) -> None:
     block = Block(rows_of(tmp_path, "t\n1\n2\n"), 0, range(1, 3))
     block.check_times(np.array([1.0, 2.0]), "t")
-    with pytest.raises(InputFileError, match=r"line 3, column t: .* that grow after 1|after 2"):
+    with pytest.raises(InputFileError, match=r"line 3, column t: .* that increase after 1|after 2"):
         block.check_times(np.array(times), "t")
 
 

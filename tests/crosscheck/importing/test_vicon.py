@@ -46,7 +46,7 @@ def test_segments_and_markers_are_read_in_metres(tmp_path: Path) -> None:
 
 def test_a_rotation_of_unknown_meaning_is_refused_unless_nobody_needs_it(tmp_path: Path) -> None:
     path = written(tmp_path, EXPORT)
-    with pytest.raises(InputFileError, match="three numbers for a rotation may mean many things"):
+    with pytest.raises(InputFileError, match="three numbers of a rotation can mean several things"):
         read_vicon(path)
     assert read_vicon(path, bodies_too=False).bodies == {}
 

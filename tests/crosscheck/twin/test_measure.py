@@ -16,7 +16,7 @@ from crosscheck.suite.effects import effect_cases, run_effect
 from crosscheck.twin.chain import hang
 from crosscheck.twin.descent import descend
 from crosscheck.twin.hidden import times
-from crosscheck.twin.lengths import paid_out, way_of
+from crosscheck.twin.lengths import paid_out, waypoints_of
 from crosscheck.twin.measure import measure
 from crosscheck.twin.robot import TRUE_EFFECTS, true_robot
 from crosscheck.twin.springs import Springs
@@ -187,8 +187,8 @@ def test_winches_that_turn_round_between_points_take_up_their_play_there(kind, s
     true = true_robot(robot, backlash)
     found = []
     for waypoints in ((6, 2), (7, 3)):
-        way = way_of(true, commands, waypoints)
-        found.append(paid_out(true, way, None)[way.is_row])
+        path = waypoints_of(true, commands, waypoints)
+        found.append(paid_out(true, path, None)[path.is_row])
     # what 64 parts of a way leave: two ways of looking for the same extrema
     np.testing.assert_allclose(found[0], found[1], rtol=0, atol=1e-9)
     np.testing.assert_allclose(
@@ -200,8 +200,8 @@ def test_winches_that_turn_round_between_points_take_up_their_play_there(kind, s
 def test_a_robot_on_joints_is_led_straight_along_them(seed):
     experiment = experiment_of("jointed", seed=seed, rows=4)
     robot, commands = experiment.robot, experiment.commands
-    way = way_of(true_robot(robot, []), commands, (6, 2))
-    np.testing.assert_allclose(way.pose, experiment.path.commands.pose, atol=1e-12)
+    path = waypoints_of(true_robot(robot, []), commands, (6, 2))
+    np.testing.assert_allclose(path.pose, experiment.path.commands.pose, atol=1e-12)
 
 
 def test_creep_under_a_held_pose_goes_as_kelvin_and_voigt_say():

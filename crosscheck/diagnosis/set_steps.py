@@ -32,7 +32,7 @@ from seecr.pose import Array
 _UNSEEN = 0.98
 
 
-def way_of(sought: SetSearch, names: Names) -> Search:
+def steps_of_set(sought: SetSearch, names: Names) -> Search:
     """Steps to a set of effects, each adding the effect that explains most.
 
     Args:
