@@ -29,7 +29,7 @@ from crosscheck.calibration.stages import Progress
 from crosscheck.fit.possible import can_be, hardly_happens
 from crosscheck.fit.problem import Problem, Rms, kinds_read
 from crosscheck.fit.reasons import DiagnosisVerdict
-from crosscheck.fit.state import evaluate
+from crosscheck.fit.state import State, evaluate
 from crosscheck.measurements.data import Sigma
 from seecr.description.robot import Robot
 from seecr.effects import Term, Terms
@@ -89,26 +89,9 @@ def search_sets(
     surprise = float(np.max(whole.held_out.surprise, initial=0.0))
     smooth = odds > UNKNOWN or surprise > SURPRISE
     catalogue = _catalogue(problem, terms, whole)
-    plain = evaluate(problem, terms, setting.factor)
-    tried = 0
-
-    def compared(unknown: bool, *more: Terms) -> Found:
-        most, rounds = (_REFITTED_UNKNOWN, 1) if unknown else (_REFITTED, ROUNDS)
-
-        def report(text: str) -> None:
-            nonlocal tried
-            tried += 1
-            progress(f"trying {text}", 0.5 + 0.5 * tried / (tried + most))
-
-        return compare_sets(setting, joint, catalogue, plain, report, most, rounds, [*given, *more])
-
-    structure_beside_all = is_not_noise(setting, joint, known)
-    found = compared(structure_beside_all or smooth)
-    not_noise = is_not_noise(setting, found.best.joint, known)
-    if structure_beside_all and not not_noise and not smooth:
-        # what few effects explain, all of them could: their fit ended in a local minimum
-        found = compared(False, found.best.joint.terms)
-        not_noise = is_not_noise(setting, found.best.joint, known)
+    found, not_noise = _compared(
+        whole, catalogue, evaluate(problem, terms, setting.factor), progress, given, known, smooth
+    )
     effects = [n for n in catalogue.names if n not in terms]
     sizes = {name: parameters_counted(catalogue.start(name).layout) for name in effects}
     best = found.best
@@ -134,6 +117,42 @@ def search_sets(
         setting, joint, joint.jacobian * free, joint.width * free
     )  # fmt: skip
     return SetSearch(whole, found, catalogue, classes, odds, shown, said)
+
+
+def _compared(
+    whole: Calibration, catalogue: Catalogue, plain: State, progress: Progress,
+    given: Sequence[Terms], stated: Sequence[str], smooth: bool,
+) -> tuple[Found, bool]:  # fmt: skip
+    """The compared sets, and whether what the best of them takes for noise is not noise.
+
+    Args:
+        whole, catalogue, plain: the fit of all effects, their starts, and the model as it stands.
+        progress, given: as in :func:`search_sets`.
+        stated: names of the kinds of reading whose noise was stated.
+        smooth: whether something smooth and unknown is there beside all effects.
+    """
+    setting, tried = whole.setting, 0
+
+    def compared(unknown: bool, *more: Terms) -> Found:
+        most, rounds = (_REFITTED_UNKNOWN, 1) if unknown else (_REFITTED, ROUNDS)
+
+        def report(text: str) -> None:
+            nonlocal tried
+            tried += 1
+            progress(f"trying {text}", 0.5 + 0.5 * tried / (tried + most))
+
+        return compare_sets(
+            setting, whole.joint, catalogue, plain, report, most, rounds, [*given, *more]
+        )
+
+    structure_beside_all = is_not_noise(setting, whole.joint, stated)
+    found = compared(structure_beside_all or smooth)
+    not_noise = is_not_noise(setting, found.best.joint, stated)
+    if structure_beside_all and not not_noise and not smooth:
+        # what few effects explain, all of them could: their fit ended in a local minimum
+        found = compared(False, found.best.joint.terms)
+        not_noise = is_not_noise(setting, found.best.joint, stated)
+    return found, not_noise
 
 
 def _catalogue(problem: Problem, terms: Terms, whole: Calibration) -> Catalogue:
