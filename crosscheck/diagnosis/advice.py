@@ -25,6 +25,8 @@ from seecr.effects import Term, catalogue
 from seecr.pose import Array, rotvec_from_quat
 from seecr.units import with_error
 
+# [m] No length is measured more finely by hand.
+_LEAST_BY_HAND = 1e-5
 # Most ways that are named to tell two effects apart.
 _MOST_WAYS = 2
 
@@ -43,6 +45,8 @@ class _Sure(float):
         return number
 
     def __format__(self, form: str) -> str:
+        if self == 0.0:
+            return "0"
         if not np.isfinite(self.error):
             return format(float(self), form)
         value = float(self)
@@ -73,7 +77,8 @@ def check_of(term: Term, robot: Robot, stderr: Array | None = None) -> str:
 
     def number(value: float, error: float, unit: str) -> _Sure:
         factor = in_unit(unit)[0]
-        return _Sure(factor * float(value), factor * float(error))
+        least = _LEAST_BY_HAND if unit == "m" else 0.0
+        return _Sure(factor * float(value), factor * max(float(error), least))
 
     for name, unit, value in zip(layout.names, layout.units, term.vector, strict=True):
         values[parameter_name(name, unit)] = number(value, errors[layout.names.index(name)], unit)

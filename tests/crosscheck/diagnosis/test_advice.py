@@ -101,7 +101,7 @@ def test_checks_say_what_to_expect_in_units_for_people() -> None:
         ("platform_mass", {"added_kg": 0.047}, "expect 0.447 kg, not 0.4"),
         ("stiffness", {"factor": 0.5}, "expect E S = {half:.4g} N, not {ea:.4g}"),
         ("cable_stiffness", {"factor_3": 0.5}, "E S = {half:.4g} N, not {ea:.4g}"),
-        ("centre_of_mass", {"shift_z_m": 0.01}, "at (0.0, 0.0, {z:.1f}) mm of its frame, not"),
+        ("centre_of_mass", {"shift_z_m": 0.01}, "at (0, 0, {z:.1f}) mm of its frame, not"),
         ("cable_length_offset", {"offset_2_m": 0.01}, "(offset_2: {longer:.1f} mm paid out, not"),
         ("exit_point_error", {"error_1_x_m": 0.004}, "(error_1_x: {x:.1f} mm, not"),
         ("pulley_radius", {"radius_m": 0.0099}, "expect a radius of 9.9 mm"),
@@ -121,7 +121,7 @@ def test_checks_name_totals(effect: str, values: dict[str, float], expected: str
 @pytest.mark.parametrize(
     ("effect", "values", "error", "expected"),
     [
-        ("pulley_radius", {"radius_m": 0.0099}, 2.3e-6, "a radius of 9.900 mm"),
+        ("pulley_radius", {"radius_m": 0.0099}, 2.3e-6, "a radius of 9.90 mm"),
         ("pulley_radius", {"radius_m": 0.0099}, 2.3e-3, "a radius of 10 mm"),
         ("platform_mass", {"added_kg": 0.047}, 2e-4, "expect 0.4470 kg, not 0.4000"),
         ("platform_mass", {"added_kg": 0.047}, 0.02, "expect 0.45 kg, not 0.40"),
