@@ -4,6 +4,7 @@ from __future__ import annotations
 
 # seecr/statics/solution.py turns them into sentences.
 CONVERGED, UNSTABLE, SINGULAR, STALLED, FALLING, CABLE_LAW, ITERATIONS, SPINNING = range(8)
+NO_LENGTH = 8
 
 # A stiffness below this part of the largest diagonal entry counts as zero.
 SINGULAR_PART = 1e-11

@@ -28,6 +28,7 @@ from seecr.compiled.outcomes import (
     CONVERGED,
     IDLE,
     ITERATIONS,
+    NO_LENGTH,
     SINGULAR,
     STALLED,
     TOLERANCE,
@@ -130,7 +131,13 @@ def descend(
         )  # fmt: skip
 
     in_parts(run, n, threads)
+    _refuse_no_length(tables, out)
     return out
+
+
+def _refuse_no_length(tables: Tables, found: Evaluation) -> None:
+    """Rows in which an effect leaves a cable no length have no result, whatever was computed."""
+    found.outcome[np.any(tables.cables[..., REST] <= 0.0, axis=1)] = NO_LENGTH
 
 
 def evaluate(tables: Tables, at: Evaluation, threads: int | None = 1) -> Evaluation:
@@ -175,6 +182,7 @@ def walk(tables: Tables, path: Path, limit: int) -> Evaluation:
         )  # fmt: skip
 
     run_parts(run, _apart(path, tables))
+    _refuse_no_length(tables, out)
     return out
 
 

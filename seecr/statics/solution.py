@@ -45,6 +45,7 @@ class Status(Enum):
     FALLING = "no equilibrium found: the platform fell beyond the reach of its cables"
     SPINNING = "no equilibrium found: the external moment kept turning the platform"
     CABLE_LAW = "no answer: a cable's own equations have no solution at this pose"
+    NO_LENGTH = "no answer: a cable would have no length left, or less than none, to pay out"
     ITERATIONS = "not at rest: the iteration limit was reached before the forces balanced"
     GAVE_UP = "not at rest: SciPy's solver gave up before the forces balanced"
 
@@ -320,12 +321,14 @@ def certify(robot: Robot, tables: Tables, found: batch.Evaluation) -> Solution:
     status = np.full(len(found.outcome), Status.GAVE_UP, dtype=object)
     for outcome, words in _OF_OUTCOME.items():
         status[found.outcome == outcome] = words
+    no_length = np.any(tables.cables[..., REST] <= 0.0, axis=1)
+    status[no_length] = Status.NO_LENGTH
     balanced = check.residual < TOLERANCE
     status[(status == Status.CONVERGED) & ~balanced] = Status.STALLED
     # not the deviations in ``found``: SciPy's search on joints leaves these at zero
     moved = check.deviation
     turn = np.where(moved[:, 3:4] < 0, -1.0, 1.0) * moved[:, 3:]
-    lost = np.isin(found.outcome, (FALLING, CABLE_LAW, SPINNING))
+    lost = no_length | np.isin(found.outcome, (FALLING, CABLE_LAW, SPINNING))
     return Solution(
         robot=robot,
         tables=tables,
