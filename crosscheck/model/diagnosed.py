@@ -10,10 +10,11 @@ from typing import Any
 from seecr.description.fingerprint import check_robot
 from seecr.description.robot import Robot
 from seecr.effects import Term, Terms
+from seecr.effects.limits import limits_of
 from seecr.errors import InputError, InputFileError
 from seecr.files import read_text
 from seecr.made import digits_of
-from seecr.prediction.cells import limits_of, number_of
+from seecr.prediction.cells import number_of
 
 __all__ = ["load_diagnosed"]
 

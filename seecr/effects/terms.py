@@ -16,6 +16,7 @@ from seecr.description.given import GivenRobot
 from seecr.description.robot import Robot
 from seecr.effects.base import Effect, Layout
 from seecr.effects.knowledge import Knowledge
+from seecr.effects.limits import limits_of
 from seecr.effects.own_values import Own
 from seecr.effects.registry import catalogue, layout_of
 from seecr.errors import InputError
@@ -58,12 +59,12 @@ class Term:
             values: by the parameters' names, such as ``radius_m=0.01`` or ``gain_3=0.002``.
 
         Raises:
-            InputError: no such effect, or no such parameter.
+            InputError: no such effect, no such parameter, or a value that no robot has.
         """
         layout = layout_of(name, robot)
         vector = layout.null.copy()
         for key, value in values.items():
-            vector[_place_of(layout, key)] = finite(value, key)
+            vector[_place_of(layout, key)] = _within(layout, key, value)
         return cls(layout, vector)
 
     def with_vector(self, values: Array) -> Term:
@@ -87,7 +88,8 @@ class Term:
             values: (value, standard error) by the parameters' names; fits start at the value.
 
         Raises:
-            InputError: no such parameter, or an error that is not above zero.
+            InputError: no such parameter, a value that no robot has, or an error that is not above
+                zero.
         """
         vector, known = self.vector.copy(), self.knowledge
         value, stderr = known.value.copy(), known.stderr.copy()
@@ -97,7 +99,7 @@ class Term:
                     f"effect {self.name}: {key}: expected a standard error above 0, got {error!r}"
                 )
             k = _place_of(self.layout, key)
-            vector[k] = value[k] = number
+            vector[k] = value[k] = _within(self.layout, key, number)
             stderr[k] = error
         return replace(self, vector=vector, knowledge=replace(known, value=value, stderr=stderr))
 
@@ -122,6 +124,16 @@ class Term:
     def is_possible(self, robot: Robot) -> bool:
         """Whether the robot can have it: no negative mass, no wheel larger than its cable."""
         return all(total.possible for total in self.effect().totals(robot).values())
+
+
+def _within(layout: Layout, key: str, value: float) -> float:
+    """A value within the limits of a parameter."""
+    number = float(finite(value, key))
+    low, high = limits_of(layout, _place_of(layout, key))
+    if not low <= number <= high:
+        given = f"effect {layout.name}: {key} = {number:g}"
+        raise InputError(f"{given} is out of bounds; expected {low:g} to {high:g}")
+    return number
 
 
 def _place_of(layout: Layout, key: str) -> int:

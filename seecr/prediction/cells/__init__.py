@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from seecr.prediction.cells.cell import UNSEEN, Where, nearest_first, number_of
-from seecr.prediction.cells.limits import limits_of
 from seecr.prediction.cells.table import term_of
 
-__all__ = ["UNSEEN", "Where", "limits_of", "nearest_first", "number_of", "term_of"]
+__all__ = ["UNSEEN", "Where", "nearest_first", "number_of", "term_of"]

@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Any
 
 from seecr.effects.base import Layout
+from seecr.effects.limits import limits_of
 from seecr.errors import InputFileError
 from seecr.pose import LARGEST
-from seecr.prediction.cells.limits import limits_of
 
 UNSEEN = "unseen"
 """Stands for an infinite standard error."""

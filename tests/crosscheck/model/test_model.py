@@ -15,8 +15,8 @@ from crosscheck.model.write import Provenance, calibrated, renewed, save_model, 
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.effects import catalogue, layout_of
+from seecr.effects.limits import limits_of
 from seecr.errors import InputFileError
-from seecr.prediction.cells import limits_of
 from seecr.prediction.experiment import predict
 from seecr.prediction.model import load_model, new_model
 from seecr.prediction.uncertainty import covariance_of

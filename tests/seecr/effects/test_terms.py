@@ -112,3 +112,11 @@ def test_the_effects_have_the_values() -> None:
 def test_a_term_without_a_layout_is_refused() -> None:
     with pytest.raises(InputError, match="expected an effect's layout and its values, got 'creep'"):
         Term("creep", np.zeros(2))  # type: ignore[arg-type]
+
+
+def test_values_that_no_robot_has_are_refused() -> None:
+    with pytest.raises(InputError, match=r"platform_mass: added_kg = -10 is out of bounds"):
+        Term.of(ROBOT, "platform_mass", added_kg=-10.0)
+    mass = Term.of(ROBOT, "platform_mass", added_kg=0.01)
+    with pytest.raises(InputError, match=r"added_kg = 1e\+09 is out of bounds"):
+        mass.measured(added_kg=(1e9, 1.0))

@@ -1,4 +1,4 @@
-"""How large the values in a model's file may be.
+"""How large the values of an effect may be, in a model's file or by name.
 
 Most parameters have physical bounds in their effect; these limits are for the others. They are far
 beyond anything that a robot can have, so they only stop typing errors, units and damaged files,
@@ -17,7 +17,7 @@ _SIZES, _SIZES_READ, _TURN = 1e4, 1e5, 2.0 * np.pi
 
 
 def limits_of(layout: Layout, i: int) -> tuple[float, float]:
-    """The lowest and the highest value that parameter i may have in a model's file."""
+    """The lowest and the highest value that parameter i may have."""
     lower, upper = float(layout.lower[i]), float(layout.upper[i])
     if layout.shape[i]:  # its bounds are its search range
         return lower, upper
