@@ -273,4 +273,6 @@ def _axis_of(text: str) -> NDArray[np.float64]:
             f"--grid: expected FIRST:LAST:COUNT with a count above zero, or one number [m], "
             f"got {text!r}"
         ) from None
-    return np.linspace(first, last, min(count, _MOST_POSES + 1))
+    from seecr.workspace.maps import evenly  # takes a while to import
+
+    return evenly(first, last, min(count, _MOST_POSES + 1))

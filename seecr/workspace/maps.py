@@ -50,9 +50,15 @@ def default_axes(robot: GivenRobot, values: int | None = None) -> tuple[Array, A
     down = np.abs(robot.up) > 0.5
     low = np.where(down, np.minimum(low, mirrored), low)
     return tuple(
-        np.linspace(a, b, values) if b - a > 1e-9 * robot.length else np.array([a])
-        for a, b in zip(low, high, strict=True)
+        evenly(a, b, values) if b - a > 1e-9 * robot.length else np.array([a])
+        for a, b in zip(low.tolist(), high.tolist(), strict=True)
     )  # type: ignore[return-value]
+
+
+def evenly(low: float, high: float, count: int) -> Array:
+    """Evenly spread numbers, with a 0 where rounding leaves almost 0."""
+    numbers = np.linspace(low, high, count)
+    return np.where(np.abs(numbers) < 1e-12 * (high - low), 0.0, numbers)
 
 
 def workspace_map(

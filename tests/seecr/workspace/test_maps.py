@@ -470,3 +470,12 @@ def test_a_figure_promises_an_edge_only_where_it_draws_one(tmp_path: Path) -> No
         path = tmp_path / f"{name}.svg"
         map_figure(path, replace(found, margin=margins))
         assert ("orange" in path.read_text()) == (name == "edge")
+
+
+def test_the_default_grid_has_a_zero_and_no_rounding_beside_it() -> None:
+    robot = robot_named("demobot_cogiro")
+    high = np.array(robot.exit_points)
+    high[:, 2] += 2.0 - high[:, 2].max()
+    lifted = replace(robot, exit_points=high, reference_pose=np.array([0.4, 0.25, 0.8, 1, 0, 0, 0]))
+    z = default_axes(lifted, 13)[2]  # from -0.4 to 2: linspace gives 5.6e-17 in place of 0
+    assert z[[0, 2, -1]].tolist() == [pytest.approx(-0.4), 0.0, 2.0]
