@@ -24,6 +24,9 @@ from seecr.pose import Array
 # A set: the prior width of each effect in it.
 Widths = Mapping[str, float]
 
+# Most rounds through the members when their widths are chosen.
+_ROUNDS = 3
+
 
 @dataclass(frozen=True, eq=False)
 class ColumnGroup:
@@ -149,17 +152,16 @@ class Solved:
         return np.arange(first, first + counts[at])
 
 
-def best_widths(gram: Gram, start: Widths, sweeps: int = 3, price: float = 0.0) -> dict[str, float]:
+def best_widths(gram: Gram, start: Widths, price: float = 0.0) -> dict[str, float]:
     """Widths of a set's members that maximise its evidence, by coordinate ascent.
 
     Args:
         gram: normal equations of all effects.
         start: the set with its initial widths.
-        sweeps: most rounds through the members.
         price: a width is only changed if that gains more than this ln evidence.
     """
     chosen = dict(start)
-    for _ in range(sweeps):
+    for _ in range(_ROUNDS):
         before = dict(chosen)
         for name, width in before.items():
             widths = gram.groups[name].widths

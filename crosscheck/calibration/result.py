@@ -13,7 +13,7 @@ from crosscheck.calibration.all_effects import Calibration, JointErrors, fit_all
 from crosscheck.errors import CrosscheckError, UnsolvedError
 from crosscheck.fit.prepare import Progress, prepare
 from crosscheck.fit.thinned import thinned
-from crosscheck.fit.words import fitted_lines, fitted_records, rms_words
+from crosscheck.fit.words import fitted_records, rms_words
 from crosscheck.given import GivenModel, GivenRobot, basis_of, considered, model_of, robot_of
 from crosscheck.measurements.read import GivenData, measurements_of
 from crosscheck.model.fitted import Fitted
@@ -94,10 +94,6 @@ class Calibrated(Result, JointErrors):
             *self.noise_lines(),
         ]
         return [*out, *(f"note: {note}" for note in self.notes)]
-
-    def value_lines(self) -> list[str]:
-        """A line for each parameter, with its standard error."""
-        return fitted_lines(self.fitted)
 
     def records(self) -> Sequence[Record]:
         """A record for each parameter: value and standard error, SI."""

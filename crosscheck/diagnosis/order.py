@@ -52,6 +52,11 @@ class Step:
         """The candidates that were tried beside it."""
         return self.node.candidates
 
+    @property
+    def tried(self) -> int:
+        """How many effects were tried beside it."""
+        return sum(1 for c in self.candidates if c.fit is not None or c.drop)
+
 
 def step_of(trials: Trials, added: str, node: Node) -> Step:
     """A node with its errors on held-out runs."""

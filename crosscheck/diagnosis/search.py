@@ -82,7 +82,7 @@ class Search:
     @property
     def tried(self) -> int:
         """How many effects were tried beside the model as it stood."""
-        return len([c for c in self.steps[0].candidates if c.fit is not None or c.drop])
+        return self.steps[0].tried
 
     @property
     def last(self) -> Step:

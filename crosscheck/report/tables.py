@@ -58,7 +58,7 @@ def checks(found: Diagnosis) -> list[Check]:
 
 def _of_effects(found: Diagnosis) -> list[Check]:
     assert found.search is not None
-    tried = _tried(found.search.steps[0])
+    tried = found.search.tried
     steps = [stage.step for stage in itertools.takewhile(lambda s: s.listed, stages_of(found))]
     if len(steps) == 1:
         smallest = min((c.p for c in steps[0].candidates if c.drop > 0), default=1.0)
@@ -83,10 +83,6 @@ def _of_effects(found: Diagnosis) -> list[Check]:
     ]  # fmt: skip
 
 
-def _tried(step: Step) -> int:
-    return len([c for c in step.candidates if c.fit is not None or c.drop])
-
-
 def _better_runs(steps: list[Step]) -> tuple[int, int]:
     """Runs left out whose error falls with every effect that was added, and all."""
     falls = [a.held_out.chi2 - b.held_out.chi2 for a, b in itertools.pairwise(steps)]
@@ -108,7 +104,7 @@ def _chance(before: Step, after: Step) -> float:
     """Chance of the fall of chi2, for as many effects as were tried."""
     count = len(after.fit.terms[after.added].layout)
     p = p_value(before.whiteness.chi2 - after.whiteness.chi2, count, False)
-    return min(1.0, p * max(_tried(before), 1))
+    return min(1.0, p * max(before.tried, 1))
 
 
 @dataclass(frozen=True)
