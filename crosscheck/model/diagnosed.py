@@ -10,7 +10,6 @@ from typing import Any
 from seecr.description.fingerprint import check_robot
 from seecr.description.robot import Robot
 from seecr.effects import Term, Terms
-from seecr.effects.limits import limits_of
 from seecr.errors import InputError, InputFileError
 from seecr.files import read_text
 from seecr.made import digits_of
@@ -99,11 +98,4 @@ def _term(path: Path, item: Any, robot: Robot) -> Term:
         raise InputFileError.at(
             path, f"effect {name}: expected a number for {lacking[0]}; is it of another robot?"
         )
-    for i, (key, value) in enumerate(zip(term.layout.names, term.vector, strict=True)):
-        low, high = limits_of(term.layout, i)
-        if not low <= value <= high:
-            raise InputFileError.at(
-                path,
-                f"effect {name}: {key}: {value:g} is out of bounds; expected {low:g} to {high:g}",
-            )
     return term

@@ -30,7 +30,7 @@ from seecr.workspace.margins import margins_at, read_once
 Progress = Callable[[int], None]
 """Called with the number of poses done since the last call."""
 
-__all__ = ["default_axes", "workspace_map"]
+__all__ = ["default_axes", "evenly", "workspace_map"]
 
 # Poses per part.
 _PART = 5_000
