@@ -20,6 +20,7 @@ from crosscheck.fit.problem import Problem
 from crosscheck.fit.state import evaluate
 from seecr.description.mjcf import load_robot
 from seecr.effects import Term, Terms, effect_named, layout_of
+from seecr.effects.base import mean_length
 
 ROBOT = load_robot(COGIRO)
 DRUMS = "drum_eccentricity"
@@ -96,3 +97,20 @@ def test_what_promises_most_of_many_shapes_is_worth_their_mean() -> None:
     free = Scores(scores.gram, scores.of)
     assert free.score(alone_in) - scores.score(alone_in) == pytest.approx(found.price)
     assert scores.neighbours(alone_in)[none] == pytest.approx(free.neighbours(alone_in)[none])
+
+
+@pytest.mark.parametrize("part", [0.06, 0.15])
+def test_drums_are_found_that_are_small_or_large_beside_the_cables(part: float) -> None:
+    """50 mm of radius are a sixth of the cables of a robot on a desk."""
+    radius = part * mean_length(ROBOT)
+    hidden = term(ROBOT, DRUMS, sine_2_m=2e-3, cosine_5_m=2e-3, drum_radius_m=radius)
+    data = measured(ROBOT, [hidden], points=6)
+    setting = setting_of(Problem(ROBOT, data, SIGMA, np.ones(data.n_rows, dtype=bool)))
+    plain = settle(setting, evaluate(setting.problem, Terms(), setting.factor), np.zeros(0), WHITE)
+    (found,) = promising_beside(setting, plain, [LAYOUT])
+    terms = Terms([found.term])
+    joint = settle(
+        setting, evaluate(setting.problem, terms, setting.factor), widths_of(terms), WHITE
+    )
+    fitted = joint.terms[DRUMS].vector[LAYOUT.names.index("drum_radius_m")]
+    assert fitted == pytest.approx(radius, rel=0.05)

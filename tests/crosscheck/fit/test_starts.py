@@ -13,6 +13,7 @@ from crosscheck.fit.candidates import Trials, candidates_for, fit_candidate, nul
 from crosscheck.fit.gauss_newton import fit
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.starts import equation_start, starts_of
+from crosscheck.measurements.data import Sigma
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.effects import Terms
@@ -54,6 +55,18 @@ def test_it_leads_where_the_derivative_at_null_does_not(case) -> None:
     assert reached[0].chi2 > 10 * noise
     far = (reached[1].terms.vector - OFFSETS) / reached[1].stderr
     assert np.all(np.abs(far) < 4.5)
+
+
+def test_of_many_shapes_the_chance_is_never_above_one() -> None:
+    robot = load_robot(COGIRO)
+    exact = Sigma(position_m=1e-12, orientation_rad=1e-12)
+    data = measured(robot, [], points=6, sigma=exact)  # nothing is left for any shape to explain
+    problem = Problem(robot, data, SIGMA, np.ones(data.n_rows, dtype=bool))
+    factor = problem.noise(problem.experiment.predict())
+    base = null_fit(problem, Terms(), factor, refit=False)
+    tried = screen(Trials(problem, factor), base, layout_named(problem, "drum_eccentricity"))
+    assert tried.starts is not None and tried.starts.shapes > 10
+    assert tried.p == 1.0
 
 
 def test_what_a_weight_does_is_seen_where_its_derivative_says_the_contrary() -> None:

@@ -643,7 +643,7 @@ def test_what_history_does_not_go_with_is_said(cogiro):
 def test_a_cable_without_any_length_left_is_no_equilibrium(method: str, history: bool) -> None:
     """Formulas go on below a length of 0, with tensions of either sign."""
     robot = load_robot(model_path("demobot_parallel"))
-    shorter = Term.of(robot, "cable_length_offset", offset_1_m=-1.2 * robot.rest_lengths[0])
+    shorter = Term.of(robot, "cable_length_offset", offset_1_m=-2.0 * robot.rest_lengths[0])
     effects = [shorter, *([Term.of(robot, "backlash", gap_m=1e-3)] if history else [])]
     found = solve(robot, robot.reference_pose[None], effects=effects, method=method)
     assert found.status[0] is Status.NO_LENGTH
