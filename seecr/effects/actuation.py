@@ -13,8 +13,9 @@ from seecr.effects.setup import Setup
 from seecr.effects.totals import Total
 from seecr.pose import Array, pose_add
 
-# Largest radius of a drum, as a part of the mean cable length.
-_LARGEST = 0.25
+# Largest radius of a drum, as a part of the mean cable length. Drums of a quarter of it, which turn
+# half a turn in the data, imitated a platform that bends.
+_LARGEST = 0.12
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,8 +122,8 @@ class DrumEccentricity(Effect):
     """An eccentric drum adds a sine of its angle to the paid-out length.
 
     l0_i += sine_i sin(a) + cosine_i (cos(a) - 1), a = (commanded change)/radius; zero at the
-    zero of the winch. Radii up to a quarter of the mean cable length are considered: beyond, the
-    travel turns a drum so little that its sine acts like a gain.
+    zero of the winch. Radii up to 12 % of the mean cable length are considered: a larger drum turns
+    so little that its sine imitates whatever varies smoothly with a cable's length.
     """
 
     name: ClassVar[str] = "drum_eccentricity"
