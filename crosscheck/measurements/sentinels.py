@@ -15,6 +15,7 @@ _FAR, _TURNS = 100.0, 10.0 * 2.0 * np.pi
 _NINES, _ROWS = 3, 4
 
 _REMEDY = "leave the cells empty where nothing was read"
+_SURVEY = ", and subtract a constant from coordinates in a survey's grid"
 
 
 def refuse_sentinels(columns: Columns, robot: Robot) -> None:
@@ -26,7 +27,7 @@ def refuse_sentinels(columns: Columns, robot: Robot) -> None:
     far = _FAR * robot.reach
     near = f"within {far:.3g} m of the robot"
     for axis, home in zip(POSITION, robot.reference_pose[:3], strict=True):
-        _refuse_beyond(columns, f"meas_{axis}", float(home), far, near)
+        _refuse_beyond(columns, f"meas_{axis}", float(home), far, near, _SURVEY)
     for angle in ANGLES:
         _refuse_beyond(columns, f"meas_{angle}", 0.0, _TURNS, "of at most ten turns")
     tensions = [f"tension_{i + 1}" for i in range(robot.n_cables)]
@@ -35,7 +36,9 @@ def refuse_sentinels(columns: Columns, robot: Robot) -> None:
             _refuse_nines(columns, quantity)
 
 
-def _refuse_beyond(columns: Columns, quantity: str, home: float, most: float, where: str) -> None:
+def _refuse_beyond(
+    columns: Columns, quantity: str, home: float, most: float, where: str, more: str = ""
+) -> None:
     if quantity not in columns.known:
         return
     column, values = columns.known[quantity], columns.numbers(quantity, blank_is_nan=True)
@@ -44,7 +47,8 @@ def _refuse_beyond(columns: Columns, quantity: str, home: float, most: float, wh
         np.abs(values - home) > most,
         quantity,
         lambda row: (
-            f"expected a reading {where}, got {given[row]:.10g} {column.unit.suffix}; {_REMEDY}"
+            f"expected a reading {where}, got {given[row]:.10g} {column.unit.suffix}; "
+            f"{_REMEDY}{more}"
         ),
     )
 

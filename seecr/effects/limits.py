@@ -25,3 +25,11 @@ def limits_of(layout: Layout, i: int) -> tuple[float, float]:
     most = _TURN if layout.units[i] == "rad" else sizes * float(layout.scale[i])
     null = float(layout.null[i])
     return max(lower, null - most), min(upper, null + most)
+
+
+def beyond(layout: Layout, i: int, value: float) -> str:
+    """What is wrong with a value that parameter i cannot have; "" if nothing is."""
+    low, high = limits_of(layout, i)
+    if low <= value <= high:
+        return ""
+    return f"{value:g} is out of bounds; expected {low:g} to {high:g}"

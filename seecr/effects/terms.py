@@ -16,7 +16,7 @@ from seecr.description.given import GivenRobot
 from seecr.description.robot import Robot
 from seecr.effects.base import Effect, Layout
 from seecr.effects.knowledge import Knowledge
-from seecr.effects.limits import limits_of
+from seecr.effects.limits import beyond
 from seecr.effects.own_values import Own
 from seecr.effects.registry import catalogue, layout_of
 from seecr.errors import InputError
@@ -64,7 +64,8 @@ class Term:
         layout = layout_of(name, robot)
         vector = layout.null.copy()
         for key, value in values.items():
-            vector[_place_of(layout, key)] = _within(layout, key, value)
+            k = _place_of(layout, key)
+            vector[k] = _within(layout, k, value)
         return cls(layout, vector)
 
     def with_vector(self, values: Array) -> Term:
@@ -99,7 +100,7 @@ class Term:
                     f"effect {self.name}: {key}: expected a standard error above 0, got {error!r}"
                 )
             k = _place_of(self.layout, key)
-            vector[k] = value[k] = _within(self.layout, key, number)
+            vector[k] = value[k] = _within(self.layout, k, number)
             stderr[k] = error
         return replace(self, vector=vector, knowledge=replace(known, value=value, stderr=stderr))
 
@@ -126,13 +127,12 @@ class Term:
         return all(total.possible for total in self.effect().totals(robot).values())
 
 
-def _within(layout: Layout, key: str, value: float) -> float:
-    """A value within the limits of a parameter."""
-    number = float(finite(value, key))
-    low, high = limits_of(layout, _place_of(layout, key))
-    if not low <= number <= high:
-        given = f"effect {layout.name}: {key} = {number:g}"
-        raise InputError(f"{given} is out of bounds; expected {low:g} to {high:g}")
+def _within(layout: Layout, k: int, value: float) -> float:
+    """A value within the limits of parameter k."""
+    name = layout.names[k]
+    number = float(finite(value, name))
+    if wrong := beyond(layout, k, number):
+        raise InputError(f"effect {layout.name}: {name}: {wrong}")
     return number
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from seecr.effects.base import Layout
-from seecr.effects.limits import limits_of
+from seecr.effects.limits import beyond
 from seecr.errors import InputFileError
 from seecr.pose import LARGEST
 
@@ -122,9 +122,8 @@ class _Reader:
         value = number_of(given)
         if value is None:
             raise self.error(f"{what}expected a number, got {given!r}")
-        low, high = limits_of(self.layout, self.i)
-        if not low <= value <= high:
-            raise self.error(f"{what}{value:g} is out of bounds; expected {low:g} to {high:g}")
+        if wrong := beyond(self.layout, self.i, value):
+            raise self.error(f"{what}{wrong}")
         return value
 
     def _fixed(self, table: Mapping[str, Any]) -> bool:

@@ -216,7 +216,8 @@ REFUSED = {
     "another world": (
         [POSE.replace("_x_m", "_x_mm"), "0,0,0,0", "0,0,0,-999999"],
         r"line 3, column meas_x_mm: expected a reading within \d+ m of the robot, got -999999 mm; "
-        "leave the cells empty where nothing was read$",
+        "leave the cells empty where nothing was read, and subtract a constant from coordinates in "
+        "a survey's grid$",
     ),
     "thousands of turns": (
         [POSE.replace("meas_x_m", "meas_rx_deg"), "0,0,0,9999.5"],

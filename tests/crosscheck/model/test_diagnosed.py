@@ -59,7 +59,7 @@ def test_that_of_another_robot_is_refused(tmp_path: Path, other: str, words: str
 def test_a_value_beyond_all_sizes_is_refused(tmp_path: Path) -> None:
     path = diagnosis(tmp_path)
     path.write_text(path.read_text().replace('"value": 0.01', '"value": 1e3'))
-    with pytest.raises(InputFileError, match=r"radius_m = 1000 is out of bounds; expected 0 to"):
+    with pytest.raises(InputFileError, match=r"radius_m: 1000 is out of bounds; expected 0 to"):
         load_diagnosed(path, ROBOT)
 
 

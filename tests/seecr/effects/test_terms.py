@@ -115,8 +115,8 @@ def test_a_term_without_a_layout_is_refused() -> None:
 
 
 def test_values_that_no_robot_has_are_refused() -> None:
-    with pytest.raises(InputError, match=r"platform_mass: added_kg = -10 is out of bounds"):
+    with pytest.raises(InputError, match=r"platform_mass: added_kg: -10 is out of bounds"):
         Term.of(ROBOT, "platform_mass", added_kg=-10.0)
     mass = Term.of(ROBOT, "platform_mass", added_kg=0.01)
-    with pytest.raises(InputError, match=r"added_kg = 1e\+09 is out of bounds"):
+    with pytest.raises(InputError, match=r"added_kg: 1e\+09 is out of bounds"):
         mass.measured(added_kg=(1e9, 1.0))
