@@ -30,6 +30,12 @@ def pytest_sessionstart(session: pytest.Session) -> None:
         compile_all()
 
 
+def pytest_itemcollected(item: pytest.Item) -> None:
+    """Sweeps and benchmarks are slow as well: `-m 'not slow'` replaces what leaves them out."""
+    if item.get_closest_marker("sweep") or item.get_closest_marker("benchmark"):
+        item.add_marker(pytest.mark.slow)
+
+
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """What takes long comes first: no worker is to begin it when the others are done.

@@ -93,6 +93,7 @@ class Adding(Effect):
         setup.mass = setup.mass + self.added
 
 
+@pytest.mark.slow
 def test_threads_may_ask_at_once() -> None:
     """Derivatives along a way ask for each parameter's setup in threads of their own."""
     base = plain()
