@@ -53,6 +53,12 @@ def _weights(row: NDArray[np.int64], residual: Array, scale: float) -> Array:
     return np.asarray((1.0 - off + off * least)[group])
 
 
+def log_chance_of_outliers(chain: Chain, weight: Array) -> float:
+    """ln prior odds of these outliers, and no others, over none."""
+    count = outliers_by_kind(chain, weight, int(chain.row.max(initial=-1)) + 1).sum()
+    return float(count * np.log(_CHANCE / (1.0 - _CHANCE)))
+
+
 def outliers(chain: Chain, weight: Array, n_rows: int) -> NDArray[np.bool_]:
     """(n,) bool rows in which some kind of reading hardly counts."""
     return np.asarray(outliers_by_kind(chain, weight, n_rows).any(axis=1))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,9 +14,11 @@ from crosscheck.calibration.equals import parameters_counted
 from crosscheck.calibration.field import UNKNOWN, log_odds
 from crosscheck.calibration.imitated import field_in_place
 from crosscheck.calibration.joining import layouts
+from crosscheck.calibration.joint import JointFit
 from crosscheck.calibration.judgement import SURPRISE, Judgement, judge
 from crosscheck.calibration.linearised import free_of
 from crosscheck.calibration.not_noise import is_not_noise
+from crosscheck.calibration.own_noise import noise_of_fewer
 from crosscheck.calibration.probability import (
     Classes,
     alike_beyond,
@@ -133,7 +135,7 @@ def _compared(
     """
     setting, tried = whole.setting, 0
 
-    def compared(unknown: bool, *more: Terms) -> Found:
+    def compared(unknown: bool, *more: Terms, joint: JointFit = whole.joint) -> Found:
         most, rounds = (_REFITTED_UNKNOWN, 1) if unknown else (_REFITTED, ROUNDS)
 
         def report(text: str) -> None:
@@ -141,9 +143,7 @@ def _compared(
             tried += 1
             progress(f"trying {text}", 0.5 + 0.5 * tried / (tried + most))
 
-        return compare_sets(
-            setting, whole.joint, catalogue, plain, report, most, rounds, [*given, *more]
-        )
+        return compare_sets(setting, joint, catalogue, plain, report, most, rounds, [*given, *more])
 
     structure_beside_all = is_not_noise(setting, whole.joint, stated)
     found = compared(structure_beside_all or smooth)
@@ -152,6 +152,12 @@ def _compared(
         # what few effects explain, all of them could: their fit ended in a local minimum
         found = compared(False, found.best.joint.terms)
         not_noise = is_not_noise(setting, found.best.joint, stated)
+    if not (not_noise or smooth):
+        fewer = noise_of_fewer(setting, found)
+        if fewer is not None:
+            joint = replace(whole.joint, colour=fewer.colour, weight=fewer.weight)
+            found = compared(False, fewer.terms, joint=joint)
+            not_noise = is_not_noise(setting, found.best.joint, stated)
     return found, not_noise
 
 

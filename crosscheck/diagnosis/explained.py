@@ -11,6 +11,7 @@ from crosscheck.calibration.alternatives import alternatives
 from crosscheck.calibration.equals import EQUAL
 from crosscheck.calibration.exact import Refit
 from crosscheck.calibration.judgement import Judgement
+from crosscheck.calibration.robust import outliers
 from crosscheck.calibration.search import SetSearch
 from crosscheck.calibration.sets import Names
 from crosscheck.diagnosis.advice import check_of
@@ -64,7 +65,7 @@ def explained(sought: SetSearch, notes: Sequence[str]) -> Diagnosis:
         before=sought.calibration.before,
         floor=_floor(sought),
         candidates=_not_listed(search, chances),
-        notes=(*notes, *_noise_notes(sought, chances), *_size_notes(sought), *([MORE] * more)),
+        notes=(*notes, *_noise_notes(sought), *_size_notes(sought), *([MORE] * more)),
         chances=chances,
         where=where_of(search) if imitated else (),
         alternatives=some,
@@ -118,21 +119,20 @@ def _rival(sought: SetSearch, own: Refit, swapped: Refit, other: str) -> Rival:
 
 def _floor(sought: SetSearch) -> Rms:
     """The rms errors of the noise at its estimated size."""
-    setting, joint = sought.calibration.setting, sought.calibration.joint
-    floor = noise_floor(setting.problem, joint.state)
-    scale = joint.colour.scale
+    floor = noise_floor(sought.calibration.setting.problem, sought.calibration.joint.state)
+    scale = sought.found.best.joint.colour.scale
     return {
         kind.key: None if floor[kind.key] is None else float(scale[k]) * (floor[kind.key] or 0.0)
         for k, kind in enumerate(KINDS)
     }
 
 
-def _noise_notes(sought: SetSearch, chances: Chances) -> list[str]:
+def _noise_notes(sought: SetSearch) -> list[str]:
     """Notes about noise that is not as stated, and about lines that hardly count."""
-    out, together = [], chances.together
-    assert together is not None
-    for name, scale in together.scale.items():
-        rho = together.rho[name]
+    out, setting, joint = list[str](), sought.calibration.setting, sought.found.best.joint
+    scales, rhos = joint.colour.by_kind(setting.problem)
+    for name, scale in scales.items():
+        rho = rhos[name]
         if abs(scale - 1.0) > OTHER or rho > _ALIKE:
             alike = (
                 (f", with a correlation of {rho:.2f} from row to row of a run")
@@ -140,9 +140,9 @@ def _noise_notes(sought: SetSearch, chances: Chances) -> list[str]:
                 else ""
             )
             out.append(f"noise of the {name}: {scale:.2f} times the assumed noise{alike}")
-    rows = sought.calibration.outliers
+    rows = outliers(setting.chain, joint.weight, setting.problem.data.n_rows)
     if rows.any():
-        lines = sought.calibration.setting.problem.data.lines_of(rows)
+        lines = setting.problem.data.lines_of(rows)
         out.append(f"outliers, given little weight and not included in these errors: {lines}")
     return out
 

@@ -1,0 +1,69 @@
+"""Noise that the fit of all effects follows is not taken for effects."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_data import COGIRO, measured, term
+
+from crosscheck.calibration import search
+from crosscheck.calibration.all_effects import Calibration, fit_all_effects
+from crosscheck.calibration.colour import Colour
+from crosscheck.calibration.search import SetSearch, search_sets
+from crosscheck.fit.prepare import prepare
+from crosscheck.given import considered
+from crosscheck.measurements.data import Measurements, Sigma
+from seecr.description.mjcf import load_robot
+from seecr.effects import Terms
+from seecr.pose import Array
+
+pytestmark = pytest.mark.slow
+
+ROBOT = load_robot(COGIRO)
+FEW = ("pulley_radius", "gravity_tilt", "drum_gain", "cable_length_offset", "tracker_target")
+SIGMA = Sigma(position_m=1e-4)
+
+
+def alike(run: Array, rng: np.random.Generator) -> Array:
+    """Noise (n, 3) of one standard deviation, of which 0.8 passes from each row to the next."""
+    out = rng.standard_normal((len(run), 3))
+    for k in range(1, len(run)):
+        if run[k] == run[k - 1]:
+            out[k] = 0.8 * out[k - 1] + 0.6 * out[k]
+    return out
+
+
+def correlated() -> Measurements:
+    """Positions of few rows, beside a pulley, with correlated noise of half the stated size."""
+    quiet = Sigma(position_m=1e-12, orientation_rad=1e-12)
+    data = measured(ROBOT, [term(ROBOT, "pulley_radius", radius_m=0.006)], points=12, sigma=quiet)
+    noise = 0.5 * SIGMA.position_m * alike(data.run, np.random.default_rng(3))
+    return replace(data, position=data.position + noise, quat_wxyz=None, sigma=SIGMA)
+
+
+def sought(data: Measurements) -> SetSearch:
+    ready = prepare(ROBOT, data, Terms(), considered(FEW))
+    assert ready.refusal is None
+    return search_sets(ready.problem, SIGMA)
+
+
+def test_noise_that_all_effects_followed_is_found_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The joint fit is made to believe that what it leaves is small and not correlated."""
+
+    def followed(*args: object) -> Calibration:
+        found = fit_all_effects(*args)  # type: ignore[arg-type]
+        small = Colour(np.array([0.25, 1.0, 1.0]), np.zeros(3))
+        return replace(found, joint=replace(found.joint, colour=small))
+
+    monkeypatch.setattr(search, "fit_all_effects", followed)
+    monkeypatch.setattr(search, "is_not_noise", lambda _setting, _joint, _stated: False)
+    monkeypatch.setattr(search, "log_odds", lambda _setting, _joint, _stated: -5.0)
+    data = correlated()
+    found = sought(data)
+    assert found.found.best.names == {"pulley_radius"}
+    noise = found.found.best.joint.colour
+    assert noise.scale[0] == pytest.approx(0.5, rel=0.3) and noise.rho[0] > 0.6
+    monkeypatch.setattr(search, "noise_of_fewer", lambda _setting, _found: None)
+    assert sought(data).found.best.names > {"pulley_radius"}
