@@ -163,7 +163,7 @@ class Exact:
         state = evaluate(self.setting.problem, start, self.setting.factor, self.plain)
         if not state.valid:
             return None
-        found = settle(self.setting, state, _width(start, widths), self.joint.colour, _STEPS)
+        found = settle(self.setting, state, width_of(start, widths), self.joint.colour, _STEPS)
         return _scored(self.setting, found, names, widths, scores)
 
 
@@ -192,7 +192,8 @@ def _off_bound(term: Term) -> Term:
     return term.with_vector(np.where(pressed, term.vector + 0.03 * layout.scale, term.vector))
 
 
-def _width(terms: Terms, widths: dict[str, float]) -> Array:
+def width_of(terms: Terms, widths: Mapping[str, float]) -> Array:
+    """(p,) prior standard deviations of z; 0 holds a parameter."""
     parts = [np.where(t.layout.shape, SHAPES, widths.get(t.name, 1.0)) for t in terms]
     return np.where(terms.knowledge.fixed, 0.0, np.concatenate([np.zeros(0), *parts]))
 

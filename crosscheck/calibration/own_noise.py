@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from itertools import combinations
 
-from crosscheck.calibration.exact import FEW
+from crosscheck.calibration.exact import FEW, width_of
 from crosscheck.calibration.joint import JointFit, Setting, settle
 from crosscheck.calibration.refits import Found
 from crosscheck.calibration.robust import log_chance_of_outliers
@@ -69,6 +69,6 @@ def _fitted(setting: Setting, found: Found, out: Names) -> JointFit | None:
     state = evaluate(free.problem, kept, free.factor, best.state)
     if not state.valid:
         return None
-    own = ~sum((best.terms.own(name) for name in out), start=best.width < 0.0)
-    joint = with_noise(free, settle(free, state, best.width[own], best.colour))
+    width = width_of(kept, found.best.widths)
+    joint = with_noise(free, settle(free, state, width, best.colour))
     return joint if joint.settled else None
