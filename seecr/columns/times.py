@@ -59,11 +59,11 @@ def times(columns: Columns, run: NDArray[np.str_]) -> Array | None:
     """
     if "t" not in columns.known:
         return None
-    index = columns.known["t"].index
+    name, index = columns.known["t"].name, columns.known["t"].index
     cells = columns.table.cells[index]
     of_day = began(columns.table, index) is not None
     if of_day:
-        columns.notes.append(f"Column t_s holds times of day: counted from {show(cells[0])}.")
+        columns.notes.append(f"Column {name} holds times of day: counted from {show(cells[0])}.")
     t_s = times_of_day(columns.table, index) if of_day else columns.numbers("t")
     falls = np.concatenate([[False], (np.diff(t_s) < 0) & (run[1:] == run[:-1])])
     columns.refuse(

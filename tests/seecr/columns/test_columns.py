@@ -7,22 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_columns import columns_of
 from random_robots import random_robot
 
-from seecr.columns.known import Columns, know_columns
 from seecr.columns.poses import command_lengths, command_poses, measured_orientation
-from seecr.columns.table import Table, read_table
+from seecr.columns.table import read_table
 from seecr.description.robot import Joint, Robot
 from seecr.errors import InputFileError
 from seecr.pose import quat_from_rxyz
-
-
-def columns_of(header: str, *rows: str, n_cables: int = 6) -> Columns:
-    cells = [row.split(",") for row in rows]
-    names = tuple(header.split(","))
-    lines = np.arange(2, 2 + len(rows))
-    table = Table(Path("a.csv"), names, lines, 1, list(zip(*cells, strict=True)))
-    return know_columns(table, n_cables)
 
 
 def test_a_table_keeps_texts_by_column_and_the_line_of_each_row(tmp_path: Path) -> None:
