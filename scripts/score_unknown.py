@@ -166,6 +166,8 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="append a line for each case there")
     parser.add_argument("--summary", type=Path, nargs="*", default=[], help="files to sum up")
     chosen = parser.parse_args()
+    if chosen.folder is None and range(*chosen.seeds):
+        parser.error("--seeds needs the folder of laboratories whose robots are taken")
     rows = [json.loads(line) for path in chosen.summary for line in path.read_text().splitlines()]
     for seed in range(*chosen.seeds):
         rows.append(judged(chosen.folder, seed))
