@@ -81,4 +81,5 @@ def _box(points: Array) -> tuple[Array, Array, float]:
 def _round(low: float, high: float) -> Array:
     """Round numbers within a range."""
     step = colours.round_up((high - low) / _TICKS)
-    return step * np.arange(np.ceil(low / step), np.floor(high / step) + 1.0)
+    # the smallest integer above -0.3 is -0, which would be written so
+    return step * np.arange(np.ceil(low / step), np.floor(high / step) + 1.0) + 0.0
