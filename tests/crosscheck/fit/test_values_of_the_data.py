@@ -14,7 +14,7 @@ from crosscheck.fit.parts import LaidOut
 from crosscheck.fit.problem import Problem
 from crosscheck.measurements.data import Measurements
 from seecr.description.mjcf import load_robot
-from seecr.effects import ApartLayout, Term, Terms, effect_named, layout_of
+from seecr.effects import ApartLayout, Term, Terms, apart, effect_named, layout_of
 from seecr.pose import Array
 
 ROBOT = load_robot(COGIRO)
@@ -107,6 +107,22 @@ def test_what_the_model_leaves_widens_the_error_and_noise_does_not_narrow_it() -
     assert rms > 10.0
     far = replace(exact, position=exact.position + off)
     assert error(far) == pytest.approx(plain * rms, rel=0.05)
+
+
+def test_only_runs_that_the_model_has_not_seen_are_fitted() -> None:
+    data = data_of()
+    half = data.n_rows // 2
+    data = replace(data, run=np.repeat(["seen", "new"], [half, data.n_rows - half]))
+    seen, new = (str(data.parts["run"][k]) for k in (0, -1))
+    layout = apart(SCALE, "run", (seen, new), SCALE.null)
+    model = Terms([Term(layout, np.array([1.0, 1.0]))])
+    found = freed(problem_of(data), LaidOut(model, (("tracker_scale", new),), ()))
+    assert found.free.tolist() == [False, True]
+    expected = slope(positions(data)[half:], data.position[half:])
+    assert found.terms["tracker_scale"].vector == pytest.approx([1.0, expected], abs=1e-7)
+    (note,) = found.notes
+    assert note.startswith("tracker_scale was fitted to these data first: ")
+    assert "seen" not in note
 
 
 def test_of_several_files_each_that_says_so_has_its_own() -> None:
