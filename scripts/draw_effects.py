@@ -69,7 +69,7 @@ def sweep() -> Commands:
     pose[:, 0], pose[:, 1], pose[:, 2], pose[:, 3] = x, 0.25, 0.1, 1.0
     warm = np.linspace(COLDEST_C, WARMEST_C, len(x))
     run = np.zeros(len(x), dtype=np.int64)
-    return Commands(pose, run=run, time=STEP_S * np.arange(len(x)), temperature=warm)
+    return Commands(pose, run=run, time=STEP_S * np.arange(float(len(x))), temperature=warm)
 
 
 @cache
@@ -177,8 +177,8 @@ def _draw(axes: Axes, x: Array, values: Array, names: list[str], label: str) -> 
     if np.abs(values).max() < 1e-4:
         axes.set_ylim(-0.01, 0.01)
     axes.set(xlabel="commanded x [m]", ylabel=f"change of {label}")
-    axes.xaxis.label.set_size(8)
-    axes.yaxis.label.set_size(8)
+    axes.xaxis.label.set_fontsize(8)
+    axes.yaxis.label.set_fontsize(8)
     axes.tick_params(labelsize=8)
     axes.legend(fontsize=7, frameon=False, ncols=3, loc="best")
     axes.spines[["top", "right"]].set_visible(False)

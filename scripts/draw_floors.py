@@ -109,7 +109,8 @@ def picture() -> str:
     graph = arrows()
     blocks = [_block(package, graph) for package in PACKAGES]
     width = max(layout.width for _, layout in blocks) + 2 * _MARGIN
-    body, top = [], _MARGIN
+    body: list[str] = []
+    top = _MARGIN
     for package, (rooms, layout) in zip(PACKAGES, blocks, strict=True):
         left = (width - layout.width) / 2
         body += _drawn(package, rooms, layout, left, top, width)

@@ -25,6 +25,7 @@ from seecr.commands.data import Commands
 from seecr.effects import Effect, Layout, catalogue, layout_of
 from seecr.pose import Array, pose_difference
 from seecr.prediction.experiment import Experiment, read
+from seecr.report.drawing import COLOURS, figure
 
 MEASURED, ABOUT = np.array([20.0, -15.0]), np.array([2.0, 3.0])
 """Tilt at the ends [deg] and deviation along z [mm], and what "about" is taken to mean."""
@@ -103,7 +104,7 @@ def experiment(ends: tuple[int, ...] = EVERY) -> Experiment:
     poses = np.tile(robot.reference_pose, (4, 1))
     poses[:, 0], poses[:, 2] = [0.17, 0.63, 0.17, 0.63], [0.1, 0.1, 0.2, 0.2]
     runs = np.arange(len(ends))
-    return Experiment(robot, Commands(poses[list(ends)], run=runs, time=60.0 * runs))
+    return Experiment(robot, Commands(poses[list(ends)], run=runs, time=60.0 * runs.astype(float)))
 
 
 @cache
@@ -157,10 +158,9 @@ def placing(names: tuple[str, ...], some: tuple[int, ...] = EVERY) -> Callable[[
 
 def explain(names: tuple[str, ...], some: tuple[int, ...] = EVERY) -> Explanation:
     """The sizes that come nearest to both numbers and stay plausible: damped Gauss-Newton."""
-    null, low, high = (
-        of_all(names, lambda name, side=side: getattr(layout(name), side))
-        for side in ("null", "lower", "upper")
-    )
+    null = of_all(names, lambda name: layout(name).null)
+    low = of_all(names, lambda name: layout(name).lower)
+    high = of_all(names, lambda name: layout(name).upper)
     unit = of_all(names, scale)
     low, high = (low - null) / unit, (high - null) / unit
     at = placing(names, some)
@@ -233,13 +233,13 @@ def summary(singles: Sequence[Explanation], pairs: Sequence[Explanation]) -> str
 def picture(path: Path, singles: Sequence[Explanation]) -> None:
     """Where effects bring both numbers, from nothing to twice a plausible size."""
     moved = [one for one in singles if one.size <= _PLAUSIBLE and one.nearness < _FAR]
-    with make_paper.figure(path, 1, 1, figsize=(7.4, 4.6)) as axes:
+    with figure(path, 1, 1, figsize=(7.4, 4.6)) as axes:
         ax = axes[0, 0]
         low = MEASURED - ABOUT
         ax.add_patch(Rectangle(tuple(low), *(2.0 * ABOUT), color="#009E73", alpha=0.2, lw=0))
         words = "what the text says\nwas measured, “about”"
         ax.annotate(words, (low[0] + 0.1, low[1] + 0.2), fontsize=8)
-        for colour, one in zip(make_paper.COLOURS, moved, strict=False):
+        for colour, one in zip(COLOURS, moved, strict=False):
             place = placing(one.names)
             sizes = np.linspace(0.0, _PLAUSIBLE, 2 * _SAMPLES + 1)
             way = np.array([place(size * one.at / one.size) for size in sizes])

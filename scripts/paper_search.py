@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import optimize
 
 from seecr.description.robot import Robot
@@ -31,7 +32,7 @@ class Search:
     """
 
     calls: Array
-    claims: Array
+    claims: NDArray[np.bool_]
     left: Array
 
 

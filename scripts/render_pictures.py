@@ -184,6 +184,7 @@ def draw(
     elif picture.step is not None:
         client.set_time("model_step", sequence=picture.step, play_state="paused")
     else:
+        assert picture.settling_s is not None
         client.set_time("settling_time", duration=picture.settling_s, play_state="paused")
     time.sleep(_DRAWN)
     image = Image.open(io.BytesIO(client.take_screenshot())).convert("RGB")

@@ -91,10 +91,12 @@ def read(case: Measurements, truth: Truth, sigma: Sigma, noise: Array) -> Measur
     turn = quat_from_rotvec(sigma.orientation_rad * noise[:, 3:])
     quat = quat_multiply(turn, truth.quat_wxyz)
     quat *= np.where(quat[:, :1] < 0.0, -1.0, 1.0)
+    anew: dict[str, Any] = dict.fromkeys(
+        ("angles_rad", "position_mask", "angle_mask", "tension_mask", "line")
+    )
     data = replace(
         case, position=truth.position + sigma.position_m * noise[:, :3], quat_wxyz=quat,
-        sigma=sigma, angles_rad=None, position_mask=None, angle_mask=None, tension_mask=None,
-        line=None,
+        sigma=sigma, **anew,
     )  # fmt: skip
     return data.rows(truth.at_rest)
 
@@ -141,6 +143,7 @@ def make(seed: int, count: int, noise: str) -> tuple[Robot, Measurements, list[T
     robot = load_robot(model_path(ROBOTS[seed % 2]))
     random = random_of(seed, 5)
     sigma = sigma_of(robot)
+    smallest, largest = np.log(SIZES)
     for extent in (0.75, 0.5, 0.35):
         case = sweeps(robot, 18, extent, seed)
         hidden = choose(robot, random_of(seed, 0), None, count)
@@ -148,7 +151,7 @@ def make(seed: int, count: int, noise: str) -> tuple[Robot, Measurements, list[T
         exact = measure(robot, case.as_commands(robot), ())
         data = read(case, exact, sigma, np.zeros((case.n_rows, 6)))
         power = np.sum(signals(robot, data, hidden) ** 2, axis=0)
-        wanted = np.exp(random.uniform(*np.log(SIZES), len(hidden)))
+        wanted = np.exp(random.uniform(smallest, largest, len(hidden)))
         grown = np.minimum(wanted * np.sqrt(VISIBLE / np.maximum(power, 1e-12)), LARGEST)
         hidden = [times(one, f) for one, f in zip(hidden, grown, strict=True)]
         truth = measure(robot, case.as_commands(robot), [one.effect() for one in hidden])
@@ -204,8 +207,8 @@ def table(rows: list[dict[str, Any]]) -> list[str]:
     for names, row in false:
         out.append(f"false: seed {row['seed']} {row['noise']} {'/'.join(names)} {row['hidden']}")
     for noise in NOISES:
-        some = [row for row in rows if row["noise"] == noise]
-        counts = Counter((len(row["hidden"]) > 0, row["verdict"]) for row in some)
+        with_it = [row for row in rows if row["noise"] == noise]
+        counts = Counter((len(row["hidden"]) > 0, row["verdict"]) for row in with_it)
         for (any_, verdict), n in sorted(counts.items()):
             out.append(f"{noise}, {'effects' if any_ else 'nothing'} hidden: {verdict} {n}")
     spent = sorted(row["seconds"] for row in rows)

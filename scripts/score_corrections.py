@@ -44,7 +44,7 @@ def score(seed: int) -> str:
     found = diagnose(path, twin.measured)
     poses = np.concatenate([demobot_sweep(z, POSES) for z in (0.1, 0.2)])
     n = len(poses)
-    told = Commands(poses, time=SECONDS * np.arange(n), temperature=np.full(n, WARMTH))
+    told = Commands(poses, time=SECONDS * np.arange(float(n)), temperature=np.full(n, WARMTH))
     corrected = correct(twin.robot, told, effects=found.terms)
     hidden = [term.effect() for term in twin.hidden]
 
@@ -73,7 +73,7 @@ def score_calibrated(seed: int, exclude: Sequence[str] = ()) -> str:
     terms = calibrate(path, twin.measured, exclude=exclude).terms
     poses = np.concatenate([demobot_sweep(z, POSES) for z in (0.1, 0.2)])
     n = len(poses)
-    told = Commands(poses, time=SECONDS * np.arange(n), temperature=np.full(n, WARMTH))
+    told = Commands(poses, time=SECONDS * np.arange(float(n)), temperature=np.full(n, WARMTH))
     based = correct(twin.robot, told, effects=terms)
     aimed = correct(twin.robot, placed(twin.robot, told, terms), effects=terms)
     both = based.reached & aimed.reached

@@ -85,7 +85,8 @@ def with_option(
         noise = 0.02 * float(np.mean(tensions))
         tensions = tensions + noise * random.standard_normal(tensions.shape)
         stated = replace(sigma, tension_N=noise)
-        return replace(data, tensions=tensions, sigma=stated, tension_mask=None)
+        anew: dict[str, Any] = {"tensions": tensions, "tension_mask": None}
+        return replace(data, sigma=stated, **anew)
     factor = {"half": 0.5, "double": 2.0}.get(option)
     if factor is None:
         return replace(data, sigma=Sigma())

@@ -18,6 +18,7 @@ import time
 from collections.abc import Iterator
 from copy import copy
 from pathlib import Path
+from typing import Any, TypedDict
 
 import numpy as np
 from brute_cables import Pull, hanging, nearly_straight, straight
@@ -33,7 +34,15 @@ from seecr.inverse.correction import correct
 from seecr.pose import Array, pose_add, pose_difference, quat_to_matrix
 from seecr.workspace.zones import feasible
 
-LIMITS: dict[str, dict[str, float]] = {
+
+class Limits(TypedDict, total=False):
+    """Of tensions [N]."""
+
+    lowest: float
+    highest: float
+
+
+LIMITS: dict[str, Limits] = {
     "demobot_parallel": {},
     "demobot_cogiro": {"lowest": 0.3, "highest": 3.0},
     "cogiro_large": {"highest": 5000.0},
@@ -63,9 +72,10 @@ def _any_turn(random: np.random.Generator, n: int) -> Array:
     return np.asarray(turn / np.linalg.norm(turn, axis=1, keepdims=True))
 
 
-def wanted_poses(robot: Robot, limits: dict[str, float], kind: str, n: int, seed: int = 1) -> Array:
+def wanted_poses(robot: Robot, limits: Limits, kind: str, n: int, seed: int = 1) -> Array:
     """Poses (n, 7) that cannot be held."""
-    random, out, frame = np.random.default_rng(seed), [], _frame(robot)
+    random, frame = np.random.default_rng(seed), _frame(robot)
+    out: list[Array] = []
     box = np.concatenate([robot.exit_points, robot.reference_pose[None, :3]])
     while len(out) < n:
         pose, toward = robot.reference_pose.copy(), random.normal(size=3)
@@ -102,7 +112,7 @@ class Brute:
     def __init__(
         self,
         robot: Robot,
-        limits: dict[str, float],
+        limits: Limits,
         wanted: Array,
         kept: bool = False,
         cable_weight: float = 0.0,
@@ -247,7 +257,7 @@ class Brute:
         )
         return np.asarray(((plus - minus) * self.unit / (2.0 * step)).T)
 
-    def nearest(self, sample: Array, limits: dict[str, float]) -> float:
+    def nearest(self, sample: Array, limits: Limits) -> float:
         """[m] the least way of all answers at which the platform stays; infinite for none."""
         sizes = [np.inf]
         for start in self._starts(sample, limits):
@@ -256,7 +266,7 @@ class Brute:
                 sizes.append(float(np.linalg.norm(found[0])))
         return min(sizes)
 
-    def _starts(self, sample: Array, limits: dict[str, float]) -> Iterator[Array]:
+    def _starts(self, sample: Array, limits: Limits) -> Iterator[Array]:
         random = np.random.default_rng(7)
         if self.kept:  # turns at the wanted position
             sample = np.tile(self.wanted, (_TURNS, 1))
@@ -280,7 +290,7 @@ class Brute:
         yield from away[random.choice(order, min(_SEEDS // 2, len(order)), replace=False)]
 
 
-def held_sample(robot: Robot, limits: dict[str, float]) -> Array:
+def held_sample(robot: Robot, limits: Limits) -> Array:
     """Poses over the frame that can be held, half of them turned by all angles."""
     random = np.random.default_rng(99)
     box = np.concatenate([robot.exit_points, robot.reference_pose[None, :3]])
@@ -348,7 +358,8 @@ def main() -> None:
     )
     parser.add_argument("--keep", type=Path, help="file of references, read and written")
     given = parser.parse_args()
-    kept: dict[str, Array] = {}
+    # arrays, but savez takes them beside a bool of its own by name
+    kept: dict[str, Any] = {}
     if given.keep is not None and given.keep.is_file():
         with np.load(given.keep) as file:
             kept = {key: file[key] for key in file}

@@ -32,17 +32,17 @@ def twin(robot: str, *effects: str, points: int = 8, tensions: bool = True) -> T
     return make_twin(model_path(robot), 3, effects=effects, points=points, tensions=tensions)
 
 
-def _compared(robot: str, *effects: str, **more: int) -> Callable[[Path, Made], None]:
+def _compared(robot: str, *effects: str, points: int = 8) -> Callable[[Path, Made], None]:
     def write(path: Path, made: Made) -> None:
-        one = twin(robot, *effects, **more)
+        one = twin(robot, *effects, points=points)
         write_page(compare(one.robot, one.measured), path, made)
 
     return write
 
 
-def _diagnosed(robot: str, *effects: str, **more: int) -> Callable[[Path, Made], None]:
+def _diagnosed(robot: str, *effects: str, points: int = 8) -> Callable[[Path, Made], None]:
     def write(path: Path, made: Made) -> None:
-        one = twin(robot, *effects, **more)
+        one = twin(robot, *effects, points=points)
         write_page(diagnose(one.robot, one.measured, only=FEW), path, made)
 
     return write
@@ -72,7 +72,7 @@ PAGES: dict[str, Callable[[Path, Made], None]] = {
 }
 
 
-def main(folder: Path = Path("pages"), *names: str) -> None:
+def main(folder: Path, *names: str) -> None:
     """Write the pages and take their pictures."""
     folder.mkdir(parents=True, exist_ok=True)
     for name in names or PAGES:
@@ -98,4 +98,5 @@ def photograph(page: Path) -> list[str]:
 
 
 if __name__ == "__main__":
-    main(*(Path(word) for word in sys.argv[1:2]), *sys.argv[2:])
+    given, *pages = sys.argv[1:] or ["pages"]
+    main(Path(given), *pages)
