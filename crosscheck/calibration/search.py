@@ -9,6 +9,7 @@ import numpy as np
 
 from crosscheck.calibration.all_effects import PLAIN, Calibration, fit_all_effects
 from crosscheck.calibration.catalogue import Catalogue
+from crosscheck.calibration.colour import Colour
 from crosscheck.calibration.detectable import detectable_size
 from crosscheck.calibration.equals import parameters_counted
 from crosscheck.calibration.field import UNKNOWN, log_odds
@@ -29,7 +30,7 @@ from crosscheck.calibration.refits import ROUNDS, Found, compare_sets
 from crosscheck.calibration.sets import Names
 from crosscheck.calibration.stages import Progress
 from crosscheck.fit.possible import can_be, hardly_happens
-from crosscheck.fit.problem import Problem, Rms, kinds_read
+from crosscheck.fit.problem import KINDS, Problem, Rms, kinds_read
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.fit.state import State, evaluate
 from crosscheck.measurements.data import Sigma
@@ -38,6 +39,8 @@ from seecr.effects import Term, Terms
 
 # Sets refitted about one linear model; fewer if something unknown is there, which none explains.
 _REFITTED, _REFITTED_UNKNOWN = 20, 4
+# The noise that fewer effects leave may be so many times what was stated.
+_LOUDER = 1.25
 NO_MORE: Mapping[Names, float] = {}
 # Most equivalents that are fitted in place of a listed member.
 _SWAPPED = 6
@@ -154,11 +157,17 @@ def _compared(
         not_noise = is_not_noise(setting, found.best.joint, stated)
     if not (not_noise or smooth):
         fewer = noise_of_fewer(setting, found)
-        if fewer is not None:
+        if fewer is not None and not _louder(fewer.colour, stated):
             joint = replace(whole.joint, colour=fewer.colour, weight=fewer.weight)
             found = compared(False, fewer.terms, joint=joint)
             not_noise = is_not_noise(setting, found.best.joint, stated)
     return found, not_noise
+
+
+def _louder(colour: Colour, stated: Sequence[str]) -> bool:
+    """Whether noise is larger than was stated: something unknown may be taken for noise."""
+    scale = [colour.scale[k] for k, kind in enumerate(KINDS) if kind.name in stated]
+    return max(scale, default=0.0) > _LOUDER
 
 
 def _catalogue(problem: Problem, terms: Terms, whole: Calibration) -> Catalogue:

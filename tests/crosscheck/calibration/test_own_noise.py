@@ -65,5 +65,8 @@ def test_noise_that_all_effects_followed_is_found_again(monkeypatch: pytest.Monk
     assert found.found.best.names == {"pulley_radius"}
     noise = found.found.best.joint.colour
     assert noise.scale[0] == pytest.approx(0.5, rel=0.3) and noise.rho[0] > 0.6
+    with monkeypatch.context() as louder:
+        louder.setattr(search, "_LOUDER", 0.3)  # as if that noise were larger than stated
+        assert sought(data).found.best.names > {"pulley_radius"}
     monkeypatch.setattr(search, "noise_of_fewer", lambda _setting, _found: None)
     assert sought(data).found.best.names > {"pulley_radius"}
