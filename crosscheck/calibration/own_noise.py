@@ -34,14 +34,17 @@ def noise_of_fewer(setting: Setting, found: Found) -> JointFit | None:
         found: the compared sets.
 
     Returns:
-        None if no such set does, or if the best set is large.
+        None if no such set does, if no member is doubtful, or if the best set is large.
     """
     if len(found.best.names - found.always) > FEW:
         return None
-    whole = _fitted(setting, found, frozenset())
-    fewer = (_fitted(setting, found, out) for out in _doubtful_members(found))
-    fits = [fit for fit in (whole, *fewer) if fit is not None]
-    best = max(fits, key=lambda fit: evidence(setting, found, fit), default=None)
+    some = list(_doubtful_members(found))
+    whole = _fitted(setting, found, frozenset()) if some else None
+    if whole is None:
+        return None
+    fewer = (_fitted(setting, found, out) for out in some)
+    fits = [whole, *(fit for fit in fewer if fit is not None)]
+    best = max(fits, key=lambda fit: evidence(setting, found, fit))
     return None if best is whole else best
 
 
