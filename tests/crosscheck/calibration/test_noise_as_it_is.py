@@ -8,7 +8,7 @@ from made_data import COGIRO, measured
 
 from crosscheck.calibration.colour import WHITE, Chain, Colour, chain_of, log_det, whitened
 from crosscheck.calibration.restricted import estimate, log_evidence
-from crosscheck.calibration.robust import outliers, row_weights
+from crosscheck.calibration.robust import log_chance_of_outliers, outliers, row_weights
 from crosscheck.fit.problem import Problem
 from crosscheck.measurements.data import Sigma
 from seecr.description.mjcf import load_robot
@@ -122,3 +122,12 @@ def test_chains_follow_runs_and_time() -> None:
     assert np.all(problem.column_of[linked] == problem.column_of[c.before[linked]])
     assert np.all(c.row[linked] == c.row[c.before[linked]] + 1)
     assert np.median(c.gap[linked]) == 1.0
+
+
+def test_each_outlier_has_prior_odds_of_one_to_nineteen() -> None:
+    """Of one kind in one row, however many of its readings are off."""
+    c = chain(8)
+    weight = np.ones(len(c.row))
+    assert log_chance_of_outliers(c, weight) == 0.0
+    weight[np.isin(c.row, [2, 5])] = 0.01
+    assert log_chance_of_outliers(c, weight) == pytest.approx(-2.0 * np.log(19.0))

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_data import COGIRO, measured, term
+from score_chances import alike
 
 from crosscheck.calibration import search
 from crosscheck.calibration.all_effects import Calibration, fit_all_effects
@@ -17,7 +18,6 @@ from crosscheck.given import considered
 from crosscheck.measurements.data import Measurements, Sigma
 from seecr.description.mjcf import load_robot
 from seecr.effects import Terms
-from seecr.pose import Array
 
 pytestmark = pytest.mark.slow
 
@@ -26,20 +26,11 @@ FEW = ("pulley_radius", "gravity_tilt", "drum_gain", "cable_length_offset", "tra
 SIGMA = Sigma(position_m=1e-4)
 
 
-def alike(run: Array, rng: np.random.Generator) -> Array:
-    """Noise (n, 3) of one standard deviation, of which 0.8 passes from each row to the next."""
-    out = rng.standard_normal((len(run), 3))
-    for k in range(1, len(run)):
-        if run[k] == run[k - 1]:
-            out[k] = 0.8 * out[k - 1] + 0.6 * out[k]
-    return out
-
-
 def correlated() -> Measurements:
     """Positions of few rows, beside a pulley, with correlated noise of half the stated size."""
     quiet = Sigma(position_m=1e-12, orientation_rad=1e-12)
     data = measured(ROBOT, [term(ROBOT, "pulley_radius", radius_m=0.006)], points=12, sigma=quiet)
-    noise = 0.5 * SIGMA.position_m * alike(data.run, np.random.default_rng(3))
+    noise = 0.5 * SIGMA.position_m * alike(np.random.default_rng(3), data.n_rows, 3, data.run)
     return replace(data, position=data.position + noise, quat_wxyz=None, sigma=SIGMA)
 
 
@@ -70,3 +61,10 @@ def test_noise_that_all_effects_followed_is_found_again(monkeypatch: pytest.Monk
         assert sought(data).found.best.names > {"pulley_radius"}
     monkeypatch.setattr(search, "noise_of_fewer", lambda _setting, _found: None)
     assert sought(data).found.best.names > {"pulley_radius"}
+
+
+def test_only_kinds_whose_noise_was_stated_can_be_louder_than_that() -> None:
+    colour = Colour(np.array([2.0, 1.2, 1.0]), np.zeros(3))
+    assert search._louder(colour, ["position", "orientation"])
+    assert not search._louder(colour, ["orientation", "tension"])
+    assert not search._louder(colour, [])
