@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shlex
+import shutil
+import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,7 +17,19 @@ Words = tuple[object, ...]
 
 def following(*words: object) -> str:
     """The line that names a command, as a shell takes it."""
-    return f"next: {shlex.join(str(word) for word in words)}"
+    program, *arguments = (str(word) for word in words)
+    return f"next: {shlex.join([_reached(program), *arguments])}"
+
+
+def _reached(program: str) -> str:
+    """How a shell reaches a program: by its name or, if need be, beside the one that runs.
+
+    Those of a virtual environment that is not active were called by their path.
+    """
+    beside = Path(sys.argv[0]).with_name(program)
+    is_ours = Path(sys.argv[0]).stem in ("seecr", "crosscheck")
+    found = shutil.which(program) is not None
+    return str(beside) if is_ours and not found and shutil.which(beside) else program
 
 
 def given_with(cable: str | None, model: Path | None) -> Words:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import shlex
+import sys
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ from click.testing import CliRunner, Result
 
 from crosscheck.cli import main as crosscheck_main
 from seecr.cli import main as seecr_main
+from seecr.cli.following import following as next_line
 from seecr.description.shipped import model_path
 
 QUIET = ("--figure", "none", "--no-recording")
@@ -28,6 +30,27 @@ def following(result: Result) -> list[str]:
     line = result.stdout.splitlines()[-1]
     assert line.startswith("next: "), result.stdout
     return shlex.split(line)[1:]
+
+
+def test_programs_of_an_environment_that_is_not_active_are_named_by_their_path(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As the command that runs was: `.venv/bin/crosscheck`."""
+    programs = tmp_path / "bin"
+    programs.mkdir()
+    for name in ("crosscheck", "rerun"):
+        (programs / name).touch(mode=0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["bin/crosscheck", "run"])
+    beside = str(Path("bin", "rerun"))
+    assert next_line("rerun", "a file.rrd") == f"next: {shlex.join([beside, 'a file.rrd'])}"
+    assert next_line("seecr", "map") == "next: seecr map"  # there is none
+    monkeypatch.setenv("PATH", str(programs))
+    assert next_line("rerun", "a.rrd") == "next: rerun a.rrd"
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr(sys, "argv", ["bin/pytest"])
+    assert next_line("rerun", "a.rrd") == "next: rerun a.rrd"
 
 
 def test_from_a_pose_to_a_workspace_to_a_plan(
