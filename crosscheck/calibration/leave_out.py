@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from crosscheck.calibration.joint import JointFit, Setting, moved_on, settle
 from crosscheck.calibration.linearised import Linear, linearised
-from crosscheck.fit.held_out import blocks_of
+from crosscheck.fit.held_out import blocks_of, folds_of
 from crosscheck.fit.problem import Rms, rms_by_kind
 from crosscheck.fit.state import State
 from seecr.pose import Array
@@ -49,7 +49,7 @@ class LeftOut:
 
 
 def leave_out(setting: Setting, joint: JointFit) -> LeftOut:
-    """Refit without each block (runs, if there are enough of them) and predict it."""
+    """Refit without each fold of blocks (runs, if there are enough of them) and predict it."""
     problem = setting.problem
     blocks = blocks_of(problem)
     linear = linearised(setting, joint)
@@ -57,17 +57,20 @@ def leave_out(setting: Setting, joint: JointFit) -> LeftOut:
     raw = np.full(problem.measured.shape, np.nan)
     chi2, readings, surprise = (np.zeros(len(blocks)) for _ in range(3))
     values = np.zeros((len(blocks), len(joint.z)))
-    for b, rows in enumerate(blocks):
+    for fold in folds_of(len(blocks)):
+        rows = np.any([blocks[b] for b in fold], axis=0)
         mine = rows[problem.row_of]
-        # independent measurements belong to no block
-        absent = np.concatenate([mine, np.zeros(len(linear.y) - len(mine), dtype=bool)])
+        absent = _padded(mine, len(linear.y))
         state = _without(setting, joint, mine)
-        values[b], raw[rows] = state.terms.vector, state.raw[rows]
-        left = joint.whitened(setting.chain, state.white)[mine]
-        chi2[b], readings[b] = float(left @ left), len(left)
+        values[fold], raw[rows] = state.terms.vector, state.raw[rows]
+        left = joint.whitened(setting.chain, state.white)
         straight = joint.state.white + joint.jacobian @ (fitted - without(linear, absent))
-        left = joint.whitened(setting.chain, straight)[mine]
-        surprise[b] = surprise_of(linear, absent, left) / max(len(left), 1)
+        expected = joint.whitened(setting.chain, straight)
+        for b in fold:
+            own = blocks[b][problem.row_of]
+            chi2[b], readings[b] = float(left[own] @ left[own]), int(own.sum())
+            power = surprise_of(linear, absent, _padded(own, len(absent)), expected[own])
+            surprise[b] = power / max(int(own.sum()), 1)
     return LeftOut(raw, rms_by_kind(problem, raw), chi2, readings, values, surprise)
 
 
@@ -96,14 +99,27 @@ def without(linear: Linear, rows: NDArray[np.bool_]) -> Array:
     return z
 
 
-def surprise_of(linear: Linear, rows: NDArray[np.bool_], left: Array) -> float:
+def surprise_of(
+    linear: Linear, absent: NDArray[np.bool_], rows: NDArray[np.bool_], left: Array
+) -> float:
     """chi2 of residuals (k,) of held-out readings, in units of what the fit expects of them.
 
-    The fit without them predicts them with the covariance 1 + x V x^T, with V that of its values.
+    A fit predicts them with the covariance 1 + x V x^T, with V that of its values.
+
+    Args:
+        linear: the linear model.
+        absent: readings that the fit has not seen.
+        rows: the k of them that are judged.
+        left: (k,) their residuals.
     """
     free = linear.width > 0.0
-    kept, own = linear.x[~rows][:, free], linear.x[rows][:, free]
+    kept, own = linear.x[~absent][:, free], linear.x[rows][:, free]
     precision = kept.T @ kept + np.diag(1.0 / linear.width[free] ** 2)
     # (1 + x V x^T)^-1 = 1 - x (V^-1 + x^T x)^-1 x^T (Woodbury)
     part = own.T @ left
     return float(left @ left - part @ np.linalg.solve(precision + own.T @ own, part))
+
+
+def _padded(readings: NDArray[np.bool_], length: int) -> NDArray[np.bool_]:
+    """Readings (N,) among the rows of the linear model; independent measurements are no reading."""
+    return np.concatenate([readings, np.zeros(length - len(readings), dtype=bool)])

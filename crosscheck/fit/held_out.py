@@ -18,9 +18,12 @@ from seecr.pose import Array
 _LEAST_RUNS = 3
 # Most blocks of time.
 _BLOCKS = 5
+# Most fits without something: if there are more blocks, several are held out together. Nine tenths
+# of the rows remain for each fit, so that more fits would take longer and say the same.
+_FOLDS = 10
 # A fall of chi2 on held-out blocks is significant from this many standard errors on.
 _SIGNIFICANT = 2.0
-# Most Gauss-Newton steps of a refit without one block, starting from the fit to all blocks.
+# Most Gauss-Newton steps of a refit without one fold, starting from the fit to all blocks.
 _ITERATIONS = 6
 
 
@@ -32,7 +35,7 @@ class HeldOut:
         raw: (n, 6 + m) residuals, each row predicted by a model that was not fitted to its block.
         chi2: (blocks,) chi2 of each held-out block.
         readings: (blocks,) number of readings in each.
-        values: (blocks, p) parameters fitted without each block.
+        values: (blocks, p) parameters fitted without each block; the same for all of one fold.
         rms: errors of the held-out rows, by kind.
         valid: whether every fold could be fitted and predicted.
     """
@@ -64,6 +67,11 @@ def blocks_of(problem: Problem) -> list[NDArray[np.bool_]]:
     return [np.isin(index, part) for part in np.array_split(rows, _count(problem))]
 
 
+def folds_of(blocks: int) -> list[range]:
+    """The numbers of the blocks that are held out together, for each fit without them."""
+    return [range(k, blocks, _FOLDS) for k in range(min(_FOLDS, blocks))]
+
+
 def blocks_note(problem: Problem) -> str:
     """A note that the blocks held out are not whole runs; "" if they are."""
     if problem.groups is not None:
@@ -93,7 +101,7 @@ def _count(problem: Problem) -> int:
 
 
 def hold_out(problem: Problem, best: Fit, factor: Array, fit: Callable[..., Fit] = fit) -> HeldOut:
-    """Refit the model without each block, starting from the full fit, and predict that block.
+    """Refit the model without each fold, starting from the full fit, and predict its blocks.
 
     Args:
         problem: the data.
@@ -106,18 +114,17 @@ def hold_out(problem: Problem, best: Fit, factor: Array, fit: Callable[..., Fit]
     chi2, readings = np.zeros(len(blocks)), np.zeros(len(blocks))
     values = np.zeros((len(blocks), len(best.terms)))
     valid = best.valid
-    for b, rows in enumerate(blocks):
-        fold = fit(
-            problem.only(~rows), best.terms, factor, best.state,
+    for fold in folds_of(len(blocks)):
+        out = np.any([blocks[b] for b in fold], axis=0)
+        rest = fit(
+            problem.only(~out), best.terms, factor, best.state,
             iterations=_ITERATIONS, quick=True,
         )  # fmt: skip
-        valid = valid and fold.valid
-        values[b] = fold.terms.vector
-        raw[rows] = fold.state.raw[rows]
-        white = fold.state.table[rows[:, None] & problem.counted]
-        solved = bool(np.all(fold.state.prediction.solved[rows]))
-        valid = valid and solved
-        chi2[b], readings[b] = float(white @ white), len(white)
+        valid = valid and rest.valid and bool(np.all(rest.state.prediction.solved[out]))
+        raw[out], values[fold] = rest.state.raw[out], rest.terms.vector
+        for b in fold:
+            white = rest.state.table[blocks[b][:, None] & problem.counted]
+            chi2[b], readings[b] = float(white @ white), len(white)
     return HeldOut(raw, chi2, readings, values, rms_by_kind(problem, raw), valid)
 
 

@@ -151,6 +151,8 @@ def toy(
     seed: int = 0,
     noise: float = 1.0,
     columns: Mapping[str, Array] | None = None,
+    runs: int = RUNS,
+    rows: int = ROWS,
 ) -> LinearToy:
     """Effects with random columns of one sigma per reading and plausible size, some of them hidden.
 
@@ -160,8 +162,10 @@ def toy(
         seed: of columns and noise.
         noise: in units of the stated one.
         columns: of some effects, in place of random ones.
+        runs: number of runs.
+        rows: of each run.
     """
-    problem = toy_problem()
+    problem = toy_problem(runs, rows)
     rng = np.random.default_rng(seed)
     shape = problem.measured.shape
     made = {}

@@ -148,6 +148,10 @@ def test_leaving_out_in_a_linear_model_is_refitting_without() -> None:
     left = y[:8] - x[:8] @ z
     known = np.linalg.inv(kept.T @ kept + np.diag(width[[0, 1, 3]] ** -2.0))
     expected = np.eye(8) + x[:8][:, [0, 1, 3]] @ known @ x[:8][:, [0, 1, 3]].T
-    assert surprise_of(Linear(x, y, width), rows, left) == pytest.approx(
+    assert surprise_of(Linear(x, y, width), rows, rows, left) == pytest.approx(
         left @ np.linalg.solve(expected, left)
+    )
+    # of two runs that are left out together, each is judged by itself
+    assert surprise_of(Linear(x, y, width), rows, np.arange(30) < 3, left[:3]) == pytest.approx(
+        left[:3] @ np.linalg.solve(expected[:3, :3], left[:3])
     )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from linear_toy import toy, toy_problem
 
-from crosscheck.fit.gauss_newton import PRIOR_SIZES
+from crosscheck.fit.gauss_newton import PRIOR_SIZES, Fit
 from crosscheck.fit.held_out import (
     blocks_note,
     blocks_of,
@@ -16,6 +16,8 @@ from crosscheck.fit.held_out import (
     significantly_improves,
     unfitted,
 )
+from crosscheck.fit.problem import Problem
+from seecr.effects import Terms
 
 NAMES = ("drum_gain", "tracker_scale", "centre_of_mass")
 
@@ -35,6 +37,29 @@ def test_each_run_is_predicted_by_a_fit_to_the_others() -> None:
         layout = made.layout("drum_gain")
         assert held.values[b] == pytest.approx(layout.null + z * layout.scale)
     assert held.valid
+
+
+def test_of_many_runs_every_tenth_is_held_out_in_the_same_fit() -> None:
+    made = toy({"drum_gain": 0.5}, NAMES, runs=23, rows=4)
+    fits: list[int] = []
+
+    def counting(problem: Problem, terms: Terms, *_: object, **__: object) -> Fit:
+        fits.append(int(problem.use.sum()))
+        return made.fit(problem, terms)
+
+    best = made.fit(made.problem, made.terms("drum_gain"))
+    held = hold_out(made.problem, best, np.zeros(0), counting)
+    assert fits == [80] * 3 + [84] * 7  # of 92 rows, three runs or two are out
+    x, y, counted = made.columns["drum_gain"], made.table, made.problem.measured
+    blocks = blocks_of(made.problem)
+    assert len(blocks) == len(held.chi2) == 23
+    for b, rows in enumerate(blocks):
+        out = np.any(blocks[b % 10 :: 10], axis=0)
+        a, c = x[~out][counted[~out]], y[~out][counted[~out]]
+        z = np.linalg.solve(a.T @ a + np.eye(8) / PRIOR_SIZES**2, a.T @ c)
+        left = (y[rows] - x[rows] @ z)[counted[rows]]
+        assert held.chi2[b] == pytest.approx(left @ left)
+        assert held.readings[b] == len(left)
 
 
 @pytest.mark.slow
