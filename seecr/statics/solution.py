@@ -133,10 +133,11 @@ class Solution(Result):
 
         For a free platform [N/m, N/rad; N m/m, N m/rad], by translation and rotation vector in the
         base frame; else by the joints. An external moment, which has no potential, makes it
-        asymmetric.
+        asymmetric. Where a cable is exactly as long as its rest length and the platform is free to
+        move to one side, it is that of this side.
         """
         unit = self._units()
-        return batch.stiffness(self.tables, self.evaluation) * unit[:, None] * unit[None, :]
+        return batch.stiffness(self.tables, self._softer_side) * unit[:, None] * unit[None, :]
 
     @cached_property
     def modes(self) -> tuple[Array, Array]:
@@ -187,17 +188,23 @@ class Solution(Result):
         return replace(self, **values)
 
     @cached_property
+    def _softer_side(self) -> batch.Evaluation:
+        """The evaluation whose stiffness says what is free to move."""
+        rows = np.flatnonzero(self.status == Status.SINGULAR)
+        if len(rows) == 0:
+            return self.evaluation
+        # a cable that is exactly as long as its rest length has stiffness on one side only
+        there = batch.take_evaluation(self.evaluation, rows)
+        hessian = self.evaluation.hessian.copy()
+        hessian[rows] = batch.without_idle(take(self.tables, rows), there).hessian
+        return replace(self.evaluation, hessian=hessian)
+
+    @cached_property
     def _softest(self) -> tuple[Array, Array]:
         """Smallest eigenvalue of the scaled stiffness (n,), and its eigenvector (n, d)."""
         from seecr.compiled.softest import softest_batch  # takes a while to import
 
-        hessian = self.evaluation.hessian
-        rows = np.flatnonzero(self.status == Status.SINGULAR)
-        if len(rows):
-            # a cable that is exactly as long as its rest length has stiffness on one side only
-            there = batch.take_evaluation(self.evaluation, rows)
-            hessian = hessian.copy()
-            hessian[rows] = batch.without_idle(take(self.tables, rows), there).hessian
+        hessian = self._softer_side.hessian
         values, directions = np.empty(len(hessian)), np.empty(hessian.shape[:2])
 
         def run(part: slice) -> None:

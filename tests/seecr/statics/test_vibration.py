@@ -17,6 +17,7 @@ from seecr.effects import Term
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
 from seecr.report.words import direction_words, stiffness_lines
+from seecr.statics.solution import Status
 
 BOB = Robot(
     "bob", np.array([[0.0, 0, 1]]), np.zeros((1, 3)), np.array([100.0]), np.ones(1), 2.0,
@@ -33,6 +34,15 @@ def test_a_bob_swings_as_a_pendulum_and_bounces_on_its_cable() -> None:
     )
     assert direction_words(BOB, found.modes[1][0, :, 5]) == "move along z"
     assert next(stiffness_lines(found)).startswith("free to turn about ")
+
+
+def test_free_to_turn_beside_a_cable_that_just_becomes_taut_has_no_frequency() -> None:
+    """Two cables hold it, a third is exactly as long as its rest length."""
+    robot = load_robot(model_path("demobot_parallel"))
+    found = solve(robot, [[0.225, 0.35, 0.1, 1, 0, 0, 0]])
+    assert found.status[0] is Status.SINGULAR and np.sum(~found.slack) == 2
+    assert found.frequencies[0, 0] == 0.0 < found.frequencies[0, 1]
+    assert np.linalg.eigvalsh(found.stiffness[0])[0] == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.parametrize("name", ["demobot_parallel", "demobot_off_centre", "planar_vertical"])
