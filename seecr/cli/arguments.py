@@ -86,8 +86,33 @@ def turned_option(of: str) -> Callable[[F], F]:
         nargs=4,
         type=float,
         metavar="QW QX QY QZ",
+        callback=_unit_turn,
         help=f"Orientation of {of}.  [default: that of the reference pose]",
     )
+
+
+def _unit_turn(
+    _ctx: click.Context, _option: click.Parameter, value: tuple[float, ...] | None
+) -> tuple[float, ...] | None:
+    """``--turned`` as given, if it is a rotation."""
+    if value is not None:
+        _check_unit("--turned", value)
+    return value
+
+
+def _check_unit(name: str, turn: Sequence[float]) -> None:
+    """That a quaternion is of unit norm, to the rounding of what is typed.
+
+    Raises:
+        InputError: it is not.
+    """
+    from seecr import InputError
+
+    norm = sum(part * part for part in turn) ** 0.5
+    if not abs(norm - 1.0) <= 1e-3:
+        raise InputError(
+            f"{name}: expected a unit quaternion, scalar first, got one of norm {norm:.4g}"
+        )
 
 
 _FIGURES = ("png", "svg")
@@ -193,11 +218,8 @@ def pose_of(coordinates: Sequence[float], robot: Robot) -> list[float]:
             f"expected X Y Z or X Y Z QW QX QY QZ, got {counted(len(coordinates), 'number')}"
         )
     check_places(coordinates[:3], robot)
-    norm = sum(part * part for part in coordinates[3:]) ** 0.5
-    if len(coordinates) == 7 and not abs(norm - 1.0) <= 1e-3:
-        raise InputError(
-            f"QW QX QY QZ: expected a unit quaternion, scalar first, got one of norm {norm:.4g}"
-        )
+    if len(coordinates) == 7:
+        _check_unit("QW QX QY QZ", coordinates[3:])
     return [*coordinates[:3], *(coordinates[3:] or robot.reference_pose[3:].tolist())]
 
 
