@@ -24,7 +24,7 @@ from seecr.prediction.sensitivity import sensitivities
 from seecr.prediction.uncertainty import moving_covariance
 from seecr.statics.starts import Commanded, commanded_poses, commands_from
 from seecr.statics.tables import Tables, assemble
-from seecr.workspace.zones import load_scale, margins_from
+from seecr.workspace.zones import load_scale, margins_from, wrenches_of
 
 __all__ = ["asked_chance", "held_chance", "kept_chance", "margins_with"]
 
@@ -192,24 +192,21 @@ def margins_with(
     highest: ArrayLike = np.inf,
     wrenches: ArrayLike | None = None,
 ) -> Array:
-    """Margins (n,) [N] like :func:`seecr.tension_margin`, of a robot with effects at poses (n, 7).
-
-    Raises:
-        InputError: a set of wrenches for a robot on joints.
-    """
+    """Margins (n,) [N] like :func:`seecr.tension_margin`, of a robot with effects."""
     low, high = tension_limits(robot, lowest, highest)
     told = Commands(poses, lengths=robot.commanded_lengths(poses), told=True)
     tables = assemble(Experiment(robot, told).setup(effects_of(effects, robot)))
-    some = np.zeros((1, 6)) if wrenches is None else np.atleast_2d(np.asarray(wrenches, float))
-    if robot.joints and wrenches is not None:
-        raise InputError(f"{robot.name} stands on joints: expected no set of wrenches")
+    some = np.zeros((1, 6)) if wrenches is None else wrenches_of(wrenches)
     if bends(tables):
         every = [farthest_inside(_pushed(tables, one), low, high).margins for one in some]
         return np.asarray(np.min(every, axis=0))
     matrices, load = balance_of(tables, low)
     # load of -W tau = w: the signs are those of the gradient
     loads = load[:, None]
-    if wrenches is not None:
+    if robot.joints and wrenches is not None:
+        # of a wrench only that along the joints must be balanced
+        loads = np.stack([balance_of(_pushed(tables, one), low)[1] for one in some], axis=1)
+    elif wrenches is not None:
         loads = loads + some * np.where(robot.hinges, 1.0 / robot.length, 1.0)
     return margins_from(matrices, np.ascontiguousarray(loads), low, high, load_scale(robot))
 

@@ -130,8 +130,8 @@ def tension_margin(
     elif robot.joints or (wrench is not None and np.ndim(wrench) == 2):
         return margins_from(*_loads(robot, places, wrench, wrenches), low, high, scale)
     else:
-        some = np.zeros((1, 6)) if wrenches is None else _wrenches(wrenches)
-        some = some if wrench is None else some + _wrenches(wrench)
+        some = np.zeros((1, 6)) if wrenches is None else wrenches_of(wrenches)
+        some = some if wrench is None else some + wrenches_of(wrench)
         in_parts(
             lambda part: margins_at(
                 places[part], robot.exit_points, robot.anchor_points, robot.centre_of_mass,
@@ -181,7 +181,7 @@ def _loads(
     matrix, load = balance_equations(robot, poses, wrench)
     if wrenches is None:
         return np.array(matrix, order="C"), load[:, None]
-    every = [balance_equations(robot, poses, one)[1] for one in _wrenches(wrenches)]
+    every = [balance_equations(robot, poses, one)[1] for one in wrenches_of(wrenches)]
     at_rest = balance_equations(robot, poses)[1]
     return np.array(matrix, order="C"), np.stack(every, axis=1) + (load - at_rest)[:, None]
 
@@ -219,7 +219,12 @@ def _wrench(value: ArrayLike, n: int) -> Array:
     return wrench
 
 
-def _wrenches(values: ArrayLike) -> Array:
+def wrenches_of(values: ArrayLike) -> Array:
+    """A set of wrenches (k, 6) [N, N m].
+
+    Raises:
+        InputError: another shape, or numbers that are not finite.
+    """
     some = np.atleast_2d(np.asarray(values, float))
     if some.ndim != 2 or some.shape[1] != 6:
         raise InputError(f"wrenches must be (k, 6) [N, N m], got {np.shape(values)}")

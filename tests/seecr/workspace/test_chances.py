@@ -10,7 +10,7 @@ from calibrated import KEPT, MODEL, POSES, ROBOT, model_of
 
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
-from seecr.effects import Terms
+from seecr.effects import Term, Terms
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
 from seecr.inverse.correction import correct
@@ -77,6 +77,30 @@ def test_without_effects_margins_are_those_of_the_plain_robot() -> None:
         own = margins_with(ROBOT, POSES, [], 0.1, 6.0, more)
         expected = tension_margin(ROBOT, POSES, lowest=0.1, highest=6.0, wrenches=more)
         np.testing.assert_allclose(own, expected, rtol=1e-6)
+
+
+def test_wrenches_on_joints_count_along_them_with_effects_as_without() -> None:
+    """A planar robot with a model had been refused a set of wrenches."""
+    robot = load_robot(model_path("planar_vertical"))
+    poses = np.tile(robot.reference_pose, (3, 1))
+    poses[:, 0] += [-0.04, 0.0, 0.03]
+    # what pushes across the plane is carried by the joints
+    pushes = [[0.3, 5.0, 0, 0, 0, 0], [0, 0, 0.2, 0, 0.01, 3.0]]
+    expected = tension_margin(robot, poses, lowest=0.1, highest=6.0, wrenches=pushes)
+    assert np.all(np.abs(expected - tension_margin(robot, poses, lowest=0.1, highest=6.0)) > 0.05)
+    for name, value in (("stiffness", {"factor": 1.2}), ("cable_weight", {"weight_N_per_m": 1e-9})):
+        acting = [Term.of(robot, name, **value).effect()]
+        own = margins_with(robot, poses, acting, 0.1, 6.0, pushes)
+        np.testing.assert_allclose(own, expected, rtol=1e-6)
+
+
+def test_wrenches_that_are_none_are_refused_with_effects_as_without() -> None:
+    """With a model a wrench of NaN came out as held."""
+    softer = [Term.of(ROBOT, "stiffness", factor=0.9)]
+    for bad, said in (([np.nan, 0, 0, 0, 0, 0], "not finite"), ([1, 2, 3], r"must be \(k, 6\)")):
+        for acting in ((), softer):
+            with pytest.raises(InputError, match=said):
+                workspace_map(ROBOT, 0.3, 0.2, 0.1, effects=acting, wrenches=bad, elastic=False)
 
 
 def test_a_model_without_covariance_says_nothing(tmp_path: Path) -> None:
