@@ -43,9 +43,9 @@ def told_lengths(robot: Robot, commands: Commands, effects: Sequence[Effect], pa
         if np.any(setup.backlash):
             turned = unplay(turned, commands.starts, 0.5 * setup.backlash)
         new = robot.rest_lengths + turned
-        change = float(np.max(np.abs(new - told)))
+        change = float(np.max(np.abs(new - told), initial=0.0))
         told = new
-        if change <= 1e-15 * float(np.max(np.abs(told))) or change >= last:
+        if change <= 1e-15 * float(np.max(np.abs(told), initial=0.0)) or change >= last:
             break
         last = change if change < 1e-9 else np.inf
     return told

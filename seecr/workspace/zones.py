@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seecr.arguments import finite, numbers
+from seecr.arguments import finite
 from seecr.counted import counted
 from seecr.description.given import GivenRobot, robot_of
 from seecr.description.joints import motion_columns, values_of_pose
@@ -25,6 +25,7 @@ from seecr.holding.distribution import tension_limits
 from seecr.pose import Array, all_finite, quat_rotate, transform_points
 from seecr.result import Record, Result
 from seecr.statics.solution import Solution
+from seecr.statics.starts import commanded_poses
 from seecr.threads import in_parts
 
 # Part of the load that may stay unbalanced, by rounding of the tensions.
@@ -119,7 +120,7 @@ def tension_margin(
     from seecr.compiled.margin import margins_at  # takes a while to import
 
     robot = robot_of(robot)
-    places = np.array(_poses(poses), order="C")
+    places = commanded_poses(poses)
     low, high = tension_limits(robot, lowest, highest)
     if wrench is not None:
         wrench = _wrench(wrench, len(places))
@@ -249,7 +250,7 @@ def slack_zones(solution: Solution) -> list[Zone]:
 
 def wrench_matrix(robot: Robot, poses: ArrayLike) -> Array:
     """W of eq 4 at poses (n, 7): unit vectors over moments at the platform origin, (n, 6, m)."""
-    places = _poses(poses)
+    places = commanded_poses(poses)
     anchors = transform_points(places, robot.anchor_points)
     cables = robot.exit_points - anchors
     size = np.linalg.norm(cables, axis=-1, keepdims=True)
@@ -277,10 +278,3 @@ def balance_equations(
     columns = columns * np.where(robot.hinges, 1.0 / robot.length, 1.0)
     along = np.swapaxes(columns, 1, 2)
     return along @ matrix, -np.einsum("ndk,nk->nd", along, load)
-
-
-def _poses(values: ArrayLike) -> Array:
-    poses = np.atleast_2d(numbers(values, "poses"))
-    if poses.ndim != 2 or poses.shape[1] != 7 or not all_finite(poses):
-        raise InputError(f"poses must be (n, 7) finite numbers, got {np.shape(values)}")
-    return poses

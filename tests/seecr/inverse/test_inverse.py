@@ -262,6 +262,15 @@ def test_what_cannot_be_asked_is_said() -> None:
         correct(robot, line(), aim=np.ones((3, 8)))
 
 
+def test_no_poses_have_no_corrections() -> None:
+    """It ended in a ValueError of NumPy."""
+    robot = robot_named("demobot_cogiro")
+    found = correct(robot, np.zeros((0, 7)))
+    assert len(found.commands) == 0 and found.lines() == ["demobot_cogiro: 0 of 0 poses reached"]
+    backlash = Term(layout_of(catalogue()["backlash"], robot), np.full(8, 1e-4))
+    assert len(correct(robot, np.zeros((0, 7)), effects=[backlash]).reached) == 0
+
+
 def test_without_a_highest_tension_the_nearest_poses_strain_cables_by_5_percent() -> None:
     """Poses beyond the edge were aimed at with 26 times the length of each cable."""
     robot = robot_named("camera")

@@ -153,8 +153,9 @@ def test_zones_count_only_where_there_is_an_answer(parallel: Robot) -> None:
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        ({"poses": [[0.0, 1]]}, r"poses must be \(n, 7\) finite numbers, got \(1, 2\)"),
-        ({"poses": [np.nan] * 7}, r"poses must be \(n, 7\) finite"),
+        ({"poses": [[0.0, 1]]}, r"poses must be \(n, 7\), x y z qw qx qy qz, got \(1, 2\)"),
+        ({"poses": [np.nan] * 7}, r"poses holds numbers that are not finite"),
+        ({"poses": [0.4, 0.25, 0.1, 0, 0, 0, 0]}, r"poses row 0 has a quaternion of norm 0"),
         ({"wrench": [1.0]}, r"wrench must be \(6,\) or \(1, 6\) finite numbers, got \(1,\)"),
         ({"lowest": [0.0, 1.0]}, r"lowest must be one number or \(8,\) \[N\], got \(2,\)"),
         ({"lowest": -1.0}, r"tension bounds must be 0 <= lowest <= highest"),
