@@ -73,13 +73,18 @@ def command(
     out.parent.mkdir(parents=True, exist_ok=True)
     files = {out: found.text} | ({beside: found.mujoco_text} if found.mujoco_text else {})
     write_texts(files, "cannot write the MJCF")
+    notes = [*(own.notes if own else ())]
+    if beside not in files and beside.exists():
+        notes.append(f"{beside.name} is of an earlier export: now no such file is needed")
     if as_json:
-        made = made_by(machine.source, model)
-        written = [str(path) for path in files]
-        click.echo(json_text({"made": made, "files": written, **found.as_json()}))
+        document = {
+            "made": made_by(machine.source, model), "exit_status": 0, "notes": notes,
+            "files": [str(path) for path in files], **found.as_json(),
+        }  # fmt: skip
+        click.echo(json_text(document))
         return 0
     place = [f"{value + 0.0:g}" for value in (coordinates or machine.reference_pose)[:3]]
     then = following("seecr", "pose", out, *place)
-    for line in [*(own.notes if own else ()), *found.lines(out.name, beside.name), then]:
+    for line in [*notes, *found.lines(out.name, beside.name), then]:
         click.echo(line)
     return 0

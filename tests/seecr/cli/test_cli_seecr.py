@@ -140,6 +140,18 @@ def test_export_writes_a_description_and_what_mujoco_alone_reads(tmp_path: Path)
     assert nowhere.exit_code == 2 and "out.xml: cannot be written: " in nowhere.stderr
 
 
+def test_export_tells_of_the_model_and_of_an_earlier_file_also_as_json(tmp_path: Path) -> None:
+    model, out = tmp_path / "model.toml", tmp_path / "out.xml"
+    model.write_text('[[effect]]\nname = "pulley_radius"\nparameters.radius_m = 0.01\n')
+    said = json.loads(run("export", "demobot_cogiro", out, "--model", model, "--json").stdout)
+    assert said["exit_status"] == 0 and len(said["files"]) == 2
+    assert said["notes"] == [f"{model} does not say which robot it was made for"]
+    later = json.loads(run("export", "demobot_cogiro", out, "--json").stdout)
+    note = "out-mujoco.xml is of an earlier export: now no such file is needed"
+    assert later["files"] == [str(out)] and later["notes"] == [note]
+    assert note in run("export", "demobot_cogiro", out).stdout.splitlines()
+
+
 def test_negative_numbers_are_coordinates() -> None:
     result = run("pose", "planar_two_cable", "-0.1", "0", "5e-1", "--json")
     assert json.loads(result.stdout)["command"][:3] == [-0.1, 0.0, 0.5]
