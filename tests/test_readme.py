@@ -61,6 +61,15 @@ def test_the_commands_of_one_robot_do_what_they_say(tmp_path: Path) -> None:
     assert len(page.commands) == 7
 
 
+def test_what_a_correction_gains_is_what_the_tutorial_measures() -> None:
+    """Whose output a test of the tutorial compares."""
+    said = re.search(r"off by up to (\S+) mm before, (\S+) mm after", " ".join(README.split()))
+    page = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
+    assert said
+    for day, error in zip(("before", "after"), said.groups(), strict=True):
+        assert f"\n{day}: off by up to {error} mm\n" in page
+
+
 def test_ci_runs_the_test_command_of_the_readme() -> None:
     command = re.search(r"^python3 -m venv .*pytest$", README, re.MULTILINE)
     assert command
