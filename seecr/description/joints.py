@@ -83,6 +83,11 @@ def _nearest(robot: Robot, poses: Array) -> Array:
     return values
 
 
+def reachable(robot: Robot, poses: Array) -> Array:
+    """The poses (n, 7) that the robot's joints can reach nearest to ``poses``."""
+    return pose_of_values(robot, _nearest(robot, poses))[0] if robot.joints else poses
+
+
 def _off_joints(robot: Robot, poses: Array, reached: Array) -> tuple[int, str] | None:
     """The row farthest from what the joints can reach, and its distance; None if none is."""
     miss = np.abs(pose_difference(poses, reached)) / np.repeat([robot.length, 1.0], 3)

@@ -10,6 +10,7 @@ import numpy as np
 
 from seecr.commands.data import Commands
 from seecr.description.given import GivenRobot, robot_of
+from seecr.description.joints import reachable
 from seecr.description.robot import Robot
 from seecr.effects import Effect
 from seecr.errors import InputError
@@ -35,7 +36,8 @@ def placed(robot: GivenRobot, commands: Commands, effects: GivenEffects) -> Comm
     """Commands at whose poses a model's tracker reads the poses of ``commands``.
 
     How a calibration shares an error between tracker and robot hardly matters for what is read, but
-    matters much for where the platform is taken to be.
+    matters much for where the platform is taken to be. Joints keep a platform from some poses: it
+    is then read as nearly so as they allow.
 
     Raises:
         InputError: no pose is read so.
@@ -44,9 +46,10 @@ def placed(robot: GivenRobot, commands: Commands, effects: GivenEffects) -> Comm
     acting, at = effects_of(effects, robot), commands
     for _ in range(_ROUNDS):
         missed = pose_difference(commands.pose, _tracked(robot, at, acting))
-        if np.abs(missed).max(initial=0.0) < _READ:
+        aimed = reachable(robot, pose_add(at.pose, missed))
+        if np.abs(pose_difference(aimed, at.pose)).max(initial=0.0) < _READ:
             return at
-        at = replace(at, pose=pose_add(at.pose, missed))
+        at = replace(at, pose=aimed)
     raise InputError("the model's tracker reads no pose as wanted; expected one near the robot's")
 
 

@@ -11,11 +11,12 @@ from click.testing import CliRunner
 
 from seecr.cli import main
 from seecr.commands.data import Commands
+from seecr.description.joints import off_joints
 from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.effects import Term
 from seecr.inverse.correction import correct
-from seecr.pose import quat_rotate
+from seecr.pose import pose_difference, quat_rotate
 from seecr.prediction.sensed import placed, tracked
 
 NAME = "demobot_cogiro"
@@ -45,6 +46,29 @@ def test_a_platform_is_placed_where_its_tracker_reads_what_is_wanted() -> None:
     found = correct(robot, at, effects=[target, frame])
     read = tracked(robot, Commands(found.solution.pose), [target, frame])
     assert found.reached.all() and np.abs(read - wanted.pose).max() < 1e-9
+
+
+def test_on_joints_readings_are_as_near_as_these_allow(tmp_path: Path) -> None:
+    """A tracker that stands a little askew reads no planar robot in its plane: it was refused."""
+    robot = load_robot(model_path("planar_vertical"))
+    frame = Term.of(robot, "tracker_frame", shift_x_m=0.002, rotation_x_rad=0.001)
+    target = Term.of(robot, "tracker_target", shift_z_m=0.05)
+    poses = np.tile(robot.reference_pose, (3, 1))
+    poses[:, [0, 2]] += 0.01 * np.eye(3, 2)
+    wanted = Commands(poses)
+    at = placed(robot, wanted, [frame, target])
+    assert off_joints(robot, at.pose) is None
+    missed = pose_difference(wanted.pose, tracked(robot, at, [frame, target]))
+    across = np.array([False, True, False, True, False, True])
+    assert np.abs(missed[:, ~across]).max() < 1e-5 < np.abs(missed[:, across]).max() < 2e-3
+    file, model = tmp_path / "wanted.csv", tmp_path / "model.toml"
+    file.write_text("cmd_x_m,cmd_z_m\n0.4,0.15\n")
+    model.write_text(text_of(frame, target))
+    args = ["correct", "planar_vertical", str(file), "--out", str(tmp_path / "out"), "--as-read"]
+    told = CliRunner().invoke(main, [*args, "--model", str(model)])
+    assert told.exit_code == 0, told.output
+    assert "the joints allow readings no nearer than 0.1" in told.output
+    assert " mm and 0.0573 deg along single axes" in told.output
 
 
 def test_the_command_tells_of_the_tracker(tmp_path: Path) -> None:
