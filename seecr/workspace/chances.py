@@ -28,10 +28,12 @@ from seecr.workspace.zones import load_scale, margins_from, wrenches_of
 
 __all__ = ["asked_chance", "held_chance", "kept_chance", "margins_with"]
 
-# Number of draws of the parameters: for tensions, which are linear in them; for poses, first and at
-# most. If the first draws all agree, and lie this many standard deviations from the limit, the rest
-# is left out.
-_LINEAR, _FIRST, _DRAWS, _SURE = 4096, 16, 256, 6.0
+# Number of draws of the parameters for tensions, which are linear in them.
+_LINEAR = 4096
+# Number of draws for poses, stage by stage. If the draws so far all agree, and their mean lies this
+# many of their standard deviations from the limit, the rest is left out: few draws may happen to
+# lie near each other.
+_STAGES = ((4, 15.0), (16, 6.0), (64, 4.0), (256, 0.0))
 # Rows per batch.
 _PART = 64
 _HOLDS_NONE = (
@@ -109,9 +111,9 @@ def held_chance(
 ) -> Array | None:
     """The probability that poses can be held within limits, given the uncertainty of the model.
 
-    It is the part of 256 models, drawn from the covariance, that can hold the pose; of 16 models if
-    these are all far on one side. Values are clipped to their bounds. A model with which a cable's
-    equations have no solution holds nothing.
+    It is the part of 256 models, drawn from the covariance, that can hold the pose; of fewer, from
+    four on, if these are all far on one side. Values are clipped to their bounds. A model with
+    which a cable's equations have no solution holds nothing.
 
     Args:
         robot: as described, or its MJCF.
@@ -133,26 +135,29 @@ def held_chance(
         raise InputError(_HOLDS_NONE.format(robot.name))
     terms, covariance = known
     places, limits = commanded_poses(poses), (lowest, highest, wrenches)
-    vectors = _drawn(terms, covariance, _DRAWS)
+    vectors = _drawn(terms, covariance, _STAGES[-1][0])
     edge = -1e-9 * load_scale(robot)
-
-    def held(rows: Array, some: Array) -> Array:
-        drawn = [terms.with_vector(one).effects for one in some]
-        return np.stack([margins_with(robot, rows, one, *limits) for one in drawn])
-
-    first = held(places, vectors[:_FIRST])
-    out = np.asarray((first >= edge).mean(axis=0))
-    # infinite limits, or poses out of reach, are far from any edge
-    finite = np.where(np.isfinite(first), first, np.nan)
-    far: NDArray[np.bool_] = np.asarray(~np.isfinite(first).all(axis=0))
-    mean, spread = finite[:, ~far].mean(axis=0), finite[:, ~far].std(axis=0)
-    far[~far] = np.abs(mean) > _SURE * spread
-    near = np.flatnonzero(~(far & np.isin(out, (0.0, 1.0))))
-    if len(near):
-        rest = held(places[near], vectors[_FIRST:])
-        count = (first[:, near] >= edge).sum(axis=0) + (rest >= edge).sum(axis=0)
-        out[near] = count / _DRAWS
+    out, rows = np.zeros(len(places)), np.arange(len(places))
+    seen = np.zeros((0, len(places)))
+    for count, sure in _STAGES:
+        drawn = [terms.with_vector(one).effects for one in vectors[len(seen) : count]]
+        more = [margins_with(robot, places[rows], one, *limits) for one in drawn]
+        seen = np.concatenate([seen, more])
+        out[rows] = (seen >= edge).mean(axis=0)
+        near = ~(np.isin(out[rows], (0.0, 1.0)) & _far(seen, sure))
+        rows, seen = rows[near], seen[:, near]
+        if len(rows) == 0:
+            break
     return out
+
+
+def _far(margins: Array, sure: float) -> NDArray[np.bool_]:
+    """Whether the mean of margins (draws, n) is so many standard deviations from zero."""
+    # infinite limits, or poses out of reach, are far from any edge
+    far: NDArray[np.bool_] = np.asarray(~np.isfinite(margins).all(axis=0))
+    some = margins[:, ~far]
+    far[~far] = np.abs(some.mean(axis=0)) > sure * some.std(axis=0)
+    return far
 
 
 def check_chance(robot: Robot, model: GivenEffects) -> None:

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from calibrated import KEPT, MODEL, POSES, ROBOT, model_of
 
 from seecr.description.mjcf import load_robot
+from seecr.description.robot import Robot
 from seecr.description.shipped import model_path
 from seecr.effects import Term, Terms
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
 from seecr.inverse.correction import correct
+from seecr.pose import Array
 from seecr.prediction.model import Model
 from seecr.report.corrections import chance_lines
 from seecr.report.maps import likely_lines, write_arrays
@@ -69,6 +72,29 @@ def test_poses_are_held_as_often_as_drawn_models_say(tmp_path: Path) -> None:
     seen = [margins_with(ROBOT, poses, terms, 0.02) >= 0.0 for terms in drawn(model, 200)]
     np.testing.assert_allclose(said, np.mean(seen, axis=0), atol=0.08)
     assert said.min() < 0.05 and said.max() == 1.0 and np.any((said > 0.1) & (said < 0.9))
+
+
+def test_poses_far_from_the_limit_are_decided_by_few_models(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = model_of(tmp_path, MODEL + KEPT)
+    poses = np.tile(POSES[0], (9, 1))
+    poses[:, 0] = [-0.5, *np.linspace(0.02, 0.12, 7), 0.3]
+    tried = np.zeros(9, dtype=int)
+
+    def counting(robot: Robot, at: Array, *rest: Any) -> Array:
+        tried[np.isin(poses[:, 0], at[:, 0])] += 1
+        return margins_with(robot, at, *rest)
+
+    monkeypatch.setattr(chances, "margins_with", counting)
+    few = held_chance(ROBOT, poses, model, lowest=0.02)
+    assert few is not None
+    assert np.all(tried[(few > 0.0) & (few < 1.0)] == 256)
+    assert tried.min() == 4
+    monkeypatch.setattr(chances, "_STAGES", ((256, 0.0),))
+    every = held_chance(ROBOT, poses, model, lowest=0.02)
+    assert every is not None
+    np.testing.assert_allclose(few, every, atol=0.005)
 
 
 def test_without_effects_margins_are_those_of_the_plain_robot() -> None:
