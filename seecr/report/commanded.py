@@ -15,11 +15,15 @@ _WRENCH = [
 
 
 def load_columns(loads: Loads | None) -> dict[str, list[float]]:
-    """Known loads as columns; none without loads."""
+    """Known loads as columns; none without loads.
+
+    NaN, which is to be written as an empty cell, where a payload hangs at the platform's own centre
+    of mass.
+    """
     if loads is None:
         return {}
     columns = {"payload_kg": loads.mass, **dict(zip(_WRENCH, loads.wrench.T, strict=True))}
-    if np.isfinite(loads.centre).all():
+    if np.isfinite(loads.centre).any():
         centres = zip("xyz", loads.centre.T, strict=True)
         columns |= {f"payload_{axis}_m": one for axis, one in centres}
     return {name: values.tolist() for name, values in columns.items()}

@@ -76,4 +76,4 @@ def _cell(value: Any) -> str:
     if isinstance(value, str):
         quoted = '"' + value.replace('"', '""') + '"'
         return quoted if any(mark in value for mark in ',"#') else value
-    return repr(float(value) + 0.0)
+    return "" if np.isnan(value) else repr(float(value) + 0.0)

@@ -1,0 +1,56 @@
+"""A guess of what a name means never chooses an axis or a cable."""
+
+from __future__ import annotations
+
+import pytest
+
+from seecr.columns.names import meant_by, other_rotations, unused_note
+
+POSITION = ("cmd_x_m", "cmd_y_m", "cmd_z_m")
+
+
+@pytest.mark.parametrize(
+    ("name", "absent", "meant"),
+    [
+        ("cmdy_m", POSITION, "cmd_y_m"),
+        ("CMD_Z_M", POSITION, "cmd_z_m"),
+        ("tension3_N", ("tension_1_N", "tension_3_N"), "tension_3_N"),
+        ("temperatur_C", ("temperature_C",), "temperature_C"),
+        ("timestamp", ("t_s",), "t_s"),
+    ],
+)
+def test_another_spelling_is_the_name_that_is_missing(
+    name: str, absent: tuple[str, ...], meant: str
+) -> None:
+    assert meant_by([name], absent) == {name: meant}
+
+
+@pytest.mark.parametrize(
+    ("name", "absent"),
+    [
+        ("cmd_y_mm", ("cmd_x_m", "cmd_z_m")),  # y is there already
+        ("cmd_m", POSITION),
+        ("tension_4_N", ("tension_1_N", "tension_3_N")),
+        ("tension_13_N", ("tension_1_N", "tension_3_N")),
+        ("meas_q", ("meas_qw",)),
+        ("timestamp", POSITION),
+        ("operator", POSITION),
+    ],
+)
+def test_of_which_axis_or_cable_is_not_guessed(name: str, absent: tuple[str, ...]) -> None:
+    assert meant_by([name], absent) == {}
+
+
+def test_words_for_rotations_are_neither_guessed_nor_found_within_others() -> None:
+    turns = ["Roll", "yaw_deg", "euler_x", "meas_rotvec_1", "phi", "meas_theta_deg", "rot_x"]
+    others = ["graphite", "delphi", "rotor_speed", "scroll_", "epsilon", "psig"]
+    assert other_rotations([*turns, *others]) == [*turns, "scroll_"]
+    assert meant_by(["meas_rot_rx_deg"], ["meas_rx_deg"]) == {}
+
+
+def test_one_column_is_not_several() -> None:
+    (one,) = unused_note([], ["yaw"])
+    several, rest = unused_note(["a", "b"], ["roll", "yaw"])
+    assert one.startswith("Column yaw is not used, because ")
+    assert several.startswith("Columns roll yaw are not used, because ")
+    assert rest == "Not used: a, b." and unused_note([], []) == []
