@@ -22,7 +22,7 @@ def numbers(values: ArrayLike, name: str) -> Array:
         if array.dtype.kind == "c":  # NumPy would drop the imaginary part
             raise TypeError
         return np.asarray(array, dtype=float)
-    except (TypeError, ValueError):
+    except (OverflowError, TypeError, ValueError):
         got = repr(values) if isinstance(values, str) else f"a {type(values).__name__}"
         raise InputError(f"{name}: expected numbers, got {got}") from None
 

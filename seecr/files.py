@@ -147,6 +147,11 @@ def read_toml(path: Path, expected: str) -> Toml:
     except tomllib.TOMLDecodeError as error:
         # tomllib's message ends with line and column
         raise InputFileError.at(path, f"is not TOML: {error}; {expected}") from None
+    except RecursionError:
+        raise InputFileError.at(path, f"nests too deeply; {expected}") from None
+    except ValueError:
+        text = f"has a whole number of thousands of digits; {expected}"
+        raise InputFileError.at(path, text) from None
 
 
 @contextmanager

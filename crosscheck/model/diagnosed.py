@@ -75,6 +75,9 @@ def _document(path: Path) -> Mapping[str, Any]:
     except json.JSONDecodeError as error:
         text = f"is not JSON: {error.msg}; {_EXPECTED}"
         raise InputFileError.at(path, text, line=error.lineno) from None
+    except ValueError:
+        text = f"has a whole number of thousands of digits; {_EXPECTED}"
+        raise InputFileError.at(path, text) from None
     return document if isinstance(document, Mapping) else {}
 
 

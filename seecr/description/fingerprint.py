@@ -160,7 +160,7 @@ def _numbers(value: Any) -> Any:
     """An array; None if the value is not finite numbers."""
     try:
         array = np.atleast_1d(np.asarray(value, float))
-    except (TypeError, ValueError):
+    except (OverflowError, TypeError, ValueError):
         return None
     return array if np.all(np.isfinite(array)) else None
 

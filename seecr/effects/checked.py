@@ -98,7 +98,7 @@ def _checked_law(law: Callable[[Array], Array], name: str) -> Callable[[Array], 
 def _finite(value: object, what: str) -> Array:
     try:
         array = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
+    except (OverflowError, TypeError, ValueError):
         raise InputError(f"{what} that is no number: {value!r:.60}; expected numbers") from None
     if not np.all(np.isfinite(array)):
         raise InputError(f"{what} that is not finite; expected finite numbers")

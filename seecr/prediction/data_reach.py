@@ -63,7 +63,7 @@ class DataReach:
             low, high = np.asarray(table[_POSITION], float)
             least, largest = np.asarray(table[_TENSION], float)
             fine = low.shape == high.shape == (3,) and np.all(low <= high) and least <= largest
-        except (TypeError, ValueError, KeyError):
+        except (OverflowError, TypeError, ValueError, KeyError):
             fine = False
         if not fine:
             raise where.error(

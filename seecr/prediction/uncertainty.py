@@ -201,7 +201,7 @@ def _correlations(model: Model, names: list[str], rows: object) -> Array:
         whole = len(rows) == len(names) > 0  # type: ignore[arg-type]
         fine = whole and np.allclose(np.diag(out), 1.0) and np.abs(out).max() <= 1.0 + 1e-9
         fine = bool(fine) and float(np.linalg.eigvalsh(out)[0]) > -_ROUNDED
-    except (TypeError, ValueError, IndexError):
+    except (OverflowError, TypeError, ValueError, IndexError):
         fine = False
     if not fine:
         raise _file_of(model).error(

@@ -26,6 +26,10 @@ BAD: dict[str, tuple[Callable[[Any], Any], Any, str]] = {
         lambda x: seecr.Term.of(ROBOT, "stiffness", factor=x), "a",
         "factor: expected numbers, got 'a'",
     ),
+    "digits": (
+        lambda x: seecr.Term.of(ROBOT, "stiffness", factor=x), 10**400,
+        "factor: expected numbers, got a int",
+    ),
     "limit": (
         lambda x: seecr.correct(ROBOT, POSE, lowest=x), "a", "lowest: expected numbers, got 'a'",
     ),

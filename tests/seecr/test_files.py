@@ -45,6 +45,21 @@ def test_what_cannot_be_read_is_named_with_what_was_expected(tmp_path: Path) -> 
         assert str(caught.value) == f"{path}: {words}" and caught.value.exit_status == 2
 
 
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        ("[" * 3000 + "]" * 3000, "nests too deeply; expected a model"),
+        ("1" * 5000, "has a whole number of thousands of digits; expected a model"),
+    ],
+)
+def test_toml_that_no_reader_can_take_is_refused(tmp_path: Path, value: str, words: str) -> None:
+    path = tmp_path / "a.toml"
+    path.write_text(f"a = {value}\n")
+    with pytest.raises(InputFileError) as caught:
+        read_toml(path, "expected a model")
+    assert str(caught.value) == f"{path}: {words}"
+
+
 def test_in_json_a_dataclass_is_its_fields_unless_it_says_itself() -> None:
     @dataclass
     class Part:

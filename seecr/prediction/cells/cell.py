@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -121,7 +122,7 @@ class _Reader:
         """A number within the parameter's bounds."""
         value = number_of(given)
         if value is None:
-            raise self.error(f"{what}expected a number, got {given!r}")
+            raise self.error(f"{what}expected a number, got {given!r:.60}")
         if wrong := beyond(self.layout, self.i, value):
             raise self.error(f"{what}{wrong}")
         return value
@@ -149,7 +150,7 @@ class _Reader:
         if error is None or not 0.0 < error <= LARGEST:
             raise self.error(
                 f"known: stderr must be a number above 0 and at most {LARGEST:g}, got "
-                f"{known['stderr']!r}; a value that is exact is fixed = true"
+                f"{known['stderr']!r:.60}; a value that is exact is fixed = true"
             )
         return self._within(known["value"], "known: "), error
 
@@ -160,7 +161,7 @@ class _Reader:
         number = math.nan if error is math.nan else number_of(error)
         if number is None or number < 0 or number > LARGEST:
             raise self.error(
-                f'stderr must be a number from 0 to {LARGEST:g} or "{UNSEEN}", got {error!r}'
+                f'stderr must be a number from 0 to {LARGEST:g} or "{UNSEEN}", got {error!r:.60}'
             )
         return number
 
@@ -181,4 +182,5 @@ def number_of(value: Any) -> float | None:
     """A finite number, or None if the value is not one."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return None
-    return float(value) if math.isfinite(value) else None
+    # a whole number may have any number of digits
+    return float(value) if abs(value) <= sys.float_info.max else None

@@ -41,6 +41,7 @@ def test_sigma_beside_the_data_or_named(csv_file, robot, tmp_path):
         ("[sigma]\nposition_m = nan\n", "line 2: position_m must be .* got nan"),
         ("[sigma]\nlength_m = inf\n", "got inf"),
         ("[sigma]\nlength_m = true\n", "got True"),
+        ("[sigma]\nlength_m = 1" + 400 * "0" + "\n", "must be a positive number .*got 10+;"),
         (
             "[sigma]\nposition_mm = 3\n",
             "line 2: unknown key position_mm in .sigma.; known are position_m, ",

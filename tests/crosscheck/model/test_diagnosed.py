@@ -84,9 +84,36 @@ def test_other_numbers_and_a_diagnosis_that_says_nothing_are_noted(tmp_path: Pat
     assert "robot" not in json.loads(path.read_text())
 
 
-def test_a_file_that_nests_without_end_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "diagnosis.json"
-    path.write_text("[" * 200_000)
-    with pytest.raises(InputFileError, match="nests too deeply") as error:
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        ("[" * 200_000, "nests too deeply"),
+        ("1" * 5000, "has a whole number of thousands of digits"),
+        ("1" * 400, "effect pulley_radius: expected a number for radius_m"),
+        ("null", "effect pulley_radius: expected a number for radius_m; is it of another robot"),
+    ],
+)
+def test_what_holds_no_numbers_is_refused(tmp_path: Path, value: str, words: str) -> None:
+    path = diagnosis(tmp_path)
+    path.write_text(path.read_text().replace('"value": 0.01', f'"value": {value}'))
+    with pytest.raises(InputFileError, match=f"^{path}: {words}") as error:
         load_diagnosed(path, ROBOT)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("missing", "words"),
+    [
+        (["pulley_radius"], "an item of missing without effect and parameters"),
+        ([{"effect": "pulley_radius"}], "an item of missing without effect and parameters"),
+        ([PULLEYS, PULLEYS], "effect pulley_radius is among the terms twice"),
+        ([], r"lists no missing effect \(effects_found\); there is nothing to add"),
+        (None, "has no verdict and no list of missing effects"),
+    ],
+)
+def test_what_lists_no_effects_is_refused(tmp_path: Path, missing: Any, words: str) -> None:
+    path = diagnosis(tmp_path)
+    content = json.loads(path.read_text()) | {"missing": missing}
+    path.write_text(json.dumps(content))
+    with pytest.raises(InputFileError, match=f"^{path}: {words}"):
+        load_diagnosed(path, ROBOT)

@@ -61,6 +61,8 @@ def test_a_table_of_another_kind_is_refused() -> None:
     for wrong in ({"value": 8}, "cable1", list(range(8))):
         with pytest.raises(InputFileError, match=r"\[robot\] cables: expected a list of names"):
             check_robot(PATH, {"cables": wrong}, ROBOT)
+    with pytest.raises(InputFileError, match=r"\[robot\] mass_kg: expected a number, got 10000"):
+        check_robot(PATH, {"mass_kg": 10**400}, ROBOT)
     with pytest.raises(InputFileError, match=r"\[robot\] name: expected a text, got 3"):
         check_robot(PATH, {"name": 3}, ROBOT)
 

@@ -96,6 +96,7 @@ def test_a_model_says_what_of_an_answer_is_beyond_its_data(tmp_path: Path, robot
         ("[0.5, 0.3, 0.2]", '[0.5, 0.3, "high"]'),
         ("tension_N = [0.2, 1.5]", "tension_N = [2.2, 1.5]"),
         ("tension_N = [0.2, 1.5]", "tension_N = 1.5"),
+        ("tension_N = [0.2, 1.5]", "tension_N = [0.2, 1" + 400 * "0" + "]"),
         ("tension_N = [0.2, 1.5]", "force_N = [0.2, 1.5]"),
     ],
 )

@@ -103,7 +103,8 @@ def test_without_a_covariance_nothing_is_said(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new"),
     [("[0.8, 1.0],", "[0.8, 0.9],"), ("[0.8, 1.0],", "[1.8, 1.0],"), ("[0.8, 1.0],", ""),
-     ('"gone.away"', ""), ("[0.1, 0.2, 1.0]", "[0.99, -0.99, 1.0]"), ("[1.0]", '["a"]')],
+     ('"gone.away"', ""), ("[0.1, 0.2, 1.0]", "[0.99, -0.99, 1.0]"), ("[1.0]", '["a"]'),
+     ("[1.0]", "[1" + 400 * "0" + "]")],
 )  # fmt: skip
 def test_correlations_that_are_none_are_one_sentence(tmp_path: Path, old: str, new: str) -> None:
     model = model_of(tmp_path, MODEL.replace(old, new))

@@ -47,6 +47,7 @@ def test_loads_are_read_as_they_were(
     else:
         path.write_text(corrected_csv(found, wanted))
         path.with_suffix(".toml").write_text(corrected_toml(wanted))
+    assert "nan" not in path.read_text()
     again = read_commands(path, ROBOT).commands.loads
     assert again is not None
     for name in ("mass", "centre", "wrench"):
