@@ -120,3 +120,45 @@ def test_values_that_no_robot_has_are_refused() -> None:
     mass = Term.of(ROBOT, "platform_mass", added_kg=0.01)
     with pytest.raises(InputError, match=r"added_kg: 1e\+09 is out of bounds"):
         mass.measured(added_kg=(1e9, 1.0))
+
+
+def test_what_is_fixed_is_all_of_an_effect_or_what_is_named() -> None:
+    gains = Term.of(ROBOT, "drum_gain", gain_3=0.002)
+    assert gains.fixed().knowledge.fixed.all() and not gains.knowledge.fixed.any()
+    some = gains.fixed("gain_2").fixed("gain_5")
+    assert np.flatnonzero(some.knowledge.fixed).tolist() == [1, 4]
+    assert some.with_vector(np.zeros(8)).knowledge is some.knowledge
+    assert some.vector[2] == 0.002
+
+
+def test_what_is_measured_begins_at_what_was_found() -> None:
+    gains = Term.of(ROBOT, "drum_gain", gain_3=0.002)
+    known = gains.measured(gain_2=(0.001, 1e-4)).measured(gain_4=(-0.001, 2e-4))
+    assert known.vector.tolist() == [0.0, 0.001, 0.002, -0.001, *[0.0] * 4]
+    assert np.flatnonzero(known.knowledge.measured).tolist() == [1, 3]
+    assert known.knowledge.stderr[[1, 3]].tolist() == [1e-4, 2e-4]
+    assert gains.vector[1] == 0.0 and not gains.knowledge.measured.any()
+
+
+@pytest.mark.parametrize("error", [0.0, -1.0, np.inf, np.nan])
+def test_a_measurement_has_an_error(error: float) -> None:
+    with pytest.raises(InputError, match="drum_gain: gain_2: expected a standard error above 0"):
+        Term.of(ROBOT, "drum_gain").measured(gain_2=(0.001, error))
+
+
+def test_a_parameter_that_there_is_not_is_answered_with_the_nearest() -> None:
+    words = "^effect tracker_frame: no parameter shift_w_m; the nearest are shift_[xyz]_m, "
+    frame = Term.of(ROBOT, "tracker_frame")
+    for ask in (
+        lambda: Term.of(ROBOT, "tracker_frame", shift_w_m=0.0),
+        lambda: frame.fixed("shift_w_m"),
+        lambda: frame.measured(shift_w_m=(0.0, 1.0)),
+    ):
+        with pytest.raises(InputError, match=words):
+            ask()
+
+
+def test_a_robot_cannot_have_less_than_a_twentieth_of_its_mass() -> None:
+    added = np.array([-0.949, -0.951]) * ROBOT.mass
+    possible = [Term.of(ROBOT, "platform_mass", added_kg=one).is_possible(ROBOT) for one in added]
+    assert possible == [True, False]
