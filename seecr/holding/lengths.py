@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seecr.compiled.columns import STRAIN, TENSION
+from seecr.compiled.outcomes import TOLERANCE
 from seecr.holding.balance import Rates, bends, first_tensions, here, next_rest, rates_of, with_rest
 from seecr.holding.distribution import distribute
 from seecr.holding.hanging import bridged_lengths, rest_for
@@ -24,8 +25,9 @@ from seecr.statics.tables import Tables, take
 
 # Most rounds of Newton's method, and the residual that ends them [load].
 _ROUNDS, _BALANCED = 40, 1e-12
-# If no tensions balance the linearised system, its residual must fall by this factor to go on.
-_NEARS = 0.5
+# If no tensions balance the linearised system, its residual must fall by this factor to go on,
+# unless it is this small [load]: what is left then may be the linearisation's.
+_NEARS, _NEAR = 0.5, 1e-6
 # Rounds for whether a pose is firm, which is asked for many poses.
 _FEW = 14
 # A slack cable is longer than its span by this part, to keep it slack.
@@ -149,13 +151,13 @@ def _hold(tables: Tables, aim: Array, least: Array, most: Array, rounds: int, re
         # even tensions that only come near may balance, once the directions of pulls follow them
         before, lack = short[rows], np.einsum("ndm,nm->nd", rates.by_tension, wanted) - load
         short[rows] = np.abs(lack).max(axis=1)
-        nears = possible | (short[rows] < _NEARS * before)
+        nears = possible | (short[rows] < np.maximum(_NEARS * before, _NEAR * now.scale))
         going = nears & np.isfinite(longer).all(axis=1)
         out.rest[rows[going]] = longer[going]
         rows, wanted = rows[going], wanted[going]
     out.tensions, out.strains = start.states[..., TENSION], start.states[..., STRAIN]
     # rounding may keep a row that balances to nine digits from balancing to the last
-    out.fine |= (start.residual < 1e-10) & _within(out.tensions, least, most, tables.scale)
+    out.fine |= (start.residual < TOLERANCE) & _within(out.tensions, least, most, tables.scale)
     slack = (out.tensions <= _NONE * tables.scale[:, None]) & (least <= 0.0)
     longer = (1.0 + _MARGIN) * bridged_lengths(tables)
     out.rest = np.where(slack & out.fine[:, None], longer, out.rest)

@@ -1,0 +1,95 @@
+"""Orientations in which too few cables hold a platform: by their balance, and a bar by its tilt."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from random_robots import random_poses, random_robot
+
+from seecr.commands.data import Commands
+from seecr.compiled.turning import straight_balance_batch
+from seecr.description.mjcf import load_robot
+from seecr.description.robot import Robot
+from seecr.effects.load import ExternalWrench
+from seecr.inverse.nearest.turned import Turned, turned_in_place
+from seecr.planar import bar_tilt
+from seecr.pose import Array, quat_rotate, rxyz_from_quat
+from seecr.prediction.experiment import Experiment
+from seecr.statics.tables import Tables, assemble
+
+# Less than twice the mean of the tensions: this limit is the nearer one.
+HIGH = 3.0
+WRENCH = np.array([0.5, -0.3, 0.2, 0.04, 0.02, -0.03])
+
+
+def balance(robot: Robot, pose: Array, wrench: Array) -> tuple[Array, Array]:
+    """W (6, m) and w (6,) of W tau + w = 0 about the platform (paper, eqs 3 and 4)."""
+    arms, centre = (quat_rotate(pose[3:], p) for p in (robot.anchor_points, robot.centre_of_mass))
+    way = robot.exit_points - (pose[:3] + arms)
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    weight = robot.mass * robot.gravity
+    matrix = np.concatenate([way, np.cross(arms, way)], axis=1).T
+    return matrix, wrench + np.concatenate([weight, np.cross(centre, weight)])
+
+
+def tables_of(robot: Robot, poses: Array, wrench: Array | None = None) -> Tables:
+    effects = [] if wrench is None else [ExternalWrench(wrench[:3], wrench[3:])]
+    return assemble(Experiment(robot, Commands(poses)).setup(effects))
+
+
+def turned(robot: Robot, places: Array, high: float = np.inf) -> Turned:
+    poses = np.tile(robot.reference_pose, (len(places), 1))
+    poses[:, :3] = places
+    low = np.zeros((len(poses), robot.n_cables))
+    return turned_in_place(robot, tables_of(robot, poses), low, low + high)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_balance_at_any_pose_is_equation_3(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    robot = random_robot(rng)
+    wrench = robot.weight * WRENCH
+    poses, rows = random_poses(rng, robot, 4), np.array([2, 0, 1, 1])
+    tables = tables_of(robot, np.tile(robot.reference_pose, (3, 1)), wrench)
+    matrices, loads = np.empty((4, 6, robot.n_cables)), np.empty((4, 6))
+    straight_balance_batch(tables.cables, tables.load, rows, poses, robot.length, matrices, loads)
+    unit = np.repeat([1.0, 1.0 / robot.length], 3)
+    for k, pose in enumerate(poses):
+        matrix, load = balance(robot, pose, wrench)
+        np.testing.assert_allclose(-matrices[k], unit[:, None] * matrix, atol=1e-12)
+        np.testing.assert_allclose(loads[k], unit * load, atol=1e-12 * robot.weight)
+
+
+def test_a_bar_on_two_cables_tilts_until_three_lines_meet() -> None:
+    robot = load_robot("planar_two_cable")
+    places = np.array([[0.5, 0, 0.4], [0.3, 0, 0.5], [0.75, 0, 0.2], [0.5, 0, 1.3]])
+    found = turned(robot, places)
+    tilt = bar_tilt([[0, 1], [1, 1]], places[:, [0, 2]], 0.1)
+    np.testing.assert_array_equal(found.found, np.isfinite(tilt))
+    assert found.found.tolist() == [True, True, True, False]
+    there = rxyz_from_quat(found.poses[:, 3:])[:3, 1]
+    np.testing.assert_allclose(there, -tilt[:3], atol=1e-9)
+    np.testing.assert_allclose(found.poses[:, :3], places, atol=1e-15)
+
+
+def test_four_cables_balance_a_platform_in_space_and_margins_are_those_of_their_tensions() -> None:
+    whole = load_robot("demobot_parallel")
+    some = [0, 2, 4, 6]
+    robot = replace(
+        whole, exit_points=whole.exit_points[some], anchor_points=whole.anchor_points[some],
+        ea=whole.ea[some], rest_lengths=whole.rest_lengths[some], cable_names=("a", "b", "c", "d"),
+    )  # fmt: skip
+    found = turned(robot, np.array([[0.3, 0.2, 0.3], [0.45, 0.3, 0.1]]), high=HIGH)
+    assert found.found.all()
+    level = robot.reference_pose.copy()
+    for pose, margin in zip(found.poses, found.margins, strict=True):
+        for at, rests in ((pose, True), (np.concatenate([pose[:3], level[3:]]), False)):
+            matrix, load = balance(robot, at, np.zeros(6))
+            tension = np.linalg.lstsq(matrix, -load, rcond=None)[0]
+            missing = np.linalg.norm(matrix @ tension + load) / robot.weight
+            assert (missing < 1e-10) == rests
+            if rests:
+                assert margin == pytest.approx(np.minimum(tension, HIGH - tension).min(), rel=1e-8)
+                assert margin > 0.0

@@ -1,0 +1,76 @@
+"""Positions that too few cables hold in some orientation: heavy cables by poses known to rest."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from seecr.description.mjcf import load_robot
+from seecr.effects import Term, Terms
+from seecr.equilibrium.solving import solve
+from seecr.inverse import correction
+from seecr.inverse.nearest import in_place
+from seecr.inverse.nearest.problem import Reaching
+from seecr.inverse.nearest.search import Best
+from seecr.pose import Array, quat_from_rotvec
+from seecr.statics.tables import Tables
+
+ROBOT = load_robot("planar_two_cable")
+HEAVY = Terms([Term.of(ROBOT, "cable_weight", weight_N_per_m=1.0)])
+
+
+def rests(places: Array) -> Array:
+    """Poses at which the bar rests on heavy cables, with level commands at places (n,) along x."""
+    commands = np.tile(ROBOT.reference_pose, (len(places), 1))
+    commands[:, 0] = places
+    found = solve(ROBOT, commands, effects=HEAVY)
+    assert found.converged.all()
+    return found.pose
+
+
+def problem_of(poses: Array, turned: float = 0.0) -> tuple[Reaching, Tables]:
+    """The positions of poses, with the platform asked for at another turn [rad]."""
+    wanted = poses.copy()
+    wanted[:, 3:] = quat_from_rotvec(np.array([0.0, turned, 0.0]))
+    search = correction._search_of(ROBOT, wanted, HEAVY, 0.0, np.inf, "minimum")
+    rows, tables = np.arange(len(wanted)), search._tables(search.given)
+    return search._reaching(rows, tables.scale, fix_position=True), tables
+
+
+def test_the_orientation_is_that_in_which_the_platform_rests_there() -> None:
+    poses = rests(np.array([0.35, 0.5, 0.7]))
+    np.testing.assert_allclose(in_place.poses_in_place(*problem_of(poses)), poses, atol=1e-9)
+
+
+@pytest.mark.parametrize(("stiffer", "weight", "n"), [(1.0, 1.0, 101), (100.0, 0.3, 31)])
+def test_positions_between_others_that_are_held_are_held(
+    stiffer: float, weight: float, n: int
+) -> None:
+    """Where rounding, and the rounding of stiff steel, is all that is missing."""
+    robot = replace(ROBOT, ea=stiffer * ROBOT.ea)
+    heavy = Terms([Term.of(robot, "cable_weight", weight_N_per_m=weight)])
+    level = np.tile(ROBOT.reference_pose, (n, 1))
+    level[:, 0] = np.linspace(0.25, 0.75, n)
+    margins = correction.margins_in_place(robot, level, heavy, 0.0, np.inf)
+    assert np.all(margins > 0.0)
+    np.testing.assert_allclose(margins, margins[::-1], rtol=1e-6)
+
+
+def test_others_start_from_the_results_of_their_nearest() -> None:
+    """Of a platform that is asked for nearly upside down, where nothing else is near."""
+    poses = rests(np.linspace(0.3, 0.7, 9))
+    problem, _tables = problem_of(poses, turned=2.5)
+    best, some = Best.none(problem), np.array([1, 4, 7])
+    left = np.setdiff1d(np.arange(9), some)
+    in_place._try_all(best, problem.allowed(problem.to(poses[some], some)), some)
+    assert np.flatnonzero(best.firm).tolist() == some.tolist()
+    assert in_place._from_neighbours(best, left, some).tolist() == left.tolist()
+    np.testing.assert_allclose(problem.placed(best.away, np.arange(9)), poses, atol=1e-9)
+
+
+def test_searched_rows_are_spread_evenly_from_the_first_to_the_last() -> None:
+    rows = np.arange(100, 171)
+    assert in_place._apart(rows).tolist() == [100, 110, 120, 130, 140, 150, 160, 170]
+    assert in_place._apart(rows[:3]).tolist() == [100, 101, 102]
