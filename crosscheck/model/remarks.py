@@ -29,7 +29,7 @@ def with_remarks(fresh: Any, old: Any) -> Any:
             continue
         table[key] = value
         if old[key].trivia.comment:
-            table[key].comment(old[key].trivia.comment.removeprefix("#").strip())
+            table[key].comment(old[key].trivia.comment)
     return table
 
 

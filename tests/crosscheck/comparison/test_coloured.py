@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from made_data import COGIRO, SIGMA, measured
 
+from crosscheck.comparison.coloured import Coloured
 from crosscheck.comparison.residuals import compare
 from crosscheck.comparison.result import Comparison
 from crosscheck.measurements.data import Measurements
@@ -68,3 +69,12 @@ def test_a_few_rows_far_off_are_noise_unless_they_lie_side_by_side() -> None:
 def test_white_noise_needs_no_colour() -> None:
     found = compared(np.zeros((rows(), 3)))
     assert found.is_noise and found.coloured is None
+
+
+def test_noise_in_words_tells_what_is_more_than_its_size() -> None:
+    noise = Coloured({"position": 1.25, "tension": 0.5}, {"position": 0.051, "tension": 0.05}, 1)
+    assert noise.words == (
+        "position 1.25 times the assumed noise, with a correlation of 0.05 from row to row, "
+        "tension 0.50 times the assumed noise; 1 outlier"
+    )
+    assert replace(noise, outliers=0).words.endswith("tension 0.50 times the assumed noise")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from measured_csv import POSE
 
+from crosscheck.measurements.beside import Beside, read_beside
 from crosscheck.measurements.data import Sigma
 from crosscheck.measurements.read import load_commands, load_measurements
 from seecr.errors import InputFileError
@@ -71,3 +72,19 @@ def test_named_sigma_must_exist_and_be_text(csv_file, robot, tmp_path):
     (tmp_path / "latin.toml").write_bytes(b"# \xe9\n")
     with pytest.raises(InputFileError, match=r"is not UTF-8 \(byte number 3\)"):
         load_measurements(path, robot, sigma_path=tmp_path / "latin.toml")
+
+
+def test_what_is_free_is_there_once_and_senses(tmp_path):
+    path = tmp_path / "a.toml"
+    path.write_text('free = ["tracker_target", "tracker_frame", "tracker_target"]\n')
+    assert read_beside(path).free == ("tracker_target", "tracker_frame")
+    for wrong in ('"tracker_frame"', '["stiffness"]', "[1]"):
+        path.write_text(f"\nfree = {wrong}\n")
+        with pytest.raises(InputFileError, match="line 2: free must be a list of some of tracker_"):
+            read_beside(path)
+
+
+def test_a_name_of_the_users_own_is_left_alone(tmp_path):
+    path = tmp_path / "a.toml"
+    path.write_text('operator = "x"\n[hall]\nheight_m = 8\n')
+    assert read_beside(path) == Beside()

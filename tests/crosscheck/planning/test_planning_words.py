@@ -1,0 +1,74 @@
+"""The words of a plan: what an effect is confused with, and what a measurement would gain."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from crosscheck.planning.proposer import Gain
+from crosscheck.planning.result import Visible
+from crosscheck.planning.visibility import Signal
+from crosscheck.planning.words import alike, gain_words
+from seecr.effects import layout_of
+
+DRUMS = layout_of("drum_eccentricity", "demobot_cogiro")
+SIGNAL = Signal(DRUMS, {}, np.ones((4, len(DRUMS))) * ~DRUMS.shape)
+CLEAR = Visible(SIGNAL, 15.0, 0.5, 0.75, "", (), ())
+
+
+def test_an_effect_that_shows_is_named_unless_something_looks_the_same() -> None:
+    assert CLEAR.visible and CLEAR.named and alike(CLEAR) == ""
+    for other in (replace(CLEAR, twins=("a",)), replace(CLEAR, confused=(("a", 1.0),))):
+        assert other.visible and not other.named
+    assert replace(CLEAR, factor=1.0).visible and not replace(CLEAR, factor=1.01).visible
+
+
+def test_exact_twins_come_first_and_what_is_not_seen_is_said() -> None:
+    confused = tuple((name, 1.0) for name in "bcdef")
+    both = replace(CLEAR, twins=("a",), confused=confused)
+    assert alike(both) == "a (exactly), b, c, d and 2 more"
+    assert alike(replace(CLEAR, factor=2.0)) == "(not visible at a plausible size)"
+    assert alike(replace(both, factor=2.0)).startswith("a (exactly)")
+
+
+def test_sizes_are_multiples_of_plausible_ones_without_what_gives_the_shape() -> None:
+    sizes = CLEAR.sizes(0.5)
+    assert list(sizes) == np.array(DRUMS.names)[~DRUMS.shape].tolist()
+    assert list(sizes.values()) == [0.5 * one for one in DRUMS.scale[~DRUMS.shape]]
+    seen = SIGNAL.columns.copy()
+    seen[:, 1:] = 0.0
+    assert list(replace(CLEAR, signal=replace(SIGNAL, columns=seen)).sizes(1.0)) == [DRUMS.names[0]]
+    unseen = replace(SIGNAL, columns=0.0 * seen)
+    assert replace(CLEAR, signal=unseen).sizes(0.5) == sizes
+
+
+def test_in_words_cables_are_one_size_each_and_endless_is_none() -> None:
+    words = CLEAR.words(1.0).split(", ")
+    assert [word.split()[0] for word in words] == ["sine", "cosine"]
+    assert all(word.endswith(" mm each") for word in words)
+    assert CLEAR.words(np.inf) == "none"
+
+
+def test_without_a_way_to_tell_it_from_a_twin_no_size_is_promised() -> None:
+    found = replace(CLEAR, twins=("a",), confused=(("b", 2.0),)).as_json()
+    assert found["smallest_identifiable"] is None and found["best_imitator"] is None
+    assert [one["effect"] for one in found["cannot_be_told_from"]] == ["a", "b"]
+    assert [one["exact"] for one in found["cannot_be_told_from"]] == [True, False]
+    assert CLEAR.as_json()["smallest_identifiable"] == CLEAR.sizes(0.75)
+
+
+@pytest.mark.parametrize(
+    ("other", "then", "words"),
+    [
+        ("", 2049.0, "makes a visible (signal 0.12 now, 2000 then, 15 needed)"),
+        ("b", 15.6, "tells a from b (signal 0.12 now, 16 then, 15 needed)"),
+    ],
+)
+def test_signals_have_two_digits_and_no_powers_of_ten(other: str, then: float, words: str) -> None:
+    assert gain_words(Gain("a", other, 0.1234, then, 15.0)) == words
+
+
+def test_enough_is_what_a_test_finds() -> None:
+    assert [Gain("a", "", 0.0, then, 15.0).enough for then in (14.9, 15.0)] == [False, True]
