@@ -74,7 +74,7 @@ class Visible:
         for item in fields(effect):
             unit = item.metadata["unit"]
             keys = [key for key in sizes if belongs(key, item.name, unit)]
-            if not keys or item.metadata["shape"]:
+            if not keys:
                 continue
             null = float(item.metadata["null"])
             start = f"{null:g} ± " if null else ""

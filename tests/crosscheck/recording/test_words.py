@@ -27,7 +27,9 @@ def test_places_are_millimetres_and_angles_degrees_about_moving_axes() -> None:
 def test_from_its_command_a_pose_is_displaced_with_a_sign_and_turned_without() -> None:
     moved = posed(TURN, (0.001, -0.002, 0.0))
     assert words.shift(moved, HOME) == "dx +1.00, dy -2.00, dz +0.00 mm"
-    assert words.turn(moved, HOME) == f"{np.degrees(TURN.magnitude()):.2f}°"
+    far = posed(TURN, (3.0, 0.0, 0.0))
+    assert words.turn(moved, HOME) == words.turn(far, HOME)
+    assert words.turn(far, HOME) == f"{np.degrees(TURN.magnitude()):.2f}°"
     assert words.turn(posed(TURN * TURN), posed(TURN)) == words.turn(moved, HOME)
 
 
