@@ -10,6 +10,7 @@ from made_data import measured, term
 from made_diagnoses import POINTS, SIGMA, diagnose_with, pulleys, robot
 
 from crosscheck.diagnosis import found_covariance, found_effects
+from crosscheck.diagnosis.found import _widened
 from crosscheck.fit.reasons import DiagnosisVerdict
 
 
@@ -46,3 +47,17 @@ def test_the_covariance_goes_in_the_order_of_the_effects() -> None:
 )
 def test_where_more_is_missing_than_is_listed_there_is_none(verdict: DiagnosisVerdict) -> None:
     assert found_covariance(replace(pulleys(), verdict=verdict)) is None
+
+
+def test_beside_many_effects_errors_of_the_model_are_not_widened_by_those_of_one() -> None:
+    """There each listed effect has an error of its own."""
+    found = pulleys()
+    (listed,) = found.missing
+    wider = replace(found, missing=(replace(listed, stderr=3.0 * listed.stderr),))
+    assert _widened(wider) == pytest.approx(3.0)
+    assert _widened(replace(wider, verdict=DiagnosisVerdict.MANY_EFFECTS)) == 1.0
+
+
+def test_without_a_search_there_is_no_model() -> None:
+    nothing = replace(pulleys(), search=None)
+    assert found_effects(nothing) == () and found_covariance(nothing) is None

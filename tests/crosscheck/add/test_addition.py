@@ -1,0 +1,53 @@
+"""What an addition is worth, and which of its effects is the added one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from crosscheck.add.result import Addition
+from crosscheck.fit.noise import Whiteness
+from crosscheck.model.fitted import Fitted
+from seecr.description.mjcf import load_robot
+from seecr.effects import Term
+from seecr.prediction.model import new_model
+
+ROBOT = load_robot("demobot_cogiro")
+WHITE = Whiteness(1.0, 1, 0.3, 1.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def fitted(name: str, **values: float) -> Fitted:
+    term = Term.of(ROBOT, name, **values)
+    size = len(term.layout)
+    return Fitted(term, np.full(size, 1e-4), np.zeros(size, dtype=bool))
+
+
+def addition(**changes: Any) -> Addition:
+    effects = (fitted("pulley_radius", radius_m=0.01), fitted("stiffness", factor=1.2))
+    rms: Any = {"position_m": 1e-3}
+    given: dict[str, Any] = {
+        "names": ("stiffness", "creep"), "fitted": effects, "before": rms, "after": rms,
+        "held_out_before": rms, "held_out": rms, "fall": (1.0, 0.1), "p": 0.5, "predicts": True,
+        "from_nothing": 9.0, "is_nothing": False, "whiteness": WHITE,
+        "warnings": ("odd",), "notes": ("said",), "model": new_model(ROBOT),
+    }  # fmt: skip
+    return Addition(**(given | changes))
+
+
+@pytest.mark.parametrize("predicts", [False, True])
+@pytest.mark.parametrize("is_nothing", [False, True])
+def test_what_predicts_better_pays_unless_it_is_nothing(predicts: bool, is_nothing: bool) -> None:
+    found = addition(predicts=predicts, is_nothing=is_nothing)
+    assert found.pays == (predicts and not is_nothing)
+    worth = "improves" if found.pays else "does not improve"
+    assert found.lines()[0].startswith(f"stiffness + creep {worth} the prediction of held-out runs")
+
+
+def test_the_added_effect_is_found_by_its_name_and_the_model_has_all() -> None:
+    found = addition()
+    assert found.own.term.name == "stiffness" and found.own.term.vector == [1.2]
+    assert found.terms.names == ("pulley_radius", "stiffness")
+    assert found.lines()[-2:] == ["warning: odd", "note: said"]
+    assert found.as_json()["added"] == ["stiffness", "creep"]

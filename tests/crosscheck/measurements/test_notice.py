@@ -1,0 +1,107 @@
+"""What no single cell shows: where units, orders and rows are odd, and where they are just not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from made_columns import columns_of
+from rectangle import RECTANGLE
+
+from crosscheck.measurements import notice
+from crosscheck.measurements.data import Measurements
+from seecr.columns.known import Columns
+from seecr.errors import InputFileError
+from seecr.pose import quat_from_rotvec, quat_multiply
+
+HOME = RECTANGLE.reference_pose
+# Five commands about the reference pose, with a spread of 0.1 m: the median distance.
+WAY = np.array([-0.2, -0.1, 0.0, 0.1, 0.2])
+
+
+def poses(**along: np.ndarray) -> np.ndarray:
+    out = np.tile(HOME, (5, 1))
+    for axis, values in along.items():
+        out[:, "xyz".index(axis)] += values
+    return out
+
+
+def data_of(told: np.ndarray, **read: Any) -> Measurements:
+    run = np.full(len(told), "a")
+    return Measurements(path=Path("a.csv"), n_cables=4, run=run, command_pose=told, **read)
+
+
+def positions(unit: str = "m") -> Columns:
+    return columns_of(",".join(f"meas_{c}_{unit}" for c in "xyz"), *["0,0,0"] * 5, n_cables=4)
+
+
+@pytest.mark.parametrize(("power", "unit"), [(1, "mm"), (-1, "m")])
+def test_readings_that_spread_a_hundred_times_as_far_are_in_another_unit(
+    power: int, unit: str
+) -> None:
+    told = poses(x=WAY, y=WAY)
+    for times, odd in ((101.0, True), (99.0, False)):
+        read = HOME[:3] + times**power * (told[:, :3] - HOME[:3])
+        data = data_of(told, position=read)
+        if odd:
+            with pytest.raises(InputFileError, match=f"such as meas_x_{unit}$"):
+                notice._check_spread(positions(), RECTANGLE, data)
+        else:
+            notice._check_spread(positions(), RECTANGLE, data)
+
+
+def test_one_axis_in_another_unit_is_named_if_it_was_meant_to_move() -> None:
+    told = poses(x=WAY, y=WAY)
+    read = told[:, :3].copy()
+    read[:, 1] = HOME[1] + 1e-3 * WAY
+    with pytest.raises(InputFileError, match=r"column meas_y_m: positions were .*_m$"):
+        notice._check_spread(positions(), RECTANGLE, data_of(told, position=read))
+    # a mean distance of 0.12 m, of which a frame of 5 m asks for 0.1
+    still = poses(x=WAY, y=0.8 * WAY)
+    read = still[:, :3].copy()
+    read[:, 1] = HOME[1] + 1e-3 * WAY
+    notice._check_spread(positions(), RECTANGLE, data_of(still, position=read))
+
+
+def test_few_readings_and_readings_that_stand_still_say_nothing_of_units() -> None:
+    told = poses(x=WAY)
+    some = told[:, :3] * 1e3
+    some[3:] = np.nan
+    notice._check_spread(positions(), RECTANGLE, data_of(told, position=some))
+    notice._check_spread(positions(), RECTANGLE, data_of(told, position=np.tile(HOME[:3], (5, 1))))
+
+
+def test_an_offset_is_odd_from_half_of_the_spread_and_a_twentieth_of_the_frame_on() -> None:
+    for told, least in ((poses(x=WAY), 0.25), (poses(x=10 * WAY), 0.5)):
+        for part, odd in ((0.99, False), (1.01, True)):
+            read = told[:, :3] + [0.0, part * least, 0.0]
+            notes = notice._elsewhere(RECTANGLE, data_of(told, position=read))
+            assert bool(notes) == odd
+    assert f"they are {1.01 * 0.5:.3g} m from them, which spread by 1 m" in notes[0]
+
+
+def test_a_platform_that_is_turned_in_either_order_is_not_told_to_be_in_another() -> None:
+    told = poses(x=WAY)
+    wobble = quat_from_rotvec(0.1 * np.random.default_rng(0).normal(size=(5, 3)))
+    columns = columns_of("meas_qw,meas_qx,meas_qy,meas_qz", *["1,0,0,0"] * 5, n_cables=4)
+
+    def notes(quat: np.ndarray) -> list[str]:
+        return notice._other_order(columns, RECTANGLE, data_of(told, quat_wxyz=quat))
+
+    assert notes(wobble) == []
+    (note,) = notes(np.roll(wobble, -1, axis=1))
+    assert "if their last number is the scalar" in note
+    # 120 degrees about (1, 1, 1) is (1, 1, 1, 1)/2, in whatever order
+    third = quat_from_rotvec(np.full((5, 3), 2.0 * np.pi / 3.0 / 3**0.5))
+    assert notes(quat_multiply(wobble, third)) == []
+
+
+def test_rows_that_are_the_same_are_listed_up_to_eight() -> None:
+    told = np.tile(HOME, (12, 1))
+    data = data_of(told, position=np.zeros((12, 3)))
+    (note,) = notice.twice(data)
+    assert "9 as 2" in note and "10 as 2 and 3 more" in note
+    other = data_of(told, position=np.arange(36.0).reshape(12, 3))
+    assert notice.twice(other) == []
