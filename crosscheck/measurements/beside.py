@@ -12,7 +12,6 @@ from crosscheck.units import EXAMPLE, LEAST_NOISE, MOST, parse_quantity
 from seecr.columns.beside import CHOICES, choice
 from seecr.effects import catalogue
 from seecr.files import Toml, read_toml
-from seecr.prediction.cells import number_of
 
 _SIGMAS = tuple(item.name for item in fields(Sigma))
 
@@ -86,9 +85,10 @@ def _sigma(toml: Toml, key: str, value: object) -> float:
             return parse_quantity(key, kind, value, LEAST_NOISE)
         except CrosscheckError as error:
             raise toml.error(str(error), key) from None
-    number = number_of(value) or 0.0
+    # not yet a float, which cannot hold a whole number of hundreds of digits
+    number = value if isinstance(value, int | float) and value is not True else 0.0
     if not LEAST_NOISE < number < MOST:
         size = f" between {LEAST_NOISE:g} and {MOST:g}" if number > 0.0 else ""
         text = f'{key} must be a positive number [{unit}]{size} or a text such as "{EXAMPLE[kind]}"'
         raise toml.error(f"{text}, got {value!r:.60}; leave it out if it is not known", key)
-    return number
+    return float(number)
