@@ -8,25 +8,21 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seecr.commands.data import Commands
-from seecr.compiled.columns import EXTERNAL_FORCE, EXTERNAL_MOMENT
 from seecr.description.given import GivenRobot, robot_of
 from seecr.description.robot import Robot
 from seecr.effects.terms import Terms
 from seecr.errors import InputError
-from seecr.holding.balance import balance_of, bends
 from seecr.holding.distribution import tension_limits
-from seecr.holding.inside import farthest_inside
 from seecr.pose import Array
-from seecr.prediction.experiment import Experiment, effects_of
+from seecr.prediction.experiment import Experiment
 from seecr.prediction.model import GivenEffects, Model, model_given
 from seecr.prediction.sensitivity import sensitivities
 from seecr.prediction.uncertainty import moving_covariance
 from seecr.statics.starts import Commanded, commanded_poses, commands_from
-from seecr.statics.tables import Tables, assemble
-from seecr.workspace.zones import load_scale, margins_from, wrenches_of
+from seecr.workspace.margins import margins_at
+from seecr.workspace.zones import load_scale
 
-__all__ = ["asked_chance", "held_chance", "kept_chance", "margins_with"]
+__all__ = ["asked_chance", "held_chance", "kept_chance"]
 
 # Number of draws of the parameters for tensions, which are linear in them.
 _LINEAR = 4096
@@ -36,10 +32,6 @@ _LINEAR = 4096
 _STAGES = ((4, 15.0), (16, 6.0), (64, 4.0), (256, 0.0))
 # Rows per batch.
 _PART = 64
-_HOLDS_NONE = (
-    "{} has fewer cables than degrees of freedom, so it holds no poses; expected a map without "
-    "probabilities"
-)
 _NO_COVARIANCE = (
     "probabilities need a model with its covariance; expected a table [calibration] or [fit], "
     "which crosscheck calibrate always writes, and add and diagnose if the data determine every "
@@ -122,41 +114,41 @@ def held_chance(
         lowest, highest, wrenches: as in :func:`seecr.tension_margin`.
 
     Returns:
-        (n,); None if the model keeps no covariance.
-
-    Raises:
-        InputError: the robot has fewer cables than degrees of freedom.
+        (n,); None if the model keeps no covariance. For robots with fewer cables than degrees of
+        freedom, the probability that the position can be held in some orientation.
     """
     robot = robot_of(robot)
     known = moving_covariance(model_given(model, robot))
     if known is None:
         return None
-    if robot.n_cables < robot.n_dof:
-        raise InputError(_HOLDS_NONE.format(robot.name))
     terms, covariance = known
     places, limits = commanded_poses(poses), (lowest, highest, wrenches)
     vectors = _drawn(terms, covariance, _STAGES[-1][0])
-    edge = -1e-9 * load_scale(robot)
+    edge, solved = -1e-9 * load_scale(robot), robot.n_cables < robot.n_dof
     out, rows = np.zeros(len(places)), np.arange(len(places))
     seen = np.zeros((0, len(places)))
     for count, sure in _STAGES:
         drawn = [terms.with_vector(one).effects for one in vectors[len(seen) : count]]
-        more = [margins_with(robot, places[rows], one, *limits) for one in drawn]
+        more = [margins_at(robot, places[rows], *limits, one) for one in drawn]
         seen = np.concatenate([seen, more])
         out[rows] = (seen >= edge).mean(axis=0)
-        near = ~(np.isin(out[rows], (0.0, 1.0)) & _far(seen, sure))
+        near = ~(np.isin(out[rows], (0.0, 1.0)) & _far(seen, sure, solved))
         rows, seen = rows[near], seen[:, near]
         if len(rows) == 0:
             break
     return out
 
 
-def _far(margins: Array, sure: float) -> NDArray[np.bool_]:
-    """Whether the mean of margins (draws, n) is so many standard deviations from zero."""
-    # infinite limits, or poses out of reach, are far from any edge
-    far: NDArray[np.bool_] = np.asarray(~np.isfinite(margins).all(axis=0))
-    some = margins[:, ~far]
-    far[~far] = np.abs(some.mean(axis=0)) > sure * some.std(axis=0)
+def _far(margins: Array, sure: float, solved: bool) -> NDArray[np.bool_]:
+    """Whether the mean of margins (draws, n) is so many standard deviations from zero.
+
+    Infinite limits, or poses out of reach, are far from any edge. But if the orientation has to be
+    solved for, minus infinity says nothing about how near one is that can be held.
+    """
+    infinite: NDArray[np.bool_] = np.asarray(~np.isfinite(margins).all(axis=0))
+    far = np.full(len(infinite), not solved)
+    some = margins[:, ~infinite]
+    far[~infinite] = np.abs(some.mean(axis=0)) > sure * some.std(axis=0)
     return far
 
 
@@ -164,10 +156,8 @@ def check_chance(robot: Robot, model: GivenEffects) -> None:
     """Check that poses can have probabilities, before hours are spent on them.
 
     Raises:
-        InputError: fewer cables than degrees of freedom, or not a model with a covariance.
+        InputError: not a model with a covariance.
     """
-    if robot.n_cables < robot.n_dof:
-        raise InputError(_HOLDS_NONE.format(robot.name))
     if not isinstance(model, Model) or moving_covariance(model) is None:
         raise InputError(_NO_COVARIANCE)
 
@@ -187,41 +177,6 @@ def asked_chance(
     if found is None:
         raise InputError(_NO_COVARIANCE)
     return found
-
-
-def margins_with(
-    robot: Robot,
-    poses: Array,
-    effects: GivenEffects,
-    lowest: ArrayLike = 0.0,
-    highest: ArrayLike = np.inf,
-    wrenches: ArrayLike | None = None,
-) -> Array:
-    """Margins (n,) [N] like :func:`seecr.tension_margin`, of a robot with effects."""
-    low, high = tension_limits(robot, lowest, highest)
-    told = Commands(poses, lengths=robot.commanded_lengths(poses), told=True)
-    tables = assemble(Experiment(robot, told).setup(effects_of(effects, robot)))
-    some = np.zeros((1, 6)) if wrenches is None else wrenches_of(wrenches)
-    if bends(tables):
-        every = [farthest_inside(_pushed(tables, one), low, high).margins for one in some]
-        return np.asarray(np.min(every, axis=0))
-    matrices, load = balance_of(tables, low)
-    # load of -W tau = w: the signs are those of the gradient
-    loads = load[:, None]
-    if robot.joints and wrenches is not None:
-        # of a wrench only that along the joints must be balanced
-        loads = np.stack([balance_of(_pushed(tables, one), low)[1] for one in some], axis=1)
-    elif wrenches is not None:
-        loads = loads + some * np.where(robot.hinges, 1.0 / robot.length, 1.0)
-    return margins_from(matrices, np.ascontiguousarray(loads), low, high, load_scale(robot))
-
-
-def _pushed(tables: Tables, wrench: Array) -> Tables:
-    """The same tables with an additional external wrench (6,) [N, N m] at the platform's origin."""
-    load = tables.load.copy()
-    load[:, EXTERNAL_FORCE : EXTERNAL_FORCE + 3] += wrench[:3]
-    load[:, EXTERNAL_MOMENT : EXTERNAL_MOMENT + 3] += wrench[3:]
-    return replace(tables, load=load)
 
 
 def _drawn(terms: Terms, covariance: Array, count: int) -> Array:

@@ -17,14 +17,15 @@ from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
 from seecr.inverse.correction import correct
 from seecr.pose import Array
-from seecr.prediction.model import Model
+from seecr.prediction.model import Model, load_model
 from seecr.report.corrections import chance_lines
 from seecr.report.maps import likely_lines, write_arrays
 from seecr.statics.solution import Solution
 from seecr.workspace import chances
-from seecr.workspace.chances import held_chance, kept_chance, margins_with
+from seecr.workspace.chances import held_chance, kept_chance
 from seecr.workspace.edges import boundary
 from seecr.workspace.maps import workspace_map
+from seecr.workspace.margins import margins_at, margins_with
 from seecr.workspace.zones import tension_margin
 
 
@@ -84,9 +85,9 @@ def test_poses_far_from_the_limit_are_decided_by_few_models(
 
     def counting(robot: Robot, at: Array, *rest: Any) -> Array:
         tried[np.isin(poses[:, 0], at[:, 0])] += 1
-        return margins_with(robot, at, *rest)
+        return margins_at(robot, at, *rest)
 
-    monkeypatch.setattr(chances, "margins_with", counting)
+    monkeypatch.setattr(chances, "margins_at", counting)
     few = held_chance(ROBOT, poses, model, lowest=0.02)
     assert few is not None
     assert np.all(tried[(few > 0.0) & (few < 1.0)] == 256)
@@ -95,6 +96,30 @@ def test_poses_far_from_the_limit_are_decided_by_few_models(
     every = held_chance(ROBOT, poses, model, lowest=0.02)
     assert every is not None
     np.testing.assert_allclose(few, every, atol=0.005)
+
+
+def test_two_cables_hold_a_position_as_often_as_the_mass_allows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In the middle of two cables the tension is proportional to the mass, whatever else."""
+    monkeypatch.setattr(chances, "_STAGES", ((4, 15.0), (64, 0.0)))
+    two = load_robot(model_path("planar_two_cable"))
+    (tmp_path / "model.toml").write_text(
+        'format = 1\n[[effect]]\nname = "platform_mass"\n[effect.parameters]\n'
+        "added_kg = { value = 0.0, stderr = 0.02 }\n[calibration]\n"
+        'parameters = ["platform_mass.added_kg"]\ncorrelation = [[1.0]]\n'
+    )
+    model = load_model(tmp_path / "model.toml", two)
+    middle = two.reference_pose[None]
+    tension = float(margins_at(two, middle, 0.0, np.inf, None, ())[0])
+    for z, expected in ((-1.0, 0.159), (9.0, 1.0)):
+        highest = tension * (1.0 + z * 0.02 / two.mass)
+        said = held_chance(two, middle, model, highest=highest)
+        assert said is not None and said[0] == pytest.approx(expected, abs=0.02)
+    found = workspace_map(two, 0.5, 0.0, [0.5, 0.9], effects=model, highest=tension, chance=True,
+                          elastic=False)  # fmt: skip
+    assert found.chance is not None
+    assert found.chance.ravel() == pytest.approx([0.5, 0.0], abs=0.02)
 
 
 def test_without_effects_margins_are_those_of_the_plain_robot() -> None:
@@ -189,9 +214,6 @@ def test_maps_that_can_have_no_probabilities_are_refused(tmp_path: Path) -> None
         plain.likely(0.9)
     with pytest.raises(InputError, match=r"above 0 and at most 1, got 1\.5"):
         plain.likely(1.5)
-    two = load_robot(model_path("planar_two_cable"))
-    with pytest.raises(InputError, match="than degrees of freedom, so it holds no poses"):
-        held_chance(two, two.reference_pose, model_of(tmp_path, MODEL + KEPT))
 
 
 def test_draws_spread_as_the_covariance_says_whatever_the_units(tmp_path: Path) -> None:
@@ -249,9 +271,6 @@ def test_what_can_have_no_probabilities_is_refused_before_the_map(tmp_path: Path
     def told(_done: int) -> None:
         raise AssertionError("a part was mapped")
 
-    two = load_robot(model_path("planar_two_cable"))
-    with pytest.raises(InputError, match="fewer cables than degrees of freedom"):
-        workspace_map(two, *[np.linspace(0.0, 0.1, 9)] * 3, chance=True, progress=told)
     with pytest.raises(InputError, match="need a model with its covariance"):
         workspace_map(ROBOT, 0.3, 0.2, 0.1, effects=model_of(tmp_path, MODEL), chance=True,
                       progress=told)  # fmt: skip
