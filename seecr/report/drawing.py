@@ -9,9 +9,9 @@ from typing import Any
 
 __all__ = ["COLOURS", "figure"]
 
-# Okabe and Ito (2008), "Color Universal Design".
+# Okabe and Ito (2008), "Color Universal Design"; brown for their yellow, which is faint on white.
 COLOURS = (
-    "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#000000", "#B8A800",
+    "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#000000", "#8B5A2B",
 )  # fmt: skip
 _STYLE: Any = {
     "font.size": 9, "axes.grid": True, "grid.alpha": 0.3, "axes.spines.top": False,
