@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,6 +23,7 @@ from seecr.cli.options import FILE, json_option, made_by, out_option, progress_s
 if TYPE_CHECKING:
     from crosscheck import Diagnosis, Measurements
     from seecr import Model, Robot
+    from seecr.pose import Array
 
 
 @click.command(
@@ -107,7 +109,8 @@ def command(
             from crosscheck.recording import write_diagnosis_recording
 
             write_diagnosis_recording(found, folder / "diagnosis.rrd")
-        note = "" if model_out is None else _keep(found, own, machine, measured, model_out)
+        moved = _refitted(found, own)
+        note = "" if model_out is None else _keep(found, own, moved, machine, measured, model_out)
     if as_json:
         click.echo(text)
     else:
@@ -118,20 +121,42 @@ def command(
         click.echo(note, err=as_json)
     if not as_json:
         given = Given.with_data(measured, robot, data, model, sigmas)
-        click.echo(after_diagnosis(found, given, model_out, out))
+        click.echo(after_diagnosis(found, given, model_out, out, moved))
     if found.verdict in gates:
         return 1
     return 0 if found.converged else 3
 
 
-def _keep(found: Diagnosis, own: Model, robot: Robot, measured: Measurements, path: Path) -> str:
+def _refitted(found: Diagnosis, own: Model) -> tuple[str, ...]:
+    """Effects of the model that agree with the data only with other values than it has."""
+    from crosscheck import DiagnosisVerdict
+    from crosscheck.diagnosis import found_effects
+
+    if found.verdict is not DiagnosisVerdict.NO_EFFECT_MISSING:
+        return ()
+    return tuple(
+        one.term.name
+        for one in found_effects(found)
+        if one.term.name in own.names and _differs(one.term.vector, own.terms[one.term.name].vector)
+    )
+
+
+def _differs(new: Array, old: Array) -> bool:
+    """Whether values differ; those of single files or runs, which differ in number, do not."""
+    return new.shape == old.shape and bool((new != old).any())
+
+
+def _keep(
+    found: Diagnosis, own: Model, moved: Sequence[str], robot: Robot, measured: Measurements,
+    path: Path,
+) -> str:  # fmt: skip
     """Write the model that was found, if there was a verdict; what was done."""
     from crosscheck.diagnosis import found_covariance, found_effects
     from crosscheck.model import provenance_of, renewed, save_model, with_fit
 
     if found.refusal is not None:
         return f"{path} was not written: there is no verdict"
-    if not found.missing:
+    if not found.missing and not moved:
         save_model(path, own)
         return f"Written to {path}: the model as it was, with nothing added"
     names = [effect.effect for effect in found.missing]
@@ -140,4 +165,6 @@ def _keep(found: Diagnosis, own: Model, robot: Robot, measured: Measurements, pa
     fitted, covariance = found_effects(found), found_covariance(found)
     new = with_fit(own, fitted, names, source, errors, covariance)
     save_model(path, renewed(new, robot, measured))
+    if not names:
+        return f"Written to {path}: {', '.join(moved)}, refitted to these data; nothing added"
     return f"Written to {path}: {', '.join(names)}"

@@ -64,8 +64,14 @@ def after_comparison(found: Comparison, given: Given) -> str:
     return _using(given, given.model)
 
 
-def after_diagnosis(found: Diagnosis, given: Given, kept: Path | None, out: Path) -> str:
-    """Adding what was found, calibrating all, or measuring more."""
+def after_diagnosis(
+    found: Diagnosis, given: Given, kept: Path | None, out: Path, refitted: Sequence[str] = ()
+) -> str:
+    """Adding what was found, calibrating all, or measuring more.
+
+    A model that agrees only with its values ``refitted`` is used where these were kept, and gets
+    them otherwise.
+    """
     from crosscheck import DiagnosisVerdict
 
     files, to = (given.robot, *given.data), ("--model", given.model or _MODEL)
@@ -73,7 +79,10 @@ def after_diagnosis(found: Diagnosis, given: Given, kept: Path | None, out: Path
         case DiagnosisVerdict.MANY_EFFECTS:
             return following("crosscheck", "calibrate", *files, *to, *given.options)
         case DiagnosisVerdict.NO_EFFECT_MISSING if given.model is not None:
-            return _using(given, given.model)
+            if refitted and kept is None:
+                again = (refitted[0], *files, *to, "--refit", *given.options)
+                return following("crosscheck", "add", *again)
+            return _using(given, kept or given.model)
         case DiagnosisVerdict.NO_VERDICT:
             return following("crosscheck", "plan", given.robot, "--rows", _ROWS, *given.options)
     if not found.missing:

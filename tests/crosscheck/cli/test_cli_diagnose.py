@@ -138,6 +138,28 @@ def test_the_model_that_was_found_is_written_and_gates_end_1(
 
 
 @pytest.mark.usefixtures("unpaged")
+def test_a_model_that_agrees_only_with_other_values_is_written_with_these(
+    planar: tuple[Path, Path], tmp_path: Path
+) -> None:
+    """Once it was written as it was, with "model and data agree", which they did not."""
+    old, new = tmp_path / "old.toml", tmp_path / "new.toml"
+    old.write_text(
+        'format = 1\n[[effect]]\nname = "pulley_radius"\n[effect.parameters]\nradius_m = 0.008\n'
+    )
+    told = ("--model", old, *QUICK, "--out", tmp_path / "o")
+    done = run("diagnose", *planar, *told, "--model-out", new)
+    assert done.exit_code == 0 and done.stdout.count("no_effect_missing: ") == 1, done.output
+    assert f"Written to {new}: pulley_radius, refitted to these data; nothing added" in done.stdout
+    assert f"next: seecr correct {planar[0]} {planar[1]} --model {new}  #" in done.stdout
+    model = load_model(new, load_robot(planar[0]))
+    assert model.terms["pulley_radius"].vector == pytest.approx([0.01], abs=2e-4)
+    assert model.document["effect"][0]["refitted"]["by"] == "crosscheck diagnose"
+    # and where nothing is written, the next command does it
+    done = run("diagnose", *planar, *told)
+    assert f"add pulley_radius {planar[0]} {planar[1]} --model {old} --refit" in done.stdout
+
+
+@pytest.mark.usefixtures("unpaged")
 def test_all_that_a_diagnosis_lists_is_added_at_once(
     planar: tuple[Path, Path], tmp_path: Path
 ) -> None:
