@@ -180,8 +180,11 @@ class Comparison(Result):
         if w is None:
             why = f": {self.unsolved[0].why}" if self.unsolved else ""
             return f"Nothing could be compared{why}."
-        if (w.is_noise or self.coloured is not None) and self.refusal is not None:
-            return f"No verdict: {self.refusal}; {self.refusal.remedy}."
+        if self.refusal is not None:
+            said = f"No verdict: {self.refusal}; {self.refusal.remedy}."
+            if w.is_noise or self.coloured is not None:
+                return said
+            return f"{said} The errors are {w.scale:.3g} times the noise."
         if w.is_noise:
             stated = kinds_stated(self.problem) == kinds_read(self.problem)
             times = f"{w.scale:.2f} times the {'stated' if stated else 'estimated'} noise"

@@ -221,8 +221,17 @@ _FIRST = {
 
 
 def _to_find(where: Sequence[Association]) -> str:
+    # an offset says nothing about where to look; what is left beside it does
+    offset = where[0] if where and where[0].kind is QuantityKind.EVERYWHERE else None
+    rest = next((one for one in where if one.kind is not QuantityKind.EVERYWHERE), None)
     again = "repeat the same poses forward, back and an hour later"
-    if not where:
-        return f"{again}, to see what the error depends on"
-    advice = _FIRST.get(where[0].kind, f"{again}, and see whether that changes")
-    return f"the unexplained error depends on {where[0].against}: {advice}"
+    if rest is None:
+        found = f"{again}, to see what the error depends on"
+    else:
+        advice = _FIRST.get(rest.kind, f"{again}, and see whether that changes")
+        error = "the unexplained error" if offset is None else "the rest"
+        found = f"{error} depends on {rest.against}: {advice}"
+    if offset is None:
+        return found
+    share = f"{100 * offset.share:.0f} %"
+    return f"a constant offset is {share} of the mean square of the unexplained error; {found}"

@@ -9,7 +9,7 @@ from made_data import soft_cogiro, term
 
 from crosscheck.calibration.varying import Varying
 from crosscheck.comparison.associations import Association
-from crosscheck.comparison.quantities import QuantityKind
+from crosscheck.comparison.quantities import EVERYWHERE, QuantityKind
 from crosscheck.diagnosis.advice import check_of, measure_next, measured_directly
 from crosscheck.diagnosis.search import Search, search
 from crosscheck.fit.reasons import DiagnosisVerdict
@@ -49,6 +49,18 @@ def test_the_unknown_is_looked_for_where_it_goes(
     for words in ("commanded z", "the run", "time", "anything"):
         line = advice(found, goes_with(kind, words))
         assert line.startswith(f"the unexplained error depends on {words}: {expected}")
+
+
+def test_beside_a_constant_offset_it_is_looked_for_where_the_rest_goes(found: Search) -> None:
+    """Once it was said to depend on nothing, where it also varied over the workspace."""
+    offset = goes_with(QuantityKind.EVERYWHERE, EVERYWHERE)
+    start = "a constant offset is 60 % of the mean square of the unexplained error; "
+    line = advice(found, offset, goes_with(QuantityKind.PLACE, "commanded z"))
+    assert line.startswith(f"{start}the rest depends on commanded z: measure more poses along it")
+    assert advice(found, offset) == (
+        f"{start}repeat the same poses forward, back and an hour later, to see what the error "
+        "depends on"
+    )
 
 
 def test_what_shows_as_a_hose_is_taken_off_first(found: Search) -> None:

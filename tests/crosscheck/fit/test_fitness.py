@@ -172,5 +172,10 @@ def test_from_the_command_line(tmp_path: Path) -> None:
     assert "next: add poses spread over the workspace" in done.stdout
     done = run("compare", xml, data, "--out", tmp_path / "out", "--no-recording")
     assert "No verdict: only 4 poses measured" in done.stdout and "agree" not in done.stdout
+    # errors beyond the noise are no verdict either: once the page had none and the sentence one
+    off = ("--sigma", "position=1um", "--sigma", "orientation=0.001deg")
+    done = run("compare", xml, data, *off, "--out", tmp_path / "out", "--no-recording")
+    assert "No verdict: only 4 poses measured" in done.stdout and "misses" not in done.stdout
+    assert "times the noise." in " ".join(done.stdout.split())
     words = refused("calibrate", xml, data, "--model", tmp_path / "m.toml")
     assert "only 4 poses measured" in words and not (tmp_path / "m.toml").exists()
