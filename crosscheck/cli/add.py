@@ -157,6 +157,10 @@ def _check_names(old: Model, effect: str, refit: bool, path: Path) -> None:
         raise CrosscheckError(
             f"{path} has no {effect} to fit again (it has {has}); leave out --refit to add it"
         )
+    if refit and old.terms[effect].knowledge.fixed.all():
+        raise CrosscheckError(
+            f"{path}: {effect} is fixed and never fitted; take out fixed = true to fit it again"
+        )
 
 
 def _text(found: Addition, old: Model, model: Path, written: bool, made: Made) -> str:

@@ -44,7 +44,7 @@ def laid_out(data: Measurements, terms: Terms) -> LaidOut:
         new = [name for name in names if known[name] is None]
         out.append(_term(term, {name: known[name] or _unknown(term) for name in names}))
         fresh += [(term.name, name) for name in new]
-        notes.append(_said(term.name, term.own.kind, [n for n in names if n not in new], new))
+        notes.append(_said(term, term.own.kind, [n for n in names if n not in new], new))
     return LaidOut(Terms(out), tuple(fresh), tuple(notes))
 
 
@@ -88,8 +88,10 @@ def _unknown(term: Term) -> Values:
     return Values(term.vector, np.full(count, np.inf), fixed)
 
 
-def _said(effect: str, kind: str, known: Sequence[str], new: Sequence[str]) -> str:
+def _said(term: Term, kind: str, known: Sequence[str], new: Sequence[str]) -> str:
     words = [f"{some(known)} as in the model"] if known else []
     if new:
-        words.append(f"{some(new)} not in the model, so fitted to these data first")
-    return f"{effect} has separate values for each {kind}: {'; '.join(words)}"
+        held = bool(term.knowledge.fixed.all())
+        then = "at the fixed common values" if held else "fitted to these data first"
+        words.append(f"{some(new)} not in the model, so {then}")
+    return f"{term.name} has separate values for each {kind}: {'; '.join(words)}"

@@ -35,17 +35,19 @@ class Why(Enum):
     EXPLAINED_BETTER = "{by} explains the same better"
     NOT_NEEDED = "not needed"
     ALIKE = "indistinguishable from {by}, which is listed"
-    NOT_NEEDED_BESIDE = "not needed once {by} is in the model (probability {p:.2g})"
+    NOT_NEEDED_BESIDE = "not needed once {by} {are} in the model (probability {chance})"
     CARRIES_LITTLE = (
-        "probable ({p:.2g}) but not certain: it explains little once {by} is in the model"
+        "probable ({chance}) but not certain: it explains little once {by} {are} in the model"
     )
-    NOT_SURE = "probable ({p:.2g}) but not certain"
-    IMPROBABLE = "explains too little (probability {p:.2g})"
+    NOT_SURE = "probable ({chance}) but not certain"
+    IMPROBABLE = "explains too little (probability {chance})"
     IMITATES = "not certain: its {parameters} can imitate much of the unexplained error"
     MAY_IMITATE = "not certain: more probably it imitates an unknown effect"
     EXPLAINS_PART = "not certain: it explains a part, but structure remains"
 
 
+# A probability that two digits round to 1 is not said to be 1.
+_SURE = 0.995
 _LACKING = {
     Why.EXCLUDED,
     Why.TOO_MANY_PARAMETERS,
@@ -88,7 +90,9 @@ class Reason:
             parameters=counted(self.parameters, "parameter"),
             rows=counted(self.rows, "row"),
             p=min(1.0, self.p),
+            chance="> 0.99" if self.p >= _SURE else f"{self.p:.2g}",
             by=", ".join(self.by),
+            are="is" if len(self.by) == 1 else "are",
         )
 
     def __str__(self) -> str:

@@ -122,7 +122,8 @@ class _Reader:
         """A number within the parameter's bounds."""
         value = number_of(given)
         if value is None:
-            raise self.error(f"{what}expected a number, got {given!r:.60}")
+            got = "none" if given is None else f"{given!r:.60}"
+            raise self.error(f"{what}expected a number, got {got}")
         if wrong := beyond(self.layout, self.i, value):
             raise self.error(f"{what}{wrong}")
         return value

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import tomlkit
 
-from seecr.counted import some
+from seecr.counted import plural, some
 from seecr.effects import Knowledge, Own, Term, Values, layout_of
 from seecr.effects.base import Layout
 from seecr.effects.own_values import KINDS
@@ -149,6 +149,8 @@ def _check_names(where: Where, k: int, layout: Layout, given: Mapping[str, Any])
     missing = [key for key in layout.names if key not in given]
     if missing:
         raise where.error(
-            f"effect {layout.name}: parameter {some(missing, _MOST_NAMED)} is missing; expected a "
-            f"line such as {missing[0]} = {{ value = {layout.null[0]:g} }}", k, "parameters",
+            f"effect {layout.name}: {plural(len(missing), 'parameter')} "
+            f"{some(missing, _MOST_NAMED)} {'is' if len(missing) == 1 else 'are'} missing; "
+            f"expected a line such as {missing[0]} = {{ value = {layout.null[0]:g} }}",
+            k, "parameters",
         )  # fmt: skip

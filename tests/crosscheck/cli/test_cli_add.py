@@ -91,6 +91,12 @@ def test_what_is_there_already_is_only_fitted_again_when_asked(both, tmp_path):
     again = load_model(model, load_robot(both[0]))
     assert again.names == ("pulley_radius",)
     assert again.terms["pulley_radius"].vector[0] == pytest.approx(0.01, abs=5e-4)
+    # what is fixed is never fitted, so that there is nothing to weigh
+    name = 'name = "pulley_radius"'
+    model.write_text(model.read_text().replace(name, f"{name}\nfixed = true"))
+    assert "pulley_radius is fixed and never fitted" in refused(
+        "add", "pulley_radius", *both, "--model", model, "--refit"
+    )
 
 
 def test_json_and_out(both, tmp_path):

@@ -14,6 +14,7 @@ import crosscheck
 import seecr
 from crosscheck.cli import main
 from crosscheck.fit.held_out import blocks_of
+from crosscheck.fit.parts import laid_out
 from crosscheck.fit.prepare import prepare
 from crosscheck.measurements.together import together
 from crosscheck.measurements.write import write_measurements
@@ -89,6 +90,12 @@ def test_a_day_that_the_model_has_not_seen_is_fitted_first_and_said(days, added,
         ROBOT, days / "wednesday.csv", [term(ROBOT, "pulley_radius", **PULLEY)]
     )
     assert not plain.is_noise
+
+
+def test_a_fixed_effect_is_not_said_to_be_fitted(days):
+    held = replace(term(ROBOT, "pulley_radius", radius_m=0.03).fixed(), own=Own("file", {}))
+    found = laid_out(crosscheck.load_measurements(days / "monday.csv", ROBOT), Terms([held]))
+    assert found.notes[0].endswith("monday.csv not in the model, so at the fixed common values")
 
 
 def test_a_model_by_hand_needs_no_values_and_a_diagnosis_goes_beside_it(days):

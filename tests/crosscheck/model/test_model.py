@@ -226,6 +226,12 @@ BAD = {
 }  # fmt: skip
 
 
+def test_several_missing_parameters_are_named_together(robot, tmp_path):
+    path = tmp_path / "m.toml"
+    path.write_text('[[effect]]\nname = "centre_of_mass"\n[effect.parameters]\nshift_x_m = 0.002\n')
+    assert "parameters shift_y_m, shift_z_m are missing; expected a line" in error_of(path, robot)
+
+
 @pytest.mark.parametrize("kind", BAD)
 def test_bad_models_are_refused_with_their_line(kind, robot, saved):
     old, new, words = BAD[kind]
@@ -364,7 +370,7 @@ KNOWN = {
         r"line \d+: effect pulley_radius: unknown fixd; expected fixed",
     ),
     "fixed without a value": (
-        "value = 0.01,", "fixed = true,", r"radius_m: expected a number, got None",
+        "value = 0.01,", "fixed = true,", r"radius_m: expected a number, got none",
     ),
 }  # fmt: skip
 
