@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from crosscheck.comparison.coloured import Coloured
 from crosscheck.fit.noise import Whiteness
 from crosscheck.fit.problem import Rms
 from crosscheck.fit.words import fitted_lines, fitted_records, rms_words
@@ -29,6 +30,8 @@ class Addition(Result):
         from_nothing: distance of their values from null, in standard errors (Mahalanobis).
         is_nothing: whether that is no further than one standard error of a single value.
         whiteness: test of the residuals.
+        coloured: the residuals as noise with autocorrelation or outliers; None if they are white
+            noise, or no noise.
         warnings: about the values. notes: about the data.
         model: the robot's model with all of this; :func:`crosscheck.save_model` keeps it.
     """
@@ -45,6 +48,7 @@ class Addition(Result):
     from_nothing: float
     is_nothing: bool
     whiteness: Whiteness
+    coloured: Coloured | None
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
     model: Model
@@ -58,6 +62,11 @@ class Addition(Result):
     def pays(self) -> bool:
         """Whether the effects are worth adding."""
         return self.predicts and not self.is_nothing
+
+    @property
+    def is_noise(self) -> bool:
+        """Whether the residuals are noise, white or coloured."""
+        return self.whiteness.is_noise or self.coloured is not None
 
     @property
     def terms(self) -> Terms:
@@ -96,7 +105,8 @@ class Addition(Result):
             "p": self.p,
             "chi2_fall_a_block": self.fall[0],
             "chi2_fall_stderr": self.fall[1],
-            "is_noise": self.whiteness.is_noise,
+            "is_noise": self.is_noise,
+            "coloured_noise": self.coloured,
             "residual": vars(self.whiteness),
             "warnings": list(self.warnings),
             "notes": list(self.notes),

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from crosscheck.add.result import Addition
+from crosscheck.comparison.coloured import coloured_noise
 from crosscheck.errors import UnsolvedError
 from crosscheck.fit.candidates import null_fit, seen_directions
 from crosscheck.fit.evidence import FALSE_ALARM, p_value
@@ -61,14 +62,18 @@ def weigh(
     _refuse_unsettled(problem, names, best, held)
     own = np.isin([effect for effect, _key in best.terms.labels], list(names))
     white = whiteness_of(problem, best)
+    coloured = None if white.is_noise else coloured_noise(problem, best.state, factor)
+    noise = white.is_noise or coloured is not None
     # standard errors are too small if the noise is larger than stated or autocorrelated, and also
     # if another effect is still missing
-    moved = np.zeros(len(own)) if white.is_noise else moved_by_others(problem, best)
+    moved = np.zeros(len(own)) if noise else moved_by_others(problem, best)
     inflation = max(white.inflation, firmness)
     known = firmer(best.terms, 1.0 / firmness)
     covariance = _no_wider(known, inflation**2 * best.covariance + np.diag(moved**2))
     fitted = _split(known, best, np.sqrt(np.diag(covariance)))
-    drop = (base.chi2 - best.chi2) / max(1.0, white.scale) ** 2
+    # autocorrelated noise looks like an effect more easily than white noise of its size
+    larger = max(1.0, white.scale) if coloured is None else white.inflation
+    drop = (base.chi2 - best.chi2) / larger**2
     p = p_value(drop, seen_directions(best, own), False)
     distance, count = distance_from_nothing(best.terms, covariance, own)
     before, after = (
@@ -89,6 +94,7 @@ def weigh(
         from_nothing=distance,
         is_nothing=is_nothing(distance, count),
         whiteness=white,
+        coloured=coloured,
         warnings=(*_warnings(problem.robot, best, fitted, own), *_widened(best, moved, own)),
         notes=tuple(dict.fromkeys(notes)),
         model=_model(problem, basis, fitted, names, errors, covariance),

@@ -118,7 +118,7 @@ def command(
     else:
         _tell(found, old, model, written)
         given = Given.with_data(measured, robot, data, model, sigmas)
-        click.echo(after_fit(found.whiteness.is_noise, written, given))
+        click.echo(after_fit(found.is_noise, written, given))
     return 0 if written else 1
 
 

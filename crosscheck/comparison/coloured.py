@@ -8,7 +8,6 @@ workspace explains nothing.
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +18,7 @@ from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.not_noise import is_not_noise
 from crosscheck.calibration.restricted import estimate
 from crosscheck.calibration.robust import outliers, row_weights
-from crosscheck.fit.problem import Problem
+from crosscheck.fit.problem import Problem, kinds_stated
 from crosscheck.fit.state import State
 from seecr.counted import counted
 from seecr.effects import Terms
@@ -27,6 +26,8 @@ from seecr.pose import Array
 
 # Noise that is larger than stated by this factor is not the stated noise.
 _LARGER = 1.5
+# Fewer readings than this do not show how noise is correlated.
+_LEAST_READINGS = 60
 
 
 @dataclass(frozen=True)
@@ -54,15 +55,15 @@ class Coloured:
         return sizes + (f"; {counted(self.outliers, 'outlier')}" if self.outliers else "")
 
 
-def coloured_noise(
-    problem: Problem, state: State, factor: Array, stated: Collection[str]
-) -> Coloured | None:
+def coloured_noise(problem: Problem, state: State, factor: Array) -> Coloured | None:
     """The residuals as autocorrelated noise with outliers; None if they are not noise.
 
     Args:
         problem: the data. state: the model's predictions. factor: :meth:`Problem.noise`.
-        stated: names of the kinds of reading whose noise was stated.
     """
+    if not state.valid or problem.n_readings < _LEAST_READINGS:
+        return None
+    stated = [kind.name for kind in kinds_stated(problem)]
     setting = Setting(problem, factor, chain_of(problem))
     weight = row_weights(setting.chain, WHITE, state.white)
     none, blank = np.zeros(0), np.zeros((len(state.white), 0))

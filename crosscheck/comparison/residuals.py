@@ -7,22 +7,19 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from crosscheck.comparison.associations import associations
-from crosscheck.comparison.coloured import Coloured, coloured_noise
+from crosscheck.comparison.coloured import coloured_noise
 from crosscheck.comparison.quantities import channels
 from crosscheck.comparison.result import Comparison, Coordinate, Group, UnsolvedRow, WorstRow
 from crosscheck.comparison.travel import Travel, regions_of, travel
 from crosscheck.fit.noise import as_table, whiteness
 from crosscheck.fit.prepare import noise_floor, outlying_rows, prepare
-from crosscheck.fit.problem import Problem, kinds_stated, rms_by_kind
+from crosscheck.fit.problem import Problem, rms_by_kind
 from crosscheck.fit.state import State, evaluate
 from crosscheck.given import GivenModel, GivenRobot, model_of, robot_of
 from crosscheck.measurements.data import Names
 from crosscheck.measurements.read import GivenData, measurements_of
-from seecr.pose import Array
 
 _MOST_WORST = 10
-# Fewer readings than this do not show how noise is correlated.
-_LEAST_READINGS = 60
 
 
 def compare(robot: GivenRobot, data: GivenData, model: GivenModel = ()) -> Comparison:
@@ -65,18 +62,11 @@ def compare(robot: GivenRobot, data: GivenData, model: GivenModel = ()) -> Compa
         associations=tuple(associations(problem, state.white, state.prediction) if some else ()),
         worst=tuple(_worst(problem, state, way)),
         whiteness=white,
-        coloured=_coloured(problem, state, factor) if white and not white.is_noise else None,
+        coloured=coloured_noise(problem, state, factor) if white and not white.is_noise else None,
         unsolved=tuple(_unsolved(problem, state)),
         notes=tuple(dict.fromkeys(notes)),
         refusal=ready.refusal,
     )
-
-
-def _coloured(problem: Problem, state: State, factor: Array) -> Coloured | None:
-    if not state.valid or problem.n_readings < _LEAST_READINGS:
-        return None
-    stated = [kind.name for kind in kinds_stated(problem)]
-    return coloured_noise(problem, state, factor, stated)
 
 
 def _outliers(problem: Problem, state: State) -> list[str]:

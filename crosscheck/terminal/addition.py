@@ -27,8 +27,7 @@ def print_addition(
     console.print(_table(found))
     for warning in found.warnings:
         say(console, f"warning: {warning}", "bold yellow")
-    left = "the residuals are noise" if found.whiteness.is_noise else _left(found)
-    say(console, f"With {found.name}, {left}.", "green" if found.whiteness.is_noise else "")
+    say(console, f"With {found.name}, {_left(found)}.", "green" if found.is_noise else "")
     if not found.pays:
         say(console, why_not(found, written), "bold yellow")
     if written:
@@ -67,6 +66,9 @@ def _nothing(found: Addition) -> str:
 
 
 def _left(found: Addition) -> str:
+    if found.is_noise:
+        kind = "" if found.coloured is None else f" ({found.coloured.words})"
+        return f"the residuals are noise{kind}"
     return (
         f"the residuals are {found.whiteness.scale:.3g} times the noise: find what else is "
         "missing with crosscheck diagnose"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from made_data import measured
@@ -69,6 +71,22 @@ def test_an_effect_that_is_nothing_is_not_worth_adding() -> None:
     known = covariance_of(sure.model)
     assert known is not None and np.sqrt(known[0, 0]) == pytest.approx(sure.own.stderr[0], rel=1e-6)
     assert not sure.is_nothing and sure.from_nothing > 50.0 and sure.pays
+
+
+@pytest.mark.slow
+def test_autocorrelated_noise_is_no_effect_that_is_missing(shared_data: Path) -> None:
+    """Once 50 ± 5 mm came of it where 50.0 ± 0.3 was known, with advice to look for more."""
+    folder = shared_data / "labs" / "B04"
+    found = add_effect(folder / "robot.xml", folder / "measured.csv", "pulley_radius")
+    assert not found.whiteness.is_noise and found.is_noise and found.pays
+    assert found.coloured is not None and 0.7 < found.coloured.rho["position"] < 0.9
+    error = float(found.own.stderr[0])
+    assert 1e-4 < error < 1e-3 and abs(found.own.term.vector[0] - 0.05) < 3.0 * error
+    assert not found.warnings
+    # and what is only noise explains less than white noise of its size would let it
+    null = shared_data / "labs" / "B01"
+    found = add_effect(null / "robot.xml", null / "measured.csv", "stiffness")
+    assert found.is_noise and found.p > 1e-4
 
 
 @pytest.mark.slow
