@@ -156,7 +156,7 @@ def measure_next(
             out.append(f"to find {seen}: {seen.advice}")
         out += [_to_find(where), _ALL_AT_ONCE]
     if verdict is DiagnosisVerdict.NO_EFFECT_MISSING:
-        out.append("nothing is missing; to find smaller effects, use crosscheck plan")
+        out.append("nothing that matters is missing; to find smaller effects, use crosscheck plan")
     return list(dict.fromkeys(out))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 from crosscheck.calibration.equals import SMALL
@@ -55,7 +55,7 @@ def diagnosis_of(
         after=after,
         held_out=last.held_out.rms,
         floor=floor,
-        candidates=tuple(candidates),
+        candidates=tuple(_with_equals(candidates, missing)),
         measure_next=tuple(measure_next(search, missing, verdict, where, alternatives, seen)),
         notes=tuple(dict.fromkeys([*notes, *overestimated(search.problem, after)])),
         search=search,
@@ -63,6 +63,17 @@ def diagnosis_of(
         where=where,
         chances=chances,
     )
+
+
+def _with_equals(
+    candidates: Sequence[NotListed], missing: Sequence[MissingEffect]
+) -> Iterator[NotListed]:
+    """What may stand for a listed effect is not listed for that reason, and for no other."""
+    listed = {name: one.effect for one in reversed(missing) for name in one.indistinguishable}
+    for row in candidates:
+        first = listed.get(row.effect)
+        alike = None if first is None else Reason(Why.ALIKE, by=(first,))
+        yield row if alike is None else replace(row, why_not=alike)
 
 
 def missing_of(

@@ -119,6 +119,12 @@ def test_a_diagnosis_beside_a_known_stiffness_names_the_mass_alone() -> None:
     data = measured(robot(), [heavy], points=POINTS, sigma=SIGMA)
     stiff = Term.of(robot(), "stiffness", factor=1.0)
     told = stiff.measured(factor=(1.0, 0.01))
+    both = diagnose(robot(), data, exclude=SLOW)
+    named, other = sorted(("platform_mass", "stiffness"), key=lambda n: n != both.missing[0].effect)
+    assert both.missing[0].effect == named and other in both.missing[0].indistinguishable
+    # once it was also "not significant (p = 1)" beside that
+    (why,) = (row.why_not for row in both.candidates if row.effect == other)
+    assert str(why) == f"indistinguishable from {named}, which is listed"
     for given in (told, stiff.fixed()):
         (found,) = diagnose(robot(), data, [given], exclude=SLOW).missing
         assert found.effect == "platform_mass" and not found.rivals

@@ -106,3 +106,4 @@ def test_structure_is_a_verdict_only_where_it_matters() -> None:
     found = diagnose(robot(), moved, only=few, tolerance=told)
     assert found.verdict is DiagnosisVerdict.NO_EFFECT_MISSING
     assert "The structure that remains is too small to matter: " in found.sentence
+    assert found.measure_next[-1].startswith("nothing that matters is missing;")
