@@ -12,6 +12,8 @@ from seecr.effects import Term
 
 # How many effects of a class are named.
 _FIRST = 2
+# Classes that are not listed are told from this probability on.
+_WORTH_SAYING = 0.05
 
 
 def words_of(missing: Sequence[MissingEffect]) -> str:
@@ -97,6 +99,22 @@ def one_of(members: Sequence[str]) -> str:
     if others:
         some.append(others[0] if len(others) == 1 else f"one of {len(others)} others")
     return " or ".join([", ".join(some[:-1]), some[-1]] if len(some) > 1 else some)
+
+
+def equals_of(found: Diagnosis) -> list[str]:
+    """Classes of equivalent effects of which none is listed, with their probabilities.
+
+    Those with a single member, or that are hardly probable, are left out.
+    """
+    if found.chances is None:
+        return []
+    listed = {name for one in found.missing for name in (one.effect, *one.indistinguishable)}
+    said = probability_name(found)
+    return [
+        f"one of {', '.join(members)}: {said} {probability_words(p)}"
+        for members, p in found.chances.classes
+        if len(members) > 1 and p >= _WORTH_SAYING and listed.isdisjoint(members)
+    ]
 
 
 def none_of(tried: int) -> str:

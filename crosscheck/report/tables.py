@@ -115,6 +115,7 @@ class CandidateRow:
         effect, title: its name, and in words. score: of the search.
         alone: part of the excess chi2 that it takes away by itself, 0 to 1; None if not tried.
         needs: what it would take. why_not: the reason. probability: in words, "" if not known.
+        together: that of its class, if it has equivalents.
     """
 
     effect: str
@@ -124,6 +125,7 @@ class CandidateRow:
     needs: str
     why_not: str
     probability: str
+    together: str
 
 
 def candidate_rows(found: Diagnosis) -> list[CandidateRow]:
@@ -143,6 +145,7 @@ def candidate_rows(found: Diagnosis) -> list[CandidateRow]:
                 needs=_needs(found, candidate),
                 why_not=str(row.why_not),
                 probability=_probability(found, row.effect),
+                together=_together(found, row.effect),
             )
         )
     return out
@@ -161,6 +164,14 @@ def _probability(found: Diagnosis, effect: str) -> str:
     if found.chances is None or effect not in found.chances.effect:
         return ""
     return probability_words(found.chances.effect[effect])
+
+
+def _together(found: Diagnosis, effect: str) -> str:
+    """The probability of the effect's class; "" if it has no other members."""
+    for members, p in () if found.chances is None else found.chances.classes:
+        if effect in members and len(members) > 1:
+            return probability_words(p)
+    return ""
 
 
 def _alone(found: Diagnosis, candidate: Candidate | None) -> float | None:

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from crosscheck.diagnosis.result import MissingEffect
-from crosscheck.diagnosis.words import WITHIN, probability_name, probability_words
+from crosscheck.diagnosis.words import WITHIN, equals_of, probability_name, probability_words
 from crosscheck.fit.reasons import DiagnosisVerdict, Why
 from crosscheck.terminal.lines import console_for, print_parameters, rms_table, say
 
@@ -45,6 +45,8 @@ def print_diagnosis(found: Diagnosis, out: Path, console: Console | None = None)
         if found.missing and found.within_catalogue:
             say(console, f"note: {WITHIN}", "dim")
         _print_candidates(console, found)
+        for line in equals_of(found):
+            say(console, line, "dim")
     for line in found.measure_next:
         say(console, f"measure next: {line}")
     say(console, f"Results in {out}/ (open diagnosis.html)", "dim")

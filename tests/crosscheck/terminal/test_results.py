@@ -20,6 +20,7 @@ from crosscheck.comparison.result import Comparison
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
 from crosscheck.fit.words import shown
 from crosscheck.measurements.together import together
+from crosscheck.report.tables import candidate_rows
 from crosscheck.terminal.addition import print_addition, why_not
 from crosscheck.terminal.calibration import print_calibration
 from crosscheck.terminal.comparison import print_comparison
@@ -141,6 +142,26 @@ def test_beside_something_unknown_probabilities_are_within_the_catalogue() -> No
     assert "(probability > 99 %)" in texts[0] and "within" not in texts[0]
     assert "(probability within the catalogue > 99 %)" in texts[1]
     assert "note: Probabilities within the catalogue assume that what is missing" in texts[1]
+
+
+def test_classes_of_equals_are_told_with_their_probability_where_none_is_listed() -> None:
+    whole = made.pulleys()
+    assert whole.chances is not None
+    single = {name: 0.4 for name in ("stiffness", "platform_mass")}
+    classes = (
+        (("pulley_radius", "length_scale"), 0.999),  # one of it is listed
+        (("stiffness", "platform_mass"), 0.8),
+        (("gravity_tilt",), 0.3),
+        (("drum_gain", "tracker_scale"), 0.01),
+    )
+    effect = whole.chances.effect | single | {"gravity_tilt": 0.3}
+    found = replace(whole, chances=replace(whole.chances, effect=effect, classes=classes))
+    screen, out = console()
+    print_diagnosis(found, Path("here"), screen)
+    told = [line for line in out.getvalue().splitlines() if line.startswith("one of ")]
+    assert told == ["one of stiffness, platform_mass: probability 80 %"]
+    rows = {row.effect: (row.probability, row.together) for row in candidate_rows(found)}
+    assert rows["stiffness"] == ("40 %", "80 %") and rows["gravity_tilt"] == ("30 %", "")
 
 
 def test_what_was_left_out_as_asked_is_not_told_again() -> None:
