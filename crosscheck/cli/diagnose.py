@@ -23,7 +23,6 @@ from seecr.cli.options import FILE, json_option, made_by, out_option, progress_s
 if TYPE_CHECKING:
     from crosscheck import Diagnosis, Measurements
     from seecr import Model, Robot
-    from seecr.pose import Array
 
 
 @click.command(
@@ -78,6 +77,7 @@ def command(
     input, 3 rows without an equilibrium.
     """
     from crosscheck import DiagnosisVerdict, Tolerance, diagnose, load_measurements
+    from crosscheck.diagnosis import refitted
     from crosscheck.given import considered
     from crosscheck.measurements.stated import with_stated
     from crosscheck.model import check_place
@@ -109,7 +109,7 @@ def command(
             from crosscheck.recording import write_diagnosis_recording
 
             write_diagnosis_recording(found, folder / "diagnosis.rrd")
-        moved = _refitted(found, own)
+        moved = refitted(found, own)
         note = "" if model_out is None else _keep(found, own, moved, machine, measured, model_out)
     if as_json:
         click.echo(text)
@@ -125,25 +125,6 @@ def command(
     if found.verdict in gates:
         return 1
     return 0 if found.converged else 3
-
-
-def _refitted(found: Diagnosis, own: Model) -> tuple[str, ...]:
-    """Effects of the model that agree with the data only with other values than it has."""
-    from crosscheck import DiagnosisVerdict
-    from crosscheck.diagnosis import found_effects
-
-    if found.verdict is not DiagnosisVerdict.NO_EFFECT_MISSING:
-        return ()
-    return tuple(
-        one.term.name
-        for one in found_effects(found)
-        if one.term.name in own.names and _differs(one.term.vector, own.terms[one.term.name].vector)
-    )
-
-
-def _differs(new: Array, old: Array) -> bool:
-    """Whether values differ; those of single files or runs, which differ in number, do not."""
-    return new.shape == old.shape and bool((new != old).any())
 
 
 def _keep(

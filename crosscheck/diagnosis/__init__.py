@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from crosscheck.diagnosis.found import found_covariance, found_effects
+from crosscheck.diagnosis.found import found_covariance, found_effects, refitted
 
-__all__ = ["found_covariance", "found_effects"]
+__all__ = ["found_covariance", "found_effects", "refitted"]

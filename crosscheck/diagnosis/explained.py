@@ -173,19 +173,18 @@ def _sentence(
         return and_what_is_left(words_of(missing), left, tried)
     together = chances.together
     assert together is not None
+    all_of_them = (
+        f"On held-out runs it is {rms_words(together.before)} as the model stands and "
+        f"{rms_words(together.held_out)} with all {tried} effects together."
+    )
     if len(alternatives) > 1:
         return (
             "A few effects explain the error, but these data leave open which: "
-            f"{either(alternatives)}. All {tried} effects together reduce it from "
-            f"{rms_words(together.before)} to {rms_words(together.held_out)} on held-out runs."
+            f"{either(alternatives)}. {all_of_them}"
         )
     if alternatives:
         some = probable_words(hints_of(chances, (), alternatives[0]))
-        return (
-            f"A few effects explain the error, though not with certainty: {some}. All {tried} "
-            f"effects together reduce it from {rms_words(together.before)} to "
-            f"{rms_words(together.held_out)} on held-out runs."
-        )
+        return f"A few effects explain the error, though not with certainty: {some}. {all_of_them}"
     sure = ", ".join(m.effect for m in missing)
     return (
         f"No few effects explain the error, but all {tried} together do: they reduce it from "

@@ -9,8 +9,9 @@ from crosscheck.diagnosis.steps import shown_stages
 from crosscheck.fit.reasons import DiagnosisVerdict
 from crosscheck.model.fitted import Fitted
 from seecr.pose import Array
+from seecr.prediction.model import Model
 
-__all__ = ["found_covariance", "found_effects"]
+__all__ = ["found_covariance", "found_effects", "refitted"]
 
 
 def found_effects(found: Diagnosis) -> tuple[Fitted, ...]:
@@ -26,6 +27,22 @@ def found_effects(found: Diagnosis) -> tuple[Fitted, ...]:
     own = [(term, best.terms.part(term.name)) for term in best.terms if term.name not in names]
     had = [Fitted(term, wider * best.stderr[part], best.at_bound[part]) for term, part in own]
     return (*had, *listed)
+
+
+def refitted(found: Diagnosis, own: Model) -> tuple[str, ...]:
+    """Effects of a model that agree with the data only with other values than it has."""
+    if found.verdict is not DiagnosisVerdict.NO_EFFECT_MISSING:
+        return ()
+    return tuple(
+        one.term.name
+        for one in found_effects(found)
+        if one.term.name in own.names and _differs(one.term.vector, own.terms[one.term.name].vector)
+    )
+
+
+def _differs(new: Array, old: Array) -> bool:
+    """Whether values differ; those of single files or runs, which differ in number, do not."""
+    return new.shape == old.shape and bool((new != old).any())
 
 
 def _widened(found: Diagnosis) -> float:

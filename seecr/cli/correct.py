@@ -20,10 +20,7 @@ from seecr.cli.following import following, given_with
 from seecr.cli.options import FILE, json_option, made_by, out_option, progress_share
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from seecr import Commands, Model, Robot
+    from seecr import Model, Robot
     from seecr.columns.command_file import CommandFile
 
 # A tracker that reads poses off by less [m] is not worth a line.
@@ -191,6 +188,7 @@ def _as_tracked(
 
     from seecr import InputError
     from seecr.prediction.sensed import placed, tracked
+    from seecr.report.corrections import joint_lines
 
     if model is None:
         if as_read:
@@ -204,7 +202,7 @@ def _as_tracked(
             f"as read: the platform is brought to places up to {1e3 * away:.3g} mm from the "
             "wanted poses, where the model's tracker reads the wanted poses; want_* are those "
             "places",
-            *_left_by_joints(commands, tracked(robot, at, model)),
+            *joint_lines(commands.pose, tracked(robot, at, model), _SEEN),
         ]
     read = tracked(robot, commands, model)
     away = np.linalg.norm(read[:, :3] - commands.pose[:, :3], axis=1).max()
@@ -214,19 +212,4 @@ def _as_tracked(
         f"the model's tracker reads these poses up to {1e3 * away:.3g} mm off: the platform is "
         "brought to them in the base frame, which a calibration with a tracker knows no better "
         "than that; --as-read brings the readings to them"
-    ]
-
-
-def _left_by_joints(wanted: Commands, read: NDArray[np.float64]) -> list[str]:
-    """How far off the tracker reads the platform, where joints keep it from other poses."""
-    import numpy as np
-
-    from seecr.pose import pose_difference
-
-    off = np.abs(pose_difference(wanted.pose, read)).reshape(-1, 2, 3).max(axis=(0, 2))
-    if off.max() <= _SEEN:
-        return []
-    return [
-        f"the joints allow readings no nearer than {1e3 * off[0]:.3g} mm and "
-        f"{np.degrees(off[1]):.3g} deg along single axes"
     ]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -19,6 +21,12 @@ from seecr.cli.arguments import (
 )
 from seecr.cli.following import following
 from seecr.cli.options import json_option, made_by, out_option, progress_bar
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from seecr import Workspace
 
 
 @click.command(
@@ -104,48 +112,32 @@ def command(
     """  # fmt: skip
     import numpy as np
 
-    from seecr import InputError, boundary, default_axes, workspace_map
-    from seecr.counted import counted
+    from seecr import boundary, default_axes, workspace_map
     from seecr.files import json_text, staged, write_text
     from seecr.report.map_slices import map_figure
-    from seecr.report.maps import (
-        beyond_line,
-        edge_line,
-        likely_lines,
-        sag_lines_of,
-        softest_line,
-        write_arrays,
-    )
+    from seecr.report.maps import beyond_line, write_arrays
 
     machine = robot_at(robot, cable)
     own = model_at(model, machine)
     axes = axes_of(grid, machine) if grid else list(default_axes(machine))
     total = int(np.prod([len(axis) for axis in axes]))
+    asked: dict[str, Any] = {
+        "lowest": lowest, "highest": np.inf if highest is None else highest,
+        "wrenches": wrenches or None, "effects": own or (),
+    }  # fmt: skip
     with staged(out, sometimes=files_of_pictures("map")) as folder:
         with progress_bar("mapping", total) as tell:
             found = workspace_map(
-                machine, *axes, orientation=turned or None, lowest=lowest,
-                highest=np.inf if highest is None else highest, wrenches=wrenches or None,
-                effects=own or (), elastic=not no_elastic, chance=at_least is not None,
-                progress=lambda done: tell(done, ""),
+                machine, *axes, orientation=turned or None, elastic=not no_elastic,
+                chance=at_least is not None, progress=lambda done: tell(done, ""), **asked,
             )  # fmt: skip
         if not np.any(found.feasible):
-            by_place = machine.n_cables < machine.n_dof
-            what = "in no orientation do " if by_place else "no "
-            raise InputError(
-                f"no pose of the grid can be held: {what}tensions from {lowest:g} to "
-                f"{np.inf if highest is None else highest:g} N balance the load"
-                f"{' so that the platform stays' if by_place else ''} at any of "
-                f"{counted(total, 'pose')}; expected another grid, orientation or wider limits"
-            )
+            raise _holds_none(found, asked["lowest"], asked["highest"])
         places = None
         if edge is not None:
             inside = found.feasible if at_least is None else found.likely(at_least)
-            places = boundary(
-                machine, *found.crossings(inside), tolerance=edge, lowest=lowest,
-                highest=np.inf if highest is None else highest, wrenches=wrenches or None,
-                effects=own or (), at_least=at_least,
-            )  # fmt: skip
+            pairs = found.crossings(inside)
+            places = boundary(machine, *pairs, tolerance=edge, at_least=at_least, **asked)
         notes = [*own.notes, *beyond_line(found, own.reach)] if own else []
         status = 3 if found.elastic and not np.any(found.rests) else 0
         text = json_text({
@@ -155,8 +147,8 @@ def command(
         })  # fmt: skip
         write_text(folder / "map.json", text + "\n")
         write_arrays(folder / "map.npz", found, places)
-        drawn = figure != "none" and sum(len(axis) > 1 for axis in axes) > 1
-        if drawn:
+        flat = sum(len(axis) > 1 for axis in axes) < 2
+        if figure != "none" and not flat:
             map_figure(folder / f"map.{figure}", found, edge=places, at_least=at_least)
         if not no_recording:
             # takes a second or two to import
@@ -166,15 +158,46 @@ def command(
     if as_json:
         click.echo(text)
         return status
-    lines = [*found.lines(), *softest_line(found), *likely_lines(found, at_least)]
-    lines += sag_lines_of(found, own.names if own else ())
-    if figure != "none" and not drawn:
+    lines = [*notes, *_lines(found, own.names if own else (), at_least, places, edge)]
+    if figure != "none" and flat:
         lines.append("no figure: the grid has more than one value along fewer than two axes")
-    if places is not None and edge is not None:
-        lines.append(edge_line(places, edge))
-    tensions = ("--lowest", f"{lowest:g}") if lowest else ()
-    most = () if highest is None else ("--highest", f"{highest:g}")
-    then = following("crosscheck", "plan", robot, "--rows", 40, *tensions, *most)
-    for line in [*notes, *lines, f"Results in {out}/", then]:
+    for line in [*lines, f"Results in {out}/", _next(robot, lowest, highest)]:
         click.echo(line)
     return status
+
+
+def _holds_none(found: Workspace, lowest: float, highest: float) -> Exception:
+    """That no pose of the grid can be held."""
+    from seecr import InputError
+    from seecr.counted import counted
+
+    by_place = found.robot.n_cables < found.robot.n_dof
+    what, stays = (
+        ("in no orientation do ", " so that the platform stays") if by_place else ("no ", "")
+    )
+    return InputError(
+        f"no pose of the grid can be held: {what}tensions from {lowest:g} to {highest:g} N balance "
+        f"the load{stays} at any of {counted(found.margin.size, 'pose')}; expected another grid, "
+        "orientation or wider limits"
+    )
+
+
+def _lines(
+    found: Workspace, effects: Sequence[str], at_least: float | None,
+    places: NDArray[np.float64] | None, edge: float | None,
+) -> list[str]:  # fmt: skip
+    """What is told of a map, and of its edge."""
+    from seecr.report.maps import edge_line, likely_lines, sag_lines_of, softest_line
+
+    lines = [*found.lines(), *softest_line(found), *likely_lines(found, at_least)]
+    lines += sag_lines_of(found, effects)
+    if places is not None and edge is not None:
+        lines.append(edge_line(places, edge))
+    return lines
+
+
+def _next(robot: Path, lowest: float, highest: float | None) -> str:
+    """To plan measurements within the same limits."""
+    least = ("--lowest", f"{lowest:g}") if lowest else ()
+    most = () if highest is None else ("--highest", f"{highest:g}")
+    return following("crosscheck", "plan", robot, "--rows", 40, *least, *most)

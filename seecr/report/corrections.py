@@ -9,11 +9,11 @@ import numpy as np
 
 from seecr.columns.command_file import CommandFile
 from seecr.inverse.correction import Correction
-from seecr.pose import Array
+from seecr.pose import Array, pose_difference
 from seecr.report.commanded import load_columns, toml_beside
 from seecr.result import COORDINATES
 
-__all__ = ["chance_lines", "corrected_csv", "corrected_toml"]
+__all__ = ["chance_lines", "corrected_csv", "corrected_toml", "joint_lines"]
 
 _WANT = [f"want_{name}" for name in COORDINATES]
 # A probability below this deserves attention.
@@ -69,6 +69,19 @@ def chance_lines(found: Correction, kept: Array | None, minimum: bool = False) -
         yield (
             "  --aim minimum puts a cable at its lowest tension, where it stays within the limits "
             "with about 0.5; --aim middle keeps away from them"
+        )
+
+
+def joint_lines(wanted: Array, read: Array, seen: float) -> Iterator[str]:
+    """How far off a tracker reads poses (n, 7) where joints keep the platform from others.
+
+    Nothing if all are within ``seen`` [m, rad].
+    """
+    off = np.abs(pose_difference(wanted, read)).reshape(-1, 2, 3).max(axis=(0, 2))
+    if off.max() > seen:
+        yield (
+            f"the joints allow readings no nearer than {1e3 * off[0]:.3g} mm and "
+            f"{np.degrees(off[1]):.3g} deg along single axes"
         )
 
 

@@ -30,7 +30,7 @@ def addition(**changes: Any) -> Addition:
     given: dict[str, Any] = {
         "names": ("stiffness", "creep"), "fitted": effects, "before": rms, "after": rms,
         "held_out_before": rms, "held_out": rms, "fall": (1.0, 0.1), "p": 0.5, "predicts": True,
-        "from_nothing": 9.0, "is_nothing": False, "whiteness": WHITE,
+        "from_nothing": 9.0, "is_nothing": False, "whiteness": WHITE, "coloured": None,
         "warnings": ("odd",), "notes": ("said",), "model": new_model(ROBOT),
     }  # fmt: skip
     return Addition(**(given | changes))
