@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from crosscheck.diagnosis.chances import PROBABLE, Chances
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
 from crosscheck.fit.possible import largest_size
+from crosscheck.fit.reasons import probability_words
 from seecr.counted import counted
 from seecr.effects import Term
 
@@ -131,13 +132,6 @@ def _words_of(effect: MissingEffect) -> str:
         f"adding {effect.effect}{alike} removes {percent(effect.share)} of the unexplained error "
         "on held-out runs"
     )
-
-
-def probability_words(probability: float) -> str:
-    """A probability as people read it."""
-    if probability > 0.99:
-        return "> 99 %"
-    return "< 1 %" if probability < 0.01 else f"{100.0 * probability:.0f} %"
 
 
 def probability_name(found: Diagnosis) -> str:

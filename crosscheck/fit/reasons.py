@@ -13,6 +13,13 @@ from crosscheck.errors import CrosscheckError
 from seecr.counted import counted
 
 
+def probability_words(probability: float) -> str:
+    """A probability as people read it."""
+    if probability > 0.99:
+        return "> 99 %"
+    return "< 1 %" if probability < 0.01 else f"{100.0 * probability:.0f} %"
+
+
 class Why(Enum):
     """Why an effect is no candidate or was not chosen; the values are what people read."""
 
@@ -46,8 +53,6 @@ class Why(Enum):
     EXPLAINS_PART = "not certain: it explains a part, but structure remains"
 
 
-# A probability that two digits round to 1 is not said to be 1.
-_SURE = 0.995
 _LACKING = {
     Why.EXCLUDED,
     Why.TOO_MANY_PARAMETERS,
@@ -90,7 +95,7 @@ class Reason:
             parameters=counted(self.parameters, "parameter"),
             rows=counted(self.rows, "row"),
             p=min(1.0, self.p),
-            chance="> 0.99" if self.p >= _SURE else f"{self.p:.2g}",
+            chance=probability_words(self.p),
             by=", ".join(self.by),
             are="is" if len(self.by) == 1 else "are",
         )

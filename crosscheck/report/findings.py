@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from crosscheck.diagnosis.result import Diagnosis, MissingEffect
-from crosscheck.diagnosis.words import percent, probability_words
+from crosscheck.diagnosis.words import percent
+from crosscheck.fit.reasons import probability_words
 from crosscheck.fit.words import rms_words
 from crosscheck.units import in_unit, parameter_name, short, with_error
 from seecr.counted import counted

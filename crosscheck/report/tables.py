@@ -12,11 +12,10 @@ from crosscheck.comparison.associations import Association
 from crosscheck.diagnosis.order import Step
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.steps import stages_of
-from crosscheck.diagnosis.words import probability_words
 from crosscheck.fit.candidates import Candidate
 from crosscheck.fit.evidence import FALSE_ALARM, p_value
 from crosscheck.fit.noise import POOR_FIT, STRUCTURED
-from crosscheck.fit.reasons import DiagnosisVerdict
+from crosscheck.fit.reasons import DiagnosisVerdict, probability_words
 from crosscheck.report.findings import PLAUSIBLE
 from crosscheck.units import chance, in_unit, parameter_name, short
 from seecr.effects.base import Layout

@@ -9,8 +9,8 @@ from rich.console import Console
 from rich.table import Table
 
 from crosscheck.diagnosis.result import MissingEffect
-from crosscheck.diagnosis.words import WITHIN, equals_of, probability_name, probability_words
-from crosscheck.fit.reasons import DiagnosisVerdict, Why
+from crosscheck.diagnosis.words import WITHIN, equals_of, probability_name
+from crosscheck.fit.reasons import DiagnosisVerdict, Why, probability_words
 from crosscheck.terminal.lines import console_for, print_parameters, rms_table, say
 
 if TYPE_CHECKING:

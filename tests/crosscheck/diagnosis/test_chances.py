@@ -15,11 +15,10 @@ from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.nearby import _impossible, _refitted, chances_near
 from crosscheck.diagnosis.result import Diagnosis
 from crosscheck.diagnosis.stepwise import by_steps
-from crosscheck.diagnosis.words import probability_words
 from crosscheck.fit.candidates import null_fit
 from crosscheck.fit.prepare import prepare
 from crosscheck.fit.problem import Rms
-from crosscheck.fit.reasons import Reason, Why
+from crosscheck.fit.reasons import Reason, Why, probability_words
 from crosscheck.given import considered
 from seecr.description.mjcf import load_robot
 from seecr.effects import Terms

@@ -64,10 +64,10 @@ def test_every_reason_is_a_sentence_with_its_numbers() -> None:
         assert text.startswith("not a candidate: ") == Reason(why).lacking
     assert str(Reason(Why.CHANCE, p=3.7)) == "not significant (p = 1)"
     # "probable (1) but not certain" was said of what is all but certain
-    assert str(Reason(Why.NOT_SURE, p=0.9999)) == "probable (> 0.99) but not certain"
-    assert str(Reason(Why.NOT_SURE, p=0.994)) == "probable (0.99) but not certain"
+    assert str(Reason(Why.NOT_SURE, p=0.9999)) == "probable (> 99 %) but not certain"
+    assert str(Reason(Why.NOT_SURE, p=0.986)) == "probable (99 %) but not certain"
     two = Reason(Why.NOT_NEEDED_BESIDE, p=0.1, by=("creep", "stiffness"))
-    assert str(two) == "not needed once creep, stiffness are in the model (probability 0.1)"
+    assert str(two) == "not needed once creep, stiffness are in the model (probability 10 %)"
     late = Reason(Why.NOT_PREDICTIVE, beside=("pulley_radius", "creep"))
     assert str(late) == (
         "does not improve the prediction of held-out runs, with pulley_radius, creep in the model"

@@ -112,7 +112,8 @@ def test_two_cables_hold_a_position_as_often_as_the_mass_allows(
     model = load_model(tmp_path / "model.toml", two)
     middle = two.reference_pose[None]
     tension = float(margins_at(two, middle, 0.0, np.inf, None, ())[0])
-    for z, expected in ((-1.0, 0.159), (9.0, 1.0)):
+    # few of the models allow for the second; the first four of them do not
+    for z, expected in ((-1.0, 0.159), (-1.8, 0.036), (9.0, 1.0)):
         highest = tension * (1.0 + z * 0.02 / two.mass)
         said = held_chance(two, middle, model, highest=highest)
         assert said is not None and said[0] == pytest.approx(expected, abs=0.02)
