@@ -179,12 +179,15 @@ def _sentence(
     )
     if len(alternatives) > 1:
         return (
-            "A few effects explain the error, but these data leave open which: "
+            "No few effects explain the error with certainty: these data leave open whether it is "
             f"{either(alternatives)}. {all_of_them}"
         )
     if alternatives:
         some = probable_words(hints_of(chances, (), alternatives[0]))
-        return f"A few effects explain the error, though not with certainty: {some}. {all_of_them}"
+        return (
+            "No few effects explain the error with certainty; most probably it is "
+            f"{some}. {all_of_them}"
+        )
     sure = ", ".join(m.effect for m in missing)
     return (
         f"No few effects explain the error, but all {tried} together do: they reduce it from "

@@ -51,12 +51,12 @@ def command(
     there.
     """
     from seecr import barriers, equilibria, predict, solve, spread_of
+    from seecr.equilibrium.multiple import elsewhere
     from seecr.files import json_text, staged, write_text
     from seecr.report.rows import SweepRows
     from seecr.report.words import (
         at_rest,
         cable_lines,
-        elsewhere,
         midline_lines,
         other_lines,
         pose_lines,

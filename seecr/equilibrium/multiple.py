@@ -15,15 +15,19 @@ from seecr.description.joints import pose_of_values, values_of_pose
 from seecr.description.robot import Robot
 from seecr.effects.edits import setup_with
 from seecr.effects.setup import Setup
+from seecr.equilibrium.following import evaluated, moved, step_between
 from seecr.equilibrium.search import solve_setup
 from seecr.errors import InputError
 from seecr.pose import Array, pose_difference
 from seecr.prediction.experiment import effects_of
-from seecr.statics.solution import Solution
+from seecr.statics.solution import Solution, Status
 from seecr.statics.starts import commanded_poses
+from seecr.statics.tables import take
 
 if TYPE_CHECKING:
     from seecr.prediction.model import GivenEffects
+
+__all__ = ["elsewhere", "equilibria", "other_rests"]
 
 # Starts per batch, and most starts in all.
 _PART, _MOST = 256, 8192
@@ -35,6 +39,9 @@ _RARE = 2000
 _NEAREST = 0.2
 # Poses closer than this, in parts of the robot's length, are one equilibrium.
 _ALIKE = 1e-5
+# Poses on the way between two, and by how little the energy changes there in units of the load
+# times the robot's length, if the platform is free to go that way.
+_FINE, _EVEN = 17, 1e-10
 
 
 def equilibria(
@@ -89,14 +96,30 @@ def other_rests(
     """
     out = []
     for i in range(len(found)):
-        whole = _all_rests(found.rows([i]), partial(repeated, i), most)
-        other = [
-            k
-            for k in np.flatnonzero(whole.converged)
-            if not _alike(found.robot, whole.pose[[k]], found.pose[i])[0]
-        ]
-        out.append(whole.rows(np.array(other, dtype=int)))
+        own = found.rows([i])
+        whole = _all_rests(own, partial(repeated, i), most)
+        out.append(whole.rows(elsewhere(own, whole)))
     return tuple(out)
+
+
+def elsewhere(own: Solution, found: Solution) -> NDArray[np.intp]:
+    """Which of the equilibria found for the first command of ``own`` are not the one it is at."""
+    apart = found.converged & ~_alike(own.robot, found.pose, own.pose[0])
+    return np.array([k for k in np.flatnonzero(apart) if not _drifts(own, found.pose[[k]])], int)
+
+
+def _drifts(own: Solution, pose: Array) -> bool:
+    """Whether a platform that is free to move goes to a pose (1, 7) without gaining energy.
+
+    Such a pose is no other equilibrium but an end of the same one, where another cable tightens.
+    """
+    if own.status[0] is not Status.SINGULAR:
+        return False
+    own = own.rows([0])
+    step = step_between(own.robot, pose, own.pose)
+    way = moved(own.robot, own.pose.repeat(_FINE, 0), np.linspace(0.0, 1.0, _FINE)[:, None] * step)
+    energies = evaluated(own.robot, take(own.tables, np.zeros(_FINE, int)), way).energy
+    return bool(np.ptp(energies) < _EVEN * own.robot.usual_load * own.robot.length)
 
 
 def _all_rests(own: Solution, repeated: Callable[[int], Setup], most: int) -> Solution:

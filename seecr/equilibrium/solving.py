@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from seecr.arguments import finite
+from seecr.arguments import finite, whole
 from seecr.commands.data import Commands
 from seecr.counted import counted
 from seecr.description.given import GivenRobot, robot_of
@@ -82,8 +82,9 @@ def solve(
     """
     if method not in METHODS:
         raise InputError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
-    if max_iterations < 1:
-        raise InputError(f"max_iterations must be at least 1, got {max_iterations}")
+    whole(max_iterations, "max_iterations", 1)
+    if threads is not None:
+        whole(threads, "threads", 1)
     robot = robot_of(robot)
     if gravity is not None:
         robot = replace(robot, gravity=_array(gravity, (3,), "gravity"))

@@ -138,6 +138,9 @@ def export(robot: GivenRobot, effects: GivenEffects = (), at: ArrayLike | None =
         NoRestError: the platform has no stable equilibrium there.
     """
     robot = robot_of(robot)
+    place = robot.reference_pose[None] if at is None else commanded_poses(at, "at")
+    if len(place) != 1:
+        raise InputError(f"expected one pose to export at, got {len(place)}")
     said = expressed(robot, effects_of(effects, robot))
     home = Commands(robot.reference_pose[None])
     plain = setup_with((*said.plain, *said.lengths), robot, home)
@@ -150,7 +153,7 @@ def export(robot: GivenRobot, effects: GivenEffects = (), at: ArrayLike | None =
     if said.bodies:
         mujoco_text, solution = _for_mujoco(
             robot, (*said.plain, *said.bodies, *said.lengths),
-            robot.reference_pose[None] if at is None else commanded_poses(at),
+            place,
         )  # fmt: skip
     comment = f"{robot.name} with {_names(said.plain) or 'no effect'}; written by seecr export"
     plain_names, bodies, lengths = (
@@ -165,8 +168,6 @@ def _for_mujoco(
     robot: Robot, effects: tuple[Effect, ...], pose: np.ndarray
 ) -> tuple[str, Solution]:
     solution = solve(robot, pose, effects=effects)
-    if len(solution) != 1:
-        raise InputError(f"expected one pose to export at, got {len(solution)}")
     if not solution.converged[0]:
         raise NoRestError(
             f"robot {robot.name}: no rest at the pose to export at: {solution.sentence(0)}; "

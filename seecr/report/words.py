@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seecr.compiled.columns import WEIGHT
 from seecr.description.robot import Joint, Robot
+from seecr.equilibrium.multiple import elsewhere
 from seecr.equilibrium.passes import TWISTED, Barrier
 from seecr.planar import midline_point
 from seecr.pose import Array, pose_difference, rxyz_from_quat, transform_points
@@ -21,7 +21,6 @@ __all__ = [
     "at_rest",
     "cable_lines",
     "direction_words",
-    "elsewhere",
     "jump_lines",
     "midline_lines",
     "other_lines",
@@ -223,13 +222,6 @@ def midline_lines(solution: Solution) -> Iterator[str]:
     place = " ".join(f"{1e3 * value:.2f}" for value in met)
     if np.isfinite(met).all():
         yield f"midlines of both pairs of cables meet at {where} {place} mm (the paper's V or H)"
-
-
-def elsewhere(solution: Solution, others: Solution) -> NDArray[np.intp]:
-    """Indices of the equilibria that differ from that of the first command."""
-    gaps = pose_difference(others.pose, np.repeat(solution.pose[:1], len(others), axis=0))
-    apart = np.linalg.norm(gaps[:, :3], axis=1) / solution.robot.length
-    return np.flatnonzero(np.maximum(apart, np.linalg.norm(gaps[:, 3:], axis=1)) > 1e-6)
 
 
 def other_lines(

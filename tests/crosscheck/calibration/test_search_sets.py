@@ -118,9 +118,9 @@ def test_what_a_set_leaves_is_asked_of_a_field(monkeypatch: pytest.MonkeyPatch) 
     assert found.judgement.sure == ("pulley_radius",)
     assert MORE in explained(found, []).notes
     none = replace(found.judgement, sure=())
-    assert "No few effects" in explained(replace(found, judgement=none), []).sentence
+    assert "most probably" not in explained(replace(found, judgement=none), []).sentence
     few = replace(none, more=False)
-    assert explained(replace(found, judgement=few), []).sentence.startswith("A few effects")
+    assert "most probably it is pulley" in explained(replace(found, judgement=few), []).sentence
 
 
 def assert_a_model_by_itself(found: SetSearch) -> None:
@@ -140,7 +140,7 @@ def assert_open_which(found: SetSearch) -> None:
     refits = {**found.found.refits, pair: replace(best, names=pair)}
     none = Judgement(DiagnosisVerdict.MANY_EFFECTS, (), 0.0)
     said = explained(replace(found, found=replace(found.found, refits=refits), judgement=none), [])
-    assert "these data leave open which: " in said.sentence
+    assert "these data leave open whether it is " in said.sentence
     assert "gravity_tilt + pulley_radius" in said.sentence
     assert "backlash + drum_gain" in said.sentence
     assert any(line.endswith("(gravity_tilt)") for line in said.measure_next)
@@ -150,7 +150,7 @@ def assert_not_beyond_doubt(found: SetSearch) -> None:
     """As it is told where nothing else explains as well, and yet none is sure."""
     none = Judgement(DiagnosisVerdict.MANY_EFFECTS, (), 0.0)
     said = explained(replace(found, judgement=none), [])
-    start = "A few effects explain the error, though not with certainty: "
+    start = "No few effects explain the error with certainty; most probably it is "
     assert said.sentence.startswith(start) and not said.missing
     assert "gravity_tilt (" in said.sentence and "pulley_radius (" in said.sentence
     for name in ("gravity_tilt", "pulley_radius"):

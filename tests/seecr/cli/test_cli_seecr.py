@@ -272,6 +272,8 @@ def test_map_writes_its_files_or_says_why_not(tmp_path: Path) -> None:
         and places > 20
     )
     assert np.load(out / "map.npz")["edge"].shape == (places, 7)
+    endless = run("map", "demobot_cogiro", "--edge", "nan", "--out", out)
+    assert endless.exit_code == 2 and "'--edge': nan is not a finite number" in endless.output
     none = run("map", "demobot_cogiro", *grid, "--edge", "0.001", "--no-elastic", "--out", out)
     assert (
         none.exit_code == 0

@@ -596,7 +596,11 @@ def test_nothing_to_carry_and_nothing_pulls(cogiro: Robot) -> None:
         ({"rest_lengths": [[-1.0]]}, r"rest_lengths must be positive \[m\]"),
         ({"rest_lengths": [[np.nan]]}, "rest_lengths holds numbers that are not finite"),
         ({"poses": [HERE] * 2, "rest_lengths": [[1.0]] * 3}, "poses must be one or as many as t"),
-        ({"poses": HERE, "max_iterations": 0}, "max_iterations must be at least 1, got 0"),
+        (
+            {"poses": HERE, "max_iterations": 0},
+            "max_iterations: expected a whole number from 1 on, got 0",
+        ),
+        ({"poses": HERE, "threads": -1}, "threads: expected a whole number from 1 on, got -1"),
     ],
 )
 def test_bad_input_is_one_sentence(arguments: dict[str, Any], text: str) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,11 +12,13 @@ from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
 from seecr.description.shipped import model_path
 from seecr.effects import Term
-from seecr.equilibrium.multiple import _spread, equilibria
+from seecr.equilibrium.following import moved
+from seecr.equilibrium.multiple import _spread, elsewhere, equilibria
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
 from seecr.pose import Array, pose_difference, quat_from_rotvec, quat_multiply
 from seecr.report.words import other_lines, softest_words
+from seecr.statics.solution import Status
 
 # To one of this command's rests only few starts lead.
 HARD = np.array([0.308667, 0.214797, 0.14935, 0.996763, -0.037391, -0.069476, 0.015419])
@@ -91,6 +95,21 @@ def test_the_tilted_command_with_two_rests() -> None:
     own = solve(robot, pose)
     (line,) = other_lines(own, found)
     assert line.startswith("could also rest 15.7") and "slack: cable2 cable3 cable5 cable7" in line
+
+
+def test_where_it_drifts_to_without_resistance_is_no_other_equilibrium() -> None:
+    """Two cables are tight, and the platform can turn until a third one is: that is one rest."""
+    robot = load_robot(model_path("demobot_parallel"))
+    pose = np.array([0.1, 0.1, 0.1, 1.0, 0.0, 0.0, 0.0])
+    own, found = solve(robot, pose, others=True), equilibria(robot, pose)
+    assert own.status[0] is Status.SINGULAR and own.others is not None
+    assert found.converged.any(), "where the third cable holds it"
+    assert len(own.others[0]) == 0 and list(elsewhere(own, found)) == []
+    assert list(other_lines(own, found)) == ["no other stable equilibrium was found"]
+    # as far away, but uphill
+    up = np.array([[0.0, 0.0, 0.01, 0.0, 0.0, 0.0]])
+    hill = replace(found, pose=moved(robot, found.pose, up))
+    assert list(elsewhere(own, hill)) == list(np.flatnonzero(found.converged))
 
 
 def test_solve_tells_the_others() -> None:

@@ -10,13 +10,13 @@ from seecr.description.shipped import model_path
 from seecr.effects import Term, effect_named, layout_of
 from seecr.equilibrium import passes
 from seecr.equilibrium.following import evaluated, moved
-from seecr.equilibrium.multiple import equilibria
+from seecr.equilibrium.multiple import elsewhere, equilibria
 from seecr.equilibrium.passes import barriers
 from seecr.equilibrium.solving import solve
 from seecr.errors import InputError
 from seecr.pose import pose_difference, quat_from_rotvec
 from seecr.prediction.model import load_model
-from seecr.report.words import elsewhere, other_lines
+from seecr.report.words import other_lines
 from seecr.statics.tables import take
 
 

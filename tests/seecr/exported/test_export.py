@@ -16,7 +16,7 @@ from seecr.description.robot import Robot
 from seecr.description.shipped import model_path
 from seecr.effects import Term, Terms
 from seecr.equilibrium.solving import solve
-from seecr.errors import NoRestError
+from seecr.errors import InputError, NoRestError
 from seecr.exported.bodies import SEGMENTS
 from seecr.exported.chain import HangingCable, hanging
 from seecr.exported.export import Export, export
@@ -254,6 +254,12 @@ def test_another_vertical_than_gravity_is_said() -> None:
         exported = export(COGIRO, [term(COGIRO, name, **v) for name, v in given.items()])
         assert exported.leans is leans
         assert ("along the tilted gravity" in " ".join(exported.lines())) is leans
+
+
+@pytest.mark.parametrize("at", [[1.0, 2.0], np.tile(COGIRO.reference_pose, (2, 1))])
+def test_it_is_exported_at_one_pose_even_where_nothing_depends_on_it(at: object) -> None:
+    with pytest.raises(InputError, match=r"at must be \(n, 7\)|one pose to export at, got 2"):
+        export(COGIRO, at=at)  # type: ignore[arg-type]
 
 
 def test_a_pose_without_rest_is_one_sentence() -> None:
