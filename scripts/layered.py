@@ -9,6 +9,7 @@ numbers: the same boxes and lines give the same drawing.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -142,7 +143,11 @@ def _mean(values: Sequence[float], otherwise: float) -> float:
 
 
 def _pulled(grid: _Grid, gap: float) -> dict[str, float]:
-    """Middles [pixels]: each pulled over its neighbours, in order and without touching."""
+    """Middles [pixels]: each pulled over its neighbours, in order and without touching.
+
+    Pulling may drift: boxes that push one another apart go on doing so. The round with the shortest
+    lines counts.
+    """
     x: dict[str, float] = {}
     for row in grid.rows:
         at = 0.0
@@ -152,12 +157,16 @@ def _pulled(grid: _Grid, gap: float) -> dict[str, float]:
         for name in row:
             x[name] -= at / 2
     neighbours = grid.neighbours()
+    best, shortest = dict(x), math.inf
     for _ in range(_PULLS):
         for row in grid.rows:
             wanted = [_mean([x[b] for b in neighbours[n]], x[n]) for n in row]
             for name, at in zip(row, _apart(row, wanted, grid.widths, gap), strict=True):
                 x[name] = at
-    return x
+        length = sum(abs(x[a] - x[b]) for a, b in grid.links)
+        if length < shortest:
+            best, shortest = dict(x), length
+    return best
 
 
 def _apart(
