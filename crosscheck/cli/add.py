@@ -116,7 +116,9 @@ def command(
     if as_json:
         click.echo(text)
     else:
-        _tell(found, old, model, written)
+        from crosscheck.terminal import print_addition
+
+        print_addition(found, model, written)
         given = Given.with_data(measured, robot, data, model, sigmas)
         click.echo(after_fit(found.is_noise, written, given))
     return 0 if written else 1
@@ -168,9 +170,3 @@ def _text(found: Addition, old: Model, model: Path, written: bool, made: Made) -
 
     document = {"made": made, "written": written, "model": str(model), **found.as_json()}
     return json_text({**document, "model_notes": list(old.notes)})
-
-
-def _tell(found: Addition, old: Model, model: Path, written: bool) -> None:
-    from crosscheck.terminal import print_addition
-
-    print_addition(found, model, written)

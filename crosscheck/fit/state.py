@@ -12,7 +12,7 @@ from crosscheck.fit.problem import Problem, in_units_of
 from seecr.effects import Terms
 from seecr.effects.base import Effect
 from seecr.pose import Array
-from seecr.prediction.experiment import Experiment, Prediction
+from seecr.prediction.experiment import Experiment, Prediction, mixed
 from seecr.prediction.parted import rates
 
 # A row is far off if the mean square of its whitened residuals exceeds _FAR_OFF. It may then rest
@@ -111,9 +111,9 @@ def _on_measured_branch(problem: Problem, state: State) -> State:
     keep = rows[better[rows]]
     if len(keep) == 0:
         return state
-    mixed = state.experiment.from_other_starts(effects, at, keep, other.pose[keep])
+    moved = state.experiment.from_other_starts(effects, at, keep, other.pose[keep])
     return _compared(
-        problem, state.terms, mixed, problem.residuals(mixed.readings), state.factor,
+        problem, state.terms, moved, problem.residuals(moved.readings), state.factor,
         state.experiment,
     )  # fmt: skip
 
@@ -224,18 +224,14 @@ class Rows:
 
     def with_rows(self, other: Rows, rows: NDArray[np.bool_]) -> Rows:
         """These rows, some replaced by another's; with history, the prediction is approximate."""
-
-        def mixed(mine: Array, theirs: Array) -> Array:
-            return np.where(rows.reshape(-1, *[1] * (mine.ndim - 1)), theirs, mine)
-
         there = other.prediction
         return Rows(
-            length_errors=mixed(self.length_errors, other.length_errors),
+            length_errors=mixed(rows, self.length_errors, other.length_errors),
             prediction=there if there.has_history else self.prediction.with_rows(there, rows),
             solved=np.where(rows, other.solved, self.solved),
-            raw=mixed(self.raw, other.raw),
-            rate=mixed(self.rate, other.rate),
-            factor=mixed(self.factor, other.factor),
+            raw=mixed(rows, self.raw, other.raw),
+            rate=mixed(rows, self.rate, other.rate),
+            factor=mixed(rows, self.factor, other.factor),
         )
 
     def cost(self, problem: Problem, spread: Array) -> Array:

@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from seecr.effects import Term
 from seecr.pose import Array
 
@@ -19,7 +22,7 @@ class Fitted:
 
     term: Term
     stderr: Array
-    at_bound: Any
+    at_bound: NDArray[np.bool_]
 
     def as_json(self) -> dict[str, Any]:
         """Its parameters by name, in SI units."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -11,6 +10,7 @@ from rich.table import Table
 
 from crosscheck.add import Addition
 from crosscheck.fit.evidence import FALSE_ALARM
+from crosscheck.model.fitted import Fitted
 from crosscheck.terminal.lines import console_for, print_parameters, rms_table, say
 from crosscheck.units import with_error
 
@@ -75,7 +75,7 @@ def _left(found: Addition) -> str:
     )
 
 
-def _print_values(console: Console, fitted: Any) -> None:
+def _print_values(console: Console, fitted: Fitted) -> None:
     layout = fitted.term.layout
     say(console, f"{layout.name}: {layout.effect.title}", "bold")
     print_parameters(

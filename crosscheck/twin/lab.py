@@ -202,16 +202,14 @@ def read_of(made: Measured, random: np.random.Generator) -> Measurements:
     turn = quat_from_rotvec(sigma.orientation_rad * noise[:, 3:])
     quat = quat_multiply(turn, truth.quat_wxyz)
     quat *= np.where(quat[:, :1] < 0.0, -1.0, 1.0)
-    pull: Any = None
-    if sigma.tension_N is not None:
-        pull = truth.tension_readings + sigma.tension_N * random.standard_normal(
-            truth.tension_readings.shape
-        )
     stops = ((case.read | ~case.read.any()) & made.at_rest)[:, None]
     anew: dict[str, Any] = dict.fromkeys(
-        ("angles_rad", "position_mask", "angle_mask", "tension_mask", "line")
+        ("angles_rad", "tensions", "position_mask", "angle_mask", "tension_mask", "line")
     )
-    anew["tensions"] = None if pull is None else np.where(stops, pull, np.nan)
+    if sigma.tension_N is not None:
+        pulls = truth.tension_readings
+        pulls = pulls + sigma.tension_N * random.standard_normal(pulls.shape)
+        anew["tensions"] = np.where(stops, pulls, np.nan)
     return replace(
         case,
         path=Path("measured.csv"),

@@ -95,11 +95,8 @@ class Prediction(Result):
         Neither may have a history: rows that depend on the rows before cannot be exchanged.
         """
 
-        def mixed(one: Array, two: Array) -> Array:
-            return np.where(rows.reshape(-1, *[1] * (one.ndim - 1)), two, one)
-
         def put(one: Any, two: Any, *names: str) -> Any:
-            some = {name: mixed(getattr(one, name), getattr(two, name)) for name in names}
+            some = {name: mixed(rows, getattr(one, name), getattr(two, name)) for name in names}
             return replace(one, **some)
 
         return replace(
@@ -109,7 +106,9 @@ class Prediction(Result):
             found=put(self.found, other.found, *(f.name for f in fields(batch.Evaluation))),
             readings=put(self.readings, other.readings, *(f.name for f in fields(Readings))),
             walk=None,
-            kept={k: mixed(v, other.kept[k]) for k, v in self.kept.items() if k in other.kept},
+            kept={
+                k: mixed(rows, v, other.kept[k]) for k, v in self.kept.items() if k in other.kept
+            },
         )
 
     def lines(self) -> list[str]:
@@ -132,6 +131,11 @@ class Prediction(Result):
     def solution(self) -> Solution:
         """The rows as a certified :class:`seecr.Solution`."""
         return certify(self.setup.robot, self.tables, self.found)
+
+
+def mixed(rows: NDArray[np.bool_], one: Array, other: Array) -> Array:
+    """An array (n, ...) with some rows (n,) of another."""
+    return np.where(rows.reshape(-1, *[1] * (one.ndim - 1)), other, one)
 
 
 @dataclass(eq=False)

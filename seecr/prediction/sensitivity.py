@@ -174,9 +174,9 @@ class _ByWrench:
         return length_sensitivities(self.at)
 
     @cached_property
-    def way(self) -> _Path:
+    def way(self) -> _Waypoints:
         """The path through the rows, for effects with history."""
-        return _Path.of(self.experiment, self.at, self.terms)
+        return _Waypoints.of(self.experiment, self.at, self.terms)
 
     def column(self, shift: Shift, along: bool = False) -> Array:
         """Derivative of the readings (n, 6 + m) with respect to the shifted parameter.
@@ -304,7 +304,7 @@ def _inverse_of(tables: Tables, found: batch.Evaluation) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class _Path:
+class _Waypoints:
     """The N waypoints of a prediction's path, solved once and not again.
 
     Attributes:
@@ -321,7 +321,7 @@ class _Path:
     motion: Array
 
     @classmethod
-    def of(cls, experiment: Experiment, at: Prediction, terms: Terms) -> _Path:
+    def of(cls, experiment: Experiment, at: Prediction, terms: Terms) -> _Waypoints:
         found = _walk_of(experiment, at, terms)
         setup = experiment.setup(terms.effects, experiment.path.commands)
         tables = assemble(setup, found.states[..., STRAIN])
