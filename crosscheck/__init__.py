@@ -1,4 +1,4 @@
-"""Hold the statics of a cable robot against MuJoCo and against measurements.
+"""Check the statics of a cable robot against MuJoCo and against measurements.
 
 import crosscheck
 found = crosscheck.diagnose("robot.xml", "measured.csv")
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from crosscheck.comparison.result import Comparison
     from crosscheck.diagnosis.result import Diagnosis, MissingEffect
     from crosscheck.diagnosis.verdict import diagnose
-    from crosscheck.errors import CrosscheckError
+    from crosscheck.errors import CrosscheckError, UnsolvedError
     from crosscheck.fit.reasons import DiagnosisVerdict
     from crosscheck.fit.tolerance import Tolerance
     from crosscheck.importing.case import Imported, import_case
@@ -58,6 +58,7 @@ _WHERE = {
     "Sigma": "measurements.data",
     "Tolerance": "fit.tolerance",
     "Twin": "twin.make",
+    "UnsolvedError": "errors",
     "add_effect": "add",
     "add_effects": "add",
     "calibrate": "calibration.result",
@@ -95,6 +96,7 @@ __all__ = [
     "Sigma",
     "Tolerance",
     "Twin",
+    "UnsolvedError",
     "add_effect",
     "add_effects",
     "calibrate",
@@ -115,3 +117,7 @@ __all__ = [
 ]
 
 __getattr__ = lazily(__name__, _WHERE)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

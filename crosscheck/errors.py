@@ -10,6 +10,6 @@ class CrosscheckError(SeecrError):
 
 
 class UnsolvedError(CrosscheckError):
-    """Rows that have no equilibrium, so that nothing can be fitted."""
+    """Rows that have no equilibrium, or a fit that does not converge."""
 
     exit_status = 3

@@ -70,7 +70,7 @@ def _entries(face: ModuleType) -> Iterator[str]:
             yield f"```python\n{name}{_signature(found)}\n```\n"
         yield from as_markdown(getdoc(found) or "", _own_names(found))
         if isclass(found) and issubclass(found, Enum):
-            yield "".join(f"- `{one.name}`: {one.value}\n" for one in found)
+            yield "".join(f"- `{one.name}`: {_meaning(one)}\n" for one in found)
         elif isclass(found):
             yield from _members(found)
 
@@ -160,6 +160,11 @@ def _linked(text: str) -> str:
     """Markdown for what Sphinx writes otherwise."""
     text = re.sub(r":\w+:`~?([^`]*)`", r"`\1`", text)
     return text.replace("``", "`")
+
+
+def _meaning(one: Enum) -> str:
+    """The sentence of a member: its value, or if that is a word of a file what the word means."""
+    return str(getattr(one, "meaning", one.value))
 
 
 def _members(found: type) -> Iterator[str]:

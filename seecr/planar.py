@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from seecr.arguments import finite, numbers
 from seecr.errors import InputError
 from seecr.pose import Array
 from seecr.result import Record, Result
@@ -42,11 +43,15 @@ def bar_tilt(exit_points: ArrayLike, positions: ArrayLike, half_length: float = 
 
     Returns:
         theta, (...) [rad]; nan if the two cables cannot hold the bar.
+
+    Raises:
+        InputError: wrong shapes, numbers that are not finite, or a negative half length.
     """
-    exits, places = _points(exit_points, 2), np.asarray(positions, float)
+    exits, places = _points(exit_points, 2), finite(positions, "positions")
     if places.shape[-1:] != (2,):
         raise InputError(f"positions must be (..., 2), x y, got {places.shape}")
-    if not (np.isfinite(half_length) and half_length >= 0.0):
+    half_length = _half_length(half_length)
+    if half_length < 0.0:
         raise InputError(f"half_length must not be negative [m], got {half_length:g}")
     to_exit = exits - places[..., None, :]
     if half_length == 0.0:
@@ -104,11 +109,13 @@ def bar_equilibria(
         half_length: h [m], above zero.
 
     Raises:
-        InputError: wrong shapes, or a length that is not above zero, coinciding exit points.
+        InputError: wrong shapes, numbers that are not finite, a length that is not above zero, or
+            coinciding exit points.
     """
-    if not (np.isfinite(half_length) and half_length > 0.0):
+    half_length = _half_length(half_length)
+    if half_length <= 0.0:
         raise InputError(f"half_length must be above zero [m], got {half_length:g}")
-    place = np.asarray(position, float)
+    place = finite(position, "position")
     if place.shape != (2,):
         raise InputError(f"position must be (2,), x y, got {place.shape}")
     exits = _points(exit_points, 2)
@@ -137,8 +144,11 @@ def solution_manifold(
 
     Returns:
         (r, k) [rad]; nan where the two cables cannot hold the bar.
+
+    Raises:
+        InputError: wrong shapes, numbers that are not finite, or a negative half length.
     """
-    grid = np.stack(np.meshgrid(np.asarray(x, float), np.asarray(y, float)), axis=-1)
+    grid = np.stack(np.meshgrid(finite(x, "x"), finite(y, "y")), axis=-1)
     return bar_tilt(exit_points, grid, half_length)
 
 
@@ -155,8 +165,11 @@ def midline_point(exit_points: ArrayLike, anchor_points: ArrayLike) -> Array:
 
     Returns:
         (..., 2) [m]; infinite if the midlines are parallel.
+
+    Raises:
+        InputError: wrong shapes.
     """
-    exits, anchors = np.asarray(exit_points, float), np.asarray(anchor_points, float)
+    exits, anchors = numbers(exit_points, "exit_points"), numbers(anchor_points, "anchor_points")
     if exits.shape[-2:] != (4, 2) or anchors.shape[-2:] != (4, 2):
         raise InputError(
             "exit_points and anchor_points must be (..., 4, 2), got "
@@ -173,10 +186,17 @@ def midline_point(exit_points: ArrayLike, anchor_points: ArrayLike) -> Array:
 
 
 def _points(values: ArrayLike, count: int) -> Array:
-    points = np.asarray(values, float)
+    points = numbers(values, "exit_points")
     if points.shape != (count, 2) or not np.all(np.isfinite(points)):
         raise InputError(f"exit_points must be ({count}, 2) finite numbers, got {points.shape}")
     return points
+
+
+def _half_length(value: float) -> float:
+    length = finite(value, "half_length")
+    if length.shape:
+        raise InputError(f"half_length must be one number [m], got {length.shape}")
+    return float(length)
 
 
 def _middles(points: Array) -> Array:

@@ -54,6 +54,21 @@ def test_every_public_name_is_there_and_documented(face: ModuleType) -> None:
         face.nothing  # noqa: B018
 
 
+@pytest.mark.parametrize("face", FACES, ids=lambda face: face.__name__)
+def test_a_shell_completes_public_names_before_their_first_use(face: ModuleType) -> None:
+    assert set(face.__all__) <= set(dir(face))
+
+
+def test_errors_that_functions_raise_can_be_caught_by_their_public_names() -> None:
+    public = {*seecr.__all__, *crosscheck.__all__}
+    raised = set()
+    for face in FACES:
+        for function in filter(inspect.isfunction, (getattr(face, n) for n in face.__all__)):
+            words = str(inspect.getdoc(function)).partition("\nRaises:\n")[2].split("\n\n")[0]
+            raised |= set(re.findall(r"\b\w+Error\b", words))
+    assert "UnsolvedError" in raised and raised <= public
+
+
 def test_no_module_hides_a_public_name() -> None:
     """Importing a module makes it an attribute of its package: of another name than a function."""
     for package in ("seecr", "crosscheck"):

@@ -135,6 +135,7 @@ def calibrate(
     Raises:
         InputError: there is no effect of a name.
         CrosscheckError: the data allow no calibration.
+        UnsolvedError: rows have no equilibrium.
     """
     robot = robot_of(robot)
     thin = thinned(robot, measurements_of(data, robot))

@@ -31,7 +31,7 @@ def compare(robot: GivenRobot, data: GivenData, model: GivenModel = ()) -> Compa
         model: the effects with their values, or their file; by default the plain model.
 
     Raises:
-        SeecrError: a file cannot be read, or is of another robot.
+        InputFileError, RobotError: a file cannot be read, or is of another robot.
     """
     robot = robot_of(robot)
     data = measurements_of(data, robot)

@@ -63,7 +63,9 @@ def diagnose(
         tolerance: from which size on a remainder beyond noise counts as missing.
 
     Raises:
-        SeecrError: a file cannot be read, or is of another robot.
+        InputFileError, RobotError: a file cannot be read, or is of another robot.
+        InputError: there is no effect of a name, or ``tolerance`` is something else.
+        CrosscheckError: ``only`` and ``exclude`` leave no effect to consider.
     """
     if not isinstance(tolerance, Tolerance):
         raise InputError(f"tolerance: expected a crosscheck.Tolerance, got {tolerance!r}")

@@ -232,7 +232,7 @@ class Measurements(Result):
         return some([self.place(int(row)) for row in chosen], most)
 
     def lines_of(self, rows: ArrayLike) -> str:
-        """The same with a noun: ``line 3``, ``lines 3, 5``."""
+        """Lines of some rows as in :meth:`places`, with their noun: ``line 3``, ``lines 3, 5``."""
         count = len(np.arange(self.n_rows)[np.asarray(rows)])
         return f"{plural(count, 'line')} {self.places(rows)}"
 

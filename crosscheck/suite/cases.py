@@ -97,7 +97,12 @@ class Case:
 
 
 def shipped_cases(seed: int = 0, n_random: int = N_RANDOM) -> list[Case]:
-    """DemoBots along the paper's sweeps, rotated, at random and tilted; planar and other robots."""
+    """DemoBots along the paper's sweeps, rotated, at random and tilted; planar and other robots.
+
+    Args:
+        seed: of the random poses.
+        n_random: number of random poses of each DemoBot and cable; other robots have fewer.
+    """
     cases = []
     for robot, turn in (("cogiro", _COGIRO_TURN), ("parallel", 0.0)):
         path = model_path(f"demobot_{robot}")

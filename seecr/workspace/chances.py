@@ -61,6 +61,10 @@ def kept_chance(
 
     Returns:
         (n,), NaN for a row without equilibrium; None if the model keeps no covariance.
+
+    Raises:
+        InputError: wrong shapes, or limits that contradict each other.
+        InputFileError: no such file, or no model of this robot in it.
     """
     robot = robot_of(robot)
     known = moving_covariance(model_given(model, robot))
@@ -116,6 +120,11 @@ def held_chance(
     Returns:
         (n,); None if the model keeps no covariance. For robots with fewer cables than degrees of
         freedom, the probability that the position can be held in some orientation.
+
+    Raises:
+        InputError: wrong shapes, quaternions that are no rotations, or limits that contradict each
+            other.
+        InputFileError: no such file, or no model of this robot in it.
     """
     robot = robot_of(robot)
     known = moving_covariance(model_given(model, robot))

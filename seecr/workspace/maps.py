@@ -12,7 +12,7 @@ from queue import SimpleQueue
 import numpy as np
 from numpy.typing import ArrayLike
 
-from seecr.arguments import finite
+from seecr.arguments import finite, whole
 from seecr.commands.data import Commands
 from seecr.description.given import GivenRobot, robot_of
 from seecr.description.robot import Robot
@@ -39,11 +39,24 @@ _VALUES, _FEW = 33, 13
 
 
 def default_axes(robot: GivenRobot, values: int | None = None) -> tuple[Array, Array, Array]:
-    """A grid over the exit points, down to as far below the reference pose as they are above it."""
+    """A grid over the exit points, down to as far below the reference pose as they are above it.
+
+    Args:
+        robot: as described, or its MJCF.
+        values: on each axis along which the grid extends; by default 33, or 13 for a robot with
+            fewer cables than degrees of freedom.
+
+    Returns:
+        x, y and z of the grid, (nx,), (ny,) and (nz,) [m].
+
+    Raises:
+        InputError: ``values`` is not a whole number from 1 on.
+    """
     robot = robot_of(robot)
     if values is None:
         # robots with too few cables are solved for their orientation, which is slow
         values = _VALUES if robot.n_cables >= robot.n_dof else _FEW
+    values = whole(values, "values", 1)
     points = np.concatenate([robot.exit_points, robot.reference_pose[None, :3]])
     low, high = points.min(axis=0), points.max(axis=0)
     mirrored = 2.0 * robot.reference_pose[:3] - high

@@ -83,6 +83,10 @@ def feasible(
 
     Returns:
         (n,) bool.
+
+    Raises:
+        InputError: wrong shapes, numbers that are not finite, quaternions that are no rotations, or
+            limits that contradict each other.
     """
     robot = robot_of(robot)
     margin = tension_margin(robot, poses, wrench=wrench, lowest=lowest, highest=highest)
@@ -116,6 +120,9 @@ def tension_margin(
     Returns:
         (n,) [N]; minus infinity if W is singular or there are too few cables, and no tensions
         within bounds balance the load.
+
+    Raises:
+        InputError: as for :func:`feasible`.
     """
     from seecr.compiled.margin import margins_at  # takes a while to import
 
@@ -237,7 +244,11 @@ def _rows(wrench: ArrayLike | None, rows: NDArray[np.intp]) -> ArrayLike | None:
 
 
 def slack_zones(solution: Solution) -> list[Zone]:
-    """The zones of a trajectory by number of slack cables, in order (paper, Figs 7 and 11)."""
+    """The zones of a trajectory by number of slack cables, in order (paper, Figs 7 and 11).
+
+    Args:
+        solution: of the trajectory's poses in their order.
+    """
     counts = [
         int(row.sum()) if ok else None
         for row, ok in zip(solution.slack, solution.converged, strict=True)

@@ -138,6 +138,10 @@ def test_swapped_cables_hang_the_bar_the_same_without_length() -> None:
         ((EXITS * np.nan, PLACE), r"exit_points must be \(2, 2\) finite"),
         ((EXITS, [0.0, 1, 2]), r"positions must be \(\.\.\., 2\), x y, got \(3,\)"),
         ((EXITS, PLACE, -0.1), r"half_length must not be negative \[m\], got -0.1"),
+        ((EXITS, [np.nan, 0.2], 0.1), r"positions holds numbers that are not finite"),
+        ((EXITS, "ab"), r"positions: expected numbers, got 'ab'"),
+        ((EXITS, PLACE, "h"), r"half_length: expected numbers, got 'h'"),
+        ((EXITS, PLACE, [0.1, 0.2]), r"half_length must be one number \[m\], got \(2,\)"),
     ],
 )
 def test_bad_input(arguments: tuple, text: str) -> None:
@@ -341,5 +345,7 @@ def test_bars_without_length_are_refused() -> None:
         bar_equilibria([[0, 1], [1, 1]], [0.5, 0.5], 0.0)
     with pytest.raises(InputError, match=r"position must be \(2,\)"):
         bar_equilibria([[0, 1], [1, 1]], [[0.5, 0.5]], 0.1)
+    with pytest.raises(InputError, match="position holds numbers that are not finite"):
+        bar_equilibria([[0, 1], [1, 1]], [np.nan, 0.5], 0.1)
     with pytest.raises(InputError, match="exit_points must be two places, got one"):
         bar_equilibria([[1, 1], [1, 1]], [1.0, 0.5], 0.1)

@@ -427,6 +427,8 @@ def test_the_default_grid_lies_between_the_exit_points() -> None:
     x, y, z = default_axes(robot_named("demobot_cogiro"), 3)
     np.testing.assert_allclose([x[0], x[-1], y[0], y[-1], z[-1]], [0.04, 0.76, 0.04, 0.46, 0.485])
     assert [len(axis) for axis in default_axes(robot_named("planar_vertical"), 3)] == [3, 1, 3]
+    with pytest.raises(InputError, match="values: expected a whole number from 1 on, got -2"):
+        default_axes(robot_named("demobot_cogiro"), -2)
 
 
 def test_all_of_a_grid_is_as_large_as_its_box() -> None:
