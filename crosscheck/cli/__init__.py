@@ -23,7 +23,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
 
 @group_of("crosscheck.cli", COMMANDS)
 def main() -> None:
-    """Hold the statics of a cable-driven parallel robot against MuJoCo and against measurements.
+    """Check the statics of a cable-driven parallel robot against MuJoCo and against measurements.
 
     \b
     ROBOT.xml is an MJCF file, or the name of a shipped robot (demobot_cogiro, planar_vertical ...).

@@ -1,4 +1,4 @@
-"""Options of the commands that hold a model against measurements."""
+"""Options of the commands that compare a model with measurements."""
 
 from __future__ import annotations
 

@@ -56,8 +56,8 @@ def command(
     """Show where a model is off, by how much, and whether the residuals are noise.
 
     ROBOT.xml is the robot's MJCF, DATA.csv its measurements; a TOML file beside it states the
-    noise. The model's values are used as they are, and nothing is fitted. Writes comparison.json,
-    comparison.html and comparison.rrd.
+    noise. The model's values are used as they are; nothing is fitted but what the data leave free,
+    and the notes name it. Writes comparison.json, comparison.html and comparison.rrd.
 
     \b
     With limits the command is a gate for continuous integration: on the rms over all rows and

@@ -102,7 +102,7 @@ def _using(given: Given, model: Path) -> str:
 
 
 def after_fit(is_noise: bool, written: bool, given: Given) -> str:
-    """Holding the new model against the data, or looking for what else is missing."""
+    """Comparing the new model with the data, or looking for what else is missing."""
     there = written or (given.model is not None and given.model.exists())
     model = given_with(None, given.model) if there else ()
     verb = "compare" if is_noise and written else "diagnose"

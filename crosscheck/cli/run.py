@@ -100,7 +100,7 @@ def command(
       summary.md       the table, failures and findings
       CASE.rrd         a recording per case: open it with 'rerun CASE.rrd'
       worst_pose.xml   the pose nearest to its threshold, for MuJoCo's viewer
-      thresholds.toml  what the run was held against
+      thresholds.toml  the thresholds of this run
 
     \b
     Exit status: 0 all agree, 1 a threshold exceeded, 2 bad input, 3 a solve did not converge
