@@ -6,11 +6,12 @@ import shutil
 from collections.abc import Iterable
 from dataclasses import fields
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from crosscheck.errors import CrosscheckError
+from seecr.arguments import finite
 from seecr.description.given import GivenRobot, robot_of
 from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
@@ -24,6 +25,7 @@ __all__ = [
     "GivenModel",
     "GivenRobot",
     "basis_of",
+    "check_above_zero",
     "considered",
     "copy_robot",
     "file_of",
@@ -125,6 +127,20 @@ def model_of(given: GivenModel, robot: Robot) -> tuple[Terms, tuple[str, ...]]:
     if len(terms) < len(effects):
         raise no_effects(next(one for one in effects if not isinstance(one, Term)))
     return Terms(terms), notes
+
+
+def check_above_zero(sizes: Any) -> None:
+    """Check that the fields of a dataclass are numbers above zero, or None.
+
+    Raises:
+        InputError: something else.
+    """
+    for name, value in vars(sizes).items():
+        if value is None:
+            continue
+        size = finite(value, name)
+        if size.shape or not size > 0.0:
+            raise InputError(f"{name}: expected a number above zero, got {value!r}")
 
 
 def numbers_of(option: str, text: str, count: int = 3, expected: str = "") -> Array:

@@ -28,6 +28,10 @@ NO_RESULTS = {seecr.Robot, seecr.Effect, crosscheck.Case}
 PARTS = {crosscheck.CaseResult, crosscheck.MissingEffect, seecr.Jump}
 
 
+def repr_of(value: object) -> str:
+    return type(value).__name__
+
+
 def returned() -> set[type]:
     """The classes of which the faces' functions return one, or several."""
     found = set()
@@ -105,6 +109,37 @@ def test_a_private_name_is_seen() -> None:
     assert not is_public("crosscheck.fit.state", "evaluate")
     assert not is_public("seecr.files", "_missing")
     assert is_public("seecr.files", "staged") and is_public("crosscheck", "diagnose")
+
+
+REFUSED = {
+    "load_commands": lambda odd: crosscheck.load_commands(odd, "planar_vertical"),
+    "load_measurements": lambda odd: crosscheck.load_measurements(odd, "planar_vertical"),
+    "compare": lambda odd: crosscheck.compare("planar_vertical", odd),
+    "import_case": lambda odd: crosscheck.import_case(odd, "a.csv", "planar_vertical", "b.csv"),
+    "make_plan": lambda odd: crosscheck.make_plan("planar_vertical", odd),
+    "choose_poses": lambda odd: crosscheck.choose_poses("planar_vertical", odd),
+    "make_twin": lambda odd: crosscheck.make_twin("planar_vertical", odd),
+    "shipped_cases": crosscheck.shipped_cases,
+    "Sigma": lambda odd: crosscheck.Sigma(position_m=odd),
+    "Tolerance": lambda odd: crosscheck.Tolerance(tension_N=odd),
+    "user_cases": lambda odd: crosscheck.user_cases("planar_vertical", n_random=odd),
+    "write_measurements": lambda odd: crosscheck.write_measurements("a.csv", odd),
+    "write_plan": lambda odd: crosscheck.write_plan(odd, "a"),
+    "save_model": lambda odd: crosscheck.save_model("a.toml", odd),
+    "layout_of": lambda odd: seecr.layout_of(odd, "planar_vertical"),
+    "slack_zones": seecr.slack_zones,
+    "barriers": lambda odd: seecr.barriers(odd, odd),
+    "default_axes": lambda odd: seecr.default_axes("planar_vertical", odd),
+    "bar_tilt": lambda odd: seecr.bar_tilt([[0, 1], [1, 1]], odd),
+    "midline_point": lambda odd: seecr.midline_point(odd, odd),
+}
+
+
+@pytest.mark.parametrize("odd", [object(), {"a": 1}, -0.5, [["a"]]], ids=repr_of)
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_is_of_another_kind_is_refused_by_the_typed_error(name: str, odd: object) -> None:
+    with pytest.raises(seecr.SeecrError):
+        REFUSED[name](odd)
 
 
 @pytest.mark.parametrize("result", RESULTS, ids=lambda result: result.__name__)

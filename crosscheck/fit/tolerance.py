@@ -15,6 +15,7 @@ import numpy as np
 from crosscheck.errors import CrosscheckError
 from crosscheck.fit.problem import KINDS, Problem, Rms
 from crosscheck.fit.words import rms_words
+from crosscheck.given import check_above_zero
 from crosscheck.measurements.data import Sigma
 from crosscheck.units import SI, parse_kind
 
@@ -32,11 +33,17 @@ class Tolerance:
 
     Attributes:
         position_m, orientation_rad, tension_N: None for half the noise.
+
+    Raises:
+        InputError: something else than a number above zero.
     """
 
     position_m: float | None = None
     orientation_rad: float | None = None
     tension_N: float | None = None
+
+    def __post_init__(self) -> None:
+        check_above_zero(self)
 
     @classmethod
     def parsed(cls, texts: Iterable[str]) -> Tolerance:

@@ -133,7 +133,7 @@ def import_case(
         InputFileError, CrosscheckError: any mistake in the files.
         InputError: an unknown form, or a case of a robot without a file.
     """
-    if form not in READERS:
+    if not isinstance(form, str) or form not in READERS:
         raise InputError(f"form must be one of {', '.join(READERS)}, got {form!r}")
     choices = choices or ImportChoices()
     choices.check(form)

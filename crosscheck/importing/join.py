@@ -16,8 +16,6 @@ from seecr.errors import InputFileError
 from seecr.pose import Array
 from seecr.prediction.experiment import Experiment
 
-_MOST_LINES = 6
-
 
 @dataclass(frozen=True, eq=False)
 class HeldCommands:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from crosscheck.given import check_above_zero
 from crosscheck.measurements.named import named_columns
 from seecr.commands.data import Commands
 from seecr.commands.loads import Loads
@@ -55,12 +56,18 @@ class Sigma:
         orientation_rad: of each measured rotation component [rad].
         tension_N: of each measured tension [N].
         length_m: of the *commanded* lengths [m]; reaches the pose through the robot.
+
+    Raises:
+        InputError: something else than a number above zero.
     """
 
     position_m: float | None = None
     orientation_rad: float | None = None
     tension_N: float | None = None
     length_m: float | None = None
+
+    def __post_init__(self) -> None:
+        check_above_zero(self)
 
 
 def origin_of(path: Path) -> str:

@@ -27,6 +27,7 @@ from seecr.columns.table import read_table
 from seecr.columns.times import began, runs, temperatures, times
 from seecr.counted import counted
 from seecr.errors import InputError
+from seecr.files import path_of
 
 if TYPE_CHECKING:
     from seecr.description.robot import Robot
@@ -88,9 +89,10 @@ def load_commands(
 
     Raises:
         InputFileError: any mistake in either file.
+        InputError: no path.
     """
     robot = robot_of(robot)
-    return _load(_open(path, robot), robot, sigma_path)
+    return _load(_open(path_of(path, "commands"), robot), robot, sigma_path)
 
 
 def measurements_of(given: GivenData, robot: Robot) -> Measurements:

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 from crosscheck.measurements.data import Measurements
+from seecr.errors import InputError
 from seecr.files import write_texts
 
 
@@ -21,7 +22,10 @@ def write_measurements(path: str | Path, data: Measurements, remark: str = "") -
 
     Raises:
         InputFileError: the folder cannot be written.
+        InputError: not measurements.
     """
+    if not isinstance(data, Measurements):
+        raise InputError(f"expected measurements, got {type(data).__name__}")
     path = Path(path)
     columns = dict(data.columns())
     rows = (",".join(map(_cell, row)) for row in zip(*columns.values(), strict=True))

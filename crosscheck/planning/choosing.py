@@ -18,6 +18,7 @@ from crosscheck.planning.places import held_within, tilted_grid, trustworthy
 from crosscheck.planning.planned import Planned, Reads, expected_sigma, kinds_of, planned
 from crosscheck.planning.sight import all_visible
 from crosscheck.planning.visibility import EXACT, Signal, left_over, signals
+from seecr.arguments import whole
 from seecr.counted import counted
 from seecr.description.joints import pose_of_values
 from seecr.description.robot import Robot
@@ -64,8 +65,9 @@ def choose_poses(
 
     Raises:
         CrosscheckError: the robot can hold too few poses within the limits.
+        InputError: ``rows`` is not a whole number from 1 on.
     """
-    robot = robot_of(robot)
+    robot, rows = robot_of(robot), whole(rows, "rows", least=1)
     progress("looking for poses", 0.0)
     kinds = kinds_of(reads, sigma or Sigma())
     full, _assumed = expected_sigma(robot, sigma or Sigma(), kinds)

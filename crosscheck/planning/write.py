@@ -12,6 +12,7 @@ from crosscheck.given import numbers_of
 from crosscheck.measurements.data import Measurements
 from crosscheck.measurements.write import write_measurements
 from crosscheck.planning.result import Plan
+from seecr.errors import InputError
 from seecr.files import check_writable
 from seecr.pose import Array
 
@@ -31,7 +32,10 @@ def write_plan(plan: Plan, folder: str | Path, own: bool = True) -> tuple[str, .
 
     Raises:
         InputFileError: the folder cannot be made or written to.
+        InputError: not a plan.
     """
+    if not isinstance(plan, Plan):
+        raise InputError(f"expected a plan, as make_plan returns it, got {type(plan).__name__}")
     folder = Path(folder)
     files = {"poses.csv": plan.planned.problem.data} if own else {}
     for item in plan.suggestions:

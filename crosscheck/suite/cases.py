@@ -23,6 +23,7 @@ from crosscheck.suite.poses import (
     robot_random,
     robot_sweep,
 )
+from seecr.arguments import whole
 from seecr.description.shipped import CABLES, model_path, robot_file
 from seecr.pose import Array, quat_from_rotvec
 
@@ -102,7 +103,11 @@ def shipped_cases(seed: int = 0, n_random: int = N_RANDOM) -> list[Case]:
     Args:
         seed: of the random poses.
         n_random: number of random poses of each DemoBot and cable; other robots have fewer.
+
+    Raises:
+        InputError: either is not a whole number.
     """
+    seed, n_random = whole(seed, "seed"), whole(n_random, "n_random")
     cases = []
     for robot, turn in (("cogiro", _COGIRO_TURN), ("parallel", 0.0)):
         path = model_path(f"demobot_{robot}")
@@ -141,8 +146,10 @@ def user_cases(
         n_random: number of random poses.
 
     Raises:
-        InputError: a robot without a file, or with numbers other than its file's.
+        InputError: a robot without a file, or with numbers other than its file's; a seed or number
+            that is not whole.
     """
+    seed, n_random = whole(seed, "seed"), whole(n_random, "n_random")
     model, robot = file_of(robot), robot_of(robot)
     name, other = model.stem, model if mujoco_model is None else robot_file(mujoco_model)
     random = robot_random(robot, _generator(seed, f"{name}-random"), n_random)

@@ -118,6 +118,9 @@ def barriers(solution: Solution, others: Solution, i: int = 0) -> tuple[Barrier,
     Raises:
         InputError: the equilibria belong to another command or robot, or a row is not at rest.
     """
+    for one in (solution, others):
+        if not isinstance(one, Solution):
+            raise InputError(f"barriers: expected a seecr.Solution, got {type(one).__name__}")
     lengths = solution.rest_lengths[i]
     if others.robot.n_cables != len(lengths) or not np.allclose(others.rest_lengths, lengths):
         raise InputError("barriers: expected equilibria of one command, got other rest lengths")

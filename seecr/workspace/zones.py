@@ -248,7 +248,12 @@ def slack_zones(solution: Solution) -> list[Zone]:
 
     Args:
         solution: of the trajectory's poses in their order.
+
+    Raises:
+        InputError: not a solution.
     """
+    if not isinstance(solution, Solution):
+        raise InputError(f"expected a seecr.Solution, got {type(solution).__name__}")
     counts = [
         int(row.sum()) if ok else None
         for row, ok in zip(solution.slack, solution.converged, strict=True)

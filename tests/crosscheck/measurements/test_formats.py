@@ -130,7 +130,8 @@ name = "x"
 """
     data = load_measurements(write(header, "1,1,1,1,0", toml=toml), robot)
     assert data.told and not data.absolute and data.stands.tolist() == [True]
-    assert data.sigma == Sigma(0.1 / 1000, pytest.approx(np.deg2rad(0.02)), None, 1e-4)
+    stated = Sigma(0.1 / 1000, data.sigma.orientation_rad, None, 1e-4)
+    assert data.sigma == stated and stated.orientation_rad == pytest.approx(np.deg2rad(0.02))
     plain = load_measurements(write(header, "1,1,1,1,0"), robot)
     assert plain.absolute and not plain.stands.any()
     poses = load_measurements(write(POSE, "a,0,0,0,0", toml='lengths = "told"'), robot)
