@@ -71,13 +71,16 @@ class Result(ABC):
             from pyarrow import Table
 
             return Table.from_pylist(records)
-        except ModuleNotFoundError:
-            pass
+        except ModuleNotFoundError as error:
+            if error.name != "pyarrow":  # installed, but one of its own imports is missing
+                raise
         try:
             from pandas import DataFrame
 
             return DataFrame.from_records(records)
-        except ModuleNotFoundError:
+        except ModuleNotFoundError as error:
+            if error.name != "pandas":
+                raise
             raise MissingPackageError(
                 "a data frame needs pyarrow or pandas, and neither is installed; "
                 "install one: pip install pyarrow"

@@ -63,12 +63,13 @@ def test_a_frame_has_one_row_per_pose_in_the_numbers_of_the_solution(
     assert np.array_equal(table[f"slack_{name}"], solution.slack[:, 4])
 
 
-def without(monkeypatch: pytest.MonkeyPatch, *packages: str) -> None:
+def without(monkeypatch: pytest.MonkeyPatch, *packages: str, lacking: str = "") -> None:
+    """Packages that are absent, or that lack one of their own imports."""
     real = builtins.__import__
 
     def refuse(name: str, *args: Any, **more: Any) -> Any:
         if name.split(".")[0] in packages:
-            raise ModuleNotFoundError(name)
+            raise ModuleNotFoundError(f"No module named {lacking or name!r}", name=lacking or name)
         return real(name, *args, **more)
 
     monkeypatch.setattr(builtins, "__import__", refuse)
@@ -79,6 +80,14 @@ def test_without_pyarrow_and_pandas_a_frame_is_a_typed_error(
 ) -> None:
     without(monkeypatch, "pyarrow", "pandas")
     with pytest.raises(seecr.MissingPackageError, match="needs pyarrow or pandas"):
+        solution.to_frame()
+
+
+def test_a_package_that_is_itself_incomplete_is_not_taken_for_absent(
+    solution: seecr.Solution, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    without(monkeypatch, "pyarrow", lacking="cffi")
+    with pytest.raises(ModuleNotFoundError, match="cffi"):
         solution.to_frame()
 
 
