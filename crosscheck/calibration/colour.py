@@ -111,13 +111,27 @@ def whitened(chain: Chain, colour: Colour, weight: Array, values: Array) -> Arra
         weight: (N,) 1, or less for a reading that counts as noisier than the others.
         values: residuals or derivatives, in units of the stated noise.
     """
-    wide = (slice(None),) + (None,) * (values.ndim - 1)
-    unit = values * (np.sqrt(weight) / colour.scale[chain.kind])[wide]
+    return apart_from_before(chain, colour, scaled(chain, colour, weight, values))
+
+
+def scaled(chain: Chain, colour: Colour, weight: Array, values: Array) -> Array:
+    """The first step of whitening: (N,) or (N, p) in units of the noise's size."""
+    size = np.sqrt(weight) / colour.scale[chain.kind]
+    return np.asarray(values * _along(values, size))
+
+
+def apart_from_before(chain: Chain, colour: Colour, unit: Array) -> Array:
+    """The second step: each scaled reading less what the one before predicts, at unit size."""
     phi = foretold(chain, colour)
     if not phi.any():
-        return np.asarray(unit)
-    left = unit - phi[wide] * unit[np.maximum(chain.before, 0)]
-    return np.asarray(left / np.sqrt(1.0 - phi**2)[wide])
+        return unit
+    left = unit - _along(unit, phi) * unit[np.maximum(chain.before, 0)]
+    return np.asarray(left / _along(unit, np.sqrt(1.0 - phi**2)))
+
+
+def _along(values: Array, factor: Array) -> Array:
+    """Factors (N,) as they multiply values (N,) or (N, p)."""
+    return factor if values.ndim == 1 else factor[:, None]
 
 
 def log_det(chain: Chain, colour: Colour, weight: Array) -> float:

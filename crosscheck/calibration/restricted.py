@@ -11,13 +11,23 @@ from __future__ import annotations
 import numpy as np
 from scipy import linalg, optimize
 
-from crosscheck.calibration.colour import Chain, Colour, log_det, whitened
+from crosscheck.calibration.colour import (
+    Chain,
+    Colour,
+    apart_from_before,
+    foretold,
+    log_det,
+    scaled,
+    whitened,
+)
 from crosscheck.fit.definite import root_beside_one
 from crosscheck.fit.problem import KINDS
 from seecr.pose import Array
 
 _MOST_ALIKE = 0.97
 _SMALLEST, _LARGEST = 1e-2, 1e3
+# rho for derivatives at 0: of gaps below 1, rho^gap grows there without bound.
+_LEAST_RHO = 1e-6
 
 
 def log_evidence(
@@ -31,6 +41,42 @@ def log_evidence(
     power = float(left @ left) - float(part @ part)
     volume = 2.0 * float(np.sum(np.log(np.abs(np.diag(factor)))))
     return -0.5 * (power + volume + log_det(chain, colour, weight))
+
+
+def with_slopes(
+    chain: Chain, colour: Colour, weight: Array, x: Array, y: Array, width: Array
+) -> tuple[float, Array, Array]:
+    """The same, and its derivatives by the logarithm of each kind's scale (3,) and by its rho (3,).
+
+    Power and volume depend on the noise through the same quadratic form: with L L^T = 1 + X^T X of
+    the whitened X, and what the best z leaves of y, they change as the squares of the whitened rows
+    of (X L^-T, y - X z) do.
+    """
+    unit = scaled(chain, colour, weight, np.column_stack([x * width, y]))
+    white = apart_from_before(chain, colour, unit)
+    factor = root_beside_one(white[:, :-1])
+    part = linalg.solve_triangular(
+        factor, white[:, :-1].T @ white[:, -1], lower=True, check_finite=False
+    )
+    z = linalg.solve_triangular(factor, part, lower=True, trans=1, check_finite=False)
+    ball = linalg.solve_triangular(factor, unit[:, :-1].T, lower=True, check_finite=False)
+    rows = np.column_stack([ball.T, unit @ np.append(-z, 1.0)])
+    left = apart_from_before(chain, colour, rows)
+    power = float(left[:, -1] @ left[:, -1]) + float(z @ z)
+    volume = 2.0 * float(np.sum(np.log(np.abs(np.diag(factor)))))
+    value = -0.5 * (power + volume + log_det(chain, colour, weight))
+
+    phi, rho = foretold(chain, colour), np.maximum(colour.rho[chain.kind], _LEAST_RHO)
+    by_phi = np.where(chain.before < 0, 0.0, chain.gap * rho ** (chain.gap - 1.0))
+    squares = np.einsum("ij,ij->i", left, left)
+    with_before = np.einsum("ij,ij->i", left, rows[np.maximum(chain.before, 0)])
+    other = 1.0 - phi**2
+    slope = by_phi / other * (phi * (1.0 - squares) + np.sqrt(other) * with_before)
+
+    def by_kind(each: Array) -> Array:
+        return np.bincount(chain.kind, each, len(colour.scale)).astype(float)
+
+    return value, by_kind(squares - 1.0), by_kind(slope)
 
 
 def estimate(
@@ -57,9 +103,13 @@ def estimate(
     limits = [(np.log(_SMALLEST), np.log(_LARGEST))] * len(kinds)
     limits += [(0.0, _MOST_ALIKE)] * int(linked.sum())
     first = np.concatenate([np.log(start.scale[kinds]), start.rho[kinds[linked]]])
+
+    def cost(numbers: Array) -> tuple[float, Array]:
+        value, by_scale, by_rho = with_slopes(chain, colour_at(numbers), weight, x, y, width)
+        return -value, -np.concatenate([by_scale[kinds], by_rho[kinds[linked]]])
+
     found = optimize.minimize(
-        lambda numbers: -log_evidence(chain, colour_at(numbers), weight, x, y, width),
-        np.clip(first, *np.array(limits).T), method="L-BFGS-B", bounds=limits,
+        cost, np.clip(first, *np.array(limits).T), jac=True, method="L-BFGS-B", bounds=limits,
         options={"maxiter": 30, "ftol": 1e-7}, 
     )  # fmt: skip
     return colour_at(np.asarray(found.x, float))

@@ -157,8 +157,10 @@ def with_rows_back(setting: Setting, joint: JointFit) -> JointFit:
     for heat in _HEATS:
         if not np.any(outliers(setting.chain, joint.weight, setting.problem.data.n_rows)):
             break
-        wide = settle(alike, joint.state, joint.width, WHITE.hotter(heat * LARGER), _STEPS)
-        other = with_noise(setting, settle(setting, wide.state, joint.width, joint.colour))
+        hot = WHITE.hotter(heat * LARGER)
+        wide = settle(alike, joint.state, joint.width, hot, _STEPS, joint.jacobian)
+        back = settle(setting, wide.state, joint.width, joint.colour, jacobian=wide.jacobian)
+        other = with_noise(setting, back)
         if worth(setting, other) > worth(setting, joint) + _SURE:
             joint = other
     return joint

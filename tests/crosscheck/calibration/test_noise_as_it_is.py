@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from made_data import COGIRO, measured
 
 from crosscheck.calibration.colour import WHITE, Chain, Colour, chain_of, log_det, whitened
-from crosscheck.calibration.restricted import estimate, log_evidence
+from crosscheck.calibration.restricted import estimate, log_evidence, with_slopes
 from crosscheck.calibration.robust import log_chance_of_outliers, outliers, row_weights
 from crosscheck.fit.problem import Problem
 from crosscheck.measurements.data import Sigma
 from seecr.description.mjcf import load_robot
+from seecr.pose import Array
 
 
 def chain(rows: int, channels: int = 3, runs: int = 2) -> Chain:
@@ -56,6 +59,33 @@ def test_marginal_evidence_is_that_of_the_whole_covariance() -> None:
     whole = (x * width**2) @ x.T + covariance(c, COLOUR, np.ones(n))
     direct = -0.5 * (y @ np.linalg.solve(whole, y) + np.linalg.slogdet(whole)[1])
     assert log_evidence(c, COLOUR, np.ones(n), x, y, width) == pytest.approx(direct)
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.4, 0.95])
+def test_its_slopes_are_those_of_finite_differences(rho: float) -> None:
+    """Two kinds, gaps below and above one step, weights, columns of very different sizes."""
+    rng, one = np.random.default_rng(5), chain(30)
+    n = len(one.row)
+    kind = np.where(np.arange(n) % 3 == 2, 2, 0)
+    c = replace(one, kind=kind, gap=np.ones(n) if rho == 0.0 else rng.uniform(0.5, 3.0, n))
+    x, width = rng.normal(size=(n, 7)) * 10.0 ** np.arange(-2, 5), np.geomspace(0.1, 5.0, 7)
+    y, weight = rng.normal(size=n).cumsum(), rng.uniform(0.1, 1.0, n)
+    scale, alike = np.array([1.7, 1.0, 0.6]), np.array([rho, 0.0, 0.5])
+
+    def at(more: Array, rise: Array) -> float:
+        colour = Colour(scale * np.exp(more), alike + rise)
+        return log_evidence(c, colour, weight, x, y, width)
+
+    value, by_scale, by_rho = with_slopes(c, Colour(scale, alike), weight, x, y, width)
+    assert value == pytest.approx(at(np.zeros(3), np.zeros(3)), rel=1e-10)
+    assert by_scale[1] == by_rho[1] == 0.0, "nothing of that kind was read"
+    for k in (0, 2):
+        step, none = 1e-5 * np.eye(3)[k], np.zeros(3)
+        each = (at(step, none) - at(-step, none)) / 2e-5
+        assert by_scale[k] == pytest.approx(each, rel=1e-5, abs=1e-5)
+        back = none if alike[k] == 0.0 else -step
+        each = (at(none, step) - at(none, back)) / (1e-5 if alike[k] == 0.0 else 2e-5)
+        assert by_rho[k] == pytest.approx(each, rel=1e-3 if alike[k] == 0.0 else 1e-5)
 
 
 def test_evidence_of_huge_columns_is_that_of_their_directions() -> None:
