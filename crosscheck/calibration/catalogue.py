@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crosscheck.calibration.gram import ColumnGroup, Gram, gram_of
 from crosscheck.calibration.joining import added_columns, amplitudes, amplitudes_at_null
@@ -73,9 +74,10 @@ def gram_with(
     groups, first = {}, 0
     for name, x in columns.items():
         count = x.shape[1]
-        layout = catalogue.start(name).layout
+        term, seen = _in_linear_model(joint, catalogue, name)
+        one_sided = (term.layout.lower == term.layout.null)[seen]
         own = np.arange(first, first + count)
-        groups[name] = ColumnGroup.of(own, layout, widths_for(layout))
+        groups[name] = ColumnGroup(own, widths_for(term.layout), one_sided)
         first += count
     white = joint.state.white
     x = np.concatenate([np.zeros((len(white), 0)), *columns.values()], axis=1)
@@ -89,15 +91,23 @@ def gram_with(
 
 def known_of(joint: JointFit, catalogue: Catalogue, names: Sequence[str]) -> tuple[Array, Array]:
     """Independent measurements: columns (k, p) by the effects' amplitudes, and readings (k,)."""
-    terms = Terms(joint.terms[n] if n in joint.terms else catalogue.start(n) for n in names)
+    each = [_in_linear_model(joint, catalogue, name) for name in names]
+    terms = Terms(term for term, _seen in each)
     columns, readings = known_readings(terms)
-    order = []
-    for name in names:
-        term = terms[name]
-        own = amplitudes(term) if name in joint.terms else amplitudes_at_null(term)
-        order.append(np.flatnonzero(terms.own(name))[own])
+    order = [np.flatnonzero(terms.own(term.name))[seen] for term, seen in each]
     none = np.zeros(0, dtype=np.intp)
     return columns[:, np.concatenate([none, *order])], readings
+
+
+def _in_linear_model(
+    joint: JointFit, catalogue: Catalogue, name: str
+) -> tuple[Term, NDArray[np.bool_]]:
+    """An effect in the fit or at its start, and which (p,) of its parameters have columns."""
+    if name in joint.terms:
+        term = joint.terms[name]
+        return term, amplitudes(term)
+    term = catalogue.start(name)
+    return term, amplitudes_at_null(term)
 
 
 def catalogue_columns(

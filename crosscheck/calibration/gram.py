@@ -9,16 +9,15 @@ effect beside the set, for every width at once (:mod:`crosscheck.calibration.wor
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from crosscheck.calibration.worth import log_gains
+from crosscheck.calibration.worth import log_gains, log_positive
 from crosscheck.fit.definite import inverse_of
-from seecr.effects.base import Layout
 from seecr.pose import Array
 
 # A set: the prior width of each effect in it.
@@ -33,18 +32,13 @@ class ColumnGroup:
     """The columns of one effect.
 
     Attributes:
-        columns: their indices. widths: prior widths over which its evidence is averaged.
-        one_sided: whether the effect is a single parameter that cannot be negative.
+        columns: (k,) their indices. widths: prior widths over which its evidence is averaged.
+        one_sided: (k,) which of its parameters cannot be negative; none by default.
     """
 
     columns: NDArray[np.intp]
     widths: Array
-    one_sided: bool = False
-
-    @classmethod
-    def of(cls, columns: NDArray[np.intp], layout: Layout, widths: Array) -> ColumnGroup:
-        """The columns of an effect with this layout."""
-        return cls(columns, widths, len(columns) == 1 and bool(layout.lower[0] == layout.null[0]))
+    one_sided: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(1, bool))
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,14 +107,16 @@ class Solved:
 
     @property
     def _one_sided(self) -> float:
-        """ln of the change of Z for members that cannot be negative, each treated by itself."""
-        total = 0.0
-        for name in self.chosen:
-            if self.gram.groups[name].one_sided:
-                at = self._place(name)
-                error = float(np.sqrt(self.inverse[at[0], at[0]]))
-                total += np.log(2.0) + float(special.log_ndtr(self.values[at[0]] / error))
-        return total
+        """ln of the change of Z for parameters that cannot be negative, each treated by itself."""
+        at = np.flatnonzero(self._bounded)
+        return float(log_positive(self.values[at], self.inverse[at, at]))
+
+    @cached_property
+    def _bounded(self) -> NDArray[np.bool_]:
+        """(k,) columns that cannot be negative."""
+        groups = (self.gram.groups[name] for name in self.chosen)
+        each = (np.broadcast_to(g.one_sided, len(g.columns)) for g in groups)
+        return np.concatenate([np.zeros(0, bool), *each])
 
     def beside(self, name: str) -> tuple[Array, Array]:
         """An effect's normal matrix and gradient after the (other) members are eliminated."""
@@ -145,6 +141,29 @@ class Solved:
         gains = self.gains(name)
         return float(special.logsumexp(gains) - np.log(len(gains)))
 
+    def gains_of_member(self, name: str) -> Array:
+        """The same of a member, less what its width costs others that cannot be negative.
+
+        A narrow member may be replaced by others, in the linear model also by negative ones.
+        """
+        gains, own = self.gains(name), self._place(name)
+        others = np.setdiff1d(np.flatnonzero(self._bounded), own)
+        if len(others) == 0:
+            return gains
+        normal, gradient = self.beside(name)
+        power, axes = np.linalg.eigh(normal)
+        square = self.gram.groups[name].widths[:, None] ** 2
+        share = square / (1.0 + square * np.maximum(power, 0.0))
+        # the others follow the member by its covariance with them
+        rate = self.inverse[np.ix_(others, own)] @ inverse_of(self.inverse[np.ix_(own, own)])
+        along, moved = rate @ axes, rate @ self.values[own]
+        values = self.values[others] - moved + (share * (axes.T @ gradient)) @ along.T
+        alone = self.inverse[others, others] - np.sum(
+            rate * self.inverse[np.ix_(others, own)], axis=1
+        )
+        variance = np.maximum(alone, 1e-300) + share @ (along**2).T
+        return np.asarray(gains + log_positive(values, variance))
+
     def _place(self, name: str) -> NDArray[np.intp]:
         counts = [len(self.gram.groups[n].columns) for n in self.chosen]
         at = list(self.chosen).index(name)
@@ -165,7 +184,7 @@ def best_widths(gram: Gram, start: Widths, price: float = 0.0) -> dict[str, floa
         before = dict(chosen)
         for name, width in before.items():
             widths = gram.groups[name].widths
-            gains = gram.solved(chosen).gains(name) - price * (widths != width)
+            gains = gram.solved(chosen).gains_of_member(name) - price * (widths != width)
             chosen[name] = float(widths[int(np.argmax(gains))])
         if chosen == before:
             break
@@ -180,6 +199,6 @@ def averaged(gram: Gram, chosen: Widths) -> float:
 
 def averaging(solved: Solved, name: str) -> float:
     """How much averaging over the widths of one member changes ln Z, beside the others."""
-    gains = solved.gains(name)
+    gains = solved.gains_of_member(name)
     at = int(np.argmin(np.abs(solved.gram.groups[name].widths - solved.chosen[name])))
     return float(special.logsumexp(gains) - np.log(len(gains)) - gains[at])

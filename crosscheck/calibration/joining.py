@@ -119,7 +119,7 @@ class _Beside:
         )
         normal = x.T @ x - cross.T @ cross
         layout = term.layout
-        one_sided = bool(np.any(layout.lower == layout.null)) and x.shape[1] == 1
+        one_sided = (layout.lower == layout.null)[amplitudes_at_null(term)]
         return log_gain(normal, x.T @ self.left, one_sided=one_sided)
 
 

@@ -75,5 +75,7 @@ def groups_of(joint: JointFit, widths: Callable[[Layout], Array]) -> dict[str, C
         own = np.flatnonzero(joint.terms.own(term.name))
         own = own[free[own] & ~layout.shape]
         if len(own):
-            out[term.name] = ColumnGroup.of(own, layout, widths(layout))
+            first = joint.terms.part(term.name).start
+            one_sided = (layout.lower == layout.null)[own - first]
+            out[term.name] = ColumnGroup(own, widths(layout), one_sided)
     return out

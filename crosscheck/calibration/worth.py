@@ -6,8 +6,8 @@ matrix and gradient after the others are eliminated, the evidence gains over tha
     ln gain = 1/2 sum lambda^2 b_i^2/(1 + lambda^2 e_i) - 1/2 sum ln(1 + lambda^2 e_i)
 
 in the axes of C = U diag(e) U^T. It is averaged over the width lambda of the group, so that a badly
-wrong plausible size does not decide. A single parameter that cannot be negative has half a Gaussian
-as its prior.
+wrong plausible size does not decide. A parameter that cannot be negative has half a Gaussian as its
+prior, which multiplies the evidence by twice the probability that it is positive, given the data.
 """
 
 from __future__ import annotations
@@ -18,24 +18,41 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import special
 
-from crosscheck.fit.evidence import WIDTHS, half_gaussian
+from crosscheck.fit.evidence import WIDTHS
 from seecr.pose import Array
 
 
-def log_gains(normal: Array, gradient: Array, widths: ArrayLike, one_sided: bool = False) -> Array:
+def log_gains(
+    normal: Array, gradient: Array, widths: ArrayLike, one_sided: ArrayLike = False
+) -> Array:
     """(k,) ln evidence that a group gains, for each width.
 
     Args:
         normal: (p, p) its normal matrix after the others are eliminated.
         gradient: (p,) the same of X^T y.
         widths: (k,) prior standard deviations of z.
-        one_sided: whether the group is one parameter that cannot be negative.
+        one_sided: (p,) parameters that cannot be negative; each is treated by itself.
     """
     power, axes = np.linalg.eigh(normal)
-    power = np.maximum(power, 0.0)
-    if one_sided and len(gradient) == 1:
-        return half_gaussian(power, gradient, np.asarray(widths, float))
-    return gains_along(power, axes.T @ gradient, widths)
+    power, along = np.maximum(power, 0.0), axes.T @ gradient
+    gains = gains_along(power, along, widths)
+    bounded = np.broadcast_to(one_sided, len(gradient))
+    if not bounded.any():
+        return gains
+    square = np.asarray(widths, float)[:, None] ** 2
+    share = square / (1.0 + square * power)
+    own = axes[bounded]
+    return np.asarray(gains + log_positive((share * along) @ own.T, share @ (own**2).T))
+
+
+def log_positive(values: Array, variance: Array) -> Array:
+    """(...) ln of what half a Gaussian as prior changes, for parameters (..., q).
+
+    Args:
+        values: their most probable values without the bound. variance: of these.
+    """
+    chance = special.log_ndtr(values / np.sqrt(variance))
+    return np.asarray(np.sum(np.log(2.0) + chance, axis=-1))
 
 
 def gains_along(power: Array, along: Array, widths: ArrayLike) -> Array:
@@ -53,7 +70,7 @@ def gains_along(power: Array, along: Array, widths: ArrayLike) -> Array:
 
 
 def log_gain(
-    normal: Array, gradient: Array, widths: Sequence[float] = WIDTHS, one_sided: bool = False
+    normal: Array, gradient: Array, widths: Sequence[float] = WIDTHS, one_sided: ArrayLike = False
 ) -> float:
     """ln evidence that a group gains, averaged over its width."""
     gains = log_gains(normal, gradient, widths, one_sided)

@@ -115,7 +115,7 @@ def _candidate(sought: SetSearch, c: Candidate) -> Candidate:
         score = found.scores.score(names) - found.scores.score(found.always)
     score -= found.scores.log_prior(names) - found.scores.log_prior(found.always)
     drop, seen = _drop(found.scores.gram, c.name)
-    p = p_value(drop, seen, found.scores.gram.groups[c.name].one_sided)
+    p = p_value(drop, seen, bool(found.scores.gram.groups[c.name].one_sided.all()))
     refit = found.refits.get(names)
     base = sought.found.none
     if refit is None:

@@ -22,7 +22,7 @@ def toy(seed: int = 0, groups: int = 5, size: int = 3, one_sided: bool = False) 
     z[:size], z[2 * size : 3 * size] = 1.5, -2.0
     y = x @ z + rng.normal(size=60)
     parts = {
-        f"e{k}": ColumnGroup(np.arange(k * size, (k + 1) * size), WIDTHS, one_sided)
+        f"e{k}": ColumnGroup(np.arange(k * size, (k + 1) * size), WIDTHS, np.full(size, one_sided))
         for k in range(groups)
     }
     return gram_of(x, y, parts)
@@ -75,6 +75,66 @@ def test_gain_of_half_a_gaussian_is_the_integral_over_it() -> None:
         normal, gradient = np.array([[x @ x]]), np.array([x @ shifted])
         found = log_gains(normal, gradient, np.array([0.7]), one_sided=True)[0]
         assert found == pytest.approx(np.log(whole), abs=1e-6)
+
+
+def test_a_group_that_cannot_be_negative_is_the_integral_over_its_positive_part() -> None:
+    """Two parameters, one of which wants to be negative; exact where they do not interfere."""
+    rng = np.random.default_rng(4)
+    x = np.linalg.qr(rng.normal(size=(40, 2)))[0] * np.array([3.0, 2.0])
+    y = x @ np.array([0.8, -0.4]) + 0.3 * rng.normal(size=40)
+
+    def likelihood(b: float, a: float) -> float:
+        ratio = np.exp(-0.5 * np.sum((y - x @ [a, b]) ** 2) + 0.5 * np.sum(y**2))
+        return float(ratio * np.prod(2.0 * stats.norm.pdf([a, b], scale=0.7)))
+
+    whole, _ = integrate.dblquad(likelihood, 0.0, 5.0, 0.0, 5.0)
+    found = log_gains(x.T @ x, x.T @ y, np.array([0.7]), np.array([True, True]))[0]
+    assert found == pytest.approx(np.log(whole), abs=1e-6)
+    group = ColumnGroup(np.arange(2), WIDTHS, np.array([True, True]))
+    gram = gram_of(x, y, {"both": group})
+    more = gram.solved({"both": 0.7}).log_evidence - gram.solved({}).log_evidence
+    assert more == pytest.approx(np.log(whole), abs=1e-6)
+    half = log_gains(x.T @ x, x.T @ y, np.array([0.7]), np.array([True, False]))[0]
+    assert half > found, "the other may be negative, as it wants to be"
+
+
+def bounded(seed: int) -> Gram:
+    """Three effects of two columns that resemble one another; some cannot be negative."""
+    rng = np.random.default_rng(seed)
+    x = rng.normal(size=(30, 6)) + 2.0 * rng.normal(size=(30, 1))
+    y = x @ np.array([0.5, 0.2, 0.4, 0.0, 0.1, 0.3]) + rng.normal(size=30)
+    sides = {"e0": (False, False), "e1": (True, False), "e2": (True, True)}
+    return gram_of(x, y, {
+        name: ColumnGroup(np.array([2 * k, 2 * k + 1]), WIDTHS, np.array(side))
+        for k, (name, side) in enumerate(sides.items())
+    })  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_a_width_costs_the_other_members_is_counted(seed: int) -> None:
+    gram, chosen = bounded(seed), {"e0": 1.0, "e1": 0.3, "e2": 3.0}
+    solved = gram.solved(chosen)
+    for name in gram.names:
+        whole = [gram.solved({**chosen, name: w}).log_evidence for w in WIDTHS]
+        found = solved.gains_of_member(name)
+        assert found - found[0] == pytest.approx(np.subtract(whole, whole[0]), abs=1e-8)
+
+
+def test_no_member_is_replaced_by_others_that_would_have_to_be_negative() -> None:
+    """Small stiffnesses had been explained by a frame that yields the wrong way."""
+    rng = np.random.default_rng(0)
+    yields = rng.normal(size=(60, 2))
+    stiff = np.column_stack(
+        [-(yields @ [1.0, 1.5]) + 0.02 * rng.normal(size=60), *rng.normal(size=(3, 60))]
+    )
+    x = 30.0 * np.column_stack([stiff, yields])
+    y = x[:, 0] * 0.3 + rng.normal(size=60)
+    groups = {"stiffness": ColumnGroup(np.arange(4), WIDTHS)}
+    chosen = {"stiffness": 1.0, "frame": 1.0}
+    free = {**groups, "frame": ColumnGroup(np.array([4, 5]), WIDTHS)}
+    assert best_widths(gram_of(x, y, free), chosen)["stiffness"] == WIDTHS[0]
+    held = {**groups, "frame": ColumnGroup(np.array([4, 5]), WIDTHS, np.array([True, True]))}
+    assert best_widths(gram_of(x, y, held), chosen)["stiffness"] > WIDTHS[0]
 
 
 def test_averaging_over_the_width_is_a_mean_of_evidences() -> None:

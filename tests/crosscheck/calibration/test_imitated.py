@@ -160,7 +160,7 @@ def test_a_member_that_only_the_field_leaves_positive_is_weighed_beside_it() -> 
     x[:, 1] = 0.8 * x[:, 0] + 0.2 * x[:, 1]
     field = x[:, :1] * 1.0 + 0.1 * random.standard_normal((80, 1))
     groups = {
-        "pulley_radius": ColumnGroup(np.array([1]), np.array([1.0]), one_sided=True),
+        "pulley_radius": ColumnGroup(np.array([1]), np.array([1.0]), one_sided=np.array([True])),
         "field": ColumnGroup(np.array([2]), np.array([1.0])),
     }
     y = x[:, 1] - 3.0 * field[:, 0] + random.standard_normal(80)
