@@ -4,15 +4,18 @@ Sets are compared with the noise of the fit of all effects: its size, autocorrel
 With that many parameters it can follow an outlier, above all where a cable is about to go slack,
 and in few readings it can follow noise that is correlated. What is left is then too small, and
 calls for effects that do not exist. So the best set is also compared with what remains of it
-without doubtful members, each with the noise that it leaves itself.
+without doubtful members, each with the noise that it leaves itself. That also says how sure these
+members are: the size of noise that is estimated from few readings, and how much it follows itself,
+are uncertain, and the evidence with one value of both is surer than the data.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
+from crosscheck.calibration.colour import Colour
 from crosscheck.calibration.exact import FEW, width_of
 from crosscheck.calibration.joint import JointFit, Setting, settle
 from crosscheck.calibration.refits import Found
@@ -26,26 +29,67 @@ from seecr.effects import Terms
 _NEEDED = 300.0
 
 
-def noise_of_fewer(setting: Setting, found: Found) -> JointFit | None:
-    """The fit of fewer effects that explains the data better than the best set, each by its noise.
+@dataclass(frozen=True, eq=False)
+class OwnNoise:
+    """The best set and what remains of it without doubtful members, each with its own noise.
+
+    Attributes:
+        fewer: the fit of fewer effects that explains the data better than the best set; None if no
+            such set does.
+        scores: of sets of fewer effects, where their own noise makes them better than the noise
+            with which all sets were compared.
+    """
+
+    fewer: JointFit | None = None
+    scores: Mapping[Names, float] = field(default_factory=dict)
+
+
+def by_own_noise(
+    setting: Setting, found: Found, may_be: Callable[[Colour], bool] = lambda _colour: True
+) -> OwnNoise:
+    """Compare the best set with fewer effects, each by its own noise.
 
     Args:
         setting: the data.
         found: the compared sets.
+        may_be: whether noise may be as large as this.
 
     Returns:
-        None if no such set does, if no member is doubtful, or if the best set is large.
+        nothing if no member is doubtful, or if the best set is large.
     """
     if len(found.best.names - found.always) > FEW:
-        return None
+        return OwnNoise()
     some = list(_doubtful_members(found))
     whole = _fitted(setting, found, frozenset()) if some else None
     if whole is None:
+        return OwnNoise()
+    fits = {out: _fitted(setting, found, out) for out in some}
+    fewer = [fit for fit in fits.values() if fit is not None and may_be(fit.colour)]
+    best = max([whole, *fewer], key=lambda fit: evidence(setting, found, fit))
+    scores = {
+        found.best.names - out: score
+        for out, fit in fits.items()
+        if fit in fewer and (score := _score(setting, found, whole, fit)) is not None
+    }
+    return OwnNoise(None if best is whole else best, scores)
+
+
+def _score(setting: Setting, found: Found, whole: JointFit, fit: JointFit) -> float | None:
+    """The score of a fit of fewer effects if it differs from the best one by more with own noise.
+
+    In few readings the noise is not known well: what an effect explains may nearly as well be
+    noise that is larger, or follows itself more.
+    """
+    same = found.refit(frozenset(fit.terms.names))
+    if same is None:
         return None
-    fewer = (_fitted(setting, found, out) for out in some)
-    fits = [whole, *(fit for fit in fewer if fit is not None)]
-    best = max(fits, key=lambda fit: evidence(setting, found, fit))
-    return None if best is whole else best
+    fixed = [worth(setting, one.joint) for one in (found.best, same)]
+    own = [
+        worth(setting, one) + log_chance_of_outliers(setting.chain, one.weight)
+        for one in (whole, fit)
+    ]
+    gained = (own[1] - own[0]) - (fixed[1] - fixed[0])
+    return same.score + gained if gained > 0.0 else None
 
 
 def evidence(setting: Setting, found: Found, joint: JointFit) -> float:

@@ -19,7 +19,7 @@ from crosscheck.calibration.joint import JointFit
 from crosscheck.calibration.judgement import SURPRISE, Judgement, judge
 from crosscheck.calibration.linearised import free_of
 from crosscheck.calibration.not_noise import is_not_noise
-from crosscheck.calibration.own_noise import noise_of_fewer
+from crosscheck.calibration.own_noise import by_own_noise
 from crosscheck.calibration.probability import (
     Classes,
     alike_beyond,
@@ -94,14 +94,14 @@ def search_sets(
     surprise = float(np.max(whole.held_out.surprise, initial=0.0))
     smooth = odds > UNKNOWN or surprise > SURPRISE
     catalogue = _catalogue(problem, terms, whole)
-    found, not_noise = _compared(
+    found, not_noise, by_own = _compared(
         whole, catalogue, evaluate(problem, terms, setting.factor), progress, given, known, smooth
     )
     effects = [n for n in catalogue.names if n not in terms]
     sizes = {name: parameters_counted(catalogue.start(name).layout) for name in effects}
     best = found.best
     in_place = field_in_place(setting, best.joint, best.widths, found.scores)
-    classes = _classes(found, best.names, sizes)
+    classes = _classes(found, best.names, sizes, by_own)
     beside = log_odds(setting, best.joint, all_stated)
     said = judge(found, classes, odds, surprise, not_noise, _doubted(found), beside, in_place)
     listed = found.always | set(said.sure)
@@ -111,6 +111,7 @@ def search_sets(
         further = {
             **with_equivalents(found, listed, classes, problem.robot, terms),
             listed: alone.score,
+            **by_own,
         }
         classes = _classes(found, listed, sizes, further)
     if said.imitated is not None:
@@ -127,8 +128,9 @@ def search_sets(
 def _compared(
     whole: Calibration, catalogue: Catalogue, plain: State, progress: Progress,
     given: Sequence[Terms], stated: Sequence[str], smooth: bool,
-) -> tuple[Found, bool]:  # fmt: skip
-    """The compared sets, and whether what the best of them takes for noise is not noise.
+) -> tuple[Found, bool, Mapping[Names, float]]:  # fmt: skip
+    """The compared sets, whether what the best of them takes for noise is not noise, and the scores
+    of sets that are better by their own noise than by that of all.
 
     Args:
         whole, catalogue, plain: the fit of all effects, their starts, and the model as it stands.
@@ -155,13 +157,15 @@ def _compared(
         # what few effects explain, all of them could: their fit ended in a local minimum
         found = compared(False, found.best.joint.terms)
         not_noise = is_not_noise(setting, found.best.joint, stated)
-    if not (not_noise or smooth):
-        fewer = noise_of_fewer(setting, found)
-        if fewer is not None and not _louder(fewer.colour, stated):
-            joint = replace(whole.joint, colour=fewer.colour, weight=fewer.weight)
-            found = compared(False, fewer.terms, joint=joint)
-            not_noise = is_not_noise(setting, found.best.joint, stated)
-    return found, not_noise
+    if not_noise or smooth:
+        return found, not_noise, NO_MORE
+    own = by_own_noise(setting, found, lambda colour: not _louder(colour, stated))
+    if own.fewer is not None:
+        joint = replace(whole.joint, colour=own.fewer.colour, weight=own.fewer.weight)
+        found = compared(False, own.fewer.terms, joint=joint)
+        not_noise = is_not_noise(setting, found.best.joint, stated)
+        own = by_own_noise(setting, found, lambda colour: not _louder(colour, stated))
+    return found, not_noise, own.scores
 
 
 def _louder(colour: Colour, stated: Sequence[str]) -> bool:

@@ -54,8 +54,8 @@ def test_nothing_is_fitted_where_nothing_is_doubtful_or_the_set_is_large(
     setting: Any = None
     many = {f"effect {k}": 1.0 for k in range(FEW + 1)}
     for one in (found({"a": 1e4}), found(many)):
-        assert own_noise.noise_of_fewer(setting, one) is None and not fitted
-    assert own_noise.noise_of_fewer(setting, found({"a": 1.0})) is None
+        assert own_noise.by_own_noise(setting, one).fewer is None and not fitted
+    assert own_noise.by_own_noise(setting, found({"a": 1.0})).fewer is None
     assert fitted == [frozenset()]  # nor any other, if the best set itself has no fit
 
 
@@ -63,14 +63,45 @@ def test_nothing_is_fitted_where_nothing_is_doubtful_or_the_set_is_large(
 def test_the_set_with_the_most_evidence_by_its_own_noise_is_taken(
     monkeypatch: pytest.MonkeyPatch, best: str
 ) -> None:
-    def joint(_setting: Any, _found: Any, out: frozenset[str]) -> str:
-        return "".join(sorted(out))
-
-    def evidence(_setting: Any, _found: Any, fit: str) -> float:
-        return 2.0 if fit == best else 1.0
-
-    monkeypatch.setattr(own_noise, "_fitted", joint)
-    monkeypatch.setattr(own_noise, "evidence", evidence)
+    monkeypatch.setattr(own_noise, "_fitted", fit_of)
+    monkeypatch.setattr(own_noise, "_score", lambda *_all: None)
+    monkeypatch.setattr(own_noise, "evidence", lambda _s, _f, fit: float(fit.out == best))
     setting: Any = None
-    taken = own_noise.noise_of_fewer(setting, found({"a": 1.0, "b": 2.0}))
-    assert taken == (best or None)
+    taken = own_noise.by_own_noise(setting, found({"a": 1.0, "b": 2.0}))
+    assert taken.scores == {} and (taken.fewer is None if best == "" else taken.fewer.out == best)
+    louder = own_noise.by_own_noise(
+        setting, found({"a": 1.0, "b": 2.0}), lambda colour: colour != best
+    )
+    assert louder.fewer is None, "noise must not be as large as this"
+
+
+def test_a_set_is_as_good_as_by_its_own_noise(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the noise of all, a is worth 7 and b 9; with their own, 3 and more."""
+    fixed = {"ab": 0.0, "b": -7.0, "a": -9.0, "": -30.0}
+    own = {"": 10.0, "a": 7.0, "b": -5.0, "ab": -5.0}
+    ready = found({"a": 1.0, "b": 2.0})
+    refits = {
+        frozenset(name): SimpleNamespace(joint=name, score=worth + 0.5)
+        for name, worth in fixed.items()
+    }
+    ready.best.joint = "ab"
+    ready.refit = lambda some: refits[some] if some else None
+    monkeypatch.setattr(own_noise, "_fitted", fit_of)
+    monkeypatch.setattr(own_noise, "evidence", lambda _s, _f, fit: own[fit.out])
+    monkeypatch.setattr(own_noise, "log_chance_of_outliers", lambda _chain, _weight: 0.0)
+    monkeypatch.setattr(
+        own_noise, "worth",
+        lambda _s, joint: fixed[joint] if isinstance(joint, str) else own[joint.out],
+    )  # fmt: skip
+    setting: Any = SimpleNamespace(chain=None)
+    taken = own_noise.by_own_noise(setting, ready)
+    assert taken.fewer is None
+    # worth 3 instead of 7; b is worth more, which is not believed; without both there is no fit
+    assert taken.scores == {frozenset("b"): pytest.approx(-6.5 + 4.0)}
+
+
+def fit_of(_setting: Any, _found: Any, out: frozenset[str]) -> Any:
+    """A fit without some of two members."""
+    gone = "".join(sorted(out))
+    terms = SimpleNamespace(names=tuple(set("ab") - out))
+    return SimpleNamespace(out=gone, terms=terms, colour=gone, weight=None)

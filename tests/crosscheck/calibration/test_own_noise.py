@@ -12,6 +12,7 @@ from score_chances import alike
 from crosscheck.calibration import search
 from crosscheck.calibration.all_effects import Calibration, fit_all_effects
 from crosscheck.calibration.colour import Colour
+from crosscheck.calibration.own_noise import OwnNoise
 from crosscheck.calibration.search import SetSearch, search_sets
 from crosscheck.fit.prepare import prepare
 from crosscheck.given import considered
@@ -59,7 +60,7 @@ def test_noise_that_all_effects_followed_is_found_again(monkeypatch: pytest.Monk
     with monkeypatch.context() as louder:
         louder.setattr(search, "_LOUDER", 0.3)  # as if that noise were larger than stated
         assert sought(data).found.best.names > {"pulley_radius"}
-    monkeypatch.setattr(search, "noise_of_fewer", lambda _setting, _found: None)
+    monkeypatch.setattr(search, "by_own_noise", lambda _setting, _found, _may_be: OwnNoise())
     assert sought(data).found.best.names > {"pulley_radius"}
 
 
