@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from crosscheck.calibration.worth import log_gains, log_positive
+from crosscheck.calibration.worth import ByWidth, log_gains, log_positive
 from crosscheck.fit.definite import inverse_of
 from seecr.pose import Array
 
@@ -150,19 +150,14 @@ class Solved:
         others = np.setdiff1d(np.flatnonzero(self._bounded), own)
         if len(others) == 0:
             return gains
-        normal, gradient = self.beside(name)
-        power, axes = np.linalg.eigh(normal)
-        square = self.gram.groups[name].widths[:, None] ** 2
-        share = square / (1.0 + square * np.maximum(power, 0.0))
+        group = ByWidth.of(*self.beside(name), self.gram.groups[name].widths)
         # the others follow the member by its covariance with them
-        rate = self.inverse[np.ix_(others, own)] @ inverse_of(self.inverse[np.ix_(own, own)])
-        along, moved = rate @ axes, rate @ self.values[own]
-        values = self.values[others] - moved + (share * (axes.T @ gradient)) @ along.T
-        alone = self.inverse[others, others] - np.sum(
-            rate * self.inverse[np.ix_(others, own)], axis=1
-        )
-        variance = np.maximum(alone, 1e-300) + share @ (along**2).T
-        return np.asarray(gains + log_positive(values, variance))
+        with_own = self.inverse[np.ix_(others, own)]
+        rate = with_own @ inverse_of(self.inverse[np.ix_(own, own)])
+        values, variance = group.seen(rate)
+        alone = self.inverse[others, others] - np.sum(rate * with_own, axis=1)
+        values = values + self.values[others] - rate @ self.values[own]
+        return np.asarray(gains + log_positive(values, variance + np.maximum(alone, 1e-300)))
 
     def _place(self, name: str) -> NDArray[np.intp]:
         counts = [len(self.gram.groups[n].columns) for n in self.chosen]

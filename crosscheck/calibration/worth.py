@@ -13,6 +13,7 @@ prior, which multiplies the evidence by twice the probability that it is positiv
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +21,39 @@ from scipy import special
 
 from crosscheck.fit.evidence import WIDTHS
 from seecr.pose import Array
+
+
+@dataclass(frozen=True, eq=False)
+class ByWidth:
+    """A group of parameters beside others, for each of k prior widths.
+
+    Attributes:
+        power: (p,) eigenvalues of its normal matrix. axes: (p, p) their axes.
+        along: (p,) gradient along the axes.
+        widths: (k,) prior standard deviations of z.
+    """
+
+    power: Array
+    axes: Array
+    along: Array
+    widths: Array
+
+    @classmethod
+    def of(cls, normal: Array, gradient: Array, widths: ArrayLike) -> ByWidth:
+        """From normal matrix (p, p) and gradient (p,) after the others are eliminated."""
+        power, axes = np.linalg.eigh(normal)
+        return cls(np.maximum(power, 0.0), axes, axes.T @ gradient, np.asarray(widths, float))
+
+    @property
+    def gains(self) -> Array:
+        """(k,) ln evidence gained, with Gaussian priors."""
+        return gains_along(self.power, self.along, self.widths)
+
+    def seen(self, rate: Array) -> tuple[Array, Array]:
+        """Most probable values and variances (k, q) of rate @ z, for rate (q, p)."""
+        square, rate = self.widths[:, None] ** 2, rate @ self.axes
+        share = square / (1.0 + square * self.power)
+        return (share * self.along) @ rate.T, share @ (rate**2).T
 
 
 def log_gains(
@@ -33,16 +67,10 @@ def log_gains(
         widths: (k,) prior standard deviations of z.
         one_sided: (p,) parameters that cannot be negative; each is treated by itself.
     """
-    power, axes = np.linalg.eigh(normal)
-    power, along = np.maximum(power, 0.0), axes.T @ gradient
-    gains = gains_along(power, along, widths)
-    bounded = np.broadcast_to(one_sided, len(gradient))
+    group, bounded = ByWidth.of(normal, gradient, widths), np.broadcast_to(one_sided, len(gradient))
     if not bounded.any():
-        return gains
-    square = np.asarray(widths, float)[:, None] ** 2
-    share = square / (1.0 + square * power)
-    own = axes[bounded]
-    return np.asarray(gains + log_positive((share * along) @ own.T, share @ (own**2).T))
+        return group.gains
+    return np.asarray(group.gains + log_positive(*group.seen(np.eye(len(gradient))[bounded])))
 
 
 def log_positive(values: Array, variance: Array) -> Array:
