@@ -164,7 +164,7 @@ class Exact:
         if not state.valid:
             return None
         found = settle(self.setting, state, width_of(start, widths), self.joint.colour, _STEPS)
-        return _scored(self.setting, found, names, widths, scores)
+        return scored(self.setting, found, names, widths, scores)
 
 
 def _linear_terms(catalogue: Catalogue, scores: Scores, names: Names) -> Terms:
@@ -198,7 +198,7 @@ def width_of(terms: Terms, widths: Mapping[str, float]) -> Array:
     return np.where(terms.knowledge.fixed, 0.0, np.concatenate([np.zeros(0), *parts]))
 
 
-def _scored(
+def scored(
     setting: Setting, joint: JointFit, names: Names, widths: dict[str, float], scores: Scores
 ) -> Refit:
     """A fit with its evidence, linearised about its own optimum and averaged over prior widths."""

@@ -15,13 +15,13 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 
-from crosscheck.calibration.colour import Colour
-from crosscheck.calibration.exact import FEW, width_of
+from crosscheck.calibration.colour import Colour, log_det
+from crosscheck.calibration.exact import FEW, scored, width_of
 from crosscheck.calibration.joint import JointFit, Setting, settle
 from crosscheck.calibration.refits import Found
 from crosscheck.calibration.robust import log_chance_of_outliers
 from crosscheck.calibration.sets import Names
-from crosscheck.calibration.stages import with_noise, worth
+from crosscheck.calibration.stages import with_noise
 from crosscheck.fit.state import evaluate
 from seecr.effects import Terms
 
@@ -64,38 +64,29 @@ def by_own_noise(
     if whole is None:
         return OwnNoise()
     fits = {out: _fitted(setting, found, out) for out in some}
-    fewer = [fit for fit in fits.values() if fit is not None and may_be(fit.colour)]
-    best = max([whole, *fewer], key=lambda fit: evidence(setting, found, fit))
-    scores = {
-        found.best.names - out: score
+    worth = {
+        out: evidence(setting, found, fit)
         for out, fit in fits.items()
-        if fit in fewer and (score := _score(setting, found, whole, fit)) is not None
+        if fit is not None and may_be(fit.colour)
     }
-    return OwnNoise(None if best is whole else best, scores)
-
-
-def _score(setting: Setting, found: Found, whole: JointFit, fit: JointFit) -> float | None:
-    """The score of a fit of fewer effects if it differs from the best one by more with own noise.
-
-    In few readings the noise is not known well: what an effect explains may nearly as well be
-    noise that is larger, or follows itself more.
-    """
-    same = found.refit(frozenset(fit.terms.names))
-    if same is None:
-        return None
-    fixed = [worth(setting, one.joint) for one in (found.best, same)]
-    own = [
-        worth(setting, one) + log_chance_of_outliers(setting.chain, one.weight)
-        for one in (whole, fit)
-    ]
-    gained = (own[1] - own[0]) - (fixed[1] - fixed[0])
-    return same.score + gained if gained > 0.0 else None
+    own = evidence(setting, found, whole)
+    best = max(worth, key=lambda out: worth[out], default=None)
+    fewer = None if best is None or worth[best] <= own else fits[best]
+    scores = dict[Names, float]()
+    for out, value in worth.items():
+        names, score = found.best.names - out, found.best.score + value - own
+        same = found.refit(names)
+        if same is None or score > same.score:
+            scores[names] = score
+    return OwnNoise(fewer, scores)
 
 
 def evidence(setting: Setting, found: Found, joint: JointFit) -> float:
     """ln evidence of a set by a fit with its own noise, plus ln of its prior."""
-    prior = found.scores.log_prior(frozenset(joint.terms.names))
-    return worth(setting, joint) + prior + log_chance_of_outliers(setting.chain, joint.weight)
+    fixed = replace(setting, frozen=True, weight=joint.weight)
+    names, noise = frozenset(joint.terms.names), (setting.chain, joint.colour, joint.weight)
+    score = scored(fixed, joint, names, found.best.widths, found.scores).score
+    return score - 0.5 * log_det(*noise) + log_chance_of_outliers(setting.chain, joint.weight)
 
 
 def _doubtful_members(found: Found) -> Iterable[Names]:

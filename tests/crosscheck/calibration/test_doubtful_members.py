@@ -11,13 +11,22 @@ from crosscheck.calibration import own_noise
 from crosscheck.calibration.exact import FEW
 
 
-def found(worth: dict[str, float], always: frozenset[str] = frozenset()) -> Any:
-    """A best set whose members are worth so much ln evidence, beside those of the model."""
+def found(
+    worth: dict[str, float],
+    fitted: dict[str, float] | None = None,
+    always: frozenset[str] = frozenset(),
+) -> Any:
+    """A best set whose members are worth so much ln evidence, beside those of the model.
+
+    Its score is 0; ``fitted`` are those of other sets that were fitted.
+    """
     names = frozenset(worth) | always
     near = {names - {name}: 1000.0 - value for name, value in worth.items()}
     near |= {names - {name}: 1000.0 for name in always}
     scores = SimpleNamespace(neighbours=lambda _names: near, score=lambda _names: 1000.0)
-    return SimpleNamespace(best=SimpleNamespace(names=names), always=always, scores=scores)
+    refits = {frozenset(n): SimpleNamespace(score=score) for n, score in (fitted or {}).items()}
+    best = SimpleNamespace(names=names, score=0.0)
+    return SimpleNamespace(best=best, always=always, scores=scores, refit=refits.get)
 
 
 @pytest.mark.parametrize(
@@ -38,7 +47,7 @@ def test_those_worth_little_are_left_out_alone_and_then_together(
 
 
 def test_what_the_model_has_already_is_not_doubted() -> None:
-    some = list(own_noise._doubtful_members(found({"a": 1.0}, frozenset("b"))))
+    some = list(own_noise._doubtful_members(found({"a": 1.0}, always=frozenset("b"))))
     assert some == [frozenset("a")]
 
 
@@ -64,44 +73,31 @@ def test_the_set_with_the_most_evidence_by_its_own_noise_is_taken(
     monkeypatch: pytest.MonkeyPatch, best: str
 ) -> None:
     monkeypatch.setattr(own_noise, "_fitted", fit_of)
-    monkeypatch.setattr(own_noise, "_score", lambda *_all: None)
     monkeypatch.setattr(own_noise, "evidence", lambda _s, _f, fit: float(fit.out == best))
     setting: Any = None
     taken = own_noise.by_own_noise(setting, found({"a": 1.0, "b": 2.0}))
-    assert taken.scores == {} and (taken.fewer is None if best == "" else taken.fewer.out == best)
+    assert taken.fewer is None if best == "" else taken.fewer.out == best  # type: ignore[union-attr]
     louder = own_noise.by_own_noise(
         setting, found({"a": 1.0, "b": 2.0}), lambda colour: colour != best
     )
     assert louder.fewer is None, "noise must not be as large as this"
+    assert all(frozenset("ab") - set(best) != names for names in louder.scores) or best == ""
 
 
 def test_a_set_is_as_good_as_by_its_own_noise(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With the noise of all, a is worth 7 and b 9; with their own, 3 and more."""
-    fixed = {"ab": 0.0, "b": -7.0, "a": -9.0, "": -30.0}
-    own = {"": 10.0, "a": 7.0, "b": -5.0, "ab": -5.0}
-    ready = found({"a": 1.0, "b": 2.0})
-    refits = {
-        frozenset(name): SimpleNamespace(joint=name, score=worth + 0.5)
-        for name, worth in fixed.items()
-    }
-    ready.best.joint = "ab"
-    ready.refit = lambda some: refits[some] if some else None
+    """With the noise of all, a is worth 7 and b 9; with their own, 3 and 15, and both 12."""
+    own = {"": 10.0, "a": 7.0, "b": -5.0, "ab": -2.0}
+    ready = found({"a": 1.0, "b": 2.0}, {"b": -7.0, "a": -9.0, "": -30.0})
     monkeypatch.setattr(own_noise, "_fitted", fit_of)
     monkeypatch.setattr(own_noise, "evidence", lambda _s, _f, fit: own[fit.out])
-    monkeypatch.setattr(own_noise, "log_chance_of_outliers", lambda _chain, _weight: 0.0)
-    monkeypatch.setattr(
-        own_noise, "worth",
-        lambda _s, joint: fixed[joint] if isinstance(joint, str) else own[joint.out],
-    )  # fmt: skip
-    setting: Any = SimpleNamespace(chain=None)
+    setting: Any = None
     taken = own_noise.by_own_noise(setting, ready)
     assert taken.fewer is None
-    # worth 3 instead of 7; b is worth more, which is not believed; without both there is no fit
-    assert taken.scores == {frozenset("b"): pytest.approx(-6.5 + 4.0)}
+    # that b is worth more than with the noise of all is not believed
+    assert taken.scores == {frozenset("b"): -3.0, frozenset(): -12.0}
 
 
 def fit_of(_setting: Any, _found: Any, out: frozenset[str]) -> Any:
     """A fit without some of two members."""
     gone = "".join(sorted(out))
-    terms = SimpleNamespace(names=tuple(set("ab") - out))
-    return SimpleNamespace(out=gone, terms=terms, colour=gone, weight=None)
+    return SimpleNamespace(out=gone, colour=gone)
