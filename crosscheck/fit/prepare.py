@@ -28,6 +28,8 @@ Progress = Callable[[str, float], None]
 # than this part of the rows are, none counts as one.
 _OUTLIER = 6.0
 _MOST_OUTLIERS = 0.05
+# What a pose consists of, in words.
+_PARTS = ("x", "y", "z", *(f"rotation about {axis}" for axis in "xyz"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,10 +87,21 @@ def prepare(
             known = replace(problem, sigma=data.sigma)
             problem, estimates = estimate_sigma(known, plain)
     odd = doubts(problem, plain.readings)
-    notes = (*data.notes, *odd, *problem.left_out, *estimates, *said)
+    notes = (*data.notes, *_filled_in(problem), *odd, *problem.left_out, *estimates, *said)
     problem = problem.with_groups(groups_of(data, terms))
     refusal = refusal_of(problem, plain.pose[:, :3], data.sigma)
     return Prepared(problem, terms, notes, blocks_note(problem), refusal, int(found.free.sum()))
+
+
+def _filled_in(problem: Problem) -> list[str]:
+    """A note about parts of the pose that nothing read."""
+    names = [name for name, is_filled in zip(_PARTS, problem.filled_in, strict=True) if is_filled]
+    if not names:
+        return []
+    return [
+        f"{', '.join(names)}: not counted as readings, because the joints allow no such motion and "
+        "the file has the same number in every row"
+    ]
 
 
 def _solved_rows(problem: Problem, plain: Prediction) -> Problem:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from crosscheck.measurements.data import Measurements, Sigma
 from crosscheck.units import in_unit
+from seecr.description.joints import locked
 from seecr.description.robot import Robot
 from seecr.effects import catalogue
 from seecr.effects.base import Readings
@@ -35,6 +36,8 @@ from seecr.prediction.parted import Parted, rates_by_length
 
 # Columns of a residual row: position, orientation, then tensions.
 POSITION, ORIENTATION, TENSION = slice(0, 3), slice(3, 6), slice(6, None)
+# Numbers that differ less [m, rad] are the same number; in so many rows no instrument reads it.
+_ROUNDING, _ROWS = 1e-12, 4
 
 
 @dataclass(eq=False)
@@ -101,9 +104,29 @@ class Problem:
             turned = np.repeat(whole[:, None], 3, axis=1)
         else:
             turned = np.asarray(np.isfinite(data.angles_rad))
-        return np.concatenate(
+        measured = np.concatenate(
             [np.isfinite(data.position), turned, np.isfinite(data.tensions)], axis=1
         )
+        measured[:, :6] &= ~self.filled_in
+        return measured
+
+    @cached_property
+    def filled_in(self) -> NDArray[np.bool_]:
+        """(6,) parts of the pose that joints lock and whose columns hold one number in all rows.
+
+        Nothing read them: whoever wrote the file filled the pose in. Their noise would be zero.
+        """
+        data, fixed = self.data, locked(self.robot)
+        if not fixed.any():
+            return fixed
+        turned = data.angles_rad
+        if data.quat_wxyz is not None:
+            home = quat_conjugate(self.robot.reference_pose[3:])
+            turned = rotvec_from_quat(quat_multiply(data.quat_wxyz, home))
+        for k, values in enumerate(np.concatenate([data.position, turned], axis=1).T):
+            some = values[np.isfinite(values)]
+            fixed[k] &= len(some) >= _ROWS and np.ptp(some) <= _ROUNDING
+        return fixed
 
     @property
     def counted(self) -> NDArray[np.bool_]:
@@ -143,10 +166,12 @@ class Problem:
             turned = (turned + np.pi) % (2 * np.pi) - np.pi
         else:
             turned = np.full((data.n_rows, 3), np.nan)
-        return np.concatenate(
+        raw = np.concatenate(
             [data.position - readings.position, turned, data.tensions - readings.tensions],
             axis=1,
         )
+        raw[:, :6][:, self.filled_in] = np.nan
+        return raw
 
     def as_read(self, change: Array, readings: Readings) -> Array:
         """Convert derivatives (n, 6 + m, p) of rotation vectors to those of the angles read."""

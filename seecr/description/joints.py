@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seecr.description.robot import Robot
 from seecr.errors import InputError
@@ -17,6 +18,8 @@ from seecr.pose import (
 
 # Allowed distance of a commanded pose from what the joints reach [robot's length, or rad].
 _OFF_MANIFOLD = 1e-6
+# Changes of a pose below this are rounding [m or robot's length, rad]; so many values show them.
+_ROUNDING, _TRIES = 1e-12, 8
 
 
 def pose_of_values(robot: Robot, values: Array) -> tuple[Array, Array]:
@@ -44,6 +47,18 @@ def pose_of_values(robot: Robot, values: Array) -> tuple[Array, Array]:
         turn = quat_multiply(own, turn)
     quat = quat_multiply(turn, robot.reference_pose[3:])
     return np.concatenate([origin + shift, quat], axis=1), screws
+
+
+def locked(robot: Robot) -> NDArray[np.bool_]:
+    """(6,) which parts of the pose no joint changes: x y z, and rotations about x y z."""
+    if not robot.joints:
+        return np.zeros(6, dtype=bool)
+    # any values will do: a part that they change has a rate almost everywhere
+    values = np.random.default_rng(0).uniform(-1.0, 1.0, (_TRIES, len(robot.joints)))
+    pose, _screws = pose_of_values(robot, values)
+    off = np.abs(pose_difference(pose, np.tile(robot.reference_pose, (_TRIES, 1))))
+    size = np.repeat([max(robot.length, 1.0), 1.0], 3)
+    return np.asarray(np.all(off <= _ROUNDING * size, axis=0))
 
 
 def values_of_pose(robot: Robot, poses: Array) -> tuple[Array, Array]:

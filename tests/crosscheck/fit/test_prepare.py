@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_data import term
+from made_data import measured, term
 
 from crosscheck.fit.candidates import candidates_for, null_fit
 from crosscheck.fit.gauss_newton import FitStatus
@@ -15,9 +15,12 @@ from crosscheck.fit.prepare import outlying_rows, prepare
 from crosscheck.fit.problem import Problem
 from crosscheck.fit.reasons import Reason, Refusal, Unfit, Why
 from crosscheck.fit.state import evaluate
-from crosscheck.measurements.data import Measurements
+from crosscheck.measurements.data import Measurements, Sigma
+from seecr.description.mjcf import load_robot
 from seecr.description.robot import Robot
+from seecr.description.shipped import model_path
 from seecr.effects import Terms
+from seecr.pose import quat_from_rxyz, rxyz_from_quat
 
 
 def loose(robot: Robot) -> Robot:
@@ -141,3 +144,27 @@ def test_what_can_be_imitated_is_a_part_from_nothing_to_all() -> None:
     assert basis(np.column_stack([columns, columns[:, 0] * 1e-7, np.zeros(50)])).shape == (50, 4)
     assert imitated(inside, basis(np.zeros((50, 0)))) == 0.0
     assert imitated(np.zeros(50), span) == 0.0
+
+
+def test_what_no_joint_changes_and_the_file_says_of_every_row_is_no_reading() -> None:
+    """Rows of x, z and a tilt, filled up to whole poses, say as much as without the filling."""
+    planar = load_robot(model_path("planar_vertical"))
+    read = replace(measured(planar, points=12), sigma=Sigma())
+    tilt = rxyz_from_quat(read.quat_wxyz)[:, 1]
+    about = np.zeros((read.n_rows, 3))
+    about[:, 1] = tilt
+    place = read.position.copy()
+    place[:, 1] = planar.reference_pose[1]
+    filled = replace(read, position=place, quat_wxyz=quat_from_rxyz(about))
+    bare = replace(read, position=place * [1, np.nan, 1], quat_wxyz=None,
+                   angles_rad=about * [np.nan, 1, np.nan])  # fmt: skip
+    ready, alike = (prepare(planar, one, Terms()) for one in (filled, bare))
+    sigma = ready.problem.sigma
+    assert sigma.orientation_rad == pytest.approx(3.5e-4, rel=0.4)
+    assert sigma.orientation_rad == pytest.approx(alike.problem.sigma.orientation_rad, rel=1e-3)
+    assert sigma.position_m == pytest.approx(alike.problem.sigma.position_m)
+    assert ready.problem.n_readings == alike.problem.n_readings
+    assert ready.notes[0].startswith("y, rotation about x, rotation about z: not counted as ")
+    # what an instrument read there differs from row to row; a free platform may turn anywhere
+    assert not prepare(planar, read, Terms()).problem.filled_in.any()
+    assert not Problem(replace(planar, joints=()), filled, sigma, filled.read).filled_in.any()
