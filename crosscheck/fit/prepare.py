@@ -15,7 +15,7 @@ from crosscheck.fit.parts import groups_of, laid_out
 from crosscheck.fit.problem import Problem, Rms, rms_by_kind
 from crosscheck.fit.reasons import Refusal, Unfit
 from crosscheck.fit.state import State
-from crosscheck.fit.unstated import estimate_sigma
+from crosscheck.fit.unstated import estimate_sigma, oversized
 from crosscheck.measurements.data import Measurements
 from seecr.description.robot import Robot
 from seecr.effects import Terms, catalogue
@@ -86,7 +86,7 @@ def prepare(
         if estimates:  # the first residuals also contained the error of the frame
             known = replace(problem, sigma=data.sigma)
             problem, estimates = estimate_sigma(known, plain)
-    odd = doubts(problem, plain.readings)
+    odd = [*doubts(problem, plain.readings), *oversized(problem, plain)]
     notes = (*data.notes, *_filled_in(problem), *odd, *problem.left_out, *estimates, *said)
     problem = problem.with_groups(groups_of(data, terms))
     refusal = refusal_of(problem, plain.pose[:, :3], data.sigma)

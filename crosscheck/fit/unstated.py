@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from crosscheck.fit.problem import Problem, Rms, kinds_read
+from crosscheck.fit.problem import Problem, Rms, kinds_read, kinds_stated
 from crosscheck.fit.smooth import monomials
 from seecr.pose import Array, rotvec_from_quat
 from seecr.prediction.experiment import Prediction
@@ -20,6 +20,8 @@ _ROWS = 4
 _EACH = 1.5
 # A later estimate replaces an earlier one only if it is less than this part of it.
 _MUCH = 0.7
+# Stated noise is odd if it is so many times what the readings show, over at least so many of them.
+_FAR_ABOVE, _LEAST = 10.0, 12
 
 
 def estimate_sigma(problem: Problem, at: Prediction) -> tuple[Problem, tuple[str, ...]]:
@@ -86,6 +88,32 @@ def overestimated(problem: Problem, left: Rms) -> list[str]:
                 f"{kind.sigma} was estimated too large: the residuals are only {words} rms; state "
                 f"the noise, as with --sigma {name}={words.replace(' ', '')}, and smaller effects "
                 "become visible"
+            )
+    return out
+
+
+def oversized(problem: Problem, at: Prediction) -> list[str]:
+    """A sentence for each stated noise that the readings contradict, as of a wrong unit.
+
+    Differences between neighbouring rows contain all noise that is not common to them, so that
+    noise far above them was hardly meant. Their mean square is used, which every jump enlarges.
+
+    Args:
+        problem: the data with their noise. at: the prediction of the model as it stands.
+    """
+    raw, out = problem.residuals(at.readings), []
+    for kind in kinds_stated(problem):
+        noise = problem.reading_sigma[:, kind.columns]
+        found = _differences(problem, raw[:, kind.columns] / noise)
+        if found is None or len(found) < _LEAST:
+            continue
+        part = float(np.sqrt(np.mean(found**2)))
+        if part * _FAR_ABOVE < 1.0:
+            stated = kind.factor * float(np.median(noise[problem.use]))
+            out.append(
+                f"{kind.sigma} is stated as {stated:.2g} {kind.unit}, but neighbouring rows differ "
+                f"as if it were {part * stated:.2g} {kind.unit}: is it in another unit? Effects "
+                "below the stated noise stay invisible"
             )
     return out
 

@@ -125,3 +125,14 @@ def test_rows_of_one_moment_follow_as_any_others_do(robot: Robot) -> None:
     for clock in (np.sort(np.append(np.arange(11.0), 4.0)), np.zeros(12)):
         chain = chain_of(prepare(robot, replace(data, t_s=clock), Terms()).problem)
         assert set(chain.gap[chain.before >= 0]) == {1.0}
+
+
+@pytest.mark.parametrize(("stated", "odd"), [(3e-5, False), (2.4e-4, False), (0.03, True)])
+def test_stated_noise_far_above_the_scatter_is_told(robot: Robot, stated: float, odd: bool) -> None:
+    """Millimetres that were stated as metres hide every effect, and nothing else shows it."""
+    sigma = replace(SIGMA, position_m=stated)
+    ready = prepare(robot, replace(measured(robot, points=12), sigma=sigma), Terms())
+    said = [note for note in ready.notes if "is it in another unit?" in note]
+    assert len(said) == odd
+    if odd:
+        assert said[0].startswith("position_m is stated as 30 mm, but neighbouring rows differ as ")
