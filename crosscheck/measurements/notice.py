@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 _FAR = 2.5
 # Readings whose spread is so many times that of the commands, or less, are in another unit.
 _OTHER_UNIT, _LEAST_ROWS = 100.0, 4
+# Angles that follow the commands turned by at least so much [rad], but this closely at a rate of
+# pi/180 or its inverse, are in the other unit.
+_TURNED_AT_LEAST, _FOLLOWS, _RATE_OFF = np.radians(0.5), 0.9, 0.25
 # Commands that spread over this part of the frame along an axis are meant to move along it.
 _MOVED = 0.02
 # Quaternions this far [rad] from where they should be, but near it in another order.
@@ -40,6 +43,7 @@ def notice(columns: Columns, robot: Robot, data: Measurements) -> list[str]:
     check_reach(columns, robot, data.command_pose, data.command_lengths)
     refuse_sentinels(columns, robot)
     _check_spread(columns, robot, data)
+    _check_angles(columns, data)
     return [
         *_far(robot, data),
         *_elsewhere(robot, data),
@@ -99,6 +103,34 @@ def _other_unit(columns: Columns, k: int, read: float, told: float) -> InputFile
         f"such as meas_{POSITION[k]}_{'mm' if read > told else 'm'}",
         column=column.name,
     )
+
+
+def _check_angles(columns: Columns, data: Measurements) -> None:
+    """Refuse angles that follow the commanded ones, in radians where degrees are stated or so."""
+    if data.command_pose is None:
+        return
+    told = rxyz_from_quat(data.command_pose[:, 3:])
+    for k, angle in enumerate(ANGLES):
+        column = columns.known.get(f"meas_{angle}")
+        if column is None:
+            continue
+        read = columns.numbers(f"meas_{angle}", blank_is_nan=True)
+        seen = np.isfinite(read)
+        read, wanted = read[seen], told[seen, k]
+        if _mean_spread(wanted) < _TURNED_AT_LEAST or _mean_spread(read) == 0.0:
+            continue
+        read, wanted = read - read.mean(), wanted - wanted.mean()
+        rate = float(read @ wanted / (wanted @ wanted))
+        other = "rad" if column.unit.suffix == "deg" else "deg"
+        mistaken = np.pi / 180.0 if other == "rad" else 180.0 / np.pi
+        follows = rate * np.sqrt((wanted @ wanted) / (read @ read))
+        if follows > _FOLLOWS and abs(rate / mistaken - 1.0) < _RATE_OFF:
+            raise columns.table.error(
+                f"the angles are {rate:.3g} times the commanded ones; expected about the same; are "
+                f"these really {column.unit.suffix}? Name the column by its unit, such as "
+                f"meas_{angle}_{other}",
+                column=column.name,
+            )
 
 
 def _elsewhere(robot: Robot, data: Measurements) -> list[str]:

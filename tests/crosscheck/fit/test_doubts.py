@@ -19,6 +19,7 @@ from seecr.description.mjcf import load_robot
 from seecr.description.shipped import model_path
 from seecr.effects import Terms
 from seecr.errors import InputFileError
+from seecr.pose import quat_conjugate, quat_from_rotvec, quat_multiply, rotvec_from_quat
 
 COGIRO, PLANAR = soft_cogiro(), load_robot(model_path("planar_vertical"))
 
@@ -109,3 +110,27 @@ def test_newtons_in_a_column_of_kilonewtons(cogiro, tmp_path, unpaged):
     # whatever is fitted to them says so, from Python as well
     kilo = replace(cogiro, tensions=1e3 * cogiro.tensions)
     assert any("Tensions of" in note for note in prepare(COGIRO, kilo, Terms()).all_notes)
+
+
+def test_rotations_in_radians_that_are_called_degrees(cogiro):
+    assert "Rotations change" not in notes(COGIRO, cogiro)
+    turned = rotvec_from_quat(cogiro.quat_wxyz) * np.pi / 180.0
+    # as read beside the target's own orientation, which says nothing of the unit
+    target = quat_from_rotvec(np.array([0.3, 0.0, 0.2]))
+    read = quat_multiply(quat_from_rotvec(turned), target)
+    data = replace(cogiro, quat_wxyz=read, tensions=None)
+    assert "are these radians in columns of degrees" in notes(COGIRO, data)
+    angles = replace(cogiro, quat_wxyz=None, angles_rad=turned * [1, np.nan, 1], tensions=None)
+    assert "are these radians in columns of degrees" in notes(COGIRO, angles)
+    still = replace(COGIRO, ea=1e4 * COGIRO.ea)  # whose platform hardly turns
+    level = cogiro.rows(cogiro.run != "loop")
+    assert "Rotations change" not in notes(still, replace(level, position=level.command_pose[:, :3],
+        quat_wxyz=np.tile([1.0, 0.0, 0.0, 0.0], (level.n_rows, 1)), tensions=None))  # fmt: skip
+
+
+def test_rotations_of_the_base_as_seen_from_the_platform(cogiro):
+    assert "every rotation is inverted" not in notes(COGIRO, cogiro)
+    data = replace(cogiro, quat_wxyz=quat_conjugate(cogiro.quat_wxyz), tensions=None)
+    assert "if every rotation is inverted: does the tracker report how the base" in notes(
+        COGIRO, data
+    )

@@ -105,3 +105,28 @@ def test_rows_that_are_the_same_are_listed_up_to_eight() -> None:
     assert "9 as 2" in note and "10 as 2 and 3 more" in note
     other = data_of(told, position=np.arange(36.0).reshape(12, 3))
     assert notice.twice(other) == []
+
+
+@pytest.mark.parametrize(("unit", "factor", "name"), [
+    ("deg", np.pi / 180.0, "rad"), ("rad", 180.0 / np.pi, "deg"),
+])  # fmt: skip
+def test_angles_that_follow_the_commands_in_another_unit_are_refused(
+    unit: str, factor: float, name: str
+) -> None:
+    told = poses(x=WAY)
+    turned = np.zeros((5, 3))
+    turned[:, 1] = [-0.1, 0.06, 0.0, -0.05, 0.09]
+    told[:, 3:] = quat_from_rotvec(turned)
+    size = 180.0 / np.pi if unit == "deg" else 1.0
+    sway = np.array([0.01, -0.01, 0.0, 0.01, -0.01])  # where the platform really rests
+
+    def check(read: np.ndarray, told: np.ndarray = told) -> None:
+        cells = [f"{value:.9f}" for value in read]
+        notice._check_angles(columns_of(f"meas_ry_{unit}", *cells, n_cables=4), data_of(told))
+
+    right = size * (turned[:, 1] + sway)
+    check(right)
+    with pytest.raises(InputFileError, match=rf"column meas_ry_{unit}: .*such as meas_ry_{name}$"):
+        check(factor * right)
+    check(factor * right[[1, 0, 4, 2, 3]])  # as small, but it does not follow the commands
+    check(factor * right, told=poses(x=WAY))  # which do not turn: nothing can be said
