@@ -44,6 +44,7 @@ def notice(columns: Columns, robot: Robot, data: Measurements) -> list[str]:
     refuse_sentinels(columns, robot)
     _check_spread(columns, robot, data)
     _check_angles(columns, data)
+    _refuse_zeros(columns, robot, data)
     return [
         *_far(robot, data),
         *_elsewhere(robot, data),
@@ -131,6 +132,23 @@ def _check_angles(columns: Columns, data: Measurements) -> None:
                 f"meas_{angle}_{other}",
                 column=column.name,
             )
+
+
+def _refuse_zeros(columns: Columns, robot: Robot, data: Measurements) -> None:
+    """Refuse positions of exactly 0 0 0 far from the command, which stand for "not seen"."""
+    which = [k for k in range(3) if data.position_mask[k]]
+    if data.command_pose is None or len(which) < 2:
+        return
+    off = np.linalg.norm(data.command_pose[:, which], axis=1)
+    zero = np.all(data.position[:, which] == 0.0, axis=1)
+    columns.refuse(
+        zero & (off > _OF_FRAME * robot.reach),
+        f"meas_{POSITION[which[0]]}",
+        lambda row: (
+            f"expected a position near its command, got exactly {' '.join('0' * len(which))}, "
+            f"{off[row]:.3g} m from it; leave the cells empty where nothing was read"
+        ),
+    )
 
 
 def _elsewhere(robot: Robot, data: Measurements) -> list[str]:

@@ -130,3 +130,18 @@ def test_angles_that_follow_the_commands_in_another_unit_are_refused(
         check(factor * right)
     check(factor * right[[1, 0, 4, 2, 3]])  # as small, but it does not follow the commands
     check(factor * right, told=poses(x=WAY))  # which do not turn: nothing can be said
+
+
+def test_positions_of_exactly_nothing_are_no_readings() -> None:
+    told = poses(x=WAY)
+    read = told[:, :3].copy()
+    read[3] = 0.0
+    with pytest.raises(InputFileError, match=(
+        r"line 5, column meas_x_m: expected a position near its command, got exactly 0 0 0, "
+        r"2.97 m from it; leave the cells empty"
+    )):  # fmt: skip
+        notice._refuse_zeros(positions(), RECTANGLE, data_of(told, position=read))
+    read[3, 0] = 1e-6
+    notice._refuse_zeros(positions(), RECTANGLE, data_of(told, position=read))
+    there = told - np.array([*HOME[:3], 0, 0, 0, 0])  # where 0 0 0 is a place like any other
+    notice._refuse_zeros(positions(), RECTANGLE, data_of(there, position=0.0 * read))
