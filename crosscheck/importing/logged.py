@@ -11,13 +11,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from seecr.counted import some
+from seecr.counted import counted, some
 from seecr.errors import InputFileError
 from seecr.pose import Array, quat_conjugate, quat_multiply, quat_rotate
 
 # Rotates axes with Y up, as on screens, to axes with Z up: by 90 degrees about x.
 _UPRIGHT = np.array([np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0])
 _MOST_NAMED = 12
+# Positions of 0 0 0 are real if others are nearer to it than this part of the way that they span.
+_NEAR = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +88,29 @@ class Logged:
             notes=(*self.notes, "Y is up in the file: turned by 90 deg about x, so that Z is up"),
         )
 
+    def seen_only(self) -> Logged:
+        """The same without positions of exactly 0 0 0, which stand for "not seen"."""
+        bodies, markers = dict(self.bodies), dict(self.markers)
+        lost: list[str] = []
+        for name, (position, quat) in self.bodies.items():
+            rows = _not_seen(position)
+            if rows.any():
+                nothing = rows[:, None]
+                bodies[name] = (
+                    np.where(nothing, np.nan, position),
+                    None if quat is None else np.where(nothing, np.nan, quat),
+                )
+                lost.append(f"{name} in {counted(int(rows.sum()), 'row')}")
+        for name, position in self.markers.items():
+            rows = _not_seen(position)
+            if rows.any():
+                markers[name] = np.where(rows[:, None], np.nan, position)
+                lost.append(f"{name} in {counted(int(rows.sum()), 'row')}")
+        if not lost:
+            return self
+        note = f"positions of exactly 0 0 0 count as not seen: {some(lost, _MOST_NAMED)}"
+        return replace(self, bodies=bodies, markers=markers, notes=(*self.notes, note))
+
     def body(self, name: str | None) -> Stream:
         """The named body, or the only one.
 
@@ -122,3 +147,14 @@ class Logged:
         there = ", ".join(near) or "none"
         text = f"has no {what} {name!r}; expected one of those it has, nearest first: {there}"
         return InputFileError.at(self.path, text)
+
+
+def _not_seen(position: Array) -> NDArray[np.bool_]:
+    """(n,) rows of exactly 0 0 0 in positions (n, 3) none of which else is near there."""
+    zero = np.asarray(np.all(position == 0.0, axis=1))
+    others = position[~zero & np.isfinite(position).all(axis=1)]
+    if not zero.any() or len(others) == 0:
+        return zero & False
+    span = float(np.linalg.norm(np.ptp(others, axis=0)))
+    near = float(np.min(np.linalg.norm(others, axis=1)))
+    return zero & (near > _NEAR * span)

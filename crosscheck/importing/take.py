@@ -53,7 +53,7 @@ class Take:
 def take_of(
     form: str, path: Path, robot: Robot, log: Measurements, choices: ImportChoices, said: list[str]
 ) -> Take:
-    export = READERS[form](path, choices)
+    export = READERS[form](path, choices).seen_only()
     export = replace(export, up=choices.up or export.up).upright()
     stream, fit = _stream(export, choices)
     arm = float(np.sqrt(np.mean(np.sum(robot.anchor_points**2, axis=1))))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -62,3 +63,17 @@ def test_columns_that_are_no_poses_are_refused(tmp_path: Path, head: str, said: 
 def test_times_that_fall_are_two_recordings(tmp_path: Path) -> None:
     with pytest.raises(InputFileError, match=r"line 3, column t_s: .* are two recordings in one"):
         read_poses(log(tmp_path, "t_s,x_m,y_m,z_m", "5,0,0,0", "4,0,0,0"))
+
+
+def test_positions_of_exactly_nothing_are_not_seen_unless_others_are_near(tmp_path: Path) -> None:
+    head = "t_s,x_m,y_m,z_m,qw,qx,qy,qz"
+    rows = ["0,3,2,1,1,0,0,0", "1,0,0,0,1,0,0,0", "2,3.5,2,1,1,0,0,0"]
+    read = read_poses(log(tmp_path, head, *rows))
+    assert read.body(None).seen.all()
+    found = read.seen_only()
+    assert found.body(None).seen.tolist() == [True, False, True]
+    assert found.notes == ("positions of exactly 0 0 0 count as not seen: log in 1 row",)
+    near = read_poses(log(tmp_path, head, *rows, "3,0.01,0,0,1,0,0,0")).seen_only()
+    assert near.body(None).seen.all() and near.notes == ()
+    marked = replace(read, bodies={}, markers={"m": read.bodies["log"][0]}).seen_only()
+    assert np.isnan(marked.marker("m")[:, 0]).tolist() == [False, True, False]
