@@ -129,6 +129,7 @@ def test_angles_that_follow_the_commands_in_another_unit_are_refused(
     with pytest.raises(InputFileError, match=rf"column meas_ry_{unit}: .*such as meas_ry_{name}$"):
         check(factor * right)
     check(factor * right[[1, 0, 4, 2, 3]])  # as small, but it does not follow the commands
+    check(factor * (right + 0.1 * size * np.array([1, 1, -4, 1, 1])))  # nor does most of this
     check(factor * right, told=poses(x=WAY))  # which do not turn: nothing can be said
 
 
