@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from seecr import __version__ as __version__
 from seecr.lazy import lazily
 
 if TYPE_CHECKING:

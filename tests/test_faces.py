@@ -63,6 +63,10 @@ def test_a_shell_completes_public_names_before_their_first_use(face: ModuleType)
     assert set(face.__all__) <= set(dir(face))
 
 
+def test_both_packages_say_their_version() -> None:
+    assert len({face.__version__ for face in FACES}) == 1
+
+
 def test_errors_that_functions_raise_can_be_caught_by_their_public_names() -> None:
     public = {*seecr.__all__, *crosscheck.__all__}
     raised = set()
