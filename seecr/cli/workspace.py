@@ -47,7 +47,8 @@ Examples:
     "--grid",
     nargs=3,
     metavar="X Y Z",
-    help="Each FIRST:LAST:COUNT or one number [m].  [default: between the exit points]",
+    help="Each FIRST:LAST:COUNT or one number [m].  [default: over the exit points, down to as far "
+    "below the reference pose as they are above it]",
 )
 @turned_option("all poses")
 @limit_options
