@@ -65,7 +65,8 @@ def load_robot(path: str | Path) -> Robot:
     The file has one moving body with a free joint or with slide and hinge joints. Each cable is a
     spatial tendon through two sites, one fixed to the world (the exit point A_i) and one on the
     body (the anchor point B_i), with ``springlength="0 l0"`` and a stiffness. Mass, centre of mass
-    and gravity are those of the compiled model.
+    and gravity are those of the compiled model. Limits of joints and tendons, damping, dry friction
+    and contacts are ignored.
 
     Args:
         path: the MJCF file, or the name of a shipped robot.
