@@ -9,6 +9,7 @@ import numpy as np
 
 from crosscheck.fit.problem import Problem, Rms, kinds_read, kinds_stated
 from crosscheck.fit.smooth import monomials
+from crosscheck.units import short
 from seecr.pose import Array, rotvec_from_quat
 from seecr.prediction.experiment import Prediction
 
@@ -111,9 +112,9 @@ def oversized(problem: Problem, at: Prediction) -> list[str]:
         if part * _FAR_ABOVE < 1.0:
             stated = kind.factor * float(np.median(noise[problem.use]))
             out.append(
-                f"{kind.sigma} is stated as {stated:.2g} {kind.unit}, but neighbouring rows differ "
-                f"as if it were {part * stated:.2g} {kind.unit}: is it in another unit? Effects "
-                "below the stated noise stay invisible"
+                f"{kind.sigma} is stated as {short(stated)} {kind.unit}, but neighbouring rows "
+                f"differ as if it were {short(part * stated)} {kind.unit}: is it in another unit? "
+                "Effects below the stated noise stay invisible"
             )
     return out
 

@@ -135,4 +135,6 @@ def test_stated_noise_far_above_the_scatter_is_told(robot: Robot, stated: float,
     said = [note for note in ready.notes if "is it in another unit?" in note]
     assert len(said) == odd
     if odd:
-        assert said[0].startswith("position_m is stated as 30 mm, but neighbouring rows differ as ")
+        assert said[0].startswith(
+            "position_m is stated as 30.0 mm, but neighbouring rows differ as "
+        )
