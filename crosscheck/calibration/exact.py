@@ -12,7 +12,7 @@ from crosscheck.calibration.catalogue import Catalogue, gram_about, widths_for
 from crosscheck.calibration.gram import ColumnGroup, Gram, averaged, best_widths, gram_of
 from crosscheck.calibration.joining import at_null
 from crosscheck.calibration.joint import JointFit, Setting, settle
-from crosscheck.calibration.linearised import Linear, groups_of, linearised
+from crosscheck.calibration.linearised import Linear, groups_of, left_to_gain, linearised
 from crosscheck.calibration.priors import SHAPES
 from crosscheck.calibration.sets import Names, Scores
 from crosscheck.calibration.shapes import log_shares, prices_about
@@ -201,7 +201,10 @@ def width_of(terms: Terms, widths: Mapping[str, float]) -> Array:
 def scored(
     setting: Setting, joint: JointFit, names: Names, widths: dict[str, float], scores: Scores
 ) -> Refit:
-    """A fit with its evidence, linearised about its own optimum and averaged over prior widths."""
+    """A fit with its evidence, linearised about its own optimum and averaged over prior widths.
+
+    What the linear model would still gain there, the fit has tried and did not find.
+    """
     linear = linearised(setting, joint)
     gram = own_gram(linear, joint)
     # what moves readings at this fit need not have been in the linear model of the search
@@ -209,7 +212,8 @@ def scored(
     better = best_widths(gram, inside)
     share = sum(log_shares(joint, linear).values()) + log_absent(setting, joint, linear, better)
     score = averaged(gram, better) + share + scores.log_prior(names)
-    return Refit(names, joint, widths | better, score - 0.5 * joint.state.log_det)
+    score -= 0.5 * (joint.state.log_det + left_to_gain(linear, joint.z))
+    return Refit(names, joint, widths | better, score)
 
 
 def own_gram(linear: Linear, joint: JointFit) -> Gram:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from crosscheck.calibration.gram import ColumnGroup
 from crosscheck.calibration.joint import JointFit, Setting
+from crosscheck.fit.definite import solved
 from crosscheck.fit.known import known_left, known_readings
 from seecr.effects.base import Layout
 from seecr.pose import Array
@@ -64,6 +65,18 @@ def linearised(setting: Setting, joint: JointFit) -> Linear:
     x = np.concatenate([joint.whitened(chain, joint.jacobian * free), columns])
     left = np.concatenate([joint.whitened(chain, joint.state.white), known_left(joint.terms)])
     return Linear(x, left + x @ joint.z, joint.width * free)
+
+
+def left_to_gain(linear: Linear, z: Array) -> float:
+    """How much further the objective would fall from z (p,) if the model were linear.
+
+    It is next to nothing where a fit converged, unless its derivatives point the wrong way: the sag
+    of a cable grows with the square of its weight.
+    """
+    free = linear.width > 0.0
+    x, inverse2 = linear.x[:, free], linear.width[free] ** -2.0
+    slope = x.T @ (linear.y - linear.x @ z) - z[free] * inverse2
+    return float(slope @ solved(x.T @ x + np.diag(inverse2), slope))
 
 
 def groups_of(joint: JointFit, widths: Callable[[Layout], Array]) -> dict[str, ColumnGroup]:

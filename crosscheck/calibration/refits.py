@@ -19,6 +19,7 @@ from crosscheck.calibration.exact import FEW, LOCAL_MINIMUM, Exact, Refit
 from crosscheck.calibration.joining import amplitudes, inside, promising_beside
 from crosscheck.calibration.joint import JointFit, Setting
 from crosscheck.calibration.sets import Names, Scores, explore
+from crosscheck.fit.possible import hardly_happens
 from crosscheck.fit.state import State
 from seecr.effects import Terms
 
@@ -107,8 +108,34 @@ def compare_sets(
             break
         scores = exact.scores_about(other.joint)
         best = _searched(exact, scores, other.names, most)
+    other = plainer(exact, best)
+    if other.names != best.names:
+        scores, best = exact.scores_about(other.joint), other
     idle = frozenset(n for n in best.names - always if _is_idle(exact, scores, best, n))
     return Found(exact.possible, best, scores, lambda names: exact.fit(scores, names), always, idle)
+
+
+def plainer(exact: Exact, best: Refit) -> Refit:
+    """The best set, or an equivalent one that is easier to believe.
+
+    That is one with an effect that a member contains in its place, such as the cable behind the
+    exit points for friction on it, or with fewer members that are larger than any effect is.
+    """
+    always = frozenset(exact.plain.terms.names)
+
+    def strange(refit: Refit) -> int:
+        return sum(t.name not in always and hardly_happens(t) for t in refit.joint.terms)
+
+    def is_plainer(other: Refit) -> bool:
+        gone, come = best.names - other.names, other.names - best.names
+        if len(gone) != 1 or len(come) != 1 or best.score - other.score >= EQUAL:
+            return False
+        (member,), (instead,) = gone, come
+        contained = exact.catalogue.start(member).layout.effect.parent == instead
+        return strange(other) < strange(best) + contained
+
+    some = filter(is_plainer, exact.possible.values())
+    return min(some, key=lambda other: (strange(other), -other.score), default=best)
 
 
 def _searched(exact: Exact, scores: Scores, begin: Names, most: int) -> Refit:
