@@ -132,11 +132,20 @@ def _means(values: Array, half: int) -> tuple[Array, Array]:
 
 
 def _speed(stream: Stream, values: Array, half: int) -> Array:
-    """(n,) rate of change of columns (n, k); at the ends that of the nearest whole window."""
+    """(n,) rate of change of columns (n, k); at the ends that of the nearest whole window.
+
+    Where nothing was seen in a window, it is the rate from the last row that was seen to the next.
+    """
     before, after = _means(values, half)
     times = np.where(np.isfinite(values[:, :1]), stream.t_s[:, None], np.nan)
     early, late = _means(times, half)
     out = np.linalg.norm(after - before, axis=1) / (late - early)[:, 0]
+    lost, seen = np.flatnonzero(~np.isfinite(out)), np.flatnonzero(np.isfinite(times[:, 0]))
+    last, following = np.searchsorted(seen, lost) - 1, np.searchsorted(seen, lost, side="right")
+    inside = (last >= 0) & (following < len(seen))
+    first, then = seen[last[inside]], seen[following[inside]]
+    way = np.linalg.norm(values[then] - values[first], axis=1)
+    out[lost[inside]] = way / (stream.t_s[then] - stream.t_s[first])
     known = np.flatnonzero(np.isfinite(out))
     if len(known):
         out[: known[0]], out[known[-1] + 1 :] = out[known[0]], out[known[-1]]

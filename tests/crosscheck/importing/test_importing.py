@@ -296,6 +296,26 @@ def test_a_swing_that_dies_out_is_no_rest():
     assert np.abs(dwells.position).max() < 1e-4
 
 
+@pytest.mark.parametrize("rate", [10, 100])
+def test_samples_that_are_lost_do_not_end_a_rest(rate: int) -> None:
+    """Nor do they turn a move into one: between two rests a second of it is lost."""
+    t = np.arange(0.0, 20.0, 1.0 / rate)
+    rng = np.random.default_rng(0)
+    moved = np.clip((t - 9.0) / 2.0, 0.0, 1.0)
+    position = np.stack([moved, 0 * t, 0 * t], axis=1) + 1e-4 * rng.standard_normal((len(t), 3))
+    whole = find_dwells(Stream(None, t, np.arange(len(t)), position), np.zeros(0))
+    lost = position.copy()
+    lost[[3 * rate, 5 * rate, 5 * rate + 1, 14 * rate]] = np.nan
+    lost[(t > 9.5) & (t < 10.5)] = np.nan
+    lost[(t > 16.0) & (t < 16.4)] = np.nan
+    found = find_dwells(Stream(None, t, np.arange(len(t)), lost), np.zeros(0))
+    assert len(found) == len(whole) == 2
+    assert found.begin_s == pytest.approx(whole.begin_s, abs=0.3)
+    assert found.end_s == pytest.approx(whole.end_s, abs=0.3)
+    assert found.position == pytest.approx(whole.position, abs=2e-4)
+    assert np.all(found.samples <= whole.samples)
+
+
 def test_the_command_writes_a_case_and_names_the_next_one(made, commands, tmp_path):
     xml, out = tmp_path / "robot.xml", tmp_path / "case"
     xml.write_text(soft_xml(), encoding="utf-8")
