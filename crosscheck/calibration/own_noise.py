@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 
-from crosscheck.calibration.colour import Colour, log_det
+from crosscheck.calibration.colour import log_det
 from crosscheck.calibration.exact import FEW, scored, width_of
 from crosscheck.calibration.joint import JointFit, Setting, settle
 from crosscheck.calibration.refits import Found
@@ -45,14 +45,14 @@ class OwnNoise:
 
 
 def by_own_noise(
-    setting: Setting, found: Found, may_be: Callable[[Colour], bool] = lambda _colour: True
+    setting: Setting, found: Found, may_be: Callable[[JointFit], bool] = lambda _fit: True
 ) -> OwnNoise:
     """Compare the best set with fewer effects, each by its own noise.
 
     Args:
         setting: the data.
         found: the compared sets.
-        may_be: whether noise may be as large as this.
+        may_be: whether what a fit leaves may be noise.
 
     Returns:
         nothing if no member is doubtful, or if the best set is large.
@@ -67,7 +67,7 @@ def by_own_noise(
     worth = {
         out: evidence(setting, found, fit)
         for out, fit in fits.items()
-        if fit is not None and may_be(fit.colour)
+        if fit is not None and may_be(fit)
     }
     own = evidence(setting, found, whole)
     best = max(worth, key=lambda out: worth[out], default=None)

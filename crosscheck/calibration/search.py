@@ -159,13 +159,19 @@ def _compared(
         not_noise = is_not_noise(setting, found.best.joint, stated)
     if not_noise or smooth:
         return found, not_noise, NO_MORE
-    own = by_own_noise(setting, found, lambda colour: not _louder(colour, stated))
+
+    def may_be(fit: JointFit) -> bool:
+        return not _louder(fit.colour, stated) and not is_not_noise(setting, fit, stated)
+
+    own = by_own_noise(setting, found, may_be)
     if own.fewer is not None:
         joint = replace(whole.joint, colour=own.fewer.colour, weight=own.fewer.weight)
-        found = compared(False, own.fewer.terms, joint=joint)
-        not_noise = is_not_noise(setting, found.best.joint, stated)
-        own = by_own_noise(setting, found, lambda colour: not _louder(colour, stated))
-    return found, not_noise, own.scores
+        again = compared(False, own.fewer.terms, joint=joint)
+        if is_not_noise(setting, again.best.joint, stated):
+            return found, False, NO_MORE  # nor is what fewer effects leave
+        found = again
+        own = by_own_noise(setting, found, may_be)
+    return found, False, own.scores
 
 
 def _louder(colour: Colour, stated: Sequence[str]) -> bool:

@@ -78,7 +78,7 @@ def test_the_set_with_the_most_evidence_by_its_own_noise_is_taken(
     taken = own_noise.by_own_noise(setting, found({"a": 1.0, "b": 2.0}))
     assert taken.fewer is None if best == "" else taken.fewer.out == best  # type: ignore[union-attr]
     louder = own_noise.by_own_noise(
-        setting, found({"a": 1.0, "b": 2.0}), lambda colour: colour != best
+        setting, found({"a": 1.0, "b": 2.0}), lambda fit: fit.out != best
     )
     assert louder.fewer is None, "noise must not be as large as this"
     assert all(frozenset("ab") - set(best) != names for names in louder.scores) or best == ""
@@ -100,4 +100,4 @@ def test_a_set_is_as_good_as_by_its_own_noise(monkeypatch: pytest.MonkeyPatch) -
 def fit_of(_setting: Any, _found: Any, out: frozenset[str]) -> Any:
     """A fit without some of two members."""
     gone = "".join(sorted(out))
-    return SimpleNamespace(out=gone, colour=gone)
+    return SimpleNamespace(out=gone)

@@ -60,6 +60,14 @@ def test_noise_that_all_effects_followed_is_found_again(monkeypatch: pytest.Monk
     with monkeypatch.context() as louder:
         louder.setattr(search, "_LOUDER", 0.3)  # as if that noise were larger than stated
         assert sought(data).found.best.names > {"pulley_radius"}
+    with monkeypatch.context() as structure:
+        # as if what the pulley alone leaves were no noise
+        structure.setattr(
+            search,
+            "is_not_noise",
+            lambda _setting, fit, _kinds: fit.terms.names == ("pulley_radius",),
+        )
+        assert sought(data).found.best.names > {"pulley_radius"}
     monkeypatch.setattr(search, "by_own_noise", lambda _setting, _found, _may_be: OwnNoise())
     assert sought(data).found.best.names > {"pulley_radius"}
 
