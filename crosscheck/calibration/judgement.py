@@ -42,6 +42,7 @@ _PART, _WORTH = 0.1, 25.0
 _MOST, _ALL = 0.5, 0.95
 
 NONE: Names = frozenset()
+NOTHING: Mapping[Names, float] = {}
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +75,7 @@ def judge(
     doubted: Names = NONE,
     beside: float = -np.inf,
     in_place: Imitated = NOT_ASKED,
+    without: Mapping[Names, float] = NOTHING,
 ) -> Judgement:
     """Decide on the verdict.
 
@@ -86,8 +88,11 @@ def judge(
         doubted: members of the best set that are implausibly large.
         beside: ln odds of a smooth field beside the best set.
         in_place: a field in place of some members of the best set.
+        without: how probable it is that groups of its members are noise; that makes them less sure,
+            but it does not take many effects.
     """
     best, undecided = found.best.names - found.always - found.idle, classes.undecided
+    classes = classes.at_most(found.best.names, without)
     unknown = not_noise or field_odds > UNKNOWN or surprise > SURPRISE
     sure = sure_effects(found, classes, True)
     few = len(best) <= _FEW and undecided < (_OPEN_BESIDE if set(sure) == best else _OPEN)

@@ -15,6 +15,9 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 
+import numpy as np
+from scipy import special
+
 from crosscheck.calibration.colour import log_det
 from crosscheck.calibration.exact import FEW, scored, width_of
 from crosscheck.calibration.joint import JointFit, Setting, settle
@@ -27,6 +30,8 @@ from seecr.effects import Terms
 
 # A member that is worth more ln evidence than this is not doubtful.
 _NEEDED = 300.0
+# Fewer effects only win if they are better by more than this: else their members are less sure.
+_WINS = 12.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,14 +39,14 @@ class OwnNoise:
     """The best set and what remains of it without doubtful members, each with its own noise.
 
     Attributes:
-        fewer: the fit of fewer effects that explains the data better than the best set; None if no
-            such set does.
-        scores: of sets of fewer effects, where their own noise makes them better than the noise
-            with which all sets were compared.
+        fewer: the fit of fewer effects that explains the data much better than the best set; None
+            if no such set does.
+        without: for each group of doubtful members, also none, the probability among these sets
+            that it is not needed and the others are.
     """
 
     fewer: JointFit | None = None
-    scores: Mapping[Names, float] = field(default_factory=dict)
+    without: Mapping[Names, float] = field(default_factory=dict)
 
 
 def by_own_noise(
@@ -71,14 +76,10 @@ def by_own_noise(
     }
     own = evidence(setting, found, whole)
     best = max(worth, key=lambda out: worth[out], default=None)
-    fewer = None if best is None or worth[best] <= own else fits[best]
-    scores = dict[Names, float]()
-    for out, value in worth.items():
-        names, score = found.best.names - out, found.best.score + value - own
-        same = found.refit(names)
-        if same is None or score > same.score:
-            scores[names] = score
-    return OwnNoise(fewer, scores)
+    fewer = None if best is None or worth[best] <= own + _WINS else fits[best]
+    every = {frozenset[str](): own, **worth}
+    total = special.logsumexp(list(every.values()))
+    return OwnNoise(fewer, {out: float(np.exp(e - total)) for out, e in every.items()})
 
 
 def evidence(setting: Setting, found: Found, joint: JointFit) -> float:

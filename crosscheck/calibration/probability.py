@@ -58,6 +58,37 @@ class Classes:
         probability = [p * (1.0 - chance * yes) for p, yes in pairs]
         return Classes(of(self.effect), self.members, probability, of(self.further))
 
+    def at_most(self, best: Names, without: Mapping[Names, float]) -> Classes:
+        """The probabilities if some members of the best set may be noise.
+
+        Args:
+            best: the best set.
+            without: for each group of its members, the probability that just these are noise.
+        """
+
+        def limit(some: Iterable[str], least: int = 1) -> float:
+            mine = best.intersection(some)
+            if len(mine) < least:
+                return 1.0
+            return 1.0 - sum(p for out, p in without.items() if len(mine - out) < least)
+
+        effect = {n: min(p, limit([n])) for n, p in self.effect.items()}
+        pairs = [
+            (members, min(p, limit(members)))
+            for members, p in zip(self.members, self.probability, strict=True)
+        ]
+        pairs.sort(key=lambda pair: -pair[1])
+        further = {}
+        for members, _p in pairs:
+            # the most needed member first; the others are further ones
+            some = sorted(
+                best.intersection(members), key=lambda n: (-limit([n]), n in self.further)
+            )
+            before = sorted((self.further[n] for n in some if n in self.further), reverse=True)
+            for count, (name, p) in enumerate(zip(some[1:], before, strict=False), start=2):
+                further[name] = min(p, limit(members, count))
+        return Classes(effect, [m for m, _p in pairs], [p for _m, p in pairs], further)
+
     def of(self, name: str) -> float:
         """Probability that an effect or an equivalent is missing; see ``further`` for some."""
         pairs = zip(self.members, self.probability, strict=True)

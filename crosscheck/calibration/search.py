@@ -94,16 +94,18 @@ def search_sets(
     surprise = float(np.max(whole.held_out.surprise, initial=0.0))
     smooth = odds > UNKNOWN or surprise > SURPRISE
     catalogue = _catalogue(problem, terms, whole)
-    found, not_noise, by_own = _compared(
+    found, not_noise, without = _compared(
         whole, catalogue, evaluate(problem, terms, setting.factor), progress, given, known, smooth
     )
     effects = [n for n in catalogue.names if n not in terms]
     sizes = {name: parameters_counted(catalogue.start(name).layout) for name in effects}
     best = found.best
     in_place = field_in_place(setting, best.joint, best.widths, found.scores)
-    classes = _classes(found, best.names, sizes, by_own)
+    classes = _classes(found, best.names, sizes)
     beside = log_odds(setting, best.joint, all_stated)
-    said = judge(found, classes, odds, surprise, not_noise, _doubted(found), beside, in_place)
+    said = judge(
+        found, classes, odds, surprise, not_noise, _doubted(found), beside, in_place, without
+    )
     listed = found.always | set(said.sure)
     alone = found.refit(listed) if said.verdict is DiagnosisVerdict.EFFECTS_FOUND else None
     if alone is not None and listed != best.names:
@@ -111,9 +113,9 @@ def search_sets(
         further = {
             **with_equivalents(found, listed, classes, problem.robot, terms),
             listed: alone.score,
-            **by_own,
         }
         classes = _classes(found, listed, sizes, further)
+    classes = classes.at_most(best.names, without)
     if said.imitated is not None:
         odds = max(odds, in_place.odds)
         classes = classes.without(in_place.replaced, in_place.chance)
@@ -129,8 +131,8 @@ def _compared(
     whole: Calibration, catalogue: Catalogue, plain: State, progress: Progress,
     given: Sequence[Terms], stated: Sequence[str], smooth: bool,
 ) -> tuple[Found, bool, Mapping[Names, float]]:  # fmt: skip
-    """The compared sets, whether what the best of them takes for noise is not noise, and the scores
-    of sets that are better by their own noise than by that of all.
+    """The compared sets, whether what the best of them takes for noise is not noise, and how
+    probable it is that groups of its members are noise.
 
     Args:
         whole, catalogue, plain: the fit of all effects, their starts, and the model as it stands.
@@ -158,7 +160,7 @@ def _compared(
         found = compared(False, found.best.joint.terms)
         not_noise = is_not_noise(setting, found.best.joint, stated)
     if not_noise or smooth:
-        return found, not_noise, NO_MORE
+        return found, not_noise, {}
 
     def may_be(fit: JointFit) -> bool:
         return not _louder(fit.colour, stated) and not is_not_noise(setting, fit, stated)
@@ -168,10 +170,10 @@ def _compared(
         joint = replace(whole.joint, colour=own.fewer.colour, weight=own.fewer.weight)
         again = compared(False, own.fewer.terms, joint=joint)
         if is_not_noise(setting, again.best.joint, stated):
-            return found, False, NO_MORE  # nor is what fewer effects leave
+            return found, False, {}  # nor is what fewer effects leave
         found = again
         own = by_own_noise(setting, found, may_be)
-    return found, False, own.scores
+    return found, False, own.without
 
 
 def _louder(colour: Colour, stated: Sequence[str]) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from crosscheck.calibration import own_noise
@@ -73,7 +74,7 @@ def test_the_set_with_the_most_evidence_by_its_own_noise_is_taken(
     monkeypatch: pytest.MonkeyPatch, best: str
 ) -> None:
     monkeypatch.setattr(own_noise, "_fitted", fit_of)
-    monkeypatch.setattr(own_noise, "evidence", lambda _s, _f, fit: float(fit.out == best))
+    monkeypatch.setattr(own_noise, "evidence", lambda _s, _f, fit: 13.0 * (fit.out == best))
     setting: Any = None
     taken = own_noise.by_own_noise(setting, found({"a": 1.0, "b": 2.0}))
     assert taken.fewer is None if best == "" else taken.fewer.out == best  # type: ignore[union-attr]
@@ -81,20 +82,27 @@ def test_the_set_with_the_most_evidence_by_its_own_noise_is_taken(
         setting, found({"a": 1.0, "b": 2.0}), lambda fit: fit.out != best
     )
     assert louder.fewer is None, "noise must not be as large as this"
-    assert all(frozenset("ab") - set(best) != names for names in louder.scores) or best == ""
+    assert set(taken.without) == {frozenset(some) for some in ("", "a", "b", "ab")}
 
 
-def test_a_set_is_as_good_as_by_its_own_noise(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With the noise of all, a is worth 7 and b 9; with their own, 3 and 15, and both 12."""
-    own = {"": 10.0, "a": 7.0, "b": -5.0, "ab": -2.0}
-    ready = found({"a": 1.0, "b": 2.0}, {"b": -7.0, "a": -9.0, "": -30.0})
+def test_a_member_is_as_probable_as_by_the_noise_without_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    own = {"": 10.0, "a": 9.0, "b": 8.0, "ab": 22.0}
     monkeypatch.setattr(own_noise, "_fitted", fit_of)
     monkeypatch.setattr(own_noise, "evidence", lambda _s, _f, fit: own[fit.out])
     setting: Any = None
-    taken = own_noise.by_own_noise(setting, ready)
-    assert taken.fewer is None
-    # that b is worth more than with the noise of all is not believed
-    assert taken.scores == {frozenset("b"): -3.0, frozenset(): -12.0}
+    taken = own_noise.by_own_noise(setting, found({"a": 1.0, "b": 2.0, "c": 1e4}))
+    assert taken.fewer is None, "not much better"
+    total = sum(np.exp(list(own.values())))
+    assert taken.without == pytest.approx(
+        {frozenset(out): np.exp(e) / total for out, e in own.items()}
+    )
+    alone = own_noise.by_own_noise(
+        setting, found({"a": 1.0, "b": 2.0}), lambda fit: fit.out in ("", "b")
+    )
+    less = 1.0 / (1.0 + np.exp(2.0))
+    assert alone.without == pytest.approx({frozenset(): 1.0 - less, frozenset("b"): less})
 
 
 def fit_of(_setting: Any, _found: Any, out: frozenset[str]) -> Any:

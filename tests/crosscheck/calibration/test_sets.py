@@ -11,6 +11,7 @@ import pytest
 from crosscheck.calibration.exact import Refit
 from crosscheck.calibration.gram import ColumnGroup, Gram, gram_of
 from crosscheck.calibration.probability import (
+    Classes,
     alike_beyond,
     all_scores,
     of_classes,
@@ -254,3 +255,22 @@ def test_the_best_set_is_among_the_best_at_any_size_of_score() -> None:
     scores = Scores(toy(0, (1, 2, 6)), 8)
     scores.solved = {NONE: (-1e21, {}), frozenset({"e1"}): (-2e21, {})}
     assert scores.best(2, 15.0) == [NONE]
+
+
+def test_members_of_the_best_set_that_may_be_noise_are_less_sure() -> None:
+    """Of a class with two members, the one that is needed beyond noise stands for it."""
+    best = frozenset("abc")
+    chances = Classes(
+        {"a": 0.99, "b": 0.98, "c": 0.97, "d": 0.3},
+        [("a", "b"), ("c", "d")],
+        [0.99, 0.97],
+        {"b": 0.9},
+    )
+    less = chances.at_most(best, {frozenset(): 0.1, frozenset("a"): 0.6, frozenset("ac"): 0.3})
+    assert less.members == [("a", "b"), ("c", "d")]
+    assert less.probability == pytest.approx([0.99, 0.7])
+    assert less.effect == pytest.approx({"a": 0.1, "b": 0.98, "c": 0.7, "d": 0.3})
+    assert less.of("b") == pytest.approx(0.99) and less.of("a") == pytest.approx(0.1)
+    same = chances.at_most(best, {})
+    assert (same.members, same.probability) == (chances.members, chances.probability)
+    assert same.further == chances.further and same.effect == chances.effect
