@@ -30,8 +30,6 @@ from seecr.effects import Terms
 
 # A member that is worth more ln evidence than this is not doubtful.
 _NEEDED = 300.0
-# Fewer effects only win if they are better by more than this: else their members are less sure.
-_WINS = 12.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,8 +37,8 @@ class OwnNoise:
     """The best set and what remains of it without doubtful members, each with its own noise.
 
     Attributes:
-        fewer: the fit of fewer effects that explains the data much better than the best set; None
-            if no such set does.
+        fewer: the fit of fewer effects that explains the data better than the best set; None if no
+            such set does.
         without: for each group of doubtful members, also none, the probability among these sets
             that it is not needed and the others are.
     """
@@ -76,7 +74,7 @@ def by_own_noise(
     }
     own = evidence(setting, found, whole)
     best = max(worth, key=lambda out: worth[out], default=None)
-    fewer = None if best is None or worth[best] <= own + _WINS else fits[best]
+    fewer = None if best is None or worth[best] <= own else fits[best]
     every = {frozenset[str](): own, **worth}
     total = special.logsumexp(list(every.values()))
     return OwnNoise(fewer, {out: float(np.exp(e - total)) for out, e in every.items()})

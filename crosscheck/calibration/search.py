@@ -173,6 +173,8 @@ def _compared(
             return found, False, {}  # nor is what fewer effects leave
         found = again
         own = by_own_noise(setting, found, may_be)
+        if own.fewer is not None:
+            return found, False, {}  # the noise is still another: it says nothing for sure
     return found, False, own.without
 
 
