@@ -203,7 +203,7 @@ def scored(
 ) -> Refit:
     """A fit with its evidence, linearised about its own optimum and averaged over prior widths.
 
-    What the linear model would still gain there, the fit has tried and did not find.
+    What the linear model would still gain there, the fit did not find: it is taken off.
     """
     linear = linearised(setting, joint)
     gram = own_gram(linear, joint)

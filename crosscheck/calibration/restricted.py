@@ -39,8 +39,7 @@ def log_evidence(
     factor = root_beside_one(columns)
     part = linalg.solve_triangular(factor, columns.T @ left, lower=True, check_finite=False)
     power = float(left @ left) - float(part @ part)
-    volume = 2.0 * float(np.sum(np.log(np.abs(np.diag(factor)))))
-    return -0.5 * (power + volume + log_det(chain, colour, weight))
+    return -0.5 * (power + _volume(factor) + log_det(chain, colour, weight))
 
 
 def with_slopes(
@@ -63,8 +62,7 @@ def with_slopes(
     rows = np.column_stack([ball.T, unit @ np.append(-z, 1.0)])
     left = apart_from_before(chain, colour, rows)
     power = float(left[:, -1] @ left[:, -1]) + float(z @ z)
-    volume = 2.0 * float(np.sum(np.log(np.abs(np.diag(factor)))))
-    value = -0.5 * (power + volume + log_det(chain, colour, weight))
+    value = -0.5 * (power + _volume(factor) + log_det(chain, colour, weight))
 
     phi, rho = foretold(chain, colour), np.maximum(colour.rho[chain.kind], _LEAST_RHO)
     by_phi = np.where(chain.before < 0, 0.0, chain.gap * rho ** (chain.gap - 1.0))
@@ -77,6 +75,11 @@ def with_slopes(
         return np.bincount(chain.kind, each, len(colour.scale)).astype(float)
 
     return value, by_kind(squares - 1.0), by_kind(slope)
+
+
+def _volume(factor: Array) -> float:
+    """ln determinant of L L^T."""
+    return 2.0 * float(np.sum(np.log(np.abs(np.diag(factor)))))
 
 
 def estimate(

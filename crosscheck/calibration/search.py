@@ -16,7 +16,7 @@ from crosscheck.calibration.field import UNKNOWN, log_odds
 from crosscheck.calibration.imitated import field_in_place
 from crosscheck.calibration.joining import layouts
 from crosscheck.calibration.joint import JointFit
-from crosscheck.calibration.judgement import SURPRISE, Judgement, judge
+from crosscheck.calibration.judgement import NOTHING, SURPRISE, Judgement, judge
 from crosscheck.calibration.linearised import free_of
 from crosscheck.calibration.not_noise import is_not_noise
 from crosscheck.calibration.own_noise import by_own_noise
@@ -41,7 +41,6 @@ from seecr.effects import Term, Terms
 _REFITTED, _REFITTED_UNKNOWN = 20, 4
 # The noise that fewer effects leave may be so many times what was stated.
 _LOUDER = 1.25
-NO_MORE: Mapping[Names, float] = {}
 # Most equivalents that are fitted in place of a listed member.
 _SWAPPED = 6
 
@@ -160,7 +159,7 @@ def _compared(
         found = compared(False, found.best.joint.terms)
         not_noise = is_not_noise(setting, found.best.joint, stated)
     if not_noise or smooth:
-        return found, not_noise, {}
+        return found, not_noise, NOTHING
 
     def may_be(fit: JointFit) -> bool:
         return not _louder(fit.colour, stated) and not is_not_noise(setting, fit, stated)
@@ -170,11 +169,11 @@ def _compared(
         joint = replace(whole.joint, colour=own.fewer.colour, weight=own.fewer.weight)
         again = compared(False, own.fewer.terms, joint=joint)
         if is_not_noise(setting, again.best.joint, stated):
-            return found, False, {}  # nor is what fewer effects leave
+            return found, False, NOTHING  # nor is what fewer effects leave
         found = again
         own = by_own_noise(setting, found, may_be)
         if own.fewer is not None:
-            return found, False, {}  # the noise is still another: it says nothing for sure
+            return found, False, NOTHING  # the noise is still another: it says nothing for sure
     return found, False, own.without
 
 
@@ -193,7 +192,7 @@ def _catalogue(problem: Problem, terms: Terms, whole: Calibration) -> Catalogue:
 
 
 def _classes(
-    found: Found, own: Names, sizes: Mapping[str, int], further: Mapping[Names, float] = NO_MORE
+    found: Found, own: Names, sizes: Mapping[str, int], further: Mapping[Names, float] = NOTHING
 ) -> Classes:
     """Probabilities, and what is equivalent to members of a set.
 

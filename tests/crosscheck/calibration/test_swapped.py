@@ -10,8 +10,8 @@ from made_data import COGIRO, SIGMA, measured, term
 
 from crosscheck.calibration.catalogue import Catalogue, gram_about
 from crosscheck.calibration.colour import WHITE, chain_of
-from crosscheck.calibration.exact import Exact
-from crosscheck.calibration.joint import Setting, settle
+from crosscheck.calibration.exact import Exact, scored
+from crosscheck.calibration.joint import Setting, cost, settle
 from crosscheck.calibration.priors import widths_of
 from crosscheck.calibration.refits import swapped
 from crosscheck.calibration.sets import Scores
@@ -109,3 +109,23 @@ def test_what_no_robot_can_have_does_not_take_the_place_of_what_one_can(
     monkeypatch.setattr(exact, "_from", lambda *_given: kept)
     exact.take(scores, heavy)
     assert exact.possible == {names: kept}
+
+
+def test_what_a_fit_did_not_find_is_no_evidence() -> None:
+    """The linear model is the same on the way and at the end; the objective is not."""
+    problem = warmed()
+    factor = problem.noise(problem.experiment.predict(()))
+    setting = Setting(problem, factor, chain_of(problem), frozen=True)
+    moved = Terms([term(ROBOT, "tracker_target", shift_x_m=1e-4)])
+    plain = evaluate(problem, Terms(), factor)
+    joint = settle(setting, evaluate(problem, moved, factor), widths_of(moved), WHITE)
+    fixed = replace(setting, weight=joint.weight)
+    scores = Scores(gram_about(fixed, joint, Catalogue(moved, Terms())), 1, frozenset())
+    off = joint.terms.with_vector(joint.terms.vector + 2e-5)
+    early = replace(joint, state=evaluate(problem, off, factor, plain))
+    names, widths = frozenset({"tracker_target"}), {"tracker_target": 1.0}
+    end, way = (scored(fixed, fit, names, widths, scores).score for fit in (joint, early))
+    lost = cost(fixed, WHITE, joint.weight, early.state, joint.width) - cost(
+        fixed, WHITE, joint.weight, joint.state, joint.width
+    )
+    assert lost > 1.0 and end - way == pytest.approx(0.5 * lost, rel=0.05)
