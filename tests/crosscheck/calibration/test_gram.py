@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 from scipy import integrate, special, stats
 
-from crosscheck.calibration.gram import ColumnGroup, Gram, averaged, best_widths, gram_of
+from crosscheck.calibration.gram import (
+    ColumnGroup,
+    Gram,
+    averaged,
+    averaging,
+    best_widths,
+    gram_of,
+)
 from crosscheck.calibration.worth import log_gain, log_gains
 
 WIDTHS = np.array([0.1, 0.3, 1.0, 3.0, 10.0])
@@ -118,6 +125,9 @@ def test_what_a_width_costs_the_other_members_is_counted(seed: int) -> None:
         whole = [gram.solved({**chosen, name: w}).log_evidence for w in WIDTHS]
         found = solved.gains_of_member(name)
         assert found - found[0] == pytest.approx(np.subtract(whole, whole[0]), abs=1e-8)
+        at = list(WIDTHS).index(chosen[name])
+        mean = special.logsumexp(whole) - np.log(len(whole))
+        assert averaging(solved, name) == pytest.approx(mean - whole[at], abs=1e-8)
 
 
 def test_no_member_is_replaced_by_others_that_would_have_to_be_negative() -> None:

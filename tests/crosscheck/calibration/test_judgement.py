@@ -58,6 +58,16 @@ def test_one_effect_beyond_doubt() -> None:
     assert (said.verdict, said.sure) == (DiagnosisVerdict.EFFECTS_FOUND, ("a",))
 
 
+def test_an_effect_that_may_be_noise_is_not_sure_but_nor_does_it_take_many() -> None:
+    found = found_of({"": -900.0, "a": -6.0, "b": -800.0, "ab": 0.0})
+    classes = probabilities(all_scores(found), found.best.names, NAMES, fitted=found.refits)
+    sure = judge(found, classes, -5.0, 1.0)
+    assert (sure.verdict, sure.sure) == (DiagnosisVerdict.EFFECTS_FOUND, ("a", "b"))
+    said = judge(found, classes, -5.0, 1.0, without={frozenset(): 0.5, frozenset("b"): 0.5})
+    assert (said.verdict, said.sure) == (DiagnosisVerdict.EFFECTS_FOUND, ("a",))
+    assert said.undecided == sure.undecided
+
+
 def test_sure_effects_are_a_diagnosis_though_many_others_stay_open() -> None:
     some = [*"cdefg", *map("".join, combinations("cdefg", 2))]
     hints = {"ab" + x: -0.1 for x in some}
