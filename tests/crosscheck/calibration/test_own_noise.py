@@ -9,10 +9,11 @@ import pytest
 from made_data import COGIRO, measured, term
 from score_chances import alike
 
-from crosscheck.calibration import search
+from crosscheck.calibration import own_noise, search
 from crosscheck.calibration.all_effects import Calibration, fit_all_effects
 from crosscheck.calibration.colour import Colour
 from crosscheck.calibration.own_noise import OwnNoise
+from crosscheck.calibration.refits import Found
 from crosscheck.calibration.search import SetSearch, search_sets
 from crosscheck.fit.prepare import prepare
 from crosscheck.given import considered
@@ -70,6 +71,30 @@ def test_noise_that_all_effects_followed_is_found_again(monkeypatch: pytest.Monk
         assert sought(data).found.best.names > {"pulley_radius"}
     monkeypatch.setattr(search, "by_own_noise", lambda _setting, _found, _may_be: OwnNoise())
     assert sought(data).found.best.names > {"pulley_radius"}
+
+
+def test_the_evidence_of_a_fit_is_greatest_with_the_noise_that_it_leaves() -> None:
+    found = sought(correlated())
+    setting, best = found.calibration.setting, found.found.best.joint
+    by_size = [
+        own_noise.evidence(setting, found.found, replace(best, colour=best.colour.hotter(factor)))
+        for factor in (0.7, 1.0, 1.4)
+    ]
+    assert by_size[1] > max(by_size[0], by_size[2]) + 3.0
+
+
+@pytest.mark.parametrize("again", [False, True])
+def test_what_may_be_noise_is_told_as_less_probable_unless_the_noise_is_still_another(
+    monkeypatch: pytest.MonkeyPatch, again: bool
+) -> None:
+    noise = {frozenset[str](): 0.4, frozenset({"pulley_radius"}): 0.6}
+
+    def own(_setting: object, found: Found, _may_be: object) -> OwnNoise:
+        return OwnNoise(found.best.joint if again else None, noise)
+
+    monkeypatch.setattr(search, "by_own_noise", own)
+    chance = sought(correlated()).classes.of("pulley_radius")
+    assert chance > 0.99 if again else chance == pytest.approx(0.4)
 
 
 def test_only_kinds_whose_noise_was_stated_can_be_louder_than_that() -> None:

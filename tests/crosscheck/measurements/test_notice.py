@@ -12,7 +12,10 @@ from rectangle import RECTANGLE
 
 from crosscheck.measurements import notice
 from crosscheck.measurements.data import Measurements
+from crosscheck.measurements.read import load_measurements
 from seecr.columns.known import Columns
+from seecr.description.mjcf import load_robot
+from seecr.description.shipped import model_path
 from seecr.errors import InputFileError
 from seecr.pose import quat_from_rotvec, quat_multiply
 
@@ -146,3 +149,22 @@ def test_positions_of_exactly_nothing_are_no_readings() -> None:
     notice._refuse_zeros(positions(), RECTANGLE, data_of(told, position=read))
     there = told - np.array([*HOME[:3], 0, 0, 0, 0])  # where 0 0 0 is a place like any other
     notice._refuse_zeros(positions(), RECTANGLE, data_of(there, position=0.0 * read))
+
+
+@pytest.mark.parametrize(
+    ("read", "said"),
+    [("0,0,0,0.{k}", "exactly 0 0 0"), ("{x},0.25,0.1,{r:.9f}", "are these really deg")],
+)
+def test_both_are_refused_when_a_file_is_read(tmp_path: Path, read: str, said: str) -> None:
+    told = "cmd_x_m,cmd_y_m,cmd_z_m,cmd_rx_deg,cmd_ry_deg,cmd_rz_deg"
+    head = f"{told},meas_x_m,meas_y_m,meas_z_m,meas_ry_deg"
+    lines = []
+    for k in range(8):
+        x, turned = 0.3 + 0.02 * k, 0.5 * (k - 4) * (-1) ** k
+        good = f"{x},0.25,0.1,{turned}"
+        mistaken = read.format(k=k, x=x, r=np.radians(turned)) if "r:" in read or k == 3 else good
+        lines.append(f"{x},0.25,0.1,0,{turned},0,{mistaken}")
+    path = tmp_path / "measured.csv"
+    path.write_text("\n".join([head, *lines]))
+    with pytest.raises(InputFileError, match=said):
+        load_measurements(path, load_robot(model_path("demobot_cogiro")))
