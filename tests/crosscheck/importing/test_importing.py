@@ -255,6 +255,19 @@ def test_noise_that_goes_together_counts_for_less():
     assert mean_error(alike) == pytest.approx(1 / np.sqrt(40), rel=0.5)
 
 
+def test_zeros_in_a_log_stand_for_not_seen(tmp_path, made, commands):
+    log = made_of.poses_csv(tmp_path / "log.csv", made)
+    whole = import_case("poses", [log], ROBOT, [commands]).measured
+    head, *lines = log.read_text().splitlines()
+    gone = lines[len(lines) // 3].split(",")
+    gone[1:4] = ["0", "0", "0"]
+    lines[len(lines) // 3] = ",".join(gone)
+    log.write_text("\n".join([head, *lines]))
+    found = import_case("poses", [log], ROBOT, [commands])
+    assert any("exactly 0 0 0 count as not seen" in note for note in found.notes)
+    assert found.measured.position == pytest.approx(whole.position, abs=1e-4)
+
+
 @pytest.mark.parametrize("flicker", [0.0, 1e-3], ids=["repeated", "last digit"])
 @pytest.mark.parametrize("digits", [0, 1, 9])
 def test_what_only_the_last_digit_shows_is_not_stated(tmp_path, flicker, digits):
