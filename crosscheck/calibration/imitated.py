@@ -23,6 +23,9 @@ from crosscheck.calibration.linearised import groups_of, linearised
 from crosscheck.calibration.sets import Names, Scores
 from crosscheck.calibration.varying import Varying, varying
 
+# A field that is less likely than the members it could replace is told from this probability on.
+_DOUBT = 0.05
+
 
 @dataclass(frozen=True, eq=False)
 class Imitated:
@@ -42,9 +45,19 @@ class Imitated:
     worth: Mapping[str, float] = field(default_factory=dict)
 
     @property
+    def probability(self) -> float:
+        """Posterior probability of the field with prior odds of e^-5."""
+        return float(special.expit(self.odds - UNKNOWN))
+
+    @property
     def chance(self) -> float:
-        """Posterior probability of the field with prior odds of e^-5; 0 unless it is likelier."""
-        return float(special.expit(self.odds - UNKNOWN)) if self.odds > UNKNOWN else 0.0
+        """The probability, or 0 unless the field is likelier than the members it replaces."""
+        return self.probability if self.odds > UNKNOWN else 0.0
+
+    @property
+    def is_doubt(self) -> bool:
+        """Whether the field is less likely than these members, but not excluded."""
+        return not self.chance and self.probability > _DOUBT
 
 
 NOT_ASKED = Imitated(-np.inf, frozenset())

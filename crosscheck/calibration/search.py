@@ -13,7 +13,7 @@ from crosscheck.calibration.colour import Colour
 from crosscheck.calibration.detectable import detectable_size
 from crosscheck.calibration.equals import parameters_counted
 from crosscheck.calibration.field import UNKNOWN, log_odds
-from crosscheck.calibration.imitated import field_in_place
+from crosscheck.calibration.imitated import Imitated, field_in_place
 from crosscheck.calibration.joining import layouts
 from crosscheck.calibration.joint import JointFit
 from crosscheck.calibration.judgement import NOTHING, SURPRISE, Judgement, judge
@@ -56,6 +56,7 @@ class SetSearch:
         field_odds: ln odds of something smooth and unknown, beside all effects or in place of some.
         shown: by kind of reading, the size from which on that would have shown; None if unsaid.
         judgement: the verdict.
+        in_place: something unknown in place of some members of the best set.
     """
 
     calibration: Calibration
@@ -65,6 +66,7 @@ class SetSearch:
     field_odds: float
     shown: Rms | None
     judgement: Judgement
+    in_place: Imitated
 
 
 def search_sets(
@@ -123,7 +125,7 @@ def search_sets(
     shown = None if said.more or said.imitated else detectable_size(
         setting, joint, joint.jacobian * free, joint.width * free
     )  # fmt: skip
-    return SetSearch(whole, found, catalogue, classes, odds, shown, said)
+    return SetSearch(whole, found, catalogue, classes, odds, shown, said, in_place)
 
 
 def _compared(

@@ -37,6 +37,8 @@ class Chances:
         further: for effects that share a class with others that are needed more, the probability
             that as many members of the class are missing.
         imitated: something smooth and unknown that some of the effects found imitate.
+        doubt: something smooth and unknown that is less likely than the effects it could replace,
+            but that the data do not exclude.
     """
 
     effect: dict[str, float]
@@ -46,6 +48,7 @@ class Chances:
     shown: Rms | None = None
     further: Mapping[str, float] = dataclasses.field(default_factory=dict)
     imitated: Imitated | None = None
+    doubt: Imitated | None = None
 
     @property
     def words(self) -> str:
@@ -77,6 +80,12 @@ class Chances:
             unknown |= {
                 "instead_of": sorted(self.imitated.replaced), "seen_in": self.imitated.seen,
             }  # fmt: skip
+        if self.doubt is not None:
+            unknown["not_excluded"] = {
+                "probability": self.doubt.probability,
+                "instead_of": sorted(self.doubt.replaced),
+                "seen_in": self.doubt.seen,
+            }
         place = {n: k for k, (members, _p) in enumerate(self.classes) for n in members}
         return {
             "catalogue": [
@@ -91,9 +100,10 @@ class Chances:
 
 def chances_of(sought: SetSearch) -> Chances:
     """The probabilities that follow from compared sets."""
-    classes = sought.classes
+    classes, in_place = sought.classes, sought.in_place
     pairs = zip(classes.members, classes.probability, strict=True)
     return Chances(
         classes.effect, tuple(pairs), sought.field_odds, sought.calibration.together, sought.shown,
         classes.further, sought.judgement.imitated,
+        in_place if in_place.is_doubt else None,
     )  # fmt: skip

@@ -14,6 +14,7 @@ from crosscheck.diagnosis.result import Diagnosis, MissingEffect, NotListed
 from crosscheck.diagnosis.rivals import Rival, rivals_of
 from crosscheck.diagnosis.search import Search
 from crosscheck.diagnosis.small import share_of
+from crosscheck.diagnosis.words import doubts_about
 from crosscheck.fit.candidates import Candidate
 from crosscheck.fit.problem import Rms, rms_by_kind
 from crosscheck.fit.reasons import DiagnosisVerdict, Reason, Why
@@ -47,6 +48,8 @@ def diagnosis_of(
     last = (search if shown is None else shown).last
     after = rms_by_kind(search.problem, last.fit.state.raw)
     seen = None if chances.imitated is None else chances.imitated.seen
+    is_unknown = verdict is DiagnosisVerdict.UNKNOWN_EFFECT
+    doubts = [] if is_unknown else doubts_about(missing, chances)
     return Diagnosis(
         verdict=verdict,
         sentence=sentence,
@@ -57,7 +60,7 @@ def diagnosis_of(
         floor=floor,
         candidates=tuple(_with_equals(candidates, missing)),
         measure_next=tuple(measure_next(search, missing, verdict, where, alternatives, seen)),
-        notes=tuple(dict.fromkeys([*notes, *overestimated(search.problem, after)])),
+        notes=tuple(dict.fromkeys([*notes, *overestimated(search.problem, after), *doubts])),
         search=search,
         whiteness=search.last.whiteness,
         where=where,

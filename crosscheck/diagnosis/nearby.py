@@ -145,4 +145,5 @@ def _with_equals(
         None,
         shown,
         imitated=in_place if in_place.chance else None,
+        doubt=in_place if in_place.is_doubt else None,
     )

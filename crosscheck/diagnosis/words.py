@@ -75,6 +75,20 @@ def size_notes(terms: Iterable[Term]) -> list[str]:
     ]
 
 
+def doubts_about(missing: Iterable[MissingEffect], chances: Chances | None) -> list[str]:
+    """A note about something unknown that may be there in place of listed effects, if any."""
+    doubt = None if chances is None else chances.doubt
+    listed = {name for one in missing for name in (one.effect, *one.indistinguishable)}
+    if doubt is None or doubt.seen is None or listed.isdisjoint(doubt.replaced):
+        return []
+    advice = f"; {doubt.seen.advice}" if doubt.seen.advice else ""
+    likely = probability_words(doubt.probability)
+    return [
+        f"there may be something else in place of {' + '.join(sorted(doubt.replaced))} "
+        f"(probability {likely}): {doubt.seen}{advice}"
+    ]
+
+
 def noise_left(hints: Mapping[str, float]) -> str:
     """Says that what was added leaves noise, with ``hints`` as for `agreement`."""
     return f"the remaining residuals are noise{f', with a {_hint_of(hints)}' if hints else ''}"

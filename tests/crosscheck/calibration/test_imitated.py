@@ -73,6 +73,23 @@ def test_the_odds_are_those_of_the_covariances() -> None:
     assert found.odds < UNKNOWN and found.chance == 0.0 and not found.worth
 
 
+@pytest.mark.parametrize(
+    ("odds", "doubt", "chance"),
+    [
+        (-np.inf, False, 0.0),
+        (2.0, False, 0.0),
+        (2.1, True, 0.0),
+        (4.99, True, 0.0),
+        (6.0, False, 0.731),
+    ],
+)
+def test_a_field_that_is_less_likely_is_a_doubt_from_one_in_twenty_on(
+    odds: float, doubt: bool, chance: float
+) -> None:
+    found = Imitated(odds, frozenset("a"), Varying.POSITION)
+    assert found.is_doubt is doubt and found.chance == pytest.approx(chance, abs=1e-3)
+
+
 def test_of_a_model_nothing_is_replaced() -> None:
     setting, joint = fitted(term(ROBOT, "tracker_scale", factor=1.003))
     scores = Scores(

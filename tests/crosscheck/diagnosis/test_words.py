@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import cast
+
 import pytest
 
 from crosscheck.calibration.imitated import Imitated
@@ -9,7 +12,8 @@ from crosscheck.calibration.judgement import Judgement
 from crosscheck.calibration.varying import Varying
 from crosscheck.diagnosis.chances import Chances
 from crosscheck.diagnosis.explained import _sentence
-from crosscheck.diagnosis.words import hints_of, noise_left, one_of
+from crosscheck.diagnosis.result import MissingEffect
+from crosscheck.diagnosis.words import doubts_about, hints_of, noise_left, one_of
 from crosscheck.fit.reasons import DiagnosisVerdict
 
 
@@ -61,3 +65,25 @@ def test_what_imitates_something_unknown_is_told_with_where_that_shows() -> None
         "something that varies smoothly over the workspace, in the position alone. 26 effects were "
         "tried."
     )
+
+
+def test_what_a_field_could_replace_is_told_if_that_is_not_excluded() -> None:
+    """Expansion was listed above 95 % where a field of the position is as likely."""
+    doubt = Imitated(4.98, frozenset({"thermal_expansion"}), Varying.POSITION)
+    chances = Chances({}, (), None, None, doubt=doubt)
+    listed = cast(MissingEffect, SimpleNamespace(effect="creep", indistinguishable=[]))
+    alike = cast(
+        MissingEffect, SimpleNamespace(effect="creep", indistinguishable=["thermal_expansion"])
+    )
+    assert doubts_about([alike], chances) == [
+        "there may be something else in place of thermal_expansion (probability 50 %): something "
+        "that varies smoothly over the workspace, in the position alone; move the tracker and "
+        "measure some poses again; an error that moves with it comes from the tracker"
+    ]
+    assert (
+        doubts_about([listed], chances) == [] == doubts_about([alike], Chances({}, (), None, None))
+    )
+    assert chances.as_json()["unknown"]["not_excluded"] == {
+        "probability": doubt.probability, "instead_of": ["thermal_expansion"],
+        "seen_in": Varying.POSITION,
+    }  # fmt: skip
